@@ -126,6 +126,19 @@ class Artifact:
         return content | {k: t.validate_python(settings[k]) for k, t in self.types.items()}
 
 
+class Files(Artifact):
+    """An artifact whose function gets as ``outputs`` the paths that it writes, by name.
+
+    It looks after its own files: many of them, or in places that may vary.
+    """
+
+    def perform(
+        self, settings: Mapping[str, Any], inputs: Mapping[str, Any], outputs: Mapping[str, str]
+    ) -> None:
+        """Write all of them."""
+        self.function(**self.read(settings, inputs), outputs=outputs)
+
+
 def make(
     address: str,
     rule: str,

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 from pdrom.core.store import Condition, check_file, read_table, write_text
 from study.artifact.paths import FIGURE, RESULTS, TABLE, Place
-from study.artifact.reads import Every, PerScene, Preferred, ProjectFile, Read, Setting, TableOf
+from study.artifact.reads import Every, ProjectFile, Read, Setting, TableOf
 from study.artifact.usage import usage_of
 from study.figures.kit.declaration import declarations
 from study.paper.figure_numbers import figures_page
@@ -80,14 +80,12 @@ def _row(column: Column) -> str:
 
 def _source(read: Read) -> str:
     match read:
-        case Every(place) | Preferred(place):
+        case Every(place):
             return f"`{place.pattern}`"
         case TableOf(name):
             return f"table [{name}](#{name})"
         case Setting(key):
             return f"setting `{key}`"
-        case PerScene(key):
-            return f"`{key}` of every scene"
         case ProjectFile(path):
             return f"`{path}`"
     raise TypeError(f"{read} has no words")

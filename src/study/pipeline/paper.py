@@ -1,12 +1,12 @@
 """Facts of a study that the manuscript states beside its results."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from types import SimpleNamespace
 from typing import Any
 
 from pdrom.model.constraints.base import GroupConfig
 from pdrom.view.text import require_typeset
 from study.artifact.markup import to_tex
+from study.artifact.reads import Labels
 from study.figures.kit.declaration import declarations
 from study.paper.build import PAGES, Facts
 from study.paper.source import source_files
@@ -14,20 +14,12 @@ from study.pipeline.folders import DEFAULT
 from study.pipeline.study import Study
 from study.tables.claims.rules import load_claims
 
-Labels = Mapping[str, str]
 Row = dict[str, Any]
 
 
-@dataclass(frozen=True)
-class Manuscript:
-    """Files of the manuscript's source: both documents, then what they read."""
-
-    sources: list[str]
-
-
-def manuscript(study: Study, labels: Labels) -> Manuscript:
-    """Files of the manuscript's source below the root of ``study``."""
-    return Manuscript(source_files(study.root, study.is_own))
+def manuscript(study: Study, labels: Labels) -> SimpleNamespace:
+    """The manuscript's ``sources`` below the root of ``study``: both documents, what they read."""
+    return SimpleNamespace(sources=source_files(study.root, study.is_own))
 
 
 def facts(study: Study, labels: Labels) -> Facts:
@@ -110,6 +102,3 @@ def _scene(study: Study, name: str) -> Row:
         "time_step": config.time_step,
         "vertex_mass": config.vertex_mass,
     }
-
-
-DERIVED = {"manuscript": manuscript, "facts": facts}

@@ -21,7 +21,7 @@ from study.experiments.live import LARGEST
 from study.figures.kit.declaration import declarations
 from study.live.page import live_page
 from study.paper.build import paper, paper_inputs
-from study.pipeline.contents import labels_of, paths_of
+from study.pipeline.contents import labels_of
 from study.pipeline.folders import DEFAULT, Folders
 from study.pipeline.paper import check_texts
 from study.pipeline.resolve import Job, Resolver
@@ -186,7 +186,11 @@ class Plan:
     def measured(self) -> list[str]:
         """Every file that an experiment of the study writes."""
         places = [place for made in self.experiments.values() for place in made.writes.values()]
-        return [path for place in places for path in paths_of(self.study, place, self.results)]
+        return [
+            place.at(self.results, **labels)
+            for place in places
+            for labels in labels_of(self.study, place)
+        ]
 
     @cached_property
     def fixed(self) -> dict[str, list[Job]]:

@@ -5,10 +5,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from pdrom.core.errors import ConfigurationError, choices
-from pdrom.model.scene import SceneConfig
 from study.artifact.artifact import Artifact, make, modules_in
 from study.artifact.paths import TABLE, Place
-from study.artifact.reads import Labels, Paths
+from study.artifact.reads import EditedFiles, Labels, Paths
 from study.pipeline.contents import labels_of
 from study.pipeline.fingerprint import digest, fingerprint
 from study.pipeline.study import Study, part_of
@@ -80,7 +79,8 @@ class Resolver:
     def _resolved(self, artifact: Artifact, labels: dict[str, str]) -> Job:
         settings = artifact.settings(self, labels)
         inputs = artifact.inputs(self, labels)
-        edited = [p for k, r in artifact.files.items() if r.edited for p in listed(inputs[k])]
+        edited = [k for k, read in artifact.files.items() if isinstance(read, EditedFiles)]
+        content = [path for name in edited for path in listed(inputs[name])]
         places = artifact.writes.items()
         return Job(
             artifact,
@@ -88,7 +88,7 @@ class Resolver:
             inputs,
             {name: place.at(self.results, **labels) for name, place in places},
             artifact.plain(settings),
-            digest(self.study.root, *edited) if edited else "",
+            digest(self.study.root, *content) if content else "",
             self.code(artifact.module, *sorted(set(modules_in(settings)))),
         )
 
@@ -121,18 +121,6 @@ class Resolver:
             if all(held[name] == labels[name] for name in held.keys() & labels.keys())
         ]
 
-    def first(self, place: Place, label: str, value: str) -> list[str]:
-        """One path of ``place`` for each set of its other labels.
-
-        It is that whose ``label`` has this ``value``, else the first.
-        """
-        chosen: dict[tuple[str, ...], Labels] = {}
-        for labels in labels_of(self.study, place):
-            others = tuple(other for name, other in labels.items() if name != label)
-            if others not in chosen or labels[label] == value:
-                chosen[others] = labels
-        return [place.at(self.results, **labels) for labels in chosen.values()]
-
     def table(self, name: str) -> str:
         """File of the table ``name``; ConfigurationError if there is no such table."""
         if name not in declared():
@@ -146,13 +134,6 @@ class Resolver:
             return self.study.value(key)
         value = DERIVED[head](self.study, labels)
         return part_of(value, parts, key) if parts else value
-
-    def per_scene(self, key: str) -> dict[str, Any]:
-        """Value of ``key`` of every scene by its name."""
-        if key not in SceneConfig.model_fields:
-            known = choices(key, SceneConfig.model_fields)
-            raise ConfigurationError(f"the key '{key}' of scenes: unknown{known}")
-        return {name: getattr(scene, key) for name, scene in self.study.scenes.items()}
 
 
 def listed(paths: Paths) -> list[str]:

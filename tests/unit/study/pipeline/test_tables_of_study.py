@@ -6,7 +6,7 @@ import pytest
 
 from pdrom.core.errors import ConfigurationError
 from places import ROOT
-from study.artifact.reads import PerScene, Setting, TableOf
+from study.artifact.reads import Setting, TableOf
 from study.pipeline.folders import Folders
 from study.pipeline.plan import Plan
 from study.pipeline.resolve import Job
@@ -78,7 +78,6 @@ def test_a_setting_is_a_parameter_of_those_who_read_it_only():
     [
         (Setting("stability.wrogn"), "table payoff reads the key 'stability.wrogn'.*wrong"),
         (Setting("ranks.more"), "reads the key 'ranks.more'"),
-        (PerScene("time_stap"), "reads the key 'time_stap' of scenes.*time_step"),
         (TableOf("sensitivty"), "reads 'sensitivty'.*sensitivity"),
     ],
 )
