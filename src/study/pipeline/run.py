@@ -12,7 +12,7 @@ from pydantic import ValidationError
 
 from pdrom.core.errors import ConfigurationError, PdromError
 from pdrom.core.machine import Machine, Units
-from pdrom.core.store import read_table
+from pdrom.core.store import read_table, write_text
 from study.artifact.paths import MACHINE
 from study.pipeline.commandline import CommandLine, one_line, recall, remember
 from study.pipeline.failures import Failures, listen
@@ -31,7 +31,7 @@ from study.pipeline.running import (
 )
 from study.pipeline.scenes import Coarsen
 from study.pipeline.summary import configuration, preview, summary
-from study.pipeline.targets import known
+from study.pipeline.targets import check_targets
 from study.pipeline.tracked import COLUMNS, COSTS, kind_of
 
 RUN_TIMES = Path("config/reference/run_times.csv")
@@ -136,7 +136,7 @@ class Run:
         ConfigurationError
             A target or the report cannot be made.
         """
-        known(plan).check(self.command.targets, list(rules))
+        check_targets(plan, self.command.targets, list(rules))
         reports = self.command.report and not self.command.targets
         if reports and not Path(folders.manuscript).is_file():
             last = " ".join(recall())
@@ -171,11 +171,12 @@ class Run:
     def succeed(self, workflow: Any, plan: Plan, folders: Folders) -> None:
         """End a run whose jobs all succeeded: it says what came of ``plan`` in ``folders``."""
         # late: a plan needs nothing of it
-        from study.pipeline.inventory import write_contents
+        from study.pipeline.inventory import CONTENTS, contents
 
         try:
             if not self.command.targets:
-                write_contents(configuration(self.command), workflow.dag, plan, folders)
+                text = contents(self.command, workflow.dag, folders)
+                write_text(text, CONTENTS.at(folders.results))
             write_manifest(plan, folders, self.command.configuration)
         except PdromError as error:
             say_last(f"pdrom: {error}\n")

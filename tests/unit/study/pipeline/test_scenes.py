@@ -10,10 +10,8 @@ from pdrom.model.constraints.base import GroupConfig
 from pdrom.model.scene import Scene, SceneConfig
 from places import ROOT
 from study.artifact.paths import LABELS
-from study.pipeline.plan import Plan
 from study.pipeline.scenes import Replicate, Variants, read_scene
 from study.pipeline.study import Study
-from study.pipeline.targets import known
 
 SECTION = Variants(
     scenes=("spring_oop",), resolutions=(0.5, 1.5), stiffness_ratios=(0.01, 1), seeds=(1, 2)
@@ -75,14 +73,6 @@ def test_a_replicated_scene_is_faster_and_starts_elsewhere() -> None:
     starts = [s.effects[-1].seed for s in (scene.heldout_variant("kick"),)]
     assert starts == [102]
     assert read_scene(ROOT, "bar_twist", Replicate()) == base
-
-
-def test_files_of_variants_are_targets() -> None:
-    config = {"scenes": ["strain_oop"], "methods": ["deim"], "variants": SECTION.model_dump()}
-    study = Study.load({**config, "coarsen": {"resolution": 0.3, "frames": 0.1}}, ROOT)
-    labels = known(Plan(study)).labels
-    assert set(labels["scene"]({})) >= set(study.scenes)
-    assert set(labels["mesh"]({})) >= set(study.meshes)
 
 
 def test_an_unknown_scene_is_named() -> None:
