@@ -5,7 +5,8 @@ into labels. The results folder itself is chosen by the pipeline, one for each c
 """
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from string import Formatter
@@ -141,3 +142,12 @@ ARTICLE = Place("article/{name}")
 LIVE_PAGE = Place("article/live.html")
 
 PLACES = tuple(place for place in vars().copy().values() if isinstance(place, Place))
+
+
+def labels_in(path: str, results: str) -> Iterator[dict[str, str]]:
+    """Labels of a file below ``results``, for each kind of file that it can be."""
+    for place in PLACES:
+        with suppress(StorageError):
+            labels = place.file(path).labels
+            if place.at(results, **labels) == path:
+                yield labels

@@ -47,7 +47,14 @@ def check_subspaces(study: Study) -> None:
         for name, config in {**study.scenes, **study.online}.items()
         if (effects := not_taken(config))
     }
-    for key, scenes in _asking(study).items():
+    settings = study.settings
+    asking = {
+        "subspace.scenes": settings.subspace.scenes,
+        "scaling.scenes": settings.scaling.scenes,
+        "online.scenes": settings.online.scenes,
+        "alternatives.scenes": settings.alternatives.scenes,
+    }
+    for key, scenes in asking.items():
         for name in scenes:
             if name in outside:
                 raise ConfigurationError(
@@ -60,17 +67,6 @@ def check_subspaces(study: Study) -> None:
             name,
             "', '".join(effects),
         )
-
-
-def _asking(study: Study) -> dict[str, tuple[str, ...]]:
-    """Scenes of which each key of the configuration requests a subspace."""
-    settings = study.settings
-    return {
-        "subspace.scenes": settings.subspace.scenes,
-        "scaling.scenes": tuple(settings.scaling.scenes),
-        "online.scenes": settings.online.scenes,
-        "alternatives.scenes": tuple(settings.alternatives.scenes),
-    }
 
 
 def check_live(study: Study) -> None:
@@ -153,34 +149,27 @@ class Plan:
 
     def check(self) -> None:
         """Read every file of the configuration, so that a fault shows early."""
-        folder = self.root / "config"
-        load_claims(folder / "claims.yaml", self.settings.claim_sets)
-        self._check_scenes(folder)
-        check_subspaces(self.study)
-        check_live(self.study)
-        check_texts(self.study)
-        scaled_methods(self.study, {})
-        self._check_tables()
-        self.fixed  # noqa: B018 : every figure and text is checked
-
-    def _check_scenes(self, folder: Path) -> None:
         settings = self.settings
+        load_claims(self.root / "config" / "claims.yaml", settings.claim_sets)
         named = {
             "ladder.scenes": settings.ladder.scenes,
             "live.scenes": settings.live.scenes,
             "subspace.scenes": settings.subspace.scenes,
-            "scaling.scenes": tuple(settings.scaling.scenes),
+            "scaling.scenes": settings.scaling.scenes,
             "stability.scenes": settings.stability.scenes,
         }
         for place, scenes in named.items():
             require_scenes(self.root, scenes, place)
-
-    def _check_tables(self) -> None:
+        check_subspaces(self.study)
+        check_live(self.study)
+        check_texts(self.study)
+        scaled_methods(self.study, {})
         for table in self.tables.values():
             try:
                 self.job(table)
             except ConfigurationError as error:
                 raise ConfigurationError(f"table {table.name} reads {error}") from error
+        self.fixed  # noqa: B018 : every figure and text is checked
 
     @property
     def measured(self) -> list[str]:

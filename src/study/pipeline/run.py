@@ -43,28 +43,22 @@ def units_of(study: str, root: Path) -> Units:
     return Units(**row[list(Units.model_fields)])
 
 
-def slower_here(plan: Plan, study: str) -> float:
-    """Time of this machine over that of `units_of` for ``study``; 1 if not known.
-
-    Its units stand in the record that ``plan`` names.
-    """
-    try:
-        record = (plan.root / MACHINE.at(plan.results)).read_bytes()
-        here = Machine.model_validate_json(record).units
-    except (OSError, ValidationError):
-        return 1.0  # before the first run, or a record of an older version
-    return 1.0 if here is None else here.unit_s / units_of(study, plan.root).unit_s
-
-
 def expected_seconds(plan: Plan) -> Callable[[str], float]:
     """Function that returns the expected processor seconds of a job of a plan, given its log.
 
-    A kind that was not measured takes the median of all.
+    A kind that was not measured takes the median of all. Times are scaled by the units of the
+    machine that the last run of the plan has recorded.
     """
     full = plan.settings.coarsen == Coarsen()
     study, column = ("full", "seconds") if full else ("tiny", "coarse_seconds")
     table = read_table(plan.root / COSTS, COLUMNS, result=False)
-    seconds = slower_here(plan, study) * table[column]
+    try:
+        record = (plan.root / MACHINE.at(plan.results)).read_bytes()
+        here = Machine.model_validate_json(record).units
+    except (OSError, ValidationError):
+        here = None  # before the first run, or a record of an older version
+    slower = 1.0 if here is None else here.unit_s / units_of(study, plan.root).unit_s
+    seconds = slower * table[column]
     known = dict(zip(table.kind, seconds, strict=True))
     usual = float(seconds.median())
     return lambda log: float(known.get(kind_of(log, plan.results), usual))

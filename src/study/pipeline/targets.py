@@ -5,7 +5,7 @@ from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
-from pdrom.core.errors import ConfigurationError, StorageError, choices, suggestion
+from pdrom.core.errors import ConfigurationError, choices, suggestion
 from study.artifact import paths
 from study.figures.kit.declaration import declarations
 from study.paper.figure_numbers import SUPPLEMENT, figure_numbers
@@ -91,26 +91,16 @@ def check_targets(plan: Plan, targets: Iterable[str], rules: Sequence[Any]) -> N
         named = any(rule.name == target for rule in rules)
         if named or not any(rule.is_producer(target) for rule in rules):
             raise ConfigurationError(f"target '{target}': {_unknown(plan, target, own)}")
-        for place in paths.PLACES:
-            _check_labels(plan, place, target)
+        for labels in paths.labels_in(target, plan.results):
+            for label, value in labels.items():
+                allowed = _allowed(plan.study, label, labels)
+                if allowed is not None and value not in allowed:
+                    hint = suggestion(value, allowed)
+                    raise ConfigurationError(f"target '{target}': unknown {label} '{value}'{hint}")
 
 
-def _check_labels(plan: Plan, place: paths.Place, target: str) -> None:
-    try:
-        labels = place.file(target).labels
-    except StorageError:
-        return  # no file of that kind
-    if place.at(plan.results, **labels) != target:
-        return
-    for label, value in labels.items():
-        allowed = allowed_labels(plan.study, label, labels)
-        if allowed is not None and value not in allowed:
-            hint = suggestion(value, allowed)
-            raise ConfigurationError(f"target '{target}': unknown {label} '{value}'{hint}")
-
-
-def allowed_labels(study: Study, label: str, before: Mapping[str, str]) -> Collection[str] | None:
-    """What a label of a file may be, by the labels ``before`` it; None where that is open."""
+def _allowed(study: Study, label: str, before: Mapping[str, str]) -> Collection[str] | None:
+    """Values that a label of a file may have, by the labels ``before`` it; None if any."""
     match label:
         case "scene":
             return {*scene_names(study.root), *study.scenes}
