@@ -118,7 +118,7 @@ def _allowed(study: Study, label: str, before: Mapping[str, str]) -> Collection[
 
 
 def _unknown(plan: Plan, target: str, rules: Collection[str]) -> str:
-    """Why nothing makes a target, which is no name of the ``rules`` that a target may name."""
+    """End of the message about a target that nothing makes; ``rules`` are those without labels."""
     scenes = {*scene_names(plan.root), *plan.study.scenes}
     if target in scenes:
         example = paths.FULL_ORDER.at(plan.results, scene=target, run="train")

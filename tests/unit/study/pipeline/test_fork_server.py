@@ -13,9 +13,8 @@ import psutil
 import pytest
 
 from study.pipeline import run as running
-from study.pipeline.fork_server import interpreter
+from study.pipeline.fork_server import SUPPORTED, interpreter
 from study.pipeline.fork_server.client import ADDRESS, of_this_user, place_of
-from study.pipeline.fork_server.start import SUPPORTED
 
 pytestmark = pytest.mark.skipif(not SUPPORTED, reason="no safe forks on this platform")
 
