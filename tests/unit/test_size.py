@@ -13,14 +13,14 @@ import pytest
 from places import ROOT
 
 LIMITS = {
-    "lines of src": 41_855,
-    "modules of src": 277,
-    "lines of tests": 28_458,
-    "words of documentation": 24_744,
+    "lines of src": 41_200,
+    "modules of src": 276,
+    "lines of tests": 28_354,
+    "words of documentation": 24_736,
     "tables": 25,
     "figures": 23,
     "experiments": 21,
-    "percent of src in decorators, signatures and imports": 21.38,
+    "percent of src in decorators, signatures and imports": 20.90,
 }
 PAGES = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "config/README.md", "docs/**/*.md")
 

@@ -13,7 +13,7 @@ from pydantic import Field, model_validator
 
 from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel
-from pdrom.model.dynamics.solvers import solver_class
+from pdrom.model.dynamics.solvers import SOLVERS
 from pdrom.model.dynamics.space import VertexSpace
 from pdrom.model.dynamics.stepper import State, Stepper
 from pdrom.model.dynamics.system import DEFAULT_SOLVER
@@ -207,8 +207,8 @@ def sensitivities(
         for seed in seeds:
             other = trajectory(scene, perturbation_field(scene, size, seed))
             parts.append(_rows(scene, f"{size:g}", seed, relative_difference(other, base)))
-    own = solver_class(DEFAULT_SOLVER)
-    solver = next(name for name in OTHER_SOLVERS if solver_class(name) is not own)
+    own = SOLVERS.load(DEFAULT_SOLVER)
+    solver = next(name for name in OTHER_SOLVERS if SOLVERS.load(name) is not own)
     variants = {
         "solver": trajectory(scene, system=scene.system_with(solver)),
         "iterations x4": trajectory(_fresh(scene, iterations=4 * scene.config.iterations)),

@@ -91,7 +91,6 @@ SCENES: dict[Place, Callable[[Study], Iterable[str]]] = {
     paths.SUBSPACES_SECONDS: _with_subspaces,
     paths.SCALING: lambda study: study.settings.scaling.scenes,
     paths.BREAK_EVEN_SIZED: lambda study: study.settings.scaling.scenes,
-    paths.EFFECTS_SIZED: lambda study: study.settings.scaling.scenes,
     paths.ALTERNATIVES: lambda study: study.settings.alternatives.scenes,
     paths.ALTERNATIVE_TIMES: lambda study: study.settings.alternatives.scenes,
     paths.ONLINE: lambda study: study.online,

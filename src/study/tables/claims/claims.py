@@ -32,7 +32,7 @@ from study.tables.claims.verdicts import (
     timed_parts,
     values_of,
 )
-from study.tables.kit.declaration import compared, flag, integer, number, table, text, timed
+from study.tables.kit.declaration import flag, integer, number, table, text, timed
 from study.tables.kit.declaration import table as declare
 
 # What the rule of a claim says of it.
@@ -63,26 +63,32 @@ def _timed_of_claims(table: pd.DataFrame, **files: Path) -> list[set[str]]:
         text("claim", "its identifier in config/claims.yaml"),
         text("source", "who claims it"),
         text("paper", "what the preprint says"),
-        compared(
-            "skipped",
-            timed(text("measured", "range of what was measured, of the tests that decide")),
+        timed(
+            text(
+                "measured",
+                "range of what was measured, of the tests that decide",
+                compared="skipped",
+            )
         ),
-        compared("exact", timed(text("verdict", f"as published, one of: {', '.join(VERDICTS)}"))),
-        compared("skipped", timed(text("why", "all tests in words"))),
+        timed(text("verdict", f"as published, one of: {', '.join(VERDICTS)}", compared="exact")),
+        timed(text("why", "all tests in words", compared="skipped")),
         text("figure_or_table", "where to see it"),
         text("section", "section of the preprint"),
         text("shown", "figures of the preprint"),
         text("text", "the claim in our words"),
         text("qualifiers", "what a fair test has to keep"),
-        compared("skipped", timed(text("condition", "what the verdict depends on"))),
-        compared(
-            "skipped",
-            timed(text("measured_beyond", "the same of sound variants on well-posed scenes")),
+        timed(text("condition", "what the verdict depends on", compared="skipped")),
+        timed(
+            text(
+                "measured_beyond",
+                "the same of sound variants on well-posed scenes",
+                compared="skipped",
+            )
         ),
-        compared("exact", timed(text("verdict_beyond", "the verdict there"))),
-        compared("skipped", timed(text("condition_beyond", "what it depends on"))),
-        compared("skipped", timed(text("why_beyond", "all tests there in words"))),
-        compared("skipped", timed(text("answer", "both verdicts in words"))),
+        timed(text("verdict_beyond", "the verdict there", compared="exact")),
+        timed(text("condition_beyond", "what it depends on", compared="skipped")),
+        timed(text("why_beyond", "all tests there in words", compared="skipped")),
+        timed(text("answer", "both verdicts in words", compared="skipped")),
         text("history", "when and why the rules became what they are"),
     ),
     reads=READS,
@@ -149,15 +155,15 @@ def _timed_of_tests(table: pd.DataFrame, **files: Path) -> list[set[str]]:
         number("threshold", "what a value is compared with"),
         number("share", "of the rows that must agree for a clear answer"),
         number("margin", "factor of the threshold within which a ratio of times decides nothing"),
-        compared("skipped", timed(integer("satisfied", "rows that satisfy the comparison"))),
-        compared("skipped", timed(integer("of", "rows that are compared"))),
-        compared("skipped", timed(integer("close", "of them, ratios of times within the margin"))),
-        compared(
-            "skipped", timed(number("least", "smallest value; infinite for a run that failed"))
+        timed(integer("satisfied", "rows that satisfy the comparison", compared="skipped")),
+        timed(integer("of", "rows that are compared", compared="skipped")),
+        timed(integer("close", "of them, ratios of times within the margin", compared="skipped")),
+        timed(
+            number("least", "smallest value; infinite for a run that failed", compared="skipped")
         ),
-        compared("skipped", timed(number("median", "their median"))),
-        compared("skipped", timed(number("most", "largest value"))),
-        compared("exact", timed(text("verdict", f"of this test, one of: {', '.join(VERDICTS)}"))),
+        timed(number("median", "their median", compared="skipped")),
+        timed(number("most", "largest value", compared="skipped")),
+        timed(text("verdict", f"of this test, one of: {', '.join(VERDICTS)}", compared="exact")),
     ),
     reads=READS,
     timed_cells=_timed_of_tests,
@@ -195,9 +201,11 @@ def _found(test: TestRule, tables: Tables) -> dict[str, Any]:
         text("part", f"tests that decide: {', '.join(PARTS)}"),
         text("varied", f"what is changed in all of them: {', '.join(VARIED)}"),
         text("variation", "how: factor, share, sizes, split, scene left out"),
-        compared("exact", timed(text("verdict", f"one of: {', '.join(VERDICTS)}")), FRAGILE),
-        compared("exact", timed(text("verdict_of_rules", "the verdict of the rules as they are"))),
-        compared("exact", timed(flag("same", "the two agree")), FRAGILE),
+        timed(
+            text("verdict", f"one of: {', '.join(VERDICTS)}", compared="exact", tolerance=FRAGILE)
+        ),
+        timed(text("verdict_of_rules", "the verdict of the rules as they are", compared="exact")),
+        timed(flag("same", "the two agree", compared="exact", tolerance=FRAGILE)),
     ),
     reads=READS,
     timed_cells=timed_parts("verdict", "verdict_of_rules", "same"),

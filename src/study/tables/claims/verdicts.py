@@ -10,7 +10,7 @@ import pandas as pd
 from study.artifact.reads import ProjectFile, TableOf
 from study.tables.claims.metrics import METRICS, VALUE, Tables, filtered
 from study.tables.claims.rules import PARTS, ClaimRule, TestRule, load_claims
-from study.tables.kit.declaration import TimedCells, compared, flag, table, text, timed
+from study.tables.kit.declaration import TimedCells, flag, table, text, timed
 
 VERDICTS = HOLDS, FAILS, DEPENDS, MACHINE, UNDECIDED = (
     "holds", "does not hold", "depends", "depends on the machine", "cannot be decided",
@@ -168,10 +168,10 @@ def timed_parts(*cells: str) -> TimedCells:
     columns=(
         text("claim", "its identifier in config/claims.yaml"),
         text("part", f"which verdict: {', '.join(PARTS)}"),
-        compared("exact", timed(text("verdict", f"of this study, one of: {', '.join(VERDICTS)}"))),
+        timed(text("verdict", f"of this study, one of: {', '.join(VERDICTS)}", compared="exact")),
         text("verdict_replication", "of config/replication.yaml, recorded"),
-        compared("exact", timed(flag("same", "the two agree"))),
-        compared("skipped", timed(text("measured", "range of the tests that decide"))),
+        timed(flag("same", "the two agree", compared="exact")),
+        timed(text("measured", "range of the tests that decide", compared="skipped")),
         text("measured_replication", "the same range there"),
         flag("rules_unchanged", "the rules are those by which the record was decided"),
         text("date", "day of the record"),
