@@ -86,7 +86,8 @@ def cause(said: str, folder: Path) -> str:
     if found is None:
         return "it ended without a word"
     status = int(found["status"] or 0)
-    name = found["signal"] or (_signal(status - 128) if status > 128 else "")
+    signals = {number.value + 128: number.name for number in signal.Signals}
+    name = found["signal"] or signals.get(status, "")
     if name:
         return _CAUSES.get(name, f"crashed ({name})")
     return _STATUSES.get(status, f"exit status {status}, without a word")
@@ -101,13 +102,6 @@ def crash(written: str, log: str) -> str:
     own = [f for f in frames if re.search("/src/(pdrom|study)/", f["file"])]
     frame = (own or frames)[0]
     return f" at {frame['file']}:{frame['line']} in {frame['function']} (log: {log})"
-
-
-def _signal(number: int) -> str:
-    try:
-        return signal.Signals(number).name
-    except ValueError:
-        return ""
 
 
 def batch(name: str, log: str) -> str:
@@ -170,13 +164,6 @@ class Failures(logging.Handler):
             lines.append(f"pdrom: {self.stopped}")
         text = "\n".join([*dict.fromkeys([*lines, *self.other]), ADVICE]) + "\n"
         return text, INTERRUPTED if self.stopped else 1
-
-
-def listen() -> Failures:
-    """Failures of this process's run, from now on."""
-    failures = Failures()
-    logging.getLogger("snakemake.logging").addHandler(failures)
-    return failures
 
 
 def _first(names: Iterable[str]) -> str:

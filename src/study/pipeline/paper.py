@@ -25,10 +25,9 @@ def manuscript(study: Study, labels: Labels) -> SimpleNamespace:
 def facts(study: Study, labels: Labels) -> Facts:
     """Facts that the manuscript states beside results of ``study``; one of its own is no part."""
     own = study.is_own
+    said = [(name, each.words(study.value)) for name, each in declarations().items()]
     return Facts(
-        captions={
-            name: _caption(*each.words(study.value)) for name, each in declarations().items()
-        },
+        captions={name: f"{to_tex(title)}. {to_tex(text)}" for name, (title, text) in said},
         part=None if study.is_full or own else study.configuration,
         full_study=study.configuration if own else DEFAULT,
         pages={} if own else PAGES,
@@ -41,10 +40,6 @@ def facts(study: Study, labels: Labels) -> Facts:
             "scenes": [_scene(study, name) for name in study.scenes],
         },
     )
-
-
-def _caption(title: str, caption: str) -> str:
-    return f"{to_tex(title)}. {to_tex(caption)}"
 
 
 def check_texts(study: Study) -> None:

@@ -77,8 +77,9 @@ class Resolver:
         return self._jobs[key]
 
     def _resolved(self, artifact: Artifact, labels: dict[str, str]) -> Job:
-        settings = artifact.settings(self, labels)
-        inputs = artifact.inputs(self, labels)
+        known = {**labels, "figure": artifact.name}  # a figure's options are found by its name
+        settings = artifact.settings(self, known)
+        inputs = artifact.inputs(self, known)
         edited = [k for k, read in artifact.files.items() if isinstance(read, EditedFiles)]
         content = [path for name in edited for path in listed(inputs[name])]
         places = artifact.writes.items()

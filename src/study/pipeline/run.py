@@ -15,7 +15,7 @@ from pdrom.core.machine import Machine, Units
 from pdrom.core.store import read_table, write_text
 from study.artifact.paths import MACHINE
 from study.pipeline.commandline import CommandLine, one_line, recall, remember
-from study.pipeline.failures import Failures, listen
+from study.pipeline.failures import Failures
 from study.pipeline.folders import Folders
 from study.pipeline.fork_server import hold_pipe, start_server
 from study.pipeline.manifest import write_manifest
@@ -67,8 +67,6 @@ def expected_seconds(plan: Plan) -> Callable[[str], float]:
 def tell_expectation(workflow: Any, plan: Plan) -> None:
     """Log what every job of Snakemake's ``workflow`` is expected to take by ``plan``.
 
-    See `progress.Estimate.expect`.
-
     A job's share of this machine is 1 where it is alone, and where jobs run on a cluster.
     """
     dag, seconds_of = workflow.dag, expected_seconds(plan)
@@ -118,7 +116,9 @@ class Run:
                 hold()
                 settle_dates(DATED)
                 remember(command)
-        return cls(command, listen())
+        failures = Failures()
+        logging.getLogger("snakemake.logging").addHandler(failures)
+        return cls(command, failures)
 
     def check(self, plan: Plan, folders: Folders, rules: Iterable[Any], cores: int) -> None:
         """Check targets and report; a dry run says at its end what it would take on ``cores``.

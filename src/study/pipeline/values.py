@@ -187,7 +187,7 @@ DERIVED: dict[str, Callable[[Study, Labels], Any]] = {
     "scene": lambda study, labels: study.scene(labels["scene"]),
     "title": lambda study, labels: study.titles[study.scene(labels["scene"]).name],
     "mesh": lambda study, labels: study.mesh(labels["mesh"]),
-    "method": lambda study, labels: study.method(labels["method"]),
+    "method": lambda study, labels: study.methods[labels["method"]],
     "basis": lambda study, labels: study.basis(labels["basis"]),
     "methods": lambda study, labels: study.methods,
     "every_method": lambda study, labels: study.every_method,
