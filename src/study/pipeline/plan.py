@@ -6,16 +6,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 from pdrom.core.errors import ConfigurationError, SceneError
 from pdrom.reduction.subspace.exported import DOUBLES, require_known
 from study.article.build import article
-from study.artifact.artifact import Artifact
 from study.artifact.logs import planning_log
 from study.artifact.paths import LIVE_MODEL
-from study.artifact.reads import Labels
 from study.experiments.kit.declaration import experiments
 from study.experiments.live import LARGEST
 from study.figures.kit.declaration import declarations
@@ -26,7 +23,7 @@ from study.pipeline.folders import DEFAULT, Folders
 from study.pipeline.paper import check_texts
 from study.pipeline.resolve import Job, Resolver
 from study.pipeline.scenes import not_taken, require_scenes
-from study.pipeline.study import Study, StudySettings
+from study.pipeline.study import Study
 from study.pipeline.values import scaled_methods
 from study.tables import declared
 from study.tables.claims.rules import load_claims
@@ -126,26 +123,16 @@ def load_plan(
     return plan
 
 
-class Plan:
+class Plan(Resolver):
     """Everything that depends on the configuration and is needed to write the rules."""
 
     def __init__(self, study: Study, folders: Folders = OF_STUDY) -> None:
-        self.study = study
+        super().__init__(study, folders.results)
         self.root = study.root
-        self.results = folders.results
+        self.settings = study.settings
         self.documents = folders.documents
         self.experiments = experiments()
         self.tables = declared()
-        self._resolver = Resolver(study, folders.results)
-
-    @property
-    def settings(self) -> StudySettings:
-        """Checked settings of the study."""
-        return self.study.settings
-
-    def job(self, artifact: Artifact, labels: Labels = MappingProxyType({})) -> Job:
-        """Job of an ``artifact`` with these ``labels``."""
-        return self._resolver.job(artifact, labels)
 
     def check(self) -> None:
         """Read every file of the configuration, so that a fault shows early."""

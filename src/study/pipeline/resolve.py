@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any
 
 from pdrom.core.errors import ConfigurationError, choices
@@ -62,7 +63,7 @@ class Resolver:
         self._jobs: dict[tuple[str, ...], Job] = {}
         self._prints: dict[tuple[str, ...], str] = {}
 
-    def job(self, artifact: Artifact, labels: Labels) -> Job:
+    def job(self, artifact: Artifact, labels: Labels = MappingProxyType({})) -> Job:
         """The job of an artifact with these labels.
 
         Raises

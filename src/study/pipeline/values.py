@@ -57,9 +57,14 @@ def _usual_bases(study: Study, labels: Labels) -> list[File]:
     return [File("", dict(held)) for held in chosen.values()]
 
 
-def _of_scene(study: Study, place: paths.Place, scene: str) -> tuple[OfScene, ...]:
-    """A scene if the study itself holds its file of a kind."""
-    return (OfScene(scene=scene),) if {"scene": scene} in labels_of(study, place) else ()
+def _holds(study: Study, place: paths.Place, labels: Labels) -> bool:
+    """Whether the study itself has the file of a kind that belongs to a job with these labels."""
+    return {name: labels[name] for name in place.labels} in labels_of(study, place)
+
+
+def _of_scene(study: Study, place: paths.Place, labels: Labels) -> tuple[OfScene, ...]:
+    """The scene of a job if the study itself holds its file of a kind."""
+    return (OfScene(scene=labels["scene"]),) if _holds(study, place, labels) else ()
 
 
 def _joint_rows(study: Study, labels: Labels) -> tuple[JointRows, ...]:
@@ -128,12 +133,12 @@ class Run(Experiment):
 def _options(study: Study, labels: Labels) -> Options:
     """Options of a figure with the scenes that the study holds.
 
-    A list of scenes, methods or groups of which it holds none becomes empty, which means all.
+    A list of scenes or methods of which it holds none becomes empty, which means all.
     """
     chosen = study.figures[labels["figure"]]
-    held = {"methods": study.methods, "groups": {group for _, group in study.experiments}}
-    lost = [key for key, names in held.items() if {*chosen.names(key)}.isdisjoint(names)]
-    update: dict[str, tuple[str, ...]] = {key: () for key in lost if chosen.names(key)}
+    update: dict[str, tuple[str, ...]] = {}
+    if {*chosen.names("methods")}.isdisjoint(study.methods) and chosen.names("methods"):
+        update["methods"] = ()
     if scenes := chosen.names("scenes"):
         update["scenes"] = tuple(scene for scene in scenes if scene in study.scenes)
     return chosen.model_copy(update=update)
@@ -154,8 +159,7 @@ def _experiments(study: Study, labels: Labels) -> tuple[Experiment, ...]:
                 effects=config.effects,
                 only=len(reduced) == 1,
             )
-            for group in chosen.names("groups") or reduced
-            if group in reduced
+            for group in reduced
         ]
     return tuple(found)
 
@@ -194,6 +198,12 @@ DERIVED: dict[str, Callable[[Study, Labels], Any]] = {
     "scene_time_steps": lambda study, _: {k: v.time_step for k, v in study.scenes.items()},
     "scene_iterations": lambda study, _: {k: v.iterations for k, v in study.scenes.items()},
     "usual_bases": _usual_bases,
+    "own_ladder": lambda study, labels: (
+        study.settings.ladder if _holds(study, paths.LADDER, labels) else None
+    ),
+    "own_noise": lambda study, labels: (
+        study.settings.noise if _holds(study, paths.NOISE, labels) else None
+    ),
     "horizon": _horizon,
     "heldout_ranks": _heldout_ranks,
     "stability": _stability,
@@ -202,10 +212,8 @@ DERIVED: dict[str, Callable[[Study, Labels], Any]] = {
         study.settings.noise.methods, "noise.methods"
     ),
     "repeated": _repeated,
-    "with_subspaces": lambda study, labels: _of_scene(study, paths.SUBSPACES, labels["scene"]),
-    "with_online_models": lambda study, labels: _of_scene(
-        study, paths.ONLINE_MODELS, labels["scene"]
-    ),
+    "with_subspaces": lambda study, labels: _of_scene(study, paths.SUBSPACES, labels),
+    "with_online_models": lambda study, labels: _of_scene(study, paths.ONLINE_MODELS, labels),
     "joint_rows": _joint_rows,
     "timed_scenes": lambda study, _: [NamedScene(scene=each) for each in study.scenes.values()],
     "large_scenes": lambda study, _: [NamedScene(scene=each) for each in study.online.values()],

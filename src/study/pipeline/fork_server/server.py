@@ -48,8 +48,8 @@ class Request:
         self.streams: list[int] = []
         self._content = b""
 
-    def read(self) -> bool:
-        """Whether the request is complete, with what there is to read now.
+    def read(self) -> list[str]:
+        """Folder, script and environment, once there is all of it to read; nothing before.
 
         Raises
         ------
@@ -62,14 +62,12 @@ class Request:
         if not more:
             raise OSError("the client is gone")
         if len(self._content) < HEADER:
-            return False
+            return []
         size = int(self._content[:HEADER])
         if not 0 < size <= LARGEST:
             raise ValueError(f"a request of {size} bytes")
-        return len(self._content) >= HEADER + size
-
-    def parts(self) -> list[str]:
-        """Folder, script and environment; ValueError if something is missing."""
+        if len(self._content) < HEADER + size:
+            return []
         found = self._content[HEADER:].decode("utf-8", "surrogateescape").split("\0")
         if len(found) < 2 or len(self.streams) != 3:
             raise ValueError("no folder, script or streams")
@@ -173,9 +171,9 @@ class Server:
     def _answer(self, request: Request) -> str | None:
         """Fork a job once its request is complete; the script in the fork, None in the server."""
         try:
-            if not request.read():
+            parts = request.read()
+            if not parts:
                 return None
-            parts = request.parts()
             process = os.fork()
         except (OSError, ValueError):
             self._drop(request)

@@ -181,7 +181,7 @@ def taken() -> tuple[str, str]:
         ("model/constraints/spring.py", "\nADDED = 1\n", (False, True)),
         ("model/constraints/bending.py", "\nADDED = 1\n", (False, False)),
         ("model/mesh/generators.py", "\nADDED = 1\n", (True, True)),
-        ("core/store/atomic.py", "\nADDED = 1\n", (True, True)),
+        ("core/store/__init__.py", "\nADDED = 1\n", (True, True)),
     ],
 )
 def test_an_edit_changes_what_uses_the_module(copy, name, text, changed):
