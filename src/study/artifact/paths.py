@@ -44,7 +44,10 @@ class Place:
 
     def where(self, **labels: str) -> "Place":
         """Fix some of the labels."""
-        return Place(self.pattern.format_map(_Fixed(labels)))
+        pattern = self.pattern
+        for label, value in labels.items():
+            pattern = pattern.replace(f"{{{label}}}", value)
+        return Place(pattern)
 
     @property
     def labels(self) -> list[str]:
@@ -70,13 +73,6 @@ class Place:
             if label is not None:
                 parts.append(f"(?P<{label}>{LABELS[label]})")
         return re.compile(rf"(?:^|/){''.join(parts)}$")
-
-
-class _Fixed(dict[str, str]):
-    """Mapping for `str.format_map` with some labels; the others stay in braces."""
-
-    def __missing__(self, label: str) -> str:
-        return f"{{{label}}}"
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,7 @@ from pdrom.core.yamlfile import read_yaml, validate
 from pdrom.view import style
 from pdrom.view.artists import Figure
 from study.artifact.artifact import Artifact, declare, declared_in
-from study.artifact.markup import filled, keys, to_plain
+from study.artifact.markup import filled, to_plain
 from study.artifact.paths import FIGURE, FIGURE_PICTURE
 from study.artifact.reads import Read, Setting
 from study.figures.kit.options import NothingToDraw, Options
@@ -68,7 +68,7 @@ class Declaration(Artifact):
         ConfigurationError
             A setting does not exist.
         """
-        return self.title, filled(self.caption, {key: value(key) for key in keys(self.caption)})
+        return self.title, filled(self.caption, value)
 
     def perform(
         self, settings: Mapping[str, Any], inputs: Mapping[str, Any], outputs: Mapping[str, str]

@@ -23,6 +23,9 @@ from pathlib import Path
 from study.pipeline.fork_server.alone import PIPE
 from study.pipeline.fork_server.client import ADDRESS, place_of
 
+# The plain interpreter, in whose place the workflow starts scripts by `interpreter`.
+PYTHON = sys.executable
+
 # Forks of a process that has loaded system frameworks are unsafe on macOS.
 SUPPORTED = sys.platform == "linux"
 
@@ -49,10 +52,10 @@ LIBRARIES = (
 )
 
 
-def interpreter(python: str = sys.executable) -> str:
-    """Words of a shell that run a script by the client; ``python`` is the plain interpreter."""
+def interpreter() -> str:
+    """Words of a shell that run a script by the client, in the place of the plain interpreter."""
     client = Path(__file__).with_name("client.py")
-    return f"{shlex.quote(python)} -I -S {shlex.quote(str(client))}"
+    return f"{shlex.quote(PYTHON)} -I -S {shlex.quote(str(client))}"
 
 
 def hold_pipe(place: Path) -> None:
@@ -75,8 +78,8 @@ def hold_pipe(place: Path) -> None:
     os.environ[PIPE] = str(place.absolute())
 
 
-def start_server(python: str = sys.executable, libraries: Sequence[str] = LIBRARIES) -> None:
-    """Start the server of this process by ``python``; it ends when this process does.
+def start_server(libraries: Sequence[str] = LIBRARIES) -> None:
+    """Start the server of this process; it ends when this process does.
 
     The address goes into the environment, which jobs inherit. It is a name that Linux keeps beside
     the file system and forgets with the last process that listens there, so that nothing is left
@@ -94,7 +97,7 @@ def start_server(python: str = sys.executable, libraries: Sequence[str] = LIBRAR
         listener.listen(64)
         numbers = (listener.fileno(), owner)
         subprocess.Popen(
-            [python, "-m", "study.pipeline.fork_server.server", *map(str, numbers), *libraries],
+            [PYTHON, "-m", "study.pipeline.fork_server.server", *map(str, numbers), *libraries],
             pass_fds=numbers,
             stdin=subprocess.DEVNULL,
             start_new_session=True,

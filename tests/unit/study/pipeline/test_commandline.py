@@ -5,7 +5,7 @@ import pytest
 from pdrom.core.errors import ConfigurationError
 from places import ROOT
 from study.paper.figure_numbers import figure_numbers
-from study.pipeline.commandline import RECORD, CommandLine, check_files, recall, remember
+from study.pipeline.commandline import RECORD, CommandLine, recall, remember
 from study.pipeline.folders import Folders, folders
 from study.pipeline.front import LINES, OPTIONS, completed
 
@@ -102,22 +102,6 @@ def test_a_forgotten_separator_is_explained(arguments, expected):
 )  # fmt: skip
 def test_targets_are_replaced_and_options_kept(given, more, made, expected):
     assert parse(given).rewritten(more.split(), made) == expected.split()
-
-
-@pytest.mark.parametrize(
-    ("content", "message"),
-    [
-        ("", "found nothing"),
-        ("[1]", r"found \[1\]"),
-        ("a: 1\na: 2", "given twice"),
-        ("__use_yte__: true\n", "templates are not allowed"),
-    ],
-)
-def test_faulty_files_are_named(tmp_path, content, message):
-    (tmp_path / "good.yaml").write_text("a: 1")
-    (tmp_path / "bad.yaml").write_text(content)
-    with pytest.raises(ConfigurationError, match=rf"bad\.yaml: .*{message}"):
-        check_files([tmp_path / "good.yaml", tmp_path / "bad.yaml"])
 
 
 @pytest.mark.parametrize(
