@@ -89,13 +89,7 @@ class Artifact:
         return {name: read.paths(sources, labels) for name, read in self.files.items()}
 
     def settings(self, sources: Sources, labels: Labels) -> dict[str, Any]:
-        """Typed settings from ``sources`` of a job with these ``labels``, by name.
-
-        Raises
-        ------
-        ConfigurationError
-            If a key does not exist.
-        """
+        """Typed settings of a job by name; ConfigurationError if a key does not exist."""
         found: dict[str, Any] = {}
         for name, read in self.reads.items():
             if isinstance(read, SettingRead):
@@ -162,13 +156,7 @@ def make(
 
 
 def declare(made: A, *parameters: str) -> A:
-    """Return ``made``, whose function takes what it reads and ``parameters``.
-
-    Raises
-    ------
-    TypeError
-        If the function takes something else.
-    """
+    """Return ``made``; TypeError if its function does not take reads and ``parameters``."""
     try:
         inspect.signature(made.function).bind(**made.reads, **dict.fromkeys(parameters))
     except TypeError as error:

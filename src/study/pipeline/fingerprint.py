@@ -37,6 +37,7 @@ _IMPORT = re.compile(
 )
 
 
+@cache
 def fingerprint(*places: str) -> str:
     """SHA-256 over the named modules and everything of the package that they import.
 

@@ -82,13 +82,7 @@ def write_manifest(plan: Plan, folders: Folders, options: Iterable[str]) -> None
 
 
 def read_manifest(results: str) -> Manifest:
-    """The manifest in a folder of results; nothing is changed.
-
-    Raises
-    ------
-    StorageError
-        It is missing, damaged, or of another layout.
-    """
+    """The manifest in a folder; StorageError if it is missing, damaged, or of another layout."""
     path = Path(paths.MANIFEST.at(results))
     if check_file(path) is Condition.DAMAGED:
         raise StorageError(f"{path}: damaged, its content and its checksum differ")

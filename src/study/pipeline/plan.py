@@ -32,13 +32,7 @@ log = logging.getLogger(__name__)
 
 
 def check_subspaces(study: Study) -> None:
-    """Say which scenes of ``study`` go without subspaces.
-
-    Raises
-    ------
-    ConfigurationError
-        One of them is named where a subspace is asked for.
-    """
+    """Say which scenes go without subspaces; ConfigurationError if one is asked for."""
     outside = {
         name: effects
         for name, config in {**study.scenes, **study.online}.items()

@@ -61,16 +61,9 @@ class Resolver:
     def __init__(self, study: Study, results: str) -> None:
         self.study, self.results = study, results
         self._jobs: dict[tuple[str, ...], Job] = {}
-        self._prints: dict[tuple[str, ...], str] = {}
 
     def job(self, artifact: Artifact, labels: Labels = MappingProxyType({})) -> Job:
-        """The job of an artifact with these labels.
-
-        Raises
-        ------
-        ConfigurationError
-            If it reads a table or a key that does not exist.
-        """
+        """The job with these labels; ConfigurationError if it reads what does not exist."""
         key = (artifact.rule, *(labels[name] for name in artifact.labels))
         if key not in self._jobs:
             own = {name: labels[name] for name in artifact.labels}
@@ -91,14 +84,8 @@ class Resolver:
             {name: place.at(self.results, **labels) for name, place in places},
             artifact.plain(settings),
             digest(self.study.root, *content) if content else "",
-            self.code(artifact.module, *sorted(set(modules_in(settings)))),
+            fingerprint(artifact.module, *sorted(set(modules_in(settings)))),
         )
-
-    def code(self, *modules: str) -> str:
-        """Fingerprint of modules, see `study.pipeline.fingerprint`."""
-        if modules not in self._prints:
-            self._prints[modules] = fingerprint(*modules)
-        return self._prints[modules]
 
     # What declarations ask for (`Sources`) --------------------------------------------------
 

@@ -159,13 +159,7 @@ class Study:
         return load_methods(self.root / "config" / "methods.yaml")
 
     def scene(self, name: str) -> SceneConfig:
-        """Configuration of scene ``name``; of one outside the study, too, if it has a file.
-
-        Raises
-        ------
-        ConfigurationError
-            If there is no such scene, or it is faulty.
-        """
+        """Scene ``name``, held or not; ConfigurationError if it has no file or is faulty."""
         for held in (self.scenes, self.online, self._others):
             if name in held:
                 return held[name]
@@ -250,13 +244,7 @@ class Study:
 
 
 def part_of(value: Any, parts: str, key: str) -> Any:
-    """Part of a ``value`` that ``parts`` names, with dots between them.
-
-    Raises
-    ------
-    ConfigurationError
-        There is none; ``key`` is named.
-    """
+    """Part ``a.b`` of a ``value``; ConfigurationError, which names ``key``, if there is none."""
     for part in parts.split("."):
         if not hasattr(value, part):
             known = choices(part, getattr(type(value), "model_fields", ()))

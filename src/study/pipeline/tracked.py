@@ -96,13 +96,7 @@ def _used(results: str) -> pd.DataFrame:
 
 
 def main(words: Sequence[str]) -> None:
-    """Write the measurements that ``words`` name again.
-
-    Raises
-    ------
-    ConfigurationError
-        There are no such ones.
-    """
+    """Write again what ``words`` name; ConfigurationError if there is no such measurement."""
     for word in words or [""]:
         if word == "costs":
             path = COSTS

@@ -165,7 +165,7 @@ def copy(tmp_path, monkeypatch):
 
 
 def forget() -> None:
-    for kept in (module._locate, module._read):
+    for kept in (module._locate, module._read, fingerprint):
         kept.cache_clear()
 
 
