@@ -11,13 +11,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from builders import call_kernel, random_rotation
-from pdrom.model.constraints.area import TriangleArea
 from pdrom.model.constraints.bending import VertexBending
 from pdrom.model.constraints.lanes import LANES, pack
 from pdrom.model.constraints.spring import EdgeSpring
 from pdrom.model.constraints.tetrahedron import DeformationGradient, TetrahedronStrain
 from pdrom.model.constraints.triangle_strain import TriangleStrain
-from pdrom.model.constraints.volume import TetrahedronVolume
+from pdrom.model.constraints.volume import TetrahedronVolume, TriangleArea
 from pdrom.model.mesh.generators import cloth
 from pdrom.model.mesh.types import Mesh
 from simplices import bound, projected

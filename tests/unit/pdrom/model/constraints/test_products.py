@@ -6,9 +6,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from builders import random_rotation
-from pdrom.model.constraints.area import TriangleArea
 from pdrom.model.constraints.products import reference_nearest
-from pdrom.model.constraints.volume import TetrahedronVolume
+from pdrom.model.constraints.volume import TetrahedronVolume, TriangleArea
 from simplices import bound, projected
 
 LOW, HIGH = 0.99, 1.01
