@@ -70,7 +70,7 @@ def test_a_timed_kernel_does_what_the_kernel_does(rng):
     assert (own == other).all()
     assert stand.seconds > 0.0
     space = scene.space(scene.system)
-    assert space.compiled([Timed(g, ("begin_frame",)) for g in scene.groups]) is not None
+    assert space.compiled([Timed(g, ("begin_frame",)) for g in scene.groups])[0] is not None
 
 
 def test_effects_are_left_out_alone_and_groups_together():
