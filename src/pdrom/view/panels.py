@@ -15,7 +15,6 @@ from pdrom.view.camera import Camera, Window, bounds, window_of
 from pdrom.view.mesh_render import (
     FLOOR,
     Colour,
-    Surface,
     draw_floor,
     draw_outline,
     draw_surface,
@@ -72,11 +71,6 @@ class RunPanel:
         return self.zoomed(window).width / window.width
 
 
-def mesh_surface(mesh: Mesh) -> Surface:
-    """Surface of a mesh; that of a volume is closed."""
-    return Surface(mesh.triangles, open=len(mesh.tetrahedra) == 0)
-
-
 def shared_window(
     camera: Camera, reference: np.ndarray, panels: list[RunPanel], margin: float = 0.1
 ) -> Window:
@@ -126,21 +120,17 @@ def draw_run(
         centre_note(ax, note, FAILED if panel.failure else "#666666")
         return
     shown, zoom = panel.zoomed(window), panel.scale(window)
-    surface = mesh_surface(mesh)
     for body in panel.obstacles or ():
-        faces = Surface(body.triangles)
-        draw_surface(ax, body.points, faces, camera, FLOOR, wire=0.05).set_zorder(0.1)
+        draw_surface(ax, body.points, body, camera, FLOOR, wire=0.05).set_zorder(0.1)
     if panel.obstacles is None and not panel.failure:
-        draw_floor(ax, panel.positions, surface, camera=camera, window=shown)
+        draw_floor(ax, panel.positions, mesh, camera, shown)
     if ghost is not None:
         edges = outline_edges(mesh.points, mesh.triangles)
         if not len(edges):  # a round body has no edges of its own
             edges = silhouette_edges(ghost, mesh.triangles, camera)
         draw_outline(ax, ghost, edges, camera=camera)
     contrast = 0.5 if isinstance(panel.colour, np.ndarray) else 1.0
-    draw_surface(
-        ax, panel.positions, surface, camera=camera, colour=panel.colour, contrast=contrast
-    )
+    draw_surface(ax, panel.positions, mesh, camera, panel.colour, contrast=contrast)
     set_window(ax, shown)
     lines = [text for text in (panel.failure, panel.remark) if text]
     if zoom > SLACK:

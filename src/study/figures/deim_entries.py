@@ -102,7 +102,7 @@ def axes_hit(entries: np.ndarray, per_element: int) -> dict[int, str]:
 
 def _draw_hits(ax: Axes, elements: ElementMap, hit: dict[int, str], camera: Camera) -> None:
     points = elements.mesh.points
-    draw_surface(ax, points, elements.surface, camera=camera, colour=NEUTRAL, wire=0.18)
+    draw_surface(ax, points, elements.mesh, camera=camera, colour=NEUTRAL, wire=0.18)
     centres = camera.project(elements.centres(points))
     for axis, colour in (*style.AXES.items(), ("several", SEVERAL)):
         where = centres[[e for e, a in hit.items() if a == axis]]

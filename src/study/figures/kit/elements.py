@@ -10,7 +10,7 @@ from pdrom.model.effects import EFFECTS
 from pdrom.model.mesh.types import Mesh
 from pdrom.view.artists import Axes, Normalize, ScalarMappable
 from pdrom.view.camera import Camera
-from pdrom.view.mesh_render import Surface, draw_lines, draw_surface
+from pdrom.view.mesh_render import draw_lines, draw_surface
 
 NEUTRAL = "#E4E1DA"
 SIGNED = "RdBu_r"
@@ -47,11 +47,6 @@ class ElementMap:
     cells: np.ndarray
     mesh: Mesh
 
-    @property
-    def surface(self) -> Surface:
-        """Surface of the mesh, ready to be drawn."""
-        return Surface(self.mesh.triangles, open=len(self.mesh.tetrahedra) == 0)
-
     def centres(self, points: np.ndarray) -> np.ndarray:
         """Centre of each element (e, 3), m, with vertices at ``points`` (N, 3) m."""
         return points[self.cells].mean(axis=1)
@@ -87,9 +82,9 @@ class ElementMap:
 
         Its elements have ``values`` (e,), which ``colours`` maps to colours.
         """
-        if self.kind == "edge" and self.surface.open:
+        if self.kind == "edge" and not len(self.mesh.tetrahedra):
             draw_surface(
-                ax, points, self.surface, camera=camera, colour="#FFFFFF", wire=0.0, contrast=0.15
+                ax, points, self.mesh, camera=camera, colour="#FFFFFF", wire=0.0, contrast=0.15
             )
             draw_lines(ax, points[self.cells], camera, colours=colours.to_rgba(values))
             return
@@ -100,7 +95,7 @@ class ElementMap:
         carried = self.face_values(values) if not faces else values[self.mesh.triangles].mean(1)
         rgb = colours.to_rgba(np.nan_to_num(carried))[:, :3]
         rgb[~np.isfinite(carried)] = (0.92, 0.91, 0.89)
-        draw_surface(ax, points, self.surface, camera=camera, colour=rgb, wire=0.12, contrast=0.35)
+        draw_surface(ax, points, self.mesh, camera=camera, colour=rgb, wire=0.12, contrast=0.35)
 
 
 def element_map(group: str, mesh: Mesh, elements: int, source: str) -> ElementMap:
