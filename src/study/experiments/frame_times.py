@@ -4,37 +4,39 @@ Every process times everything in another random order. The full-order run of ea
 twice, the second time as a control: what two identical runs differ by is no speed-up.
 """
 
-import logging
-from collections.abc import Iterator, Sequence
+from collections import defaultdict
+from collections.abc import Iterator
+from dataclasses import dataclass, field
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from time import process_time
+from typing import Any
 
 import pandas as pd
 
 from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel, SceneName
-from pdrom.model.scene import SceneConfig
-from pdrom.reduction.basis import basis_of
+from pdrom.model.mesh.types import load_mesh
+from pdrom.model.scene import Scene, SceneConfig
+from pdrom.reduction.basis import basis_of, load_basis
 from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.sampling import select
+from pdrom.reduction.sampling.local_step import ReducedLocalStep, replace_group
 from pdrom.reduction.snapshots import load_snapshots
+from pdrom.reduction.subspace.model import load_models
 from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import EachOf, Settings
+from study.experiments.kit.costs import variant
 from study.experiments.kit.declaration import experiment
-from study.experiments.kit.fresh_process import (
-    Projections,
-    Request,
-    Subspaces,
-    TimedScene,
-    in_fresh_process,
-)
-from study.experiments.kit.measurement import Protocol
-from study.experiments.kit.settings import Count, Modes, PositionBasis, Repeats, Solver
+from study.experiments.kit.measurement import Case, Processes, Variant, in_processes
+from study.experiments.kit.reruns import load_reduction
+from study.experiments.kit.settings import Modes, PositionBasis, Solver
 
-log = logging.getLogger(__name__)
-
+FULL, CONTROL, REDUCED = "full", "control", "reduced"
+COLUMNS = [
+    "process", "scene", "vertices", "frames", "role", "group", "method", "position_basis", "k", "r",
+    "ms_per_frame",
+]  # fmt: skip
 SECONDS_COLUMNS = ["scene", "group", "method", "r", "reduction_s"]
 
 
@@ -64,14 +66,6 @@ class ProjectionCase(ConfigModel):
     def labels(self) -> dict[str, str]:
         """Labels of its files."""
         return {"scene": self.scene, "group": self.group, "method": self.method}
-
-
-class Processes(Protocol):
-    """``processes`` that each time every run: ``frames``, ``warmup`` and ``repeats`` of each."""
-
-    frames: Count = 4
-    repeats: Repeats = 3
-    processes: Count = 10
 
 
 class FrameTimes(Processes):
@@ -107,6 +101,48 @@ class Options(ConfigModel):
     solver: Solver
 
 
+@dataclass(frozen=True)
+class TimedScene(Case):
+    """A scene, timed in full order, once more as a control, and with its reductions.
+
+    mesh : file of the mesh; it is made if there is none
+    projections : reduced ones with their methods, and the files of their bases and samplings
+    models : files of position subspaces, with the method, kind of basis and number of modes of
+        those that are timed; every one if that is None
+    """
+
+    scene: SceneConfig
+    solver: str
+    frames: int
+    mesh: str | None = None
+    projections: list[tuple[ProjectionCase, MethodSpec, str, str]] = field(default_factory=list)
+    models: dict[str, list[tuple[str, str, int]] | None] = field(default_factory=dict)
+
+    def variants(self) -> Iterator[Variant]:
+        """Every loop of the scene."""
+        config = self.scene
+        mesh = config.mesh.build(Path()) if self.mesh is None else load_mesh(self.mesh)
+        scene = Scene.build(config, mesh)
+        system = scene.system_with(self.solver)
+        frames = min(self.frames, config.frames)
+        common = {"scene": config.name, "vertices": mesh.vertices, "frames": config.frames}
+        for role in (FULL, CONTROL):
+            yield variant(scene, system, scene.groups, frames, {**common, "role": role})
+        reduced: dict[str, Any] = {**common, "role": REDUCED}
+        for own, spec, basis, sampling in self.projections:
+            reduction = load_reduction(load_basis(basis), sampling, spec, r=own.r)
+            step = ReducedLocalStep(scene.group(own.group), reduction)
+            steps = replace_group(scene, own.group, step)
+            labels = {**reduced, **own.model_dump(), "position_basis": "full"}
+            yield variant(scene, system, steps, frames, labels)
+        for path, wanted in self.models.items():
+            for found, model in load_models(path):
+                own_labels = found["method"], found["position_basis"], found["k"]
+                if wanted is None or own_labels in wanted:
+                    sizes = {"group": "all", "r": model.elements_evaluated(scene)}
+                    yield Variant({**reduced, **sizes, **found}, *model.loop(scene), frames)
+
+
 @experiment(
     "Times of frames in several processes",
     reads={
@@ -134,85 +170,31 @@ def frame_times(
 ) -> None:
     """Start the processes one after the other, and join what they measured."""
     asked = settings.frame_times
-    scenes = (
-        *_small(settings, meshes, _projections(settings, bases, samplings), subspaces),
-        *_large(settings, large),
-    )
-    parts = []
-    with TemporaryDirectory() as folder:
-        for process in range(1, asked.processes + 1):
-            request = Request(
-                scenes=scenes,
-                timing=Protocol(frames=asked.frames, warmup=asked.warmup, repeats=asked.repeats),
-                solver=settings.solver,
-                seed=process,
-                result=str(Path(folder) / f"{process}.csv"),
-            )
-            parts.append(in_fresh_process(request, Path(folder)))
-            log.info("process %d of %d", process, asked.processes)
-    write_table(pd.concat(parts, ignore_index=True), times.path)
-    rows = [
-        (case.scene, case.group, case.method, case.r, _seconds(case, file, settings))
-        for case, file in zip(settings.projection_cases, snapshots, strict=True)
+    scenes: dict[str, TimedScene] = {}
+    for named, file in zip(settings.timed_scenes, meshes, strict=True):
+        scenes[named.scene.name] = TimedScene(named.scene, settings.solver, asked.frames, file.path)
+    rows = []
+    cases = zip(settings.projection_cases, bases, samplings, snapshots, strict=True)
+    for own, basis, sampling, data in cases:
+        spec = settings.projection_methods[own.method]
+        scenes[own.scene].projections.append((own, spec, basis.path, sampling.path))
+        rows.append((own.scene, own.group, own.method, own.r, _seconds(data, spec, own.r)))
+    chosen: dict[str, list[tuple[str, str, int]]] = defaultdict(list)
+    for case, file in zip(settings.subspace_cases, subspaces, strict=True):
+        chosen[file.path].append((case.method, case.position_basis, case.k))
+        scenes[case.scene].models[file.path] = chosen[file.path]
+    alone = [
+        TimedScene(named.scene, settings.solver, asked.frames, models={file.path: None})
+        for named, file in zip(settings.large_scenes, large, strict=True)
     ]
+    table = pd.DataFrame(in_processes([*scenes.values(), *alone], asked), columns=COLUMNS)
+    write_table(table.astype({"k": "Int64", "r": "Int64"}), times.path)
     write_table(pd.DataFrame(rows, columns=SECONDS_COLUMNS), seconds.path)
 
 
-def _small(
-    settings: Options,
-    meshes: list[File],
-    projections: list[tuple[str, Projections]],
-    subspaces: list[File],
-) -> Iterator[TimedScene]:
-    """Yield the study's scenes with their quoted reductions."""
-    for named, mesh in zip(settings.timed_scenes, meshes, strict=True):
-        name = named.scene.name
-        yield TimedScene(
-            scene=named.scene,
-            mesh=mesh.path,
-            projections=tuple(own for scene, own in projections if scene == name),
-            subspaces=_subspaces(name, settings.subspace_cases, subspaces),
-        )
-
-
-def _large(settings: Options, large: list[File]) -> Iterator[TimedScene]:
-    for named, models in zip(settings.large_scenes, large, strict=True):
-        yield TimedScene(scene=named.scene, subspaces=Subspaces(path=models.path))
-
-
-def _projections(
-    settings: Options, bases: list[File], samplings: list[File]
-) -> list[tuple[str, Projections]]:
-    cases = zip(settings.projection_cases, bases, samplings, strict=True)
-    return [
-        (
-            case.scene,
-            Projections(
-                group=case.group,
-                method=case.method,
-                r=case.r,
-                spec=settings.projection_methods[case.method],
-                basis=basis.path,
-                sampling=sampling.path,
-            ),
-        )
-        for case, basis, sampling in cases
-    ]
-
-
-def _subspaces(
-    scene: str, cases: Sequence[SubspaceCase], files: Sequence[File]
-) -> Subspaces | None:
-    own = [(c, f) for c, f in zip(cases, files, strict=True) if c.scene == scene]
-    if not own:
-        return None
-    chosen = tuple((case.method, case.position_basis, case.k) for case, _ in own)
-    return Subspaces(path=own[0][1].path, chosen=chosen)
-
-
-def _seconds(case: ProjectionCase, snapshots: File, settings: Options) -> float:
+def _seconds(snapshots: File, spec: MethodSpec, r: int) -> float:
     """Processor time of basis and sampling, s."""
-    data, spec = load_snapshots(snapshots.path), settings.projection_methods[case.method]
+    data = load_snapshots(snapshots.path)
     before = process_time()
-    select(basis_of(data, spec), spec, case.r)
+    select(basis_of(data, spec), spec, r)
     return process_time() - before

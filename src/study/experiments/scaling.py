@@ -4,10 +4,10 @@ import ctypes
 import gc
 import logging
 import os
-from dataclasses import dataclass
+from collections.abc import Sequence
 from pathlib import Path
 from time import perf_counter
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 import pandas as pd
@@ -18,17 +18,17 @@ from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.model.dynamics.system import GlobalSystem
 from pdrom.model.scene import Scene, SceneConfig
-from pdrom.reduction.basis import Basis, compute_basis
+from pdrom.reduction.basis import compute_basis
 from pdrom.reduction.method import MethodSpec
-from pdrom.reduction.sampling import Reduction, select, select_path
+from pdrom.reduction.sampling import Reduction, reductions
 from pdrom.reduction.sampling.local_step import ReducedLocalStep, replace_group
 from pdrom.reduction.snapshots import row_masses
 from pdrom.reduction.subspace.model import SubspaceModel, make_columns, sample_elements
-from study.artifact.paths import BREAK_EVEN_SIZED, EFFECTS_SIZED, SCALING, File
+from study.artifact.paths import BREAK_EVEN_SIZED, SCALING, File
 from study.artifact.reads import Settings, SourcesOf
-from study.experiments.kit.costs import effect_costs, local_costs, variant
+from study.experiments.kit.costs import local_costs, variant
 from study.experiments.kit.declaration import experiment
-from study.experiments.kit.measurement import Measurement, Protocol, Variant, measure
+from study.experiments.kit.measurement import Protocol, Variant, measure
 from study.experiments.kit.settings import FOM, Modes, Repeats, Solver, Tolerance
 
 log = logging.getLogger(__name__)
@@ -39,22 +39,6 @@ ITERATIONS = [
 ]  # fmt: skip
 STATES = 4  # states of the training run at which local steps are timed alone
 TrainingFrames = Annotated[int, Field(ge=3, le=1000)]
-
-
-@dataclass(frozen=True)
-class Training:
-    """Positions (n, N, 3) m after the training frames, and projections (n, e p, 3) within them.
-
-    ``roundoff`` (n,) is that of the projections.
-    """
-
-    positions: np.ndarray
-    projections: np.ndarray
-    roundoff: np.ndarray
-
-    def first(self, frames: int) -> "Training":
-        """Keep the first frames only."""
-        return Training(self.positions[:frames], self.projections[:frames], self.roundoff[:frames])
 
 
 class SizedBreakEven(ConfigModel):
@@ -105,12 +89,10 @@ class Options(ConfigModel):
 @experiment(
     "Cost of {scene} on a mesh with {factor} times the vertices along a side",
     reads={"sources": SourcesOf("scene.mesh"), "settings": Settings(Options)},
-    writes={"iterations": SCALING, "breakeven": BREAK_EVEN_SIZED, "effects": EFFECTS_SIZED},
+    writes={"iterations": SCALING, "breakeven": BREAK_EVEN_SIZED},
     alone=True,
 )
-def scaling(
-    sources: list[Path], settings: Options, iterations: File, breakeven: File, effects: File
-) -> None:
+def scaling(sources: list[Path], settings: Options, iterations: File, breakeven: File) -> None:
     """Measure a scene on one mesh: ``factor`` times the vertices along each side."""
     config, solver, sized = settings.scene, settings.solver, settings.scaling
     specs, alone = settings.scaled_methods, settings.scaling.breakeven
@@ -122,23 +104,42 @@ def scaling(
     idle = _memory()
     system, seconds = _factorised(scene, solver)
     measured = {"factorisation_ms": 1e3 * seconds, "memory_mb": _memory() - idle}
-    training = train(scene, system, max(sized.training_frames, alone.training_frames))
-    first = training.first(sized.training_frames)
-    basis = _basis(scene, first, specs[sized.method])
+    group, few = scene.groups[0], sized.training_frames
+    positions, projections, roundoff = _training(scene, system, max(few, alone.training_frames))
+    columns = make_columns(scene, positions[:few], "pod", k=sized.k)
+    trained_on = np.arange(len(positions[:few]))
+    (samples,) = sample_elements(scene, columns, trained_on, tolerances=[sized.tolerance])
+    model = SubspaceModel("pod", columns, samples)
+    inside = {"k": columns.modes, "elements_sampled": model.elements_evaluated(scene)}
+    (reduction,) = _reductions(
+        scene, projections[:few], roundoff[:few], specs[sized.method], [sized.r]
+    )
+    sampled = {"r": reduction.r, "elements_sampled": len(reduction.elements)}
+    steps = replace_group(scene, group.name, ReducedLocalStep(group, reduction))
     variants = [
         variant(scene, system, scene.groups, sized.frames, {"method": FOM, **measured}),
-        _reduced(scene, system, basis, specs[sized.method], sized),
-        _subspace(scene, first, sized),
+        variant(scene, system, steps, sized.frames, {"method": sized.method, **sampled}),
+        Variant({"method": "ecsw", **inside}, *model.loop(scene), sized.frames),
     ]
-    results = measure(variants, sized.warmup, sized.repeats)
-    rows = [{"scene": config.name, **m.labels, **_times(scene, m)} for m in results]
-    write_table(pd.DataFrame(rows, columns=ITERATIONS), iterations.path)
-    costs = effect_costs(scene, system, sized.frames, warmup=sized.warmup, repeats=sized.repeats)
-    write_table(costs, effects.path)
-    steps = _steps_alone(scene, training.first(alone.training_frames), specs, alone)
-    states = training.positions[:: len(training.positions) // STATES][:STATES]
-    times = local_costs(scene, steps, states, warmup=sized.warmup, repeats=alone.repeats)
-    write_table(times.assign(factor=factor), breakeven.path)
+    times = pd.DataFrame(measure(variants, sized.warmup, sized.repeats)).assign(
+        scene=config.name,
+        vertices=scene.mesh.vertices,
+        elements=sum(group.elements for group in scene.groups),
+        ms_per_iteration=lambda own: own.ms_per_frame / config.iterations,
+        local_ms=lambda own: (own.local_ms + own.assembly_ms) / config.iterations,
+        global_ms=lambda own: own.global_ms / config.iterations,
+        local_share=lambda own: own.local_ms / (own.local_ms + own.global_ms),
+    )
+    write_table(times[ITERATIONS], iterations.path)
+    few = alone.training_frames
+    reduced = {
+        (group.name, name, own.r): ReducedLocalStep(group, own)
+        for name in alone.methods
+        for own in _reductions(scene, projections[:few], roundoff[:few], specs[name], alone.sizes)
+    }
+    states = positions[:: len(positions) // STATES][:STATES]
+    costs = local_costs(scene, reduced, states, warmup=sized.warmup, repeats=alone.repeats)
+    write_table(costs.assign(factor=factor), breakeven.path)
     log.info("%s: %d vertices done", config.name, scene.mesh.vertices)
 
 
@@ -152,78 +153,11 @@ def _factorised(scene: Scene, solver: str) -> tuple[GlobalSystem, float]:
     return system, perf_counter() - started
 
 
-def _basis(scene: Scene, training: Training, spec: MethodSpec) -> Basis:
-    group = scene.groups[0]
-    mass, rows = row_masses(group, scene.masses), group.rows_per_element
-    roundoff = float(np.linalg.norm(training.roundoff))
-    return compute_basis(training.projections, mass, roundoff, rows_per_element=rows, spec=spec)
+def _training(scene: Scene, system: GlobalSystem, frames: int) -> tuple[np.ndarray, ...]:
+    """Positions (n, N, 3) m after the first n ``frames`` of the full-order run of ``scene``.
 
-
-def _steps_alone(
-    scene: Scene, training: Training, specs: dict[str, MethodSpec], settings: SizedBreakEven
-) -> dict[tuple[str, str, int], ReducedLocalStep]:
-    """Local steps of the first group by group, method and size, as far as the rank allows."""
-    group, steps = scene.groups[0], {}
-    for name in settings.methods:
-        spec, basis = specs[name], _basis(scene, training, specs[name])
-        sizes = sorted({min(r, basis.rank) for r in settings.sizes})
-        for size, sampling in select_path(basis, spec, sizes).items():
-            reduction = Reduction(basis, sampling, spec, r=size)
-            steps[group.name, name, size] = ReducedLocalStep(group, reduction)
-    return steps
-
-
-def _reduced(
-    scene: Scene, system: GlobalSystem, basis: Basis, spec: MethodSpec, settings: Sized
-) -> Variant:
-    group, method = scene.groups[0], settings.method
-    size = min(settings.r, basis.rank)
-    reduction = Reduction(basis, select(basis, spec, size), spec, r=size)
-    steps = replace_group(scene, group.name, ReducedLocalStep(group, reduction))
-    labels = {"r": reduction.r, "elements_sampled": len(reduction.elements)}
-    return variant(scene, system, steps, settings.frames, {"method": method, **labels})
-
-
-def _subspace(scene: Scene, training: Training, settings: Sized) -> Variant:
-    columns = make_columns(scene, training.positions, "pod", k=settings.k)
-    frames = np.arange(len(training.positions))
-    (samples,) = sample_elements(scene, columns, frames, tolerances=[settings.tolerance])
-    model = SubspaceModel("pod", columns, samples)
-    labels = {
-        "method": "ecsw",
-        "k": columns.modes,
-        "elements_sampled": model.elements_evaluated(scene),
-    }
-    return Variant(labels, *model.loop(scene), settings.frames)
-
-
-def _times(scene: Scene, measured: Measurement) -> dict[str, Any]:
-    """Mean milliseconds of an iteration."""
-    local = (measured.local + measured.assembly) / scene.config.iterations
-    solve = measured.solve / scene.config.iterations
-    return {
-        "vertices": scene.mesh.vertices,
-        "elements": sum(group.elements for group in scene.groups),
-        "ms_per_iteration": measured.frame / scene.config.iterations,
-        "local_ms": local,
-        "global_ms": solve,
-        "local_share": local / (local + solve),
-    }
-
-
-def _memory() -> float:
-    """Resident memory of this process, in MB, after what is free went back to the system."""
-    gc.collect()
-    trim = getattr(ctypes.CDLL(None), "malloc_trim", None) if os.name == "posix" else None
-    if trim is not None:  # glibc; elsewhere small sizes may fit into free memory
-        trim(0)
-    return psutil.Process().memory_info().rss / 1e6
-
-
-def train(scene: Scene, system: GlobalSystem, frames: int) -> Training:
-    """First ``frames`` of the full-order run of ``scene`` with the matrix of ``system``.
-
-    The projections are those at the last local iterates.
+    Beside them the projections (n, e p, 3) of its first group at the last local iterates, and their
+    roundoff (n,).
     """
     group = scene.groups[0]
     loop, state = scene.stepper(system, track_objective=False), scene.initial_state()
@@ -236,4 +170,33 @@ def train(scene: Scene, system: GlobalSystem, frames: int) -> Training:
     for frame in range(frames):
         state, _ = loop.step(state, frame, watch)
         positions.append(state.positions)
-    return Training(np.stack(positions), np.stack(projections), np.array(roundoff))
+    return np.stack(positions), np.stack(projections), np.array(roundoff)
+
+
+def _reductions(
+    scene: Scene,
+    projections: np.ndarray,
+    roundoff: np.ndarray,
+    spec: MethodSpec,
+    asked: Sequence[int],
+) -> list[Reduction]:
+    """Reductions of the first group in sizes as large as ``asked``, as far as the rank allows."""
+    group = scene.groups[0]
+    basis = compute_basis(
+        projections,
+        row_masses(group, scene.masses),
+        float(np.linalg.norm(roundoff)),
+        rows_per_element=group.rows_per_element,
+        spec=spec,
+    )
+    sizes = sorted({min(r, basis.rank) for r in asked})
+    return list(reductions(basis, spec, sizes).values())
+
+
+def _memory() -> float:
+    """Resident memory of this process, in MB, after what is free went back to the system."""
+    gc.collect()
+    trim = getattr(ctypes.CDLL(None), "malloc_trim", None) if os.name == "posix" else None
+    if trim is not None:  # glibc; elsewhere small sizes may fit into free memory
+        trim(0)
+    return psutil.Process().memory_info().rss / 1e6

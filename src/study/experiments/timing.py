@@ -1,9 +1,8 @@
 """Milliseconds a frame of full-order and reduced runs, of local steps alone, and of effects."""
 
 import logging
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from time import perf_counter
 from typing import Annotated, Any
 
@@ -15,7 +14,6 @@ from scipy import sparse
 from pdrom.core.store import open_hdf5, write_table
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.model.constraints.base import ConstraintGroup
-from pdrom.model.dynamics.stepper import LocalStep
 from pdrom.model.dynamics.system import GlobalSystem
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.basis import load_basis
@@ -28,33 +26,21 @@ from study.artifact.reads import Every, Settings
 from study.experiments.iterations import IterationCounts, accelerated, stepper_of
 from study.experiments.kit.costs import effect_costs, left_out, local_costs, variant
 from study.experiments.kit.declaration import experiment
-from study.experiments.kit.load_reduction import basis_of, load_reduction
-from study.experiments.kit.measurement import Measurement, Protocol, Variant, measure
+from study.experiments.kit.measurement import Protocol, Variant, measure
+from study.experiments.kit.reruns import basis_of, load_reduction
 from study.experiments.kit.scenes import scene_of
 from study.experiments.kit.settings import ANDERSON, FOM, Count, Rank, Solver, resolve_ranks
 
 
-class _Slower:
-    """Base of the implementations; the time of their products with S^T is counted separately."""
+class NumpyLocalStep:
+    """Vectorised NumPy projections of all elements, SciPy sparse products around them.
 
-    implementation: str
+    The time of the products with S^T is counted separately, here as in the other implementation.
+    """
 
     def __init__(self, group: ConstraintGroup) -> None:
-        self.name = group.name
-        self.group = group
+        self.name, self.group, self.begin_frame = group.name, group, group.begin_frame
         self.assembly_seconds = 0.0
-
-    def begin_frame(self, q: np.ndarray) -> None:
-        self.group.begin_frame(q)
-
-
-class NumpyLocalStep(_Slower):
-    """Vectorised NumPy projections of all elements, SciPy sparse products around them."""
-
-    implementation = "numpy"
-
-    def __init__(self, group: ConstraintGroup) -> None:
-        super().__init__(group)
         self._shape = (group.elements, group.rows_per_element, 3)
         self._all = np.arange(group.elements)
         self._weights = group.row_weights[:, None]
@@ -71,13 +57,12 @@ class NumpyLocalStep(_Slower):
         return energy
 
 
-class InterpretedLocalStep(_Slower):
+class InterpretedLocalStep:
     """One element after the other in interpreted Python, as straightforward codes do it."""
 
-    implementation = "interpreted"
-
     def __init__(self, group: ConstraintGroup) -> None:
-        super().__init__(group)
+        self.name, self.group, self.begin_frame = group.name, group, group.begin_frame
+        self.assembly_seconds = 0.0
         rows = group.rows_per_element
         self._blocks = []
         for e in range(group.elements):
@@ -107,13 +92,10 @@ IMPLEMENTATIONS: dict[str, Callable[[ConstraintGroup], Any]] = {
 
 log = logging.getLogger(__name__)
 
-Make = Callable[[dict[str, Any], Sequence[LocalStep]], Variant]
-Alone = dict[tuple[str, str, int], ReducedLocalStep]
-
 COLUMNS = [
     "scene", "group", "method", "position_basis", "k", "r", "iterations", "vertices",
     "implementation", "ms_per_frame", "inertia_ms", "local_ms", "assembly_ms", "lift_ms",
-    "global_ms", "repeats",
+    "global_ms",
 ]  # fmt: skip
 STATES = 5  # states of the full-order run at which local steps are timed alone
 
@@ -175,16 +157,39 @@ def timing(
     without: File,
 ) -> None:
     """Measure frames (``out``), local steps alone, effects, and frames ``without`` each of them."""
-    scene = scene_of(settings.scene, mesh)
-    system, asked = scene.system_with(settings.solver), settings.timing
-    frames, name = min(asked.frames, scene.config.frames), scene.config.name
-    variants, alone = _variants(scene, system, frames, settings, samplings, bases, subspaces)
-    slow = [v for v in variants if v.labels["implementation"] == "interpreted"]
-    quick = [v for v in variants if v.labels["implementation"] != "interpreted"]
-    reported = partial(log.info, f"{name}: repeat %d of %d")
-    results = measure(quick, asked.warmup, asked.repeats, progress=reported)
-    results += measure(slow, 0, asked.repeats)
-    write_table(pd.DataFrame([_row(scene, m) for m in results], columns=COLUMNS), out.path)
+    scene, asked = scene_of(settings.scene, mesh), settings.timing
+    system, name = scene.system_with(settings.solver), scene.config.name
+    frames = min(asked.frames, scene.config.frames)
+    common = {"scene": name, "vertices": scene.mesh.vertices, "iterations": scene.config.iterations}
+    slow, quick = _full_order(scene, system, frames, asked, common)
+    quick += _other_counts(scene, system, frames, settings.iterations, common)
+    alone: dict[tuple[str, str, int], ReducedLocalStep] = {}
+    for sampling in samplings:
+        spec = settings.methods[sampling["method"]]
+        basis = load_basis(basis_of(sampling, spec, bases).path)
+        with open_hdf5(sampling.path) as stored:  # sizes that the file holds
+            held = {int(key[1:]) for key in stored if key.startswith("r")}
+        timed = held.intersection(resolve_ranks(settings.ranks, basis.rank))
+        sizes = held.intersection(resolve_ranks(asked.breakeven, basis.rank))
+        sizes = set() if spec.rows == "all" else sizes
+        group = scene.group(sampling["group"])
+        for r in sorted(timed | sizes):
+            reduction = load_reduction(basis, sampling.path, spec, r=r)
+            step = ReducedLocalStep(group, reduction)
+            if r in timed:
+                own = {"group": group.name, "method": sampling["method"], "r": r}
+                labels = {**common, **own, "implementation": "compiled"}
+                steps = replace_group(scene, group.name, step)
+                quick.append(variant(scene, system, steps, frames, labels))
+            if r in sizes:
+                alone[group.name, sampling["method"], r] = step
+    for file in subspaces:
+        for own, model in load_models(file.path):
+            labels = {**common, "iterations": None, "implementation": "compiled", "group": "all"}
+            quick.append(Variant({**labels, **own}, *model.loop(scene), frames))
+    log.info("%s: %d runs of %d frames", name, len(quick) + 1, frames)
+    results = measure(quick, asked.warmup, asked.repeats) + measure([slow], 0, asked.repeats)
+    write_table(pd.DataFrame(results, columns=COLUMNS), out.path)
     log.info("%s: %d reduced local steps alone", name, len(alone))
     often = {"warmup": asked.warmup, "repeats": asked.breakeven_repeats}
     times = local_costs(scene, alone, _states(fom), **often)
@@ -195,79 +200,28 @@ def timing(
     write_table(left_out(scene, costs, frames, **often, solver=settings.solver), without.path)
 
 
-def _variants(
-    scene: Scene,
-    system: GlobalSystem,
-    frames: int,
-    settings: Options,
-    samplings: list[File],
-    bases: list[File],
-    subspaces: list[File],
-) -> tuple[list[Variant], Alone]:
-    """Everything whose frames are timed, and the reduced local steps that are timed alone."""
-
-    def make(labels: dict[str, Any], steps: Sequence[LocalStep]) -> Variant:
-        labels = {"iterations": scene.config.iterations, **labels}
-        return variant(scene, system, steps, frames, labels)
-
-    variants = _full_order(scene, make, settings.timing)
-    variants += _other_counts(scene, system, frames, settings.iterations)
-    alone: Alone = {}
-    for sampling in samplings:
-        group, method = sampling["group"], sampling["method"]
-        source = _Source(scene.group(group), sampling, settings.methods[method], bases)
-        for r in source.sizes(settings.ranks):
-            step, labels = source.step(r), {"group": group, "method": method, "r": r}
-            steps = replace_group(scene, group, step)
-            variants.append(make({**labels, "implementation": "compiled"}, steps))
-        if source.spec.rows != "all":
-            for r in source.sizes(settings.timing.breakeven):
-                alone[group, method, r] = source.step(r)
-    for file in subspaces:
-        for labels, model in load_models(file.path):
-            labels = {"group": "all", **labels, "implementation": "compiled"}
-            variants.append(Variant(labels, *model.loop(scene), frames))
-    return variants, alone
-
-
-class _Source:
-    """Reduced local steps of one group and method, by size."""
-
-    def __init__(
-        self, group: ConstraintGroup, sampling: File, spec: MethodSpec, bases: list[File]
-    ) -> None:
-        self.spec = spec
-        self._group, self._path = group, sampling.path
-        self._space = load_basis(basis_of(sampling, spec, bases).path)
-        with open_hdf5(sampling.path) as stored:
-            self._stored = {int(key[1:]) for key in stored if key.startswith("r")}
-
-    def sizes(self, asked: Sequence[Rank]) -> list[int]:
-        """Requested sizes that the basis can have and the file holds."""
-        return [r for r in resolve_ranks(asked, self._space.rank) if r in self._stored]
-
-    def step(self, r: int) -> ReducedLocalStep:
-        """Local step of size r."""
-        reduction = load_reduction(self._space, self._path, self.spec, r=r)
-        return ReducedLocalStep(self._group, reduction)
-
-
-def _full_order(scene: Scene, make: Make, timing: Timing) -> list[Variant]:
-    """The full-order run in every implementation; the slowest does only some iterations."""
-    variants = [make({"implementation": "compiled"}, scene.groups)]
+def _full_order(
+    scene: Scene, system: GlobalSystem, frames: int, asked: Timing, common: dict[str, Any]
+) -> tuple[Variant, list[Variant]]:
+    """The full-order run in the slowest implementation, of some iterations only, and in others."""
+    quick = variant(scene, system, scene.groups, frames, {**common, "implementation": "compiled"})
+    made = [quick]
     for name, step in IMPLEMENTATIONS.items():
-        made = make({"implementation": name}, [step(g) for g in scene.groups])
-        frames = min(made.frames, getattr(timing, f"{name}_frames"))
-        variants.append(replace(made, frames=frames))
-    slow = variants[-1]
-    whole = scene.config.iterations
-    slow.loop.iterations = min(whole, timing.interpreted_iterations)
-    variants[-1] = replace(slow, share=slow.loop.iterations / whole)
-    return variants
+        steps = [step(group) for group in scene.groups]
+        fewer = min(frames, getattr(asked, f"{name}_frames"))
+        labels = {**common, "implementation": name}
+        made.append(variant(scene, system, steps, fewer, labels))
+    slow, whole = made.pop(), scene.config.iterations
+    slow.loop.iterations = min(whole, asked.interpreted_iterations)
+    return replace(slow, share=slow.loop.iterations / whole), made
 
 
 def _other_counts(
-    scene: Scene, system: GlobalSystem, frames: int, asked: IterationCounts
+    scene: Scene,
+    system: GlobalSystem,
+    frames: int,
+    asked: IterationCounts,
+    common: dict[str, Any],
 ) -> list[Variant]:
     """The compiled full-order run with other numbers of iterations, plain and accelerated."""
     variants = []
@@ -278,7 +232,7 @@ def _other_counts(
             loop = stepper_of(scene, system, count, window=size)
             method = ANDERSON if size else FOM
             labels = {"method": method, "iterations": count, "implementation": "compiled"}
-            variants.append(Variant(labels, loop, scene.initial_state(), frames))
+            variants.append(Variant({**common, **labels}, loop, scene.initial_state(), frames))
     return variants
 
 
@@ -287,18 +241,3 @@ def _states(run: File) -> np.ndarray:
     with open_hdf5(run.path) as file:
         positions = file["positions"]
         return np.stack([positions[i * (len(positions) - 1) // STATES] for i in range(STATES)])
-
-
-def _row(scene: Scene, measurement: Measurement) -> dict[str, Any]:
-    return {
-        "scene": scene.config.name,
-        "vertices": scene.mesh.vertices,
-        **measurement.labels,
-        "ms_per_frame": measurement.frame,
-        "inertia_ms": measurement.inertia,
-        "local_ms": measurement.local,
-        "assembly_ms": measurement.assembly,
-        "lift_ms": measurement.lift,
-        "global_ms": measurement.solve,
-        "repeats": measurement.repeats,
-    }

@@ -126,7 +126,7 @@ SOME: dict[Place, Callable[[Study], Iterator[Labels]]] = {
     **dict.fromkeys([paths.FIGURE, paths.FIGURE_PICTURE], _named(declarations)),
     paths.PAPER_INPUT: _named(lambda: FILES),
     **dict.fromkeys(_in_subspaces, _subspaces),
-    **dict.fromkeys([paths.SCALING, paths.BREAK_EVEN_SIZED, paths.EFFECTS_SIZED], _sizes),
+    **dict.fromkeys([paths.SCALING, paths.BREAK_EVEN_SIZED], _sizes),
     **dict.fromkeys(_online, lambda study: ({"scene": scene} for scene in study.online)),
     paths.REPETITIONS: _groups(_repeated),
     **dict.fromkeys([paths.NOISE, paths.NOISE_RUNS], _groups(_noisy)),

@@ -23,21 +23,10 @@ from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, PerScene, TableOf
 from study.experiments.kit.settings import ANDERSON, FOM
-from study.tables.kit.declaration import compared, flag, integer, number, table, text, timed
+from study.tables.kit.declaration import flag, integer, number, table, text, timed
 from study.tables.kit.parts import joined, timings_in_one_time
 from study.tables.kit.reruns import COLUMNS, MEDIAN, trained, with_held_out
-from study.tables.kit.vocabulary import (
-    ERROR_WITHIN,
-    GROUP,
-    METHOD,
-    MS_PER_FRAME,
-    POSITION_BASIS,
-    SCENE,
-    USERS,
-    VERTICES,
-    K,
-    R,
-)
+from study.tables.kit.vocabulary import shared
 
 FEWER = "fewer-iterations"
 _MODEL = ["scene", "position_basis", "k", "method"]
@@ -48,28 +37,19 @@ CONVERGED, OWN = "converged", "own iterations"
     title="Every method and size as a point of accuracy and cost",
     only_with_error=True,
     columns=(
-        SCENE,
-        GROUP,
-        METHOD,
-        POSITION_BASIS,
-        K,
-        R,
+        *shared("scene group method position_basis k r"),
         integer("iterations", "local/global iterations of a frame"),
-        ERROR_WITHIN,
-        MS_PER_FRAME,
+        *shared("relative_error_within_horizon ms_per_frame"),
         timed(flag("pareto", "no point of the same reference is as good in both, better in one")),
-        compared(
-            "error",
-            number(
-                "error_converged",
-                "error against the run of converged frames: of the full order, whose error before "
-                "the horizon may have another reference, and in position subspaces",
-            ),
+        number(
+            "error_converged",
+            "error against the run of converged frames: of the full order, whose error before "
+            "the horizon may have another reference, and in position subspaces",
             tolerance=0.05,
         ),
         *COLUMNS,
         timed(flag("pareto_heldout", "the same by the error held out; full order as it is")),
-        *USERS,
+        *shared("velocity_error relative_shape_error energy_drift contact_delay"),
     ),
     reads={
         "reruns": TableOf("reduced_reruns"),
@@ -160,25 +140,26 @@ def pareto(error: Sequence[float], cost: Sequence[float]) -> list[bool]:
 @table(
     title="Requested tolerances and errors reached",
     columns=(
-        SCENE,
+        *shared("scene"),
         text("motion", "held-out motion that was run"),
-        compared("exact", number("tolerance", "largest relative error of the positions requested")),
-        VERTICES,
-        compared("error", flag("met", "the run says that it is within the tolerance")),
-        compared("error", integer("frames", "first frames for which it says so")),
-        compared("error", flag("reduced", "a reduction made the run")),
+        number("tolerance", "largest relative error of the positions requested", compared="exact"),
+        *shared("vertices"),
+        flag("met", "the run says that it is within the tolerance", compared="error"),
+        integer("frames", "first frames for which it says so", compared="error"),
+        flag("reduced", "a reduction made the run", compared="error"),
         number("error", "error over these frames against the converged implicit step"),
         number("velocity_error", "error of the velocities, likewise"),
-        compared("error", number("expected", "error in the calibration, times the factor")),
-        compared("error", number("estimate", "estimate by checks and a second run, likewise")),
-        compared("error", flag("broken", "met, and the error is above the tolerance")),
-        compared("error", text("level", "level of accuracy that made the run")),
-        compared("error", integer("failed", "levels that were tried before")),
-        compared("error", integer("checks", "frames that a more accurate level did as well")),
-        MS_PER_FRAME,
-        compared(
-            "error",
-            text("full_level", "cheapest full order within the tolerance by the calibration"),
+        number("expected", "error in the calibration, times the factor", compared="error"),
+        number("estimate", "estimate by checks and a second run, likewise", compared="error"),
+        flag("broken", "met, and the error is above the tolerance", compared="error"),
+        text("level", "level of accuracy that made the run", compared="error"),
+        integer("failed", "levels that were tried before", compared="error"),
+        integer("checks", "frames that a more accurate level did as well", compared="error"),
+        *shared("ms_per_frame"),
+        text(
+            "full_level",
+            "cheapest full order within the tolerance by the calibration",
+            compared="error",
         ),
         number("full_error", "its error over the same frames"),
         timed(number("full_ms", "time of its frame, without checks", "ms")),

@@ -14,11 +14,11 @@ from study.artifact.paths import File
 from study.artifact.reads import Every, Setting, TableOf
 from study.experiments.alternatives import settings
 from study.experiments.alternatives.settings import REDUCTIONS
-from study.tables.kit.declaration import compared, flag, integer, number, table, text, timed
+from study.tables.kit.declaration import flag, integer, number, table, text, timed
 from study.tables.kit.parts import joined, median_interval
-from study.tables.kit.vocabulary import ELEMENTS_SAMPLED, METHOD, MS_PER_FRAME, SCENE, VERTICES, K
+from study.tables.kit.vocabulary import shared
 
-STIFFNESS = compared("exact", number("stiffness", "factor on all weights of the scene"))
+STIFFNESS = number("stiffness", "factor on all weights of the scene", compared="exact")
 SUBSTEPS = integer("substeps", "steps that a frame is divided into")
 ITERATIONS = integer("iterations", "iterations of each substep")
 
@@ -41,15 +41,15 @@ CURVE = ["scene", "stiffness", "reference", "limit"]
 PLAIN = "projective"
 KNOWN = 3.0  # a motion decides about an error only if it is known this many times better
 REFERENCE = text("reference", "what the error is taken against: implicit or continuous")
-LIMIT = compared("exact", number("limit", "error that is allowed"))
+LIMIT = number("limit", "error that is allowed", compared="exact")
 
 
 @table(
     title="Error and time of the alternatives to projective dynamics",
     columns=(
-        SCENE,
-        compared("exact", number("factor", "on the vertices along a side of the scene's own mesh")),
-        VERTICES,
+        *shared("scene"),
+        number("factor", "on the vertices along a side of the scene's own mesh", compared="exact"),
+        *shared("vertices"),
         STIFFNESS,
         text(
             "method",
@@ -59,17 +59,20 @@ LIMIT = compared("exact", number("limit", "error that is allowed"))
         SUBSTEPS,
         ITERATIONS,
         TRAINED_ON,
-        K,
-        ELEMENTS_SAMPLED,
+        *shared("k elements_sampled"),
         MOTION,
         integer("frames", "frames that errors are taken over"),
-        compared("error", flag("finite", "no frame blew up")),
-        MS_PER_FRAME,
+        flag("finite", "no frame blew up", compared="error"),
+        *shared("ms_per_frame"),
         timed(number("ms_low", "the same in the fastest process", "ms")),
         timed(number("ms_high", "the same in the slowest process", "ms")),
         integer("processes", "processes that timed it, all in the first motion"),
-        compared("error", number("error_implicit", "against the converged step"), LOOSE),
-        compared("error", number("error_continuous", "against continuous time: the total"), LOOSE),
+        number("error_implicit", "against the converged step", tolerance=LOOSE),
+        number(
+            "error_continuous",
+            "against continuous time: the total",
+            tolerance=LOOSE,
+        ),
         number("reference_error", "estimated error of that motion"),
     ),
     reads={"parts": Every(paths.ALTERNATIVES), "times": Every(paths.ALTERNATIVE_TIMES)},
@@ -104,17 +107,16 @@ def beside(rows: pd.DataFrame, times: pd.DataFrame) -> tuple[pd.DataFrame, list[
 @table(
     title="Who reaches an error in the shortest time",
     columns=(
-        SCENE,
-        VERTICES,
+        *shared("scene vertices"),
         STIFFNESS,
         MOTION,
         REFERENCE,
         LIMIT,
-        timed(METHOD),
+        *map(timed, shared("method")),
         timed(SUBSTEPS),
         timed(ITERATIONS),
         timed(number("error", "error that it has")),
-        MS_PER_FRAME,
+        *shared("ms_per_frame"),
         timed(text("second", "the next best of the other full-order methods")),
         timed(number("second_ms", "time of a frame of the second", "ms")),
         timed(number("margin", "time of the second over that of the first")),

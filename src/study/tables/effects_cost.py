@@ -8,21 +8,9 @@ from study.artifact.paths import File
 from study.artifact.reads import Every, Setting, TableOf
 from study.experiments.kit.settings import FOM, GLOBAL, REST, RIGHT, floor_of, horizons
 from study.experiments.sensitivity import without
-from study.tables.kit.declaration import compared, flag, integer, number, table, text, timed
+from study.tables.kit.declaration import flag, integer, number, table, text, timed
 from study.tables.kit.parts import in_one_time, joined, timings_in_one_time
-from study.tables.kit.vocabulary import (
-    ELEMENTS_SAMPLED,
-    FLOOR,
-    GLOBAL_MS,
-    LOCAL_MS,
-    LOCAL_SHARE,
-    MS_PER_FRAME,
-    SCENE,
-    SPEEDUP,
-    VERTICES,
-    K,
-    R,
-)
+from study.tables.kit.vocabulary import shared
 
 KEYS = ["scene", "effect"]
 NOTHING = "nothing"  # left out: the whole scene
@@ -36,7 +24,7 @@ FEWEST = 3  # meshes, for an exponent
 @table(
     title="Cost and contribution of each effect in a full-order run",
     columns=(
-        SCENE,
+        *shared("scene"),
         text(
             "effect",
             "name of the effect; right-hand side, global solve and the rest have rows, too, and "
@@ -48,21 +36,22 @@ FEWEST = 3  # meshes, for an exponent
             f"{PHASE}: no effect; {SEVERAL}: left out together",
         ),
         integer("elements", "elements of a group, vertices of another effect"),
-        MS_PER_FRAME,
+        *shared("ms_per_frame"),
         timed(number("share", "of the frame; those of a scene add up to one")),
         integer("groups", "constraint groups of the scene that is built without it"),
         timed(number("without_ms", "time of a frame of the scene that is built without it", "ms")),
         timed(number("saved_ms", "time of the whole scene less that", "ms")),
         number("force", "root mean square over the frames of the norm of its force", "N"),
         number("force_share", "of the sum over the effects of the scene"),
-        compared("error", integer("acting_frames", "frames in which it exerts a force at all")),
+        integer("acting_frames", "frames in which it exerts a force at all", compared="error"),
         number("energy", "range of the energy that it holds, where it has one", "J"),
-        compared(
-            "error",
-            number("moved", "how far the run moves without it: largest drift before the horizon"),
+        number(
+            "moved",
+            "how far the run moves without it: largest drift before the horizon",
+            compared="error",
         ),
-        FLOOR,
-        compared("error", flag("above_floor", "moved is larger than the sensitivity floor")),
+        *shared("sensitivity_floor"),
+        flag("above_floor", "moved is larger than the sensitivity floor", compared="error"),
     ),
     reads={
         "parts": Every(paths.EFFECTS),
@@ -166,13 +155,11 @@ def _largest(
 @table(
     title="Share of the local step in a full-order frame",
     columns=(
-        SCENE,
+        *shared("scene"),
         text("implementation", f"of the local step: {', '.join(IMPLEMENTATIONS)}"),
-        VERTICES,
-        LOCAL_MS,
+        *shared("vertices local_ms"),
         timed(number("assembly_ms", "time of the right-hand side in a frame", "ms")),
-        GLOBAL_MS,
-        LOCAL_SHARE,
+        *shared("global_ms local_share"),
     ),
     reads={"timings": Every(paths.TIMINGS), "frame_times": TableOf("frame_times")},
 )
@@ -195,20 +182,17 @@ def local_share(timings: list[File], frame_times: pd.DataFrame) -> pd.DataFrame:
 @table(
     title="Cost of an iteration against the size of the mesh",
     columns=(
-        SCENE,
+        *shared("scene"),
         text("method", f"{FOM} (full order), a reduced local step, or ecsw"),
-        VERTICES,
+        *shared("vertices"),
         integer("elements", "elements of all groups"),
-        R,
-        K,
-        ELEMENTS_SAMPLED,
+        *shared("r k elements_sampled"),
         timed(number("factorisation_ms", "assembly and factorisation of the system", "ms")),
         timed(number("memory_mb", "memory that both took", "MB")),
         timed(number("ms_per_iteration", "time of an iteration", "ms")),
         timed(number("local_ms", "time of the local step in an iteration", "ms")),
         timed(number("global_ms", "time of the global solve in an iteration", "ms")),
-        LOCAL_SHARE,
-        SPEEDUP,
+        *shared("local_share speedup"),
         timed(number("local_speedup", "the same of the local step alone")),
         integer("meshes", "sizes of the mesh of the curve"),
         timed(number("exponent", "of the time of an iteration in the number of vertices")),

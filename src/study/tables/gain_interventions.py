@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 
 from study.artifact.reads import TableOf
-from study.tables.kit.declaration import compared, integer, number, table, text
+from study.tables.kit.declaration import integer, number, table, text
 from study.tables.kit.reruns import families, judged_runs
 
 RESAMPLES, SEED = 2000, 1
@@ -44,34 +44,29 @@ _CELL = ["scene", "group", "r"]
         text("step", f"one of: {', '.join([*STEPS, *SQUARE, *KINDS])}"),
         text("method_before", "method before the step"),
         text("method_after", "method after it, on the same basis"),
-        compared("share", integer("pairs", "scenes, groups and sizes at which both methods ran")),
-        compared("share", integer("scenes", "scenes among them")),
-        compared("share", number("gain_ratio", "median of the gain after over that before")),
-        compared(
-            "share", number("error_ratio", "median of the error of the run after over that before")
+        integer("pairs", "scenes, groups and sizes at which both methods ran", compared="share"),
+        integer("scenes", "scenes among them", compared="share"),
+        number("gain_ratio", "median of the gain after over that before", compared="share"),
+        number(
+            "error_ratio", "median of the error of the run after over that before", compared="share"
         ),
-        compared(
-            "share",
-            number(
-                "error_ratio_low",
-                "2.5 % quantile of this median, families of scenes resampled (bootstrap)",
-            ),
+        number(
+            "error_ratio_low",
+            "2.5 % quantile of this median, families of scenes resampled (bootstrap)",
+            compared="share",
         ),
-        compared("share", number("error_ratio_high", "97.5 % quantile")),
-        compared("share", number("fallen_share", "pairs whose error falls")),
-        compared("share", integer("scenes_fallen", "scenes whose median error ratio is below one")),
-        compared(
-            "share",
-            number("p_value", "two-sided sign test over all families, for which a tie is no fall"),
+        number("error_ratio_high", "97.5 % quantile", compared="share"),
+        number("fallen_share", "pairs whose error falls", compared="share"),
+        integer("scenes_fallen", "scenes whose median error ratio is below one", compared="share"),
+        number(
+            "p_value",
+            "two-sided sign test over all families, for which a tie is no fall",
+            compared="share",
         ),
-        compared("share", integer("families", "families among the scenes: a scene and its twin")),
-        compared(
-            "share", integer("families_fallen", "those whose median error ratio is below one")
-        ),
-        compared(
-            "share", number("rank_correlation", "of the two ratios over the pairs (Spearman)")
-        ),
-        compared("share", number("unexplained_share", "pairs of which one falls, the other not")),
+        integer("families", "families among the scenes: a scene and its twin", compared="share"),
+        integer("families_fallen", "those whose median error ratio is below one", compared="share"),
+        number("rank_correlation", "of the two ratios over the pairs (Spearman)", compared="share"),
+        number("unexplained_share", "pairs of which one falls, the other not", compared="share"),
     ),
     reads={
         "reruns": TableOf("reduced_reruns"),

@@ -8,10 +8,10 @@ import pandas as pd
 from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, TableOf
-from study.tables.kit.declaration import compared, integer, number, table, timed
+from study.tables.kit.declaration import integer, number, table, timed
 from study.tables.kit.parts import joined
 from study.tables.kit.reruns import FAILED, trained, with_held_out
-from study.tables.kit.vocabulary import ELEMENTS, GROUP, METHOD, POSITION_BASIS, SCENE, VERTICES, R
+from study.tables.kit.vocabulary import shared
 
 # What the sizes r of one line of the table have in common.
 CURVE = ["scene", "group", "method", "factor"]
@@ -22,13 +22,9 @@ _ERROR = "relative_error_within_horizon"
 @table(
     title="Reduced local steps against the full one, and where they stop paying",
     columns=(
-        SCENE,
-        GROUP,
-        METHOD,
-        compared("exact", number("factor", "on the vertices along a side of the scene's own mesh")),
-        VERTICES,
-        ELEMENTS,
-        R,
+        *shared("scene group method"),
+        number("factor", "on the vertices along a side of the scene's own mesh", compared="exact"),
+        *shared("vertices elements r"),
         timed(number("local_ms", "time of the reduced local step", "ms")),
         timed(number("full_ms", "time of the full local step of the group", "ms")),
         timed(number("ratio", "the first over the second")),
@@ -85,14 +81,12 @@ def break_even(r: Sequence[int], ratio: Sequence[float]) -> int | None:
 @table(
     title="Where reductions pay and where they lose to the full order",
     columns=(
-        POSITION_BASIS,
-        METHOD,
-        compared("share", integer("scenes", "scenes (and groups) with a timed run")),
-        compared(
-            "share",
-            integer(
-                "accurate", "those with a run whose error before the horizon is at most a tenth"
-            ),
+        *shared("position_basis method"),
+        integer("scenes", "scenes (and groups) with a timed run", compared="share"),
+        integer(
+            "accurate",
+            "those with a run whose error before the horizon is at most a tenth",
+            compared="share",
         ),
         timed(integer("pays", "those among them with an accurate run faster than the full order")),
         timed(integer("loses", "those whose accurate runs are all slower")),
@@ -109,13 +103,11 @@ def break_even(r: Sequence[int], ratio: Sequence[float]) -> int | None:
         timed(integer("heldout", "runs that had a held-out motion")),
         timed(number("error_heldout_low", "median of the least error of each over its motions")),
         timed(number("error_heldout_high", "median of the largest")),
-        compared(
-            "share",
-            integer(
-                "accurate_heldout",
-                "scenes (and groups) whose most accurate size on the training motion has at most a "
-                "tenth held out",
-            ),
+        integer(
+            "accurate_heldout",
+            "scenes (and groups) whose most accurate size on the training motion has at most a "
+            "tenth held out",
+            compared="share",
         ),
         timed(integer("pays_heldout", "those that pay whose run has at most a tenth held out")),
     ),

@@ -6,9 +6,9 @@ from pdrom.reduction.basis import load_basis
 from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, Preferred
-from study.tables.kit.declaration import compared, flag, integer, number, table, text
+from study.tables.kit.declaration import flag, integer, number, table, text
 from study.tables.kit.parts import joined
-from study.tables.kit.vocabulary import ELEMENTS_SAMPLED, GAIN, GROUP, METHOD, SCENE, R
+from study.tables.kit.vocabulary import shared
 
 _SMALL = "empty at round-off level"
 
@@ -16,8 +16,7 @@ _SMALL = "empty at round-off level"
 @table(
     title="Singular values of the training snapshots",
     columns=(
-        SCENE,
-        GROUP,
+        *shared("scene group"),
         integer("component", "number of the mode, from 1"),
         number("singular_value", "of the snapshot matrix", "that of the group's projections"),
         number("relative", "over the first one"),
@@ -50,18 +49,15 @@ def singular_values(bases: list[File]) -> pd.DataFrame:
 @table(
     title="Reconstruction error of every method and size",
     columns=(
-        SCENE,
-        GROUP,
-        METHOD,
-        R,
+        *shared("scene group method r"),
         text("split", "snapshots that are reconstructed: train, test, heldout"),
         number("relative_error", f"of the projections; {_SMALL}"),
         number("relative_error_x", f"of their x-coordinates; {_SMALL}"),
         number("relative_error_y", f"of their y-coordinates; {_SMALL}"),
         number("relative_error_z", f"of their z-coordinates; {_SMALL}"),
-        GAIN,
-        compared("value", integer("rows_sampled", "rows of the projections that are evaluated")),
-        ELEMENTS_SAMPLED,
+        *shared("gain"),
+        integer("rows_sampled", "rows of the projections that are evaluated", compared="value"),
+        *shared("elements_sampled"),
     ),
     reads={"parts": Every(paths.RECONSTRUCTION)},
 )

@@ -13,21 +13,19 @@ from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, Setting, TableOf
 from study.experiments.kit.settings import floor_of, horizons
-from study.tables.kit import vocabulary
 from study.tables.kit.declaration import table, text
 from study.tables.kit.parts import timings_in_one_time
 from study.tables.kit.reruns import KEYS, TRAIN
+from study.tables.kit.vocabulary import shared
 
 
 @table(
     title="Reduced runs of the training and the held-out motions",
     columns=(
-        vocabulary.SCENE, vocabulary.GROUP, vocabulary.METHOD, vocabulary.POSITION_BASIS,
-        vocabulary.K, vocabulary.R, vocabulary.FRAMES, vocabulary.FINITE, vocabulary.BLOWUP_FRAME,
-        vocabulary.MAX_EXTENT, vocabulary.RELATIVE_ERROR, vocabulary.ERROR_WITHIN,
-        vocabulary.HORIZON_FRAME, vocabulary.FLOOR, vocabulary.MS_PER_FRAME, vocabulary.LOCAL_MS,
-        vocabulary.GLOBAL_MS, vocabulary.SPEEDUP, vocabulary.ERROR_OVER_EXTENT,
-        vocabulary.SHAPE_ERROR, *vocabulary.USERS,
+        *shared("scene group method position_basis k r frames finite blowup_frame max_extent"),
+        *shared("relative_error relative_error_within_horizon horizon_frame sensitivity_floor"),
+        *shared("ms_per_frame local_ms global_ms speedup error_over_extent shape_error"),
+        *shared("velocity_error relative_shape_error energy_drift contact_delay"),
         text(
             "motion",
             f"{TRAIN}, or how the motion differs from the training one: {', '.join(MOTIONS)}",
@@ -46,7 +44,7 @@ from study.tables.kit.reruns import KEYS, TRAIN
         "perturbation": Setting("sensitivity.reference"),
         "threshold": Setting("sensitivity.threshold"),
     },
-)  # fmt: skip
+)
 def reduced_reruns(
     runs: list[File],
     rows: list[File],

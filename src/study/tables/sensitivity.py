@@ -1,23 +1,15 @@
 """Changes of results by what should not matter, and by one choice of the method at a time."""
 
+from dataclasses import replace
+
 import pandas as pd
 
 from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every
-from study.tables.kit.declaration import compared, integer, number, table, text
+from study.tables.kit.declaration import integer, number, table, text
 from study.tables.kit.parts import joined
-from study.tables.kit.vocabulary import (
-    BLOWUP_FRAME,
-    ERROR_WITHIN,
-    FINITE,
-    FRAMES,
-    GAIN,
-    GROUP,
-    METHOD,
-    SCENE,
-    R,
-)
+from study.tables.kit.vocabulary import shared
 
 _CELL = ["scene", "group", "method", "r", "varied"]
 
@@ -25,10 +17,10 @@ _CELL = ["scene", "group", "method", "r", "varied"]
 @table(
     title="Drift of perturbed full-order runs",
     columns=(
-        SCENE,
+        *shared("scene"),
         text("perturbation", "of the start, over the extent; or what else was changed"),
         integer("frame", "number of the frame, from 0"),
-        compared("error", number("relative_difference", "largest over the seeds")),
+        number("relative_difference", "largest over the seeds", compared="error"),
     ),
     reads={"parts": Every(paths.SENSITIVITY)},
 )
@@ -42,22 +34,18 @@ def sensitivity(parts: list[File]) -> pd.DataFrame:
 @table(
     title="Runs on bases of round-off",
     columns=(
-        SCENE,
-        GROUP,
+        *shared("scene group"),
         text(
             "noisy_axes",
             "what the start's round-off reaches: all axes; of a flat mesh its plane, or this and "
             "the axis across it at one vertex",
         ),
         integer("seed", "of the start's round-off"),
-        METHOD,
-        R,
-        compared("value", integer("rank", "modes that the snapshots have without a cutoff")),
+        *shared("method r"),
+        integer("rank", "modes that the snapshots have without a cutoff", compared="value"),
         # the modes are made of round-off
-        compared("skipped", GAIN),
-        FRAMES,
-        FINITE,
-        BLOWUP_FRAME,
+        replace(*shared("gain"), compared="skipped"),
+        *shared("frames finite blowup_frame"),
         number(
             "relative_error", "error of the positions over all frames, which end at the horizon"
         ),
@@ -72,14 +60,11 @@ def noise(parts: list[File]) -> pd.DataFrame:
 @table(
     title="Repeated runs: other training frames, moved starts",
     columns=(
-        SCENE,
-        GROUP,
-        METHOD,
-        R,
+        *shared("scene group method r"),
         text("varied", "what differs: training (frames), start"),
         integer("repetitions", "runs; their range encloses the median of all but by 2^(1 - n)"),
-        compared(
-            "error", integer("ended", "runs that ended before the horizon, with an infinite error")
+        integer(
+            "ended", "runs that ended before the horizon, with an infinite error", compared="error"
         ),
         number("error_median", "median of the errors of the positions before the horizon"),
         number("error_low", "the least of them"),
@@ -87,7 +72,7 @@ def noise(parts: list[File]) -> pd.DataFrame:
         number("gain_median", "median of the gains"),
         number("gain_low", "the least of them"),
         number("gain_high", "the largest"),
-        compared("error", number("spread", "largest error over least")),
+        number("spread", "largest error over least", compared="error"),
     ),
     reads={"parts": Every(paths.REPETITIONS)},
 )
@@ -117,8 +102,7 @@ def repetitions(parts: list[File]) -> pd.DataFrame:
 @table(
     title="From the published choices to sound ones, one at a time",
     columns=(
-        SCENE,
-        GROUP,
+        *shared("scene group"),
         text(
             "direction",
             "up from published choices, down from sound ones, signs of the modes, square: "
@@ -126,16 +110,14 @@ def repetitions(parts: list[File]) -> pd.DataFrame:
         ),
         text("rung", "choice that changes on this rung"),
         integer("rows_per_element", "rows of an element"),
-        compared("value", integer("entries", "sampled entries that determine the coefficients")),
-        R,
-        compared("value", number("condition", "condition number of the sampled modes")),
-        GAIN,
+        integer("entries", "sampled entries that determine the coefficients", compared="value"),
+        *shared("r"),
+        number("condition", "condition number of the sampled modes"),
+        *shared("gain"),
         number("error_train", "reconstruction error of the training snapshots"),
         number("error_test", "the same of the snapshots between them"),
         number("error_heldout", "the same of the held-out motion"),
-        FINITE,
-        BLOWUP_FRAME,
-        ERROR_WITHIN,
+        *shared("finite blowup_frame relative_error_within_horizon"),
         integer("repetitions", "runs trained on other frames, where they were repeated"),
         number("error_median", "median of their errors before the horizon"),
         number("error_low", "the least of them"),

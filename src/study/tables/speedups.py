@@ -7,24 +7,11 @@ import pandas as pd
 from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, TableOf
-from study.experiments.kit.fresh_process import CONTROL, FULL, REDUCED
-from study.tables.kit.declaration import compared, flag, integer, number, table, text, timed
+from study.experiments.frame_times import CONTROL, FULL, REDUCED
+from study.tables.kit.declaration import flag, integer, number, table, text, timed
 from study.tables.kit.parts import confirmed, in_words, joined, median_interval
 from study.tables.kit.reruns import COLUMNS, HIGH, LOW, MEDIAN, TRAIN, TWIN, over_motions, trained
-from study.tables.kit.vocabulary import (
-    ELEMENTS_SAMPLED,
-    GROUP,
-    METHOD,
-    MS_PER_FRAME,
-    POSITION_BASIS,
-    SCENE,
-    SPEEDUP,
-    SPEEDUP_HIGH,
-    SPEEDUP_LOW,
-    VERTICES,
-    K,
-    R,
-)
+from study.tables.kit.vocabulary import shared
 
 _MODEL = ["scene", "position_basis", "k", "method"]
 _REDUCTION = ["scene", "group", "method", "r"]
@@ -41,10 +28,9 @@ _TIMES = ["ms_per_frame", "fom_ms_per_frame", "speedup", "speedup_low", "speedup
 @table(
     title="Times of full-order frames, with their controls",
     columns=(
-        SCENE,
-        VERTICES,
+        *shared("scene vertices"),
         integer("processes", "processes that timed it"),
-        MS_PER_FRAME,
+        *shared("ms_per_frame"),
         timed(number("low_ms", "2.5 % quantile of this median (bootstrap)", "ms")),
         timed(number("high_ms", "97.5 % quantile", "ms")),
         timed(number("control_ratio", "time of the same run, timed once more, over this one")),
@@ -91,30 +77,16 @@ def _named(names: tuple[str, str, str], values: pd.Series) -> dict:
 @table(
     title="Speed-ups over several processes, with what they cost",
     columns=(
-        SCENE,
-        VERTICES,
-        GROUP,
-        METHOD,
-        POSITION_BASIS,
-        K,
-        R,
+        *shared("scene vertices group method position_basis k r"),
         integer("processes", "processes that timed it"),
         timed(number("full_ms", "time of a frame of the full-order run", "ms")),
-        MS_PER_FRAME,
-        SPEEDUP,
-        SPEEDUP_LOW,
-        SPEEDUP_HIGH,
+        *shared("ms_per_frame speedup speedup_low speedup_high"),
         timed(text("shown", "the median and its quantiles, where the control confirms the times")),
         timed(flag("loses", "dearer than the full order: the upper quantile is below one")),
         timed(number("training_s", "time of the training run", "s")),
         timed(number("reduction_s", "processor time of basis and sampling", "s")),
-        compared(
-            "timed",
-            timed(
-                number(
-                    "frames_to_break_even", "frames after which both are paid back; none if never"
-                )
-            ),
+        timed(
+            number("frames_to_break_even", "frames after which both are paid back; none if never")
         ),
         number(
             "error_train", "of the training motion before the horizon, over all of a large scene"
@@ -220,23 +192,19 @@ def _first_known(made: pd.DataFrame, sources: list[pd.DataFrame], column: str) -
 @table(
     title="Large scenes in position subspaces with sampled elements",
     columns=(
-        SCENE,
-        VERTICES,
+        *shared("scene vertices"),
         integer("elements", "elements of all groups"),
-        POSITION_BASIS,
-        K,
-        compared("exact", number("tau", "tolerance of the element sampling")),
-        ELEMENTS_SAMPLED,
+        *shared("position_basis k"),
+        number("tau", "tolerance of the element sampling", compared="exact"),
+        *shared("elements_sampled"),
         number("relative_error_train", "error of the positions in the training motion"),
         number("relative_error_heldout", "the same in held-out motions: their median"),
         number("relative_error_heldout_low", "the least of them"),
         number("relative_error_heldout_high", "the largest"),
-        MS_PER_FRAME,
+        *shared("ms_per_frame"),
         timed(number("ms_per_iteration", "time of an iteration", "ms")),
         timed(number("fom_ms_per_frame", "time of a frame of the full-order run", "ms")),
-        SPEEDUP,
-        SPEEDUP_LOW,
-        SPEEDUP_HIGH,
+        *shared("speedup speedup_low speedup_high"),
     ),
     reads={
         "parts": Every(paths.ONLINE),

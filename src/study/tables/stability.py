@@ -10,24 +10,10 @@ from pdrom.core.store import open_hdf5
 from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, PerScene, Setting, TableOf
-from study.tables.kit.declaration import compared, flag, number, table, text
+from study.tables.kit.declaration import flag, number, table, text
 from study.tables.kit.parts import joined
 from study.tables.kit.reruns import KEYS, trained
-from study.tables.kit.vocabulary import (
-    BLOWUP_FRAME,
-    ENERGY_RATIO,
-    FINITE,
-    FRAMES,
-    GAIN,
-    GROUP,
-    MAX_EXTENT,
-    METHOD,
-    POSITION_BASIS,
-    RELATIVE_ERROR,
-    SCENE,
-    K,
-    R,
-)
+from study.tables.kit.vocabulary import shared
 
 # the first is the only one after which numbers of the run count
 OUTCOMES = ("accurate", "wrong", "left the scene", "blow-up", "not run", "not judged")
@@ -39,22 +25,13 @@ FRAGILE = 0.005
 @table(
     title="Where each method can be trusted",
     columns=(
-        SCENE,
-        METHOD,
-        R,
-        compared("exact", number("h", "time step", "s")),
-        compared("exact", number("stiffness_ratio", "factor on the weights of the reduced groups")),
-        FINITE,
-        BLOWUP_FRAME,
-        MAX_EXTENT,
-        ENERGY_RATIO,
-        GAIN,
-        GROUP,
-        POSITION_BASIS,
-        K,
+        *shared("scene method r"),
+        number("h", "time step", "s", compared="exact"),
+        number("stiffness_ratio", "factor on the weights of the reduced groups", compared="exact"),
+        *shared("finite blowup_frame max_extent energy_ratio gain group position_basis k"),
         text("experiment", "rerun (of the study) or sweep (a short run)"),
-        RELATIVE_ERROR,
-        compared("error", text("outcome", f"one of: {', '.join(OUTCOMES)}")),
+        *shared("relative_error"),
+        text("outcome", f"one of: {', '.join(OUTCOMES)}", compared="error"),
     ),
     reads={
         "full_order": Every(paths.TRAIN),
@@ -153,23 +130,21 @@ def _rerun_rows(
     title="Every reduction in every hard case",
     columns=(
         text("case", "name of the hard case"),
-        METHOD,
+        *shared("method"),
         flag("bounded_projections", "no state makes projections of the reduced group large"),
-        K,
-        R,
-        GAIN,
-        FRAMES,
-        compared("error", FINITE, FRAGILE),
-        BLOWUP_FRAME,
-        compared(
-            "error", number("max_extent", "largest extent over the scale of the full-order run")
+        *shared("k r gain frames"),
+        flag("finite", "no frame blew up", compared="error", tolerance=FRAGILE),
+        *shared("blowup_frame"),
+        number(
+            "max_extent", "largest extent over the scale of the full-order run", compared="error"
         ),
-        compared(
-            "skipped",
-            number("objective_rise", "largest in one iteration, over the first value of its frame"),
+        number(
+            "objective_rise",
+            "largest in one iteration, over the first value of its frame",
+            compared="skipped",
         ),
-        compared("error", text("outcome", "how the reduction fared"), FRAGILE),
-        compared("error", text("why", "reason of a refusal or of an expected failure")),
+        text("outcome", "how the reduction fared", compared="error", tolerance=FRAGILE),
+        text("why", "reason of a refusal or of an expected failure", compared="error"),
     ),
     reads={"parts": Every(paths.HARD_CASES)},
 )

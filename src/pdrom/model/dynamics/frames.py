@@ -262,9 +262,14 @@ class WholeFrames:
     def run(
         self, q: np.ndarray, v: np.ndarray, frames: range, h: float, iterations: int, track: bool
     ) -> Blocks | None:
-        """Run as many of ``frames`` as one call can do, from q and v (N, 3) with step h (s).
+        """Run as many of ``frames`` as one call can do; None where another solver is in use.
 
-        ``track`` asks for the objectives. None where the iterations take another solver.
+        Parameters
+        ----------
+        q, v : (N, 3) positions, m, and velocities, m/s, at the beginning
+        h : time step, s
+        iterations : of a frame
+        track : whether the objectives are wanted
         """
         fixed, targets = self._space.held_path(frames[:BLOCK], q)
         system = self._space.system.eliminate(fixed)

@@ -7,8 +7,6 @@ the more zeros it stores. Which columns go together is decided by dynamic progra
 processor cycles.
 """
 
-from abc import ABC, abstractmethod
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -20,18 +18,23 @@ from pdrom.core.registry import Registry
 from pdrom.model.compiled import rows
 from pdrom.model.compiled.functions import compiled
 from pdrom.model.compiled.rows import WIDTH
-from pdrom.model.dynamics.sweeps import SWEEP, load, sweep
+from pdrom.model.dynamics.sweeps import SWEEP, WIDTHS, load, sweep
 
-WIDTHS = np.array([1, 2, 3, 4, 6, 8])
 # Cycles of a panel (a branch that is guessed wrong, the chain of its own columns) and of each row
 # below, for each column and for the row itself; fitted to sheets and bars of 400 to 10,000
 # vertices.
 PANEL, ROW, ENTRY = 20.0, 1.0, 0.5
 
 
-@dataclass(frozen=True)
-class Panels:
-    """L D L^T = A with a unit lower triangular L (n, n), by panels.
+def panels(lower: sparse.csc_array, diagonal: np.ndarray) -> tuple[Any, ...]:
+    """L D L^T = A by panels, from L = ``lower`` (n, n) and D = ``diagonal`` (n,).
+
+    L is unit lower triangular with ascending row indices.
+
+    Returns
+    -------
+    The first argument of `pdrom.model.dynamics.sweeps.sweep`: the arrays, and the function's
+    address.
 
     first : (P + 1,) first column of each panel
     row_start, value_start : (P + 1,) where its rows and numbers begin
@@ -39,50 +42,22 @@ class Panels:
     values : of each panel with w columns 1 / D (w), the triangle of L row by row without its
         diagonal, then the rows below (m, w)
     """
-
-    first: np.ndarray
-    row_start: np.ndarray
-    value_start: np.ndarray
-    rows: np.ndarray
-    values: np.ndarray
-
-    @classmethod
-    def of(cls, lower: sparse.csc_array, diagonal: np.ndarray) -> "Panels":
-        """Panels of L = ``lower`` (n, n) with ascending row indices and D = ``diagonal`` (n,)."""
-        n = lower.shape[0]
-        below = np.zeros((int(WIDTHS.max()) + 1, n), np.int64)
-        _count_rows_below(lower.indptr, lower.indices, np.full(n, -1), below)
-        ends = _partition(below)
-        width = np.diff(ends, prepend=0)
-        rows = below[width, ends - 1]
-        first = np.concatenate([[0], ends]).astype(np.int32)
-        row_start = np.concatenate([[0], np.cumsum(rows)])
-        own = width + width * (width - 1) // 2
-        value_start = np.concatenate([[0], np.cumsum(own + rows * width)])
-        panels = cls(
-            first, row_start, value_start, np.empty(row_start[-1], np.int32),
-            np.zeros(value_start[-1]),
-        )  # fmt: skip
-        _fill(
-            lower.indptr, lower.indices, lower.data, 1.0 / diagonal, first, row_start, value_start,
-            panels.rows, panels.values, np.full(n, -1),
-        )  # fmt: skip
-        return panels
-
-    @property
-    def bytes(self) -> int:
-        """Bytes that one sweep reads."""
-        return sum(array.nbytes for array in self.arrays)
-
-    @property
-    def arrays(self) -> tuple[np.ndarray, ...]:
-        """Arrays in the order in which `pdrom.model.dynamics.sweeps.sweep` takes them."""
-        return self.first, self.row_start, self.value_start, self.rows, self.values
-
-    @property
-    def factor(self) -> tuple[Any, ...]:
-        """First argument of `pdrom.model.dynamics.sweeps.sweep`."""
-        return *self.arrays, SWEEP.address
+    n = lower.shape[0]
+    below = np.zeros((max(WIDTHS) + 1, n), np.int64)
+    _count_rows_below(lower.indptr, lower.indices, np.full(n, -1), below)
+    ends = _partition(below)
+    width = np.diff(ends, prepend=0)
+    count = below[width, ends - 1]
+    first = np.concatenate([[0], ends]).astype(np.int32)
+    row_start = np.concatenate([[0], np.cumsum(count)])
+    own = width + width * (width - 1) // 2
+    value_start = np.concatenate([[0], np.cumsum(own + count * width)])
+    rows, values = np.empty(row_start[-1], np.int32), np.zeros(value_start[-1])
+    _fill(
+        lower.indptr, lower.indices, lower.data, 1.0 / diagonal, first, row_start, value_start,
+        rows, values, np.full(n, -1),
+    )  # fmt: skip
+    return first, row_start, value_start, rows, values, SWEEP.address
 
 
 @compiled
@@ -108,7 +83,7 @@ def _partition(below: np.ndarray) -> np.ndarray:
     """End column (exclusive) of each panel in the cheapest partition, ascending."""
     n = below.shape[1]
     chosen = np.zeros(n + 1, np.int64)
-    _choose(below, WIDTHS, np.full(n + 1, np.inf), chosen)
+    _choose(below, np.array(WIDTHS), np.full(n + 1, np.inf), chosen)
     ends = []
     end = n
     while end > 0:
@@ -189,8 +164,8 @@ NOTHING_FREE: Factor = (
 NO_COUPLING = (np.zeros(0, np.int64), np.zeros(1, np.int32), np.zeros(0, np.int32), np.zeros(0))
 
 
-class SparseSolver(ABC):
-    """A factored symmetric positive definite matrix.
+class SuperLUSolver:
+    """A factored symmetric positive definite matrix: SciPy's SuperLU and its own substitution.
 
     Parameters
     ----------
@@ -199,32 +174,11 @@ class SparseSolver(ABC):
     coupling : (n, m) to m held vertices, whose part is taken from the right-hand side; None: m = 0
     """
 
+    ordering = "MMD_AT_PLUS_A"
     factor: Factor | None = None
     """For a compiled loop; None if the solver is not compiled."""
     coupling = NO_COUPLING
     """To the held vertices, for a compiled loop."""
-
-    @abstractmethod
-    def __init__(
-        self,
-        matrix: sparse.csr_array,
-        vertices: np.ndarray,
-        coupling: sparse.csr_array | None = None,
-    ) -> None: ...
-
-    @abstractmethod
-    def set_targets(self, targets: np.ndarray) -> None:
-        """Hold the held vertices at ``targets`` (m, 3) in the solves that follow."""
-
-    @abstractmethod
-    def solve(self, rhs: np.ndarray, y: np.ndarray) -> None:
-        """Overwrite the rows ``vertices`` of ``y`` (N, 3) by the solution for ``rhs`` (N, 3)."""
-
-
-class SuperLUSolver(SparseSolver):
-    """SciPy's SuperLU with a symmetric ordering and its own substitution."""
-
-    ordering = "MMD_AT_PLUS_A"
 
     def __init__(
         self,
@@ -232,15 +186,21 @@ class SuperLUSolver(SparseSolver):
         vertices: np.ndarray,
         coupling: sparse.csr_array | None = None,
     ) -> None:
-        self._factor = factored(matrix, self.ordering)
-        self._vertices, self._coupling = vertices, coupling
+        self._vertices, self._held = vertices, coupling
         self._load = np.zeros((len(vertices), 3))
+        self._take(factored(matrix, self.ordering))
+
+    def _take(self, factor: SuperLU) -> None:
+        """Keep the factor in the form that `solve` needs."""
+        self._factor = factor
 
     def set_targets(self, targets: np.ndarray) -> None:
-        if self._coupling is not None:
-            self._load = self._coupling @ targets
+        """Hold the held vertices at ``targets`` (m, 3) in the solves that follow."""
+        if self._held is not None:
+            self._load = self._held @ targets
 
     def solve(self, rhs: np.ndarray, y: np.ndarray) -> None:
+        """Overwrite the rows ``vertices`` of ``y`` (N, 3) by the solution for ``rhs`` (N, 3)."""
         y[self._vertices] = self._factor.solve(rhs[self._vertices] - self._load)
 
 
@@ -250,45 +210,34 @@ class ColumnOrderedSolver(SuperLUSolver):
     ordering = "COLAMD"
 
 
-class SupernodalSolver(SparseSolver):
+class SupernodalSolver(SuperLUSolver):
     """SuperLU's factor in panels, swept by compiled code with x, y and z in one pass.
 
-    Attributes
-    ----------
-    panels : the factor
     factor : the first arguments of `sweep`
     """
 
-    def __init__(
-        self,
-        matrix: sparse.csr_array,
-        vertices: np.ndarray,
-        coupling: sparse.csr_array | None = None,
-    ) -> None:
-        n = matrix.shape[0]
-        factor = factored(matrix, "MMD_AT_PLUS_A")
+    factor: Factor
+
+    def _take(self, factor: SuperLU) -> None:
         lower = sparse.csc_array(factor.L)
         lower.sort_indices()
-        self.panels = Panels.of(lower, factor.U.diagonal())
         unknowns = np.argsort(factor.perm_c)
-        order = vertices[unknowns].astype(np.int32)
-        self._loads = rows.zeros(rows.WIDTH * n)
-        self._sweep = (self.panels.factor, order, self._loads, rows.empty(rows.WIDTH * n))
-        self.factor = self._sweep
-        self.coupling = NO_COUPLING
-        if coupling is not None:
-            own = sparse.csr_array(coupling[unknowns])
+        order = self._vertices[unknowns].astype(np.int32)
+        loads, work = rows.zeros(rows.WIDTH * len(order)), rows.empty(rows.WIDTH * len(order))
+        self.factor = panels(lower, factor.U.diagonal()), order, loads, work
+        if self._held is not None:
+            own = sparse.csr_array(self._held[unknowns])
             # few unknowns have a held neighbour
             beside = np.flatnonzero(np.diff(own.indptr))
             self.coupling = beside, own.indptr, own.indices, own.data
 
     def set_targets(self, targets: np.ndarray) -> None:
         if len(self.coupling[0]):
-            load(*self.coupling, np.ascontiguousarray(targets), self._loads)
+            load(*self.coupling, np.ascontiguousarray(targets), self.factor[2])
 
     def solve(self, rhs: np.ndarray, y: np.ndarray) -> None:
         right, solution = rows.flat(rhs), rows.flat(y)
-        sweep(*self._sweep, right, solution)
+        sweep(*self.factor, right, solution)
         if not rows.shares(y, solution):
             y[...] = rows.unflat(solution)
 
@@ -315,8 +264,3 @@ def factored(matrix: sparse.csr_array, ordering: str) -> SuperLU:
     if not (symmetric and (factor.U.diagonal() > 0.0).all()):
         raise SolverError(f"global system of size {size}: not positive definite")
     return factor
-
-
-def solver_class(name: str) -> type[SparseSolver]:
-    """Class of the solver that is registered as ``name``."""
-    return SOLVERS.load(name)

@@ -8,7 +8,7 @@ v = (y - q) / h and q = y. What replaces the projections of a group is a `LocalS
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from time import perf_counter
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -56,23 +56,6 @@ class FrameReport:
     seconds: np.ndarray
 
 
-class CompiledFrames(Protocol):
-    """Frames that run in compiled code alone, see `pdrom.model.dynamics.frames`."""
-
-    def run(
-        self, q: np.ndarray, v: np.ndarray, frames: range, h: float, iterations: int, track: bool
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray] | None:
-        """Positions, velocities, objectives and seconds after some of ``frames``; None: not now.
-
-        Parameters
-        ----------
-        q, v : (N, 3) positions, m, and velocities, m/s, at the beginning
-        h : time step, s
-        iterations : of a frame
-        track : whether the objectives are wanted
-        """
-
-
 class Stepper:
     """Advances a state frame by frame in the coordinates of a `Space`."""
 
@@ -92,7 +75,8 @@ class Stepper:
         self._acceleration = acceleration
         self._track = track_objective
         self._compiled = space.compiled(self.local_steps, acceleration)
-        self._whole: CompiledFrames | None = None
+        # has the method `run` of `pdrom.model.dynamics.frames.WholeFrames`
+        self._whole: Any = None
         if self._compiled is not None:
             self._whole = space.whole(self.local_steps, self._compiled, acceleration)
 

@@ -7,7 +7,7 @@ width: its columns stay in registers while the rows below go by.
 
 from llvmlite import ir
 from numba import types
-from numba.core import cgutils, errors
+from numba.core import cgutils
 from numba.extending import intrinsic
 
 from pdrom.model.compiled.arithmetic import multiply_add, spread, subtract
@@ -16,12 +16,14 @@ from pdrom.model.compiled.rows import NUMBERS, WIDTH, at, doubles, indices, inte
 from pdrom.model.compiled.rows import load as load_row
 
 _INDEX = ir.IntType(64)
+# Columns that a panel may have.
+WIDTHS = (1, 2, 3, 4, 6, 8)
 
 
 class _Panel:
     """Writes the instructions of a panel of ``width`` columns.
 
-    values : of the panel, see `pdrom.model.dynamics.solvers.Panels`
+    values : of the panel, see `pdrom.model.dynamics.solvers.panels`
     """
 
     def __init__(self, context, builder, signature, arguments, width):
@@ -81,15 +83,20 @@ def _panel_intrinsic(write):
     """An intrinsic ``(width, x, first, rows, start, stop, values, value_start)``."""
 
     def typed(_context, width, x, first, rows, start, stop, values, value_start):
-        if not isinstance(width, types.IntegerLiteral):
-            raise errors.RequireLiteralValue("the width of a panel")
-
         def generate(context, builder, signature, arguments):
-            write(_Panel(context, builder, signature, arguments, width.literal_value))
+            after = builder.append_basic_block("after")
+            switch = builder.switch(arguments[0], after)
+            for columns in WIDTHS:
+                block = builder.append_basic_block(f"panel.{columns}")
+                switch.add_case(ir.Constant(_INDEX, columns), block)
+                builder.position_at_end(block)
+                write(_Panel(context, builder, signature, arguments, columns))
+                builder.branch(after)
+            builder.position_at_end(after)
             return context.get_dummy_value()
 
         index = types.intp
-        return types.void(width, x, index, rows, index, index, values, index), generate
+        return types.void(index, x, index, rows, index, index, values, index), generate
 
     typed.__name__ = typed.__qualname__ = write.__name__
     return intrinsic(typed)
@@ -171,33 +178,11 @@ def _sweep(
     for p in range(count):
         a, width = WIDTH * at(first, p), at(first, p + 1) - at(first, p)
         start, stop, v = at(row_start, p), at(row_start, p + 1), at(value_start, p)
-        if width == 8:
-            _forward(8, x, a, rows, start, stop, values, v)
-        elif width == 6:
-            _forward(6, x, a, rows, start, stop, values, v)
-        elif width == 4:
-            _forward(4, x, a, rows, start, stop, values, v)
-        elif width == 3:
-            _forward(3, x, a, rows, start, stop, values, v)
-        elif width == 2:
-            _forward(2, x, a, rows, start, stop, values, v)
-        else:
-            _forward(1, x, a, rows, start, stop, values, v)
+        _forward(width, x, a, rows, start, stop, values, v)
     for p in range(count - 1, -1, -1):
         a, width = WIDTH * at(first, p), at(first, p + 1) - at(first, p)
         start, stop, v = at(row_start, p), at(row_start, p + 1), at(value_start, p)
-        if width == 8:
-            _backward(8, x, a, rows, start, stop, values, v)
-        elif width == 6:
-            _backward(6, x, a, rows, start, stop, values, v)
-        elif width == 4:
-            _backward(4, x, a, rows, start, stop, values, v)
-        elif width == 3:
-            _backward(3, x, a, rows, start, stop, values, v)
-        elif width == 2:
-            _backward(2, x, a, rows, start, stop, values, v)
-        else:
-            _backward(1, x, a, rows, start, stop, values, v)
+        _backward(width, x, a, rows, start, stop, values, v)
     for i in range(size):
         store(y, WIDTH * at(vertices, i), load_row(x, WIDTH * i))
 
@@ -226,7 +211,7 @@ def sweep(panels, vertices, loads, x, rhs, y):
 
     Parameters
     ----------
-    panels : see `pdrom.model.dynamics.solvers.Panels.factor`
+    panels : see `pdrom.model.dynamics.solvers.panels`
     vertices : (n,) row of ``rhs`` and ``y`` of each unknown, in the order of the factor
     loads : (4 n,) rows that are taken from the right-hand side, in that order
     x : (4 n,) working array

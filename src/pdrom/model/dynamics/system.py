@@ -8,13 +8,7 @@ from scipy import sparse
 from pdrom.core.errors import SolverError
 from pdrom.core.store import require_finite
 from pdrom.model.constraints.base import ConstraintGroup
-from pdrom.model.dynamics.solvers import (
-    NO_COUPLING,
-    NOTHING_FREE,
-    Factor,
-    SparseSolver,
-    solver_class,
-)
+from pdrom.model.dynamics import solvers
 
 DEFAULT_SOLVER = "supernodal"
 
@@ -35,12 +29,13 @@ class Elimination:
         self.fixed = fixed
         self.free = np.setdiff1d(np.arange(matrix.shape[0]), fixed)
         coupling = sparse.csr_array(matrix[self.free][:, fixed]) if len(fixed) else None
-        self._solver: SparseSolver | None = None
-        self.factor: Factor | None = NOTHING_FREE
-        self.coupling = NO_COUPLING
+        self._solver: solvers.SuperLUSolver | None = None
+        self.factor: solvers.Factor | None = solvers.NOTHING_FREE
+        self.coupling = solvers.NO_COUPLING
         if len(self.free):
             block = matrix if not len(fixed) else matrix[self.free][:, self.free]
-            self._solver = solver_class(solver)(sparse.csr_array(block), self.free, coupling)
+            kind: type[solvers.SuperLUSolver] = solvers.SOLVERS.load(solver)
+            self._solver = kind(sparse.csr_array(block), self.free, coupling)
             self.factor, self.coupling = self._solver.factor, self._solver.coupling
             require_accurate(block, self._solve_free)
 

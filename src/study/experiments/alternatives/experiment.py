@@ -6,12 +6,9 @@ All run the held-out motions; only the reduction has a training motion.
 """
 
 import logging
-import pickle
-import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -21,9 +18,7 @@ from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.model.constraints.base import GroupConfig
 from pdrom.model.held_out import FIRST
-from pdrom.model.metrics import trajectory_error
 from pdrom.model.scene import Scene, SceneConfig
-from pdrom.reduction.rerun import displacement_norms
 from study.artifact.paths import ALTERNATIVE_TIMES, ALTERNATIVES, File
 from study.artifact.reads import Settings, SourcesOf
 from study.experiments.alternatives.candidates import Trained, candidates, trained
@@ -31,11 +26,10 @@ from study.experiments.alternatives.settings import CONVERGED, SETTING, Comparis
 from study.experiments.alternatives.solvers.explicit import continuous
 from study.experiments.kit.converged import converged_run
 from study.experiments.kit.declaration import experiment
-from study.experiments.kit.fresh_process import new_process
-from study.experiments.kit.measurement import Variant, measure
+from study.experiments.kit.measurement import Case, Variant, in_processes
+from study.experiments.kit.reruns import run_error
 from study.experiments.kit.settings import BlowupExtent
 
-MODULE = "study.experiments.alternatives.experiment"
 TIME_COLUMNS = ["scene", "factor", "stiffness", *SETTING, "process", "ms_per_frame"]
 log = logging.getLogger(__name__)
 COLUMNS = [
@@ -46,48 +40,19 @@ COLUMNS = [
 
 
 @dataclass(frozen=True)
-class Case:
+class Timed(Case):
     """A scene in the motion that is timed, its labels, and the reductions of it."""
 
     labels: dict[str, object]
     scene: Scene
     models: tuple[Trained, ...]
+    settings: Comparison
 
-
-def in_processes(cases: Sequence[Case], settings: Comparison) -> pd.DataFrame:
-    """Rows of `TIME_COLUMNS`: a process after the other times all ``cases``."""
-    with TemporaryDirectory() as folder:
-        asked, answer = Path(folder, "cases.pickle"), Path(folder, "rows.pickle")
-        asked.write_bytes(pickle.dumps((cases, settings)))
-        parts = []
-        for process in range(1, settings.processes + 1):
-            new_process(MODULE, str(asked), str(answer), str(process))
-            parts.append(pickle.loads(answer.read_bytes()))
-    return pd.concat(parts, ignore_index=True)
-
-
-def timed(cases: Sequence[Case], settings: Comparison, process: int) -> pd.DataFrame:
-    """Time all candidates in the random order that the number of the ``process`` gives."""
-    found = [
-        ({**case.labels, **each.labels}, each)
-        for case in cases
-        for each in candidates(case.scene, case.models, settings)
-    ]
-    variants = [Variant(own, c.loop, c.start, c.steps * settings.frames) for own, c in found]
-    order = np.random.default_rng(process).permutation(len(variants))
-    measured = measure([variants[i] for i in order], settings.warmup, settings.repeats)
-    rows = []
-    for i in np.argsort(order):
-        labels, candidate = found[order[i]]
-        ms = candidate.steps * measured[i].frame
-        rows.append({**labels, "process": process, "ms_per_frame": ms})
-    return pd.DataFrame(rows, columns=TIME_COLUMNS)
-
-
-def main(asked: str, answer: str, process: str) -> None:
-    """Time what the file ``asked`` holds and write the rows to ``answer``."""
-    cases, settings = pickle.loads(Path(asked).read_bytes())
-    Path(answer).write_bytes(pickle.dumps(timed(cases, settings, int(process))))
+    def variants(self) -> Iterator[Variant]:
+        """Loops of all candidates; ``steps`` of one are a frame."""
+        for each in candidates(self.scene, self.models, self.settings):
+            labels = {**self.labels, **each.labels, "steps": each.steps}
+            yield Variant(labels, each.loop, each.start, each.steps * self.settings.frames)
 
 
 class Options(ConfigModel):
@@ -111,9 +76,10 @@ class References:
 
     def errors(self, run: np.ndarray | None) -> dict[str, float | None]:
         """Relative errors of a ``run`` (F + 1, N, 3) m, empty if it blew up."""
+        against = {"implicit": self.implicit, "continuous": self.continuous}
         return {
-            "error_implicit": _error(run, self.implicit),
-            "error_continuous": _error(run, self.continuous),
+            f"error_{name}": None if run is None or other is None else run_error(run, other)
+            for name, other in against.items()
         }
 
 
@@ -145,10 +111,12 @@ def alternatives(sources: list[Path], settings: Options, out: File, times: File)
             for row in _rows(scene, models, settings):
                 rows.append({**own, "motion": motion, **row})
             if motion == FIRST:
-                cases.append(Case(own, scene, models))
+                cases.append(Timed(own, scene, models, section))
         log.info("%s: stiffness %g done", settings.scene.name, stiffness)
     write_table(pd.DataFrame(rows, columns=COLUMNS), out.path)
-    write_table(in_processes(cases, section), times.path)
+    measured = pd.DataFrame(in_processes(cases, section))
+    measured["ms_per_frame"] *= measured.steps
+    write_table(measured.reindex(columns=TIME_COLUMNS), times.path)
 
 
 def sized(config: SceneConfig, factor: float, stiffness: float) -> SceneConfig:
@@ -193,14 +161,3 @@ def references(scene: Scene, section: Comparison) -> References:
         if implicit is None:
             log.warning("%s: no convergence in %d evaluations", name, section.implicit.limit)
     return References(implicit, exact.positions, exact.error)
-
-
-def _error(run: np.ndarray | None, reference: np.ndarray | None) -> float | None:
-    if run is None or reference is None:
-        return None
-    difference = np.linalg.norm((run - reference)[1:].reshape(len(run) - 1, -1), axis=1)
-    return trajectory_error(difference, displacement_norms(reference))
-
-
-if __name__ == "__main__":
-    main(*sys.argv[1:])

@@ -8,8 +8,8 @@ from pdrom.core.errors import choices
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.model.held_out import FIRST, MOTIONS, HeldOutMotion
 from study.experiments.alternatives.solvers.substeps import METHODS
-from study.experiments.kit.measurement import Protocol
-from study.experiments.kit.settings import Count, Modes, Repeats, Tolerance
+from study.experiments.kit.measurement import Processes
+from study.experiments.kit.settings import Count, Modes, Tolerance
 
 REDUCED, ACCELERATED = REDUCTIONS = "ecsw", "ecsw-anderson"  # the others are full-order ones
 OWN: Final = "own iterations"  # frames that a reduction may be trained on, as may converged ones
@@ -88,7 +88,7 @@ class ImplicitReference(ConfigModel):
     limit: Annotated[int, Field(ge=2)] = 4000
 
 
-class Comparison(Protocol):
+class Comparison(Processes):
     """One scene on one mesh.
 
     ``steps`` has pairs (substeps of a frame, iterations of each) for each method. Errors are taken
@@ -116,8 +116,6 @@ class Comparison(Protocol):
     continuous: ContinuousReference = ContinuousReference()
     motions: Annotated[tuple[HeldOutMotion, ...], AfterValidator(_with_the_first)] = MOTIONS
     frames: Count = 2
-    repeats: Repeats = 3
-    processes: Repeats = 10
 
     def factors(self, scene: str, size: float) -> tuple[float, ...]:
         """Factors on all weights of a scene with ``size`` times the vertices along a side."""

@@ -4,6 +4,7 @@ Effects are timed by stand-ins around them, so that a normal run holds no timer 
 """
 
 from collections.abc import Callable, Hashable, Mapping, Sequence
+from copy import copy
 from itertools import combinations
 from time import perf_counter
 from typing import Any
@@ -22,13 +23,7 @@ from pdrom.model.dynamics.system import GlobalSystem
 from pdrom.model.effects.base import Boundary, Contact, Effect, Force
 from pdrom.model.scene import Scene
 from pdrom.reduction.sampling.local_step import ReducedLocalStep
-from study.experiments.kit.measurement import (
-    Measurement,
-    Variant,
-    measure,
-    measure_calls,
-    median_frames,
-)
+from study.experiments.kit.measurement import Variant, measure, measure_calls, median_frames
 from study.experiments.kit.settings import GLOBAL, REST, RIGHT
 
 COLUMNS = [
@@ -82,14 +77,15 @@ def local_costs(
     states : (n, N, 3) positions in m; frame-lagged data are those of the first
     """
     groups = {name: scene.group(name) for name, _, _ in reduced}
-    steps: dict[Hashable, LocalStep] = {}
-    for name, group in groups.items():
-        steps[name] = group
-    for key, step in reduced.items():
-        steps[key] = step
-    calls = {key: _all_states(step, states) for key, step in steps.items()}
+    rhs, iterates = vertices(len(states[0])), [as_vertices(y) for y in states]
+    calls: dict[Hashable, Callable[[], None]] = {}
+    steps: list[tuple[Hashable, LocalStep]] = [*groups.items(), *reduced.items()]
+    for key, step in steps:
+        step.begin_frame(states[0])
+        calls[key] = _each(step.accumulate, [(y, rhs) for y in iterates])
     for key, own in reduced.items():
-        calls["solve", key], calls["lift", key] = _solve_and_lift(own, states)
+        calls["solve", key] = _each(own.solve, [(own.sample(y),) for y in states])
+        calls["lift", key] = _each(own.lift, [(rhs,) for _ in states])
     with np.errstate(over="ignore", invalid="ignore"):
         times = measure_calls(calls, warmup, repeats)
     rows = []
@@ -102,34 +98,14 @@ def local_costs(
     return pd.DataFrame(rows, columns=COLUMNS)
 
 
-def _solve_and_lift(
-    step: ReducedLocalStep, states: np.ndarray
-) -> tuple[Callable[[], None], Callable[[], None]]:
-    """The two dense parts of a reduced local step over all states."""
-    rhs = vertices(len(states[0]))
-    step.begin_frame(states[0])
-    sampled = [step.sample(y) for y in states]
+def _each(call: Callable[..., object], arguments: Sequence[tuple]) -> Callable[[], None]:
+    """A function that does ``call`` with each of the ``arguments``."""
 
-    def solve() -> None:
-        for values in sampled:
-            step.solve(values)
+    def every() -> None:
+        for own in arguments:
+            call(*own)
 
-    def lift() -> None:
-        for _ in states:
-            step.lift(rhs)
-
-    return solve, lift
-
-
-def _all_states(step: LocalStep, states: np.ndarray) -> Callable[[], None]:
-    rhs, iterates = vertices(len(states[0])), [as_vertices(y) for y in states]
-    step.begin_frame(states[0])
-
-    def call() -> None:
-        for y in iterates:
-            step.accumulate(y, rhs)
-
-    return call
+    return every
 
 
 class Timed:
@@ -266,33 +242,23 @@ def left_out(
     ``repeats`` as there, ``solver`` is the name of the linear solver.
     """
     sets = left_out_sets(scene)
-    variants = [_without(scene, names, frames, solver) for names in sets]
-    if not variants:
+    if not sets:
         return pd.DataFrame(columns=LEFT_OUT)
-    results = measure(variants, warmup, repeats)
-    whole, own = results[0].frame, costs.set_index("effect")
-    rows = [_saving(r, names, whole, own) for r, names in zip(results, sets, strict=True)]
-    return pd.DataFrame([(scene.config.name, *row) for row in rows], columns=LEFT_OUT)
-
-
-def _without(scene: Scene, names: tuple[str, ...], frames: int, solver: str) -> Variant:
-    part = scene.changed(effects=scene.config.effects_without(*names))
-    labels: dict[str, object] = {"groups": len(part.groups)}
-    return variant(part, part.system_with(solver), part.groups, frames, labels)
-
-
-def _saving(
-    result: Measurement, names: tuple[str, ...], whole: float, own: pd.DataFrame
-) -> tuple[object, ...]:
-    chosen = own.loc[list(names)]
-    return (
-        " + ".join(names) or "nothing",
-        result.labels["groups"],
-        int(chosen.elements.sum()),
-        result.frame,
-        whole - result.frame,
-        float(chosen.ms_per_frame.sum()),
-    )
+    variants = []
+    for names in sets:
+        part = scene.changed(effects=scene.config.effects_without(*names))
+        own = costs.set_index("effect").loc[list(names)]
+        labels = {
+            "scene": scene.config.name,
+            "left_out": " + ".join(names) or "nothing",
+            "groups": len(part.groups),
+            "elements": int(own.elements.sum()),
+            "own_ms": float(own.ms_per_frame.sum()),
+        }
+        variants.append(variant(part, part.system_with(solver), part.groups, frames, labels))
+    table = pd.DataFrame(measure(variants, warmup, repeats))
+    table["saved_ms"] = table.ms_per_frame.iloc[0] - table.ms_per_frame
+    return table[LEFT_OUT]
 
 
 @local_kernel
@@ -311,5 +277,7 @@ def timed(kernel: LocalKernel) -> tuple[LocalKernel, np.ndarray]:
     arrays = (seconds, clocks)
     places = [kernel.address, kernel.record.ctypes.data, *(array.ctypes.data for array in arrays)]
     record = np.concatenate([kernel.record[:OWN], np.array(places, dtype=np.int64)])
-    kept = (*arrays, kernel.record, *kernel.arrays)
-    return LocalKernel(_timed, record, kept, kernel.prepares, kernel.touched), seconds
+    same = copy(kernel)
+    same.function, same.record = _timed, record
+    same.arrays = (*arrays, kernel.record, *kernel.arrays)
+    return same, seconds

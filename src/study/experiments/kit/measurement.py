@@ -3,22 +3,40 @@
 A variant makes a step loop and its initial state. Every repeat runs each variant once, from there,
 so that drifts of the machine's clock hit all variants alike. Of each frame the repeat with the
 median time counts: an interruption hits one frame of one repeat, and is left out.
+
+Where a process has its arrays and its code in memory changes its times by more than its repeats
+scatter. Only new processes show that (`in_processes`); a fork would inherit the places.
 """
 
+import logging
+import pickle
+import subprocess
+import sys
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from time import perf_counter, process_time
-from typing import Annotated, TypeVar
+from typing import Annotated, Any, TypeVar
 
 import numpy as np
 from pydantic import Field
 
+from pdrom.core.errors import PdromError
+from pdrom.core.store.checksum import damaged_set_aside
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.model.dynamics.stepper import State, Stepper
 from study.experiments.kit.settings import Count, Repeats
 
 T = TypeVar("T")
-Progress = Callable[[int, int], None]
+log = logging.getLogger(__name__)
+
+# Times of a frame: the whole; prediction at its beginning, contacts and velocities at its end;
+# projections of all groups, and coefficients of reduced ones; product with S^T W, where an
+# implementation does it apart from the projections; from coefficients to the right-hand side; the
+# global step.
+PHASES = ("ms_per_frame", "inertia_ms", "local_ms", "assembly_ms", "lift_ms", "global_ms")
+_INNER = ("assembly_seconds", "lift_seconds")
 
 
 class Protocol(ConfigModel):
@@ -29,6 +47,14 @@ class Protocol(ConfigModel):
     repeats: Repeats = 5
 
 
+class Processes(Protocol):
+    """``processes`` that each time every run: ``frames``, ``warmup`` and ``repeats`` of each."""
+
+    frames: Count = 4
+    repeats: Repeats = 3
+    processes: Repeats = 10
+
+
 @dataclass(frozen=True)
 class Variant:
     """A loop to time: labels for the table, the loop with its first state, and how many frames.
@@ -37,58 +63,33 @@ class Variant:
     repeat with the iterations are divided by it.
     """
 
-    labels: dict[str, object]
+    labels: dict[str, Any]
     loop: Stepper
     start: State
     frames: int
     share: float = 1.0
 
 
-@dataclass(frozen=True)
-class Measurement:
-    """Mean times per frame in ms, by phase, of the median repeat of each frame.
-
-    inertia : prediction at the beginning of a frame, contacts and velocities at its end
-    local : projections of all groups, and coefficients of reduced ones
-    assembly : product with S^T W, where an implementation does it apart from the projections
-    lift : from coefficients to the right-hand side
-    solve : global step
-    low, high : least and largest mean time per frame of a repeat
-    """
-
-    labels: dict[str, object]
-    frame: float
-    inertia: float
-    local: float
-    assembly: float
-    lift: float
-    solve: float
-    low: float
-    high: float
-    repeats: int
-
-
-def measure(
-    variants: Sequence[Variant],
-    warmup: int,
-    repeats: int,
-    progress: Progress = lambda done, total: None,
-) -> list[Measurement]:
+def measure(variants: Sequence[Variant], warmup: int, repeats: int) -> list[dict[str, Any]]:
     """Time all variants; factorisations are cached by the first run, the warm-up.
+
+    Returned are the labels of each, with its mean times per frame, in ms, of the median repeat of
+    each frame, by phase (`PHASES`).
 
     Parameters
     ----------
     warmup, repeats : runs of each variant before the timed ones, and timed ones
-    progress : called with the repeats that are done and all
     """
     samples: list[list[np.ndarray]] = [[] for _ in variants]
     for repeat in range(-warmup, repeats):
-        for index, variant in enumerate(variants):
-            sample = _time_once(variant)
-            if repeat >= 0:
-                samples[index].append(sample)
-        progress(max(0, repeat + 1), repeats)
-    return [_summary(v.labels, np.array(s)) for v, s in zip(variants, samples, strict=True)]
+        for own, variant in zip(samples, variants, strict=True):
+            own.append(_time_once(variant))
+        log.info("repeat %d of %d", max(0, repeat + 1), repeats)
+    times = [median_frames(np.array(own[warmup:])).tolist() for own in samples]
+    return [
+        {**variant.labels, **dict(zip(PHASES, own, strict=True))}
+        for variant, own in zip(variants, times, strict=True)
+    ]
 
 
 def measure_calls(
@@ -96,14 +97,12 @@ def measure_calls(
 ) -> dict[Hashable, float]:
     """Median time in ms of each of ``calls`` over the repeats, interleaved; ``warmup`` before."""
     samples: dict[Hashable, list[float]] = {key: [] for key in calls}
-    for repeat in range(-warmup, repeats):
+    for _ in range(warmup + repeats):
         for key, call in calls.items():
             before = perf_counter()
             call()
-            seconds = perf_counter() - before
-            if repeat >= 0:
-                samples[key].append(1e3 * seconds)
-    return {key: float(np.median(values)) for key, values in samples.items()}
+            samples[key].append(1e3 * (perf_counter() - before))
+    return {key: float(np.median(values[warmup:])) for key, values in samples.items()}
 
 
 def clocked(made: Iterable[T]) -> Iterator[tuple[float, T]]:
@@ -118,45 +117,24 @@ def clocked(made: Iterable[T]) -> Iterator[tuple[float, T]]:
         yield process_time() - before, item
 
 
-_INNER = ("assembly_seconds", "lift_seconds")
-
-
 def _time_once(variant: Variant) -> np.ndarray:
-    """Milliseconds of each frame that ran: total, inertia, local, assembly, lift, global."""
-    loop, state = variant.loop, variant.start
-    rows = []
+    """Milliseconds of each frame that ran, by phase (`PHASES`)."""
+    loop, state, rows = variant.loop, variant.start, []
     with np.errstate(over="ignore", invalid="ignore"):
         for frame in range(variant.frames):
-            _reset(loop)
+            for step in loop.local_steps:
+                for name in _INNER:
+                    if hasattr(step, name):
+                        setattr(step, name, 0.0)
             state, report = loop.step(state, frame)
-            rows.append([*report.seconds, *(_inner(loop, name) for name in _INNER)])
+            inner = [sum(getattr(s, name, 0.0) for s in loop.local_steps) for name in _INNER]
+            rows.append([*report.seconds, *inner])
             if not np.isfinite(state.positions).all():
                 break
     start, local, solve, end, assembly, lift = np.array(rows).T
     repeated = np.array([local - assembly - lift, assembly, lift, solve]) / variant.share
     inertia = start + end
     return 1e3 * np.vstack([inertia + repeated.sum(axis=0), inertia, repeated]).T
-
-
-def _reset(loop: Stepper) -> None:
-    for step in loop.local_steps:
-        for name in _INNER:
-            if hasattr(step, name):
-                setattr(step, name, 0.0)
-
-
-def _inner(loop: Stepper, name: str) -> float:
-    """Seconds of a phase inside the local steps."""
-    return sum(getattr(step, name, 0.0) for step in loop.local_steps)
-
-
-def _summary(labels: dict[str, object], samples: np.ndarray) -> Measurement:
-    means = samples[:, :, 0].mean(axis=1)
-    frame, inertia, local, assembly, lift, solve = median_frames(samples).tolist()
-    low, high = float(means.min()), float(means.max())
-    return Measurement(
-        labels, frame, inertia, local, assembly, lift, solve, low, high, repeats=len(samples)
-    )
 
 
 def median_frames(samples: np.ndarray) -> np.ndarray:
@@ -167,3 +145,55 @@ def median_frames(samples: np.ndarray) -> np.ndarray:
     """
     order = np.argsort(samples[:, :, 0], axis=0, kind="stable")[len(samples) // 2]
     return samples[order, np.arange(samples.shape[1])].mean(axis=0)
+
+
+class Case:
+    """Something whose loops new processes time; it is pickled for them."""
+
+    def variants(self) -> Iterator[Variant]:
+        """Loops of this case, with all labels."""
+        raise NotImplementedError
+
+
+def in_processes(cases: Sequence[Case], asked: Processes) -> list[dict[str, Any]]:
+    """Labels of all variants of ``cases`` with their times in each of the new processes, in order.
+
+    One process after the other times all of them, in a random order of its own.
+
+    Raises
+    ------
+    PdromError
+        A process failed; the message ends with its last line.
+    """
+    rows: list[dict[str, Any]] = []
+    with TemporaryDirectory() as folder:
+        given, answer = Path(folder, "cases.pickle"), Path(folder, "rows.pickle")
+        given.write_bytes(pickle.dumps((cases, asked)))
+        for process in range(1, asked.processes + 1):
+            ended = subprocess.run(
+                [sys.executable, "-m", __name__, str(given), str(answer), str(process)],
+                stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False,
+            )  # fmt: skip
+            if ended.returncode:
+                last = ended.stderr.strip().rpartition("\n")[2]
+                raise PdromError(
+                    f"a process that times frames ended with {ended.returncode}: {last}"
+                )
+            rows += pickle.loads(answer.read_bytes())
+            log.info("process %d of %d", process, asked.processes)
+    return rows
+
+
+def _in_this_process(given: str, answer: str, process: str) -> None:
+    """Time the cases of the file ``given`` and write the rows to ``answer``."""
+    with damaged_set_aside():  # the process is part of a job
+        cases, asked = pickle.loads(Path(given).read_bytes())
+        variants = [variant for case in cases for variant in case.variants()]
+        order = np.random.default_rng(int(process)).permutation(len(variants))
+        measured = measure([variants[i] for i in order], asked.warmup, asked.repeats)
+    rows = [{**measured[i], "process": int(process)} for i in np.argsort(order)]
+    Path(answer).write_bytes(pickle.dumps(rows))
+
+
+if __name__ == "__main__":
+    _in_this_process(*sys.argv[1:])

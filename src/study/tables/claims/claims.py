@@ -24,6 +24,7 @@ from study.tables.claims.rules import (
 from study.tables.claims.verdicts import (
     VERDICTS,
     answer_of,
+    by_rules,
     close,
     combined,
     evaluate,
@@ -32,7 +33,7 @@ from study.tables.claims.verdicts import (
     timed_parts,
     values_of,
 )
-from study.tables.kit.declaration import compared, flag, integer, number, table, text, timed
+from study.tables.kit.declaration import flag, integer, number, table, text, timed
 from study.tables.kit.declaration import table as declare
 
 # What the rule of a claim says of it.
@@ -52,50 +53,47 @@ _Keep = Callable[[pd.Series], pd.Series]
 _Variation = tuple[str, str, Sequence[TestRule], _Rows]  # what, how, the tests and their rows
 
 
-def _timed_of_claims(table: pd.DataFrame, **files: Path) -> list[set[str]]:
-    loaded = load_claims(files["rules"])
-    return [timed_columns(loaded[claim]) for claim in table.claim]
-
-
 @declare(
     title="Verdicts on the claims of the preprint",
     columns=(
         text("claim", "its identifier in config/claims.yaml"),
         text("source", "who claims it"),
         text("paper", "what the preprint says"),
-        compared(
-            "skipped",
-            timed(text("measured", "range of what was measured, of the tests that decide")),
+        timed(
+            text(
+                "measured",
+                "range of what was measured, of the tests that decide",
+                compared="skipped",
+            )
         ),
-        compared("exact", timed(text("verdict", f"as published, one of: {', '.join(VERDICTS)}"))),
-        compared("skipped", timed(text("why", "all tests in words"))),
+        timed(text("verdict", f"as published, one of: {', '.join(VERDICTS)}", compared="exact")),
+        timed(text("why", "all tests in words", compared="skipped")),
         text("figure_or_table", "where to see it"),
         text("section", "section of the preprint"),
         text("shown", "figures of the preprint"),
         text("text", "the claim in our words"),
         text("qualifiers", "what a fair test has to keep"),
-        compared("skipped", timed(text("condition", "what the verdict depends on"))),
-        compared(
-            "skipped",
-            timed(text("measured_beyond", "the same of sound variants on well-posed scenes")),
+        timed(text("condition", "what the verdict depends on", compared="skipped")),
+        timed(
+            text(
+                "measured_beyond",
+                "the same of sound variants on well-posed scenes",
+                compared="skipped",
+            )
         ),
-        compared("exact", timed(text("verdict_beyond", "the verdict there"))),
-        compared("skipped", timed(text("condition_beyond", "what it depends on"))),
-        compared("skipped", timed(text("why_beyond", "all tests there in words"))),
-        compared("skipped", timed(text("answer", "both verdicts in words"))),
+        timed(text("verdict_beyond", "the verdict there", compared="exact")),
+        timed(text("condition_beyond", "what it depends on", compared="skipped")),
+        timed(text("why_beyond", "all tests there in words", compared="skipped")),
+        timed(text("answer", "both verdicts in words", compared="skipped")),
         text("history", "when and why the rules became what they are"),
     ),
     reads=READS,
-    timed_cells=_timed_of_claims,
+    timed_cells=by_rules(lambda rule, row: timed_columns(rule)),
 )
 def claims(rules: Path, added: Added = NONE_ADDED, **tables: pd.DataFrame) -> pd.DataFrame:
-    """One row per claim, in the order of the file ``rules``; see `claims_rows`."""
-    return claims_rows(load_claims(rules, added), tables)
-
-
-def claims_rows(rules: Mapping[str, ClaimRule], tables: Tables) -> pd.DataFrame:
-    """Rows of the table claims from ``rules`` and ``tables``, in the order of the file."""
-    return pd.DataFrame([_row(name, rule, tables) for name, rule in rules.items()])
+    """One row per claim, in the order of the file ``rules``."""
+    found = load_claims(rules, added)
+    return pd.DataFrame([_row(name, rule, tables) for name, rule in found.items()])
 
 
 def _row(name: str, rule: ClaimRule, tables: Tables) -> dict[str, Any]:
@@ -125,16 +123,9 @@ def _decided(tests: Sequence[TestRule], tables: Tables) -> dict[str, str]:
     }
 
 
-def _timed_of_tests(table: pd.DataFrame, **files: Path) -> list[set[str]]:
-    rules = load_claims(files["rules"])
-    tests = {
-        (claim, part, test.what): test
-        for claim, rule in rules.items()
-        for part in PARTS
-        for test in getattr(rule, part)
-    }
-    keys = zip(table.claim, table.part, table.what, strict=True)
-    return [set(FOUND) if tests[key].timed else set() for key in keys]
+def _timed_of_test(rule: ClaimRule, row: Any) -> set[str]:
+    test = next(test for test in getattr(rule, row.part) if test.what == row.what)
+    return {*FOUND} if test.timed else set()
 
 
 @table(
@@ -149,29 +140,24 @@ def _timed_of_tests(table: pd.DataFrame, **files: Path) -> list[set[str]]:
         number("threshold", "what a value is compared with"),
         number("share", "of the rows that must agree for a clear answer"),
         number("margin", "factor of the threshold within which a ratio of times decides nothing"),
-        compared("skipped", timed(integer("satisfied", "rows that satisfy the comparison"))),
-        compared("skipped", timed(integer("of", "rows that are compared"))),
-        compared("skipped", timed(integer("close", "of them, ratios of times within the margin"))),
-        compared(
-            "skipped", timed(number("least", "smallest value; infinite for a run that failed"))
+        timed(integer("satisfied", "rows that satisfy the comparison", compared="skipped")),
+        timed(integer("of", "rows that are compared", compared="skipped")),
+        timed(integer("close", "of them, ratios of times within the margin", compared="skipped")),
+        timed(
+            number("least", "smallest value; infinite for a run that failed", compared="skipped")
         ),
-        compared("skipped", timed(number("median", "their median"))),
-        compared("skipped", timed(number("most", "largest value"))),
-        compared("exact", timed(text("verdict", f"of this test, one of: {', '.join(VERDICTS)}"))),
+        timed(number("median", "their median", compared="skipped")),
+        timed(number("most", "largest value", compared="skipped")),
+        timed(text("verdict", f"of this test, one of: {', '.join(VERDICTS)}", compared="exact")),
     ),
     reads=READS,
-    timed_cells=_timed_of_tests,
+    timed_cells=by_rules(_timed_of_test),
 )
 def claims_tests(rules: Path, added: Added = NONE_ADDED, **tables: pd.DataFrame) -> pd.DataFrame:
     """One row per claim, part and test, in the order of the file ``rules``; see `claims`."""
-    return outcome_rows(load_claims(rules, added), tables)
-
-
-def outcome_rows(rules: Mapping[str, ClaimRule], tables: Tables) -> pd.DataFrame:
-    """Rows of the table claims_tests from ``rules`` and ``tables``, in the order of the file."""
     rows = [
         {"claim": name, "part": part, **test.model_dump(include=SAID), **_found(test, tables)}
-        for name, rule in rules.items()
+        for name, rule in load_claims(rules, added).items()
         for part in PARTS
         for test in getattr(rule, part)
     ]
@@ -195,9 +181,11 @@ def _found(test: TestRule, tables: Tables) -> dict[str, Any]:
         text("part", f"tests that decide: {', '.join(PARTS)}"),
         text("varied", f"what is changed in all of them: {', '.join(VARIED)}"),
         text("variation", "how: factor, share, sizes, split, scene left out"),
-        compared("exact", timed(text("verdict", f"one of: {', '.join(VERDICTS)}")), FRAGILE),
-        compared("exact", timed(text("verdict_of_rules", "the verdict of the rules as they are"))),
-        compared("exact", timed(flag("same", "the two agree")), FRAGILE),
+        timed(
+            text("verdict", f"one of: {', '.join(VERDICTS)}", compared="exact", tolerance=FRAGILE)
+        ),
+        timed(text("verdict_of_rules", "the verdict of the rules as they are", compared="exact")),
+        timed(flag("same", "the two agree", compared="exact", tolerance=FRAGILE)),
     ),
     reads=READS,
     timed_cells=timed_parts("verdict", "verdict_of_rules", "same"),
@@ -233,20 +221,27 @@ def _verdict(tests: Sequence[TestRule], rows: _Rows) -> str:
     return combined([answer_of(test, values[VALUE].to_numpy(float)) for test, values in found])
 
 
+def _with(test: TestRule, **changes: Any) -> TestRule:
+    return test.model_copy(update=changes)
+
+
 def _variations(tests: Sequence[TestRule], rows: _Rows, tables: Tables) -> Iterator[_Variation]:
     """The tests with other numbers, then on a part of their rows, or on those of another split."""
     for factor in FACTORS:
-        changed = [_changed(t, threshold=factor * t.threshold) for t in tests]
+        changed = [_with(test, threshold=factor * test.threshold) for test in tests]
         yield "threshold", f"x {factor:g}", changed, rows
     for share in SHARES:
-        yield "share", f"{share:g}", [_changed(test, share=share) for test in tests], rows
+        yield "share", f"{share:g}", [_with(test, share=share) for test in tests], rows
     for margin in MARGINS if any(test.timed for test in tests) else ():
-        changed = [_changed(test, margin=margin) if test.timed else test for test in tests]
+        changed = [_with(test, margin=margin) if test.timed else test for test in tests]
         yield "margin", f"{margin:g}", changed, rows
     sizes = {f"r up to {SMALL}": lambda r: ~(r > SMALL), f"r above {SMALL}": lambda r: r > SMALL}
     yield from _kept(tests, rows, "sizes", "r", sizes)
     for split in SPLITS:
-        changed = [_of_split(test, split) for test in tests]
+        changed = [
+            _with(test, where={**test.where, "split": (split,)}) if "split" in test.where else test
+            for test in tests
+        ]
         if changed != list(tests):
             yield "splits", split, changed, [values_of(test, tables) for test in changed]
     scenes = dict.fromkeys(s for values in rows if "scene" in values for s in values.scene)
@@ -262,14 +257,3 @@ def _kept(
         kept = [values[keep(values[column])] if column in values else values for values in rows]
         if sum(map(len, kept)) < sum(map(len, rows)):
             yield varied, name, tests, kept
-
-
-def _changed(test: TestRule, **changes: float) -> TestRule:
-    return test.model_copy(update=changes)
-
-
-def _of_split(test: TestRule, split: str) -> TestRule:
-    """Repeat the test over another split of the snapshots, where it is about one."""
-    if "split" not in test.where:
-        return test
-    return test.model_copy(update={"where": {**test.where, "split": (split,)}})

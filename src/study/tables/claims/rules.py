@@ -33,7 +33,7 @@ READS: dict[str, Read] = {
 class TestRule(ConfigModel):
     """One comparison.
 
-    what : words for the rows that are compared, used in the reason
+    what : words for the rows that are used in the reason
     metric : name in `METRICS`
     where : column -> allowed values
     accuracy : error up to which a run counts as accurate, for the metrics that ask

@@ -4,7 +4,7 @@ A table is a function under its declaration::
 
     @table(
         title="What part of a frame the local step takes",
-        columns=(SCENE, number("local_share", "local over all", timed=True)),
+        columns=(*shared("scene"), timed(number("local_share", "local over all"))),
         reads={"timings": Every(paths.TIMINGS), "wrong": Setting("stability.wrong")},
     )
     def local_share(timings: list[File], wrong: float) -> pd.DataFrame: ...
@@ -15,6 +15,7 @@ configuration as plain data. Whatever it returns is brought to the declared colu
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal, Protocol
 
@@ -45,38 +46,34 @@ Kind = Literal["text", "integer", "number", "flag"]
 _DTYPES: dict[Kind, str] = {"integer": "Int64", "number": "float64", "flag": "boolean"}
 
 
-def usual_quantity(kind: str, name: str, timed: bool) -> Quantity:
-    """Kind of a column that declares none: by its type (``kind``, ``timed``) and ``name``."""
-    if timed:
-        return "timed"
-    if kind != "number":
-        return "exact"
-    return "error" if "error" in name else "value"
-
-
 @dataclass(frozen=True)
 class Column:
     """A column; any cell may be empty.
 
+    meaning : tells readers what it holds, in a few words
     unit : empty for text, counts and what has no dimension
     timed : it depends on timing (or on the memory in use), so that two runs may differ
-    declared : its quantity, where that does not follow from type and name
+    compared : its quantity, where that does not follow from type and name
     tolerance : its own, where that of its quantity is not the right one; of words and truth values
         the share of the rows that may be others
     """
 
-    name: str
     kind: Kind
+    name: str
     meaning: str
     unit: str = ""
     timed: bool = False
-    declared: Quantity | None = None
+    compared: Quantity | None = None
     tolerance: float | None = None
 
     @property
     def quantity(self) -> Quantity:
         """Kind of difference that two machines may have in it."""
-        return self.declared or usual_quantity(self.kind, self.name, self.timed)
+        if self.compared or self.timed:
+            return self.compared or "timed"
+        if self.kind != "number":
+            return "exact"
+        return "error" if "error" in self.name else "value"
 
     @property
     def within(self) -> float:
@@ -92,47 +89,25 @@ class Column:
         if self.kind == "text":
             return values
         if self.kind == "flag":
-            values = _flags(values)
+            # as objects: joined with an empty column, flags are numbers
+            others = values[values.notna() & ~values.isin([True, False])]
+            if len(others):
+                raise ValueError(f"'{others.iloc[0]}'")
+            flags = [None if pd.isna(value) else bool(value) for value in values]
+            values = pd.Series(flags, values.index, dtype=object)
         return values.astype(_DTYPES[self.kind])
 
 
-def _flags(values: pd.Series) -> pd.Series:
-    """Flags as objects: True, False, None; joined with an empty column they are numbers."""
-    others = values[values.notna() & ~values.isin([True, False])]
-    if len(others):
-        raise ValueError(f"'{others.iloc[0]}'")
-    flags = [None if pd.isna(value) else bool(value) for value in values]
-    return pd.Series(flags, values.index, dtype=object)
-
-
-def text(name: str, meaning: str) -> Column:
-    """Column ``name`` of words; ``meaning`` tells readers what it holds, in a few words."""
-    return Column(name, "text", meaning)
-
-
-def integer(name: str, meaning: str) -> Column:
-    """Column ``name`` of counts, sizes or indices; ``meaning`` as in `text`."""
-    return Column(name, "integer", meaning)
-
-
-def flag(name: str, meaning: str) -> Column:
-    """Column ``name`` of True and False; ``meaning`` as in `text`."""
-    return Column(name, "flag", meaning)
-
-
-def number(name: str, meaning: str, unit: str = "") -> Column:
-    """Column ``name`` of floating-point numbers in ``unit``; ``meaning`` as in `text`."""
-    return Column(name, "number", meaning, unit)
+# Columns of words; of counts, sizes or indices; of True and False; of floating-point numbers.
+text = partial(Column, "text")
+integer = partial(Column, "integer")
+flag = partial(Column, "flag")
+number = partial(Column, "number")
 
 
 def timed(column: Column) -> Column:
     """Mark a column as a timing."""
-    return replace(column, timed=True, declared=None)
-
-
-def compared(quantity: Quantity, column: Column, tolerance: float | None = None) -> Column:
-    """Declare the quantity of a column, and its own tolerance."""
-    return replace(column, declared=quantity, tolerance=tolerance)
+    return replace(column, timed=True)
 
 
 class TimedCells(Protocol):
@@ -246,19 +221,14 @@ def table(
             name, title, reads, writes, function, columns=tuple(columns), timed_cells=timed_cells,
             only_with_error=only_with_error,
         )  # fmt: skip
-        _require_distinct(made)
+        names = made.column_names
+        if twice := sorted({column for column in names if names.count(column) > 1}):
+            raise TypeError(f"table {name}: column(s) declared twice: {', '.join(twice)}")
         return declare(made)
 
     return decorate
 
 
-def declared(package: str = "study.tables") -> dict[str, Table]:
-    """Return every table of a package by name."""
-    return declared_in(package, Table)
-
-
-def _require_distinct(made: Table) -> None:
-    names = made.column_names
-    twice = sorted({name for name in names if names.count(name) > 1})
-    if twice:
-        raise TypeError(f"table {made.name}: column(s) declared twice: {', '.join(twice)}")
+def declared() -> dict[str, Table]:
+    """Return every table of the study by name."""
+    return declared_in("study.tables", Table)

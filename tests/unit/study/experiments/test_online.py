@@ -15,8 +15,9 @@ from pdrom.model.scene import SceneConfig
 from pdrom.reduction.subspace.model import load_models
 from study.artifact.paths import File
 from study.experiments import subspaces as experiment
-from study.experiments.kit.fresh_process import Request, Subspaces, TimedScene, in_fresh_process
-from study.experiments.kit.measurement import Protocol
+from study.experiments.frame_times import COLUMNS as TIME_COLUMNS
+from study.experiments.frame_times import TimedScene
+from study.experiments.kit.measurement import Processes, in_processes
 from study.experiments.subspaces import (
     COLUMNS,
     LARGE_COLUMNS,
@@ -34,6 +35,7 @@ EFFECTS = (
 )
 JUDGED = ("motion", "relative_error_within_horizon", "horizon_frame")
 NO_RERUNS = pd.DataFrame(columns=[*COLUMNS, *JUDGED])
+ONCE = Processes(repeats=1, processes=1)
 CHANGES = {"reduce": {"spring": {"train": 5}}, "held_out": {"kick": 0.5}}
 
 
@@ -49,13 +51,10 @@ def written(tmp_path_factory):
     out, stored = File(str(path), {"scene": "test"}), File(str(models), {})
     settings = LargeOptions(scene=config, online=asked, blowup_extent=10.0)
     experiment.online(sources=[], settings=settings, out=out, models=stored)
-    timed = TimedScene(scene=config, subspaces=Subspaces(path=str(models)))
-    request = Request(
-        scenes=(timed,), timing=Protocol(frames=3, warmup=1, repeats=1), solver=DEFAULT_SOLVER,
-        seed=1, result=str(path.parent / "times.csv"),
-    )  # fmt: skip
-    in_fresh_process(request, path.parent)
-    return scene, path, File(request.result, {})
+    timed = TimedScene(config, DEFAULT_SOLVER, frames=3, models={str(models): None})
+    rows = pd.DataFrame(in_processes([timed], ONCE), columns=TIME_COLUMNS)
+    write_table(rows, path.with_name("times.csv"))
+    return scene, path, File(str(path.with_name("times.csv")), {})
 
 
 def test_rows_of_a_scene(written):
@@ -101,15 +100,10 @@ def test_a_fresh_process_times_every_model(written):
 
 
 def test_a_process_that_fails_is_told(written, tmp_path):
-    missing = TimedScene(
-        scene=written[0].config, subspaces=Subspaces(path=str(tmp_path / "none.h5"))
-    )
-    request = Request(
-        scenes=(missing,), timing=Protocol(), solver=DEFAULT_SOLVER, seed=1,
-        result=str(tmp_path / "times.csv"),
-    )  # fmt: skip
+    file = str(tmp_path / "none.h5")
+    missing = TimedScene(written[0].config, DEFAULT_SOLVER, frames=1, models={file: None})
     with pytest.raises(PdromError, match=r"none\.h5"):
-        in_fresh_process(request, tmp_path)
+        in_processes([missing], ONCE)
 
 
 def test_a_motion_that_blows_up_has_an_infinite_error(written, tmp_path):

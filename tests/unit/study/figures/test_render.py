@@ -10,8 +10,8 @@ from pdrom.reduction.sampling.deim import block_elements, deim_entries
 from pdrom.view.camera import Camera
 from pdrom.view.read import choose_ranks, positions_at, rerun_infos, rerun_positions
 from study.artifact.paths import RERUNS, TRAIN
-from study.figures.deim_iterations import iterations
 from study.figures.kit.elements import element_map, magnitudes, signed_entry
+from study.figures.sampling import iterations
 
 from .conftest import BLOWN_UP, BLOWUP_FRAME
 

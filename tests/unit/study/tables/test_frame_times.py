@@ -9,7 +9,7 @@ from scipy.stats import binom
 
 from pdrom.core.store import write_table
 from study.artifact.paths import File
-from study.experiments.kit.fresh_process import COLUMNS
+from study.experiments.frame_times import COLUMNS
 from study.tables.kit.parts import confirmed, in_one_time, in_words, median_interval
 from study.tables.sensitivity import repetitions
 from study.tables.speedups import frame_times, speedups

@@ -62,7 +62,7 @@ def test_every_size_is_measured(tmp_path, name):
     )
     outputs = {}
     for factor in (0.7, 1.0):
-        paths = {k: str(tmp_path / f"{k}{factor}") for k in ("iterations", "breakeven", "effects")}
+        paths = {k: str(tmp_path / f"{k}{factor}") for k in ("iterations", "breakeven")}
         files = {k: File(path, {"factor": f"{factor:g}"}) for k, path in paths.items()}
         experiment(sources=[], settings=settings, **files)
         outputs[factor] = paths

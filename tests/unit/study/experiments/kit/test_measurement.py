@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pdrom.model.dynamics.stepper import FrameReport, State
-from study.experiments.kit.measurement import Variant, measure, measure_calls
+from study.experiments.kit.measurement import PHASES, Variant, measure, measure_calls
 
 
 class Clock:
@@ -51,41 +51,25 @@ def test_variants_take_turns_and_start_afresh():
 
 
 @pytest.mark.parametrize(
-    ("times", "frames", "warmup", "repeats"),
-    [([1e6, 2.0, 2.0, 2.0], 1, 1, 3), ([1.0, 3.0], 2, 0, 1)],
+    ("times", "frames", "warmup", "repeats", "mean"),
+    [
+        # the warm-up does not count
+        ([1e6, 2.0, 2.0, 2.0], 1, 1, 3, 2.0),
+        ([1.0, 3.0], 2, 0, 1, 2.0),
+        ([5.0, 1.0, 2.0], 1, 0, 3, 2.0),
+        # every repeat is interrupted once, in another frame
+        ([9.0, 2.0, 3.0, 1.0, 9.0, 3.0, 1.0, 2.0, 9.0], 3, 0, 3, 2.0),
+    ],
 )
-def test_time_is_per_frame_and_warm_up_does_not_count(times, frames, warmup, repeats):
+def test_the_median_repeat_of_each_frame_counts_with_its_own_phases(
+    times, frames, warmup, repeats, mean
+):
     (result,) = measure([variant("a", [], times, frames)], warmup=warmup, repeats=repeats)
-    assert result.frame == pytest.approx(2000.0)
-    assert result.repeats == repeats
-    if warmup:
-        assert (result.low, result.high) == pytest.approx((2000.0, 2000.0))
-
-
-def test_median_repeat_with_its_own_phases():
-    (result,) = measure([variant("a", [], [5.0, 1.0, 2.0])], warmup=0, repeats=3)
-    assert result.labels == {"name": "a"}
-    assert result.frame == pytest.approx(2000.0)
-    assert result.local == pytest.approx(1000.0)
-    assert result.solve == pytest.approx(600.0)
-    assert result.assembly == 0.0
-    assert (result.low, result.high) == pytest.approx((1000.0, 5000.0))
-
-
-def test_an_interruption_of_one_frame_is_left_out():
-    """Every repeat is interrupted once, in another frame."""
-    runs = [9.0, 2.0, 3.0, 1.0, 9.0, 3.0, 1.0, 2.0, 9.0]
-    (result,) = measure([variant("a", [], runs, 3)], warmup=0, repeats=3)
-    assert result.frame == pytest.approx(1e3 * (1.0 + 2.0 + 3.0) / 3)
-    assert result.local == pytest.approx(0.5 * result.frame)
-
-
-def test_assembly_is_taken_out_of_the_local_step():
-    steps = [Assembling(), Assembling()]
-    (result,) = measure([variant("a", [], [0.1] * 4, 2, local_steps=steps)], warmup=1, repeats=1)
-    assert result.assembly == pytest.approx(2.0)
-    assert result.local == pytest.approx(50.0 - 2.0)
-    assert result.frame == pytest.approx(100.0)
+    assert result["name"] == "a"
+    assert result["ms_per_frame"] == pytest.approx(1e3 * mean)
+    assert result["local_ms"] == pytest.approx(0.5e3 * mean)
+    assert result["global_ms"] == pytest.approx(0.3e3 * mean)
+    assert result["assembly_ms"] == 0.0
 
 
 class Lifting(Assembling):
@@ -94,22 +78,24 @@ class Lifting(Assembling):
     lift_seconds = 55.0
 
 
-def test_phases_add_up_to_the_frame():
-    (result,) = measure([variant("a", [], [0.1, 0.1], local_steps=[Lifting()])], 1, 1)
-    assert result.inertia == pytest.approx(20.0)
-    assert result.lift == 0.0  # set back before the run, and this step never lifts
-    phases = result.inertia + result.local + result.assembly + result.lift + result.solve
-    assert phases == pytest.approx(result.frame) == pytest.approx(100.0)
+def test_assembly_is_taken_out_of_the_local_step_and_phases_add_up():
+    steps = [Assembling(), Lifting()]
+    (result,) = measure([variant("a", [], [0.1] * 4, 2, local_steps=steps)], warmup=1, repeats=1)
+    assert result["assembly_ms"] == pytest.approx(2.0)
+    assert result["local_ms"] == pytest.approx(50.0 - 2.0)
+    assert result["inertia_ms"] == pytest.approx(20.0)
+    assert result["lift_ms"] == 0.0  # set back before the run, and this step never lifts
+    assert sum(result[name] for name in PHASES[1:]) == pytest.approx(result["ms_per_frame"])
+    assert result["ms_per_frame"] == pytest.approx(100.0)
 
 
 def test_a_part_of_the_iterations_stands_for_all():
     """Inertia is paid once a frame, the other phases with every iteration."""
     clock = Clock("a", [], seconds(1.0))
     (result,) = measure([Variant({}, clock, START, 1, share=0.25)], 0, 1)
-    assert result.inertia == pytest.approx(200.0)
-    assert result.local == pytest.approx(2000.0)
-    assert result.solve == pytest.approx(1200.0)
-    assert result.frame == pytest.approx(3400.0)
+    assert [result[name] for name in ("inertia_ms", "local_ms", "global_ms", "ms_per_frame")] == [
+        pytest.approx(ms) for ms in (200.0, 2000.0, 1200.0, 3400.0)
+    ]
 
 
 def test_calls_take_turns():
@@ -126,10 +112,10 @@ def test_a_run_that_blows_up_is_timed_up_to_there():
         [variant("a", calls, [1.0, 3.0, 100.0], 3, bad_frame=1)], warmup=0, repeats=1
     )
     assert [frame for _, frame, _ in calls] == [0, 1]
-    assert result.frame == pytest.approx(2000.0)
+    assert result["ms_per_frame"] == pytest.approx(2000.0)
 
 
-def test_progress_is_told():
-    told = []
-    measure([variant("a", [], [1.0] * 4)], 1, 3, lambda *args: told.append(args))
-    assert told == [(0, 3), (1, 3), (2, 3), (3, 3)]
+def test_progress_is_told(caplog):
+    with caplog.at_level("INFO", logger="study"):
+        measure([variant("a", [], [1.0] * 3)], 1, 2)
+    assert caplog.messages == ["repeat 0 of 2", "repeat 1 of 2", "repeat 2 of 2"]
