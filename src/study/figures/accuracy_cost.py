@@ -225,7 +225,6 @@ def handles(found: TradeOffs) -> list[Block]:
         "table": TableOf("accuracy_cost"),
         "runs": TableOf("reduced_reruns"),
     },
-    options=Methods,
 )
 def accuracy_cost(
     options: Methods, drawn: Drawn, table: pd.DataFrame, runs: pd.DataFrame

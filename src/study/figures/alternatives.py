@@ -56,7 +56,6 @@ LOOKS = {
         "$\\times 100$: the same scene with stiffer weights. Errors outside are drawn on the rim."
     ),
     reads={"table": TableOf("alternatives")},
-    options=Scenes,
 )
 def alternatives(options: Scenes, table: pd.DataFrame) -> Figure:
     """Draw a pair of panels for each scene, mesh and stiffness."""
@@ -119,7 +118,6 @@ def _draw_best(ax: Axes, points: pd.DataFrame, colour: str, marker: str) -> None
         "included. What lies outside is drawn on the rim."
     ),
     reads={"table": TableOf("requested_tolerances")},
-    options=Options,
 )
 def requested_tolerances(options: Options, table: pd.DataFrame) -> Figure:
     """Draw errors and times side by side."""

@@ -56,7 +56,6 @@ class BreakEven(Methods, Columns):
         "the claim everywhere, compiled code only where projections are expensive."
     ),
     reads={"drawn": Settings(Drawn), "table": TableOf("local_share")},
-    options=Scenes,
 )
 def local_share(options: Scenes, drawn: Drawn, table: pd.DataFrame) -> Figure:
     """Draw a panel per implementation, a bar per scene with the time per frame at its end."""
@@ -110,7 +109,6 @@ def _draw_bars(ax: Axes, rows: pd.DataFrame, scenes: list[str]) -> None:
         "factorisation before the first frame are in the table `scaling`."
     ),
     reads={"drawn": Settings(Drawn), "table": TableOf("scaling")},
-    options=Scenes,
 )
 def scaling(options: Scenes, drawn: Drawn, table: pd.DataFrame) -> Figure:
     """Draw a panel per scene: the time of an iteration, by phase."""
@@ -171,7 +169,6 @@ def _draw_times(ax: Axes, rows: pd.DataFrame) -> None:
         "than all projections. Lines end at the numerical rank."
     ),
     reads={"drawn": Settings(Drawn), "table": TableOf("breakeven")},
-    options=BreakEven,
 )
 def break_even(options: BreakEven, drawn: Drawn, table: pd.DataFrame) -> Figure:
     """Draw a panel per constraint group, a line per scene and method; above 1 it costs more."""
@@ -220,7 +217,6 @@ def _draw_group(ax: Axes, rows: pd.DataFrame, styles: dict[str, tuple[str, str]]
         "table": TableOf("effects_cost"),
         "contributions": EachOf(CONTRIBUTIONS, "experiments"),
     },
-    options=Scenes,
 )
 def effects_contribution(
     options: Scenes, drawn: Drawn, table: pd.DataFrame, contributions: list[File]
@@ -299,7 +295,6 @@ def _draw_moved(ax: Axes, rows: pd.DataFrame, scenes: list[str], looks: Looks) -
         "for what the scene does not list."
     ),
     reads={"drawn": Settings(Drawn), "table": TableOf("effects_cost")},
-    options=Scenes,
 )
 def effects_cost(options: Scenes, drawn: Drawn, table: pd.DataFrame) -> Figure:
     """Draw a bar per scene, divided by effect; on the right one scene without some of its effects.

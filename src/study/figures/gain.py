@@ -34,7 +34,6 @@ _KEYS = ["scene", "group", "method", "r"]
         "errors": TableOf("reconstruction_error"),
         "repetitions": TableOf("repetitions"),
     },
-    options=Methods,
 )
 def error_against_gain(
     options: Methods,
@@ -136,7 +135,6 @@ def _span(upper: int) -> str:
         "scenes; pale ones that over choices of the arbitrary signs of the singular vectors."
     ),
     reads={"table": TableOf("ladder")},
-    options=Scenes,
 )
 def ladder(options: Scenes, table: pd.DataFrame) -> Figure:
     """Draw rungs from top (published) to bottom; left the error of the rerun, right the gain.

@@ -170,7 +170,6 @@ def obstacles_of(experiment: Experiment, positions: np.ndarray) -> list[Mesh] | 
     title="The bar, reduced",
     caption=f"Bars with tetrahedral constraints: {COMPARED}",
     reads=RUNS,
-    options=ReducedRuns,
 )
 def bar_runs(options: ReducedRuns, drawn: Drawn, horizon: Horizon, **files: list[File]) -> Figure:
     """Draw full-order runs beside reduced ones, see `Runs.draw`."""
@@ -182,7 +181,6 @@ def bar_runs(options: ReducedRuns, drawn: Drawn, horizon: Horizon, **files: list
     title="Springs only, reduced",
     caption=f"Sheets with edge springs only: {COMPARED}",
     reads=RUNS,
-    options=ReducedRuns,
 )
 def spring_runs(
     options: ReducedRuns, drawn: Drawn, horizon: Horizon, **files: list[File]
@@ -196,7 +194,6 @@ def spring_runs(
     title="Triangle strain only, reduced",
     caption=f"Sheets with triangle strain only: {COMPARED}",
     reads=RUNS,
-    options=ReducedRuns,
 )
 def strain_runs(
     options: ReducedRuns, drawn: Drawn, horizon: Horizon, **files: list[File]
@@ -217,7 +214,6 @@ def strain_runs(
         "reductions on bases of round-off). The curved sheet has projections that matter."
     ),
     reads={**RUNS, "noise": TableOf("noise"), "noise_runs": Every(NOISE_RUNS)},
-    options=ReducedRuns,
 )
 def bending_runs(
     options: ReducedRuns,
@@ -287,7 +283,6 @@ def _alike(table: pd.DataFrame) -> dict[tuple[tuple[int, str], ...], list[str]]:
         "strain changes little whatever the method."
     ),
     reads=RUNS,
-    options=ReducedRuns,
 )
 def cloth_all_grid(
     options: ReducedRuns, drawn: Drawn, horizon: Horizon, **files: list[File]
@@ -383,7 +378,6 @@ def _colours() -> ScalarMappable:
         "subspaces": EachOf(SUBSPACES, "drawn_subspaces"),
         "errors": TableOf("reduced_reruns"),
     },
-    options=ReducedRuns,
 )
 def teaser(
     options: ReducedRuns,

@@ -75,7 +75,6 @@ class Iteration:
         "bases": EachOf(BASIS, "first_run"),
         "samples": EachOf(SAMPLING, "first_run"),
     },
-    options=Steps,
 )
 def deim_iterations(
     options: Steps, drawn: Drawn, meshes: list[File], bases: list[File], samples: list[File]
@@ -200,7 +199,6 @@ def _joint_residual(V: np.ndarray, entries: np.ndarray, k: int) -> np.ndarray:
         "snapshots": EachOf(SNAPSHOTS, "experiments"),
         "samples": EachOf(SAMPLING, "runs"),
     },
-    options=Entries,
 )
 def deim_entries(
     options: Entries, drawn: Drawn, meshes: list[File], snapshots: list[File], samples: list[File]

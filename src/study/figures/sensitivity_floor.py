@@ -80,7 +80,6 @@ class Options(Scenes, Columns):
         "judged by its error. Dashed lines are twins, scenes that end before."
     ),
     reads={"drawn": Settings(Drawn), **FLOORS},
-    options=Options,
 )
 def sensitivity_floor(
     options: Options, drawn: Drawn, sensitivity: list[File], horizon: Horizon

@@ -51,7 +51,6 @@ class Options(Methods, Instants, Count, View):
         "sets": EachOf(SNAPSHOTS, "first_run"),
         "bases": EachOf(BASIS, "first_run"),
     },
-    options=Options,
 )
 def snapshots_and_modes(
     options: Options,

@@ -122,7 +122,6 @@ class Options(Methods, Ranks):
         "frame. Groups whose projections are round-off are left out."
     ),
     reads={"drawn": Settings(Drawn), "table": TableOf("stability")},
-    options=Options,
 )
 def stability_map(options: Options, drawn: Drawn, table: pd.DataFrame) -> Figure:
     """Draw strips of blocks: a block per method, its columns are sizes; a row per experiment.
