@@ -167,9 +167,7 @@ def obstacles_of(experiment: Experiment, positions: np.ndarray) -> list[Mesh] | 
 
 
 @figure(
-    title="The bar, reduced",
-    caption=f"Bars with tetrahedral constraints: {COMPARED}",
-    reads=RUNS,
+    title="The bar, reduced", caption=f"Bars with tetrahedral constraints: {COMPARED}", reads=RUNS
 )
 def bar_runs(options: ReducedRuns, drawn: Drawn, horizon: Horizon, **files: list[File]) -> Figure:
     """Draw full-order runs beside reduced ones, see `Runs.draw`."""
@@ -340,21 +338,17 @@ def _over_time(
     if info is None:
         return None
     plain = style.surface_colour(style.GREY)
-    panels = [
-        _coloured(view.run_panel(path, info, frame, colour=plain, title=""), q, mesh)
-        for frame, q in zip(frames, full, strict=True)
-    ]
+    panels = []
+    for frame, q in zip(frames, full, strict=True):
+        panel = view.run_panel(path, info, frame, colour=plain, title="")
+        if panel.positions is not None and not panel.failure:
+            distance = np.linalg.norm(panel.positions - q, axis=1) / mesh.extent
+            colour = _colours().to_rgba(distance[mesh.triangles].mean(axis=1))[:, :3]
+            panel = replace(panel, colour=colour)
+        panels.append(panel)
     middle = len(panels) // 2
     panels[middle] = replace(panels[middle], title=f"{title}, {info.title}")
     return panels
-
-
-def _coloured(panel: RunPanel, full: np.ndarray, mesh: Mesh) -> RunPanel:
-    """The panel with each triangle coloured by its distance to the full-order run."""
-    if panel.positions is None or panel.failure:
-        return panel
-    distance = np.linalg.norm(panel.positions - full, axis=1) / mesh.extent
-    return replace(panel, colour=_colours().to_rgba(distance[mesh.triangles].mean(axis=1))[:, :3])
 
 
 def _colours() -> ScalarMappable:

@@ -207,14 +207,8 @@ def scaling(parts: list[File]) -> pd.DataFrame:
     for quantity, name in EXPONENTS.items():
         rows[name] = np.nan
         for _, curve in curves:
-            rows.loc[curve.index, name] = _exponent(curve.vertices, curve[quantity])
+            measured = curve[curve[quantity] > 0.0]
+            if measured.vertices.nunique() >= FEWEST:
+                x, y = np.log(measured[["vertices", quantity]].to_numpy(float)).T
+                rows.loc[curve.index, name] = float(np.polyfit(x, y, 1)[0])
     return rows
-
-
-def _exponent(vertices: pd.Series, values: pd.Series) -> float:
-    """Slope of the logarithms of what was measured; nan of fewer than three meshes."""
-    measured = values > 0.0
-    if vertices[measured].nunique() < FEWEST:
-        return np.nan
-    x, y = (np.log(series[measured].to_numpy(float)) for series in (vertices, values))
-    return float(np.polyfit(x, y, 1)[0])
