@@ -30,7 +30,7 @@ from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import EachOf, Settings
 from study.experiments.kit.declaration import experiment
-from study.experiments.kit.load_reduction import load_reduction
+from study.experiments.kit.reruns import load_reduction
 from study.experiments.kit.scenes import positions_of, scene_of
 from study.experiments.kit.settings import Modes, Tolerance
 

@@ -1,30 +1,25 @@
 """Reductions of a group whose projections are round-off, on bases of that noise."""
 
 import logging
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Annotated, Any
 
 import h5py
 import numpy as np
-import pandas as pd
 from pydantic import Field
 
-from pdrom.core.store import write_hdf5, write_table
 from pdrom.core.yamlfile import ConfigModel
-from pdrom.model.scene import Scene, SceneConfig
+from pdrom.model.scene import Scene
 from pdrom.reduction.basis import Basis, compute_basis
 from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.rerun import Rerun, displacement_norms
 from pdrom.reduction.sampling import reductions
 from pdrom.reduction.sampling.local_step import rerun_reduced
 from pdrom.reduction.snapshots import row_masses, training_frames
-from study.artifact.paths import MESH, NOISE, NOISE_RUNS, SENSITIVITY, File
-from study.artifact.reads import Settings
-from study.experiments.kit.declaration import experiment
-from study.experiments.kit.scenes import scene_of
-from study.experiments.kit.settings import BlowupExtent, Horizon, Modes
-from study.experiments.sensitivity import perturbation_field
+from study.experiments.kit.reruns import store_end
+from study.experiments.kit.scenes import perturbation_field
+from study.experiments.kit.settings import Modes
 
 log = logging.getLogger(__name__)
 
@@ -56,42 +51,36 @@ class Noise(NoiseRuns):
     methods: tuple[str, ...] = ("deim-joint", "published")
 
 
-class Options(ConfigModel):
-    """Settings of the runs of a scene."""
+def noisy_runs(
+    scene: Scene,
+    group: str,
+    asked: NoiseRuns,
+    methods: Mapping[str, MethodSpec],
+    blowup_extent: float,
+    file: h5py.File,
+) -> list[dict[str, Any]]:
+    """Perturb the start of ``scene``, run, make bases without a cutoff, rerun.
 
-    scene: SceneConfig
-    noise: NoiseRuns
-    noise_methods: dict[str, MethodSpec]
-    horizon: Horizon
-    blowup_extent: BlowupExtent
-
-
-@experiment(
-    "Bases of the round-off of {group} in {scene}",
-    reads={"mesh": MESH, "sensitivity": SENSITIVITY, "settings": Settings(Options)},
-    writes={"out": NOISE, "runs": NOISE_RUNS},
-)
-def noise(mesh: File, sensitivity: File, settings: Options, out: File, runs: File) -> None:
-    """Perturb, run, make bases without a cutoff, rerun; up to the scene's horizon."""
-    labels, asked = out.labels, settings.noise
-    whole = scene_of(settings.scene, mesh)
-    frames = min(whole.config.frames, max(2, settings.horizon.frames(sensitivity)))
-    scene = whole.changed(frames=frames)
+    Returned are the rows of all runs with the ``group`` reduced by each of ``methods``. The runs of
+    one start of each kind go to ``file``, in the layout of `study.experiments.reruns`; marked where
+    r exceeds the rank.
+    """
     rows = []
-    with write_hdf5(runs.path) as file:
-        for axes in kinds(scene):
-            kept: Runs = []
-            for seed in range(1, asked.repetitions + 1):
-                found = list(_runs(scene, labels["group"], axes, seed, settings))
-                rows += [{**labels, "noisy_axes": axes, "seed": seed, **row} for row, _ in found]
-                if not kept or (irregular(found) and not irregular(kept)):
-                    kept = found
-            for row, outcome in kept:
-                store = file.create_group(f"{axes}/{row['method']}/r{row['r']:04d}")
-                _store(store, row["r"], outcome)
-            log.info("%s: %d starts", axes, asked.repetitions)
-    whole_numbers = dict.fromkeys(("frames", "blowup_frame"), "Int64")
-    write_table(pd.DataFrame(rows, columns=COLUMNS).astype(whole_numbers), out.path)
+    for axes in kinds(scene):
+        kept: Runs = []
+        for seed in range(1, asked.repetitions + 1):
+            start = roundoff_field(scene, axes, asked.perturbation, seed=seed)
+            found = list(_runs(scene, group, start, asked.sizes, methods, blowup_extent))
+            rows += [{"noisy_axes": axes, "seed": seed, **row} for row, _ in found]
+            if not kept or (irregular(found) and not irregular(kept)):
+                kept = found
+        for row, outcome in kept:
+            store = file.create_group(f"{axes}/{row['method']}/r{row['r']:04d}")
+            store.attrs.update(r=row["r"], marked=outcome is None)
+            if outcome is not None:
+                store_end(store, outcome)
+        log.info("%s: %d starts", axes, asked.repetitions)
+    return rows
 
 
 def irregular(runs: Runs) -> bool:
@@ -146,49 +135,35 @@ def noise_basis(
     return replace(basis, active_axes=(True, True, True))
 
 
-def _full_order(
-    scene: Scene, look: Callable[[np.ndarray], np.ndarray], start: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Positions (F + 1, N, 3) of a run, and ``look`` at the last iterates of its frames (F, ...).
-
-    ``start`` (N, 3) m is added to the initial positions.
-    """
-    loop, state = scene.stepper(), scene.initial_state(start)
-    positions, seen = [state.positions], []
-    for frame in range(scene.config.frames):
-        state, _ = loop.step(state, frame, lambda y: seen.append(look(y)))
-        positions.append(state.positions)
-    return np.stack(positions), np.stack(seen)
-
-
 def _runs(
-    scene: Scene, name: str, axes: str, seed: int, settings: Options
+    scene: Scene,
+    name: str,
+    start: np.ndarray,
+    sizes: Sequence[int],
+    methods: Mapping[str, MethodSpec],
+    blowup_extent: float,
 ) -> Iterator[tuple[dict[str, Any], Rerun | None]]:
-    """Rows and runs of one start: its full-order run, then the reductions trained on it."""
-    group, plan = scene.group(name), scene.config.reduce[name]
-    start = roundoff_field(scene, axes, settings.noise.perturbation, seed=seed)
-    reference, projections = _full_order(scene, group.project, start)
-    even = training_frames(scene.config.frames, min(plan.train, (scene.config.frames + 1) // 2))
-    masses = row_masses(group, scene.masses)
+    """Rows and runs from one ``start`` (N, 3) m, which is added to the initial positions.
+
+    The reductions are trained on its full-order run.
+    """
+    group, plan, frames = scene.group(name), scene.config.reduce[name], scene.config.frames
+    loop, state = scene.stepper(), scene.initial_state(start)
+    positions, projections = [state.positions], []
+    for frame in range(frames):
+        state, _ = loop.step(state, frame, lambda y: projections.append(group.project(y)))
+        positions.append(state.positions)
+    reference = np.stack(positions)
+    even = training_frames(frames, min(plan.train, (frames + 1) // 2))
+    trained_on, masses = np.stack(projections)[even], row_masses(group, scene.masses)
     displacement = displacement_norms(reference)
-    for method, spec in settings.noise_methods.items():
-        basis = noise_basis(projections[even], masses, group.rows_per_element, method=spec)
-        made = reductions(basis, spec, settings.noise.sizes)
-        for r in settings.noise.sizes:
+    for method, spec in methods.items():
+        basis = noise_basis(trained_on, masses, group.rows_per_element, method=spec)
+        made = reductions(basis, spec, sizes)
+        for r in sizes:
             row = {"method": method, "r": r, "rank": basis.rank, "frames": 0}
             outcome = None
             if r in made:
-                outcome = rerun_reduced(
-                    scene, name, made[r], reference, blowup_extent=settings.blowup_extent
-                )
+                outcome = rerun_reduced(scene, name, made[r], reference, blowup_extent)
                 row |= {"gain": made[r].gain, **outcome.row(displacement)}
             yield row, outcome
-
-
-def _store(store: h5py.Group, r: int, outcome: Rerun | None) -> None:
-    """A run in the layout of `study.experiments.reruns`; marked where r exceeds the rank."""
-    store.attrs.update(r=r, marked=outcome is None)
-    if outcome is not None:
-        blowup = -1 if outcome.blowup_frame is None else outcome.blowup_frame
-        store.attrs.update(blowup_frame=blowup, max_extent=outcome.max_extent)
-        store["positions"] = outcome.positions.astype(np.float32)

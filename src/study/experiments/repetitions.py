@@ -6,14 +6,15 @@ start. Where an error of the run decides something, its repetitions say how much
 
 import logging
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Annotated, Any, Literal
 
 import numpy as np
 import pandas as pd
 from pydantic import Field
 
-from pdrom.core.store import write_table
+from pdrom.core.store import write_hdf5, write_table
 from pdrom.core.yamlfile import ConfigModel, SceneName
 from pdrom.model.metrics import relative_errors
 from pdrom.model.scene import Scene, SceneConfig
@@ -25,12 +26,13 @@ from pdrom.reduction.sampling import Reduction, reductions
 from pdrom.reduction.sampling.local_step import rerun_reduced
 from pdrom.reduction.snapshots import SPLITS, SnapshotSet, load_snapshots
 from study.artifact import paths
-from study.artifact.paths import LADDER, MESH, SENSITIVITY, SNAPSHOTS, TRAIN, File
-from study.artifact.reads import Setting, Settings
+from study.artifact.paths import File
+from study.artifact.reads import Settings
 from study.experiments.kit.declaration import experiment
-from study.experiments.kit.scenes import positions_of, scene_of
+from study.experiments.kit.scenes import perturbation_field, positions_of, scene_of
 from study.experiments.kit.settings import BlowupExtent, Horizon, Modes, Tolerance
-from study.experiments.sensitivity import perturbation_field
+from study.experiments.noise import COLUMNS as NOISE_COLUMNS
+from study.experiments.noise import NoiseRuns, noisy_runs
 
 Varied = Literal["start", "training", "both"]
 log = logging.getLogger(__name__)
@@ -69,37 +71,34 @@ class Repetition:
     finite: bool
 
 
+@dataclass(frozen=True)
 class ReducedRuns:
     """Runs of a scene with one group reduced, compared with its full-order run.
 
-    Parameters
-    ----------
     data : snapshots of the group
     reference : (F + 1, N, 3) m, positions of the full-order run
     end : first frame that is not judged
     blowup_extent : see `pdrom.reduction.sampling.local_step.rerun`
     """
 
-    def __init__(
-        self,
-        scene: Scene,
-        group: str,
-        data: SnapshotSet,
-        reference: np.ndarray,
-        end: int,
-        blowup_extent: float,
-    ) -> None:
-        self.scene, self.group, self.data = scene, group, data
-        self.reference, self.end, self.blowup_extent = reference, end, blowup_extent
-        self.displacement = displacement_norms(reference)
-        self._bases: dict[tuple[str, int | None, int | None], Basis] = {}
+    scene: Scene
+    group: str
+    data: SnapshotSet
+    reference: np.ndarray
+    end: int
+    blowup_extent: float
+    _bases: dict[tuple[str, int | None, int | None], Basis] = field(default_factory=dict)
+
+    @cached_property
+    def displacement(self) -> np.ndarray:
+        """Norms (F,) m of the full-order run, see `displacement_norms`."""
+        return displacement_norms(self.reference)
 
     def until_the_end(self) -> "ReducedRuns":
         """Copy of the runs up to the first frame that is not judged, but of two frames at least."""
         frames = min(self.scene.config.frames, max(2, self.end))
         scene = self.scene.changed(frames=frames)
-        reference = self.reference[: frames + 1]
-        return ReducedRuns(scene, self.group, self.data, reference, self.end, self.blowup_extent)
+        return replace(self, scene=scene, reference=self.reference[: frames + 1])
 
     def basis(
         self, method: MethodSpec, frames: int | None = None, signs: int | None = None
@@ -178,50 +177,6 @@ class Repeated(ConfigModel):
     varied: tuple[Varied, ...]
 
 
-class Options(ConfigModel):
-    """Settings of the repetitions in a scene."""
-
-    scene: SceneConfig
-    repetitions: Repetitions
-    repeated: tuple[Repeated, ...]
-    horizon: Horizon
-    blowup_extent: BlowupExtent
-
-
-@experiment(
-    "Repeated runs of {scene}, {group} reduced",
-    reads={
-        "mesh": paths.MESH,
-        "fom": paths.TRAIN,
-        "snapshots": paths.SNAPSHOTS,
-        "sensitivity": paths.SENSITIVITY,
-        "settings": Settings(Options),
-    },
-    writes={"out": paths.REPETITIONS},
-)
-def repetitions(
-    mesh: File, fom: File, snapshots: File, sensitivity: File, settings: Options, out: File
-) -> None:
-    """Repeat every listed run of the scene and group."""
-    labels = out.labels
-    runs = ReducedRuns(
-        scene_of(settings.scene, mesh),
-        labels["group"],
-        load_snapshots(snapshots.path),
-        reference=positions_of(fom),
-        end=settings.horizon.frames(sensitivity),
-        blowup_extent=settings.blowup_extent,
-    ).until_the_end()
-    rows = []
-    for own in settings.repeated:
-        for varied in own.varied:
-            found = runs.repeat(own.spec, own.sizes, varied, settings.repetitions)
-            cell = {**labels, "method": own.method, "varied": varied}
-            rows += [cell | vars(run) for run in sorted(found, key=lambda run: run.r)]
-        log.info("%s", own.method)
-    write_table(pd.DataFrame(rows, columns=COLUMNS), out.path)
-
-
 class Ladder(Repetitions):
     """The rungs of a ladder; runs are repeated on other training frames.
 
@@ -262,46 +217,86 @@ class LadderSection(Ladder):
     scenes: tuple[str, ...] = ()
 
 
+class Options(ConfigModel):
+    """Settings of the runs of a scene with a group reduced; no ladder and no noise if None."""
+
+    scene: SceneConfig
+    repetitions: Repetitions
+    repeated: tuple[Repeated, ...]
+    own_ladder: Ladder | None
+    own_noise: NoiseRuns | None
+    noise_methods: dict[str, MethodSpec]
+    horizon: Horizon
+    blowup_extent: BlowupExtent
+
+
 @experiment(
-    "Ladder of {group} in {scene}",
+    "Repeated runs of {scene}, {group} reduced",
     reads={
-        "mesh": MESH,
-        "fom": TRAIN,
-        "snapshots": SNAPSHOTS,
-        "sensitivity": SENSITIVITY,
-        "config": Setting("scene"),
-        "ladder": Setting("ladder"),
-        "horizon": Setting("horizon"),
-        "blowup_extent": Setting("blowup_extent"),
+        "mesh": paths.MESH,
+        "fom": paths.TRAIN,
+        "snapshots": paths.SNAPSHOTS,
+        "sensitivity": paths.SENSITIVITY,
+        "settings": Settings(Options),
     },
-    writes={"out": LADDER},
+    writes={
+        "out": paths.REPETITIONS,
+        "rungs": paths.LADDER,
+        "noise": paths.NOISE,
+        "noise_runs": paths.NOISE_RUNS,
+    },
 )
-def ladder(
+def repetitions(
     mesh: File,
     fom: File,
     snapshots: File,
     sensitivity: File,
-    config: SceneConfig,
-    ladder: Ladder,
-    horizon: Horizon,
-    blowup_extent: BlowupExtent,
+    settings: Options,
     out: File,
+    rungs: File,
+    noise: File,
+    noise_runs: File,
 ) -> None:
-    """Reduce and rerun the scene with every rung."""
-    labels, data = out.labels, load_snapshots(snapshots.path)
+    """Repeat every listed run of the scene and group, climb the ladder, reduce the round-off.
+
+    What the configuration does not ask of a scene has a table without rows.
+    """
+    labels = out.labels
     runs = ReducedRuns(
-        scene_of(config, mesh),
+        scene_of(settings.scene, mesh),
         labels["group"],
-        data,
+        load_snapshots(snapshots.path),
         reference=positions_of(fom),
-        end=horizon.frames(sensitivity),
-        blowup_extent=blowup_extent,
+        end=settings.horizon.frames(sensitivity),
+        blowup_extent=settings.blowup_extent,
     )
-    judged = runs.until_the_end() if labels["scene"] in ladder.repeated else None
+    short = runs.until_the_end()
     rows = []
+    for own in settings.repeated:
+        for varied in own.varied:
+            found = short.repeat(own.spec, own.sizes, varied, settings.repetitions)
+            cell = {**labels, "method": own.method, "varied": varied}
+            rows += [cell | vars(run) for run in sorted(found, key=lambda run: run.r)]
+        log.info("%s", own.method)
+    write_table(pd.DataFrame(rows, columns=COLUMNS), out.path)
+    climbed = [] if settings.own_ladder is None else _ladder(runs, short, settings.own_ladder)
+    table = pd.DataFrame([{**labels, **row} for row in climbed], columns=LADDER_COLUMNS)
+    whole = dict.fromkeys(("blowup_frame", "repetitions", "entries"), "Int64")
+    write_table(table.astype(whole), rungs.path)
+    methods, limit, reduced = settings.noise_methods, settings.blowup_extent, []
+    with write_hdf5(noise_runs.path) as file:
+        if settings.own_noise is not None:
+            reduced = noisy_runs(short.scene, runs.group, settings.own_noise, methods, limit, file)
+    table = pd.DataFrame([{**labels, **row} for row in reduced], columns=NOISE_COLUMNS)
+    write_table(table.astype({"frames": "Int64", "blowup_frame": "Int64"}), noise.path)
+
+
+def _ladder(runs: ReducedRuns, short: ReducedRuns, ladder: Ladder) -> Iterator[dict[str, Any]]:
+    """Rows of every rung; ``short`` are those of the ``runs`` that are repeated."""
+    data = runs.data
     for direction, method, seed, r in ladder.rungs(data.rows_per_element):
         rung = method.title if seed is None else f"signs {seed}"
-        row = {**labels, "direction": direction, "rung": rung, "r": r}
+        row = {"direction": direction, "rung": rung, "r": r}
         row["rows_per_element"] = data.rows_per_element
         basis = runs.basis(method, signs=seed)
         if direction == "square" and r > basis.rank:
@@ -312,13 +307,11 @@ def ladder(
             outcome = runs.run(reduction)
             row |= {**outcome.row(runs.displacement), "r": size, **_measures(reduction, data)}
             row["relative_error_within_horizon"] = runs.error(outcome)
-            if judged is not None and seed is None and direction != "square":
-                row |= _ranges(list(judged.repeat(method, [size], "training", ladder)))
-        rows.append(row)
-        log.info("%s, %s", direction, row["rung"])
-    table = pd.DataFrame(rows, columns=LADDER_COLUMNS)
-    whole = dict.fromkeys(("blowup_frame", "repetitions", "entries"), "Int64")
-    write_table(table.astype(whole), out.path)
+            repeated = runs.scene.config.name in ladder.repeated
+            if repeated and seed is None and direction != "square":
+                row |= _ranges(list(short.repeat(method, [size], "training", ladder)))
+        yield row
+        log.info("%s, %s", direction, rung)
 
 
 def _measures(reduction: Reduction, data: SnapshotSet) -> dict[str, Any]:

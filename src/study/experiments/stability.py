@@ -21,7 +21,7 @@ from pdrom.reduction.subspace.model import SubspaceModel, load_models, rerun_mod
 from study.artifact.paths import BASIS, MESH, SAMPLING, STABILITY, SUBSPACES, File
 from study.artifact.reads import Every, Setting
 from study.experiments.kit.declaration import experiment
-from study.experiments.kit.load_reduction import basis_of, load_reduction
+from study.experiments.kit.reruns import basis_of, load_reduction
 from study.experiments.kit.scenes import scene_of, varied
 from study.experiments.kit.settings import BlowupExtent, Rank, Solver, resolve_ranks
 

@@ -26,8 +26,8 @@ from study.artifact.reads import Every, Settings
 from study.experiments.iterations import IterationCounts, accelerated, stepper_of
 from study.experiments.kit.costs import effect_costs, left_out, local_costs, variant
 from study.experiments.kit.declaration import experiment
-from study.experiments.kit.load_reduction import basis_of, load_reduction
 from study.experiments.kit.measurement import Protocol, Variant, measure
+from study.experiments.kit.reruns import basis_of, load_reduction
 from study.experiments.kit.scenes import scene_of
 from study.experiments.kit.settings import ANDERSON, FOM, Count, Rank, Solver, resolve_ranks
 

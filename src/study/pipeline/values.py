@@ -15,7 +15,8 @@ from study.artifact.paths import Place
 from study.experiments.frame_times import NamedScene, ProjectionCase, SubspaceCase
 from study.experiments.kit.settings import Horizon, Rank
 from study.experiments.live import JOINT, JointRows, OfScene
-from study.experiments.repetitions import Repeated
+from study.experiments.noise import Noise
+from study.experiments.repetitions import LadderSection, Repeated
 from study.experiments.stability import Stability
 from study.pipeline import figures, paper
 from study.pipeline.contents import labels_of
@@ -127,6 +128,16 @@ def _repeated(study: Study, labels: Labels) -> tuple[Repeated, ...]:
     )
 
 
+def _own_ladder(study: Study, labels: Labels) -> LadderSection | None:
+    """The ladder of a group; None where no ladder is asked for."""
+    return study.settings.ladder if dict(labels) in labels_of(study, paths.LADDER) else None
+
+
+def _own_noise(study: Study, labels: Labels) -> Noise | None:
+    """The runs on round-off of a group; None where none are asked for."""
+    return study.settings.noise if dict(labels) in labels_of(study, paths.NOISE) else None
+
+
 def _noise_methods(study: Study, labels: Labels) -> dict[str, MethodSpec]:
     """The methods of the noise runs; they need not be among the study's."""
     return study.named_methods(study.settings.noise.methods, "noise.methods")
@@ -153,6 +164,8 @@ DERIVED: dict[str, Callable[[Study, Labels], Any]] = {
     "every_scene": lambda study, labels: study.scenes,
     "every_method": lambda study, labels: study.every_method,
     "scaled_methods": scaled_methods,
+    "own_ladder": _own_ladder,
+    "own_noise": _own_noise,
     "noise_methods": _noise_methods,
     "repeated": _repeated,
     "basis": _basis,

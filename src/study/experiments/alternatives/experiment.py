@@ -18,9 +18,7 @@ from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.model.constraints.base import GroupConfig
 from pdrom.model.held_out import FIRST
-from pdrom.model.metrics import trajectory_error
 from pdrom.model.scene import Scene, SceneConfig
-from pdrom.reduction.rerun import displacement_norms
 from study.artifact.paths import ALTERNATIVE_TIMES, ALTERNATIVES, File
 from study.artifact.reads import Settings, SourcesOf
 from study.experiments.alternatives.candidates import Trained, candidates, trained
@@ -29,6 +27,7 @@ from study.experiments.alternatives.solvers.explicit import continuous
 from study.experiments.kit.converged import converged_run
 from study.experiments.kit.declaration import experiment
 from study.experiments.kit.measurement import Case, Variant, in_processes
+from study.experiments.kit.reruns import run_error
 from study.experiments.kit.settings import BlowupExtent
 
 TIME_COLUMNS = ["scene", "factor", "stiffness", *SETTING, "process", "ms_per_frame"]
@@ -77,9 +76,10 @@ class References:
 
     def errors(self, run: np.ndarray | None) -> dict[str, float | None]:
         """Relative errors of a ``run`` (F + 1, N, 3) m, empty if it blew up."""
+        against = {"implicit": self.implicit, "continuous": self.continuous}
         return {
-            "error_implicit": _error(run, self.implicit),
-            "error_continuous": _error(run, self.continuous),
+            f"error_{name}": None if run is None or other is None else run_error(run, other)
+            for name, other in against.items()
         }
 
 
@@ -161,10 +161,3 @@ def references(scene: Scene, section: Comparison) -> References:
         if implicit is None:
             log.warning("%s: no convergence in %d evaluations", name, section.implicit.limit)
     return References(implicit, exact.positions, exact.error)
-
-
-def _error(run: np.ndarray | None, reference: np.ndarray | None) -> float | None:
-    if run is None or reference is None:
-        return None
-    difference = np.linalg.norm((run - reference)[1:].reshape(len(run) - 1, -1), axis=1)
-    return trajectory_error(difference, displacement_norms(reference))

@@ -15,6 +15,7 @@ from pdrom.model.dynamics.space import VertexSpace
 from pdrom.model.dynamics.stepper import FrameReport, State, Stepper
 from pdrom.model.dynamics.system import GlobalSystem
 from pdrom.model.scene import Scene
+from study.experiments.kit.scenes import followed
 
 MEMORY = 8
 SUFFICIENT = 1e-4  # Armijo's constant
@@ -161,9 +162,5 @@ def converged_run(scene: Scene, tolerance: float, limit: int) -> np.ndarray | No
     None where a frame does not reach the ``tolerance`` in ``limit`` evaluations.
     """
     best = ConvergedStepper(scene, scene.system, tolerance, limit)
-    state = scene.initial_state()
-    positions = [state.positions]
-    for frame in range(scene.config.frames):
-        state, _ = best.step(state, frame)
-        positions.append(state.positions)
-    return np.stack(positions) if best.converged else None
+    positions = followed(best, scene.initial_state(), scene.config.frames)
+    return positions if best.converged else None

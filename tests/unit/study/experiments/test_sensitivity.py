@@ -12,11 +12,11 @@ from builders import make_scene
 from pdrom.core.store import read_table, write_table
 from pdrom.model.runs import trajectory
 from pdrom.reduction.deviations import error_within
+from study.experiments.kit.scenes import perturbation_field
 from study.experiments.kit.settings import floor_of, horizon, horizons
 from study.experiments.sensitivity import (
     COLUMNS,
-    heldout_floor,
-    perturbation_field,
+    perturbed,
     relative_difference,
     sensitivities,
 )
@@ -96,7 +96,7 @@ def test_small_perturbations_act_in_proportion():
 
 def test_held_out_floor_is_labelled_as_such():
     scene = make_scene(SPRING, {"effect": "gravity"}, {"effect": "pins", "select": "top"}, frames=3)
-    table = heldout_floor(scene, "kick", 1e-10, (1, 2, 3))
+    table = pd.concat(perturbed(scene, trajectory(scene), 1e-10, (1, 2, 3), "kick"))
     assert set(table.perturbation) == {"kick"}
     assert table.seed.tolist() == [1, 1, 1, 2, 2, 2, 3, 3, 3]
     assert table.relative_difference[table.seed == 2].to_numpy() == pytest.approx(
@@ -123,7 +123,7 @@ PERTURBED = {
 
 
 @pytest.fixture
-def perturbed() -> pd.DataFrame:
+def floors() -> pd.DataFrame:
     """Perturbed runs of two scenes, a row for every seed."""
     return pd.DataFrame(
         [(*key, frame, v) for key, series in PERTURBED.items() for frame, v in enumerate(series)],
@@ -131,24 +131,24 @@ def perturbed() -> pd.DataFrame:
     )
 
 
-def test_floor_is_the_largest_over_the_seeds(perturbed):
-    for table in (perturbed, perturbed.sample(frac=1.0, random_state=3)):
+def test_floor_is_the_largest_over_the_seeds(floors):
+    for table in (floors, floors.sample(frac=1.0, random_state=3)):
         assert floor_of(table, "a", 1e-10).tolist() == [0.0, 2e-9, 5e-3, 1.0]
         assert floor_of(table, "a", "heldout").tolist() == [1e-12, 1.0, 1.0, 1.0]
         assert len(floor_of(table, "b", 1e-6)) == 0
 
 
-def test_horizons_of_every_scene(perturbed):
-    assert horizons(perturbed, 1e-10, 1e-3) == {"a": 2, "b": 4}
-    assert horizons(perturbed, 1e-10, 1e-2) == {"a": 3, "b": 4}
-    assert horizons(perturbed, 1e-6, 1e-3)["a"] == 0
-    assert horizons(perturbed, "heldout", 1e-3) == {"a": 1, "b": 4}
+def test_horizons_of_every_scene(floors):
+    assert horizons(floors, 1e-10, 1e-3) == {"a": 2, "b": 4}
+    assert horizons(floors, 1e-10, 1e-2) == {"a": 3, "b": 4}
+    assert horizons(floors, 1e-6, 1e-3)["a"] == 0
+    assert horizons(floors, "heldout", 1e-3) == {"a": 1, "b": 4}
 
 
 @pytest.mark.parametrize("kept", [["1e-10"], ["1e-10", "solver"]])
-def test_horizons_survive_a_file(perturbed, kept, tmp_path):
+def test_horizons_survive_a_file(floors, kept, tmp_path):
     """Labels are found whether they are read back as text or, without words, as numbers."""
-    write_table(perturbed[perturbed.perturbation.isin(kept)], tmp_path / "sensitivity.csv")
+    write_table(floors[floors.perturbation.isin(kept)], tmp_path / "sensitivity.csv")
     assert horizons(read_table(tmp_path / "sensitivity.csv"), 1e-10, 1e-3) == {"a": 2, "b": 4}
 
 

@@ -18,6 +18,7 @@ from study.experiments.alternatives.solvers.substeps import (
     inverse_masses,
     multiply,
 )
+from study.experiments.kit.scenes import followed
 
 UNSTABLE = 1e100  # m; of a larger run, or one that is not finite, no change is estimated
 
@@ -106,12 +107,7 @@ def _remaining(change: float, last: float) -> float:
 
 
 def _positions(scene: Scene, frames: int, substeps: int) -> np.ndarray:
-    loop, state = Explicit(scene, substeps), scene.initial_state()
-    positions = [state.positions]
-    for frame in range(frames):
-        state, _ = loop.step(state, frame)
-        positions.append(state.positions)
-    return np.stack(positions)
+    return followed(Explicit(scene, substeps), scene.initial_state(), frames)
 
 
 def _change(before: np.ndarray, after: np.ndarray) -> float:
