@@ -25,9 +25,8 @@ from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.requested import run as requested
 from pdrom.reduction.requested.levels import OnFrame, silent
 from pdrom.reduction.rerun import compare
-from pdrom.reduction.sampling import Reduction
+from pdrom.reduction.sampling import Reduction, select
 from pdrom.reduction.sampling.local_step import ReducedLocalStep, replace_group
-from pdrom.reduction.sampling.select import select
 from pdrom.reduction.snapshots import row_masses, training_frames
 
 SNAPSHOTS = 100  # training snapshots of a group, at most, where the scene gives no number
