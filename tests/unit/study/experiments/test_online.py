@@ -23,7 +23,6 @@ from study.experiments.subspaces import (
     LARGE_COLUMNS,
     Hrpd,
     LargeModels,
-    LargeOptions,
     Online,
 )
 from study.tables.speedups import frame_times, online, speedups
@@ -49,8 +48,7 @@ def written(tmp_path_factory):
     )
     models = path.with_suffix(".h5")
     out, stored = File(str(path), {"scene": "test"}), File(str(models), {})
-    settings = LargeOptions(scene=config, online=asked, blowup_extent=10.0)
-    experiment.online(sources=[], settings=settings, out=out, models=stored)
+    experiment.online([], config, asked, blowup_extent=10.0, out=out, models=stored)
     timed = TimedScene(config, DEFAULT_SOLVER, frames=3, models={str(models): None})
     rows = pd.DataFrame(in_processes([timed], ONCE), columns=TIME_COLUMNS)
     write_table(rows, path.with_name("times.csv"))
