@@ -1,5 +1,6 @@
 """Named errors; each carries one line: file or object, key, value, and what is allowed."""
 
+import re
 from collections.abc import Iterable
 from difflib import get_close_matches
 
@@ -21,11 +22,12 @@ def suggestion(value: object, allowed: Iterable[str]) -> str:
 class PdromError(Exception):
     """Base of every error that a user's input can cause; shown to the user without a traceback.
 
-    Its text is one line, whatever names it quotes: other separators of lines are escaped.
+    Its text is one line, whatever names it quotes: other separators of lines are escaped, and
+    a word of a thousand letters is cut.
     """
 
     def __str__(self) -> str:
-        text = super().__str__()
+        text = re.sub(r"(\S{80})\S{920,}", r"\1...", super().__str__())
         return "".join(
             character if character.isprintable() else ascii(character)[1:-1] for character in text
         )

@@ -17,7 +17,6 @@ from study.figures.kit.elements import SIGNED, ElementMap, element_map, signed, 
 from study.figures.kit.options import (
     Count,
     Drawn,
-    Experiments,
     Instants,
     Methods,
     NothingToDraw,
@@ -31,7 +30,7 @@ ABOVE, TITLE, FOOTER = 0.36, 0.34, 0.44  # room for two lines, for a title, for 
 LEFT, TALLEST = 0.75, 1.45  # where pictures begin, and how high they may be
 
 
-class Options(Experiments, Methods, Instants, Count, View):
+class Options(Methods, Instants, Count, View):
     """Options of the figure."""
 
 

@@ -26,7 +26,7 @@ from study.artifact.reads import Every, One, ProjectFile, Setting, SourcesOf
 from study.paper.macros import captions, decisions, keys_of, macros, number_of, provenance
 from study.paper.source import DOCUMENTS, documents
 from study.paper.tex import build_pdfs
-from study.paper.textables import TEX_TABLES
+from study.paper.textables import TEX_TABLES, reads, tex_table
 
 PAGES = {"main": 16, "supplement": 30}  # at most, of the paper
 
@@ -73,53 +73,37 @@ def write_inputs(
     decided = {document: decisions(text, data) for document, text in texts.items()}
     known = provenance(decided, facts.part, facts.full_study)
     written = {"macros": macros(whole, data) + known, "figures": captions(facts.captions)}
-    watched = {name: _Watched(data) for name in TEX_TABLES}
-    written |= {name: make(watched[name]) for name, make in TEX_TABLES.items()}
+    written |= {name: tex_table(name, data) for name in TEX_TABLES}
     for document, text in texts.items():
         written[document] = bibliography(text, references)
     origins = {
         "known": decided,
         "numbers": {key: asdict(number_of(key, data)) for key in keys_of(whole)},
-        "tables": {name: list(dict.fromkeys(one.read)) for name, one in watched.items()},
+        "tables": {name: reads(name) for name in TEX_TABLES},
     }
     written[Path(NUMBERS).stem] = json.dumps(origins, indent=1, allow_nan=False) + "\n"
     for name, content in written.items():
         write_text(content, outputs[name])
 
 
-class _Watched(dict[str, pd.DataFrame]):
-    """Tables by name, which note those that are read."""
-
-    def __init__(self, tables: Mapping[str, pd.DataFrame]) -> None:
-        super().__init__(tables)
-        self.read: list[str] = []
-
-    def __getitem__(self, name: str) -> pd.DataFrame:
-        self.read.append(name)
-        return super().__getitem__(name)
-
-
 def fact_tables(machine: Path, facts: Facts) -> dict[str, pd.DataFrame]:
-    """Tables of the manuscript that are no results: ``facts``, and the record ``machine``."""
+    """Tables that are no results: ``facts``, and the record ``machine`` in one row.
+
+    Versions of libraries are columns ``version_NAME``.
+    """
     tables = {name: pd.DataFrame(rows) for name, rows in facts.tables.items()}
-    return {**tables, "machine": _machine_table(machine)}
-
-
-def _machine_table(path: Path) -> pd.DataFrame:
-    """One row; versions of libraries as ``version_NAME``."""
     try:
-        record = Machine.model_validate_json(read_text(path))
+        record = Machine.model_validate_json(read_text(machine))
     except ValidationError as error:
-        raise StorageError(f"{path}: {describe(error, Machine)}") from error
-    versions = {f"version_{name}": version for name, version in record.libraries.items()}
-    architectures = ", ".join(sorted({k.architecture for k in record.kernels if k.architecture}))
-    plain = record.model_dump(exclude={"libraries", "kernels", "units"})
-    row = {**plain, **versions, "kernels": architectures}
+        raise StorageError(f"{machine}: {describe(error, Machine)}") from error
+    row = record.model_dump(exclude={"libraries", "kernels", "units"})
+    row |= {f"version_{name}": version for name, version in record.libraries.items()}
+    row["kernels"] = ", ".join(sorted({k.architecture for k in record.kernels if k.architecture}))
     if record.units is not None:
         row |= {**record.units.model_dump(), "unit_s": record.units.unit_s}
     # names of a machine are not ours and may hold any character
     words = {key: replaced(value) for key, value in row.items() if isinstance(value, str)}
-    return pd.DataFrame([{**row, **words}])
+    return {**tables, "machine": pd.DataFrame([{**row, **words}])}
 
 
 def build(
@@ -162,14 +146,11 @@ def bibliography(source: str, references: Path) -> str:
     keys = cited_keys(source)
     set_strict_mode(False)
     try:
-        database = parse_file(str(references))
-    except PybtexError as error:
-        raise PaperError(f"{references}: {error}") from error
-    missing = [key for key in keys if key not in database.entries]
-    if missing:
-        raise PaperError(f"{references}: no entry for {', '.join(missing)}")
-    try:
-        formatted = list(Style().format_entries([database.entries[key] for key in keys]))
+        entries = parse_file(str(references)).entries
+        missing = [key for key in keys if key not in entries]
+        if missing:
+            raise PaperError(f"{references}: no entry for {', '.join(missing)}")
+        formatted = list(Style().format_entries([entries[key] for key in keys]))
     except PybtexError as error:
         raise PaperError(f"{references}: {error}") from error
     backend = Backend(encoding="utf-8")

@@ -33,11 +33,11 @@ _COUNTS = ("count", "distinct")
 # Columns that say what was run; the others say what came out.
 _LABELS = ("scene", "group", "method", "position_basis", "variant", "direction", "experiment")
 AGGREGATES: dict[str, Callable[[pd.Series], Any]] = {
-    "max": lambda column: column.max(),
-    "min": lambda column: column.min(),
-    "median": lambda column: column.median(),
-    "count": lambda column: len(column),
-    "distinct": lambda column: column.nunique(),
+    "max": pd.Series.max,
+    "min": pd.Series.min,
+    "median": pd.Series.median,
+    "count": len,
+    "distinct": pd.Series.nunique,
 }
 
 
@@ -93,22 +93,21 @@ def number_of(key: str, tables: Mapping[str, pd.DataFrame]) -> Number:
     PaperError
         An unknown table or column, or several rows without an aggregate.
     """
-    parsed = _parse(key, tables)
-    rows = matching(tables[parsed.table], parsed.filters)
-    cells = rows[parsed.column].dropna()
-    if parsed.aggregate is None and len(rows) > 1:
-        raise PaperError(f"\\val{{{key}}}: matches {len(rows)} rows of table '{parsed.table}'")
-    counts = parsed.aggregate in _COUNTS
-    if not (is_held(key, tables) if counts else len(cells)):
-        text, value = MISSING, None
-    else:
-        take = AGGREGATES[parsed.aggregate] if parsed.aggregate else lambda column: column.iloc[0]
-        value = take(cells)
+    table, filters, column, aggregate = _parse(key, tables)
+    rows = matching(tables[table], filters)
+    cells = rows[column].dropna()
+    if aggregate is None and len(rows) > 1:
+        raise PaperError(f"\\val{{{key}}}: matches {len(rows)} rows of table '{table}'")
+    counts = aggregate in _COUNTS
+    value: Any = None
+    text = MISSING
+    if is_held(key, tables) if counts else len(cells):
+        value = AGGREGATES[aggregate](cells) if aggregate else cells.iloc[0]
         text = str(value) if counts else format_number(value)
         value = value if isinstance(value, str) else float(value)
         value = value if isinstance(value, str) or np.isfinite(value) else str(value)  # JSON
-    held = [int(row) for row in np.flatnonzero(tables[parsed.table].index.isin(cells.index))]
-    return Number(text, value, parsed.table, held, parsed.column, parsed.aggregate)
+    held = [int(row) for row in np.flatnonzero(tables[table].index.isin(cells.index))]
+    return Number(text, value, table, held, column, aggregate)
 
 
 def is_held(key: str, tables: Mapping[str, pd.DataFrame]) -> bool:
@@ -116,38 +115,33 @@ def is_held(key: str, tables: Mapping[str, pd.DataFrame]) -> bool:
 
     A count of none is a number where there are runs to count, whatever became of them.
     """
-    parsed = _parse(key, tables)
-    filters = parsed.filters
-    if parsed.aggregate in _COUNTS:
+    table, filters, _, aggregate = _parse(key, tables)
+    if aggregate in _COUNTS:
         filters = [entry for entry in filters if entry[0] in _LABELS]
-    return len(matching(tables[parsed.table], filters)) > 0
+    return len(matching(tables[table], filters)) > 0
 
 
-@dataclass(frozen=True)
-class _Key:
-    """A key in its parts."""
-
-    table: str
-    filters: list[Filter]
-    column: str
-    aggregate: str | None
-
-
-def _parse(key: str, tables: Mapping[str, pd.DataFrame]) -> _Key:
+def _parse(
+    key: str, tables: Mapping[str, pd.DataFrame]
+) -> tuple[str, list[Filter], str, str | None]:
+    """Table, filters, column and aggregate of a key."""
     name, *parts = key.split("|")
     if name not in tables:
         raise PaperError(f"\\val{{{key}}}: no table '{name}' (allowed: {', '.join(tables)})")
     aggregate = parts.pop() if parts and parts[-1] in AGGREGATES else None
     if not parts or "=" in parts[-1]:
         raise PaperError(f"\\val{{{key}}}: names no column of table '{name}'")
-    *filters, column = parts
-    found: list[Filter] = []
-    for entry in filters:
+    *entries, column = parts
+    filters: list[Filter] = []
+    for entry in entries:
         parsed = _FILTER.fullmatch(entry)
-        found.append((parsed[1], parsed[2], parsed[3]) if parsed else (entry, "=", ""))
-    for field in (*(field for field, _, _ in found), column):
-        _require(field, tables[name], key)
-    return _Key(name, found, column, aggregate)
+        filters.append((parsed[1], parsed[2], parsed[3]) if parsed else (entry, "=", ""))
+    known = tables[name].columns
+    for field in (*(field for field, _, _ in filters), column):
+        if field not in known:
+            allowed = ", ".join(known)
+            raise PaperError(f"\\val{{{key}}}: no column '{field}' (allowed: {allowed})")
+    return name, filters, column, aggregate
 
 
 def matching(rows: pd.DataFrame, filters: Sequence[Filter]) -> pd.DataFrame:
@@ -156,13 +150,6 @@ def matching(rows: pd.DataFrame, filters: Sequence[Filter]) -> pd.DataFrame:
         matches = rows[field].map(lambda cell, value=value: _same(cell, value))
         rows = rows[matches.astype(bool) != (sign == "!=")]
     return rows
-
-
-def _require(field: str, rows: pd.DataFrame, key: str) -> None:
-    if field not in rows.columns:
-        raise PaperError(
-            f"\\val{{{key}}}: no column '{field}' (allowed: {', '.join(rows.columns)})"
-        )
 
 
 def _same(cell: Any, value: str) -> bool:
@@ -237,10 +224,10 @@ def decisions(source: str, tables: Mapping[str, pd.DataFrame]) -> list[str]:
     for sentence in sentences(source):
         if all(is_held(key, tables) for key in keys_of(sentence.text)):
             made.append(SHOWN)
-        elif sentence.is_row:
+        elif sentence.is_row or sentence.paragraph in noted:
             made.append(DROPPED)
         else:
-            made.append(DROPPED if sentence.paragraph in noted else NOTED)
+            made.append(NOTED)
             noted.add(sentence.paragraph)
     return made
 

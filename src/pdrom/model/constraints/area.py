@@ -9,18 +9,7 @@ from typing import Literal
 import numpy as np
 
 from pdrom.model.constraints import products
-from pdrom.model.constraints.lanes import (
-    LANES,
-    SMALLEST,
-    absolute_sum,
-    choose,
-    dot,
-    lane_function,
-    load,
-    mix,
-    save,
-    scaled,
-)
+from pdrom.model.constraints.lanes import LANES, lane_function, load, mix, save, scaled
 from pdrom.model.constraints.local_kernel import gradient_kernel, local_kernel
 from pdrom.model.constraints.simplex import SIZE, F, P
 from pdrom.model.constraints.singular_values import (
@@ -29,7 +18,7 @@ from pdrom.model.constraints.singular_values import (
     project,
     project_gradients,
 )
-from pdrom.model.constraints.svd3 import jacobi_rotation, orthonormal_pair
+from pdrom.model.constraints.svd3 import rotated_pair
 from pdrom.model.constraints.triangle_strain import TriangleStrain, forces, gradients
 
 # numbers of a lane after those of every simplex: the columns of U, the rotation V, the values
@@ -39,31 +28,19 @@ WORK = VALUES + products.SIZE
 
 
 @lane_function
-def _factors(work, values):
-    """Leave U, V and the singular values of a block, the larger first."""
-    for lane in range(LANES):
-        f0, f1 = load(work, F, lane), load(work, F + 3, lane)
-        scale = absolute_sum(f0) + absolute_sum(f1) + SMALLEST
-        f0, f1 = scaled(1.0 / scale, f0), scaled(1.0 / scale, f1)
-        c, s, _ = jacobi_rotation(f0, f1, False)
-        a, b = mix(c, f0, -s, f1), mix(s, f0, c, f1)
-        # a quarter turn more puts the longer column first
-        swapped = dot(a, a) < dot(b, b)
-        u0, u1, s0, s1 = orthonormal_pair(
-            choose(swapped, b, a), choose(swapped, scaled(-1.0, a), b)
-        )
-        save(work, U, lane, u0)
-        save(work, U + 3, lane, u1)
-        work[COSINE * LANES + lane] = s if swapped else c
-        work[SINE * LANES + lane] = -c if swapped else s
-        save(values, products.VALUES, lane, (scale * s0, 1.0, scale * s1))
-
-
-@lane_function
 def _nearest(work, low, high):
     """Projections of a block."""
     values = work[VALUES * LANES :]
-    _factors(work, values)
+    for lane in range(LANES):
+        f0, f1 = load(work, F, lane), load(work, F + 3, lane)
+        scale, c, s, swapped, pair = rotated_pair(f0, f1, -1.0)
+        u0, u1, s0, s1 = pair
+        save(work, U, lane, u0)
+        save(work, U + 3, lane, u1)
+        # a quarter turn more puts the longer column first
+        work[COSINE * LANES + lane] = s if swapped else c
+        work[SINE * LANES + lane] = -c if swapped else s
+        save(values, products.VALUES, lane, (scale * s0, 1.0, scale * s1))
     products.nearest_block(values, low, high, False)
     for lane in range(LANES):
         sigma = load(values, products.VALUES, lane)

@@ -7,7 +7,6 @@ second to an array of its own that is added afterwards.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from llvmlite import ir
@@ -64,30 +63,26 @@ def add_part(table, y, rhs):
     return energy
 
 
-@dataclass(frozen=True, eq=False)
 class LocalKernel:
     """A compiled local step with its data.
 
+    Parameters
+    ----------
     function : made by `local_kernel`; it is compiled when its address is first needed
-    record : its numbers; the ``arrays`` that they point to live as long as the kernel
+    vertices, units : how many there are
+    arrays, numbers : entries of the record from `OWN` on: the numbers, then the addresses
+    touched : function of a first unit: vertices of this and all later units, for a kernel in two
+        parts; without it there is one
     prepares : whether it wants to be called with `PREPARE`
+
+    Attributes
+    ----------
+    record : its numbers; the ``arrays`` that they point to live as long as the kernel
     touched : range of vertices that the second part adds to; empty if there is one part
     """
 
-    function: Callback
-    record: np.ndarray
-    arrays: tuple[np.ndarray, ...]
-    prepares: bool
-    touched: range
-
-    @property
-    def address(self) -> int:
-        """Address of the compiled function."""
-        return self.function.address
-
-    @classmethod
-    def of(
-        cls,
+    def __init__(
+        self,
         function: Callback,
         vertices: int,
         units: int,
@@ -95,24 +90,20 @@ class LocalKernel:
         numbers: Sequence[int],
         touched: Callable[[int], np.ndarray] | None = None,
         prepares: bool = False,
-    ) -> "LocalKernel":
-        """Kernel for ``units`` units.
-
-        Parameters
-        ----------
-        arrays, numbers : entries of the record from `OWN` on: the numbers, then the addresses
-        touched : function of a first unit: vertices of this and all later units, for a kernel in
-            two parts; without it there is one
-        prepares : whether it wants to be called with `PREPARE`
-        """
-        middle, second = units, range(0)
+    ) -> None:
+        self.function, self.arrays, self.prepares = function, tuple(arrays), prepares
+        self.touched, middle = range(0), units
         if touched is not None and units > 1:
             middle = units // 2
             later = touched(middle)
-            second = range(int(later.min()), int(later.max()) + 1)
+            self.touched = range(int(later.min()), int(later.max()) + 1)
         places = [array.ctypes.data for array in arrays]
-        record = np.array([vertices, 0, middle, units, *numbers, *places], dtype=np.int64)
-        return cls(function, record, tuple(arrays), prepares, second)
+        self.record = np.array([vertices, 0, middle, units, *numbers, *places], dtype=np.int64)
+
+    @property
+    def address(self) -> int:
+        """Address of the compiled function."""
+        return self.function.address
 
 
 @compiled(nogil=True)

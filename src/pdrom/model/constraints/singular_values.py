@@ -22,15 +22,14 @@ from pdrom.model.compiled.rows import doubles
 from pdrom.model.constraints.base import GroupConfig
 from pdrom.model.constraints.lanes import LANES, take
 from pdrom.model.constraints.simplex import (
+    ENERGY,
     F,
     SimplexGroup,
     arguments,
     copy_rows,
-    energy,
     gather_edges,
     samples,
     scatter,
-    start_energy,
     store_projections,
 )
 from pdrom.model.mesh.types import Mesh
@@ -76,14 +75,18 @@ def accumulate(y_place, rhs_place, record, part, rows, gradients, nearest, force
         y_place, rhs_place, record, part, rows + 1, 1 + rows * rows
     )
     low, high = allowed[0], allowed[1]
-    start_energy(work)
+    for lane in range(LANES):
+        work[ENERGY * LANES + lane] = 0.0
     for block in range(first, last):
         gather_edges(y, corners, block, rows, work)
         gradients(work, geometry, block)
         nearest(work, low, high)
         forces(work, geometry, block)
         scatter(work, corners, block, rows, rhs)
-    return energy(work)
+    energy = 0.0
+    for lane in range(LANES):
+        energy += work[ENERGY * LANES + lane]
+    return 0.5 * energy
 
 
 @template

@@ -9,52 +9,50 @@ from typing import Literal
 import numpy as np
 
 from pdrom.model.constraints import products, svd3
-from pdrom.model.constraints.lanes import LANES, cross, dot, lane_function, load, save
+from pdrom.model.constraints.lanes import (
+    LANES,
+    cross,
+    dot,
+    lane_function,
+    load,
+    load_matrix,
+    save,
+    save_matrix,
+    unmarked,
+)
 from pdrom.model.constraints.local_kernel import gradient_kernel, local_kernel
-from pdrom.model.constraints.simplex import SIZE, F, P
+from pdrom.model.constraints.simplex import F, P
 from pdrom.model.constraints.singular_values import (
     StrainConfig,
     accumulate,
     project,
     project_gradients,
 )
+from pdrom.model.constraints.svd3 import FOUND, SIGMA
 from pdrom.model.constraints.tetrahedron import TetrahedronGroup, forces, gradients
 
-# where the working arrays of svd3 and products and the marks of finished lanes begin
-SVD = SIZE
-VALUES = SVD + svd3.FACTORS
-FOUND = VALUES + products.SIZE
-WORK = FOUND + 1
-
-
-@lane_function
-def _within_range(work, low, high):
-    """Copy F to P and mark it where det F is in the range; return how many lanes are left."""
-    left = 0.0
-    for lane in range(LANES):
-        f0, f1, f2 = load(work, F, lane), load(work, F + 3, lane), load(work, F + 6, lane)
-        volume = dot(f0, cross(f1, f2))
-        inside = volume >= low and volume <= high
-        save(work, P, lane, f0)
-        save(work, P + 3, lane, f1)
-        save(work, P + 6, lane, f2)
-        work[FOUND * LANES + lane] = 1.0 if inside else 0.0
-        left += 0.0 if inside else 1.0
-    return left
+# where the working array of products begins
+VALUES, WORK = svd3.SIZE, svd3.SIZE + products.SIZE
 
 
 @lane_function
 def _nearest(work, low, high):
-    """Projections of a block."""
-    if _within_range(work, low, high) == 0.0:
-        return
-    found, factors = work[FOUND * LANES :], work[SVD * LANES :]
-    values = work[VALUES * LANES :]
-    svd3.factor_block(work, F, found, factors)
+    """Projections of a block; a lane whose det F is in the range keeps its F."""
     for lane in range(LANES):
-        save(values, products.VALUES, lane, load(factors, svd3.SIGMA, lane))
+        f0, f1, f2 = load_matrix(work, F, lane)
+        volume = dot(f0, cross(f1, f2))
+        save_matrix(work, P, lane, (f0, f1, f2))
+        work[FOUND * LANES + lane] = 1.0 if volume >= low and volume <= high else 0.0
+    if unmarked(work, FOUND) == 0.0:
+        return
+    svd3.factor_block(work)
+    values = work[VALUES * LANES :]
+    for lane in range(LANES):
+        save(values, products.VALUES, lane, load(work, SIGMA, lane))
     products.nearest_block(values, low, high, True)
-    svd3.compose_block(values, products.VALUES, work, P, found, factors)
+    for lane in range(LANES):
+        save(work, SIGMA, lane, load(values, products.VALUES, lane))
+    svd3.compose_block(work)
 
 
 @local_kernel

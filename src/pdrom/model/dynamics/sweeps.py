@@ -23,7 +23,7 @@ WIDTHS = (1, 2, 3, 4, 6, 8)
 class _Panel:
     """Writes the instructions of a panel of ``width`` columns.
 
-    values : of the panel, see `pdrom.model.dynamics.solvers.Panels`
+    values : of the panel, see `pdrom.model.dynamics.solvers.panels`
     """
 
     def __init__(self, context, builder, signature, arguments, width):
@@ -211,7 +211,7 @@ def sweep(panels, vertices, loads, x, rhs, y):
 
     Parameters
     ----------
-    panels : see `pdrom.model.dynamics.solvers.Panels.factor`
+    panels : see `pdrom.model.dynamics.solvers.panels`
     vertices : (n,) row of ``rhs`` and ``y`` of each unknown, in the order of the factor
     loads : (4 n,) rows that are taken from the right-hand side, in that order
     x : (4 n,) working array

@@ -107,6 +107,7 @@ class Trajectory:
 
     Attributes
     ----------
+    ends : positions (N, 3) m of the start, and of the end of every frame that is done
     defects : of checked frames, m, see `check`
     seconds : processor time of the frames
     """
@@ -114,40 +115,35 @@ class Trajectory:
     def __init__(
         self, level: Level, scene: Scene, moved: bool = False, on_frame: OnFrame = silent
     ) -> None:
-        self.level, self._model, self._on_frame = level, level.model, on_frame
+        self.level, self._on_frame = level, on_frame
         hair = np.random.default_rng(SEED).standard_normal(scene.mesh.points.shape)
         state = scene.initial_state(MOVED * scene.mesh.extent * hair if moved else None)
         self._loop: Stepper
-        if self._model is None:
+        if level.model is None:
             self._loop = level.scene(scene).stepper(scene.system, track_objective=False)
         else:
-            self._loop = self._model.loop(level.scene(scene))[0]
-            projection = projector(self._model.columns, scene.masses)
+            self._loop = level.model.loop(level.scene(scene))[0]
+            projection = projector(level.model.columns, scene.masses)
             state = State(projection @ state.positions, projection @ state.velocities)
-        self._state, self._ends = state, [state.positions]
+        self._state, self.ends = state, [self._of_vertices(state.positions)]
         self.defects: dict[int, float] = {}
         self.seconds = 0.0
 
     @property
     def frames(self) -> int:
         """Frames that are done."""
-        return len(self._ends) - 1
-
-    @property
-    def end(self) -> np.ndarray:
-        """Positions (N, 3) m of all vertices at the end of the last frame."""
-        return self._positions(self._ends[-1])
+        return len(self.ends) - 1
 
     @property
     def positions(self) -> np.ndarray:
         """Positions (F + 1, N, 3) m of all frames that are done, the initial ones first."""
-        return np.stack([self._positions(y) for y in self._ends])
+        return np.stack(self.ends)
 
     def to(self, frame: int) -> "Trajectory":
         """Do all frames before number ``frame``."""
         for after in self._run(self._state, range(self.frames, frame)):
             self._state = after
-            self._ends.append(after.positions)
+            self.ends.append(self._of_vertices(after.positions))
         return self
 
     def check(self, exact: "Trajectory") -> float:
@@ -157,11 +153,11 @@ class Trajectory:
         -------
         The defect: the distance, m, between both ends of the frame, which began at the same state.
         """
-        frame, first = self.frames, self._state
-        before = State(self._positions(first.positions), self._positions(first.velocities))
+        frame = self.frames
+        before = State(self.ends[-1], self._of_vertices(self._state.velocities))
         self.to(frame + 1)
         (end,) = exact._run(before, range(frame, frame + 1))
-        self.defects[frame] = float(np.linalg.norm(self.end - end.positions))
+        self.defects[frame] = float(np.linalg.norm(self.ends[-1] - end.positions))
         return self.defects[frame]
 
     def _run(self, state: State, frames: range) -> Iterator[State]:
@@ -173,8 +169,8 @@ class Trajectory:
                 self._on_frame(self.level.title)
                 started = thread_time()
 
-    def _positions(self, y: np.ndarray) -> np.ndarray:
-        return y if self._model is None else self._model.columns.B @ y
+    def _of_vertices(self, y: np.ndarray) -> np.ndarray:
+        return y if self.level.model is None else self.level.model.positions(y)
 
 
 def relative_errors(

@@ -26,19 +26,8 @@ from pdrom.model.constraints.base import GroupConfig
 from pdrom.model.effects.base import effect_config
 from pdrom.model.held_out import KICK
 from pdrom.model.scene import Scene
-from pdrom.reduction.requested.levels import (
-    CONVERGED,
-    QUANTITIES,
-    WINDOW,
-    Level,
-    Motion,
-    OnFrame,
-    Quantity,
-    Trajectory,
-    last_within,
-    relative_errors,
-    silent,
-)
+from pdrom.reduction.requested import levels
+from pdrom.reduction.requested.levels import Level, Motion, OnFrame, Quantity, Trajectory, silent
 from pdrom.reduction.subspace.model import SubspaceModel, make_columns, sample_elements
 
 log = logging.getLogger(__name__)
@@ -87,10 +76,9 @@ def read_request(wish: object, source: str = "error") -> Request:
     if isinstance(wish, Request):
         return wish
     quantity, given, number = str(wish).rpartition("=")
-    if given and quantity not in QUANTITIES:
-        raise ConfigurationError(
-            f"{source}: unknown quantity {shown(quantity, 60)}{choices(quantity, QUANTITIES)}"
-        )
+    if given and quantity not in levels.QUANTITIES:
+        allowed = choices(quantity, levels.QUANTITIES)
+        raise ConfigurationError(f"{source}: unknown quantity {shown(quantity, 60)}{allowed}")
     try:
         error = float(number)
     except ValueError:
@@ -203,8 +191,8 @@ class Calibration:
     def horizon(self, error: float) -> tuple[int, str]:
         """Frames whose errors are known well enough for a tolerance, and what ends them."""
         least = error / self.settings.factor
-        converged = min(last_within(motion.unconverged, least) for motion in self.motions)
-        sharp = min(last_within(motion.sensitivity, least) for motion in self.motions)
+        converged = min(levels.last_within(motion.unconverged, least) for motion in self.motions)
+        sharp = min(levels.last_within(motion.sensitivity, least) for motion in self.motions)
         return min(converged, sharp), ROUNDOFF if sharp < converged else SLOW
 
     def expected(self, level: Calibrated, error: float) -> float:
@@ -271,7 +259,7 @@ class CheckedRun:
         known = min(known, frames)
         for level in own.attempts(error):
             run, estimates = self._estimated(level)
-            end = last_within(estimates[:known], error)
+            end = levels.last_within(estimates[:known], error)
             if end == known > 0 or level is own.most_accurate:
                 break
             failed.append(level.level.title)
@@ -303,6 +291,7 @@ class CheckedRun:
         where nothing was expected, a check failed, or the run blew up.
         """
         own, frames, full = self._own, self._frames, self._own.full_order(self._error).level
+        largest = BLOWUP_EXTENT * self._scene.mesh.extent
         run = self._start(level.level)
         exact = self._start(full if level.reduced else level.level.exact)
         hopeless = np.full(frames, np.inf)
@@ -314,14 +303,11 @@ class CheckedRun:
             size = np.sqrt(np.mean(np.square(list(run.defects.values())))) / own.motions[0].unit
             with np.errstate(divide="ignore", invalid="ignore"):  # nothing may move
                 estimate = expected * float(np.fmax(1.0, np.divide(size, level.defect)))
-            if not (estimate <= self._error and self._bounded(run)):
+            if not (estimate <= self._error and np.ptp(run.ends[-1], axis=0).max() <= largest):
                 return run, hopeless
-        if not self._bounded(run.to(frames)):
+        if not np.ptp(run.to(frames).ends[-1], axis=0).max() <= largest:
             return run, hopeless
         return run, np.maximum(estimate, self._amplified(level, run))
-
-    def _bounded(self, run: Trajectory) -> bool:
-        return bool(np.ptp(run.end, axis=0).max() <= BLOWUP_EXTENT * self._scene.mesh.extent)
 
     def _amplified(self, level: Calibrated, run: Trajectory) -> np.ndarray:
         """Estimated errors (F,) over the first frames of a ``run`` from that of a second level.
@@ -332,7 +318,7 @@ class CheckedRun:
         other = self._start(second.level, moved=True).to(self._frames)
         positions = run.positions
         differences = positions[1:] - other.positions[1:]
-        apart = relative_errors(differences, positions, own.motions[0].quantity)
+        apart = levels.relative_errors(differences, positions, own.motions[0].quantity)
         errors = own.expected(level, self._error), own.expected(second, self._error)
         usual = sum(errors) / own.settings.factor
         return errors[0] * np.maximum(1.0, apart / usual)
@@ -358,18 +344,18 @@ def calibrate(
     motions = [Motion(scene, least, request.quantity, on_frame) for scene in scenes]
     most = max(motion.iterations for motion in motions)
     # the iterations of a reference too, and half of many
-    many = [Level(count, WINDOW) for count in {most, max(most // 2, CONVERGED)}]
+    many = [Level(count, levels.WINDOW) for count in {most, max(most // 2, levels.CONVERGED)}]
     plain = [Level(count) for count in settings.plain]
-    full = [*many, *plain, *(Level(count, WINDOW) for count in settings.accelerated)]
-    levels: list[Calibrated] = []
+    full = [*many, *plain, *(Level(count, levels.WINDOW) for count in settings.accelerated)]
+    found: list[Calibrated] = []
     for level in (*full, *_reduced(training, motions[0], settings)):
         try:
-            levels.append(_calibrated(level, motions, on_frame))
+            found.append(_calibrated(level, motions, on_frame))
         except PdromError as error:
             if level.model is None:
                 raise
             log.warning("%s: left out (%s)", level.title, error)
-    return Calibration(sorted(levels, key=lambda each: each.work), motions, settings)
+    return Calibration(sorted(found, key=lambda each: each.work), motions, settings)
 
 
 def _reduced(training: Scene, motion: Motion, settings: ToleranceSettings) -> Iterator[Level]:
@@ -384,7 +370,9 @@ def _reduced(training: Scene, motion: Motion, settings: ToleranceSettings) -> It
             found = sample_elements(scene, columns, few, tolerances=settings.tolerances)
             for tau, samples in zip(settings.tolerances, found, strict=True):
                 model = SubspaceModel("pod", columns, samples)
-                yield from (Level(count, WINDOW, model, tau) for count in settings.iterations)
+                yield from (
+                    Level(count, levels.WINDOW, model, tau) for count in settings.iterations
+                )
     except PdromError as error:
         log.warning("%s: no reduction (%s)", training.config.name, error)
 

@@ -88,7 +88,7 @@ class Lift:
         )  # fmt: skip
         clocks = np.stack([clock(), clock()])
         arrays = (*self.arrays, np.empty(sampled), clocks, sampler.record, *sampler.arrays)
-        return LocalKernel.of(
+        return LocalKernel(
             _accumulate,
             vertices,
             units=vertices,

@@ -76,76 +76,60 @@ def training_run(
     ----------
     norm : in which the sampling's equations are measured
     """
-    steps = [SubspaceLocalStep(group, columns) for group in scene.groups]
+    watched = _Watched(scene.groups[0], columns)
+    steps = [watched, *(SubspaceLocalStep(group, columns) for group in scene.groups[1:])]
     space = ReducedSpace(scene, columns, [step.matrix for step in steps])
-    watch = _Watch(steps[0])
-    config = scene.config
-    loop = Stepper(
-        space, config.time_step, config.iterations, [watch, *steps[1:]], track_objective=False
-    )
-    measures = _Measures(space, norm, config.frames)
+    config, iterates = scene.config, watched.iterates
+    loop = Stepper(space, config.time_step, config.iterations, steps, track_objective=False)
     state = start or reduced_state(scene, columns)
     kept: list[TrainingFrame] = []
+    measures: dict[bytes, np.ndarray] = {}
     wanted = {int(frame) for frame in frames}
     for frame in range(max(wanted) + 1):
-        watch.iterates = [] if frame in wanted else None
+        iterates.clear()
         fixed = space.fixed(frame, state.positions)[0]
         first = state.positions
         state, _ = loop.step(state, frame)
         if frame in wanted:
             # a contact may have moved the end of the frame: then it is no iterate
-            iterates = watch.iterates or []
             if len(iterates) == 1:
-                iterates = [*iterates, state.positions]
+                iterates.append(state.positions)
             pairs = np.stack([iterates[:-1], iterates[1:]], axis=1)
-            kept.append(TrainingFrame(first, pairs, measures.of(fixed)))
+            key = fixed.tobytes()
+            if key not in measures:
+                measures[key] = _measure(space, fixed, norm, config.frames)
+            kept.append(TrainingFrame(first, pairs, measures[key]))
     return kept
 
 
-class _Watch:
-    """A local step that notes where it is evaluated."""
+class _Watched(SubspaceLocalStep):
+    """A local step that notes where it is evaluated in ``iterates``."""
 
-    def __init__(self, step: SubspaceLocalStep) -> None:
-        self.name, self._step = step.name, step
-        self.iterates: list[np.ndarray] | None = None
-
-    def begin_frame(self, q: np.ndarray) -> None:
-        self._step.begin_frame(q)
+    def __init__(self, group: ConstraintGroup, columns: Columns) -> None:
+        super().__init__(group, columns)
+        self.iterates: list[np.ndarray] = []
 
     def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
-        if self.iterates is not None:
-            self.iterates.append(y.copy())
-        return self._step.accumulate(y, rhs)
+        self.iterates.append(y.copy())
+        return super().accumulate(y, rhs)
 
 
-class _Measures:
-    """Measure of the coordinates that are not held, once per set of held ones."""
-
-    def __init__(self, space: ReducedSpace, norm: Norm, frames: int) -> None:
-        self._space, self._norm, self._frames = space, norm, frames
-        self._cache: dict[bytes, np.ndarray] = {}
-
-    def of(self, fixed: np.ndarray) -> np.ndarray:
-        """Measure (K', K) with the coordinates ``fixed`` held."""
-        key = fixed.tobytes()
-        if key not in self._cache:
-            size = len(self._space.matrix)
-            free = np.setdiff1d(np.arange(size), fixed)
-            block, inertia = (
-                m[np.ix_(free, free)] for m in (self._space.matrix, self._space.inertia_matrix)
-            )
-            measure = np.zeros((len(free), size))
-            if self._norm == "energy":  # a triangular R with R^T R = A^-1
-                root = linalg.cholesky(block, lower=True)
-                measure[:, free] = linalg.solve_triangular(root, np.eye(len(block)), lower=True)
-            else:  # root mean square response of each mode
-                values, modes = linalg.eigh(block, inertia)
-                c2 = 1.0 / np.maximum(values, 1.0)
-                beside = np.maximum(1.0 - c2, 1.0 / self._frames)
-                response = c2 * np.sqrt((1.0 + c2) / (1.0 + 3.0 * c2)) / beside
-                measure[:, free] = response[:, None] * modes.T
-            self._cache[key] = measure
-        return self._cache[key]
+def _measure(space: ReducedSpace, fixed: np.ndarray, norm: Norm, frames: int) -> np.ndarray:
+    """Measure (K', K) with the coordinates ``fixed`` held; a run has so many ``frames``."""
+    size = len(space.matrix)
+    free = np.setdiff1d(np.arange(size), fixed)
+    block, inertia = (m[np.ix_(free, free)] for m in (space.matrix, space.inertia_matrix))
+    measure = np.zeros((len(free), size))
+    if norm == "energy":  # a triangular R with R^T R = A^-1
+        root = linalg.cholesky(block, lower=True)
+        measure[:, free] = linalg.solve_triangular(root, np.eye(len(block)), lower=True)
+    else:  # root mean square response of each mode
+        values, modes = linalg.eigh(block, inertia)
+        c2 = 1.0 / np.maximum(values, 1.0)
+        beside = np.maximum(1.0 - c2, 1.0 / frames)
+        response = c2 * np.sqrt((1.0 + c2) / (1.0 + 3.0 * c2)) / beside
+        measure[:, free] = response[:, None] * modes.T
+    return measure
 
 
 # Rows that the training equations are hashed to, per coordinate of the subspace: several times the
@@ -291,8 +275,7 @@ def nnls_path(
     For each tolerance, in the order given: support, the indices of the positive entries, ascending
     (n,), and their values (n,). Where a tolerance cannot be reached it is the best x found.
     """
-    norms = np.linalg.norm(g, axis=0)
-    search = _Search(g, norms, b)
+    search = _ActiveSet(g, b)
     found: dict[float, tuple[np.ndarray, np.ndarray]] = {}
     for tolerance in sorted(set(tolerances), reverse=True):
         search.reach(tolerance)
@@ -307,38 +290,47 @@ def nnls_path(
     return [found[tolerance] for tolerance in tolerances]
 
 
-class _Search:
-    """The outer loop: which columns join."""
+class _ActiveSet:
+    """Active columns, their values, and the Cholesky factor of their Gram matrix."""
 
-    def __init__(self, g: np.ndarray, norms: np.ndarray, b: np.ndarray) -> None:
-        self._g, self._norms, self._most = g, norms, min(g.shape)
-        self._size = float(np.linalg.norm(b))
-        self._state = _ActiveSet(g, norms, b, self._most)
+    def __init__(self, g: np.ndarray, b: np.ndarray) -> None:
+        self._g, self._b, self._size = g, b, float(np.linalg.norm(b))
+        norms, self._most = np.linalg.norm(g, axis=0), min(g.shape)
         self._banned = norms == 0.0
-        self._safe = np.where(self._banned, 1.0, norms)
+        self._norms = np.where(self._banned, 1.0, norms)
+        self._columns = np.empty((len(b), self._most), order="F")
+        self._factor = np.zeros((self._most, self._most), order="F")
+        self._target = np.empty(self._most)
+        self._active: list[int] = []
+        self._values = np.zeros(0)
         self._alone = False
+
+    @property
+    def _residual(self) -> np.ndarray:
+        """b - G x."""
+        return self._b - self._columns[:, : len(self._active)] @ self._values
 
     @property
     def relative_residual(self) -> float:
         """|| G x - b || / || b ||."""
-        return float(np.linalg.norm(self._state.residual)) / self._size if self._size else 0.0
+        return float(np.linalg.norm(self._residual)) / self._size if self._size else 0.0
 
     def solution(self) -> tuple[np.ndarray, np.ndarray]:
         """Support, ascending, and values."""
-        order = np.argsort(self._state.active)
-        active = np.array(self._state.active, dtype=np.int64)[order]
-        return active, self._state.values[order] / self._norms[active]
+        order = np.argsort(self._active)
+        active = np.array(self._active, dtype=np.int64)[order]
+        return active, self._values[order] / self._norms[active]
 
     def reach(self, tolerance: float) -> None:
         """Add columns until the tolerance is met, the support is full, or nothing helps."""
-        while self.relative_residual > tolerance and len(self._state.active) < self._most:
+        while self.relative_residual > tolerance and len(self._active) < self._most:
             block = self._choose()
             if len(block) == 0:
                 return
-            joined = [int(c) for c in block if self._state.add(int(c))]
+            joined = [int(c) for c in block if self._add(int(c))]
             if joined:
-                self._state.solve()
-            staying = set(self._state.active).intersection(joined)
+                self._solve()
+            staying = set(self._active).intersection(joined)
             # a column that depends on the others, or left at once, would be picked for ever
             if len(block) == 1 and not staying:
                 self._banned[block] = True
@@ -346,40 +338,23 @@ class _Search:
 
     def _choose(self) -> np.ndarray:
         """Columns of the largest correlation with the residual, the best one first."""
-        gradient = (self._state.residual @ self._g) / self._safe
-        gradient[self._state.active] = -np.inf
+        gradient = (self._residual @ self._g) / self._norms
+        gradient[self._active] = -np.inf
         gradient[self._banned] = -np.inf
         best = float(gradient.max())
         if not best > 1e-12 * self._size:
             return np.empty(0, dtype=np.int64)
-        room = self._most - len(self._state.active)
-        count = 1 if self._alone else min(room, 1 + int(BLOCK * len(self._state.active)))
+        room = self._most - len(self._active)
+        count = 1 if self._alone else min(room, 1 + int(BLOCK * len(self._active)))
         if count == 1:
             return np.array([np.argmax(gradient)])
         first = np.argpartition(-gradient, min(count, len(gradient) - 1))[:count]
         first = first[gradient[first] >= CLOSE * best]
         return first[np.argsort(-gradient[first], kind="stable")]
 
-
-class _ActiveSet:
-    """Active columns, their values, and the Cholesky factor of their Gram matrix."""
-
-    def __init__(self, g: np.ndarray, norms: np.ndarray, b: np.ndarray, most: int) -> None:
-        self._g, self._norms, self._b = g, norms, b
-        self._columns = np.empty((len(b), most), order="F")
-        self._factor = np.zeros((most, most), order="F")
-        self._target = np.empty(most)
-        self.active: list[int] = []
-        self.values = np.zeros(0)
-
-    @property
-    def residual(self) -> np.ndarray:
-        """b - G x."""
-        return self._b - self._columns[:, : len(self.active)] @ self.values
-
-    def add(self, column: int) -> bool:
+    def _add(self, column: int) -> bool:
         """Append a column; False (and nothing happens) if it depends on the active ones."""
-        n, new = len(self.active), self._g[:, column] / self._norms[column]
+        n, new = len(self._active), self._g[:, column] / self._norms[column]
         cross = self._forward(self._columns[:, :n].T @ new)
         rest = float(new @ new - cross @ cross)
         if rest <= DEPENDENT**2:
@@ -387,23 +362,23 @@ class _ActiveSet:
         self._columns[:, n] = new
         self._factor[n, :n], self._factor[n, n] = cross, np.sqrt(rest)
         self._target[n] = new @ self._b
-        self.active.append(column)
-        self.values = np.append(self.values, 0.0)
+        self._active.append(column)
+        self._values = np.append(self._values, 0.0)
         return True
 
-    def solve(self) -> None:
+    def _solve(self) -> None:
         """Least squares on the active columns; columns that turn negative are taken out."""
-        while self.active:
-            n = len(self.active)
+        while self._active:
+            n = len(self._active)
             half = self._forward(self._target[:n])
             z = linalg.solve_triangular(
                 self._factor[:n, :n], half, lower=True, trans="T", check_finite=False
             )
             if (z > 0.0).all():
-                self.values = z
+                self._values = z
                 return
             negative = z <= 0.0
-            x = self.values
+            x = self._values
             step = np.min(x[negative] / (x[negative] - z[negative]))
             x = x + step * (z - x)
             keep = ~negative | (x > 1e-14 * max(float(np.abs(x).max()), np.finfo(float).tiny))
@@ -420,12 +395,12 @@ class _ActiveSet:
     def _keep(self, keep: np.ndarray, x: np.ndarray) -> None:
         """Keep only the columns of ``keep``, with values ``x``."""
         kept = np.flatnonzero(keep)
-        size, n = len(self.active), len(kept)
+        size, n = len(self._active), len(kept)
         first = int(np.flatnonzero(~keep)[0])
         self._columns[:, first:n] = self._columns[:, kept[first:]]
         self._target[:n] = self._target[kept]
-        self.active = [self.active[i] for i in kept]
-        self.values = x[kept]
+        self._active = [self._active[i] for i in kept]
+        self._values = x[kept]
         for column in np.flatnonzero(~keep)[::-1]:
             _remove_row(self._factor, size, int(column))
             size -= 1

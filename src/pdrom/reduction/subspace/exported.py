@@ -11,7 +11,8 @@ import numpy as np
 
 from pdrom.core.errors import SceneError, choices
 from pdrom.core.packed import pack_array
-from pdrom.model.constraints.base import ConstraintGroup, StencilGroup
+from pdrom.model.constraints.base import ConstraintGroup
+from pdrom.model.constraints.simplex import SimplexGroup
 from pdrom.model.effects import EFFECTS
 from pdrom.model.effects.base import Force, Start
 from pdrom.model.effects.hold import Pins
@@ -54,7 +55,17 @@ def export_scene(scene: Scene) -> dict[str, Any]:
             }
             for b in scene.boundaries
         ],
-        "groups": {group.name: _export_group(group) for group in scene.groups},
+        "groups": {
+            group.name: {
+                "kind": group.manifold,
+                "rows": group.rows_per_element,
+                "range": group.kernel_parameters().tolist()
+                if group.manifold == "clamped"
+                else None,
+                "elements": group.elements,
+            }
+            for group in scene.groups
+        },
     }
 
 
@@ -62,7 +73,7 @@ def require_known(config: SceneConfig) -> None:
     """SceneError if the engine of the page cannot run a scene."""
     for name in (each.effect for each in config.effects):
         effect = EFFECTS.load(name)
-        projected = issubclass(effect, StencilGroup) and effect.manifold in MANIFOLDS
+        projected = issubclass(effect, SimplexGroup) and effect.manifold in MANIFOLDS
         if not (projected or issubclass(effect, (Floor, Pins, Force, Start))):
             allowed = ("spring", "strain", "tetrahedron_strain", "deformation_gradient")
             raise SceneError(
@@ -74,16 +85,6 @@ def require_known(config: SceneConfig) -> None:
             f"scene '{config.name}': anderson_window = {config.anderson_window}: the page's engine "
             "has no acceleration (allowed: 0)"
         )
-
-
-def _export_group(group: ConstraintGroup) -> dict[str, Any]:
-    clamped = group.manifold == "clamped"
-    return {
-        "kind": group.manifold,
-        "rows": group.rows_per_element,
-        "range": group.kernel_parameters().tolist() if clamped else None,
-        "elements": group.elements,
-    }
 
 
 def export_basis(scene: Scene, columns: Columns, needed: np.ndarray) -> dict[str, Any]:
@@ -119,36 +120,28 @@ def export_model(scene: Scene, model: SubspaceModel) -> dict[str, Any]:
     return {
         "evaluated": model.elements_evaluated(scene),
         "groups": {
-            group.name: _export_samples(group, model.samples.get(group.name, Samples()))
-            for group in scene.groups
+            group.name: _export_samples(group, model.chosen(group)) for group in scene.groups
         },
     }
 
 
 def _export_samples(group: ConstraintGroup, chosen: Samples | Interpolation) -> dict[str, Any]:
-    elements = np.arange(group.elements) if chosen.elements is None else chosen.elements
-    stencil = _stencil(group)[elements]
     if isinstance(chosen, Samples):
-        factors = np.ones(len(elements)) if chosen.factors is None else chosen.factors
-        weights = group.weights[elements] * factors
-        return {"stencil": pack_array(stencil, "u4"), "weights": pack_array(weights, "f8")}
-    arrays = ("operator", "modes", "offset", "stiffness")
-    return {"stencil": pack_array(stencil, "u4")} | {
-        name: pack_array(getattr(chosen, name), "f8") for name in arrays
-    }
+        arrays = {"weights": group.weights[chosen.elements] * chosen.factors}
+    else:
+        names = ("operator", "modes", "offset", "stiffness")
+        arrays = {name: getattr(chosen, name) for name in names}
+    packed = {name: pack_array(array, "f8") for name, array in arrays.items()}
+    return {"stencil": pack_array(_stencil(group, chosen), "u4"), **packed}
 
 
-def _stencil(group: ConstraintGroup) -> np.ndarray:
-    assert isinstance(group, StencilGroup)  # others are refused
-    return group.stencil
+def _stencil(group: ConstraintGroup, chosen: Samples | Interpolation) -> np.ndarray:
+    """Vertices (m, corners) of the elements that are sampled."""
+    assert isinstance(group, SimplexGroup)  # others are refused
+    return group.stencil[chosen.elements]
 
 
 def needed_vertices(scene: Scene, models: Iterable[SubspaceModel]) -> np.ndarray:
     """Vertices (n,) of all elements of ``scene`` that any of the ``models`` samples."""
-    found = [np.empty(0, np.int64)]
-    for model in models:
-        for group in scene.groups:
-            elements = model.samples.get(group.name, Samples()).elements
-            chosen = np.arange(group.elements) if elements is None else elements
-            found.append(_stencil(group)[chosen].ravel())
-    return np.unique(np.concatenate(found))
+    found = [_stencil(g, model.chosen(g)).ravel() for model in models for g in scene.groups]
+    return np.unique(np.concatenate([np.empty(0, np.int64), *found]))

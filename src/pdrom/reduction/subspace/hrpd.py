@@ -42,10 +42,11 @@ class HrpdSpec(ConfigModel):
 def hrpd(group: ConstraintGroup, columns: Columns, sampled: "SampledSpace | None") -> Interpolation:
     """Interpolation of ``group`` from a sampled space, for the subspace ``columns``."""
     strain, stiffness = reduced_strain(group, columns)
-    if sampled is None:
-        return Interpolation.of_constant(stiffness, np.zeros((len(stiffness), 3)))
-    modes = strain.T @ (group.row_weights[:, None] * sampled.V)
     offset = np.zeros((len(stiffness), 3))
+    if sampled is None:
+        none, empty = np.empty(0, dtype=np.int64), np.empty((len(stiffness), 0))
+        return Interpolation(none, np.empty((0, 0)), empty, offset, stiffness, gain=1.0)
+    modes = strain.T @ (group.row_weights[:, None] * sampled.V)
     return Interpolation(sampled.elements, sampled.operator, modes, offset, stiffness, sampled.gain)
 
 

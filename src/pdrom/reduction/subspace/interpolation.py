@@ -13,8 +13,6 @@ from pdrom.model.constraints.base import ConstraintGroup
 from pdrom.reduction.sampling.reduction import Reduction
 from pdrom.reduction.subspace.columns import Columns
 
-_ARRAYS = ("elements", "operator", "modes", "offset", "stiffness")
-
 
 @dataclass(frozen=True)
 class Interpolation:
@@ -36,31 +34,6 @@ class Interpolation:
     stiffness: np.ndarray
     gain: float
 
-    @classmethod
-    def of_constant(cls, stiffness: np.ndarray, offset: np.ndarray) -> "Interpolation":
-        """Interpolation of projections that are constant up to round-off: it samples no element.
-
-        Parameters
-        ----------
-        stiffness : (K, K) B^T S^T W S B
-        offset : (K, 3) B^T S^T W p
-        """
-        none = np.empty(0, dtype=np.int64)
-        empty = np.empty((len(stiffness), 0))
-        return cls(none, np.empty((0, 0)), empty, offset, stiffness, gain=1.0)
-
-    def save(self, store) -> None:
-        """Write into the HDF5 group ``store``."""
-        store.attrs["gain"] = self.gain
-        for name in _ARRAYS:
-            store[name] = getattr(self, name)
-
-    @classmethod
-    def load(cls, store) -> "Interpolation":
-        """Read what `save` wrote into the HDF5 group ``store``."""
-        arrays = {name: store[name][...] for name in _ARRAYS}
-        return cls(**arrays, gain=float(store.attrs["gain"]))
-
 
 class InterpolatedLocalStep:
     """The local step of a group whose projections are interpolated."""
@@ -68,14 +41,14 @@ class InterpolatedLocalStep:
     def __init__(
         self, group: ConstraintGroup, columns: Columns, interpolation: Interpolation
     ) -> None:
-        self.name = group.name
-        self.matrix = interpolation.stiffness
+        self.name, self.matrix = group.name, interpolation.stiffness
         self._interpolation = interpolation
         self._elements = np.arange(len(interpolation.elements))
         if len(self._elements) == 0:
             return
-        factors = np.ones(len(self._elements))
-        self.group, vertices = group.restricted(interpolation.elements, factors)
+        self.group, vertices = group.restricted(
+            interpolation.elements, np.ones(len(self._elements))
+        )
         self._rows = np.ascontiguousarray(columns.B[vertices])
 
     def begin_frame(self, q: np.ndarray) -> None:
@@ -146,10 +119,8 @@ class SubspaceLocalStep:
         factors: np.ndarray | None = None,
     ) -> None:
         self.name = group.name
-        if elements is None:
-            elements = np.arange(group.elements)
-        if factors is None:
-            factors = np.ones(len(elements))
+        elements = np.arange(group.elements) if elements is None else elements
+        factors = np.ones(len(elements)) if factors is None else factors
         self.group, vertices = group.restricted(elements, factors)
         self._rows = np.ascontiguousarray(columns.B[vertices])
         self._transposed = np.ascontiguousarray(self._rows.T)

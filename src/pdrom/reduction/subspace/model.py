@@ -42,15 +42,18 @@ def ecsw_name(tolerance: float) -> str:
 
 @dataclass(frozen=True)
 class Samples:
-    """Sampled elements (m,) and their factors (m,); all elements with factor one if empty."""
+    """Sampled elements (m,) and their factors (m,)."""
 
-    elements: np.ndarray | None = None
-    factors: np.ndarray | None = None
+    elements: np.ndarray
+    factors: np.ndarray
 
 
 @dataclass(frozen=True)
 class SubspaceModel:
-    """Kind of position basis, see `make_columns`, its columns, and what each group samples."""
+    """Kind of position basis, see `make_columns`, its columns, and what each group samples.
+
+    A group that is not listed takes all elements, with factor one.
+    """
 
     position_basis: str
     columns: Columns
@@ -60,20 +63,24 @@ class SubspaceModel:
         """Elements that a local step of ``scene`` evaluates."""
         return sum(self.evaluated(group) for group in scene.groups)
 
+    def chosen(self, group: ConstraintGroup) -> Samples | Interpolation:
+        """What a local step evaluates of a group."""
+        every = Samples(np.arange(group.elements), np.ones(group.elements))
+        return self.samples.get(group.name, every)
+
     def evaluated(self, group: ConstraintGroup) -> int:
         """Elements of a group that a local step evaluates."""
-        elements = self.samples.get(group.name, Samples()).elements
-        return group.elements if elements is None else len(elements)
+        return len(self.chosen(group).elements)
 
     def loop(self, scene: Scene) -> tuple[Stepper, State]:
         """Step loop of ``scene`` in the coordinates of the subspace, and the initial state."""
         steps: list[SubspaceLocalStep | InterpolatedLocalStep] = []
         for group in scene.groups:
-            chosen = self.samples.get(group.name, Samples())
-            if isinstance(chosen, Interpolation):
-                steps.append(InterpolatedLocalStep(group, self.columns, chosen))
-                continue
-            steps.append(SubspaceLocalStep(group, self.columns, chosen.elements, chosen.factors))
+            own = self.chosen(group)
+            if isinstance(own, Interpolation):
+                steps.append(InterpolatedLocalStep(group, self.columns, own))
+            else:
+                steps.append(SubspaceLocalStep(group, self.columns, own.elements, own.factors))
         space = ReducedSpace(scene, self.columns, [step.matrix for step in steps])
         h, iterations = scene.config.time_step, scene.config.iterations
         start = reduced_state(scene, self.columns)
@@ -157,11 +164,9 @@ def store_model(
     """Write a model's ``labels`` and ``samples`` of each group to the HDF5 group ``store``."""
     store.attrs.update(labels)
     for name, chosen in samples.items():
-        if isinstance(chosen, Interpolation):
-            chosen.save(store.create_group(f"samples/{name}"))
-            continue
-        store[f"samples/{name}/elements"] = chosen.elements
-        store[f"samples/{name}/factors"] = chosen.factors
+        kept = store.create_group(f"samples/{name}")
+        for key, value in vars(chosen).items():
+            (kept.attrs if key == "gain" else kept)[key] = value
 
 
 def load_models(path: str | os.PathLike[str]) -> list[tuple[dict[str, object], SubspaceModel]]:
@@ -173,15 +178,17 @@ def load_models(path: str | os.PathLike[str]) -> list[tuple[dict[str, object], S
             base = str(store.attrs["base"])
             labels = {key: store.attrs[key] for key in ("method", "position_basis", "k")}
             labels["k"] = int(labels["k"])
-            samples = {
-                name: Interpolation.load(chosen)
-                if "operator" in chosen
-                else Samples(chosen["elements"][...], chosen["factors"][...])
-                for name, chosen in store.get("samples", {}).items()
-            }
+            samples = {name: _samples(kept) for name, kept in store.get("samples", {}).items()}
             model = SubspaceModel(str(labels["position_basis"]), columns[base], samples)
             models.append((labels, model))
     return models
+
+
+def _samples(store: h5py.Group) -> Samples | Interpolation:
+    arrays = {key: array[...] for key, array in store.items()}
+    if "gain" in store.attrs:
+        return Interpolation(**arrays, gain=float(store.attrs["gain"]))
+    return Samples(**arrays)
 
 
 def _columns(store: h5py.Group) -> Columns:

@@ -4,6 +4,7 @@ Effects are timed by stand-ins around them, so that a normal run holds no timer 
 """
 
 from collections.abc import Callable, Hashable, Mapping, Sequence
+from copy import copy
 from itertools import combinations
 from time import perf_counter
 from typing import Any
@@ -276,5 +277,7 @@ def timed(kernel: LocalKernel) -> tuple[LocalKernel, np.ndarray]:
     arrays = (seconds, clocks)
     places = [kernel.address, kernel.record.ctypes.data, *(array.ctypes.data for array in arrays)]
     record = np.concatenate([kernel.record[:OWN], np.array(places, dtype=np.int64)])
-    kept = (*arrays, kernel.record, *kernel.arrays)
-    return LocalKernel(_timed, record, kept, kernel.prepares, kernel.touched), seconds
+    same = copy(kernel)
+    same.function, same.record = _timed, record
+    same.arrays = (*arrays, kernel.record, *kernel.arrays)
+    return same, seconds

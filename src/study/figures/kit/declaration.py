@@ -130,26 +130,22 @@ def figure(
 
 
 def write_figure(
-    figure: Figure,
-    title: str,
-    pdf: str | os.PathLike[str],
-    png: str | os.PathLike[str],
-    with_checksum: bool = True,
+    figure: Figure, title: str, pdf: str | os.PathLike[str], png: str | os.PathLike[str]
 ) -> None:
     """Write ``figure`` as ``pdf`` (embedded TrueType fonts, no dates) and as its twin ``png``.
 
     The PDF has a ``title``; both are the same bytes every time.
 
-    Either file appears only when complete. ``with_checksum`` as in `pdrom.core.store.atomic_path`.
+    Either file appears only when complete.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     FigureCanvasAgg(figure)
     document = {"Title": title, "Creator": "pdrom", "CreationDate": None, "ModDate": None}
     with style.look():
-        with atomic_path(Path(pdf), with_checksum) as temporary:
+        with atomic_path(Path(pdf)) as temporary:
             figure.savefig(temporary, format="pdf", dpi=RASTER_DPI, metadata=document)
-        with atomic_path(Path(png), with_checksum) as temporary:
+        with atomic_path(Path(png)) as temporary:
             figure.savefig(temporary, format="png", dpi=PNG_DPI, metadata={"Title": title})
 
 
@@ -176,7 +172,7 @@ def load_choices(path: Path, known: Mapping[str, Collection[str]]) -> dict[str, 
 
     Parameters
     ----------
-    known : names that options may hold, by their key (scenes, groups, methods)
+    known : names that options may hold, by their key (scenes, methods)
 
     Raises
     ------

@@ -17,8 +17,8 @@ from study.artifact.paths import File
 
 Rank = Annotated[int, Field(ge=0)] | Literal["full"]
 Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
-Split = Literal["train", "test", "heldout"]
 Names = tuple[str, ...]
+AZIMUTH = 30.0  # of every camera, degrees
 
 
 class NothingToDraw(Exception):
@@ -56,14 +56,8 @@ class Scenes(Options):
     scenes: Names = ()
 
 
-class Experiments(Scenes):
-    """Scenes, and groups that are reduced in them."""
-
-    groups: Names = ()
-
-
-class Methods(Options):
-    """Reduction methods, in the order in which they are drawn."""
+class Methods(Scenes):
+    """Scenes and reduction methods, in the order in which they are drawn."""
 
     methods: Names = ()
 
@@ -81,14 +75,13 @@ class Instants(Options):
 
 
 class View(Options):
-    """Camera, degrees; up is against the gravity of a scene."""
+    """Elevation of the camera, degrees; up is against the gravity of a scene."""
 
-    azimuth: Annotated[float, Field(ge=-180.0, le=180.0)] = 30.0
     elevation: Annotated[float, Field(ge=-90.0, le=90.0)] = 20.0
 
     def camera(self, experiment: "Experiment") -> Camera:
         """Camera for the scene of an experiment."""
-        return Camera(self.azimuth, self.elevation, tuple(up_of(experiment.effects).tolist()))
+        return Camera(AZIMUTH, self.elevation, tuple(up_of(experiment.effects).tolist()))
 
 
 class Columns(Options):
@@ -103,23 +96,13 @@ class Count(Options):
     count: Annotated[int, Field(ge=1, le=12)] = 6
 
 
-class Splits(Options):
-    """Sets of snapshots: used for the basis, between them, of another run."""
-
-    splits: tuple[Split, ...] = ("train", "test", "heldout")
-
-
-class Beside(Options):
+class Beside(Scenes, Columns):
     """Scene -> experiment of the published code whose output is drawn beside ours."""
 
     published: dict[str, str] = Field(default_factory=dict)
 
 
-class Reconstruction(Experiments, Methods, Splits, Columns, Beside):
-    """Errors of reconstructed snapshots."""
-
-
-class ReducedRuns(Experiments, Methods, Ranks, Instants, View):
+class ReducedRuns(Methods, Ranks, Instants, View):
     """Full-order runs beside reduced ones."""
 
 

@@ -313,9 +313,9 @@ def test_representations_are_one_line(full):
 @pytest.mark.parametrize("name", [n for n in api.__all__ if n[0].islower()])
 def test_docstrings_tell_every_argument(name):
     function = getattr(api, name)
-    told = function.__doc__.split("Parameters\n")[-1]
+    told = inspect.getdoc(function).split("Parameters\n")[-1]
     for argument in inspect.signature(function).parameters:
-        assert f"    {argument} : " in told
+        assert f"\n{argument} : " in told
 
 
 @pytest.mark.parametrize("method", list(api.methods()))

@@ -27,8 +27,8 @@ from pdrom.model.mesh.types import save_mesh
 from pdrom.view.multiples import log_axes
 from pdrom.view.style import new_figure, note
 from study.artifact.paths import MESH, RERUNS, SUBSPACES
+from study.figures.alternatives import dots
 from study.figures.kit.declaration import declarations, write_figure
-from study.figures.requested_tolerances import dots
 from study.figures.runs import obstacles_of
 from study.pipeline.study import Study
 

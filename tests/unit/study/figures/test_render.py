@@ -29,8 +29,8 @@ from pdrom.view.panels import RunPanel, fit_aspect
 from pdrom.view.read import choose_ranks, frame_numbers, positions_at, rerun_infos, rerun_positions
 from places import CONFIG
 from study.artifact.paths import RERUNS, TRAIN
-from study.figures.deim_iterations import iterations
 from study.figures.kit.elements import element_map, magnitudes, signed_entry
+from study.figures.sampling import iterations
 
 from .conftest import BLOWN_UP, BLOWUP_FRAME
 

@@ -131,16 +131,12 @@ def test_every_key_names_a_column_of_a_table():
         assert not unknown, key
 
 
-def test_every_figure_of_the_study_is_shown_or_named():
+def test_every_figure_of_the_study_is_shown_or_named_and_the_text_speaks_of_what_it_shows():
     shown = re.findall(r"\\figureof\{([a-z_]+)\}", SOURCE)
     assert len(set(shown)) == len(shown)
     named = {name.replace("\\_", "_") for name in re.findall(r"\\texttt\{([a-z_\\]+)\}", SOURCE)}
     assert set(shown) <= set(declarations()) <= {*shown, *named}
-
-
-def test_the_text_speaks_of_every_figure():
-    shown = re.findall(r"\\figureof\{([a-z_]+)\}", SOURCE)
-    assert set(shown) - set(re.findall(r"\\ref\{fig:([a-z_]+)\}", SOURCE)) == set()
+    assert set(shown) <= set(re.findall(r"\\ref\{fig:([a-z_]+)\}", SOURCE))
 
 
 def test_the_text_speaks_of_every_table():

@@ -4,20 +4,7 @@ import pytest
 
 from builders import frame
 from study.paper.tex import build_pdfs
-from study.paper.textables import (
-    TEX_TABLES,
-    break_even,
-    claims,
-    iterations,
-    local_share,
-    longtable,
-    positions,
-    ranks,
-    reruns,
-    stability,
-    tabular,
-)
-from study.paper.textables import scenes as scene_table
+from study.paper.textables import TEX_TABLES, longtable, tabular, tex_table
 
 ERROR = "relative_error_within_horizon"
 
@@ -57,13 +44,6 @@ TABLES = {
         ("bar_a", "edge_spring", "deim-joint", 1, 400, 6, 20.0),
         ("bar_a", "edge_spring", "deim-joint", 1, 400, 20, 20.0),
         ("bar_a", "edge_spring", "block-deim", 1, 400, 6, None),
-    ),
-    "scaling": frame(
-        "scene method vertices meshes exponent local_exponent global_exponent",
-        ("bar_a", "fom", 400, 3, 1.25, 1.5, None),
-        ("bar_a", "fom", 800, 3, 1.25, 1.5, None),
-        ("bar_a", "ecsw", 400, 3, 0.125, None, None),
-        ("bar_b", "fom", 400, 1, None, None, None),
     ),
     "singular_values": frame(
         "component relative above_roundoff",
@@ -127,52 +107,47 @@ def rows(text: str) -> list[str]:
     return [line for line in lines if line != lines[0]]
 
 
-def test_rows_and_columns_of_a_table():
-    for make, name in ((tabular, "tabular"), (longtable, "longtable")):
-        text = make(["a", "b"], [["1", "2"], ["3", "4"]], "lr")
-        assert text.startswith(rf"\begin{{{name}}}{{lr}}")
-        assert text.endswith(rf"\end{{{name}}}" + "\n")
-        assert rows(text) == [r"1 & 2 \\", r"3 & 4 \\"]
-        assert r"a & b \\" in text
+def made(name: str, **others) -> list[str]:
+    """Rows of a table, made of `TABLES` or ``others``."""
+    return rows(tex_table(f"tab_{name}", TABLES | others))
 
 
 @pytest.mark.parametrize("name", TEX_TABLES)
 def test_every_row_has_a_cell_for_every_column(name):
-    text = TEX_TABLES[name](TABLES)
+    text = tex_table(name, TABLES)
     head = next(line for line in text.splitlines() if line.endswith(r" \\"))
     body = rows(text)
     assert body
     for row in body:
-        across = r"\multicolumn" in row
-        assert row.replace(r"\&", "").count("&") == (0 if across else head.count("&"))
+        assert row.replace(r"\&", "").count("&") == head.count("&")
         assert "nan" not in row
-    assert TEX_TABLES[name](TABLES) == text
 
 
-def test_iterations_have_error_and_time():
-    assert rows(iterations(TABLES)) == [
-        r"\texttt{bar\_a} & 0.50 (0.25) & -- & 0.12 (2) & -- & 0.062 (3) \\"
-    ]
-
-
-def test_positions_show_the_subspace_and_its_sample():
-    assert rows(positions(TABLES)) == [
-        r"\texttt{b} & 0.12 & 0.50 & 0.38 & -- & 90 & 4 & -- & -- \\"
-    ]
-
-
-def test_a_reduction_that_always_pays_has_no_break_even():
-    assert rows(break_even(TABLES)) == [r"\texttt{bar\_a} & edge spring & 400 & 20 & pays & -- \\"]
-
-
-def test_errors_that_a_reduction_does_not_reach_are_left_out():
-    assert rows(TEX_TABLES["tab_pays"](TABLES)) == [
-        r"\texttt{s\_one} & implicit & 0.10 & 400 to 10000 & 400 & 1600 & 17 (15 to 20) & 2 of 3 \\"
-    ]
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        # error and time
+        ("iterations", r"\texttt{bar\_a} & 0.50 (0.25) & -- & 0.12 (2) & -- & 0.062 (3) \\"),
+        ("positions", r"\texttt{b} & 0.12 & 0.50 & 0.38 & -- & 90 & 4 & -- & -- \\"),
+        # a reduction that always pays has no size from which it does not
+        ("break_even", r"\texttt{bar\_a} & edge spring & 400 & 20 & pays & -- \\"),
+        # errors that a reduction does not reach are left out
+        ("pays", r"\texttt{s\_one} & implicit & 0.10 & 400 to 10000 & 400 & 1600 & "
+                 r"17 (15 to 20) & 2 of 3 \\"),
+        # the largest size that ran: without ranks beyond the data, and subspaces
+        ("reruns", r"\texttt{bar\_a} & edge spring & 0.25 & \textcolor{okred}{blow-up, 4} \\"),
+        # what is above round-off
+        ("ranks", r"\texttt{bar\_a} & edge spring & 3 & 0.50 & 0.010 & -- \\"),
+        # implementations in order
+        ("local_share", r"\texttt{bar\_a} & 150 & 0.80 & 16 & 0.75 & 2 & 0.50 \\"),
+    ],
+)  # fmt: skip
+def test_the_only_row_of_a_table(name, expected):
+    assert made(name) == [expected]
 
 
 def test_speedups_that_lose_say_so():
-    deim, ecsw = rows(TEX_TABLES["tab_speedups"](TABLES))
+    deim, ecsw = made("speedups")
     assert "0.50 (loses)" in deim
     assert "never" in deim
     assert "deim\\_x, r = 6" in deim
@@ -180,12 +155,6 @@ def test_speedups_that_lose_say_so():
     assert "ecsw, k = 20" in ecsw
     # two digits of a count
     assert ecsw.endswith(r"& 1200 \\")
-
-
-def test_reruns_show_the_largest_size_that_ran():
-    """Ranks beyond the data and subspaces are left out, a blow-up shows its frame."""
-    (row,) = rows(reruns(TABLES))
-    assert row == (r"\texttt{bar\_a} & edge spring & 0.25 & \textcolor{okred}{blow-up, 4} \\")
 
 
 @pytest.mark.parametrize(
@@ -198,36 +167,22 @@ def test_reruns_show_the_largest_size_that_ran():
     ],
 )
 def test_methods_say_how_many_samples_they_take(changes, samples):
-    frame = TABLES["methods"][1:].assign(**changes)
-    (row,) = rows(TEX_TABLES["tab_methods"]({"methods": frame}))
+    (row,) = made("methods", methods=TABLES["methods"][1:].assign(**changes))
     assert row.split(" & ")[5] == samples
 
 
-def test_ranks_count_what_is_above_round_off():
-    (row,) = rows(ranks(TABLES))
-    assert row == r"\texttt{bar\_a} & edge spring & 3 & 0.50 & 0.010 & -- \\"
-
-
-def test_local_share_orders_the_implementations():
-    (row,) = rows(local_share(TABLES))
-    assert row == r"\texttt{bar\_a} & 150 & 0.80 & 16 & 0.75 & 2 & 0.50 \\"
-
-
-def test_horizon_of_a_calm_scene_is_its_run():
-    first, second = rows(scene_table(TABLES))
+def test_horizon_of_a_calm_scene_is_its_run_and_without_a_run_there_is_none():
+    first, second = made("scenes")
     assert first.endswith(r"& 400 & 722 & 10 & run \\")
     assert second.endswith(r"& 9 & 12 & 20 & 7 \\")
     assert r"triangle strain ($10^{7}$)" in first
-
-
-def test_a_scene_without_a_run_has_no_horizon():
-    other = TABLES["reduced_reruns"][TABLES["reduced_reruns"].scene == "b"]
-    first, _ = rows(scene_table(TABLES | {"reduced_reruns": other}))
+    runs = TABLES["reduced_reruns"]
+    first, _ = made("scenes", reduced_reruns=runs[runs.scene == "b"])
     assert first.endswith(r"& 10 & -- \\")
 
 
 def test_verdicts_have_their_colour():
-    holds, open_, fails = rows(claims(TABLES))
+    holds, open_, fails = made("claims")
     assert r"\textcolor{okgreen}{holds}" in holds
     assert r"\textcolor{okgrey}{cannot be decided}" in open_
     assert r"\textcolor{okred}{does not hold}" in fails
@@ -239,7 +194,7 @@ def test_verdicts_have_their_colour():
 
 
 def test_every_test_that_decides_has_a_row():
-    first, *others = rows(TEX_TABLES["tab_claims_in_full"](TABLES))
+    first, *others = made("claims_in_full")
     assert first == (
         r"C1 as published & some\_one & $\ge$ 0.10 & 1 of 2 & 0.050 & 0.10 & "
         r"\ensuremath{\infty} \\"
@@ -249,7 +204,7 @@ def test_every_test_that_decides_has_a_row():
 
 
 def test_stability_counts_what_ran():
-    first, second = rows(stability(TABLES))
+    first, second = made("stability")
     cells = [cell.strip() for cell in first.removesuffix(r"\\").split("&")]
     assert cells[1:5] == ["1", "1", "0", "1"]
     assert cells[5:] == ["3", r"\ensuremath{\infty}", "0 of 1", "2"]
@@ -264,6 +219,11 @@ PAGE = r"""\documentclass{article}\usepackage[T1]{fontenc}\usepackage{lmodern}\u
 @pytest.mark.parametrize("rows", [[], [["a", "1"]], [["a", "1"], ["b", "2"]]])
 def test_a_table_is_set(form, rows, tmp_path):
     """A table without rows is that of a configuration which holds nothing of what it shows."""
-    (tmp_path / "main.tex").write_text(PAGE % form(["name", "number"], rows, "lr"))
+    text = form(["name", "number"], rows, "lr")
+    assert text.count(r"name & number \\") == (2 if form is longtable else 1)
+    assert [line for line in text.splitlines() if line.startswith(("a &", "b &"))] == [
+        rf"{name} & {number} \\" for name, number in rows
+    ]
+    (tmp_path / "main.tex").write_text(PAGE % text)
     build_pdfs({tmp_path / "main.tex": tmp_path / "main.pdf"}, [])
     assert (tmp_path / "main.pdf").read_bytes().startswith(b"%PDF")

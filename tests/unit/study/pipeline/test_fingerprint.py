@@ -194,7 +194,7 @@ def prints(tmp_path_factory):
         "spring": edited("model/constraints/spring.py", "\nADDED = 1\n"),
         "bending": edited("model/constraints/bending.py", "\nADDED = 1\n"),
         "mesh": edited("model/mesh/generators.py", "\nADDED = 1\n"),
-        "store": edited("core/store/atomic.py", "\nADDED = 1\n"),
+        "store": edited("core/store/__init__.py", "\nADDED = 1\n"),
     }
 
 

@@ -61,8 +61,6 @@ class TwoLevel(Alternative):
         span, image = (linalg.solve_triangular(factor, a.T, lower=True) for a in (free, image))
         chosen = self._model.samples[group.name]
         assert isinstance(chosen, Samples)
-        assert chosen.elements is not None
-        assert chosen.factors is not None
         self._group, self._vertices = group.restricted(chosen.elements, chosen.factors)
         rows = span[:, self._vertices].T
         inertia = (span * (scene.masses / self.time_step**2)) @ span.T

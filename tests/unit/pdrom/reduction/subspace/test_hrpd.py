@@ -4,11 +4,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from test_subspace_run import GRAVITY, SCENES, SPRING, hrpd_of, run_model, whole_space
+from test_subspace_run import GRAVITY, SPRING, hrpd_of, run_model, whole_space
 
 from builders import GROUPS, LEFT, TOP, make_scene, random_rotation
 from pdrom.core.errors import SamplingError
-from pdrom.core.store import open_hdf5, write_hdf5
 from pdrom.model.constraints.lanes import LANES
 from pdrom.model.runs import trajectory
 from pdrom.reduction.basis import compute_basis
@@ -25,7 +24,6 @@ from pdrom.reduction.subspace.hrpd import (
 )
 from pdrom.reduction.subspace.interpolation import (
     InterpolatedLocalStep,
-    Interpolation,
     SubspaceLocalStep,
     interpolation_of,
 )
@@ -203,18 +201,6 @@ def test_projections_that_are_round_off_need_no_element():
     kept = {"bending": found["bending"]}
     one = run_model(scene, SubspaceModel("pod", columns, kept))
     np.testing.assert_allclose(one, run_model(scene, SubspaceModel("pod", columns)), atol=1e-9)
-
-
-def test_interpolations_survive_a_file(tmp_path):
-    scene = SCENES["pins"]()
-    found = hrpd_of(scene, make_columns(scene, trajectory(scene)[1:], "pod", 3))["spring"]
-    with write_hdf5(tmp_path / "it.h5") as file:
-        found.save(file.create_group("it"))
-    with open_hdf5(tmp_path / "it.h5") as file:
-        loaded = Interpolation.load(file["it"])
-    assert loaded.gain == found.gain
-    for name, value in vars(found).items():
-        np.testing.assert_array_equal(getattr(loaded, name), value)
 
 
 @pytest.mark.parametrize(

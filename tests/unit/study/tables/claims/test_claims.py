@@ -13,7 +13,7 @@ from pdrom.core.errors import ConfigurationError
 from pdrom.core.yamlfile import validate
 from places import ROOT
 from study.tables import declared
-from study.tables.claims.claims import claims, claims_rows
+from study.tables.claims.claims import claims
 from study.tables.claims.metrics import METRICS
 from study.tables.claims.rules import MARGIN, ClaimRule, TestRule, load_claims
 from study.tables.claims.verdicts import (
@@ -486,7 +486,7 @@ def test_the_claims_are_those_of_the_paper():
 def test_without_data_nothing_is_decided():
     """Every rule names columns that exist, and none passes for lack of rows."""
     empty = {name: table.checked(pd.DataFrame()) for name, table in declared().items()}
-    rows = claims_rows(RULES, empty)
+    rows = claims(ROOT / "config" / "claims.yaml", **empty)
     assert rows.claim.tolist() == list(RULES)
     assert (rows[["verdict", "verdict_beyond"]] == UNDECIDED).all(axis=None)
 

@@ -5,11 +5,10 @@ import pytest
 
 from places import ROOT
 from study.tables import declared
-from study.tables.claims.claims import claims_rows, claims_tests, outcome_rows
-from study.tables.claims.rules import load_claims
+from study.tables.claims.claims import claims, claims_tests
 from study.tables.claims.verdicts import MACHINE, UNDECIDED, combined
 
-RULES = load_claims(ROOT / "config" / "claims.yaml")
+PATH = ROOT / "config" / "claims.yaml"
 SHARES = pd.DataFrame(
     {"scene": ["a", "b", "c"], "implementation": "compiled", "local_share": [0.2, 0.8, 0.9]}
 )
@@ -23,12 +22,12 @@ def tables() -> dict[str, pd.DataFrame]:
 
 @pytest.fixture(scope="module")
 def outcomes(tables: dict[str, pd.DataFrame]) -> pd.DataFrame:
-    return outcome_rows(RULES, tables)
+    return claims_tests(PATH, **tables)
 
 
 def test_what_a_test_found(outcomes):
-    found = claims_tests.checked(outcomes)
-    one = found[(found.claim == "C1") & (found.part == "beyond") & found.decides].iloc[0]
+    found = outcomes[(outcomes.claim == "C1") & (outcomes.part == "beyond")]
+    one = found[found.decides].iloc[0]
     assert (one.satisfied, one.of, one.close, one.verdict) == (2, 3, 2, MACHINE)
     assert one.margin == 4.0
     assert (one.least, one["median"], one.most) == (0.2, 0.8, 0.9)
@@ -41,7 +40,7 @@ def test_a_test_without_rows_is_undecided(outcomes):
 
 
 def test_the_tests_that_decide_give_the_verdicts(tables, outcomes):
-    for row in claims_rows(RULES, tables).itertuples():
+    for row in claims(PATH, **tables).itertuples():
         for part, verdict in (("published", row.verdict), ("beyond", row.verdict_beyond)):
             mine = outcomes[(outcomes.claim == row.claim) & (outcomes.part == part)]
             mine = mine[mine.decides]
