@@ -15,8 +15,7 @@ from study.artifact.paths import Place
 from study.experiments.frame_times import NamedScene, ProjectionCase, SubspaceCase
 from study.experiments.kit.settings import Horizon, Rank
 from study.experiments.live import JOINT, JointRows, OfScene
-from study.experiments.noise import Noise
-from study.experiments.repetitions import LadderSection, Repeated
+from study.experiments.repetitions import LadderSection, Noise, Repeated
 from study.experiments.stability import Stability
 from study.pipeline import figures, paper
 from study.pipeline.contents import labels_of

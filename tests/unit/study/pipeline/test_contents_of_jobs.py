@@ -6,8 +6,8 @@ import pytest
 
 from bad_input.project import MESH, SCENE, SQUARE, STUDY, Replace, load_project, make_project
 from study.experiments.fom import mesh
-from study.experiments.scaling import scaling
 from study.experiments.subspaces import online
+from study.experiments.timing import scaling
 from study.pipeline.contents import labels_of
 
 # with a page of models, which prints titles
