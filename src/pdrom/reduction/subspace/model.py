@@ -64,7 +64,7 @@ class SubspaceModel:
         return sum(self.evaluated(group) for group in scene.groups)
 
     def chosen(self, group: ConstraintGroup) -> Samples | Interpolation:
-        """What a local step evaluates of a group."""
+        """Sample of a group, as a local step evaluates it."""
         every = Samples(np.arange(group.elements), np.ones(group.elements))
         return self.samples.get(group.name, every)
 
