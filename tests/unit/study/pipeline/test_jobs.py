@@ -10,8 +10,8 @@ from pdrom.core.errors import ConfigurationError
 from places import ROOT
 from study.artifact.reads import Setting, TableOf
 from study.experiments.fom import mesh
-from study.experiments.scaling import scaling
 from study.experiments.subspaces import online
+from study.experiments.timing import scaling
 from study.pipeline.contents import labels_of
 from study.pipeline.folders import Folders
 from study.pipeline.plan import Plan
