@@ -80,37 +80,29 @@ def claims_page(
     ----------
     pages : of the figures by their names
     """
-    found = verdicts.set_index("claim")
-    body = "".join(
-        _claim(name, rule, tests[tests.claim == name], found.loc[name], pages)
-        for name, rule in claims.items()
-    )
+    found, body = verdicts.set_index("claim"), ""
+    for name, rule in claims.items():
+        mine, verdict, shown = tests[tests.claim == name], found.loc[name], rule.figure_or_table
+        place = f"{pages[shown]}#fig:{shown}" if shown in pages else f"tables/{shown}.html"
+        history = "".join(
+            f"<li>{c.date} ({'results were known' if c.after_data else 'before any result'}): "
+            f"{escape(c.reason)}</li>"
+            for c in rule.changes
+        )
+        body += (
+            f"<section aria-labelledby='{name}'><h2 id='{name}'>{name}: {escape(rule.paper)}</h2>"
+            f"<p>{escape(rule.text)} <small>{escape(rule.source)}, section {escape(rule.section)}, "
+            f"figures: {escape(rule.shown)}. Qualifiers: {escape(rule.qualifiers)}.</small></p>"
+            f"<p><strong>As published: {escape(verdict.verdict)}. "
+            f"Beyond: {escape(verdict.verdict_beyond)}.</strong> Last "
+            f"<code>./reproduce verify</code>: <span data-verified='claim {name}'>not yet</span>. "
+            f"Command: <code>./reproduce claims</code>. Shown in <a href='{place}'>{shown}</a>.</p>"
+            f"{''.join(_tests(name, part, getattr(rule, part), mine) for part in PARTS)}"
+            f"<h3>History of the rules</h3><ul>{history}</ul>"
+            f"<p><small>Rules: <code>config/claims.yaml</code>, "
+            f"fingerprint {rule.fingerprint}.</small></p></section>"
+        )
     return filled(template, {"TITLE": "Claims", "BODY": body})
-
-
-def _claim(
-    name: str, rule: ClaimRule, tests: pd.DataFrame, verdict: pd.Series, pages: Mapping[str, str]
-) -> str:
-    shown = rule.figure_or_table
-    place = f"{pages[shown]}#fig:{shown}" if shown in pages else f"tables/{shown}.html"
-    history = "".join(
-        f"<li>{c.date} ({'results were known' if c.after_data else 'before any result'}): "
-        f"{escape(c.reason)}</li>"
-        for c in rule.changes
-    )
-    return (
-        f"<section aria-labelledby='{name}'><h2 id='{name}'>{name}: {escape(rule.paper)}</h2>"
-        f"<p>{escape(rule.text)} <small>{escape(rule.source)}, section {escape(rule.section)}, "
-        f"figures: {escape(rule.shown)}. Qualifiers: {escape(rule.qualifiers)}.</small></p>"
-        f"<p><strong>As published: {escape(verdict.verdict)}. "
-        f"Beyond: {escape(verdict.verdict_beyond)}.</strong> "
-        f"Last <code>./reproduce verify</code>: <span data-verified='claim {name}'>not yet</span>. "
-        f"Command: <code>./reproduce claims</code>. Shown in <a href='{place}'>{shown}</a>.</p>"
-        f"{''.join(_tests(name, part, getattr(rule, part), tests) for part in PARTS)}"
-        f"<h3>History of the rules</h3><ul>{history}</ul>"
-        f"<p><small>Rules: <code>config/claims.yaml</code>, "
-        f"fingerprint {rule.fingerprint}.</small></p></section>"
-    )
 
 
 def _tests(name: str, part: str, rules: tuple[TestRule, ...], tests: pd.DataFrame) -> str:

@@ -66,12 +66,11 @@ TABLES = {
         ("numpy", 10.0, 2.0, 4.0, 0.75),
     ).assign(scene="bar_a"),
     "claims": frame(
-        "claim paper verdict figure_or_table verdict_beyond shown text qualifiers history",
-        ("C1", "70 % or more", "holds", "local_share", "depends", "5", "a claim_1", "often",
-         "2026-01-31: first."),
-        ("C2", "x", "cannot be decided", "a", "holds", "none", "t", "q", "h"),
-        ("C3", "y", "does not hold", "b", "does not hold", "6", "t", "q", "h"),
-    ).assign(section="4"),
+        "claim paper verdict figure_or_table verdict_beyond",
+        ("C1", "70 % or more", "holds", "local_share", "depends"),
+        ("C2", "x", "cannot be decided", "a", "holds"),
+        ("C3", "y", "does not hold", "b", "does not hold"),
+    ),
     "claims_tests": frame(
         "claim part what decides compare threshold satisfied of least median most",
         ("C1", "published", "some_one", True, ">=", 0.1, 1, 2, 0.05, 0.1, float("inf")),

@@ -17,7 +17,7 @@ from study.artifact.paths import ARTICLE, TABLE
 from study.figures.kit.declaration import declarations
 from study.tables import declared
 from study.verification.again import made
-from study.verification.command import NOTHING, parser, update, verify, verify_tables
+from study.verification.command import NOTHING, update, verify, verify_tables
 from study.verification.lines import Line, Outcome, status_of
 from study.verification.references import LOG, folder_of
 from study.verification.status import Status
@@ -115,17 +115,15 @@ def test_the_code_is_that_of_the_worst_outcome(outcomes, status):
     assert status_of([Line("table", "a", outcome) for outcome in outcomes]) == status
 
 
-def test_a_configuration_without_references_is_refused(results, tmp_path):
+def test_a_configuration_without_references_and_options_that_clash_are_refused(results, tmp_path):
     own = tmp_path / "other.yaml"
     own.write_text("ranks: [6]\n")
     with pytest.raises(ConfigurationError, match="no expected tables of this configuration"):
         verify(["--configfile", str(own)])
-
-
-def test_update_goes_with_nothing_else():
     with pytest.raises(SystemExit):
-        parser().parse_args(["--no-such-option"])
-    assert parser().parse_args(["--update", "--reason", "why"]).reason == "why"
+        verify(["--no-such-option"])
+    with pytest.raises(SystemExit):
+        verify(["--update", "--files"])
 
 
 def plan_says(monkeypatch, code: int, words: str) -> None:
