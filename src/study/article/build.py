@@ -11,25 +11,14 @@ from html import escape
 from importlib.util import find_spec
 from pathlib import Path
 
-import pandas as pd
 from PIL import Image
 
 from pdrom.core.errors import PaperError
 from pdrom.core.store import atomic_path, read_table, read_text, require_intact, write_text
-from study.article.latex import Origins, linked_table, prepared
-from study.article.tables import FACTS, claims_page, contents, list_page, table_page
-from study.article.tree import (
-    Labels,
-    Node,
-    Tree,
-    attributes,
-    link,
-    numbered,
-    plain,
-    resolved,
-    words,
-)
-from study.article.verified import INDEX, write_verified
+from pdrom.view.page import safe_json
+from study.article.latex import linked_table, prepared
+from study.article.tables import FACTS, claims_page, list_page, table_page
+from study.article.tree import Labels, Node, attributes, boxed, numbered, plain, resolved, words
 from study.artifact.artifact import Files
 from study.artifact.paths import ARTICLE, FIGURE_PICTURE, File, Place
 from study.artifact.reads import Every, ProjectFile, Setting, TableOf
@@ -42,31 +31,6 @@ from study.tables.claims.rules import Added, load_claims
 # Bytes: a larger picture loses what nobody sees; a larger PDF is left to the command.
 LOSSLESS, COPIED = 150_000, 200_000
 MANY = 4  # keys of options that say what is drawn
-
-
-def write_picture(png: Path, out: Path) -> tuple[int, int]:
-    """Write the picture ``png`` of a figure as WebP ``out``; return width and height, pixels."""
-    require_intact(png)
-    with Image.open(png) as image:
-        drawn = image.convert("RGB")
-    packed = io.BytesIO()
-    drawn.save(packed, "WEBP", lossless=True, method=3)
-    if packed.tell() > LOSSLESS:
-        packed = io.BytesIO()
-        drawn.save(packed, "WEBP", quality=85, method=4)
-    with atomic_path(out) as temporary:
-        temporary.write_bytes(packed.getvalue())
-    return drawn.size
-
-
-def copy_pdf(pdf: Path, out: Path) -> bool:
-    """Copy a figure's ``pdf`` to ``out`` where it is small; whether it is."""
-    require_intact(pdf)
-    small = pdf.stat().st_size <= COPIED
-    if small:
-        with atomic_path(out) as temporary:
-            shutil.copyfile(pdf, temporary)
-    return small
 
 
 def shown_figure(
@@ -82,37 +46,33 @@ def shown_figure(
     pages : of the figures that stand in the documents, by name
     """
     attribute, caption, _ = node["c"]
-    inlines = [attributes("", "", width=str(size[0]), height=str(size[1]), loading="lazy")]
+    picture = attributes("", "", width=str(size[0]), height=str(size[1]), loading="lazy")
     alternative = words(plain(caption[1]).strip())
-    image = {"t": "Image", "c": [*inlines, alternative, [f"figures/{name}.webp", ""]]}
-    lines = {"t": "Div", "c": [attributes("", "origin"), [_para(_origin(name, with_pdf, pages))]]}
-    return {"t": "Figure", "c": [attribute, [caption[0], [*caption[1], lines]], [_para([image])]]}
+    image = {"t": "Image", "c": [picture, alternative, [f"figures/{name}.webp", ""]]}
+    # words, since pandoc hides a caption that says what the alternative text does
+    made = {"t": "RawInline", "c": ["html", _origin(name, with_pdf, pages)]}
+    origin = [{"t": "Plain", "c": [*words("Command: "), made]}]
+    told = [caption[0], [*caption[1], boxed("Div", origin, "", "origin")]]
+    return {"t": "Figure", "c": [attribute, told, [{"t": "Plain", "c": [image]}]]}
 
 
-def _para(inlines: list[Node]) -> Node:
-    return {"t": "Plain", "c": inlines}
-
-
-def _origin(name: str, with_pdf: bool, pages: Mapping[str, str]) -> list[Node]:
-    declared = declarations()[name]
-    tables = [read.name for read in declared.reads.values() if isinstance(read, TableOf)]
-    made = [*words("Command: "), {"t": "Code", "c": [attributes(), f"./reproduce figure {name}"]}]
-    made += words(". Data: " if tables else ". Drawn from the runs themselves")
-    for place, table in enumerate(tables):
-        made += [*words(", " if place else ""), link(words(table), f"tables/{table}.html")]
-    made += words(". ")
-    if with_pdf:
-        made += [link(words("PDF"), f"figures/{name}.pdf"), *words(". ")]
-    for place, other in enumerate(_kin(name, pages)):
-        made += words(", " if place else "Other scenes: ")
-        made.append(link(words(other), f"{pages[other]}#fig:{other}", "kin"))
-    if made[-1]["t"] == "Link":
-        made += words(".")
-    mark = {
-        "t": "Span",
-        "c": [attributes("", "", data_verified=f"figure {name}"), words("not yet")],
-    }
-    return [*made, *words(" Last verification: "), mark, *words(".")]
+def _origin(name: str, with_pdf: bool, pages: Mapping[str, str]) -> str:
+    """HTML of the command of a figure, its data, PDF and kin, and when it was verified."""
+    reads = declarations()[name].reads.values()
+    tables = [read.name for read in reads if isinstance(read, TableOf)]
+    data = ", ".join(f'<a href="tables/{table}.html">{table}</a>' for table in tables)
+    kin = ", ".join(
+        f'<a href="{pages[other]}#fig:{other}" class="kin">{other}</a>'
+        for other in _kin(name, pages)
+    )
+    sentences = [
+        f"<code>./reproduce figure {name}</code>.",
+        f"Data: {data}." if tables else "Drawn from the runs themselves.",
+        f'<a href="figures/{name}.pdf">PDF</a>.' if with_pdf else "",
+        f"Other scenes: {kin}." if kin else "",
+        f'Last verification: <span data-verified="figure {name}">not yet</span>.',
+    ]
+    return " ".join(filter(None, sentences))
 
 
 def _kin(name: str, pages: Mapping[str, str]) -> list[str]:
@@ -133,6 +93,17 @@ def _kin(name: str, pages: Mapping[str, str]) -> list[str]:
             or name.startswith(f"{other}_")
         )
     ]
+
+
+VERIFIED, INDEX = "verified.js", "index.html"
+
+
+def write_verified(found: Mapping[str, str], folder: Path) -> None:
+    """Write outcomes of ``verify``, by kind and name as in ``table payoff``, into ``folder``.
+
+    A page that is opened from a disk loads nothing but scripts, so that this is one.
+    """
+    write_text(f"window.pdromVerified={safe_json(dict(found))};\n", folder / VERIFIED)
 
 
 FOLDER = Path("src/study/article")
@@ -179,9 +150,10 @@ def write_article(
     assets : templates, style and script, see `ASSETS`
     """
     made = {file["name"]: file.path for file in inputs}
-    origins = Origins(**json.loads(read_text(made[NUMBERS])))
+    origins = json.loads(read_text(made[NUMBERS]))
     known = fact_tables(Path(machine.path), facts)
-    csv = contents([table.path for table in tables], known)
+    csv = {table["name"]: Path(table.path).read_bytes() for table in tables}
+    csv |= {name: known[name].to_csv(index=False, lineterminator="\n").encode() for name in FACTS}
     known |= {table["name"]: read_table(table.path) for table in tables}
     templates = {name: path.read_text("utf-8") for name, path in assets.items()}
     texts = documents(source[0].parent)
@@ -193,21 +165,26 @@ def write_article(
     written["tables"] = list_page(sorted(csv), plain)
     written["claims"] = claims_page(rules, known["claims_tests"], known["claims"], pages, plain)
     drawn = _write_figures(figures, pictures, outputs)
-    files = _linked_inputs(made, origins, known)
+    files = {
+        f"{name}.tex": linked_table(
+            read_text(made[f"{name}.tex"]), {table: known[table] for table in read}
+        )
+        for name, read in origins["tables"].items()
+    }
     labels: dict[str, tuple[str, str]] = {}
-    trees: dict[str, Tree] = {}
+    trees: dict[str, Node] = {}
     for stem, text in texts.items():
-        tex = prepared(text, stem, origins, facts)
         prefix = _PREFIX.search(text)
         trees[stem] = numbered(
-            parsed(tex, files, references),
+            parsed(prepared(text, stem, origins, facts), files, references),
             Labels(prefix[1] if prefix else "", PAGES[stem], labels),
             lambda name, node: shown_figure(name, node, *drawn[name], pages),
         )
     for stem, tree in trees.items():
-        others = {PAGES[other]: TITLES[other] for other in texts if other != stem}
-        whole = resolved(tree, labels, rules)
-        written[stem] = page(whole, assets["text"], _variables(others, facts))
+        others = {PAGES[other]: TITLES[other] for other in texts if other != stem} | LINKS
+        links = " ".join(f'<a href="{address}">{words}</a>' for address, words in others.items())
+        variables = {"pages": links} | ({"part": escape(facts.part)} if facts.part else {})
+        written[stem] = page(resolved(tree, labels, rules), assets["text"], variables)
     for name, text in written.items():
         write_text(text, outputs[name])
     write_verified({}, Path(outputs["main"]).parent)
@@ -216,34 +193,28 @@ def write_article(
 def _write_figures(
     figures: list[File], pictures: list[File], outputs: Mapping[str, str]
 ) -> dict[str, tuple[tuple[int, int], bool]]:
-    """Write pictures and PDF files; return the size of each, and whether it has a PDF here."""
+    """Write pictures as WebP, and small PDF files; size of each, and whether its PDF is here."""
     folder = Path(outputs["main"]).parent / "figures"
-    pdf = {figure["name"]: Path(figure.path) for figure in figures}
     png = {picture["name"]: Path(picture.path) for picture in pictures}
-    return {
-        name: (
-            write_picture(png[name], Path(outputs[f"picture_{name}"])),
-            copy_pdf(pdf[name], folder / f"{name}.pdf"),
-        )
-        for name in sorted(pdf)
-    }
-
-
-def _linked_inputs(
-    made: Mapping[str, str], origins: Origins, tables: Mapping[str, pd.DataFrame]
-) -> dict[str, str]:
-    """TeX tables by file name, their numbers with links to rows."""
-    return {
-        f"{name}.tex": linked_table(
-            read_text(made[f"{name}.tex"]), {table: tables[table] for table in read}
-        )
-        for name, read in origins.tables.items()
-    }
-
-
-def _variables(others: Mapping[str, str], facts: Facts) -> dict[str, str]:
-    nav = [f'<a href="{address}">{words}</a>' for address, words in {**others, **LINKS}.items()]
-    return {"pages": " ".join(nav), **({"part": escape(facts.part)} if facts.part else {})}
+    made = {}
+    for name, pdf in sorted((figure["name"], Path(figure.path)) for figure in figures):
+        require_intact(png[name])
+        with Image.open(png[name]) as image:
+            drawn = image.convert("RGB")
+        packed = io.BytesIO()
+        drawn.save(packed, "WEBP", lossless=True, method=3)
+        if packed.tell() > LOSSLESS:
+            packed = io.BytesIO()
+            drawn.save(packed, "WEBP", quality=85, method=4)
+        with atomic_path(outputs[f"picture_{name}"]) as temporary:
+            temporary.write_bytes(packed.getvalue())
+        require_intact(pdf)
+        small = pdf.stat().st_size <= COPIED
+        if small:
+            with atomic_path(folder / f"{name}.pdf") as temporary:
+                shutil.copyfile(pdf, temporary)
+        made[name] = (drawn.size, small)
+    return made
 
 
 def _writes() -> dict[str, Place]:
@@ -257,7 +228,7 @@ def _writes() -> dict[str, Place]:
 LIMIT = 300.0  # seconds; a definition that expands to itself never ends
 
 
-def parsed(text: str, files: Mapping[str, str], references: Path) -> Tree:
+def parsed(text: str, files: Mapping[str, str], references: Path) -> Node:
     r"""Pandoc's syntax tree of a LaTeX source ``text``, with its bibliography.
 
     Parameters
@@ -275,11 +246,11 @@ def parsed(text: str, files: Mapping[str, str], references: Path) -> Tree:
             Path(folder, name).write_text(content, encoding="utf-8")
         words = ["-f", "latex", "-t", "json", "--citeproc", "-M", "link-citations=true"]
         words += ["--bibliography", str(references.resolve()), "article.tex"]
-        tree: Tree = json.loads(_run(words, folder, ""))
+        tree: Node = json.loads(_run(words, folder, ""))
         return tree
 
 
-def page(tree: Tree, template: Path, variables: Mapping[str, str]) -> str:
+def page(tree: Node, template: Path, variables: Mapping[str, str]) -> str:
     """HTML of ``tree`` by a ``template`` with ``variables``; PaperError as in `parsed`.
 
     Formulas are MathML, a table of contents comes first.

@@ -6,7 +6,6 @@ Whatever the source reads or decides when TeX runs is put in its place here: ``\
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import pandas as pd
@@ -45,20 +44,14 @@ REPLACED = r"""
 """
 
 
-@dataclass(frozen=True)
-class Origins:
-    """Contents of numbers.json, see `study.paper.build.write_inputs`."""
+def prepared(source: str, document: str, origins: Mapping[str, Any], facts: Facts) -> str:
+    """Return the ``source`` of a ``document`` for pandoc, linked by ``origins`` and ``facts``.
 
-    known: Mapping[str, Sequence[str]]
-    numbers: Mapping[str, Mapping[str, Any]]
-    tables: Mapping[str, Sequence[str]]
-
-
-def prepared(source: str, document: str, origins: Origins, facts: Facts) -> str:
-    """Return the ``source`` of a ``document`` for pandoc, linked by ``origins`` and ``facts``."""
+    ``origins`` are the contents of numbers.json, see `study.paper.build.write_inputs`.
+    """
     preamble, begin, text = source.partition(r"\begin{document}")
     left_out = rf"\emph{{[{note(facts.part, facts.full_study)}]}}"
-    text = _COMMENT.sub("", _decided(text, origins.known[document], left_out))
+    text = _COMMENT.sub("", _decided(text, origins["known"][document], left_out))
     text = _FIGURE.sub(_figure, text)
     text = _CAPTION.sub(lambda found: facts.captions[found[1]], text)
     text = _PART.sub(lambda found: (found[1] if facts.part else found[2]) or "", text)
@@ -67,10 +60,9 @@ def prepared(source: str, document: str, origins: Origins, facts: Facts) -> str:
         shown = rf"\texttt{{{escape(words)}}}".replace("\\", r"\\")
         text = re.sub(rf"\\{name}(?![A-Za-z])(?:\{{\}})?", shown, text)
     text = _VAL.sub(
-        lambda found: _link(found[1], origins.numbers[found[1]]["text"]), _MATH.sub(_apart, text)
+        lambda found: _link(found[1], origins["numbers"][found[1]]["text"]), _MATH.sub(_apart, text)
     )
-    text = re.sub(r"\\(begin|end)\{fitted\}", "", text).replace("{fittedtabular}", "{tabular}")
-    text = _DROPPED.sub("", text)
+    text = _DROPPED.sub("", text.replace("{fittedtabular}", "{tabular}"))
     short = [found[0] for found in _SHORT.finditer(preamble)]
     return plain_columns("\n".join([*short, _title(preamble), REPLACED, begin, text]))
 
@@ -112,11 +104,8 @@ def _apart(found: re.Match[str]) -> str:
 
 
 def _link(key: str, text: str) -> str:
-    return rf"\href{{{ORIGIN}{key.encode().hex()}}}{{{_plain_mathematics(text)}}}"
-
-
-def _plain_mathematics(text: str) -> str:
-    return _ENSURED.sub(r"$\1$", text)
+    shown = _ENSURED.sub(r"$\1$", text)
+    return rf"\href{{{ORIGIN}{key.encode().hex()}}}{{{shown}}}"
 
 
 def linked_table(text: str, tables: Mapping[str, pd.DataFrame]) -> str:
@@ -127,7 +116,7 @@ def linked_table(text: str, tables: Mapping[str, pd.DataFrame]) -> str:
     hold the same (a rounded number, a sum or a title is none of the table's own cells).
     """
     text = _HEAD.sub("", text).replace("\\captionrow\n", "").replace("longtable", "tabular")
-    lines = text.replace(r"\noalign{\smallskip}", "").split("\n")
+    lines = text.split("\n")
     split = [line.removesuffix(END).split(" & ") if line.endswith(END) else [] for line in lines]
     first = next(place for place, cells in enumerate(split) if cells)
     header = split[first]
@@ -138,7 +127,7 @@ def linked_table(text: str, tables: Mapping[str, pd.DataFrame]) -> str:
         own = [f"row={row}"] if one_to_one else _agreeing(tables[origin], header, split[line])
         key = "|".join([origin, *own])
         lines[line] = " & ".join(_linked_cell(cell, key) for cell in split[line]) + END
-    return plain_columns("\n".join(map(_plain_mathematics, lines)))
+    return plain_columns(_ENSURED.sub(r"$\1$", "\n".join(lines)))
 
 
 def _agreeing(table: pd.DataFrame, header: Sequence[str], cells: Sequence[str]) -> list[str]:

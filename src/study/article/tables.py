@@ -4,7 +4,6 @@ import base64
 import gzip
 from collections.abc import Mapping
 from html import escape
-from pathlib import Path
 
 import pandas as pd
 
@@ -52,13 +51,6 @@ def argument(name: str) -> str:
     if name in FACTS:
         return "paper_inputs"
     return TABLE.at(RESULTS, name=name) if name in declarations() else name
-
-
-def contents(files: list[str], facts: Mapping[str, pd.DataFrame]) -> dict[str, bytes]:
-    """CSV of every table by name: results, which are ``files``, and ``facts``."""
-    found = {Path(path).stem: Path(path).read_bytes() for path in files}
-    plain = {name: facts[name].to_csv(index=False, lineterminator="\n").encode() for name in FACTS}
-    return found | plain
 
 
 def list_page(names: list[str], template: str) -> str:
@@ -122,31 +114,20 @@ def _claim(
 
 
 def _tests(name: str, part: str, rules: tuple[TestRule, ...], tests: pd.DataFrame) -> str:
-    head = "<tr><th>test</th><th>rule</th><th>rows that satisfy it</th><th>found</th></tr>"
-    rows = "".join(
-        f"<tr><td>{escape(rule.what)}{'' if rule.decides else ' (beside the verdict)'}</td>"
-        f"<td>{_rule(rule)}</td><td>{_found(name, part, row)}</td>"
-        f"<td>{_range(row)}{escape(row.verdict)}</td></tr>"
-        for rule, (_, row) in zip(rules, tests[tests.part == part].iterrows(), strict=True)
-    )
+    rows = "<tr><th>test</th><th>rule</th><th>rows that satisfy it</th><th>found</th></tr>"
+    for rule, row in zip(rules, tests[tests.part == part].itertuples(), strict=True):
+        aside = "" if rule.decides else " (beside the verdict)"
+        place = f"tables/claims_tests.html#claim={name}|part={part}|satisfied"
+        values = f"{row.least:.2g} to {row.most:.2g}, median {row.median:.2g}: " if row.of else ""
+        rows += (
+            f"<tr><td>{escape(rule.what)}{aside}</td><td>{_rule(rule)}</td>"
+            f"<td><a class=val href='{place}'>{row.satisfied} of {row.of}</a></td>"
+            f"<td>{values}{escape(row.verdict)}</td></tr>"
+        )
     label = f"Tests of {name}, {part}"
     return (
         f"<h3>{PARTS[part]}</h3><div class=scroll tabindex=0 role=region aria-label='{label}'>"
-        f"<table>{head}{rows}</table></div>"
-    )
-
-
-def _range(row: pd.Series) -> str:
-    """Range of the values of a test; nothing where it has no rows."""
-    if not row.of:
-        return ""
-    return f"{row.least:.2g} to {row.most:.2g}, median {row['median']:.2g}: "
-
-
-def _found(name: str, part: str, row: pd.Series) -> str:
-    return (
-        f"<a class=val href='tables/claims_tests.html#claim={name}|part={part}|satisfied'>"
-        f"{row.satisfied} of {row.of}</a>"
+        f"<table>{rows}</table></div>"
     )
 
 

@@ -5,17 +5,24 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
+from urllib.parse import quote
 
 from pdrom.core.errors import PaperError
 from study.article.latex import ORIGIN
 
-Node = dict[str, Any]
-Tree = dict[str, Any]
+Node = dict[str, Any]  # and the whole tree
 
 
 def attributes(identifier: str = "", classes: str = "", **keys: str) -> list[Any]:
     """Attributes of a node: its ``identifier``, ``classes`` in a string, and further ``keys``."""
     return [identifier, classes.split(), [[k.replace("_", "-"), v] for k, v in keys.items()]]
+
+
+def boxed(
+    kind: str, content: list[Node], identifier: str = "", classes: str = "", **keys: str
+) -> Node:
+    """A Span or a Div (``kind``) around ``content``, see `attributes`."""
+    return {"t": kind, "c": [attributes(identifier, classes, **keys), content]}
 
 
 def words(text: str) -> list[Node]:
@@ -33,23 +40,18 @@ def link(inlines: list[Node], address: str, classes: str = "") -> Node:
     return {"t": "Link", "c": [attributes("", classes), inlines, [address, title * formula]]}
 
 
-def content_of(node: Node) -> Any:
-    """Content of a node, None of one without any."""
-    return node.get("c")
-
-
 def plain(node: Any) -> str:
     """Text of a node without its marks."""
     if isinstance(node, list):
         return "".join(map(plain, node))
     if not isinstance(node, dict):
         return ""
-    kind, content = node.get("t"), content_of(node)
+    kind, content = node.get("t"), node.get("c")
     if kind in ("Space", "SoftBreak", "LineBreak"):
         return " "
     if kind == "Str":
         return str(content)
-    return str(content[1]) if kind in ("Math", "Code") else plain(content)
+    return str(node["c"][1]) if kind in ("Math", "Code") else plain(content)
 
 
 def changed(node: Any, visit: Callable[[Node], Any]) -> Any:
@@ -83,7 +85,7 @@ class Labels:
 
     prefix: str
     page: str
-    numbers: dict[str, tuple[str, str]] = field(default_factory=dict)
+    numbers: dict[str, tuple[str, str]]
     counts: Counter[str] = field(default_factory=Counter)
 
     def next(self, kind: str, label: str = "") -> str:
@@ -91,19 +93,13 @@ class Labels:
         self.counts[kind] += 1
         return self.note(label, f"{self.prefix}{self.counts[kind]}")
 
-    def section(self, level: int, appendix: bool, label: str) -> str:
-        """Number of the next section of a ``level``; a ``label`` will stand for it.
-
-        Those of an ``appendix`` begin with a letter.
-        """
-        if appendix and level == 1 and not self.counts["appendix"]:
-            self.counts["appendix"], self.counts["level1"] = 1, 0
+    def section(self, level: int, label: str) -> str:
+        """Number of the next section of a ``level``; a ``label`` will stand for it."""
         self.counts[f"level{level}"] += 1
         for deeper in range(level + 1, PARAGRAPH):
             self.counts[f"level{deeper}"] = 0
-        parts = [self.counts[f"level{above}"] for above in range(1, level + 1)]
-        first = chr(64 + parts[0]) if self.counts["appendix"] else f"{self.prefix}{parts[0]}"
-        return self.note(label, ".".join([first, *map(str, parts[1:])]))
+        parts = [str(self.counts[f"level{above}"]) for above in range(1, level + 1)]
+        return self.note(label, self.prefix + ".".join(parts))
 
     def note(self, label: str, number: str) -> str:
         """Let a label stand for a number."""
@@ -112,7 +108,7 @@ class Labels:
         return number
 
 
-def numbered(tree: Tree, labels: Labels, shown: Callable[[str, Node], Node]) -> Tree:
+def numbered(tree: Node, labels: Labels, shown: Callable[[str, Node], Node]) -> Node:
     """Number sections, figures, tables, equations and theorems of ``tree``, and lay them out.
 
     Parameters
@@ -122,16 +118,15 @@ def numbered(tree: Tree, labels: Labels, shown: Callable[[str, Node], Node]) -> 
     """
 
     def visit(node: Node) -> Any:
-        kind, content = node["t"], content_of(node)
+        kind, content = node["t"], node.get("c", [])
         if kind == "Header" and content[0] < PARAGRAPH:
             level, attribute, inlines = content
-            appendix = "unnumbered" in attribute[1]
-            number = labels.section(level, appendix, attribute[0])
+            number = labels.section(level, attribute[0])
             return {"t": kind, "c": [level, attribute, [*words(f"{number}\u2002"), *inlines]]}
         if kind == "Figure":
             name = re.sub(r"^fig:", "", content[0][0])
             number = labels.next("figure", content[0][0])
-            return shown(name, _captioned(node, f"Figure {number}. ", 1))
+            return shown(name, _captioned(node, f"Figure {number}."))
         if kind == "Div" and content[1] and content[1][0]["t"] == "Table":
             return _table(content[0][0], content[1][0], labels)
         if kind == "Div" and content[0][0] == "refs":
@@ -149,37 +144,32 @@ def numbered(tree: Tree, labels: Labels, shown: Callable[[str, Node], Node]) -> 
 
 def _table(label: str, node: Node, labels: Labels) -> Node:
     """A table that scrolls, below its caption, which does not."""
-    content = _captioned(node, f"Table {labels.next('table', label)}. ", 1)["c"]
-    caption = {"t": "Div", "c": [attributes("", "caption"), content[1][1]]}
-    region = {"role": "region", "tabindex": "0", "aria_label": plain(content[1])[:80]}
-    head = changed(content[3], _headed)
+
+    def headed(node: Node) -> Node | None:
+        """A formula in a head, with its letters for those who listen."""
+        return boxed("Span", [node, _heard(plain(node))]) if node["t"] == "Math" else None
+
+    content = _captioned(node, f"Table {labels.next('table', label)}.")["c"]
+    head = changed(content[3], headed)
     for cell in (cell for row in head[1] for cell in row[1]):
         cell[4] = cell[4] if plain(cell[4]).strip() else [{"t": "Plain", "c": [_heard("row")]}]
     table = {"t": "Table", "c": [content[0], [None, []], content[2], head, *content[4:]]}
-    scroll = {"t": "Div", "c": [attributes("", "scroll", **region), [table]]}
-    return {"t": "Div", "c": [attributes(label), [caption, scroll]]}
-
-
-def _headed(node: Node) -> Node | None:
-    """A formula in a head, with its letters for those who listen."""
-    if node["t"] != "Math":
-        return None
-    return {"t": "Span", "c": [attributes(), [node, _heard(plain(node))]]}
+    region = {"role": "region", "tabindex": "0", "aria_label": plain(content[1])[:80]}
+    caption = boxed("Div", content[1][1], "", "caption")
+    return boxed("Div", [caption, boxed("Div", [table], "", "scroll", **region)], label)
 
 
 def _heard(text: str) -> Node:
-    return {"t": "Span", "c": [attributes("", "heard"), words(text)]}
+    return boxed("Span", words(text), "", "heard")
 
 
-def _captioned(node: Node, opening: str, place: int) -> Node:
+def _captioned(node: Node, opening: str) -> Node:
     """A figure or a table whose caption opens with its number."""
-    content = list(node["c"])
-    short, blocks = content[place]
-    first = blocks[0] if blocks else {"t": "Plain", "c": []}
-    strong = {"t": "Strong", "c": words(opening.strip())}
-    opened = {"t": "Plain", "c": [strong, {"t": "Space"}, *first["c"]]}
-    content[place] = [short, [opened, *blocks[1:]]]
-    return {"t": node["t"], "c": content}
+    attribute, (short, blocks), *others = node["c"]
+    words_of_caption = blocks[0]["c"] if blocks else []
+    strong = {"t": "Strong", "c": words(opening)}
+    opened = {"t": "Plain", "c": [strong, {"t": "Space"}, *words_of_caption]}
+    return {"t": node["t"], "c": [attribute, [short, [opened, *blocks[1:]]], *others]}
 
 
 def _equation(node: Node, labels: Labels) -> Node:
@@ -189,18 +179,14 @@ def _equation(node: Node, labels: Labels) -> Node:
     lines = [] if found is None else [tex] if found[1] == "equation" else tex.split(r"\\")
     names = [named[1] if (named := _LABEL.search(line)) else "" for line in lines]
     marks = [
-        {
-            "t": "Span",
-            "c": [attributes(name, "number"), words(f"({labels.next('equation', name)})")],
-        }
-        for name in names
+        boxed("Span", words(f"({labels.next('equation', name)})"), name, "number") for name in names
     ]
-    numbers = {"t": "Span", "c": [attributes("", "numbers"), marks]}
     math = {"t": "Math", "c": [kind, _LABEL.sub("", tex)]}
-    return {"t": "Span", "c": [attributes("", "equation", tabindex="0"), [math, numbers]]}
+    numbers = boxed("Span", marks, "", "numbers")
+    return boxed("Span", [math, numbers], "", "equation", tabindex="0")
 
 
-def resolved(tree: Tree, labels: Mapping[str, tuple[str, str]], claims: Mapping[str, Any]) -> Tree:
+def resolved(tree: Node, labels: Mapping[str, tuple[str, str]], claims: Mapping[str, Any]) -> Node:
     """Give references their numbers, numbers and claims their links; open paragraphs in bold.
 
     Parameters
@@ -215,14 +201,14 @@ def resolved(tree: Tree, labels: Mapping[str, tuple[str, str]], claims: Mapping[
     """
 
     def visit(node: Node) -> Any:
-        kind, content = node["t"], content_of(node)
+        kind, content = node["t"], node.get("c", [])
         if kind == "Link":
             return _resolved_link(node, labels)
         if kind == "Str" and (found := _CLAIM.fullmatch(content)) and found[2] in claims:
             here = link(words(found[2]), f"claims.html#{found[2]}", "claim")
             return [*words(found[1]), here, *words(found[3])]
         if kind == "Span" and (colour := _COLOUR.search(str(content[0][2]))):
-            return {"t": kind, "c": [attributes("", colour[1]), changed(content[1], visit)]}
+            return boxed(kind, changed(content[1], visit), "", colour[1])
         return None
 
     found = changed(tree, visit)
@@ -248,23 +234,18 @@ def _run_in(blocks: list[Node]) -> list[Node]:
 
 def _resolved_link(node: Node, labels: Mapping[str, tuple[str, str]]) -> Node | None:
     attribute, inlines, (address, _) = node["c"]
-    keys = dict(attribute[2])
     if address.startswith(ORIGIN):
-        return link(
-            inlines, address_of(bytes.fromhex(address.removeprefix(ORIGIN)).decode()), "val"
-        )
-    if "reference" in keys:
-        if keys["reference"] not in labels:
-            raise PaperError(f"manuscript: no label {keys['reference']}, which the text refers to")
-        number, page = labels[keys["reference"]]
-        shown = f"({number})" if keys["reference-type"] == "eqref" else number
-        return link(words(shown), f"{page}#{keys['reference']}")
-    return None
-
-
-def address_of(key: str) -> str:
-    """Address of the rows that a key names (`study.paper.macros`) on the table's page."""
-    table, _, rows = key.partition("|")
-    signs = {"%": "%25", " ": "%20", '"': "%22", "<": "%3C", ">": "%3E", "#": "%23"}
-    place = "".join(signs.get(sign, sign) for sign in rows)
-    return f"tables/{table}.html" + (f"#{place}" if place else "")
+        key = bytes.fromhex(address.removeprefix(ORIGIN)).decode()
+        # the rows that a key names (`study.paper.macros`) on the table's page
+        table, _, rows = key.partition("|")
+        place = re.sub(r'[% "<>#]', lambda sign: quote(sign[0]), rows)
+        return link(inlines, f"tables/{table}.html" + (f"#{place}" if place else ""), "val")
+    keys = dict(attribute[2])
+    if "reference" not in keys:
+        return None
+    label = keys["reference"]
+    if label not in labels:
+        raise PaperError(f"manuscript: no label {label}, which the text refers to")
+    number, page = labels[label]
+    shown = f"({number})" if keys["reference-type"] == "eqref" else number
+    return link(words(shown), f"{page}#{label}")

@@ -3,21 +3,19 @@
 import argparse
 import subprocess
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from pathlib import Path
-
-import pandas as pd
 
 from pdrom.core.errors import ConfigurationError, StorageError
 from pdrom.core.machine import machine
 from pdrom.core.store import Condition, check_file, read_table, write_text
-from study.article.verified import INDEX, write_verified
+from study.article.build import INDEX, write_verified
 from study.artifact.paths import ARTICLE, TABLE
 from study.tables import declared
 from study.verification.examine import Examination
 from study.verification.files import verify_files
-from study.verification.lines import Line, counted, page, status_of
+from study.verification.lines import counted, page, status_of
 from study.verification.references import LOG, folder_of, note, write_reference
 from study.verification.status import Status, ended, say
 from study.verification.subject import Subject
@@ -44,27 +42,6 @@ def update(subject: Subject, reason: str) -> Path:
             raise StorageError(f"{path}: not there; make it by {subject.command(name)}")
         if check_file(path) is not Condition.INTACT:
             raise StorageError(f"{path}: damaged; delete it and run {subject.command(name)}")
-    _require_new(subject)
-    frames = {name: declared()[name].checked(read_table(path)) for name, path in paths.items()}
-    return write(subject.results, frames, words)
-
-
-def write(results: str, frames: Mapping[str, pd.DataFrame], reason: str) -> Path:
-    """Write the expected form of ``frames`` of ``results`` and a line with the ``reason``."""
-    folder = folder_of(results)
-    for name, frame in frames.items():
-        write_reference(declared()[name], frame, folder)
-    for path in [*folder.glob("*.csv"), *folder.glob("*.csv.xz")]:
-        if path.name.partition(".")[0] not in frames:
-            path.unlink()  # a table that no longer exists
-    here = machine()
-    code = f"{here.pdrom} ({here.commit})"
-    note(folder, reason, datetime.now(UTC).date(), code)
-    return folder
-
-
-def _require_new(subject: Subject) -> None:
-    """StorageError if a run would make one of the tables again."""
     command = [sys.executable, "-m", "study.pipeline.front", "-n", *subject.options, "--"]
     done = subprocess.run([*command, *declared()], capture_output=True, text=True, check=False)
     if done.returncode != 0:
@@ -75,6 +52,16 @@ def _require_new(subject: Subject) -> None:
             f"verify --update: tables are older than what they are made from; run "
             f"{subject.command()} first"
         )
+    tables = [(table, table.checked(read_table(paths[name]))) for name, table in declared().items()]
+    folder = folder_of(subject.results)
+    for table, frame in tables:
+        write_reference(table, frame, folder)
+    for old in [*folder.glob("*.csv"), *folder.glob("*.csv.xz")]:
+        if old.name.partition(".")[0] not in declared():
+            old.unlink()  # a table that no longer exists
+    here = machine()
+    note(folder, words, datetime.now(UTC).date(), f"{here.pdrom} ({here.commit})")
+    return folder
 
 
 CODES = "exit codes: 0 all holds; 1 faulty input; 2 not understood; 3 differs; 4 not there"
@@ -137,24 +124,18 @@ def verify_tables(subject: Subject) -> Status:
     for line in lines:
         say(str(line))
     written = Path(subject.results) / PAGE
-    write_text(page(lines, _about(subject, folder)), written)
+    about = (
+        f"Results in `{subject.results}`, expected ones in `{folder}` (`{LOG}` says why).",
+        "What is compared, and what the outcomes mean, is in `docs/verification.md`.",
+    )
+    write_text(page(lines, about), written)
     pages = Path(ARTICLE.at(subject.results, name=INDEX))
     if pages.is_file():
-        write_verified({f"{line.kind} {line.name}": _short(line) for line in lines}, pages.parent)
+        outcomes = (str(line).partition(": ") for line in lines)
+        write_verified({name: outcome for name, _, outcome in outcomes}, pages.parent)
     say(counted(lines))
     say(f"page: {written}")
     return status_of(lines)
-
-
-def _short(line: Line) -> str:
-    return f"{line.outcome}, {line.text}" if line.text else str(line.outcome)
-
-
-def _about(subject: Subject, folder: Path) -> list[str]:
-    return [
-        f"Results in `{subject.results}`, expected ones in `{folder}` (`{LOG}` says why).",
-        "What is compared, and what the outcomes mean, is in `docs/verification.md`.",
-    ]
 
 
 if __name__ == "__main__":

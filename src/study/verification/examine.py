@@ -1,8 +1,7 @@
 """Lines about claims, figures and tables of a results folder."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
 
 import numpy as np
@@ -15,11 +14,10 @@ from study.pipeline.resolve import Job
 from study.tables import declared
 from study.tables.claims.rules import load_claims
 from study.verification.again import is_derived, made
-from study.verification.compare import Comparison
-from study.verification.judge import Judgement, in_words, judge
-from study.verification.lines import Line, Outcome, table_line
-from study.verification.references import Reference, folder_of, kept, read_reference
-from study.verification.rows import RUNS, Context, names_row
+from study.verification.compare import RUNS, Comparison, Context, kept, names_row
+from study.verification.judge import in_words, judge
+from study.verification.lines import Line, Outcome
+from study.verification.references import Reference, folder_of, read_reference
 from study.verification.subject import Subject
 
 RULES = Path("config/claims.yaml")
@@ -29,26 +27,30 @@ PARTS = {"verdict": ("published", "as published"), "verdict_beyond": ("beyond", 
 GOOD = (Outcome.REPRODUCED, Outcome.NOT_COMPARABLE)
 
 
-@dataclass
 class Examination:
-    """Examination of what is there, what is expected, and what differs."""
+    """Examination of what is there, what is expected, and what differs.
 
-    subject: Subject
-    conditions: dict[str, Condition | None] = field(default_factory=dict)
-    tables: dict[str, pd.DataFrame] = field(default_factory=dict)
-    made_again: dict[str, pd.DataFrame] = field(default_factory=dict)
+    condition : of a file by its path, None if it is not there
+    read : table by its name, see `found`
+    again : table by its name, made again from those at hand, see `_again`
+    """
+
+    def __init__(self, subject: Subject) -> None:
+        self.subject = subject
+        self.condition = cache(lambda path: check_file(path) if Path(path).is_file() else None)
+        self.read, self.again = cache(self._read), cache(self._again)
 
     def lines(self) -> list[Line]:
-        """Lines of all claims, figures and tables."""
-        tables = [*map(self.table, declared()), *self._strangers()]
-        return [*self.claims(), *self._figures(tables), *tables]
-
-    def condition(self, path: str) -> Condition | None:
-        """Condition of the file ``path``, None if it is not there."""
-        if path not in self.conditions:
-            there = Path(path).is_file()
-            self.conditions[path] = check_file(path) if there else None
-        return self.conditions[path]
+        """Lines of all claims, figures and tables, and of files among these that are none."""
+        tables = {name: self.table(name) for name in declared()}
+        figures = [self._figure(job, tables) for job in self.subject.plan.fixed["figures"]]
+        folder = Path(TABLE.at(self.subject.results, name="any")).parent
+        strangers = [
+            Line("table", path.stem, Outcome.DIFFERS, f"{path} is no table of the study")
+            for path in sorted(folder.glob("*.csv"))
+            if path.stem not in declared() and path.name[0] != "."
+        ]
+        return [*self.claims(), *figures, *tables.values(), *strangers]
 
     def found(self, name: str) -> pd.DataFrame:
         """Table ``name``, which is there and intact.
@@ -58,16 +60,16 @@ class Examination:
         StorageError
             It cannot be read, or has other columns than those that are declared.
         """
-        if name not in self.tables:
-            path, table = TABLE.at(self.subject.results, name=name), declared()[name]
-            if self.condition(path) is not Condition.INTACT:
-                raise StorageError(f"{path}: not there, or damaged")
-            frame = read_table(path)
-            other = sorted(set(frame.columns) - set(table.column_names))
-            if other:
-                raise StorageError(f"{path}: has the unknown column(s) {', '.join(other)}")
-            self.tables[name] = read_table(path, table.column_names)
-        return declared()[name].checked(self.tables[name])
+        return declared()[name].checked(self.read(name))
+
+    def _read(self, name: str) -> pd.DataFrame:
+        path, columns = TABLE.at(self.subject.results, name=name), declared()[name].column_names
+        if self.condition(path) is not Condition.INTACT:
+            raise StorageError(f"{path}: not there, or damaged")
+        other = sorted(set(read_table(path).columns) - set(columns))
+        if other:
+            raise StorageError(f"{path}: has the unknown column(s) {', '.join(other)}")
+        return read_table(path, columns)
 
     @cached_property
     def expected(self) -> dict[str, Reference]:
@@ -85,14 +87,7 @@ class Examination:
         except StorageError:
             return Context.of(tables)
 
-    def judgement(self, name: str) -> Judgement:
-        """Judgement on the table ``name``, which is there and expected."""
-        frame, reference, table = self.found(name), self.expected[name], declared()[name]
-        lacking = set(frame.columns) - set(reference.columns)
-        known = table.checked(frame.assign(**dict.fromkeys(lacking, None)))
-        return judge(Comparison(table, reference.frame, known, self.context))
-
-    def again(self, name: str) -> pd.DataFrame | None:
+    def _again(self, name: str) -> pd.DataFrame | None:
         """Table ``name``, made from other tables alone, made again from those at hand.
 
         None for other tables, and where one of those is not intact.
@@ -102,30 +97,42 @@ class Examination:
         job = self.subject.plan.job(declared()[name])
         if any(self.condition(path) is not Condition.INTACT for path in _results(job.files)):
             return None
-        if name not in self.made_again:
-            with made(job) as files:
-                self.made_again[name] = read_table(files[job.outputs["table"]])
-        return self.made_again[name]
+        with made(job) as files:
+            return read_table(files[job.outputs["table"]])
 
     def table(self, name: str) -> Line:
         """Line of the table ``name``."""
+
+        def line(outcome: Outcome, text: str, *details: str) -> Line:
+            return Line("table", name, outcome, text, details)
+
         missing = self._missing("table", name, [TABLE.at(self.subject.results, name=name)])
         if missing is not None:
             return missing
         if name not in self.expected:
-            return Line("table", name, Outcome.NO_REFERENCE, "run verify --update")
-        table = declared()[name]
+            return line(Outcome.NO_REFERENCE, "run verify --update")
+        table, reference = declared()[name], self.expected[name]
         try:
-            judgement, again = self.judgement(name), self.again(name)
+            frame, again = self.found(name), self.again(name)
         except StorageError as error:
-            return Line("table", name, Outcome.DIFFERS, str(error))
-        other = None if again is None else _first_difference(self.tables[name], again)
+            return line(Outcome.DIFFERS, str(error))
+        other = None if again is None else _first_difference(self.read(name), again)
         if other is not None:
-            text = f"not what the tables at hand give, {other}"
-            return Line("table", name, Outcome.DIFFERS, text)
-        lacking = set(kept(table)) - set(self.expected[name].columns)
-        measured = any(not names_row(column) for column in kept(table).values())
-        return table_line(judgement, measured, sorted(lacking))
+            return line(Outcome.DIFFERS, f"not what the tables at hand give, {other}")
+        lacking = set(frame.columns) - set(reference.columns)
+        known = table.checked(frame.assign(**dict.fromkeys(lacking, None)))
+        judgement = judge(Comparison(table, reference.frame, known, self.context))
+        if judgement.differences:
+            first, *others = map(str, judgement.differences)
+            more = f" and {len(others)} more" if others else ""
+            return line(Outcome.DIFFERS, first + more, first, *others)
+        columns = kept(table)
+        if new := sorted(lacking & set(columns)):
+            return line(Outcome.NO_REFERENCE, f"column(s) {', '.join(new)}: run verify --update")
+        if all(map(names_row, columns.values())):
+            text = "its numbers are times or round-off; names and sizes agree"
+            return line(Outcome.NOT_COMPARABLE, text)
+        return line(Outcome.REPRODUCED, str(judgement))
 
     def claims(self) -> list[Line]:
         """Lines of the claims."""
@@ -138,7 +145,7 @@ class Examination:
             return [Line("claim", "all", line.outcome, line.text)]
         decided = found if again is None else again.set_index("claim")
         names = dict.fromkeys([*expected.index, *found.index])
-        return [claim_line(str(name), expected, found, decided) for name in names]
+        return [_claim(str(name), expected, found, decided) for name in names]
 
     def _missing(self, kind: str, name: str, paths: list[str]) -> Line | None:
         for path in paths:
@@ -149,24 +156,8 @@ class Examination:
                 return Line(kind, name, Outcome.MISSING, text)
         return None
 
-    def _strangers(self) -> list[Line]:
-        """Lines of files that lie among the tables and are none."""
-        known = {TABLE.at(self.subject.results, name=name) for name in declared()}
-        folder = Path(TABLE.at(self.subject.results, name="any")).parent
-        return [
-            Line("table", path.stem, Outcome.DIFFERS, f"{path} is no table of the study")
-            for path in sorted(folder.glob("*.csv"))
-            if str(path) not in known and path.name[0] != "."
-        ]
-
-    def _figures(self, tables: list[Line]) -> list[Line]:
-        by_name = {line.name: line for line in tables}
-        return [
-            self._figure(job.artifact.name, job, by_name)
-            for job in self.subject.plan.fixed["figures"]
-        ]
-
-    def _figure(self, name: str, figure: Job, tables: Mapping[str, Line]) -> Line:
+    def _figure(self, figure: Job, tables: Mapping[str, Line]) -> Line:
+        name = figure.artifact.name
         missing = self._missing("figure", name, list(figure.outputs.values()))
         if missing is not None:
             return missing
@@ -188,42 +179,27 @@ class Examination:
         return Line("figure", name, Outcome.REPRODUCED, text + more)
 
 
-def claim_line(
-    name: str, expected: pd.DataFrame, found: pd.DataFrame, decided: pd.DataFrame
-) -> Line:
-    """Line of the claim ``name``.
-
-    Parameters
-    ----------
-    expected, found : tables of claims by claim
-    decided : that which the tables at hand give
-    """
+def _claim(name: str, expected: pd.DataFrame, found: pd.DataFrame, decided: pd.DataFrame) -> Line:
+    """Line of the claim ``name``, by tables of claims; ``decided`` is what those at hand give."""
     if name not in expected.index or name not in found.index:
         text = "the claim is new" if name in found.index else "the claim is gone"
         return Line("claim", name, Outcome.DIFFERS, text)
-    outcome, same, changed = Outcome.REPRODUCED, [], []
+    parts = []
     for column, (part, words) in PARTS.items():
         a, b, c = (str(frame.loc[name, column]) for frame in (expected, found, decided))
-        if a == b == c:
-            same.append(f"{words}: {b}")
-        elif b != c:
-            changed.append(f"{words}: found '{b}', the tables at hand give '{c}'")
-            outcome = Outcome.DIFFERS
-        else:
-            timed = _rests_on_times(name, part)
-            why = ", which rests on times" if timed else ""
-            changed.append(f"{words}: expected '{a}', found '{b}'{why}")
-            if not timed or outcome is Outcome.DIFFERS:
-                outcome = Outcome.DIFFERS
-            else:
-                outcome = Outcome.NOT_COMPARABLE
-    return Line("claim", name, outcome, "; ".join(changed or same))
-
-
-def _rests_on_times(claim: str, part: str) -> bool:
-    """Whether a test decides that compares times, of the ``published`` or ``beyond`` ones."""
-    rule = load_claims(RULES).get(claim)
-    return any(test.decides and test.timed for test in getattr(rule, part, ()))
+        outcome, text = Outcome.REPRODUCED, b
+        if b != c:
+            outcome, text = Outcome.DIFFERS, f"found '{b}', the tables at hand give '{c}'"
+        elif a != b:
+            outcome, text = Outcome.DIFFERS, f"expected '{a}', found '{b}'"
+            tests = getattr(load_claims(RULES).get(name), part, ())
+            if any(test.decides and test.timed for test in tests):
+                outcome, text = Outcome.NOT_COMPARABLE, f"{text}, which rests on times"
+        parts.append((outcome, f"{words}: {text}"))
+    ranks = (Outcome.DIFFERS, Outcome.NOT_COMPARABLE, Outcome.REPRODUCED)
+    worst = min((outcome for outcome, _ in parts), key=ranks.index)
+    changed = [text for outcome, text in parts if outcome is not Outcome.REPRODUCED]
+    return Line("claim", name, worst, "; ".join(changed or [text for _, text in parts]))
 
 
 def _results(paths: Sequence[str]) -> list[str]:

@@ -8,8 +8,7 @@ import numpy as np
 import pandas as pd
 
 from study.tables.kit.declaration import Column, Table
-from study.verification.compare import Comparison
-from study.verification.rows import SAMPLES, names, names_row
+from study.verification.compare import SAMPLES, Comparison, kept, names, names_row
 
 # Columns of a row that say which one it is.
 NAMED = 6
@@ -37,8 +36,8 @@ class Difference:
     where: str
     expected: str
     found: str
-    size: float
-    allowed: float
+    size: float = np.inf
+    allowed: float = 0.0
 
     def __str__(self) -> str:
         text = f"{self.where}: expected {self.expected}, found {self.found}"
@@ -56,55 +55,59 @@ class Judgement:
     loose : cells that were compared by count, by the reason
     """
 
-    name: str
     differences: tuple[Difference, ...]
     compared: int
     loose: Counter[str]
+
+    def __str__(self) -> str:
+        if self.compared == 0:
+            return "it has no rows"
+        reasons = ", ".join(f"{reason} {count}" for reason, count in self.loose.most_common())
+        return f"{self.compared} cells" + (f"; by count: {reasons}" if reasons else "")
 
 
 def judge(comparison: Comparison) -> Judgement:
     """Judgement on the table of a ``comparison``."""
     found = [*_rows(comparison)]
     compared, loose = 0, Counter[str]()
-    for column in comparison.columns():
+    for column in kept(comparison.table).values():
         found += _cells(comparison, column)
         compared += int(comparison.compared(column).sum())
         loose.update({why: int(c.sum()) for why, c in comparison.loose(column).items()})
     found.sort(key=lambda difference: -difference.size)
-    return Judgement(comparison.table.name, tuple(found), compared, +loose)
+    return Judgement(tuple(found), compared, +loose)
 
 
 def _rows(comparison: Comparison) -> Iterator[Difference]:
     missing, new = comparison.unpaired()
     for frame, expected, found in ((missing, "a row", "none"), (new, "none", "a row")):
         for i in range(len(frame)):
-            yield Difference(row_in_words(comparison.table, frame, i), expected, found, np.inf, 0)
+            yield Difference(_row_in_words(comparison.table, frame, i), expected, found)
     moved = np.flatnonzero(np.diff([row for _, row in comparison.pairs]) < 0)
     if len(moved):
-        place = row_in_words(comparison.table, comparison.e, int(moved[0]) + 1)
-        yield Difference(f"order of the rows, {place}", "further down", "further up", np.inf, 0)
+        place = _row_in_words(comparison.table, comparison.e, int(moved[0]) + 1)
+        yield Difference(f"order of the rows, {place}", "further down", "further up")
 
 
 def _cells(comparison: Comparison, column: Column) -> Iterator[Difference]:
-    beyond = comparison.beyond(column)
+    beyond, firm = comparison.beyond(column), comparison.firm(column)
     if column.kind in ("text", "flag") and column.tolerance:
-        yield from _fragile(comparison, column, beyond)
+        allowed = max(FEW, column.within * len(beyond))
+        if beyond.sum() > allowed:
+            place = _row_in_words(comparison.table, comparison.e, int(np.argmax(beyond)))
+            words = f"at most {int(allowed)} other cells", f"{beyond.sum()}"
+            yield Difference(f"{column.name}, as of {place}", *words)
         return
-    firm = ~np.any([np.zeros(len(beyond)), *comparison.loose(column).values()], axis=0)
-    for row in np.flatnonzero(beyond & firm):
-        yield _difference(comparison, column, int(row))
+    apart, limits = comparison.apart(column), comparison.limits(column)
+    for row in map(int, np.flatnonzero(beyond & firm)):
+        place = f"{_row_in_words(comparison.table, comparison.e, row)} {column.name}".strip()
+        expected, found = (
+            in_words(frame[column.name].iloc[row]) for frame in (comparison.e, comparison.f)
+        )
+        yield Difference(place, expected, found, float(apart[row]), float(limits[row]))
     if not (beyond & firm).any() and column.kind in ("number", "integer"):
         yield from _shifted(comparison, column, firm & ~comparison.wrong(column))
     yield from _loose(comparison, column, ~firm)
-
-
-def _fragile(comparison: Comparison, column: Column, other: np.ndarray) -> Iterator[Difference]:
-    """A difference if too many cells are ``other`` ones; it names the row of the first."""
-    allowed = max(FEW, column.within * len(other))
-    if other.sum() > allowed:
-        place = row_in_words(comparison.table, comparison.e, int(np.argmax(other)))
-        words = f"at most {int(allowed)} other cells", f"{other.sum()}"
-        yield Difference(f"{column.name}, as of {place}", *words, float("inf"), allowed)
 
 
 def _shifted(comparison: Comparison, column: Column, firm: np.ndarray) -> Iterator[Difference]:
@@ -145,16 +148,7 @@ def _loose(comparison: Comparison, column: Column, cells: np.ndarray) -> Iterato
             if of_runs.sum() > allowed:
                 place = f"{column.name} of {', '.join(map(str, group))}"
                 words = f"at most {int(allowed)} of {len(of_runs)} other", f"{of_runs.sum()}"
-                yield Difference(place, *words, float("inf"), allowed)
-
-
-def _difference(comparison: Comparison, column: Column, row: int) -> Difference:
-    place = f"{row_in_words(comparison.table, comparison.e, row)} {column.name}".strip()
-    expected, found = (
-        in_words(frame[column.name].iloc[row]) for frame in (comparison.e, comparison.f)
-    )
-    size, allowed = comparison.apart(column)[row], comparison.limits(column)[row]
-    return Difference(place, expected, found, float(size), float(allowed))
+                yield Difference(place, *words)
 
 
 def in_words(value: object) -> str:
@@ -164,9 +158,9 @@ def in_words(value: object) -> str:
     return f"{value:.6g}" if isinstance(value, float) else str(value)[:60]
 
 
-def row_in_words(table: Table, frame: pd.DataFrame, row: int) -> str:
+def _row_in_words(table: Table, frame: pd.DataFrame, row: int) -> str:
     """Name of a ``row`` of ``frame``, a ``table``: its words and sizes."""
-    names = [c.name for c in table.columns if names_row(c) or c.quantity == "value"]
-    cells = [(name, frame[name].iloc[row]) for name in names]
+    columns = [c.name for c in table.columns if names_row(c) or c.quantity == "value"]
+    cells = [(name, frame[name].iloc[row]) for name in columns]
     named = [f"{name} {in_words(value)}" for name, value in cells if not pd.isna(value)]
     return ", ".join(named[:NAMED])

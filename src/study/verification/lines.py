@@ -4,11 +4,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
-from study.verification.judge import Judgement
 from study.verification.status import Status
 
-# Differences that a line names; the page names more.
-NAMED, ON_PAGE = 1, 20
+# Differences of one line that the page names.
+ON_PAGE = 20
 
 
 class Outcome(StrEnum):
@@ -43,38 +42,6 @@ class Line:
         return f"{self.kind} {self.name}: {self.outcome}" + (f", {self.text}" if self.text else "")
 
 
-def table_line(judgement: Judgement, measured: bool, lacking: Sequence[str] = ()) -> Line:
-    """Line of a table by the ``judgement`` on it.
-
-    Parameters
-    ----------
-    measured : whether a column is compared that is no name or size
-    lacking : columns that its reference does not have
-    """
-    name, differences = judgement.name, judgement.differences
-    details = tuple(map(str, differences))
-    if differences:
-        more = f" and {len(details) - NAMED} more" if len(details) > NAMED else ""
-        return Line("table", name, Outcome.DIFFERS, f"{details[0]}{more}", details)
-    if lacking:
-        text = f"column(s) {', '.join(lacking)}: run verify --update"
-        return Line("table", name, Outcome.NO_REFERENCE, text)
-    if not measured:
-        text = "its numbers are times or round-off; names and sizes agree"
-        return Line("table", name, Outcome.NOT_COMPARABLE, text)
-    return Line("table", name, Outcome.REPRODUCED, _cells(judgement))
-
-
-def _cells(judgement: Judgement) -> str:
-    if judgement.compared == 0:
-        return "it has no rows"
-    text = f"{judgement.compared} cells"
-    if judgement.loose:
-        reasons = ", ".join(f"{reason} {n}" for reason, n in judgement.loose.most_common())
-        text += f"; by count: {reasons}"
-    return text
-
-
 def status_of(lines: Iterable[Line]) -> Status:
     """Exit code of ``lines``: something is missing, else something differs, else all holds."""
     outcomes = {line.outcome for line in lines}
@@ -103,21 +70,15 @@ def page(lines: Sequence[Line], about: Sequence[str]) -> str:
     parts = ["# Verification", "", *about, "", counted(lines) + ".", ""]
     for kind in dict.fromkeys(line.kind for line in lines):
         parts += [f"## {kind.capitalize()}s", "", f"| {kind} | outcome | what |", "|---|---|---|"]
-        parts += [
-            f"| {line.name} | {line.outcome} | {_cell(line.text)} |"
-            for line in lines
-            if line.kind == kind
-        ]
+        for line in lines:
+            if line.kind == kind:
+                text = line.text.replace("|", "\\|")
+                parts.append(f"| {line.name} | {line.outcome} | {text} |")
         parts.append("")
     differing = [line for line in lines if line.details]
-    if differing:
-        parts += ["## What differs", ""]
+    parts += ["## What differs", ""] if differing else []
     for line in differing:
-        shown = line.details[:ON_PAGE]
-        more = [f"- and {len(line.details) - ON_PAGE} more"] if len(line.details) > ON_PAGE else []
-        parts += [f"### {line.kind} {line.name}", "", *(f"- {text}" for text in shown), *more, ""]
+        shown, more = line.details[:ON_PAGE], len(line.details) - ON_PAGE
+        parts += [f"### {line.kind} {line.name}", "", *(f"- {text}" for text in shown)]
+        parts += [f"- and {more} more", ""] if more > 0 else [""]
     return "\n".join(parts)
-
-
-def _cell(text: str) -> str:
-    return text.replace("|", "\\|")

@@ -16,8 +16,8 @@ import pandas as pd
 from pdrom.core.errors import StorageError
 from study.artifact.paths import RESULTS
 from study.pipeline.tracked import write_tracked
-from study.tables.kit.declaration import Column, Table
-from study.verification.compare import NOT_COMPARED
+from study.tables.kit.declaration import Table
+from study.verification.compare import kept
 
 # Digits of numbers; tolerances are a hundred times what these digits leave out, or more.
 DIGITS = 9
@@ -46,20 +46,12 @@ def folder_of(results: str) -> Path:
 
 def compact(table: Table, frame: pd.DataFrame) -> pd.DataFrame:
     """Return the part of ``frame``, a ``table``, that is kept."""
-    columns = kept(table)
-    return pd.DataFrame({n: _rounded(c, frame[n]) for n, c in columns.items()}, index=frame.index)
-
-
-def kept(table: Table) -> dict[str, Column]:
-    """Columns that are kept of a table, by name."""
-    return {c.name: c for c in table.columns if c.quantity not in NOT_COMPARED}
-
-
-def _rounded(column: Column, values: pd.Series) -> pd.Series:
-    if column.kind != "number":
-        return values
-    texts = [f"{value:.{DIGITS}g}" for value in values.to_numpy(dtype=float)]
-    return pd.Series([float(text) for text in texts], values.index, dtype=float)
+    columns = {name: frame[name] for name in kept(table)}
+    for name, column in kept(table).items():
+        if column.kind == "number":
+            texts = [f"{value:.{DIGITS}g}" for value in frame[name].to_numpy(dtype=float)]
+            columns[name] = pd.Series(map(float, texts), frame.index, dtype=float)
+    return pd.DataFrame(columns, index=frame.index)
 
 
 def write_reference(table: Table, frame: pd.DataFrame, folder: Path) -> None:

@@ -16,13 +16,13 @@ class Status(IntEnum):
     MISSING = 4
 
 
-def ended(command: Callable[[], int], faulty: int = Status.FAULTY) -> int:
-    """Exit code of ``command``; faulty input (code ``faulty``) and an interruption are one line."""
+def ended(command: Callable[[], int]) -> int:
+    """Exit code of ``command``; faulty input and an interruption are one line."""
     try:
         return command()
     except (PdromError, OSError) as error:
         sys.stderr.write(f"pdrom: {error}\n")
-        return faulty
+        return Status.FAULTY
     except KeyboardInterrupt:
         sys.stderr.write("pdrom: interrupted\n")
         return INTERRUPTED

@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 from playwright.sync_api import Page
 
-from browser import browser_or_skip, page_at
+from browser import page_at
 from builders import make_scene
 from pdrom.core.errors import StorageError
 from pdrom.core.store import write_text
@@ -64,7 +64,6 @@ def test_of_scenes_chosen_in_haste_the_last_is_shown_and_a_lost_one_is_named(tmp
 
     Stands before the tests that share a browser: there can be one at a time.
     """
-    browser_or_skip()
     one = write_sheet(tmp_path)
     files = [one.with_name(f"{name}.js") for name in "abcd"]
     for file in files:
@@ -106,7 +105,6 @@ def test_of_scenes_chosen_in_haste_the_last_is_shown_and_a_lost_one_is_named(tmp
 @pytest.fixture(scope="module", params=["", "#plain"], ids=["WebGL2", "canvas"])
 def opened(request, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
     """The page of a sheet in a headless browser; what it said and asked for is noted."""
-    browser_or_skip()
     folder = tmp_path_factory.mktemp("page")
     path = write_page(folder, [write_sheet(folder)])
     with page_at(path.as_uri() + request.param, width=900, height=800) as page:

@@ -12,7 +12,7 @@ import pytest
 
 from pdrom.core.errors import ConfigurationError, StorageError
 from pdrom.core.store import read_table, write_table, write_text
-from study.article.verified import INDEX, NAME
+from study.article.build import INDEX, VERIFIED
 from study.artifact.paths import ARTICLE, TABLE
 from study.figures.kit.declaration import declarations
 from study.tables import declared
@@ -44,11 +44,11 @@ def test_expected_results_hold(results, subject):
     assert {"claim C1", "claim C12", "figure singular_values"} <= names
     assert any(re.match("table [a-z_]+: not comparable", line) for line in printed)
     assert "| C1 | reproduced |" in page
-    assert not Path(ARTICLE.at(RESULTS, name=NAME)).exists()
+    assert not Path(ARTICLE.at(RESULTS, name=VERIFIED)).exists()
 
 
 def test_outcomes_reach_the_article_where_it_was_made(results, subject):
-    place = Path(ARTICLE.at(RESULTS, name=NAME))
+    place = Path(ARTICLE.at(RESULTS, name=VERIFIED))
     write_text("<!DOCTYPE html>", place.with_name(INDEX))
     *lines, _, _ = verified(subject)[1]
     text = place.read_text(encoding="utf-8")
@@ -57,36 +57,33 @@ def test_outcomes_reach_the_article_where_it_was_made(results, subject):
     assert {f"figure {name}" for name in declarations()} <= found.keys()
 
 
-def decide_again(subject):
-    """The tables of the claims, as the tables at hand give them."""
+def decided_again(examination, table, **columns):
+    """Claims by name, decided again of a table with other columns; and lines of their tables."""
+    path = TABLE.at(RESULTS, name=table)
+    write_table(read_table(path).assign(**columns), path)
     for name in CLAIMS:
-        with made(subject.plan.job(declared()[name])) as files:
+        with made(examination.subject.plan.job(declared()[name])) as files:
             [(path, new)] = files.items()
             write_table(read_table(new), path)
+    lines = {line.name: line for line in examination.claims()}
+    return lines, [examination.table(name) for name in CLAIMS]
 
 
-def test_a_verdict_that_times_have_changed_is_shown_and_not_judged(examination, subject):
-    path = TABLE.at(RESULTS, name="local_share")
-    shares = read_table(path)
-    slow = shares.local_share.median() >= 0.7
-    write_table(shares.assign(local_share=0.1 if slow else 0.9), path)
-    decide_again(subject)
-    [line] = [line for line in examination.claims() if line.name == "C1"]
-    assert line.outcome is Outcome.NOT_COMPARABLE
+def test_a_verdict_that_times_have_changed_is_shown_and_not_judged(examination):
+    shares = read_table(TABLE.at(RESULTS, name="local_share")).local_share
+    slow = shares.median() >= 0.7
+    claims, tables = decided_again(examination, "local_share", local_share=0.1 if slow else 0.9)
+    assert claims["C1"].outcome is Outcome.NOT_COMPARABLE
     now = "does not hold" if slow else "holds"
-    assert f"found '{now}', which rests on times" in line.text
-    assert [str(examination.table(n)) for n in CLAIMS if examination.table(n).details] == []
+    assert f"found '{now}', which rests on times" in claims["C1"].text
+    assert [str(table) for table in tables if table.details] == []
 
 
-def test_a_verdict_that_errors_have_changed_is_a_difference(examination, subject):
-    path = TABLE.at(RESULTS, name="reconstruction_error")
-    errors = read_table(path)
-    entries = errors.elements_sampled.notna()
-    write_table(errors.assign(elements_sampled=errors.elements_sampled.where(~entries, 1)), path)
-    decide_again(subject)
-    [line] = [line for line in examination.claims() if line.name == "C8"]
-    assert line.outcome is Outcome.DIFFERS
-    assert examination.table("claims").outcome is Outcome.DIFFERS
+def test_a_verdict_that_errors_have_changed_is_a_difference(examination):
+    errors = read_table(TABLE.at(RESULTS, name="reconstruction_error")).elements_sampled
+    one = errors.where(errors.isna(), 1)
+    claims, tables = decided_again(examination, "reconstruction_error", elements_sampled=one)
+    assert claims["C8"].outcome is tables[0].outcome is Outcome.DIFFERS
 
 
 def test_what_is_missing_has_its_own_code_and_names_its_command(results, subject):
