@@ -20,15 +20,13 @@ from study.experiments.hard_cases.outcomes import HardCases
 from study.experiments.iterations import IterationSweep
 from study.experiments.kit.settings import BlowupExtent, Rank, Solver
 from study.experiments.live import Live
-from study.experiments.noise import Noise
-from study.experiments.repetitions import LadderSection, RepetitionSection
+from study.experiments.repetitions import LadderSection, Noise, RepetitionSection
 from study.experiments.requested_tolerances import RequestedTolerances
 from study.experiments.reruns import Sweep
-from study.experiments.scaling import Scaling
 from study.experiments.sensitivity import Sensitivity
 from study.experiments.stability import Stability
 from study.experiments.subspaces import Online, Subspace
-from study.experiments.timing import Timing
+from study.experiments.timing import Scaling, Timing
 from study.figures.kit.declaration import load_choices
 from study.figures.kit.options import Options
 from study.pipeline.folders import DEFAULT

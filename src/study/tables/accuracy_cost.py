@@ -114,13 +114,10 @@ def _sweep(errors: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
     errors = errors.merge(cost, on=["scene", "method", "iterations"])
     own = full[full.method.isna()].set_index("scene").iterations
     early = (errors.iterations < errors.scene.map(own)) & (errors.method == FOM)
-    parts = [(errors.method, errors, "error_converged")]
-    parts.append((FEWER, errors[early], "error_scene"))
-    named = [
-        rows.assign(method=method, relative_error_within_horizon=rows[column])
-        for method, rows, column in parts
-    ]
-    points = pd.concat(named, ignore_index=True).assign(position_basis="full", k=None, r=None)
+    every = errors.assign(relative_error_within_horizon=errors.error_converged)
+    fewer = errors[early].assign(method=FEWER, relative_error_within_horizon=errors.error_scene)
+    points = pd.concat([every, fewer], ignore_index=True)
+    points = points.assign(position_basis="full", k=None, r=None)
     return points.dropna(subset=["relative_error_within_horizon", "ms_per_frame"])
 
 

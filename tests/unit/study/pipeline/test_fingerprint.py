@@ -130,10 +130,10 @@ def test_selections_are_in_no_closure_that_does_not_list_them():
     own = set(map(SELECTIONS.module, SELECTIONS))
     for name in SELECTIONS:
         method = MethodSpec(title="test", rows="element", selection=name)
-        found = closure("pdrom.reduction.sampling.select", *method.modules)
+        found = closure("pdrom.reduction.sampling.reduction", *method.modules)
         assert own & set(found) == {SELECTIONS.module(name)}
     everything = MethodSpec(title="test", rows="all")
-    assert not own & set(closure("pdrom.reduction.sampling.select", *everything.modules))
+    assert not own & set(closure("pdrom.reduction.sampling.reduction", *everything.modules))
 
 
 def test_order_and_repetition_of_modules_do_not_matter():

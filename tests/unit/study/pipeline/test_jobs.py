@@ -11,8 +11,8 @@ from places import ROOT
 from study.artifact import paths
 from study.artifact.reads import Setting, TableOf
 from study.experiments.fom import mesh
-from study.experiments.scaling import scaling
 from study.experiments.subspaces import online
+from study.experiments.timing import scaling
 from study.pipeline.contents import labels_of
 from study.pipeline.folders import Folders
 from study.pipeline.manifest import study_files
