@@ -217,7 +217,10 @@ def timing(
     write_table(pd.DataFrame(results, columns=COLUMNS), out.path)
     log.info("%s: %d reduced local steps alone", name, len(alone))
     often = {"warmup": asked.warmup, "repeats": asked.breakeven_repeats}
-    times = local_costs(scene, alone, _states(fom), **often)
+    with open_hdf5(fom.path) as file:  # states spread over the run
+        positions = file["positions"]
+        ends = [positions[i * (len(positions) - 1) // STATES] for i in range(STATES)]
+    times = local_costs(scene, alone, np.stack(ends), **often)
     write_table(times.assign(factor=1.0), breakeven.path)
     log.info("%s: effects", name)
     often = {"warmup": asked.warmup, "repeats": asked.repeats}
@@ -259,13 +262,6 @@ def _other_counts(
             labels = {"method": method, "iterations": count, "implementation": "compiled"}
             variants.append(Variant({**common, **labels}, loop, scene.initial_state(), frames))
     return variants
-
-
-def _states(run: File) -> np.ndarray:
-    """Positions (n, N, 3) spread over a full-order run."""
-    with open_hdf5(run.path) as file:
-        positions = file["positions"]
-        return np.stack([positions[i * (len(positions) - 1) // STATES] for i in range(STATES)])
 
 
 class SizedBreakEven(ConfigModel):
