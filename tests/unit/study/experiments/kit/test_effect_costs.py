@@ -57,7 +57,7 @@ def test_a_stand_in_and_its_kernel_answer_as_the_effect_does(rng):
     stand.reset()
     assert stand.seconds == 0.0
     space = scene.space(scene.system)
-    assert space.compiled([Timed(g, ("begin_frame",)) for g in scene.groups]) is not None
+    assert space.compiled([Timed(g, ("begin_frame",)) for g in scene.groups])[0] is not None
 
 
 def test_effects_are_left_out_alone_and_groups_together():
