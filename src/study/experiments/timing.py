@@ -46,6 +46,7 @@ from study.experiments.kit.settings import (
     Modes,
     Rank,
     Repeats,
+    Sizes,
     Solver,
     Tolerance,
     resolve_ranks,
@@ -295,9 +296,7 @@ class Sized(Protocol):
 class Scaling(Sized):
     """Section ``scaling``: factors on the vertices along a side for each of ``scenes``."""
 
-    scenes: dict[str, tuple[Annotated[float, Field(gt=0.0, le=100.0)], ...]] = Field(
-        default_factory=dict
-    )
+    scenes: Sizes = Field(default_factory=dict)
 
 
 class SizedOptions(ConfigModel):
