@@ -13,14 +13,14 @@ import pytest
 from places import ROOT
 
 LIMITS = {
-    "lines of src": 41_200,
-    "modules of src": 276,
-    "lines of tests": 28_354,
-    "words of documentation": 24_736,
+    "lines of src": 40_229,
+    "modules of src": 265,
+    "lines of tests": 28_254,
+    "words of documentation": 24_735,
     "tables": 25,
     "figures": 23,
-    "experiments": 21,
-    "percent of src in decorators, signatures and imports": 20.90,
+    "experiments": 19,
+    "percent of src in decorators, signatures and imports": 20.70,
 }
 PAGES = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "config/README.md", "docs/**/*.md")
 

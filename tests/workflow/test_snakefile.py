@@ -242,10 +242,10 @@ def test_a_threshold_of_a_claim_reruns_verdicts_and_manuscript_only(finished: Ch
 
 
 def test_a_caption_rerenders_its_figure_and_the_manuscript_only(finished: Checkout) -> None:
-    source = "src/study/figures/singular_values.py"
-    finished.edit(source, 'Decay of the singular values"', 'Singular values"')
+    source = "src/study/figures/stability_map.py"
+    finished.edit(source, 'Where each method can be trusted"', 'What can be trusted"')
     planned = finished.planned(*MICRO_ARGUMENTS)
-    figure = {f"{MICRO_RESULTS}/figures/singular_values.{kind}" for kind in ("pdf", "png")}
+    figure = {f"{MICRO_RESULTS}/figures/stability_map.{kind}" for kind in ("pdf", "png")}
     assert {path for path in planned if _stage(path) not in ("paper", "article")} == figure
     assert MICRO_MANUSCRIPT in planned
 

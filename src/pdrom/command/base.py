@@ -1,11 +1,11 @@
 """Declaration of a command."""
 
 import argparse
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from pdrom.model.scene import Scene
@@ -26,22 +26,24 @@ class Command:
 
     title : what it does, one line
     example : a call
-    declare : adds its arguments to a parser
+    arguments : keywords of `argparse.ArgumentParser.add_argument` for each of its arguments
     perform : does it and returns the exit code
+    one_of : arguments of which one call has one at most
     """
 
     title: str
     example: str
-    declare: Callable[[argparse.ArgumentParser], None]
+    arguments: Mapping[str, dict[str, Any]]
     perform: Callable[[argparse.Namespace], Status]
+    one_of: Sequence[str] = ()
 
 
-def declare_unchecked(parser: argparse.ArgumentParser) -> None:
-    """Add to ``parser`` the option of commands that read runs."""
-    parser.add_argument(
-        "--unchecked", action="store_true",
-        help="read a run without a checksum inside (by an older pdrom) if it is sound",
-    )  # fmt: skip
+# Arguments of more than one command.
+SCENE = {"metavar": "SCENE.yaml", "help": "file of the scene"}
+UNCHECKED = {
+    "action": "store_true",
+    "help": "read a run without a checksum inside (by an older pdrom) if it is sound",
+}
 
 
 def files_of(file: str, scene: "Scene") -> list[str]:

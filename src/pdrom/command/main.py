@@ -44,7 +44,10 @@ def parser() -> argparse.ArgumentParser:
             epilog=f"example: {command.example}",
             formatter_class=plain,
         )
-        command.declare(own)
+        one_of = own.add_mutually_exclusive_group() if command.one_of else own
+        for argument, keywords in command.arguments.items():
+            parent = one_of if argument in command.one_of else own
+            parent.add_argument(argument, **keywords)
         own.set_defaults(perform=command.perform, parser=own)
     return top
 

@@ -5,7 +5,7 @@ import json
 import math
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from pdrom.command.base import Command, Status
 
@@ -62,13 +62,11 @@ KILOGRAMS = 10.0  # of a vertex of the study's scenes, for which the weights are
 ENOUGH = 3  # fewest held vertices with which a body cannot turn about a line
 
 
-def declare(parser: argparse.ArgumentParser) -> None:
-    """Add to ``parser`` the file to write, and the mesh in it."""
-    parser.add_argument("scene", metavar="SCENE", help="file to write; .yaml is added to a name")
-    parser.add_argument("--mesh", metavar="FILE", help="mesh file (.obj, .vtu, .msh ...)")
-    parser.add_argument(
-        "--up", choices=("x", "y", "z"), default="y", help="axis of the mesh that points up (y)"
-    )
+ARGUMENTS: dict[str, dict[str, Any]] = {
+    "scene": {"metavar": "SCENE", "help": "file to write; .yaml is added to a name"},
+    "--mesh": {"metavar": "FILE", "help": "mesh file (.obj, .vtu, .msh ...)"},
+    "--up": {"choices": "xyz", "default": "y", "help": "axis of the mesh that points up (y)"},
+}
 
 
 def perform(arguments: argparse.Namespace) -> Status:
@@ -193,6 +191,6 @@ def _floor(mesh: "Mesh", axis: int) -> str:
 COMMAND = Command(
     "Write the file of a new scene, with comments",
     "pdrom new sheet.yaml --mesh sheet.obj",
-    declare,
+    ARGUMENTS,
     perform,
 )

@@ -3,9 +3,9 @@
 import argparse
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from pdrom.command.base import Command, Status, declare_unchecked, files_of, require_output
+from pdrom.command.base import SCENE, UNCHECKED, Command, Status, files_of, require_output
 
 if TYPE_CHECKING:
     from pdrom.api import ReducedRun, RequestedRun
@@ -22,32 +22,25 @@ def _size(text: str) -> int:
     return size
 
 
-def declare(parser: argparse.ArgumentParser) -> None:
-    """Add to ``parser`` the scene, what is reduced and how, and the file to write."""
-    parser.add_argument("scene", metavar="SCENE.yaml", help="file of the scene")
-    wish = parser.add_mutually_exclusive_group()
-    wish.add_argument("--group", metavar="G", help="constraint group to reduce")
-    wish.add_argument(
-        "--error",
-        metavar="E",
-        help="largest relative error of the run, 0.01 or velocity=0.05: the whole scene is reduced "
-        "as far as that allows, or not at all (reduce.error of the scene)",
-    )
-    parser.add_argument(
-        "--method", metavar="M", default="gappy", help="name in config/methods.yaml (gappy)"
-    )
-    parser.add_argument("--r", metavar="R", type=_size, default=20, help="number of modes (20)")
-    parser.add_argument(
-        "--run",
-        metavar="FILE",
-        help="full-order run by pdrom run; made first if it is left out, required with --error, "
+ARGUMENTS: dict[str, dict[str, Any]] = {
+    "scene": SCENE,
+    "--group": {"metavar": "G", "help": "constraint group to reduce"},
+    "--error": {
+        "metavar": "E",
+        "help": "largest relative error of the run, 0.01 or velocity=0.05: the whole scene is "
+        "reduced as far as that allows, or not at all (reduce.error of the scene)",
+    },
+    "--method": {"metavar": "M", "default": "gappy", "help": "name in config/methods.yaml (gappy)"},
+    "--r": {"metavar": "R", "type": _size, "default": 20, "help": "number of modes (20)"},
+    "--run": {
+        "metavar": "FILE",
+        "help": "full-order run by pdrom run; made first if it is left out, required with --error, "
         "where it may be of another motion of the same mesh",
-    )
-    parser.add_argument(
-        "--out", metavar="FILE", help="file to write (HDF5); SCENE_G_M_R.h5 without it"
-    )
-    parser.add_argument("--plot", metavar="FILE", help="picture of the error against time to write")
-    declare_unchecked(parser)
+    },
+    "--out": {"metavar": "FILE", "help": "file to write (HDF5); SCENE_G_M_R.h5 without it"},
+    "--plot": {"metavar": "FILE", "help": "picture of the error against time to write"},
+    "--unchecked": UNCHECKED,
+}
 
 
 def perform(arguments: argparse.Namespace) -> Status:
@@ -57,8 +50,7 @@ def perform(arguments: argparse.Namespace) -> Status:
     from pdrom.api import FullRun, load, load_scene, plot, reduce, run, save
     from pdrom.command.progress import Progress
     from pdrom.core.errors import StorageError
-    from pdrom.core.store import atomic_path
-    from pdrom.core.store.atomic import MARK
+    from pdrom.core.store import MARK, atomic_path
 
     file = Path(arguments.scene)
     name = f"{file.stem}_{arguments.group}_{arguments.method}_{arguments.r}.h5"
@@ -103,17 +95,11 @@ def _check_outputs(arguments: argparse.Namespace, out: str, scene: "Scene") -> N
 def _told(reduced: "ReducedRun") -> str:
     import numpy as np
 
-    outcome, full = reduced.outcome, reduced.full
-    if not outcome.finite:
-        reported = f"blew up at frame {outcome.blowup_frame} ({_gain(reduced)})"
-    else:
-        speed = f"{reduced.ms:.2f} ms a frame (full order {np.median(full.ms):.2f})"
-        reported = f"{_error(reduced)}, {_gain(reduced)}, {speed}"
-    return f"{reduced.title}: {reported}"
-
-
-def _gain(reduced: "ReducedRun") -> str:
-    return f"gain {reduced.gain:.3g} (how much sampling may amplify what the basis misses)"
+    gain = f"gain {reduced.gain:.3g} (how much sampling may amplify what the basis misses)"
+    if not reduced.outcome.finite:
+        return f"{reduced.title}: blew up at frame {reduced.outcome.blowup_frame} ({gain})"
+    speed = f"{reduced.ms:.2f} ms a frame (full order {np.median(reduced.full.ms):.2f})"
+    return f"{reduced.title}: {_error(reduced)}, {gain}, {speed}"
 
 
 def _error(reduced: "ReducedRun") -> str:
@@ -200,6 +186,7 @@ def _done(made: "RequestedRun") -> list[str]:
 COMMAND = Command(
     "Run a scene with the projections of one group reduced, and compare it with the full order",
     "pdrom reduce sheet.yaml --group spring --method gappy --r 20 --plot error.png",
-    declare,
+    ARGUMENTS,
     perform,
+    one_of=("--group", "--error"),
 )

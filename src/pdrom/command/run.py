@@ -4,15 +4,14 @@ import argparse
 import sys
 from pathlib import Path
 
-from pdrom.command.base import Command, Status, files_of, require_output
+from pdrom.command.base import SCENE, Command, Status, files_of, require_output
 
-
-def declare(parser: argparse.ArgumentParser) -> None:
-    """Add to ``parser`` the scene and the file to write."""
-    parser.add_argument("scene", metavar="SCENE.yaml", help="file of the scene")
-    parser.add_argument(
-        "--out", metavar="FILE", help="file to write (HDF5); SCENE.h5 beside the scene without it"
-    )
+ARGUMENTS = {
+    "scene": SCENE,
+    "--out": {
+        "metavar": "FILE", "help": "file to write (HDF5); SCENE.h5 beside the scene without it",
+    },
+}  # fmt: skip
 
 
 def perform(arguments: argparse.Namespace) -> Status:
@@ -36,5 +35,5 @@ def perform(arguments: argparse.Namespace) -> Status:
 
 
 COMMAND = Command(
-    "Run a scene in full order", "pdrom run sheet.yaml --out sheet.h5", declare, perform
+    "Run a scene in full order", "pdrom run sheet.yaml --out sheet.h5", ARGUMENTS, perform
 )

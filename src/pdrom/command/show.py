@@ -12,12 +12,10 @@ from pdrom.command.base import Command, Status
 LONGEST = 100  # characters of an attribute's value
 
 
-def declare(parser: argparse.ArgumentParser) -> None:
-    """Add to ``parser`` the file."""
-    parser.add_argument("file", metavar="FILE", help="a result of the pipeline or of this command")
-    parser.add_argument(
-        "--configuration", action="store_true", help="the whole configuration, as YAML"
-    )
+ARGUMENTS: dict[str, dict[str, Any]] = {
+    "file": {"metavar": "FILE", "help": "a result of the pipeline or of this command"},
+    "--configuration": {"action": "store_true", "help": "the whole configuration, as YAML"},
+}
 
 
 def perform(arguments: argparse.Namespace) -> Status:
@@ -123,6 +121,6 @@ def _short(value: Any) -> str:
 COMMAND = Command(
     "Say what a result is: content, shapes, units, configuration, provenance",
     "pdrom show results/fom/spring_oop/train.h5",
-    declare,
+    ARGUMENTS,
     perform,
 )

@@ -4,22 +4,18 @@ import argparse
 import sys
 import webbrowser
 from pathlib import Path
+from typing import Any
 
-from pdrom.command.base import Command, Status, declare_unchecked, require_output
+from pdrom.command.base import UNCHECKED, Command, Status, require_output
 
-
-def declare(parser: argparse.ArgumentParser) -> None:
-    """Add to ``parser`` the runs, and the files to write."""
-    parser.add_argument(
-        "results", metavar="RESULT", nargs="+", help="files of pdrom run and pdrom reduce"
-    )
-    parser.add_argument("--out", metavar="FILE", help="page to write; the first RESULT as .html")
-    parser.add_argument("--open", action="store_true", help="open it in the browser")
-    parser.add_argument("--png", metavar="FILE", help="picture of four frames of each run, too")
-    parser.add_argument(
-        "--vtk", metavar="FOLDER", help="files for ParaView, too: one a frame, and run.pvd"
-    )
-    declare_unchecked(parser)
+ARGUMENTS: dict[str, dict[str, Any]] = {
+    "results": {"metavar": "RESULT", "nargs": "+", "help": "files of pdrom run and pdrom reduce"},
+    "--out": {"metavar": "FILE", "help": "page to write; the first RESULT as .html"},
+    "--open": {"action": "store_true", "help": "open it in the browser"},
+    "--png": {"metavar": "FILE", "help": "picture of four frames of each run, too"},
+    "--vtk": {"metavar": "FOLDER", "help": "files for ParaView, too: one a frame, and run.pvd"},
+    "--unchecked": UNCHECKED,
+}
 
 
 def perform(arguments: argparse.Namespace) -> Status:
@@ -60,6 +56,6 @@ def perform(arguments: argparse.Namespace) -> Status:
 COMMAND = Command(
     "Write a page on which runs are looked at, a picture, or files for ParaView",
     "pdrom view sheet_spring_gappy_20.h5 --open",
-    declare,
+    ARGUMENTS,
     perform,
 )

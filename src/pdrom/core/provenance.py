@@ -12,9 +12,9 @@ import platform
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
+from types import MappingProxyType
 from typing import Any
 
 from pdrom import __version__
@@ -31,20 +31,8 @@ RECORD = (
 )
 
 
-@dataclass(frozen=True)
-class Job:
-    """A piece of work: a rule of the workflow, or a function of the package.
-
-    configuration : canonical JSON of all its settings
-    code : fingerprint of the code that it runs; empty outside of the workflow
-    """
-
-    name: str
-    configuration: str
-    code: str
-
-
-_AT_WORK: ContextVar[Job | None] = ContextVar("job", default=None)
+# What the job at work says of itself, and its configuration as canonical JSON.
+_JOB: ContextVar[Mapping[str, str]] = ContextVar("job", default=MappingProxyType({}))
 
 
 @contextmanager
@@ -53,15 +41,18 @@ def made_by(name: str, configuration: Any, code: str = "") -> Iterator[None]:
 
     Parameters
     ----------
-    configuration : settings of the job, hashed as JSON
-    code : fingerprint of the code that it runs
+    name : a rule of the workflow, or a function of the package
+    configuration : all settings of the job, hashed as JSON
+    code : fingerprint of the code that it runs; empty outside of the workflow
     """
     canonical = json.dumps(configuration, sort_keys=True, default=str)
-    previous = _AT_WORK.set(Job(name, canonical, code))
+    hashed = hashlib.sha256(canonical.encode()).hexdigest()
+    job = {"configuration": canonical, "made_by": name, "configuration_sha256": hashed}
+    previous = _JOB.set(job | {"code_sha256": code} if code else job)
     try:
         yield
     finally:
-        _AT_WORK.reset(previous)
+        _JOB.reset(previous)
 
 
 @cache
@@ -76,29 +67,18 @@ def library_versions() -> dict[str, str]:
     return found
 
 
-def provenance() -> dict[str, str]:
-    """Record of a file that is written now; the part about the job only where there is one."""
-    job = _AT_WORK.get()
-    made = {}
-    if job is not None:
-        hashed = hashlib.sha256(job.configuration.encode()).hexdigest()
-        made = {"made_by": job.name, "configuration_sha256": hashed}
-        made |= {"code_sha256": job.code} if job.code else {}
+def attributes() -> dict[str, str]:
+    """`provenance` for a file that can also hold the whole configuration (HDF5)."""
     return {
-        **made,
+        **_JOB.get(),
         "pdrom_version": __version__,
         "python_version": platform.python_version(),
         "library_versions": ", ".join(f"{k} {v}" for k, v in sorted(library_versions().items())),
+        "units": "SI (m, s, kg)",
     }
 
 
-def attributes() -> dict[str, str]:
-    """`provenance` for a file that can also hold the whole configuration (HDF5)."""
-    job = _AT_WORK.get()
-    settings = {"configuration": job.configuration} if job is not None else {}
-    return {**settings, **provenance(), "units": "SI (m, s, kg)"}
-
-
-def as_text(record: Mapping[str, str]) -> str:
-    """A record in one line, as a checksum holds it."""
-    return json.dumps(dict(record), sort_keys=True)
+def provenance() -> dict[str, str]:
+    """Record of a file that is written now; the part about the job only where there is one."""
+    everything = attributes()
+    return {name: everything[name] for name in RECORD if name in everything}

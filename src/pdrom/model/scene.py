@@ -29,8 +29,8 @@ from pdrom.model.effects.base import (
     EffectConfigs,
     Force,
     Start,
-    bind,
     held_targets,
+    held_vertices,
 )
 from pdrom.model.held_out import FIRST, HeldOut, HeldOutMotion
 from pdrom.model.mesh.checks import check_mesh
@@ -38,6 +38,14 @@ from pdrom.model.mesh.config import MeshConfig
 from pdrom.model.mesh.selection import Selection, select_vertices
 from pdrom.model.mesh.types import Mesh, vertex_measures
 
+log = logging.getLogger(__name__)
+
+# Fewer vertices leave a body free to turn about a line.
+FEW = 3
+# Targets no deeper in an obstacle than this part of the extent lie on it.
+SLACK = 1e-9
+# Vertices that a message names.
+NAMED = 10
 Mass = Annotated[float, Field(ge=1e-150, le=1e150)]
 
 
@@ -57,37 +65,6 @@ class MassConfig(ConfigModel):
         if (self.vertex_mass is None) == (self.density is None):
             raise ValueError("either vertex_mass or density is required")
         return self
-
-
-def vertex_masses(
-    mesh: Mesh, scene: str, vertex_mass: float, entries: tuple[MassConfig, ...]
-) -> np.ndarray:
-    """Masses (N,) kg of ``scene``: ``vertex_mass``, changed by each of ``entries`` in turn.
-
-    Raises
-    ------
-    SceneError
-        A selection that the mesh does not have.
-    """
-    masses = np.full(mesh.vertices, vertex_mass)
-    for number, entry in enumerate(entries):
-        try:
-            masses = _changed(masses, mesh, entry)
-        except SceneError as error:
-            raise SceneError(f"scene '{scene}', masses[{number}]: {error}") from error
-    return masses
-
-
-def _changed(masses: np.ndarray, mesh: Mesh, entry: MassConfig) -> np.ndarray:
-    chosen = np.arange(mesh.vertices)
-    if entry.select is not None:
-        chosen = select_vertices(mesh, entry.select)
-    masses = masses.copy()
-    if entry.density is None:
-        masses[chosen] = entry.vertex_mass
-    else:
-        masses[chosen] = entry.density * vertex_measures(mesh)[chosen]
-    return masses
 
 
 class ReductionPlan(ConfigModel):
@@ -112,11 +89,7 @@ def with_requested_error(keys: Any) -> Any:
 MAX_VERTEX_FRAMES = 160_000_000
 
 
-class _Model(ConfigModel):
-    """Base of the sections of a scene."""
-
-
-class SceneConfig(_Model):
+class SceneConfig(ConfigModel):
     """Configuration of a scene (config/scenes/*.yaml). Units: seconds, metres, kilograms.
 
     ``requested_error`` is the error that ``pdrom reduce`` keeps to, also written ``reduce.error``.
@@ -161,6 +134,28 @@ class SceneConfig(_Model):
     def groups(self) -> list[str]:
         """Names of the constraint groups, in the order of the effects."""
         return [e.effect for e in self.effects if isinstance(e, GroupConfig)]
+
+    def vertex_masses(self, mesh: Mesh) -> np.ndarray:
+        """Masses (N,) kg: ``vertex_mass``, changed by each entry of ``masses`` in turn.
+
+        Raises
+        ------
+        SceneError
+            A selection that the mesh does not have.
+        """
+        masses = np.full(mesh.vertices, self.vertex_mass)
+        for number, entry in enumerate(self.masses):
+            chosen = np.arange(mesh.vertices)
+            if entry.select is not None:
+                try:
+                    chosen = select_vertices(mesh, entry.select)
+                except SceneError as error:
+                    raise SceneError(f"scene '{self.name}', masses[{number}]: {error}") from error
+            if entry.density is None:
+                masses[chosen] = entry.vertex_mass
+            else:
+                masses[chosen] = entry.density * vertex_measures(mesh)[chosen]
+        return masses
 
     def effects_without(self, *names: str) -> tuple[EffectConfig, ...]:
         """Effects of the scene without those called one of ``names``, in their order."""
@@ -234,13 +229,18 @@ class Scene:
                 f"scene '{config.name}': frames = {config.frames} on {mesh.vertices} vertices: "
                 f"allowed are at most {MAX_VERTEX_FRAMES // mesh.vertices} frames"
             )
-        if masses is None:
-            masses = vertex_masses(mesh, config.name, config.vertex_mass, entries=config.masses)
-        return cls._bound(config, mesh, masses)
+        own = config.vertex_masses(mesh) if masses is None else masses
+        return cls._bound(config, mesh, own)
 
     @classmethod
     def _bound(cls, config: SceneConfig, mesh: Mesh, masses: np.ndarray) -> "Scene":
-        effects = [bind(entry, config.name, mesh, masses) for entry in config.effects]
+        effects = []
+        for entry in config.effects:
+            try:
+                effects.append(EFFECTS.load(entry.effect)(entry, mesh, masses))
+            except SceneError as error:
+                where = f"scene '{config.name}', effect '{entry.effect}'"
+                raise SceneError(f"{where}: {error}") from error
         scene = cls(
             config,
             mesh,
@@ -251,7 +251,7 @@ class Scene:
             contacts=[e for e in effects if isinstance(e, Contact)],
             starts=[e for e in effects if isinstance(e, Start)],
         )
-        check_holds(scene.boundaries, config.name, config.frames)
+        scene._check_holds()
         for force in scene.forces:
             force.time_step = config.time_step
         return scene
@@ -267,15 +267,49 @@ class Scene:
         config = self.config.model_copy(update=keys)
         return self._bound(config, self.mesh, self.masses)
 
+    def _check_holds(self) -> None:
+        """SceneError for a vertex that two hold at once, unless neither of them moves."""
+        for first, second in combinations(self.boundaries, 2):
+            shared = np.intersect1d(first.vertices, second.vertices)
+            if len(shared) == 0 or not (first.moves or second.moves):
+                continue
+            for frame in range(self.config.frames):
+                if first.active(frame) and second.active(frame):
+                    raise SceneError(
+                        f"scene '{self.config.name}': vertex {shared[0]} is held by "
+                        f"'{first.name}' and by '{second.name}' in frame {frame}"
+                    )
+
     def log_holds(self) -> None:
-        """Log how many vertices each effect holds, and which an obstacle wants elsewhere."""
-        name, points, frames = self.config.name, self.mesh.points, self.config.frames
-        log_holds(self.boundaries, name, len(points))
-        log_obstructed(self.boundaries, self.contacts, name, points=points, frames=frames)
+        """Log how many vertices each effect holds, and warn of those that end inside an obstacle.
+
+        A side that holds fewer than `FEW` is a warning, too: on an unstructured mesh a side is
+        often one single vertex.
+        """
+        for boundary in self.boundaries:
+            count, side = len(boundary.vertices), boundary.side
+            where = f"scene '{self.config.name}', effect '{boundary.name}'"
+            counted = f"{where}: holds {count} of {self.mesh.vertices} vertices"
+            if side is None:
+                log.info("%s", counted)
+            elif count >= FEW:
+                log.info("%s (select: %s)", counted, side)
+            else:
+                advice = "a list of vertices selects more"
+                log.warning("%s, fewer than %d (select: %s; %s)", counted, FEW, side, advice)
+        log_obstructed(self)
 
     def log_contacts(self) -> None:
-        """Warn of contacts that do not fit the rest shape, see `Contact.doubt`."""
-        log_contacts(self.contacts, self.boundaries, self.config.name, rest=self.mesh.points)
+        """Warn of contacts that do not fit the rest shape, see `Contact.doubt`.
+
+        Vertices that are held in the first frame do not count.
+        """
+        held = held_vertices(self.boundaries, 0)
+        free = np.setdiff1d(np.arange(self.mesh.vertices), held)
+        for contact in self.contacts if len(free) else []:
+            doubt = contact.doubt(self.mesh.points, free)
+            if doubt:
+                log.warning("scene '%s', effect '%s': %s", self.config.name, contact.name, doubt)
 
     def group(self, name: str) -> ConstraintGroup:
         """The constraint group called ``name``; SceneError if the scene does not list it."""
@@ -332,95 +366,31 @@ class Scene:
         return VertexSpace(system, self.forces, self.boundaries, contacts=self.contacts)
 
 
-log = logging.getLogger(__name__)
-
-# Fewer vertices leave a body free to turn about a line.
-FEW = 3
-# Targets no deeper in an obstacle than this part of the extent lie on it.
-SLACK = 1e-9
-# Vertices that a message names.
-NAMED = 10
-
-
-def check_holds(boundaries: Sequence[Boundary], scene: str, frames: int) -> None:
-    """SceneError for a vertex that is held twice at once, unless nothing that holds it moves."""
-    for first, second in combinations(boundaries, 2):
-        if not (first.moves or second.moves):
-            continue
-        shared = np.intersect1d(first.vertices, second.vertices)
-        if len(shared) == 0:
-            continue
-        for frame in range(frames):
-            if first.active(frame) and second.active(frame):
-                raise SceneError(
-                    f"scene '{scene}': vertex {shared[0]} is held by '{first.name}' and by "
-                    f"'{second.name}' in frame {frame}"
-                )
-
-
-def log_holds(boundaries: Sequence[Boundary], scene: str, vertices: int) -> None:
-    """Log how many of the ``vertices`` of ``scene`` (name) each of its ``boundaries`` holds.
-
-    A side that holds fewer than `FEW` is a warning: on an unstructured mesh a side is often one
-    single vertex.
-    """
-    for boundary in boundaries:
-        count = len(boundary.vertices)
-        counted = f"scene '{scene}', effect '{boundary.name}': holds {count} of {vertices} vertices"
-        if boundary.side is None:
-            log.info("%s", counted)
-        elif count >= FEW:
-            log.info("%s (select: %s)", counted, boundary.side)
-        else:
-            advice = "a list of vertices selects more"
-            log.warning("%s, fewer than %d (select: %s; %s)", counted, FEW, boundary.side, advice)
-
-
-def log_obstructed(
-    boundaries: Sequence[Boundary],
-    contacts: Sequence[Contact],
-    scene: str,
-    points: np.ndarray,
-    frames: int,
-) -> None:
+def log_obstructed(scene: Scene) -> None:
     """Warn of held vertices whose targets lie inside an obstacle, where they stay.
 
-    Vertices that are taken hold of later are taken to be where obstacles have pushed the mesh at
-    rest, ``points`` (N, 3) m.
+    Vertices that are taken hold of later are taken to be where obstacles have pushed the mesh
+    at rest.
     """
-    obstacles = [contact for contact in contacts if contact.each_alone]
-    inside, blocked = np.zeros(len(points), dtype=bool), dict[str, None]()
+    obstacles = [contact for contact in scene.contacts if contact.each_alone]
+    inside, blocked = np.zeros(scene.mesh.vertices, dtype=bool), dict[str, None]()
     # boundaries remember where they took hold
-    boundaries, positions = deepcopy(boundaries), points.copy()
-    slack = SLACK * float(np.ptp(points, axis=0).max())
-    for frame in range(frames if obstacles and boundaries else 0):
+    boundaries, positions = deepcopy(scene.boundaries), scene.mesh.points.copy()
+    slack = SLACK * scene.mesh.extent
+    for frame in range(scene.config.frames if obstacles and boundaries else 0):
         held, targets = held_targets(boundaries, frame, positions)
         positions[held] = targets
         for obstacle in obstacles:
-            before = positions.copy()
-            obstacle.correct(positions, before)
+            obstacle.correct(positions, positions.copy())
             pushed = held[np.linalg.norm(positions[held] - targets, axis=1) > slack]
             positions[held] = targets
             if len(pushed):
                 inside[pushed], blocked[obstacle.name] = True, None
     vertices = np.flatnonzero(inside)
     if len(vertices):
-        named = ", ".join(map(str, vertices[:NAMED])) + (", ..." if len(vertices) > NAMED else "")
+        more = ", ..." if len(vertices) > NAMED else ""
         log.warning(
-            "scene '%s': %d held vertices have targets inside '%s' and stay there: %s",
-            scene, len(vertices), "', '".join(blocked), named,
+            "scene '%s': %d held vertices have targets inside '%s' and stay there: %s%s",
+            scene.config.name, len(vertices), "', '".join(blocked),
+            ", ".join(map(str, vertices[:NAMED])), more,
         )  # fmt: skip
-
-
-def log_contacts(
-    contacts: Sequence[Contact], boundaries: Sequence[Boundary], scene: str, rest: np.ndarray
-) -> None:
-    """Warn of contacts that do not fit the shape ``rest`` (N, 3) m; held vertices do not count."""
-    free = np.ones(len(rest), dtype=bool)
-    for boundary in boundaries:
-        if boundary.active(0):
-            free[boundary.held(0)] = False
-    for contact in contacts:
-        doubt = contact.doubt(rest, np.flatnonzero(free)) if free.any() else ""
-        if doubt:
-            log.warning("scene '%s', effect '%s': %s", scene, contact.name, doubt)

@@ -4,8 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from pdrom.core.store import atomic_path
-from pdrom.core.store.atomic import MARK
+from pdrom.core.store import MARK, atomic_path
 from pdrom.model.constraints.base import ConstraintGroup
 from pdrom.model.effects import EFFECTS
 from pdrom.model.mesh.types import Mesh

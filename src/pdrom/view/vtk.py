@@ -6,8 +6,7 @@ from xml.etree import ElementTree
 import meshio
 import numpy as np
 
-from pdrom.core.store import atomic_path, require_own
-from pdrom.core.store.atomic import MARK
+from pdrom.core.store import MARK, atomic_path, require_own
 from pdrom.view.frames import shown_runs
 from pdrom.view.page import ViewedScene
 

@@ -1,7 +1,6 @@
 """Error of K iterations against the limit K -> infinity."""
 
 import logging
-from collections.abc import Iterator
 from typing import Annotated
 
 import numpy as np
@@ -14,15 +13,14 @@ from pdrom.model.dynamics.acceleration import Anderson
 from pdrom.model.dynamics.stepper import Stepper
 from pdrom.model.dynamics.system import GlobalSystem
 from pdrom.model.scene import Scene, SceneConfig
-from pdrom.reduction.deviations import error_within
-from pdrom.reduction.rerun import displacement_norms
 from pdrom.reduction.subspace.model import load_models
 from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, Setting
 from study.experiments.kit.converged import ConvergedStepper
 from study.experiments.kit.declaration import experiment
-from study.experiments.kit.scenes import positions_of, scene_of
+from study.experiments.kit.reruns import run_error
+from study.experiments.kit.scenes import followed, positions_of, scene_of
 from study.experiments.kit.settings import Horizon, Solver, Tolerance
 
 log = logging.getLogger(__name__)
@@ -95,7 +93,7 @@ def iterations(
     frames = max(1, horizon.frames(sensitivity))
     own = positions_of(fom, frames)
     best = ConvergedStepper(scene, system, sweep.tolerance, limit=sweep.limit)
-    limit = _run(best, scene, frames)
+    limit = followed(best, scene.initial_state(), frames)
     if not best.converged:
         log.warning("%s: no convergence in %d evaluations", name, sweep.limit)
     log.info("%s: %.0f evaluations a frame", name, np.mean(best.evaluations))
@@ -104,29 +102,26 @@ def iterations(
     for count, window in accelerated(counts, sweep.anderson_window):
         reached = own
         if (count, window) != (scene.config.iterations, scene.config.anderson_window):
-            reached = _run(stepper_of(scene, system, count, window=window), scene, frames)
-        converged = _error(reached, limit) if best.converged else None
-        rows.append((name, count, window, frames, converged, _error(reached, own), None))
+            loop = stepper_of(scene, system, count, window=window)
+            reached = followed(loop, scene.initial_state(), frames)
+        converged = run_error(reached, limit) if best.converged else None
+        rows.append((name, count, window, frames, converged, run_error(reached, own), None))
     residual = max(best.changes) / scene.mesh.extent
     converged = 0.0 if best.converged else None
-    rows.append((name, None, None, frames, converged, _error(limit, own), residual))
+    rows.append((name, None, None, frames, converged, run_error(limit, own), residual))
     table = pd.DataFrame(rows, columns=COLUMNS).astype({"iterations": "Int64", "window": "Int64"})
     write_table(table, out.path)
-    inside = [row for file in subspaces for row in _subspaces(file, limit, best.converged)]
+    inside = []
+    for source in subspaces:
+        with open_hdf5(source.path) as file:
+            for labels, model in load_models(source.path):
+                basis, k, method = (labels[name] for name in MODELS[1:4])
+                run = file[f"models/{basis}_k{k:03d}_{method}/train/coordinates"][: len(limit)]
+                error = None
+                if best.converged and len(run) == len(limit):
+                    error = run_error(np.stack([model.positions(z) for z in run]), limit)
+                inside.append((name, basis, k, method, error))
     write_table(pd.DataFrame(inside, columns=MODELS), models.path)
-
-
-def _subspaces(source: File, limit: np.ndarray, converged: bool) -> Iterator[tuple[object, ...]]:
-    """Rows of `MODELS`: errors of the training runs against the converged one, ``limit``."""
-    models = load_models(source.path)
-    with open_hdf5(source.path) as file:
-        for labels, model in models:
-            basis, k, method = (labels[name] for name in MODELS[1:4])
-            run = file[f"models/{basis}_k{k:03d}_{method}/train/coordinates"][: len(limit)]
-            whole = converged and len(run) == len(limit)
-            reached = np.stack([model.positions(z) for z in run]) if whole else None
-            error = None if reached is None else _error(reached, limit)
-            yield source["scene"], basis, k, method, error
 
 
 def accelerated(counts: list[int], window: int) -> list[tuple[int, int]]:
@@ -137,28 +132,11 @@ def accelerated(counts: list[int], window: int) -> list[tuple[int, int]]:
 
 def stepper_of(scene: Scene, system: GlobalSystem, iterations: int, window: int) -> Stepper:
     """Full-order step loop of ``scene``, with ``iterations`` and a ``window`` of acceleration."""
-    acceleration = Anderson(window) if window else None
-    space = scene.space(system)
     return Stepper(
-        space,
+        scene.space(system),
         scene.config.time_step,
         iterations,
         local_steps=scene.groups,
         track_objective=False,
-        acceleration=acceleration,
+        acceleration=Anderson(window) if window else None,
     )
-
-
-def _run(loop: Stepper, scene: Scene, frames: int) -> np.ndarray:
-    """Positions (frames + 1, N, 3), the initial ones first."""
-    state = scene.initial_state()
-    positions = [state.positions]
-    for frame in range(frames):
-        state, _ = loop.step(state, frame)
-        positions.append(state.positions)
-    return np.stack(positions)
-
-
-def _error(run: np.ndarray, reference: np.ndarray) -> float | None:
-    difference = np.linalg.norm((run - reference)[1:].reshape(len(run) - 1, -1), axis=1)
-    return error_within(difference, displacement_norms(reference), len(difference))

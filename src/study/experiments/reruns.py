@@ -1,7 +1,7 @@
 """Sampling of a group by one method, then the scene again with the group reduced, for every r."""
 
 import logging
-from dataclasses import dataclass
+from collections.abc import Iterator
 from typing import Any
 
 import h5py
@@ -13,21 +13,19 @@ from pdrom.core.yamlfile import ConfigModel
 from pdrom.model.energy import largest
 from pdrom.model.held_out import FIRST
 from pdrom.model.metrics import relative_errors
-from pdrom.model.scene import Scene, SceneConfig
+from pdrom.model.scene import SceneConfig
 from pdrom.reduction.basis import Basis, load_basis
 from pdrom.reduction.deviations import Yardstick
 from pdrom.reduction.method import MethodSpec
-from pdrom.reduction.rerun import Rerun
-from pdrom.reduction.sampling import Reduction, reductions
+from pdrom.reduction.sampling import reductions
 from pdrom.reduction.sampling.local_step import rerun_reduced
 from pdrom.reduction.snapshots import SPLITS, SnapshotSet, load_snapshots
 from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, Settings
 from study.experiments.kit.declaration import experiment
-from study.experiments.kit.load_reduction import load_reduction
-from study.experiments.kit.scenes import TRAIN as TRAINING
-from study.experiments.kit.scenes import positions_of, scene_of
+from study.experiments.kit.reruns import load_reduction, store_end
+from study.experiments.kit.scenes import TRAIN, positions_of, scene_of
 from study.experiments.kit.settings import BlowupExtent, Count, Rank, Solver, resolve_ranks
 
 log = logging.getLogger(__name__)
@@ -106,142 +104,97 @@ def reruns(
     motion runs with the ``heldout_ranks``, the others with the full one if it is among them.
     """
     space, data = load_basis(basis.path), load_snapshots(snapshots.path)
-    sample(
-        space,
-        data,
-        settings.method,
-        sweep=settings.sweep,
-        ranks=settings.ranks,
-        sampling=sampling,
-        errors=errors,
-    )
-    labels = runs.labels
+    _sample(space, data, settings, sampling, errors)
     full = tuple(rank for rank in settings.heldout_ranks if rank == "full")
-    ranks = {TRAINING: settings.ranks, FIRST: settings.heldout_ranks}
+    ranks = {TRAIN: settings.ranks, FIRST: settings.heldout_ranks}
     found = {}
     with write_hdf5(runs.path) as file:
         for run in motions:
-            motion, reference = run["run"], positions_of(run)
-            scene = scene_of(settings.scene, mesh, motion)
-            case = _Case(scene, motion, labels, settings, space, sampling.path)
-            yardstick = Yardstick(scene, reference)
+            motion = run["run"]
+            yardstick = Yardstick(scene_of(settings.scene, mesh, motion), positions_of(run))
             file.attrs.update(yardstick.units)
-            store = file if motion == TRAINING else file.create_group(motion)
-            rows = case.run(store, ranks.get(motion, full), yardstick)
-            found[motion] = pd.DataFrame(rows, columns=COLUMNS)
-    write_table(found.pop(TRAINING), out.path)
+            store = file if motion == TRAIN else file.create_group(motion)
+            for name, values in yardstick.series.items():
+                store[name] = values
+            sizes = resolve_ranks(ranks.get(motion, full), space.rank)
+            made = _runs(yardstick, sampling, space, sizes, settings, store)
+            found[motion] = pd.DataFrame(made, columns=COLUMNS)
+    write_table(found.pop(TRAIN), out.path)
     heldout = [table.assign(**{MOTION: motion}) for motion, table in found.items()]
     write_table(pd.concat(heldout, ignore_index=True), heldout_table.path)
 
 
-@dataclass(frozen=True)
-class _Case:
-    """One motion of a scene with one method."""
-
-    scene: Scene
-    motion: str
-    labels: dict[str, str]
-    settings: Options
-    basis: Basis
-    sampling: str
-
-    def run(
-        self, file: h5py.Group, ranks: tuple[Rank, ...], yardstick: Yardstick
-    ) -> list[dict[str, Any]]:
-        """Rerun for every r and return the rows; an r beyond the rank is a marked row.
-
-        Parameters
-        ----------
-        yardstick : the motion's full-order run
-        """
-        settings, group, reference = self.settings, self.labels["group"], yardstick.reference
-        for name, values in yardstick.series.items():
-            file[name] = values
-        system = self.scene.system_with(settings.solver)
-        rows = []
-        for r in resolve_ranks(ranks, self.basis.rank):
-            store = file.create_group(f"r{r:04d}")
-            store.attrs.update(r=r, full=r == self.basis.rank, marked=r > self.basis.rank)
-            if r > self.basis.rank:
-                log.warning("r = %d exceeds the numerical rank %d: not run", r, self.basis.rank)
-                rows.append({**self.labels, "r": r, "frames": 0})
-                continue
-            reduction = load_reduction(self.basis, self.sampling, settings.method, r=r)
-            outcome = rerun_reduced(
-                self.scene, group, reduction, reference, settings.blowup_extent, system
-            )
-            apart = yardstick.deviations(outcome)
-            for name, values in apart.items():
-                store[name] = values
-            _store(store, outcome, yardstick.displacement)
-            if self.motion == TRAINING:  # of which figures are drawn
-                store["positions"] = outcome.positions.astype(np.float32)
-            measured = {"energy_ratio": largest(apart["energy"]), "gain": reduction.gain}
-            row = outcome.row(yardstick.displacement)
-            rows.append({**self.labels, "r": r, **row, **measured})
-            log.info("r = %d: %d frames, blow-up %s", r, outcome.frames, outcome.blowup_frame)
-        return rows
-
-
-def _store(store: h5py.Group, outcome: Rerun, displacement: np.ndarray) -> None:
-    store["error"] = outcome.difference / np.sqrt(np.mean(displacement**2))
-    store["extent"] = outcome.extent
-    blowup = -1 if outcome.blowup_frame is None else outcome.blowup_frame
-    store.attrs.update(finite=outcome.finite, blowup_frame=blowup, max_extent=outcome.max_extent)
-
-
-def sample(
-    basis: Basis,
-    data: SnapshotSet,
-    method: MethodSpec,
-    sweep: Sweep,
-    ranks: tuple[Rank, ...],
+def _runs(
+    yardstick: Yardstick,
     sampling: File,
-    errors: File,
+    basis: Basis,
+    sizes: list[int],
+    settings: Options,
+    file: h5py.Group,
+) -> Iterator[dict[str, Any]]:
+    """Run a motion for every r and yield the rows; an r beyond the rank is a marked row.
+
+    The runs go to ``file``, with positions where that is not a group of another one: of the
+    training motion figures are drawn.
+    """
+    labels, scene = sampling.labels, yardstick.scene
+    system = scene.system_with(settings.solver)
+    for r in sizes:
+        store = file.create_group(f"r{r:04d}")
+        store.attrs.update(r=r, full=r == basis.rank, marked=r > basis.rank)
+        if r > basis.rank:
+            log.warning("r = %d exceeds the numerical rank %d: not run", r, basis.rank)
+            yield {**labels, "r": r, "frames": 0}
+            continue
+        reduction = load_reduction(basis, sampling.path, settings.method, r=r)
+        outcome = rerun_reduced(
+            scene,
+            labels["group"],
+            reduction,
+            yardstick.reference,
+            settings.blowup_extent,
+            system,
+        )
+        apart = yardstick.deviations(outcome)
+        error = outcome.difference / np.sqrt(np.mean(yardstick.displacement**2))
+        for name, values in {**apart, "error": error, "extent": outcome.extent}.items():
+            store[name] = values
+        store_end(store, outcome, with_positions=file.name == "/")
+        store.attrs["finite"] = outcome.finite
+        measured = {"energy_ratio": largest(apart["energy"]), "gain": reduction.gain}
+        yield {**labels, "r": r, **outcome.row(yardstick.displacement), **measured}
+        log.info("r = %d: %d frames, blow-up %s", r, outcome.frames, outcome.blowup_frame)
+
+
+def _sample(
+    basis: Basis, data: SnapshotSet, settings: Options, sampling: File, errors: File
 ) -> None:
     """Select samples for every r of the sweep and of the reruns; write them and the error table.
 
     Parameters
     ----------
     basis, data : of the group, from its training snapshots, and all of its snapshots
-    method : its rows and criterion of the selection
-    ranks : sizes of the reruns
     sampling, errors : files to write; their labels are the first columns of the table
     """
     labels = sampling.labels
-    asked = resolve_ranks(ranks, basis.rank)
-    wanted = {*sweep.ranks(basis.rank), *asked} if basis.rank else set()
+    asked = resolve_ranks(settings.ranks, basis.rank)
+    wanted = {*settings.sweep.ranks(basis.rank), *asked} if basis.rank else set()
     rows = []
     with write_hdf5(sampling.path) as file:
-        for r, reduction in reductions(basis, method, sorted(wanted)).items():
+        for r, reduction in reductions(basis, settings.method, sorted(wanted)).items():
             store, sampled = file.create_group(f"r{r:04d}"), reduction.sampling
             store["entries"], store["elements"] = sampled.entries, sampled.elements
             store.attrs["gain"], store.attrs["condition"] = reduction.gain, reduction.condition
-            rows += [{**labels, "r": r, **row} for row in _errors(reduction, data)]
+            sizes = (reduction.gain, reduction.rows_sampled, len(reduction.elements))
+            for split in SPLITS:
+                p = getattr(data, split)
+                # the rounding errors of n snapshots grow like sqrt(n)
+                roundoff = data.roundoff * np.sqrt(len(p) / len(data.train))
+                found = relative_errors(p, reduction.reconstruct(p), roundoff)
+                own = (*labels.values(), r, split, *found, *sizes)
+                rows.append(dict(zip(ERROR_COLUMNS, own, strict=True)))
     beyond = [r for r in asked if r > basis.rank]
     rows += [{**labels, "r": r, "split": split} for r in beyond for split in SPLITS]
     if beyond:
         log.warning("r = %s exceeds the numerical rank %d: marked rows", beyond, basis.rank)
     write_table(pd.DataFrame(rows, columns=ERROR_COLUMNS), errors.path)
-
-
-def _errors(reduction: Reduction, data: SnapshotSet) -> list[dict[str, Any]]:
-    rows = []
-    for split in SPLITS:
-        p = getattr(data, split)
-        # the rounding errors of n snapshots grow like sqrt(n)
-        roundoff = data.roundoff * np.sqrt(len(p) / len(data.train))
-        total, x, y, z = relative_errors(p, reduction.reconstruct(p), roundoff)
-        rows.append(
-            {
-                "split": split,
-                "relative_error": total,
-                "relative_error_x": x,
-                "relative_error_y": y,
-                "relative_error_z": z,
-                "gain": reduction.gain,
-                "rows_sampled": reduction.rows_sampled,
-                "elements_sampled": len(reduction.elements),
-            }
-        )
-    return rows

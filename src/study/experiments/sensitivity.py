@@ -5,6 +5,7 @@ blamed for. Beside the start, the solver (another order of summation), the numbe
 the time step are changed, and each effect is left out.
 """
 
+from collections.abc import Iterator
 from typing import Annotated, Self
 
 import numpy as np
@@ -21,10 +22,11 @@ from pdrom.model.effects.base import Contact, Effect, Force, Seed
 from pdrom.model.held_out import MOTIONS
 from pdrom.model.runs import trajectory
 from pdrom.model.scene import Scene, SceneConfig
+from pdrom.reduction.rerun import mean_motion
 from study.artifact.paths import CONTRIBUTIONS, MESH, SENSITIVITY, File
 from study.artifact.reads import Setting
 from study.experiments.kit.declaration import experiment
-from study.experiments.kit.scenes import scene_of
+from study.experiments.kit.scenes import perturbation_field, scene_of
 
 Perturbation = Annotated[float, Field(gt=0.0, lt=1.0)]
 EFFECTS = ["scene", "effect", "role", "frame", "force", "energy"]
@@ -67,12 +69,11 @@ def sensitivity(
 ) -> None:
     """Write differences of a scene's perturbed runs, and of its held-out motions, to ``out``."""
     scene = scene_of(config, mesh)
-    table = sensitivities(scene, chosen.perturbations, chosen.seeds)
-    heldout = [
-        heldout_floor(scene_of(config, mesh, motion), motion, chosen.reference, chosen.seeds)
-        for motion in MOTIONS
-    ]
-    write_table(pd.concat([table, *heldout], ignore_index=True), out.path)
+    parts = [sensitivities(scene, chosen.perturbations, chosen.seeds)]
+    for motion in MOTIONS:  # the horizon of a held-out motion is its own
+        other = scene_of(config, mesh, motion)
+        parts += perturbed(other, trajectory(other), chosen.reference, chosen.seeds, motion)
+    write_table(pd.concat(parts, ignore_index=True), out.path)
     write_table(contributions(scene), effects.path)
 
 
@@ -168,29 +169,20 @@ def relative_difference(other: np.ndarray, base: np.ndarray) -> np.ndarray:
     || Q'_f - Q_f ||_F over the root mean square of || Q_f - Q_0 ||_F over the run: one
     normalisation for all frames, so that a slow start is not divided by nothing.
     """
-    frames = len(base) - 1
-    difference = np.linalg.norm((other - base)[1:].reshape(frames, -1), axis=1)
-    motion = np.linalg.norm((base[1:] - base[0]).reshape(frames, -1), axis=1)
-    return difference / np.sqrt(np.mean(motion**2))
+    difference = (other - base)[1:].reshape(len(base) - 1, -1)
+    return np.linalg.norm(difference, axis=1) / mean_motion(base)
 
 
-def perturbation_field(scene: Scene, size: float, seed: int) -> np.ndarray:
-    """Random directions by ``seed``, of length ``size`` times the extent of ``scene``, (N, 3) m."""
-    field = np.random.default_rng(seed).standard_normal((scene.mesh.vertices, 3))
-    return size * scene.mesh.extent * field / np.linalg.norm(field, axis=1, keepdims=True)
+def perturbed(
+    scene: Scene, base: np.ndarray, size: float, seeds: tuple[int, ...], label: str
+) -> Iterator[pd.DataFrame]:
+    """Rows of runs whose start is moved by ``size``, with each of ``seeds``, under a ``label``.
 
-
-def heldout_floor(heldout: Scene, motion: str, size: float, seeds: tuple[int, ...]) -> pd.DataFrame:
-    """Rows of a held-out motion, whose horizon is its own; its name stands as perturbation.
-
-    ``size`` and ``seeds`` of the starts of ``heldout`` as in `perturbation_field`.
+    ``base`` (F + 1, N, 3) m is the run of ``scene`` that they are compared with.
     """
-    base = trajectory(heldout)
-    runs = [trajectory(heldout, perturbation_field(heldout, size, seed)) for seed in seeds]
-    return pd.concat(
-        _rows(heldout, motion, seed, relative_difference(run, base))
-        for seed, run in zip(seeds, runs, strict=True)
-    )
+    for seed in seeds:
+        other = trajectory(scene, perturbation_field(scene, size, seed))
+        yield _rows(scene, label, seed, relative_difference(other, base))
 
 
 def sensitivities(
@@ -201,24 +193,27 @@ def sensitivities(
     The others are another solver, 4 K iterations, half the time step, and no effect of one name
     (label `without`); the only constraint group cannot be left out.
     """
-    base = trajectory(scene)
-    parts = []
+    base, config = trajectory(scene), scene.config
+    parts: list[pd.DataFrame] = []
     for size in perturbations:
-        for seed in seeds:
-            other = trajectory(scene, perturbation_field(scene, size, seed))
-            parts.append(_rows(scene, f"{size:g}", seed, relative_difference(other, base)))
+        parts += perturbed(scene, base, size, seeds, f"{size:g}")
     own = SOLVERS.load(DEFAULT_SOLVER)
     solver = next(name for name in OTHER_SOLVERS if SOLVERS.load(name) is not own)
+    halved = scene.changed(
+        time_step=0.5 * config.time_step,
+        frames=2 * config.frames,
+        effects=tuple(e.with_frames_scaled(2.0) for e in config.effects),
+    )
     variants = {
         "solver": trajectory(scene, system=scene.system_with(solver)),
-        "iterations x4": trajectory(_fresh(scene, iterations=4 * scene.config.iterations)),
-        "h/2": _half_step(scene),
+        "iterations x4": trajectory(scene.changed(iterations=4 * config.iterations)),
+        "h/2": trajectory(halved)[::2],
     }
+    for effect in removable(config):
+        left = scene.changed(effects=config.effects_without(effect))
+        variants[without(effect)] = trajectory(left)
     for label, other in variants.items():
         parts.append(_rows(scene, label, 0, relative_difference(other, base)))
-    for effect in removable(scene.config):
-        other = trajectory(_fresh(scene, effects=scene.config.effects_without(effect)))
-        parts.append(_rows(scene, without(effect), 0, relative_difference(other, base)))
     return pd.concat(parts, ignore_index=True)
 
 
@@ -233,23 +228,6 @@ def removable(config: SceneConfig) -> list[str]:
     return [name for name in names if config.groups != [name]]
 
 
-def _fresh(scene: Scene, **changes: object) -> Scene:
-    """The scene bound again with changes of its configuration."""
-    return Scene.build(scene.config.model_copy(update=changes), scene.mesh)
-
-
 def _rows(scene: Scene, label: str, seed: int, values: np.ndarray) -> pd.DataFrame:
-    frames = np.arange(len(values))
-    row = (scene.config.name, label, seed, frames, values)
+    row = (scene.config.name, label, seed, np.arange(len(values)), values)
     return pd.DataFrame(dict(zip(COLUMNS, row, strict=True)))
-
-
-def _half_step(scene: Scene) -> np.ndarray:
-    config = scene.config
-    halved = _fresh(
-        scene,
-        time_step=0.5 * config.time_step,
-        frames=2 * config.frames,
-        effects=tuple(e.with_frames_scaled(2.0) for e in config.effects),
-    )
-    return trajectory(halved)[::2]

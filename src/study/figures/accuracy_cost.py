@@ -1,6 +1,5 @@
 """Accuracy of reduced models against their time per frame, by family and constraint group."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -8,90 +7,60 @@ import numpy as np
 import pandas as pd
 
 from pdrom.view import style
-from pdrom.view.artists import Artist, Axes, Figure, Line2D, SubFigure
+from pdrom.view.artists import Axes, Figure, Line2D
 from pdrom.view.multiples import clipped, label_counts, log_axis, time_axis
 from study.artifact.reads import Settings, TableOf
 from study.experiments.kit.settings import ANDERSON, FOM
 from study.figures.kit.declaration import figure
-from study.figures.kit.options import Drawn, Methods, Scenes
+from study.figures.kit.options import Drawn, Methods
 from study.tables.accuracy_cost import FEWER, pareto
 
-LINE = 0.145  # inches, of a line of text
-GAP = 0.06  # inches, between rows of blocks
-
-Block = tuple[str, Sequence[Artist]]
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "*")
 ERROR, TIME = "relative_error_within_horizon", "ms_per_frame"
-LOW, HIGH = 1e-4, 1e2  # errors outside are arrows on the rim
+LOW, HIGH = 1e-3, 1e2  # errors outside are arrows on the rim
 ABOVE, BELOW, BLOWN_UP = 6, 7, "x"  # markers: carets, and a cross
 OWN = {"color": style.GREY, "linewidth": 1.2}
 BLIND = {"color": style.FAILED, "linewidth": 0.9, "linestyle": "-."}
 RATES = (60, 30)  # frames per second
 LARGE, SMALL = 2.6, 1.6  # inches, heights of panels
-LOWEST = 1e-3  # of the axes: what matters here lies above
+LINE, GAP = 0.145, 0.06  # inches, of a line of the legend and between its rows of blocks
 COLUMNS = 4  # of the legend
-
-
-@dataclass(frozen=True)
-class Family:
-    """Models of one kind, told apart from the others by their colour."""
-
-    title: str
-    colour: str
-
-
-ITERATIONS = Family("full order, fewer iterations", style.BLACK)
-PROJECTION = Family("orthogonal projection", style.PURPLE)
-ENTRIES = Family("single entries, joint rows", style.VERMILLION)
-ELEMENTS = Family("whole elements", style.BLUE)
-WEIGHTED = Family("subspace, weighted or full", style.GREEN)
-INTERPOLATED = Family("subspace, interpolated", style.ORANGE)
-FAMILIES = (ITERATIONS, PROJECTION, ENTRIES, ELEMENTS, WEIGHTED, INTERPOLATED)
+# Models of one kind, told apart from the others by their colour.
+FAMILIES = {
+    "full order, fewer iterations": style.BLACK,
+    "orthogonal projection": style.PURPLE,
+    "single entries, joint rows": style.VERMILLION,
+    "whole elements": style.BLUE,
+    "subspace, weighted or full": style.GREEN,
+    "subspace, interpolated": style.ORANGE,
+}
+ITERATIONS, PROJECTION, ENTRIES, ELEMENTS, WEIGHTED, INTERPOLATED = FAMILIES
 _BY_ROWS = {"all": PROJECTION, "scalar": ENTRIES, "joint": ENTRIES, "element": ELEMENTS}
+Look = tuple[str | None, str]
+Block = tuple[str, list[Line2D]]
 
 
-@dataclass(frozen=True)
-class Model:
-    """A method with the kind of position basis that it is used in (``full`` for none)."""
+def look_of(method: str, position_basis: str, drawn: Drawn) -> Look:
+    """Family of a model, and its name there, which tolerances and position bases share.
 
-    method: str
-    position_basis: str
-
-    @property
-    def hollow(self) -> bool:
-        """Whether its markers are hollow: its position basis is that of skinning."""
-        return self.position_basis == "skinning"
-
-    def title(self, drawn: Drawn) -> str:
-        """Name within its family, which models share that differ by tolerance or basis only.
-
-        Titles of methods are those of ``drawn``.
-        """
-        if self.position_basis == "full":
-            return drawn.title(self.method)
-        if self.method == "full":
-            return "all projections"
-        return "ecsw, by tolerance" if self.method.startswith("ecsw") else self.method
-
-    def family(self, drawn: Drawn) -> Family | None:
-        """Family of the model of those ``drawn``; None for a method that is not drawn."""
-        if self.method == FEWER:
-            return ITERATIONS
-        if self.position_basis != "full":
-            weighted = self.method == "full" or self.method.startswith("ecsw")
-            return WEIGHTED if weighted else INTERPOLATED
-        held = drawn.reductions.get(self.method)
-        return _BY_ROWS[held.rows] if held else None
+    Titles of methods are those of ``drawn``. The family is None for a method that is not drawn.
+    """
+    if method == FEWER:
+        return ITERATIONS, "K iterations"
+    if position_basis == "full":
+        held = drawn.reductions.get(method)
+        return _BY_ROWS[held.rows] if held else None, drawn.title(method)
+    if method == "full":
+        return WEIGHTED, "all projections"
+    return (WEIGHTED, "ecsw, by tolerance") if method.startswith("ecsw") else (INTERPOLATED, method)
 
 
-def markers(models: Sequence[Model], drawn: Drawn) -> dict[Model, str]:
-    """A marker for each title of ``models`` within a family, in their order, of those ``drawn``."""
-    found: dict[Model, str] = {}
-    for family in FAMILIES[1:]:
-        members = [model for model in models if model.family(drawn) == family]
-        titles = list(dict.fromkeys(model.title(drawn) for model in members))
-        for model in members:
-            found[model] = MARKERS[titles.index(model.title(drawn)) % len(MARKERS)]
+def markers(looks: list[Look]) -> dict[Look, str]:
+    """A marker for each name within a family, in the order of ``looks``."""
+    found: dict[Look, str] = {}
+    for look in dict.fromkeys(looks):
+        before = sum(family == look[0] for family, _ in found)
+        found[look] = "X" if look[0] == ITERATIONS else MARKERS[before % len(MARKERS)]
     return found
 
 
@@ -103,18 +72,18 @@ class TradeOffs:
     blown_up : reduced runs that ended before they had an error
     own_ms : scene -> time per frame of its own full-order run
     own_error : scene -> that run's own error, against the converged one
+    marker : of each family and name
     """
 
-    drawn: Drawn
     points: pd.DataFrame
     blown_up: pd.DataFrame
     own_ms: dict[str, float]
     own_error: dict[str, float]
-    marker: dict[Model, str]
+    marker: dict[Look, str]
 
-    def models(self, family: Family) -> list[Model]:
-        """Models of a ``family``, in the order of the table."""
-        return [model for model in self.marker if model.family(self.drawn) == family]
+    def members(self, family: str) -> dict[str, str]:
+        """Names of a ``family`` with their markers."""
+        return {name: marker for (own, name), marker in self.marker.items() if own == family}
 
 
 def trade_offs(
@@ -141,44 +110,46 @@ def trade_offs(
     blown_up = runs[(runs.blowup_frame >= 0) & runs[ERROR].isna() & (runs[TIME] > 0.0)]
     scenes = drawn.scenes_of(points, "no reduced model with both an error and a time")
     points = points[points.scene.isin(scenes)]
-    names = dict.fromkeys(zip(points.method, points.position_basis, strict=True))
-    marker = markers([Model(*name) for name in names if name[0] != FEWER], drawn)
-    found = TradeOffs(drawn, points, _drawn(blown_up, drawn), dict(full[TIME]), errors, marker)
+    marker = markers(list(zip(points.family, points.member, strict=True)))
+    found = TradeOffs(points, _drawn(blown_up, drawn), dict(full[TIME]), errors, marker)
     return found, scenes
 
 
 def _drawn(table: pd.DataFrame, drawn: Drawn) -> pd.DataFrame:
-    """Rows of models that are drawn, with their family."""
+    """Rows of models that are drawn, with their family and their name in it."""
     names = zip(table.method, table.position_basis, strict=True)
-    families = [Model(*name).family(drawn) for name in names]
-    kept = np.array([family is not None for family in families], dtype=bool)
-    return table[kept].assign(family=[family.title for family in families if family])
+    looks = pd.DataFrame(
+        [look_of(*name, drawn) for name in names], table.index, ["family", "member"], dtype=object
+    )
+    return table.assign(**looks).dropna(subset="family")
 
 
-def draw_panel(ax: Axes, found: TradeOffs, scene: str, low: float = LOW, size: float = 3.0) -> None:
+def draw_panel(ax: Axes, found: TradeOffs, scene: str, size: float = 3.0) -> None:
     """Draw a scene's points, the front of each family, and the full-order run that they replace.
 
     ``ax`` gets those ``found``, with markers of ``size``.
 
-    An error below ``low`` or above `HIGH` is an arrow on the rim; a run that blew up, a cross on
-    the upper one.
+    An error outside the axis is an arrow on the rim; a run that blew up, a cross on the upper one.
     """
     ax.set_xscale("log")
-    log_axis(ax, low, HIGH)
+    log_axis(ax, LOW, HIGH)
     rows = found.points[found.points.scene == scene]
     lost = found.blown_up[found.blown_up.scene == scene]
-    for family in FAMILIES:
-        part = rows[rows.family == family.title]
-        for model in found.models(family):
-            own = (part.method == model.method) & (part.position_basis == model.position_basis)
-            fill = "none" if model.hollow else "full"
-            _points(ax, part[own], family.colour, found.marker[model], low, size, fill)
-        if family == ITERATIONS:
-            _points(ax, part, family.colour, "X", low, size)
-        _front(ax, part, family.colour, low)
-        ended = lost[lost.family == family.title]
+    for family, colour in FAMILIES.items():
+        part = rows[rows.family == family]
+        for name, marker in found.members(family).items():
+            own = part[part.member == name]
+            hollow = own.position_basis == "skinning"
+            _points(ax, own[~hollow], colour, marker, size)
+            _points(ax, own[hollow], colour, marker, size, "none")
+        unbeaten = np.array(pareto(part[ERROR].to_list(), part[TIME].to_list()), dtype=bool)
+        front = part[unbeaten].sort_values(TIME)
+        heights = clipped(front[ERROR].to_numpy(float), LOW, HIGH)
+        steps = {"linewidth": 1.3, "drawstyle": "steps-post", "zorder": 1.5}
+        ax.plot(front[TIME], heights, color=colour, **steps)
+        ended = lost[lost.family == family]
         ax.plot(
-            ended[TIME], np.full(len(ended), 0.6 * HIGH), BLOWN_UP, color=family.colour,
+            ended[TIME], np.full(len(ended), 0.6 * HIGH), BLOWN_UP, color=colour,
             markersize=6.0, markeredgewidth=1.8,
         )  # fmt: skip
     times = [*rows[TIME], *lost[TIME], found.own_ms.get(scene, np.nan)]
@@ -186,7 +157,7 @@ def draw_panel(ax: Axes, found: TradeOffs, scene: str, low: float = LOW, size: f
     if scene in found.own_ms:
         ax.axvline(found.own_ms[scene], zorder=0, **OWN)
     if scene in found.own_error:
-        ax.axhline(np.clip(found.own_error[scene], low, HIGH), zorder=0, **BLIND)
+        ax.axhline(np.clip(found.own_error[scene], LOW, HIGH), zorder=0, **BLIND)
 
 
 def _points(
@@ -194,26 +165,17 @@ def _points(
     rows: pd.DataFrame,
     colour: str,
     marker: str,
-    low: float,
     size: float,
     fill: Literal["full", "none"] = "full",
 ) -> None:
     error, time = rows[ERROR].to_numpy(float), rows[TIME].to_numpy(float)
-    looks = ((error < low, BELOW), (error > HIGH, ABOVE))
-    inside = (error >= low) & (error <= HIGH)
+    inside = (error >= LOW) & (error <= HIGH)
     common = {"linestyle": "none", "color": colour, "alpha": 0.75, "markeredgewidth": 0.9}
     ax.plot(time[inside], error[inside], marker=marker, markersize=size, fillstyle=fill, **common)
-    for outside, arrow in looks:
+    for outside, rim, arrow in ((error < LOW, LOW, BELOW), (error > HIGH, HIGH, ABOVE)):
         if outside.any():
-            rim = clipped(error[outside], low, HIGH)
-            ax.plot(time[outside], rim, marker=arrow, markersize=size + 2.5, **common)
-
-
-def _front(ax: Axes, rows: pd.DataFrame, colour: str, low: float) -> None:
-    unbeaten = np.array(pareto(rows[ERROR].to_list(), rows[TIME].to_list()), dtype=bool)
-    best = rows[unbeaten].sort_values(TIME)
-    heights = clipped(best[ERROR].to_numpy(float), low, HIGH)
-    ax.plot(best[TIME], heights, color=colour, linewidth=1.3, drawstyle="steps-post", zorder=1.5)
+            at = np.full(outside.sum(), rim)
+            ax.plot(time[outside], at, marker=arrow, markersize=size + 2.5, **common)
 
 
 def label_iterations(ax: Axes, found: TradeOffs, scene: str) -> None:
@@ -226,35 +188,21 @@ def label_iterations(ax: Axes, found: TradeOffs, scene: str) -> None:
     label_counts(ax, rows[TIME], rows[ERROR], counts=rows.iterations, prefix="K = ")
 
 
-def group_title(drawn: Drawn, scene: str) -> str:
-    """Constraint group that ``scene`` of ``drawn`` reduces, in words."""
-    groups = [each.group for each in drawn.of(scene)]
-    return style.words(groups[0]) if len(groups) == 1 else "several groups"
-
-
-def handles(found: TradeOffs) -> list[tuple[str, list[Line2D]]]:
-    """Legend entries of those ``found`` by family: a colour, a marker a title."""
+def handles(found: TradeOffs) -> list[Block]:
+    """Legend entries of those ``found`` by family: a colour, a marker a name."""
     common = {"linewidth": 1.0, "markersize": 4.0}
     entries = [
         ("full order", [
-            style.handle("K iterations", color=ITERATIONS.colour, marker="X", **common),
+            style.handle("K iterations", color=FAMILIES[ITERATIONS], marker="X", **common),
             style.handle("its time", **OWN),
             style.handle("its own error", **BLIND),
         ]),
     ]  # fmt: skip
-    for family in FAMILIES[1:]:
-        marker = {m.title(found.drawn): found.marker[m] for m in found.models(family)}
-        members = [
-            style.handle(title, color=family.colour, marker=shape, **common)
-            for title, shape in marker.items()
-        ]
-        if members:
-            entries.append((family.title, members))
+    for family, colour in FAMILIES.items():
+        looks = {name: (colour, marker) for name, marker in found.members(family).items()}
+        if looks and family != ITERATIONS:
+            entries.append((family, style.handles(looks, **common)))
     return entries
-
-
-class Options(Scenes, Methods):
-    """Options of the figure; the first scene is drawn large."""
 
 
 @figure(
@@ -274,38 +222,46 @@ class Options(Scenes, Methods):
         "table": TableOf("accuracy_cost"),
         "runs": TableOf("reduced_reruns"),
     },
-    options=Options,
 )
 def accuracy_cost(
-    options: Options, drawn: Drawn, table: pd.DataFrame, runs: pd.DataFrame
+    options: Methods, drawn: Drawn, table: pd.DataFrame, runs: pd.DataFrame
 ) -> Figure:
     """Draw the first scene large; below it one scene for each other group, the next in order."""
-    found, scenes = trade_offs(drawn, table, runs)
-    first, *rest = scenes
-    small = list({group_title(drawn, scene): scene for scene in reversed(rest)}.values())[::-1]
+    found, (first, *rest) = trade_offs(drawn, table, runs)
+    groups = {}  # in words
+    for scene in (first, *rest):
+        own = [each.group for each in drawn.of(scene)]
+        groups[scene] = style.words(own[0]) if len(own) == 1 else "several groups"
+    small = list({groups[scene]: scene for scene in reversed(rest)}.values())[::-1]
     blocks = handles(found)
-    heights = [LARGE, *([SMALL] if small else []), legend_height(blocks, COLUMNS)]
+    rows = [blocks[i : i + COLUMNS] for i in range(0, len(blocks), COLUMNS)]
+    lines = [LINE * (1.3 + max(len(entries) for _, entries in row)) + GAP for row in rows]
+    heights = [LARGE, *([SMALL] if small else []), sum(lines)]
     figure = style.new_figure(sum(heights))
     parts = figure.subfigures(len(heights), 1, squeeze=False, height_ratios=heights)[:, 0]
     ax = parts[0].subplots()
-    draw_panel(ax, found, first, low=LOWEST, size=4.2)
+    draw_panel(ax, found, first, size=4.2)
     label_iterations(ax, found, first)
     _draw_rates(ax)
-    ax.set_title(f"{group_title(drawn, first)}: {style.words(first)}")
+    ax.set_title(f"{groups[first]}: {style.words(first)}")
     ax.set(xlabel="time per frame (ms)", ylabel="relative error")
     if small:
         axes = parts[1].subplots(1, len(small), sharey=True, squeeze=False)[0]
-        _draw_small(axes, found, small)
-    draw_legend(parts[-1], blocks, COLUMNS)
+        for ax, scene in zip(axes, small, strict=True):
+            draw_panel(ax, found, scene, size=2.4)
+            ax.set_title(f"{groups[scene]}:\n{style.words(scene)}")
+            ax.set_xlabel("time per frame (ms)")
+        axes[0].set_ylabel("relative error")
+    top = 1.0
+    for row, height in zip(rows, lines, strict=True):
+        for place, (title, entries) in enumerate(row):
+            parts[-1].legend(
+                handles=entries, title=title, loc="upper left", alignment="left",
+                bbox_to_anchor=(0.01 + place / COLUMNS, top), fontsize=7, title_fontsize=7.5,
+                borderpad=0.0, borderaxespad=0.1, labelspacing=0.3, handlelength=1.8,
+            )  # fmt: skip
+        top -= height / sum(lines)
     return figure
-
-
-def _draw_small(axes: np.ndarray, found: TradeOffs, scenes: list[str]) -> None:
-    for ax, scene in zip(axes, scenes, strict=True):
-        draw_panel(ax, found, scene, low=LOWEST, size=2.4)
-        ax.set_title(f"{group_title(found.drawn, scene)}:\n{style.words(scene)}")
-        ax.set_xlabel("time per frame (ms)")
-    axes[0].set_ylabel("relative error")
 
 
 def _draw_rates(ax: Axes) -> None:
@@ -325,27 +281,3 @@ def _label(ax: Axes, x: float, text: str) -> None:
         x, 0.99, text, transform=ax.get_xaxis_transform(), fontsize=6.5, va="top", ha="right",
         color="#6B675F",
     )  # fmt: skip
-
-
-def _rows(blocks: Sequence[Block], columns: int) -> list[Sequence[Block]]:
-    return [blocks[i : i + columns] for i in range(0, len(blocks), columns)]
-
-
-def legend_height(blocks: Sequence[Block], columns: int) -> float:
-    """Height, inches, of the legend of ``blocks`` in ``columns``."""
-    rows = _rows(blocks, columns)
-    return sum(LINE * (1.3 + max(len(entries) for _, entries in row)) + GAP for row in rows)
-
-
-def draw_legend(figure: SubFigure, blocks: Sequence[Block], columns: int) -> None:
-    """Draw titled ``blocks`` of entries on ``figure`` in ``columns``, row by row from the top."""
-    height = legend_height(blocks, columns)
-    top = 1.0
-    for row in _rows(blocks, columns):
-        for place, (title, entries) in enumerate(row):
-            figure.legend(
-                handles=list(entries), title=title, loc="upper left", alignment="left",
-                bbox_to_anchor=(0.01 + place / columns, top), fontsize=7, title_fontsize=7.5,
-                borderpad=0.0, borderaxespad=0.1, labelspacing=0.3, handlelength=1.8,
-            )  # fmt: skip
-        top -= (LINE * (1.3 + max(len(entries) for _, entries in row)) + GAP) / height

@@ -1,4 +1,4 @@
-"""Error against time of the alternatives to projective dynamics."""
+"""Error against time: alternatives to projective dynamics, and requested tolerances."""
 
 import numpy as np
 import pandas as pd
@@ -6,14 +6,29 @@ import pandas as pd
 from pdrom.model.held_out import FIRST
 from pdrom.view import style
 from pdrom.view.artists import Axes, Figure
-from pdrom.view.multiples import clipped, label_outer, log_axis, panels, rows_of, time_axis
+from pdrom.view.multiples import (
+    clipped,
+    label_outer,
+    log_axes,
+    log_axis,
+    panels,
+    rows_of,
+    time_axis,
+)
 from study.artifact.reads import TableOf
 from study.experiments.alternatives.settings import ACCELERATED, CONVERGED, REDUCED, TWO_LEVEL
 from study.figures.kit.declaration import figure
-from study.figures.kit.options import NothingToDraw, Scenes
+from study.figures.kit.options import NothingToDraw, Options, Scenes
 
 LOW, HIGH = 1e-4, 1.0  # errors outside are drawn on the limit
 PAIRS = 2  # cases side by side
+TOLERANCES, TIMES, REACHED = (5e-3, 2e-1), (1e-2, 1e1), (1e-4, 1e0)
+# Colour of each kind of answer, and a factor that moves its dots along the axis of tolerances.
+KINDS = {
+    "reduction": (style.BLUE, 0.85),
+    "full order": (style.VERMILLION, 1.0),
+    "refused": (style.GREY, 1.15),
+}
 LOOKS = {
     "projective": ("projective dynamics", style.BLACK, "o"),
     "anderson": ("with Anderson acceleration", style.GREY, "s"),
@@ -41,7 +56,6 @@ LOOKS = {
         "$\\times 100$: the same scene with stiffer weights. Errors outside are drawn on the rim."
     ),
     reads={"table": TableOf("alternatives")},
-    options=Scenes,
 )
 def alternatives(options: Scenes, table: pd.DataFrame) -> Figure:
     """Draw a pair of panels for each scene, mesh and stiffness."""
@@ -74,7 +88,15 @@ def _draw_case(pair: list[Axes], labels: tuple[str, int, float], case: pd.DataFr
         if reference == "continuous" and len(own):
             ax.axhline(own.error.iloc[0], color="#555555", linestyle="--", linewidth=0.8)
         for method, (_, colour, marker) in LOOKS.items():
-            _draw_best(ax, best_points(rows[rows.method == method]), colour, marker)
+            points = best_points(rows[rows.method == method])
+            errors = clipped(points.error.to_numpy(float), LOW, HIGH)
+            ax.plot(points.ms_per_frame, errors, color=colour, linewidth=0.9)
+            divided = (points.substeps > 1).to_numpy(bool)
+            for chosen, face in ((~divided, colour), (divided, "white")):
+                ax.plot(
+                    points.ms_per_frame[chosen], errors[chosen], color=colour, marker=marker,
+                    markerfacecolor=face, linestyle="none", markersize=3.6, markeredgewidth=0.8,
+                )  # fmt: skip
 
 
 def best_points(rows: pd.DataFrame) -> pd.DataFrame:
@@ -84,12 +106,56 @@ def best_points(rows: pd.DataFrame) -> pd.DataFrame:
     return ordered[ordered.error < before]
 
 
-def _draw_best(ax: Axes, points: pd.DataFrame, colour: str, marker: str) -> None:
-    errors = clipped(points.error.to_numpy(float), LOW, HIGH)
-    ax.plot(points.ms_per_frame, errors, color=colour, linewidth=0.9)
-    divided = (points.substeps > 1).to_numpy(bool)
-    for chosen, face in ((~divided, colour), (divided, "white")):
+@figure(
+    title="Requested tolerances and errors reached",
+    caption=(
+        "A dot for each scene and held-out motion. Left: the error that a run reached against the "
+        "tolerance that was requested; dots of met tolerances above their line are broken. Right: "
+        "its time over that of a frame with the scene's own iterations, checks and failed levels "
+        "included. What lies outside is drawn on the rim."
+    ),
+    reads={"table": TableOf("requested_tolerances")},
+)
+def requested_tolerances(options: Options, table: pd.DataFrame) -> Figure:
+    """Draw errors and times side by side."""
+    table = table[table.error.notna()]
+    if table.empty:
+        raise NothingToDraw("no tolerance was requested")
+    chart = style.new_figure(3.2)
+    left, right = chart.subplots(1, 2)
+    met, reduced = table.met.astype(bool), table.reduced.astype(bool)
+    looks = {}
+    for (kind, (colour, shift)), chosen in zip(
+        KINDS.items(), (met & reduced, met & ~reduced, ~met), strict=True
+    ):
+        own = table[chosen]
+        if not own.empty:
+            looks[kind] = (colour, "o")
+        dots(left, shift * own.tolerance, own.error, REACHED, colour)
+        dots(right, shift * own.tolerance, own.over_own, TIMES, colour)
+    log_axes(left, TOLERANCES, REACHED)
+    log_axes(right, TOLERANCES, TIMES)
+    for tolerance in table.tolerance.unique():
+        ends = [0.78 * tolerance, 1.28 * tolerance]
+        left.plot(ends, [tolerance, tolerance], color="#333333", linewidth=1.2)
+    right.axhline(1.0, color="#333333", linewidth=0.8)
+    left.set_ylabel("reached error")
+    right.set_ylabel("time over that of own iterations")
+    for ax in (left, right):
+        ax.set_xlabel("requested tolerance")
+    style.legend(chart, style.handles(looks, linestyle="none", markersize=4), 3)
+    return chart
+
+
+def dots(
+    ax: Axes, tolerances: pd.Series, values: pd.Series, limits: tuple[float, float], colour: str
+) -> None:
+    """Draw a dot on ``ax`` for each pair; none, not clipped, would take all the room of the axes.
+
+    ``values`` beyond the ``limits`` are drawn on them.
+    """
+    if not values.empty:
         ax.plot(
-            points.ms_per_frame[chosen], errors[chosen], color=colour, marker=marker,
-            markerfacecolor=face, linestyle="none", markersize=3.6, markeredgewidth=0.8,
+            tolerances, clipped(np.asarray(values, float), *limits), "o",
+            markersize=3.0, color=colour, alpha=0.7, clip_on=False,
         )  # fmt: skip

@@ -1,66 +1,34 @@
-"""Runs of the scenes of the preprint, reduced: a full-order run beside the reduced ones."""
+"""Reduced runs of the scenes of the preprint, beside the full-order ones, at chosen instants."""
 
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 import pandas as pd
 
+from pdrom.core.store import open_hdf5
 from pdrom.model.mesh.types import Mesh, load_mesh
+from pdrom.view import panels as view
 from pdrom.view import style
-from pdrom.view.artists import Figure
-from pdrom.view.camera import obstacles
-from pdrom.view.panels import NOTHING_RAN, Row, RunPanel, draw_rows, run_panel, shared_window
-from pdrom.view.read import choose_ranks, positions_at, rerun_infos
-from study.artifact.paths import MESH, NOISE_RUNS, RERUNS, TRAIN, File
+from pdrom.view.artists import Figure, ScalarMappable
+from pdrom.view.camera import Camera, Window, obstacles
+from pdrom.view.panels import NOTHING_RAN, Row, RunPanel
+from pdrom.view.read import RerunInfo, choose_ranks, positions_at, rerun_infos
+from study.artifact.paths import MESH, NOISE_RUNS, RERUNS, SUBSPACES, TRAIN, File
 from study.artifact.reads import EachOf, Every, Read, Settings, TableOf
 from study.experiments.kit.settings import Horizon
 from study.figures.kit.declaration import figure
+from study.figures.kit.elements import magnitudes
 from study.figures.kit.options import Drawn, Experiment, NothingToDraw, ReducedRuns
 from study.figures.sensitivity_floor import FLOORS, Floors
+from study.tables.kit.reruns import trained
 
 NOISY = {"all": "all axes", "plane": "in the plane", "vertex": "one vertex across"}
 WRONG = 0.1  # of the motion: a run whose error is larger has failed, as one that does not start
-
-
-@dataclass(frozen=True)
-class Runs:
-    """Files of the runs of every experiment, and of their scenes.
-
-    meshes, full_order, sensitivity : files of every scene
-    reruns : files of every experiment and method
-    """
-
-    horizon: Horizon
-    meshes: Sequence[File]
-    full_order: Sequence[File]
-    reruns: Sequence[File]
-    sensitivity: Sequence[File]
-
-    @cached_property
-    def floors(self) -> Floors:
-        """Sensitivity floors of the scenes."""
-        return Floors(self.sensitivity, self.horizon)
-
-    def mesh(self, experiment: Experiment) -> Mesh:
-        """Mesh of an experiment's scene."""
-        return load_mesh(experiment.path(self.meshes))
-
-    def at(
-        self, experiment: Experiment, instants: tuple[float, ...], end: int | None = None
-    ) -> tuple[list[int], np.ndarray]:
-        """Frames of the full-order run, and its positions there, see `positions_at`."""
-        return positions_at(experiment.path(self.full_order), instants, end)
-
-
-def obstacles_of(experiment: Experiment, positions: np.ndarray) -> list[Mesh] | None:
-    """Obstacles near ``positions`` (F, N, 3) m; None for a floor alone, which has a shadow."""
-    bodies = obstacles(positions, experiment.effects)
-    floor = any(effect.effect == "floor" for effect in experiment.effects)
-    return None if floor and len(bodies) == 1 else bodies
-
-
+DISTANCES = (1e-4, 1.0)  # extents of the mesh, at the ends of the scale of colours
+FOOTER = 0.55  # inches, for the scale of colours
+TOLERANCE = "ecsw-1e-02"  # of the sampled subspace of the teaser
+MODES = 20  # at most, of that subspace
 RUNS: dict[str, Read] = {
     "drawn": Settings(Drawn),
     "meshes": EachOf(MESH, "experiments"),
@@ -72,71 +40,164 @@ COMPARED = (
     "full order against reduced projections, by basis size. The grey outline is the full-order run "
     "at the same instant; a framed picture is drawn to the smaller scale given below it."
 )
-RowsOf = Callable[[ReducedRuns, Drawn, Runs, Experiment], list[Row]]
 
 
-def experiment_rows(
-    options: ReducedRuns, drawn: Drawn, runs: Runs, experiment: Experiment
-) -> list[Row]:
-    """A row per method; a single one that says so where no method has anything to reduce."""
-    camera = options.camera(experiment)
-    colour = style.surface_colour(drawn.looks[experiment.group][0])
-    frames, full = runs.at(experiment, options.frames[-1:])
-    bodies = obstacles_of(experiment, full)
-    frame, mesh = frames[0], runs.mesh(experiment)
-    when = runs.floors.instant(experiment.scene, frame).replace(", ", "\n")
-    reference = RunPanel("full order", style.FULL_ORDER, full[0], reference=True, obstacles=bodies)
-    reduced = {}
-    for method in drawn.methods:
-        path = experiment.path(runs.reruns, method=method)
-        infos = choose_ranks(rerun_infos(path), options.ranks)
-        panels = [run_panel(path, i, frame, colour=colour, title=i.title) for i in infos]
-        reduced[method] = [replace(p, obstacles=bodies).seen_by(camera) for p in panels]
-    everything = [panel for panels in reduced.values() for panel in panels]
-    window = shared_window(camera, full[0], everything)
-    reference = reference.seen_by(camera)
-    if all(panel.positions is None and not panel.failure for panel in everything):
-        label = f"{experiment.title}\nany method\n{when}"
-        return [Row(label, mesh, [reference], [window], full, camera, NOTHING_RAN)]
-    return [
-        Row(
-            f"{experiment.title}\n{drawn.title(method)}\n{when}",
-            mesh,
-            [reference, *panels],
-            [window] * (len(panels) + 1),
-            np.repeat(full, len(panels) + 1, axis=0),
-            camera,
-        )
-        for method, panels in reduced.items()
-    ]
+@dataclass(frozen=True)
+class Shown:
+    """An experiment at the instant that is drawn: words for it and the full-order positions there.
 
-
-def draw_experiments(
-    options: ReducedRuns, drawn: Drawn, runs: Runs, rows_of: RowsOf = experiment_rows
-) -> Figure:
-    """Draw a row per experiment and method: the full-order run, then the reduced ones by size.
-
-    All pictures of an experiment show the same instant, the last one of ``options.frames``,
-    with the same camera; one that does not fit is framed and its scale is given. The grey outline
-    is the full-order run. Experiments and methods are those ``drawn``.
-
-    rows_of : rows of one experiment
+    full : (1, N, 3) m
+    colour : of reduced runs
+    bodies : obstacles, see `obstacles_of`
     """
-    if not drawn.experiments or not drawn.methods:
-        raise NothingToDraw(options.words())
-    rows = [row for each in drawn.experiments for row in rows_of(options, drawn, runs, each)]
-    return draw_rows(rows)
+
+    experiment: Experiment
+    mesh: Mesh
+    camera: Camera
+    frame: int
+    when: str
+    full: np.ndarray
+    colour: tuple[float, float, float]
+    bodies: list[Mesh] | None
+
+    def panel(self, path: str, info: RerunInfo) -> RunPanel:
+        """Panel of the reduced run ``info`` in the file ``path``."""
+        panel = view.run_panel(path, info, self.frame, colour=self.colour, title=info.title)
+        return replace(panel, obstacles=self.bodies).seen_by(self.camera)
+
+    def window(self, panels: list[RunPanel]) -> Window:
+        """Window of the full-order run and ``panels``."""
+        return view.shared_window(self.camera, self.full[0], panels)
+
+    def row(
+        self, label: str, panels: list[RunPanel], window: Window, note: str | None = None
+    ) -> Row:
+        """Row of ``panels`` behind that of the full-order run, with ``label`` below the title."""
+        first = RunPanel("full order", style.FULL_ORDER, self.full[0], reference=True)
+        panels = [replace(panel, obstacles=self.bodies) for panel in (first, *panels)]
+        return Row(
+            f"{self.experiment.title}\n{label}",
+            self.mesh,
+            [panel.seen_by(self.camera) for panel in panels],
+            [window] * len(panels),
+            np.repeat(self.full, len(panels), axis=0),
+            self.camera,
+            note,
+        )
+
+
+@dataclass(frozen=True)
+class Runs:
+    """Files that figures of runs read: those of every scene, and ``reruns`` of every method."""
+
+    options: ReducedRuns
+    drawn: Drawn
+    horizon: Horizon
+    meshes: list[File]
+    full_order: list[File]
+    reruns: list[File]
+    sensitivity: list[File]
+
+    def __post_init__(self) -> None:
+        if not self.drawn.experiments or not self.drawn.methods:
+            raise NothingToDraw(self.options.words())
+
+    @cached_property
+    def floors(self) -> Floors:
+        """Sensitivity floors of the scenes."""
+        return Floors(self.sensitivity, self.horizon)
+
+    def shown(self, experiment: Experiment) -> Shown:
+        """An experiment at the last instant of the options."""
+        path, instant = experiment.path(self.full_order), self.options.frames[-1:]
+        (frame,), full = positions_at(path, instant)
+        return Shown(
+            experiment,
+            load_mesh(experiment.path(self.meshes)),
+            self.options.camera(experiment),
+            frame,
+            self.floors.instant(experiment.scene, frame).replace(", ", "\n"),
+            full,
+            style.surface_colour(self.drawn.looks[experiment.group][0]),
+            obstacles_of(experiment, full),
+        )
+
+    def reduced(self, shown: Shown) -> dict[str, list[RunPanel]]:
+        """Panels of the reduced runs of an experiment by method, those of the chosen sizes."""
+        found = {}
+        for method in self.drawn.methods:
+            path = shown.experiment.path(self.reruns, method=method)
+            infos = choose_ranks(rerun_infos(path), self.options.ranks)
+            found[method] = [shown.panel(path, info) for info in infos]
+        return found
+
+    def rows(self, experiment: Experiment) -> list[Row]:
+        """A row per method; a single one that says so where no method has anything to reduce."""
+        shown = self.shown(experiment)
+        reduced = self.reduced(shown)
+        everything = [panel for panels in reduced.values() for panel in panels]
+        window = shown.window(everything)
+        if nothing_ran(everything):
+            return [shown.row(f"any method\n{shown.when}", [], window, NOTHING_RAN)]
+        return [
+            shown.row(f"{self.drawn.title(method)}\n{shown.when}", panels, window)
+            for method, panels in reduced.items()
+        ]
+
+    def draw(self) -> Figure:
+        """Draw a row per experiment and method: the full-order run, then the reduced by size.
+
+        All pictures of an experiment show the same instant, the last one of the options, with the
+        same camera; one that does not fit is framed and its scale is given. The grey outline is
+        the full-order run.
+        """
+        return view.draw_rows([row for each in self.drawn.experiments for row in self.rows(each)])
+
+
+def nothing_ran(panels: list[RunPanel]) -> bool:
+    """Whether all ``panels`` are of sizes beyond the rank."""
+    return all(panel.positions is None and not panel.failure for panel in panels)
+
+
+def obstacles_of(experiment: Experiment, positions: np.ndarray) -> list[Mesh] | None:
+    """Obstacles near ``positions`` (F, N, 3) m; None for a floor alone, which has a shadow."""
+    bodies = obstacles(positions, experiment.effects)
+    floor = any(effect.effect == "floor" for effect in experiment.effects)
+    return None if floor and len(bodies) == 1 else bodies
 
 
 @figure(
-    title="The bar, reduced",
-    caption=f"Bars with tetrahedral constraints: {COMPARED}",
-    reads=RUNS,
-    options=ReducedRuns,
+    title="The bar, reduced", caption=f"Bars with tetrahedral constraints: {COMPARED}", reads=RUNS
 )
 def bar_runs(options: ReducedRuns, drawn: Drawn, horizon: Horizon, **files: list[File]) -> Figure:
-    """Draw full-order runs beside reduced ones, see `draw_experiments`."""
-    return draw_experiments(options, drawn, Runs(horizon, **files))
+    """Draw full-order runs beside reduced ones, see `Runs.draw`."""
+    return Runs(options, drawn, horizon, **files).draw()
+
+
+@figure(
+    number=6,
+    title="Springs only, reduced",
+    caption=f"Sheets with edge springs only: {COMPARED}",
+    reads=RUNS,
+)
+def spring_runs(
+    options: ReducedRuns, drawn: Drawn, horizon: Horizon, **files: list[File]
+) -> Figure:
+    """Draw full-order runs beside reduced ones, see `Runs.draw`."""
+    return Runs(options, drawn, horizon, **files).draw()
+
+
+@figure(
+    number=7,
+    title="Triangle strain only, reduced",
+    caption=f"Sheets with triangle strain only: {COMPARED}",
+    reads=RUNS,
+)
+def strain_runs(
+    options: ReducedRuns, drawn: Drawn, horizon: Horizon, **files: list[File]
+) -> Figure:
+    """Draw full-order runs beside reduced ones, see `Runs.draw`."""
+    return Runs(options, drawn, horizon, **files).draw()
 
 
 @figure(
@@ -151,7 +212,6 @@ def bar_runs(options: ReducedRuns, drawn: Drawn, horizon: Horizon, **files: list
         "reductions on bases of round-off). The curved sheet has projections that matter."
     ),
     reads={**RUNS, "noise": TableOf("noise"), "noise_runs": Every(NOISE_RUNS)},
-    options=ReducedRuns,
 )
 def bending_runs(
     options: ReducedRuns,
@@ -162,94 +222,38 @@ def bending_runs(
     **files: list[File],
 ) -> Figure:
     """Draw reduced runs; where all projections are round-off, runs on bases of it, if any."""
-
-    def rows_of(options: ReducedRuns, drawn: Drawn, runs: Runs, each: Experiment) -> list[Row]:
-        found = experiment_rows(options, drawn, runs, each)
-        own = noise[(noise.scene == each.scene) & (noise.group == each.group)]
-        path = each.find(noise_runs)
-        if found[0].note != NOTHING_RAN or path is None:
-            return found
-        return noise_rows(options, drawn, runs, each, own, path) or found
-
-    return draw_experiments(options, drawn, Runs(horizon, **files), rows_of)
+    runs, rows = Runs(options, drawn, horizon, **files), []
+    for each in drawn.experiments:
+        found, path = runs.rows(each), each.find(noise_runs)
+        if found[0].note == NOTHING_RAN and path is not None:
+            own = noise[(noise.scene == each.scene) & (noise.group == each.group)]
+            found = noise_rows(drawn, runs.shown(each), own, path) or found
+        rows += found
+    return view.draw_rows(rows)
 
 
-@figure(
-    number=6,
-    title="Springs only, reduced",
-    caption=f"Sheets with edge springs only: {COMPARED}",
-    reads=RUNS,
-    options=ReducedRuns,
-)
-def spring_runs(
-    options: ReducedRuns, drawn: Drawn, horizon: Horizon, **files: list[File]
-) -> Figure:
-    """Draw full-order runs beside reduced ones, see `draw_experiments`."""
-    return draw_experiments(options, drawn, Runs(horizon, **files))
-
-
-@figure(
-    number=7,
-    title="Triangle strain only, reduced",
-    caption=f"Sheets with triangle strain only: {COMPARED}",
-    reads=RUNS,
-    options=ReducedRuns,
-)
-def strain_runs(
-    options: ReducedRuns, drawn: Drawn, horizon: Horizon, **files: list[File]
-) -> Figure:
-    """Draw full-order runs beside reduced ones, see `draw_experiments`."""
-    return draw_experiments(options, drawn, Runs(horizon, **files))
-
-
-def noise_rows(
-    options: ReducedRuns,
-    drawn: Drawn,
-    runs: Runs,
-    experiment: Experiment,
-    table: pd.DataFrame,
-    path: str,
-) -> list[Row]:
+def noise_rows(drawn: Drawn, shown: Shown, table: pd.DataFrame, path: str) -> list[Row]:
     """A row per drawn method and kind of start; below each picture how many of all starts fail.
 
     Kinds of which as many fail at every size share a row, with a run of the first of them.
 
     Parameters
     ----------
-    table : rows of the table ``noise`` of this ``experiment``
-    path : file of its ``runs`` on bases of round-off
+    table : rows of the table ``noise`` of the experiment that is ``shown``
+    path : file of its runs on bases of round-off
     """
-    camera = options.camera(experiment)
-    colour = style.surface_colour(drawn.looks[experiment.group][0])
-    frames, full = runs.at(experiment, options.frames[-1:])
-    mesh = runs.mesh(experiment)
-    when = runs.floors.instant(experiment.scene, frames[0]).replace(", ", "\n")
-    reference = RunPanel("full order", style.FULL_ORDER, full[0], reference=True).seen_by(camera)
-    rows = []
+    shown, rows = replace(shown, bodies=None), []
     for method in drawn.methods:
         for counts, kinds in _alike(table[table.method == method]).items():
             fail = dict(counts)
             panels = [
-                replace(
-                    run_panel(path, info, frames[0], colour=colour, title=info.title),
-                    remark=fail[info.r],
-                )
+                replace(shown.panel(path, info), remark=fail[info.r])
                 for info in rerun_infos(path, f"{kinds[0]}/{method}")
                 if info.r in fail
             ]
-            panels = [panel.seen_by(camera) for panel in panels]
-            label = f"{experiment.title}\n{drawn.title(method)}"
             start = ", ".join(NOISY[kind] for kind in kinds)
-            rows.append(
-                Row(
-                    f"{label}\nnoise: {start}\n{when}",
-                    mesh,
-                    [reference, *panels],
-                    [shared_window(camera, full[0], panels)] * (len(panels) + 1),
-                    np.repeat(full, len(panels) + 1, axis=0),
-                    camera,
-                )
-            )
+            label = f"{drawn.title(method)}\nnoise: {start}\n{shown.when}"
+            rows.append(shown.row(label, panels, shown.window(panels)))
     return rows
 
 
@@ -263,3 +267,174 @@ def _alike(table: pd.DataFrame) -> dict[tuple[tuple[int, str], ...], list[str]]:
         counts = ((int(r), f"{one.sum()} of {len(one)} starts fail") for r, one in sizes)
         kinds.setdefault(tuple(counts), []).append(str(kind))
     return kinds
+
+
+@figure(
+    number=4,
+    title="Three constraint groups, one of them reduced",
+    caption=(
+        "The cloth with bending, springs and strain at instants up to the scene's horizon, beyond "
+        "which no difference could be blamed on a reduction: the full-order run, then runs that "
+        "reduce the projections of one group only, by two methods. Triangles are coloured by "
+        "their distance to the full-order run, whose outline is grey; a framed picture is drawn to "
+        "the smaller scale given below it. Springs carry nearly all of the force, so that reducing "
+        "strain changes little whatever the method."
+    ),
+    reads=RUNS,
+)
+def cloth_all_grid(
+    options: ReducedRuns, drawn: Drawn, horizon: Horizon, **files: list[File]
+) -> Figure:
+    """Draw a row per reduced group (first the full-order run), the methods side by side.
+
+    A method has a column for each instant; instants are shares of the scene's horizon. All pictures
+    have the same camera and scale but for framed ones, whose scale is given. The size is the first
+    of ``options.ranks`` that ran.
+    """
+    runs, one = Runs(options, drawn, horizon, **files), drawn.experiments[0]
+    mesh, camera = load_mesh(one.path(runs.meshes)), options.camera(one)
+    end = runs.floors.horizon(one.scene)
+    frames, full = positions_at(one.path(runs.full_order), options.frames, end)
+    first = [
+        RunPanel(f"frame {f}", style.FULL_ORDER, q, reference=True)
+        for f, q in zip(frames, full, strict=True)
+    ]
+    windows = [view.shared_window(camera, q, [], margin=0.04) for q in full]
+    size = (max(w.width for w in windows), max(w.height for w in windows))
+    windows = [view.fit_aspect(w.resized(*size)) for w in windows] * len(drawn.methods)
+    ghosts = np.concatenate([full] * len(drawn.methods))
+
+    def row(label: str, panels: list[RunPanel], note: str | None) -> Row:
+        seen = [panel.seen_by(camera) for panel in panels]
+        return Row(label, mesh, seen, windows, ghosts, camera, note)
+
+    rows = [row("full order", first * len(drawn.methods), None)]
+    for each in drawn.of(one.scene):
+        reduced = [
+            _over_time(
+                each.path(runs.reruns, method=m), options, drawn.title(m), frames, full, mesh
+            )
+            for m in drawn.methods
+        ]
+        blank = [RunPanel("", style.GREY, None, remark="not run")] * len(frames)
+        panels = [panel for run in reduced for panel in run or blank]
+        note = None if any(reduced) else NOTHING_RAN
+        rows.append(row(f"{style.words(each.group)} reduced", panels, note))
+    made = view.draw_rows(rows, footer=FOOTER)
+    inch = 1.0 / made.get_figheight()
+    ax = made.add_axes((0.3, 0.40 * inch, 0.5, 0.08 * inch))
+    bar = made.colorbar(_colours(), cax=ax, orientation="horizontal", extend="both")
+    bar.set_label("distance to the full-order run (extents)", labelpad=1)
+    bar.outline.set_linewidth(0.4)
+    return made
+
+
+def _over_time(
+    path: str, options: ReducedRuns, title: str, frames: list[int], full: np.ndarray, mesh: Mesh
+) -> list[RunPanel] | None:
+    """A reduced run at every instant, coloured by its distance; None if no size ran."""
+    infos = choose_ranks(rerun_infos(path), options.ranks)
+    info = next((i for i in infos if not i.marked), None)
+    if info is None:
+        return None
+    plain = style.surface_colour(style.GREY)
+    panels = []
+    for frame, q in zip(frames, full, strict=True):
+        panel = view.run_panel(path, info, frame, colour=plain, title="")
+        if panel.positions is not None and not panel.failure:
+            distance = np.linalg.norm(panel.positions - q, axis=1) / mesh.extent
+            colour = _colours().to_rgba(distance[mesh.triangles].mean(axis=1))[:, :3]
+            panel = replace(panel, colour=colour)
+        panels.append(panel)
+    middle = len(panels) // 2
+    panels[middle] = replace(panels[middle], title=f"{title}, {info.title}")
+    return panels
+
+
+def _colours() -> ScalarMappable:
+    from matplotlib.colors import LogNorm
+
+    return magnitudes(LogNorm(*DISTANCES, clip=True))
+
+
+@figure(
+    title="Two scenes under five reductions",
+    caption=(
+        "One instant of the motion that trained all of them. `deim-joint` is the preprint's "
+        "method: joint rows, a system for each axis. `deim` samples single entries, `block-deim` "
+        "whole elements, `gappy` three elements a mode, all with shared coefficients. `ecsw` "
+        "reduces positions and sums sampled elements with non-negative weights. $r$ and $k$ are "
+        "numbers of modes, errors are relative to the motion; the outline is the full order. "
+        "A framed picture is drawn to the smaller scale given below it."
+    ),
+    reads={
+        **RUNS,
+        "subspaces": EachOf(SUBSPACES, "drawn_subspaces"),
+        "errors": TableOf("reduced_reruns"),
+    },
+)
+def teaser(
+    options: ReducedRuns,
+    drawn: Drawn,
+    horizon: Horizon,
+    subspaces: list[File],
+    errors: pd.DataFrame,
+    **files: list[File],
+) -> Figure:
+    """Draw a row per experiment: the full order, a panel per method, a sampled subspace."""
+    runs, errors = Runs(options, drawn, horizon, **files), trained(errors)
+    return view.draw_rows(
+        [_teaser_row(runs, each, errors, each.find(subspaces)) for each in drawn.experiments]
+    )
+
+
+def _teaser_row(
+    runs: Runs, experiment: Experiment, errors: pd.DataFrame, subspace: str | None
+) -> Row:
+    """The reduced runs of an experiment in one row, named by their methods.
+
+    Parameters
+    ----------
+    errors : training runs of the table reduced_reruns
+    subspace : file of the runs in position subspaces, if there is one
+    """
+    shown, panels = runs.shown(experiment), []
+    reduced = runs.reduced(shown)
+    everything = [panel for found in reduced.values() for panel in found]
+    errors = errors[errors.scene == experiment.scene]
+    ran = not nothing_ran(everything)
+    for method, found in reduced.items() if ran else ():
+        own = errors[(errors.group == experiment.group) & (errors.method == method)]
+        drawn = [panel for panel in found if panel.positions is not None]
+        # the largest sizes where the study has none of those that are chosen
+        sizes = (drawn or found)[-(len(runs.options.ranks) or 1) :]
+        own = own[own.position_basis == "full"]
+        panels += [_with_error(panel, method, own, "r") for panel in sizes]
+    if sampled := subspace and _subspace(shown.frame, subspace):
+        own = errors[(errors.position_basis == "pod") & (errors.method == TOLERANCE)]
+        panels.append(_with_error(sampled, "ecsw", own, "k"))
+    window, label = shown.window(everything), shown.when.splitlines()[-1]
+    return shown.row(label, panels, window, None if ran else NOTHING_RAN)
+
+
+def _with_error(panel: RunPanel, method: str, rows: pd.DataFrame, size: str) -> RunPanel:
+    """A panel with its method in the title, and its error before the horizon below."""
+    number = int(panel.title.split()[2])
+    error = rows[rows[size] == number].relative_error_within_horizon.dropna()
+    remark = f"error {error.iloc[0]:.2g}" if len(error) else panel.remark
+    return replace(panel, title=f"{method}, {size} = {number}", remark=remark)
+
+
+def _subspace(frame: int, path: str) -> RunPanel | None:
+    """Panel of the run with sampled elements; None where a configuration has none that small."""
+    colour = style.surface_colour(style.GREEN)
+    with open_hdf5(path) as file:
+        models = file["models"]
+        sizes = [k for k in range(MODES, 0, -1) if f"pod_k{k:03d}_{TOLERANCE}" in models]
+        if not sizes:
+            return None
+        title, base = f"k = {sizes[0]}", f"pod_k{sizes[0]:03d}"
+        stored = models[f"{base}_{TOLERANCE}"]["train"]["coordinates"]
+        if len(stored) <= frame:
+            return RunPanel(title, colour, None, "blew up")
+        return RunPanel(title, colour, file["columns"][base]["B"][...] @ stored[frame])

@@ -1,6 +1,6 @@
 """The stability map: how every reduced run of the study ended."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import pandas as pd
@@ -9,7 +9,7 @@ from pdrom.view import style
 from pdrom.view.artists import Axes, Figure
 from study.artifact.reads import Settings, TableOf
 from study.figures.kit.declaration import figure
-from study.figures.kit.options import Drawn, Experiments, Methods, NothingToDraw, Ranks
+from study.figures.kit.options import Drawn, Methods, NothingToDraw, Ranks
 
 CELLS = 48  # of one strip; more blocks make another strip
 ROW = 0.145  # inches
@@ -42,51 +42,57 @@ LOOKS = {
 }
 
 
+Cells = dict[tuple[str, str], pd.Series]  # (scene, group) -> row of the table
+
+
 @dataclass(frozen=True)
 class Block:
-    """Neighbouring columns under one title; ``labels`` name them."""
+    """Neighbouring columns under one title: labels, and the cells of each."""
 
     title: str
     labels: Sequence[str]
+    columns: Sequence[Cells]
 
 
-def draw_cells(
-    ax: Axes,
-    rows: Sequence[str],
-    blocks: Sequence[Block],
-    cell: Callable[[int, int, int], pd.Series | None],
-) -> None:
-    """Draw on ``ax`` a cell for each row and each column of each of ``blocks``.
+@dataclass(frozen=True)
+class Strip:
+    """Blocks side by side that share their rows, (scene, group) -> label."""
 
-    Parameters
-    ----------
-    rows : labels, from top to bottom
-    cell : (row, block, column) -> row of the table with ``outcome`` and ``blowup_frame``, or None
-        for a cell that stays empty
-    """
-    x, ticks, labels = 0.0, [], []
-    dense = sum(len(block.labels) for block in blocks) > DENSE
-    for j, block in enumerate(blocks):
-        width = len(block.labels)
-        title = block.title.replace("-", "-\n", 1) if dense else block.title
-        room = max(0.5 * (LEAST - width), 0.0)
-        x += room
-        ax.text(x + 0.5 * width, -0.25, title, ha="center", va="bottom", fontsize=6.5)
-        for k, label in enumerate(block.labels):
-            ticks.append(x + k + 0.5)
-            labels.append(label)
-            for i in range(len(rows)):
-                found = cell(i, j, k)
-                if found is not None:
-                    _draw_cell(ax, x + k, i, found)
-        x += width + room + GAP
-    ax.set_xlim(0.0, x - GAP)
-    ax.set_ylim(len(rows), 0.0)
-    ax.set_xticks(ticks, labels, fontsize=6, rotation=90 if dense else 0)
-    ax.set_yticks([i + 0.5 for i in range(len(rows))], rows, fontsize=6.5)
-    ax.tick_params(length=0, pad=2)
-    for spine in ax.spines.values():
-        spine.set_visible(False)
+    rows: dict[tuple[str, str], str]
+    blocks: Sequence[Block]
+    xlabel: str
+
+    def outcomes(self) -> set[str]:
+        """Outcomes that occur."""
+        cells = [column.get(key) for b in self.blocks for column in b.columns for key in self.rows]
+        return {str(cell.outcome) for cell in cells if cell is not None}
+
+    def draw(self, ax: Axes) -> None:
+        """Draw on ``ax`` a cell for each row and column; some stay empty."""
+        x, ticks = 0.0, []
+        labels = [label for block in self.blocks for label in block.labels]
+        dense = len(labels) > DENSE
+        for block in self.blocks:
+            width = len(block.labels)
+            title = block.title.replace("-", "-\n", 1) if dense else block.title
+            room = max(0.5 * (LEAST - width), 0.0)
+            x += room
+            ax.text(x + 0.5 * width, -0.25, title, ha="center", va="bottom", fontsize=6.5)
+            for k, cells in enumerate(block.columns):
+                ticks.append(x + k + 0.5)
+                for i, key in enumerate(self.rows):
+                    if key in cells:
+                        _draw_cell(ax, x + k, i, cells[key])
+            x += width + room + GAP
+        ax.set_xlim(0.0, x - GAP)
+        ax.set_ylim(len(self.rows), 0.0)
+        ax.set_xticks(ticks, labels, fontsize=6, rotation=90 if dense else 0)
+        places = [i + 0.5 for i in range(len(self.rows))]
+        ax.set_yticks(places, list(self.rows.values()), fontsize=6.5)
+        ax.tick_params(length=0, pad=2)
+        ax.set_xlabel(self.xlabel, fontsize=7)
+        ax.set_ylabel("scene", fontsize=7)
+        ax.spines[:].set_visible(False)
 
 
 def _draw_cell(ax: Axes, x: float, y: float, found: pd.Series) -> None:
@@ -101,23 +107,10 @@ def _draw_cell(ax: Axes, x: float, y: float, found: pd.Series) -> None:
         ax.text(x + 0.5, y + 0.52, mark, ha="center", va="center", fontsize=6, color=look.ink)
 
 
-def legend(figure: Figure, present: Sequence[str]) -> None:
-    """Legend on ``figure`` of the outcomes ``present``."""
-    handles = [
-        style.patch(_label(look), facecolor=look.face, edgecolor="#BBBBBB", linewidth=0.5)
-        for outcome, look in LOOKS.items()
-        if outcome in present
-    ]
-    figure.legend(handles=handles, loc="outside lower center", ncols=3, fontsize=7)
+class Sizes(Methods):
+    """Scenes, methods and basis sizes."""
 
-
-def _label(look: Look) -> str:
-    marked = look.mark and look.mark != "frame"
-    return f"{look.words} ({look.mark})" if marked else look.words
-
-
-class Options(Experiments, Methods, Ranks):
-    """Options of the figure."""
+    ranks: Ranks = ()
 
 
 @figure(
@@ -130,9 +123,8 @@ class Options(Experiments, Methods, Ranks):
         "frame. Groups whose projections are round-off are left out."
     ),
     reads={"drawn": Settings(Drawn), "table": TableOf("stability")},
-    options=Options,
 )
-def stability_map(options: Options, drawn: Drawn, table: pd.DataFrame) -> Figure:
+def stability_map(options: Sizes, drawn: Drawn, table: pd.DataFrame) -> Figure:
     """Draw strips of blocks: a block per method, its columns are sizes; a row per experiment.
 
     Runs with unreduced positions come first, then those in position subspaces. Experiments in which
@@ -147,86 +139,66 @@ def stability_map(options: Options, drawn: Drawn, table: pd.DataFrame) -> Figure
     figure = style.new_figure(ROW * sum(rows) + 0.5 * len(strips) + 0.55)
     axes = figure.subplots(len(strips), 1, squeeze=False, height_ratios=rows)[:, 0]
     for ax, strip in zip(axes, strips, strict=True):
-        draw_cells(ax, list(strip.rows.values()), strip.blocks, cell=strip.cell)
-        ax.set_xlabel(strip.xlabel, fontsize=7)
-        ax.set_ylabel("scene", fontsize=7)
-    legend(figure, list({o for strip in strips for o in strip.outcomes()}))
+        strip.draw(ax)
+    present = {outcome for strip in strips for outcome in strip.outcomes()}
+    handles = [
+        style.patch(
+            f"{look.words} ({look.mark})" if look.mark not in ("", "frame") else look.words,
+            facecolor=look.face, edgecolor="#BBBBBB", linewidth=0.5,
+        )
+        for outcome, look in LOOKS.items()
+        if outcome in present
+    ]  # fmt: skip
+    figure.legend(handles=handles, loc="outside lower center", ncols=3, fontsize=7)
     return figure
 
 
-@dataclass(frozen=True)
-class _Strip:
-    """A strip of the map: blocks of columns side by side that share their rows.
-
-    rows : (scene, group) -> label
-    lookups : for each block the (scene, group) -> rows of the table, by column
-    """
-
-    rows: dict[tuple[str, str], str]
-    blocks: list[Block]
-    lookups: list[list[dict[tuple[str, str], pd.Series]]]
-    xlabel: str
-
-    def cell(self, row: int, block: int, column: int) -> pd.Series | None:
-        """Row of the table for a cell."""
-        return self.lookups[block][column].get(list(self.rows)[row])
-
-    def outcomes(self) -> set[str]:
-        """Outcomes that occur."""
-        found = [column.get(key) for block in self.lookups for column in block for key in self.rows]
-        return {str(cell.outcome) for cell in found if cell is not None}
-
-
-def _local_strips(table: pd.DataFrame, drawn: Drawn, options: Options) -> list[_Strip]:
+def _local_strips(table: pd.DataFrame, drawn: Drawn, options: Sizes) -> list[Strip]:
     part = table[table.position_basis == "full"]
     ran = part[part.outcome != "not run"]
     held = set(zip(ran.scene, ran.group, strict=True))
     keys = {(each.scene, each.group): each.title for each in drawn.experiments}
     rows = {key: title for key, title in keys.items() if key in held}
     ranks = [r for r in options.ranks if r == "full" or r in set(part.r)]
-    blocks, lookups = [], []
+    largest = ran.sort_values("r", kind="stable").groupby(["scene", "group", "method"]).tail(1)
+    blocks = []
     for method in dict.fromkeys(part.method):
-        own = part[part.method == method]
-        blocks.append(Block(method, [str(r) for r in ranks]))
-        lookups.append([_by_experiment(_at_size(own, r)) for r in ranks])
-    return _wrapped(rows, blocks, lookups, "number of modes r (full: numerical rank)")
+        columns = [
+            _cells(largest[largest.method == method])
+            if r == "full"
+            else _cells(part[(part.method == method) & (part.r == r)])
+            for r in ranks
+        ]
+        blocks.append(Block(method, [str(r) for r in ranks], columns))
+    return _wrapped(rows, blocks, "number of modes r (full: numerical rank)")
 
 
-def _subspace_strips(table: pd.DataFrame) -> list[_Strip]:
+def _subspace_strips(table: pd.DataFrame) -> list[Strip]:
     part = table[table.position_basis != "full"]
     rows = {(scene, "all"): style.words(scene) for scene in dict.fromkeys(part.scene)}
-    blocks, lookups = [], []
+    blocks = []
     for basis, method in dict.fromkeys(zip(part.position_basis, part.method, strict=True)):
         own = part[(part.position_basis == basis) & (part.method == method)]
         sizes = sorted(own.k.dropna().unique())
-        sampled = "all" if method == "full" else method
-        blocks.append(Block(f"{basis}\n{sampled}", [str(int(k)) for k in sizes]))
-        lookups.append([_by_experiment(own[own.k == k]) for k in sizes])
-    return _wrapped(
-        rows, blocks, lookups, "number of modes k of the position subspace (all: all projections)"
-    )
+        title = f"{basis}\n{'all' if method == 'full' else method}"
+        labels = [str(int(k)) for k in sizes]
+        blocks.append(Block(title, labels, [_cells(own[own.k == k]) for k in sizes]))
+    label = "number of modes k of the position subspace (all: all projections)"
+    return _wrapped(rows, blocks, label)
 
 
-def _wrapped(rows: dict, blocks: list[Block], lookups: list, xlabel: str) -> list[_Strip]:
-    """Strips of at most `CELLS` cells."""
-    if not rows or not blocks:
-        return []
-    strips, start, used = [], 0, 0
-    for i, block in enumerate(blocks):
-        if used and used + len(block.labels) > CELLS:
-            strips.append(_Strip(rows, blocks[start:i], lookups[start:i], xlabel))
-            start, used = i, 0
-        used += len(block.labels)
-    return [*strips, _Strip(rows, blocks[start:], lookups[start:], xlabel)]
-
-
-def _at_size(rows: pd.DataFrame, size: int | str) -> pd.DataFrame:
-    """Runs of a size; "full" is the largest one that ran in each experiment."""
-    if size != "full":
-        return rows[rows.r == size]
-    ran = rows[rows.outcome != "not run"].sort_values("r", kind="stable")
-    return ran.groupby(["scene", "group"], sort=False).tail(1)
-
-
-def _by_experiment(rows: pd.DataFrame) -> dict[tuple[str, str], pd.Series]:
+def _cells(rows: pd.DataFrame) -> Cells:
     return {(row.scene, row.group): row for _, row in rows.iterrows()}
+
+
+def _wrapped(rows: dict[tuple[str, str], str], blocks: list[Block], xlabel: str) -> list[Strip]:
+    """Strips of at most `CELLS` cells."""
+    parts: list[list[Block]] = []
+    used = 0
+    for block in blocks if rows else ():
+        if not parts or (used and used + len(block.labels) > CELLS):
+            parts.append([])
+            used = 0
+        parts[-1].append(block)
+        used += len(block.labels)
+    return [Strip(rows, part, xlabel) for part in parts]

@@ -7,44 +7,354 @@ job of the workflow sets a damaged one aside: the next run finds it missing and 
 Nobody else moves a file that it reads.
 """
 
-from pdrom.core.store.atomic import (
-    atomic_path,
-    read_table,
-    read_text,
-    require_finite,
-    require_own,
-    require_place,
-    write_table,
-    write_text,
-)
+import hashlib
+import io
+import os
+import platform
+import re
+import stat
+import uuid
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import h5py
+import numpy as np
+
+from pdrom.core.errors import StorageError
+from pdrom.core.provenance import attributes
 from pdrom.core.store.checksum import (
+    BLOCK,
+    CHECKSUM_SUFFIX,
     Checksum,
     Condition,
     check_file,
     checksum_path,
+    digest_of,
+    is_hdf5,
+    new_checksum,
     provenance_of,
     read_checksum,
+    reason,
     require_intact,
+    write_block,
 )
-from pdrom.core.store.hdf5 import open_hdf5, require_self_contained, write_hdf5
+
+if TYPE_CHECKING:  # a run without tables does not load it
+    import pandas as pd
 
 __all__ = [
-    "Checksum",
-    "Condition",
-    "atomic_path",
-    "check_file",
-    "checksum_path",
-    "open_hdf5",
-    "provenance_of",
-    "read_checksum",
-    "read_table",
-    "read_text",
-    "require_finite",
-    "require_intact",
-    "require_own",
-    "require_place",
-    "require_self_contained",
-    "write_hdf5",
-    "write_table",
-    "write_text",
-]
+    "MARK", "Checksum", "Condition", "atomic_path", "check_file", "checksum_path", "open_hdf5",
+    "provenance_of", "read_checksum", "read_table", "read_text", "require_finite",
+    "require_intact", "require_own", "require_place", "require_self_contained", "write_hdf5",
+    "write_table", "write_text",
+]  # fmt: skip
+# Mark in the first or last bytes of every page, picture and file for ParaView.
+MARK, MARKED = b"made by pdrom, which may replace this file", 65_536
+# Part of the names of temporary files, so that no machine removes those of another one.
+_MACHINE = hashlib.blake2b(platform.node().encode(), digest_size=2).hexdigest()
+
+
+@contextmanager
+def atomic_path(path: str | os.PathLike[str], with_checksum: bool = True) -> Iterator[Path]:
+    """Yield a temporary path beside ``path``; checksum and rename it on success, else remove it.
+
+    What a killed process of this machine left of the same target is removed first.
+
+    Parameters
+    ----------
+    with_checksum : whether a checksum file lies beside it; not so for a file that has its checksum
+        inside, or that goes into a user's own folder
+
+    Raises
+    ------
+    StorageError
+        The folder or the file cannot be written: no permission, no space; or what has the name is
+        no regular file (a folder, a link, a device, a pipe), which a new file would replace.
+    """
+    target = Path(path)
+    _require_file(target)
+    mark = f"{_MACHINE}{os.getpid():08x}{uuid.uuid4().hex[:4]}"
+    temporary = target.with_name(f".{target.stem}.{mark}{target.suffix}")
+    checksum = temporary.with_name(f"{temporary.name}{CHECKSUM_SUFFIX}")
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        _remove_leftovers(target)
+        yield temporary
+        _bring_to_disk(temporary)
+        if with_checksum:
+            checksum.write_bytes(new_checksum(digest_of(temporary), target.name).content)
+            _bring_to_disk(checksum)
+            _rename(temporary, checksum, target)
+        else:
+            os.replace(temporary, target)
+            place = checksum_path(target)
+            content = place.read_bytes() if place.is_file() else b""
+            if content and Checksum.parse(content).content == content:  # of an earlier file
+                place.unlink()
+    except OSError as error:
+        raise StorageError(f"{target}: cannot be written ({reason(error)})") from error
+    finally:
+        for left in (temporary, checksum):
+            with suppress(OSError):
+                left.unlink(missing_ok=True)
+
+
+def require_place(path: str | os.PathLike[str]) -> None:
+    """Refuse a ``path`` that cannot be written, before a long computation of what goes there.
+
+    Raises
+    ------
+    StorageError
+        Something else than a file has the name, or its folder cannot be made or written to.
+    """
+    target = Path(path)
+    _require_file(target)
+    above = next((folder for folder in target.parents if folder.exists()), Path())
+    if not above.is_dir() or not os.access(above, os.W_OK | os.X_OK):
+        fault = "no permission to write" if above.is_dir() else "not a folder"
+        raise StorageError(f"{target}: cannot be written ({above}: {fault})")
+
+
+def require_own(path: str | os.PathLike[str]) -> None:
+    """Refuse a ``path`` whose file this package has not written: it would be lost.
+
+    Raises
+    ------
+    StorageError
+        There is such a file: no result with a checksum, nor the mark of a page or picture.
+    """
+    target = Path(path)
+    if not target.is_file():
+        return
+    if read_checksum(target) if is_hdf5(target) else check_file(target) is Condition.INTACT:
+        return
+    with open(target, "rb") as handle:
+        begin = handle.read(MARKED)
+        handle.seek(max(0, target.stat().st_size - MARKED))
+        if MARK not in begin and MARK not in handle.read():
+            raise StorageError(
+                f"{target}: cannot be written (a file that pdrom has not made; move it away)"
+            )
+
+
+def _require_file(target: Path) -> None:
+    try:
+        mode = target.lstat().st_mode
+    except (FileNotFoundError, NotADirectoryError):
+        return
+    except OSError as error:
+        raise StorageError(f"{target}: cannot be written ({reason(error)})") from error
+    if not stat.S_ISREG(mode):
+        kinds = {stat.S_ISDIR: "a folder", stat.S_ISLNK: "a link; name the file itself"}
+        kind = next((words for test, words in kinds.items() if test(mode)), "no regular file")
+        raise StorageError(f"{target}: cannot be written ({kind})")
+
+
+def _remove_leftovers(target: Path) -> None:
+    """Remove temporary files of processes of this machine that have ended."""
+    stem, suffix, checksum = map(re.escape, (target.stem, target.suffix, CHECKSUM_SUFFIX))
+    name = re.compile(rf"\.{stem}\.{_MACHINE}([0-9a-f]{{8}})[0-9a-f]{{4}}{suffix}({checksum})?")
+    for path in target.parent.iterdir():
+        found = name.fullmatch(path.name)
+        if found and not _runs(int(found[1], 16)):
+            path.unlink(missing_ok=True)
+
+
+def _runs(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except PermissionError:  # a process of another user
+        pass
+    return True
+
+
+def _bring_to_disk(path: Path) -> None:
+    with open(path, "rb") as handle:
+        os.fsync(handle.fileno())
+
+
+def _rename(temporary: Path, checksum: Path, target: Path) -> None:
+    """Give both files their names, the checksum first.
+
+    A process killed in between leaves no file, or an older one that its checksum does not fit: both
+    are made again. In the other order it would leave a good file without a checksum. Where the
+    second name is refused, the older file keeps its own checksum.
+    """
+    place = checksum_path(target)
+    previous = place.read_bytes() if place.is_file() else None
+    os.replace(checksum, place)
+    try:
+        os.replace(temporary, target)
+    except BaseException:
+        if previous is None:
+            place.unlink()
+        else:
+            place.write_bytes(previous)
+        raise
+
+
+def write_text(text: str, path: str | os.PathLike[str], with_checksum: bool = True) -> None:
+    """Write ``text`` as UTF-8 to ``path``; ``with_checksum`` as in `atomic_path`."""
+    with atomic_path(path, with_checksum) as temporary:
+        temporary.write_text(text, encoding="utf-8", newline="\n")
+
+
+def read_text(path: str | os.PathLike[str]) -> str:
+    """Read the file ``path`` by `write_text`; StorageError if it is missing or damaged."""
+    require_intact(path)
+    return Path(path).read_text(encoding="utf-8")
+
+
+FLOAT_FORMAT = "%.10g"
+
+
+def write_table(
+    table: "pd.DataFrame", path: str | os.PathLike[str], with_checksum: bool = True
+) -> None:
+    """Write a table as CSV to ``path``: fixed float format, an empty cell for no value."""
+    with atomic_path(path, with_checksum) as temporary:
+        table.to_csv(temporary, index=False, float_format=FLOAT_FORMAT, lineterminator="\n")
+
+
+def read_table(
+    path: str | os.PathLike[str], columns: Sequence[str] | None = None, result: bool = True
+) -> "pd.DataFrame":
+    """Read the CSV table ``path``; StorageError if missing, damaged or without one of ``columns``.
+
+    ``result`` marks a table that a run wrote, with a checksum; other tables have none.
+    """
+    import pandas as pd
+
+    if result:
+        require_intact(path)
+    try:
+        content = Path(path).read_bytes()
+        table = pd.read_csv(io.BytesIO(content))
+    except FileNotFoundError as error:
+        raise StorageError(f"{path}: no such file") from error
+    except OSError as error:
+        raise StorageError(f"{path}: cannot be read ({reason(error)})") from error
+    except (pd.errors.ParserError, pd.errors.EmptyDataError, UnicodeDecodeError) as error:
+        fault = " ".join(str(error).split())
+        raise StorageError(f"{path}: not a readable table ({fault})") from error
+    if not content.endswith(b"\n"):
+        raise StorageError(f"{path}: the end of its last line is missing")
+    missing = [name for name in columns or () if name not in table.columns]
+    if missing:
+        raise StorageError(f"{path}: lacks the column(s) {', '.join(missing)}")
+    return table
+
+
+def require_finite(name: str, array: np.ndarray, error: type[Exception]) -> np.ndarray:
+    """Return ``array``, or raise ``error`` with ``name`` and its first entry that is not finite."""
+    finite = np.isfinite(array)
+    if not finite.all():
+        first = tuple(int(i) for i in np.argwhere(~finite)[0])
+        raise error(f"{name}: entry {first} is {array[first]}, finite numbers are required")
+    return array
+
+
+@contextmanager
+def write_hdf5(path: str | os.PathLike[str]) -> Iterator[h5py.File]:
+    """Yield a new HDF5 file; it takes its name ``path`` when complete, with a checksum.
+
+    No time stamps are inside.
+    """
+    with atomic_path(path, with_checksum=False) as temporary:
+        with open(temporary, "w+b", buffering=0) as handle:
+            sink = _Sink(handle)
+            with h5py.File(sink, "w", track_order=True, userblock_size=BLOCK) as file:
+                file.attrs.update(attributes())
+                yield file
+            if sink.error is not None:
+                raise sink.error
+        write_block(temporary)
+
+
+class _Sink:
+    """File that HDF5 writes to; it never fails.
+
+    HDF5 does not survive an error while it writes: it cannot close the file and crashes when the
+    process ends. So the first error (no space, say) is kept for later and the rest thrown away.
+    """
+
+    def __init__(self, handle: io.FileIO) -> None:
+        self._handle = handle
+        self.error: OSError | None = None
+        for name in ("read", "seek", "tell", "flush"):
+            setattr(self, name, getattr(handle, name))
+
+    def write(self, data: memoryview) -> int:
+        left = memoryview(data)
+        while len(left) and self.error is None:
+            try:
+                left = left[self._handle.write(left) :]
+            except OSError as error:
+                self.error = error
+        return len(data)
+
+    def readinto(self, buffer: memoryview) -> int:
+        count = self._handle.readinto(buffer)
+        buffer[count:] = bytes(len(buffer) - count)  # zeros for what `write` has dropped
+        return len(buffer)
+
+    def truncate(self, size: int) -> int:
+        if self.error is None:
+            try:
+                return self._handle.truncate(size)
+            except OSError as error:
+                self.error = error
+        return size
+
+
+@contextmanager
+def open_hdf5(path: str | os.PathLike[str], unchecked: bool = False) -> Iterator[h5py.File]:
+    """Open the HDF5 file ``path`` of the results for reading.
+
+    Its checksum is compared before HDF5 sees the file, so that damage is no error of HDF5.
+
+    Parameters
+    ----------
+    unchecked : whether a file without a checksum is read
+
+    Raises
+    ------
+    StorageError
+        If the file is missing or damaged, or lacks a dataset or attribute that is read from it.
+    """
+    require_intact(path, unchecked)
+    try:
+        with h5py.File(path, "r") as file:
+            yield file
+    except KeyError as error:
+        raise StorageError(f"{path}: {error.args[0]}") from error
+    except OSError as error:
+        require_intact(path, unchecked)  # refuses a file that was damaged since the first check
+        raise StorageError(f"{path}: cannot be read ({reason(error)})") from error
+
+
+def require_self_contained(file: h5py.File, path: str | os.PathLike[str]) -> None:
+    """Refuse a ``file`` from elsewhere, at ``path``, that would read other files.
+
+    Raises
+    ------
+    StorageError
+        It has a soft or an external link, external storage or a virtual dataset.
+    """
+    groups: list[h5py.Group] = [file]
+    seen: set[int] = set()
+    while groups:
+        group = groups.pop()
+        place = h5py.h5o.get_info(group.id).addr
+        for name in group if place not in seen else ():
+            link = group.get(name, getlink=True)
+            item = group[name] if isinstance(link, h5py.HardLink) else None
+            if isinstance(item, h5py.Group):
+                groups.append(item)
+            elif not isinstance(item, h5py.Dataset) or item.is_virtual or item.external:
+                raise StorageError(f"{path}: {name} is no data of this file but leads elsewhere")
+        seen.add(place)

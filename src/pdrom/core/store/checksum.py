@@ -28,7 +28,7 @@ from enum import StrEnum
 from pathlib import Path
 
 from pdrom.core.errors import StorageError
-from pdrom.core.provenance import as_text, provenance
+from pdrom.core.provenance import provenance
 
 _ASIDE: ContextVar[bool] = ContextVar("damaged results are set aside", default=False)
 
@@ -109,7 +109,7 @@ def digest_of(path: Path, start: int = 0) -> str:
 
 def new_checksum(digest: str, name: str) -> Checksum:
     """Checksum of a file ``name`` that is made now, with the ``digest`` of its bytes."""
-    return Checksum(digest, name, as_text(provenance()))
+    return Checksum(digest, name, json.dumps(provenance(), sort_keys=True))
 
 
 def is_hdf5(path: Path) -> bool:
@@ -127,15 +127,6 @@ def write_block(path: Path) -> None:
         raise ValueError(f"{path}: a checksum of {len(content)} bytes, allowed: at most {BLOCK}")
     with open(path, "r+b") as handle:
         handle.write(content.ljust(BLOCK, b"\0"))
-
-
-def read_block(path: Path) -> bytes | None:
-    """Checksum's bytes in the HDF5 file ``path``, b"" if damaged; None without a block."""
-    with open(path, "rb") as handle:
-        block = handle.read(BLOCK)
-    if block.startswith(_SIGNATURE):
-        return None
-    return block.removeprefix(_LINE).rstrip(b"\0") if block.startswith(_LINE) else b""
 
 
 class Condition(StrEnum):
@@ -177,11 +168,8 @@ def check_file(path: str | os.PathLike[str]) -> Condition:
         if _checksum_bytes(path) is None:
             return Condition.NO_CHECKSUM
         start, name = (BLOCK, BLOCK_NAME) if is_hdf5(path) else (0, path.name)
-        checksum = read_checksum(path)
-        fits = checksum is not None and (checksum.digest, checksum.name) == (
-            digest_of(path, start),
-            name,
-        )
+        told = read_checksum(path)
+        fits = told and (told.digest, told.name) == (digest_of(path, start), name)
         return Condition.INTACT if fits else Condition.DAMAGED
     except OSError as error:
         if error.errno == errno.EIO:  # the disk cannot read a part of it
@@ -220,10 +208,15 @@ def require_intact(path: str | os.PathLike[str], unchecked: bool = False) -> Non
 
 
 def _checksum_bytes(path: Path) -> bytes | None:
-    if is_hdf5(path):
-        return read_block(path)
-    place = checksum_path(path)
-    return place.read_bytes() if place.is_file() else None
+    """Checksum's bytes inside the file ``path`` or beside it, b"" if damaged; None without any."""
+    if not is_hdf5(path):
+        place = checksum_path(path)
+        return place.read_bytes() if place.is_file() else None
+    with open(path, "rb") as handle:
+        block = handle.read(BLOCK)
+    if block.startswith(_SIGNATURE):
+        return None
+    return block.removeprefix(_LINE).rstrip(b"\0") if block.startswith(_LINE) else b""
 
 
 def _set_aside(path: Path, fault: str) -> StorageError:

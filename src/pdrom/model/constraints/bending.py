@@ -386,12 +386,8 @@ class VertexBending(ConstraintGroup):
         fan_normals(q, self.vertices, curved, *fans, self.normals)
         put_poles(self._manifold, curved, self.side, self.normals)
 
-    @property
-    def streamed(self) -> tuple[np.ndarray, ...]:
-        return *self._operator(), self._manifold
-
     def sampler(self, elements: np.ndarray) -> LocalKernel:
-        return LocalKernel.of(
+        return LocalKernel(
             project_vertices,
             self.S.shape[1],
             blocks(self.elements),
@@ -434,7 +430,7 @@ class VertexBending(ConstraintGroup):
         self._manifold = pack(np.column_stack(numbers))
         self._work = workspaces(SIZE)
         self._taken = workspace(MANIFOLD)
-        self.local_kernel = LocalKernel.of(
+        self.local_kernel = LocalKernel(
             accumulate_vertices,
             self.S.shape[1],
             blocks(self.elements),

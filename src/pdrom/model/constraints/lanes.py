@@ -85,6 +85,29 @@ def save(work, first, lane, vector):
 
 
 @lane_function
+def load_matrix(work, first, lane):
+    """Three vectors of a ``lane`` of ``work``, the first from the number ``first`` on."""
+    return load(work, first, lane), load(work, first + 3, lane), load(work, first + 6, lane)
+
+
+@lane_function
+def save_matrix(work, first, lane, matrix):
+    """Opposite of `load_matrix`: write three vectors to ``work``."""
+    save(work, first, lane, matrix[0])
+    save(work, first + 3, lane, matrix[1])
+    save(work, first + 6, lane, matrix[2])
+
+
+@lane_function
+def unmarked(work, mark):
+    """Number of lanes of a block whose number ``mark`` of ``work`` is zero."""
+    left = 0.0
+    for lane in range(LANES):
+        left += 1.0 if work[mark * LANES + lane] == 0.0 else 0.0
+    return left
+
+
+@lane_function
 def dot(a, b):
     """Inner product of two vectors ``a`` and ``b`` of three numbers."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

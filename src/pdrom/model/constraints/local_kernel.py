@@ -7,15 +7,12 @@ second to an array of its own that is added afterwards.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
-from llvmlite import ir
 from numba import types
-from numba.extending import intrinsic
 
 from pdrom.model.compiled import rows
-from pdrom.model.compiled.functions import Callback, compiled
+from pdrom.model.compiled.functions import Callback, caller, compiled, inner
 
 # Entries of every record: number of vertices, and the units of part k are those from FIRST + k to
 # FIRST + k + 1. What a kernel has of its own begins at OWN.
@@ -39,16 +36,13 @@ def local_kernel(function):
     return Callback(function, _SIGNATURE)
 
 
-@intrinsic
-def call(_context, _address, _y, _rhs, _record, _part):
+_call_local, _call_gradients = caller(types.float64), caller(types.void)
+
+
+@inner(forceinline=True)
+def call(address, y, rhs, record, part):
     """Call a local kernel by its address, with y, rhs, record and part as in `local_kernel`."""
-
-    def generate(_target, builder, _signature, arguments):
-        integer = ir.IntType(types.intp.bitwidth)
-        kind = ir.FunctionType(ir.DoubleType(), [integer] * 4)
-        return builder.call(builder.inttoptr(arguments[0], kind.as_pointer()), arguments[1:])
-
-    return types.float64(*(types.intp,) * 5), generate
+    return _call_local(address, (y, rhs, record, part))
 
 
 @compiled(nogil=True)
@@ -64,30 +58,26 @@ def add_part(table, y, rhs):
     return energy
 
 
-@dataclass(frozen=True, eq=False)
 class LocalKernel:
     """A compiled local step with its data.
 
+    Parameters
+    ----------
     function : made by `local_kernel`; it is compiled when its address is first needed
-    record : its numbers; the ``arrays`` that they point to live as long as the kernel
+    vertices, units : how many there are
+    arrays, numbers : entries of the record from `OWN` on: the numbers, then the addresses
+    touched : function of a first unit: vertices of this and all later units, for a kernel in two
+        parts; without it there is one
     prepares : whether it wants to be called with `PREPARE`
+
+    Attributes
+    ----------
+    record : its numbers; the ``arrays`` that they point to live as long as the kernel
     touched : range of vertices that the second part adds to; empty if there is one part
     """
 
-    function: Callback
-    record: np.ndarray
-    arrays: tuple[np.ndarray, ...]
-    prepares: bool
-    touched: range
-
-    @property
-    def address(self) -> int:
-        """Address of the compiled function."""
-        return self.function.address
-
-    @classmethod
-    def of(
-        cls,
+    def __init__(
+        self,
         function: Callback,
         vertices: int,
         units: int,
@@ -95,24 +85,20 @@ class LocalKernel:
         numbers: Sequence[int],
         touched: Callable[[int], np.ndarray] | None = None,
         prepares: bool = False,
-    ) -> "LocalKernel":
-        """Kernel for ``units`` units.
-
-        Parameters
-        ----------
-        arrays, numbers : entries of the record from `OWN` on: the numbers, then the addresses
-        touched : function of a first unit: vertices of this and all later units, for a kernel in
-            two parts; without it there is one
-        prepares : whether it wants to be called with `PREPARE`
-        """
-        middle, second = units, range(0)
+    ) -> None:
+        self.function, self.arrays, self.prepares = function, tuple(arrays), prepares
+        self.touched, middle = range(0), units
         if touched is not None and units > 1:
             middle = units // 2
             later = touched(middle)
-            second = range(int(later.min()), int(later.max()) + 1)
+            self.touched = range(int(later.min()), int(later.max()) + 1)
         places = [array.ctypes.data for array in arrays]
-        record = np.array([vertices, 0, middle, units, *numbers, *places], dtype=np.int64)
-        return cls(function, record, tuple(arrays), prepares, second)
+        self.record = np.array([vertices, 0, middle, units, *numbers, *places], dtype=np.int64)
+
+    @property
+    def address(self) -> int:
+        """Address of the compiled function."""
+        return self.function.address
 
 
 @compiled(nogil=True)
@@ -199,20 +185,10 @@ def gradient_kernel(function):
     return Callback(function, _GRADIENTS)
 
 
-@intrinsic
-def call_gradients(typing_context, address, d, parameters, p, m):
+@inner(forceinline=True)
+def call_gradients(address, d, parameters, p, m):
     """Call a gradient kernel by its ``address``.
 
     ``d``, ``parameters`` and ``p``, see `gradient_kernel`, are addresses; ``m`` elements.
-    ``typing_context`` is Numba's own: callers leave it out.
     """
-    integers = (types.intp,) * 5
-
-    def generate(context, builder, signature, arguments):
-        integer = ir.IntType(types.intp.bitwidth)
-        kind = ir.FunctionType(ir.VoidType(), [integer] * 4)
-        function = builder.inttoptr(arguments[0], kind.as_pointer())
-        builder.call(function, arguments[1:])
-        return context.get_dummy_value()
-
-    return types.void(*integers), generate
+    _call_gradients(address, (d, parameters, p, m))

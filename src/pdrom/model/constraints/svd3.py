@@ -8,21 +8,24 @@ S q = F^T: vector k of a matrix is column k of F. See module `lanes` for the lay
 
 import numpy as np
 
+from pdrom.model.constraints import simplex
 from pdrom.model.constraints.lanes import (
     LANES,
     SMALLEST,
     absolute_sum,
     choose,
-    clamp,
     cross,
     dot,
     lane_function,
     load,
+    load_matrix,
     mix,
     mix3,
     perpendicular,
     save,
+    save_matrix,
     scaled,
+    unmarked,
 )
 
 SWEEPS = 12
@@ -34,11 +37,9 @@ LAST_TANGENT = 1e-8
 RANK = 1e-15
 
 
-# numbers of a lane in the working array of `clamp_block`, and with the singular values that
-# `factor_block` leaves there
-B, V, SCALE, DONE = 0, 9, 18, 19
-SIZE = 20
-SIGMA, FACTORS = 20, 23
+# numbers of a lane after those of every simplex: B, V, the scale, the mark of orthogonal columns,
+# the signed singular values, and the mark of a lane whose projection is found already
+B, V, SCALE, DONE, SIGMA, FOUND, SIZE = np.add(simplex.SIZE, [0, 9, 18, 19, 20, 23, 24]).tolist()
 
 
 @lane_function
@@ -60,10 +61,9 @@ def jacobi_rotation(a, b, done):
 @lane_function
 def _sweep(work):
     """Rotate all pairs of columns once in the lanes that are not done; number of lanes left."""
-    left = 0.0
     for lane in range(LANES):
-        b0, b1, b2 = load(work, B, lane), load(work, B + 3, lane), load(work, B + 6, lane)
-        v0, v1, v2 = load(work, V, lane), load(work, V + 3, lane), load(work, V + 6, lane)
+        b0, b1, b2 = load_matrix(work, B, lane)
+        v0, v1, v2 = load_matrix(work, V, lane)
         done = work[DONE * LANES + lane] != 0.0
         c, s, t01 = jacobi_rotation(b0, b1, done)
         b0, b1 = mix(c, b0, -s, b1), mix(s, b0, c, b1)
@@ -74,17 +74,11 @@ def _sweep(work):
         c, s, t12 = jacobi_rotation(b1, b2, done)
         b1, b2 = mix(c, b1, -s, b2), mix(s, b1, c, b2)
         v1, v2 = mix(c, v1, -s, v2), mix(s, v1, c, v2)
-        save(work, B, lane, b0)
-        save(work, B + 3, lane, b1)
-        save(work, B + 6, lane, b2)
-        save(work, V, lane, v0)
-        save(work, V + 3, lane, v1)
-        save(work, V + 6, lane, v2)
+        save_matrix(work, B, lane, (b0, b1, b2))
+        save_matrix(work, V, lane, (v0, v1, v2))
         more = 1.0 if t01 > LAST_TANGENT or t02 > LAST_TANGENT or t12 > LAST_TANGENT else 0.0
         work[DONE * LANES + lane] = 1.0 - more
-    for lane in range(LANES):
-        left += 1.0 - work[DONE * LANES + lane]
-    return left
+    return unmarked(work, DONE)
 
 
 @lane_function
@@ -118,91 +112,61 @@ def orthonormal_pair(b0, b1):
 
 
 @lane_function
-def _diagonalise(f, at_f, keep, work):
-    """Leave B = F V / scale with orthogonal columns, V and scale; lanes to ``keep`` are left."""
+def rotated_pair(f0, f1, sign):
+    """Singular value decomposition of two columns by one rotation, which needs no F^T F.
+
+    Returns the scale, the rotation's cosine and sine, whether the second column is the longer one,
+    and the directions and norms over the scale, of the longer one first; where they are exchanged,
+    the first column is taken ``sign`` times.
+    """
+    scale = absolute_sum(f0) + absolute_sum(f1) + SMALLEST
+    f0, f1 = scaled(1.0 / scale, f0), scaled(1.0 / scale, f1)
+    c, s, _ = jacobi_rotation(f0, f1, False)
+    a, b = mix(c, f0, -s, f1), mix(s, f0, c, f1)
+    swapped = dot(a, a) < dot(b, b)
+    pair = orthonormal_pair(choose(swapped, b, a), choose(swapped, scaled(sign, a), b))
+    return scale, c, s, swapped, pair
+
+
+@lane_function
+def factor_block(work):
+    """Leave U in `B`, V in `V` and the signed singular values of F, largest first, in `SIGMA`.
+
+    Of a lane that is `FOUND` they mean nothing.
+    """
     for lane in range(LANES):
-        f0, f1, f2 = load(f, at_f, lane), load(f, at_f + 3, lane), load(f, at_f + 6, lane)
+        f0, f1, f2 = load_matrix(work, simplex.F, lane)
         scale = absolute_sum(f0) + absolute_sum(f1) + absolute_sum(f2) + SMALLEST
-        save(work, B, lane, scaled(1.0 / scale, f0))
-        save(work, B + 3, lane, scaled(1.0 / scale, f1))
-        save(work, B + 6, lane, scaled(1.0 / scale, f2))
-        save(work, V, lane, (1.0, 0.0, 0.0))
-        save(work, V + 3, lane, (0.0, 1.0, 0.0))
-        save(work, V + 6, lane, (0.0, 0.0, 1.0))
+        b = scaled(1.0 / scale, f0), scaled(1.0 / scale, f1), scaled(1.0 / scale, f2)
+        save_matrix(work, B, lane, b)
+        save_matrix(work, V, lane, ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))
         work[SCALE * LANES + lane] = scale
-        work[DONE * LANES + lane] = keep[lane]
+        work[DONE * LANES + lane] = work[FOUND * LANES + lane]
     for _ in range(SWEEPS):
         if _sweep(work) == 0.0:
             break
-
-
-@lane_function
-def _factors(work, lane):
-    """Columns of U and V and the singular values over the scale, the largest first."""
-    b0, b1, b2 = load(work, B, lane), load(work, B + 3, lane), load(work, B + 6, lane)
-    v0, v1, v2 = load(work, V, lane), load(work, V + 3, lane), load(work, V + 6, lane)
-    b0, v0, b1, v1 = _larger_first(b0, v0, b1, v1)
-    b1, v1, b2, v2 = _larger_first(b1, v1, b2, v2)
-    b0, v0, b1, v1 = _larger_first(b0, v0, b1, v1)
-    u0, u1, s0, s1 = orthonormal_pair(b0, b1)
-    # U has det +1, so that the last singular value takes the sign of det F (Irving et al. 2004)
-    u2 = cross(u0, u1)
-    return (u0, u1, u2), (v0, v1, v2), (s0, s1, dot(u2, b2))
-
-
-@lane_function
-def _compose(u, v, sigma, p, at_p, lane, kept):
-    """Write U diag(sigma) V^T to P unless it is kept."""
-    u0, u1, u2 = scaled(sigma[0], u[0]), scaled(sigma[1], u[1]), scaled(sigma[2], u[2])
-    for i in range(3):
-        column = mix3(v[0][i], u0, v[1][i], u1, v[2][i], u2)
-        save(p, at_p + 3 * i, lane, choose(kept, load(p, at_p + 3 * i, lane), column))
-
-
-@lane_function
-def clamp_block(f, at_f, p, at_p, keep, low, high, work):
-    """Write the matrix nearest to F with signed singular values in [low, high] to P.
-
-    Parameters
-    ----------
-    f, at_f, p, at_p : blocks of matrices and the number at which F and P begin in them
-    keep : (LANES,) lanes with a non-zero entry keep their P
-    work : `SIZE` numbers a lane
-
-    A matrix with an entry that is not finite gives nan.
-    """
-    _diagonalise(f, at_f, keep, work)
     for lane in range(LANES):
-        u, v, s = _factors(work, lane)
-        scale = work[SCALE * LANES + lane]
-        first, second = clamp(scale * s[0], low, high), clamp(scale * s[1], low, high)
-        sigma = first + 0.0 * scale, second, clamp(scale * s[2], low, high)
-        _compose(u, v, sigma, p, at_p, lane, keep[lane] != 0.0)
+        b0, b1, b2 = load_matrix(work, B, lane)
+        v0, v1, v2 = load_matrix(work, V, lane)
+        b0, v0, b1, v1 = _larger_first(b0, v0, b1, v1)
+        b1, v1, b2, v2 = _larger_first(b1, v1, b2, v2)
+        b0, v0, b1, v1 = _larger_first(b0, v0, b1, v1)
+        u0, u1, s0, s1 = orthonormal_pair(b0, b1)
+        # U has det +1, so that the last singular value takes the sign of det F (Irving et al. 2004)
+        u2 = cross(u0, u1)
+        save_matrix(work, B, lane, (u0, u1, u2))
+        save_matrix(work, V, lane, (v0, v1, v2))
+        save(work, SIGMA, lane, scaled(work[SCALE * LANES + lane], (s0, s1, dot(u2, b2))))
 
 
 @lane_function
-def factor_block(f, at_f, keep, work):
-    """Leave U in `B`, V in `V` and the signed singular values, largest first, in `SIGMA`.
-
-    ``f``, ``at_f``, ``keep`` and ``work`` as in `clamp_block`, with `FACTORS` numbers a lane.
-    """
-    _diagonalise(f, at_f, keep, work)
+def compose_block(work):
+    """Write U diag(sigma) V^T to P from what `factor_block` left; lanes that are `FOUND` stay."""
     for lane in range(LANES):
-        u, v, s = _factors(work, lane)
+        u, v = load_matrix(work, B, lane), load_matrix(work, V, lane)
+        sigma, found = load(work, SIGMA, lane), work[FOUND * LANES + lane] != 0.0
+        u0, u1, u2 = scaled(sigma[0], u[0]), scaled(sigma[1], u[1]), scaled(sigma[2], u[2])
         for i in range(3):
-            save(work, B + 3 * i, lane, u[i])
-            save(work, V + 3 * i, lane, v[i])
-        save(work, SIGMA, lane, scaled(work[SCALE * LANES + lane], s))
-
-
-@lane_function
-def compose_block(sigma, at_sigma, p, at_p, keep, work):
-    """Write U diag(sigma) V^T to P, with the U and V that `factor_block` left in ``work``.
-
-    P and sigma begin at the numbers ``at_p`` of ``p`` and ``at_sigma`` of ``sigma``; lanes to
-    ``keep`` are left as they are.
-    """
-    for lane in range(LANES):
-        u = load(work, B, lane), load(work, B + 3, lane), load(work, B + 6, lane)
-        v = load(work, V, lane), load(work, V + 3, lane), load(work, V + 6, lane)
-        _compose(u, v, load(sigma, at_sigma, lane), p, at_p, lane, keep[lane] != 0.0)
+            place = simplex.P + 3 * i
+            column = mix3(v[0][i], u0, v[1][i], u1, v[2][i], u2)
+            save(work, place, lane, choose(found, load(work, place, lane), column))

@@ -10,31 +10,29 @@ from typing import Literal
 import numpy as np
 
 from pdrom.model.compiled.rows import at
-from pdrom.model.constraints import svd3
+from pdrom.model.constraints import singular_values, svd3
 from pdrom.model.constraints.base import GroupConfig, require_cells
 from pdrom.model.constraints.lanes import (
     LANES,
     SMALLEST,
     choose,
+    clamp,
     cross,
     dot,
     lane_function,
     load,
+    load_matrix,
     mix,
     mix3,
     save,
+    save_matrix,
     scaled,
     square_distance,
+    unmarked,
 )
 from pdrom.model.constraints.local_kernel import gradient_kernel, local_kernel
-from pdrom.model.constraints.simplex import EDGE, ENERGY, FORCE, OPERATOR, SIZE, WEIGHT, F, P
-from pdrom.model.constraints.singular_values import (
-    SingularValueGroup,
-    StrainConfig,
-    accumulate,
-    project,
-    project_gradients,
-)
+from pdrom.model.constraints.simplex import EDGE, ENERGY, FORCE, OPERATOR, WEIGHT, F, P
+from pdrom.model.constraints.svd3 import FOUND
 from pdrom.model.mesh.types import Mesh
 
 STEPS = 16
@@ -48,90 +46,68 @@ _OPEN, _FOUND, _UNSUITED = 0.0, 1.0, 2.0
 
 
 @lane_function
-def _newton_step(x0, x1, x2):
-    c0, c1, c2 = cross(x1, x2), cross(x2, x0), cross(x0, x1)
-    inverse = 0.5 / dot(x0, c0)
-    return mix(0.5, x0, inverse, c0), mix(0.5, x1, inverse, c1), mix(0.5, x2, inverse, c2)
-
-
-@lane_function
-def _start(f, at_f, p, at_p, state):
+def _start(work):
     for lane in range(LANES):
-        f0, f1, f2 = load(f, at_f, lane), load(f, at_f + 3, lane), load(f, at_f + 6, lane)
+        f0, f1, f2 = load_matrix(work, F, lane)
         square = (dot(f0, f0) + dot(f1, f1) + dot(f2, f2)) / 3.0
         inverse = 1.0 / np.sqrt(square)
         # scaled before the determinant, whose products would overflow; where the mean itself does,
         # or vanishes, F is not suited
         x0, x1, x2 = scaled(inverse, f0), scaled(inverse, f1), scaled(inverse, f2)
         suited = square > SMALLEST and dot(x0, cross(x1, x2)) > WELL_CONDITIONED
-        save(p, at_p, lane, x0)
-        save(p, at_p + 3, lane, x1)
-        save(p, at_p + 6, lane, x2)
-        state[lane] = _OPEN if suited else _UNSUITED
+        save_matrix(work, P, lane, (x0, x1, x2))
+        work[FOUND * LANES + lane] = _OPEN if suited else _UNSUITED
 
 
 @lane_function
-def _advance(p, at_p, state):
+def _advance(work):
     """One Newton step of the lanes that still iterate; the others keep their bits."""
     for lane in range(LANES):
-        x0, x1, x2 = load(p, at_p, lane), load(p, at_p + 3, lane), load(p, at_p + 6, lane)
-        n0, n1, n2 = _newton_step(x0, x1, x2)
+        x0, x1, x2 = load_matrix(work, P, lane)
+        c0, c1, c2 = cross(x1, x2), cross(x2, x0), cross(x0, x1)
+        inverse = 0.5 / dot(x0, c0)
+        n0, n1, n2 = mix(0.5, x0, inverse, c0), mix(0.5, x1, inverse, c1), mix(0.5, x2, inverse, c2)
         step = square_distance(n0, x0) + square_distance(n1, x1) + square_distance(n2, x2)
-        is_open = state[lane] == _OPEN
-        save(p, at_p, lane, choose(is_open, n0, x0))
-        save(p, at_p + 3, lane, choose(is_open, n1, x1))
-        save(p, at_p + 6, lane, choose(is_open, n2, x2))
-        state[lane] = _FOUND if is_open and step < LAST_STEP else state[lane]
+        mark = work[FOUND * LANES + lane]
+        is_open = mark == _OPEN
+        new = choose(is_open, n0, x0), choose(is_open, n1, x1), choose(is_open, n2, x2)
+        save_matrix(work, P, lane, new)
+        work[FOUND * LANES + lane] = _FOUND if is_open and step < LAST_STEP else mark
 
 
 @lane_function
-def rotation_block(f, at_f, p, at_p, found):
-    """Write the nearest rotations of the suited matrices to P.
-
-    Parameters
-    ----------
-    f, at_f, p, at_p : blocks of matrices and the number at which F and P begin in them
-    found : (LANES,) set to 1 where P is the rotation and to 0 where F is not suited
-    """
-    _start(f, at_f, p, at_p, found)
+def _rotations(work):
+    """Write the nearest rotations of the suited F to P and mark them, and no other, as found."""
+    _start(work)
     for _ in range(STEPS):
-        _advance(p, at_p, found)
-        open_lanes = 0.0
-        for lane in range(LANES):
-            open_lanes += 1.0 if found[lane] == _OPEN else 0.0
-        if open_lanes == 0.0:
+        _advance(work)
+        if unmarked(work, FOUND) == 0.0:
             break
     for lane in range(LANES):
-        found[lane] = 1.0 if found[lane] == _FOUND else 0.0
+        mark = work[FOUND * LANES + lane]
+        work[FOUND * LANES + lane] = 1.0 if mark == _FOUND else 0.0
 
 
 @lane_function
-def within_range_block(f, at_f, p, at_p, low, high, found):
-    """Copy F to P, and set ``found`` to 1 where its singular values surely lie in the range.
-
-    F and P begin at the numbers ``at_f`` of ``f`` and ``at_p`` of ``p``; the range is [low, high].
+def _within_range(work, low, high):
+    """Copy F to P, and mark it as found where its singular values surely are in [low, high].
 
     Sufficient: |F^T F - I|_F bounds the distance of every squared singular value from 1, and
     det F > 0.
     """
     slack = min(1.0 - low * low, high * high - 1.0)
     for lane in range(LANES):
-        f0, f1, f2 = load(f, at_f, lane), load(f, at_f + 3, lane), load(f, at_f + 6, lane)
+        f0, f1, f2 = load_matrix(work, F, lane)
         g0, g1, g2 = dot(f0, f0) - 1.0, dot(f1, f1) - 1.0, dot(f2, f2) - 1.0
         h0, h1, h2 = dot(f1, f2), dot(f2, f0), dot(f0, f1)
         distance = g0 * g0 + g1 * g1 + g2 * g2 + 2.0 * (h0 * h0 + h1 * h1 + h2 * h2)
         inside = distance < slack * slack and dot(f0, cross(f1, f2)) > 0.0
-        save(p, at_p, lane, f0)
-        save(p, at_p + 3, lane, f1)
-        save(p, at_p + 6, lane, f2)
-        found[lane] = 1.0 if inside else 0.0
+        save_matrix(work, P, lane, (f0, f1, f2))
+        work[FOUND * LANES + lane] = 1.0 if inside else 0.0
 
 
 # numbers of a lane in the packed geometry
 GEOMETRY = 10
-# where the working array of svd3 and the marks of finished lanes begin
-SVD, FOUND = SIZE, SIZE + svd3.SIZE
-WORK = FOUND + 1
 
 
 @lane_function
@@ -139,7 +115,7 @@ def gradients(work, geometry, block):
     """S q = F^T of a ``block`` of the packed ``geometry`` from its edges, in ``work``."""
     start = block * GEOMETRY + OPERATOR
     for lane in range(LANES):
-        e0, e1, e2 = load(work, EDGE, lane), load(work, EDGE + 3, lane), load(work, EDGE + 6, lane)
+        e0, e1, e2 = load_matrix(work, EDGE, lane)
         for i in range(3):
             row = load(geometry, start + 3 * i, lane)
             save(work, F + 3 * i, lane, mix3(row[0], e0, row[1], e1, row[2], e2))
@@ -147,17 +123,22 @@ def gradients(work, geometry, block):
 
 @lane_function
 def _nearest(work, low, high):
-    """Projections of a block: the cheap cases first, the SVD where a lane is left."""
-    found = work[FOUND * LANES : (FOUND + 1) * LANES]
+    """Projections of a block: the cheap cases first, the SVD where a lane is left.
+
+    A matrix with an entry that is not finite gives nan.
+    """
     if low == high == 1.0:
-        rotation_block(work, F, work, P, found)
+        _rotations(work)
     else:
-        within_range_block(work, F, work, P, low, high, found)
-    left = 0.0
-    for lane in range(LANES):
-        left += 1.0 - found[lane]
-    if left > 0.0:
-        svd3.clamp_block(work, F, work, P, found, low, high, work[SVD * LANES :])
+        _within_range(work, low, high)
+    if unmarked(work, FOUND) > 0.0:
+        svd3.factor_block(work)
+        for lane in range(LANES):
+            s, scale = load(work, svd3.SIGMA, lane), work[svd3.SCALE * LANES + lane]
+            first = clamp(s[0], low, high) + 0.0 * scale
+            sigma = first, clamp(s[1], low, high), clamp(s[2], low, high)
+            save(work, svd3.SIGMA, lane, sigma)
+        svd3.compose_block(work)
 
 
 @lane_function
@@ -168,43 +149,39 @@ def forces(work, geometry, block):
     """
     weight, start = block * GEOMETRY + WEIGHT, block * GEOMETRY + OPERATOR
     for lane in range(LANES):
-        p0, p1, p2 = load(work, P, lane), load(work, P + 3, lane), load(work, P + 6, lane)
-        r0, r1, r2 = (
-            load(geometry, start, lane), load(geometry, start + 3, lane),
-            load(geometry, start + 6, lane),
-        )  # fmt: skip
+        f0, f1, f2 = load_matrix(work, F, lane)
+        p0, p1, p2 = load_matrix(work, P, lane)
+        r0, r1, r2 = load_matrix(geometry, start, lane)
         w = at(geometry, weight * LANES + lane)
         for corner in range(3):
             force = mix3(r0[corner], p0, r1[corner], p1, r2[corner], p2)
             save(work, FORCE + 3 * corner, lane, scaled(w, force))
         work[ENERGY * LANES + lane] += w * (
-            square_distance(load(work, F, lane), p0)
-            + square_distance(load(work, F + 3, lane), p1)
-            + square_distance(load(work, F + 6, lane), p2)
+            square_distance(f0, p0) + square_distance(f1, p1) + square_distance(f2, p2)
         )
 
 
 @local_kernel
 def _project(y, p, record, part):
-    return project(y, p, record, part, 3, gradients, _nearest)
+    return singular_values.project(y, p, record, part, 3, gradients, _nearest)
 
 
 @local_kernel
 def _accumulate(y, rhs, record, part):
-    return accumulate(y, rhs, record, part, 3, gradients, _nearest, forces)
+    return singular_values.accumulate(y, rhs, record, part, 3, gradients, _nearest, forces)
 
 
 @gradient_kernel
 def _project_gradients(d, allowed, p, m):
-    project_gradients(d, allowed, p, m, 3, WORK, _nearest)
+    singular_values.project_gradients(d, allowed, p, m, 3, svd3.SIZE, _nearest)
 
 
-class TetrahedronGroup(SingularValueGroup):
+class TetrahedronGroup(singular_values.SingularValueGroup):
     """One constraint per tetrahedron on the signed singular values of F, weight w V_t."""
 
     cells = "tetrahedron"
     rows_per_element = 3
-    work_size = WORK
+    work_size = svd3.SIZE
     split_from = 1024
     project_kernel = _project
     accumulate_kernel = _accumulate
@@ -222,7 +199,7 @@ class TetrahedronGroup(SingularValueGroup):
 class TetrahedronStrain(TetrahedronGroup):
     """Clamps to [minimum, maximum] > 0: an inverted tetrahedron is turned right side out."""
 
-    class Config(StrainConfig):
+    class Config(singular_values.StrainConfig):
         """Weight w per volume, N/m^2."""
 
         effect: Literal["tetrahedron_strain"] = "tetrahedron_strain"

@@ -16,11 +16,10 @@ from typing import Literal
 import numpy as np
 
 from pdrom.model.compiled.rows import at
+from pdrom.model.constraints import singular_values
 from pdrom.model.constraints.base import require_cells
 from pdrom.model.constraints.lanes import (
     LANES,
-    SMALLEST,
-    absolute_sum,
     choose,
     clamp,
     cross,
@@ -31,17 +30,11 @@ from pdrom.model.constraints.lanes import (
     save,
     scaled,
     square_distance,
+    unmarked,
 )
 from pdrom.model.constraints.local_kernel import gradient_kernel, local_kernel
 from pdrom.model.constraints.simplex import EDGE, ENERGY, FORCE, OPERATOR, SIZE, WEIGHT, F, P
-from pdrom.model.constraints.singular_values import (
-    SingularValueGroup,
-    StrainConfig,
-    accumulate,
-    project,
-    project_gradients,
-)
-from pdrom.model.constraints.svd3 import jacobi_rotation, orthonormal_pair
+from pdrom.model.constraints.svd3 import rotated_pair
 from pdrom.model.mesh.types import Mesh
 
 # sigma_1 sigma_2 over the mean of their squares: below it a matrix is nearly flat
@@ -79,17 +72,9 @@ def _closed_form(f0, f1, low, high):
 
 @lane_function
 def _rotated(f0, f1, low, high):
-    """Nearest matrix by one rotation that makes the columns orthogonal.
-
-    Their norms are the singular values. Working on F, not on F^T F, keeps small singular values
-    accurate.
-    """
-    scale = absolute_sum(f0) + absolute_sum(f1) + SMALLEST
-    f0, f1 = scaled(1.0 / scale, f0), scaled(1.0 / scale, f1)
-    c, s, _ = jacobi_rotation(f0, f1, False)
-    a, b = mix(c, f0, -s, f1), mix(s, f0, c, f1)
-    swapped = dot(a, a) < dot(b, b)
-    u0, u1, s0, s1 = orthonormal_pair(choose(swapped, b, a), choose(swapped, a, b))
+    """Nearest matrix by one rotation that makes the columns orthogonal."""
+    scale, c, s, swapped, pair = rotated_pair(f0, f1, 1.0)
+    u0, u1, s0, s1 = pair
     # not finite where F is not
     u0 = scaled(clamp(scale * s0, low, high) + 0.0 * scale, u0)
     u1 = scaled(clamp(scale * s1, low, high), u1)
@@ -97,33 +82,9 @@ def _rotated(f0, f1, low, high):
     return mix(c, a, s, b), mix(c, b, -s, a)
 
 
-@lane_function
-def clamp_block(work, at_f, at_p, at_found, low, high):
-    """Write the matrices nearest to F with singular values in [low, high] to P, in ``work``.
-
-    at_f, at_p, at_found : numbers of the working array at which F, P and marks of the lanes begin
-
-    A matrix with an entry that is not finite gives nan.
-    """
-    left = 0.0
-    for lane in range(LANES):
-        p0, p1, suited = _closed_form(load(work, at_f, lane), load(work, at_f + 3, lane), low, high)
-        save(work, at_p, lane, p0)
-        save(work, at_p + 3, lane, p1)
-        work[at_found * LANES + lane] = 1.0 if suited else 0.0
-    for lane in range(LANES):
-        left += 1.0 - work[at_found * LANES + lane]
-    if left > 0.0:
-        for lane in range(LANES):
-            found = work[at_found * LANES + lane] != 0.0
-            p0, p1 = _rotated(load(work, at_f, lane), load(work, at_f + 3, lane), low, high)
-            save(work, at_p, lane, choose(found, load(work, at_p, lane), p0))
-            save(work, at_p + 3, lane, choose(found, load(work, at_p + 3, lane), p1))
-
-
 # numbers of a lane in the packed geometry
 GEOMETRY = 5
-# where the marks of `clamp_block` begin in the working array
+# where the marks of matrices that the closed form suits begin in the working array
 FOUND, WORK = SIZE, SIZE + 1
 
 
@@ -161,23 +122,33 @@ def forces(work, geometry, block):
 
 @lane_function
 def _nearest(work, low, high):
-    """Projections of a block."""
-    clamp_block(work, F, P, FOUND, low, high)
+    """Projections of a block. A matrix with an entry that is not finite gives nan."""
+    for lane in range(LANES):
+        p0, p1, suited = _closed_form(load(work, F, lane), load(work, F + 3, lane), low, high)
+        save(work, P, lane, p0)
+        save(work, P + 3, lane, p1)
+        work[FOUND * LANES + lane] = 1.0 if suited else 0.0
+    if unmarked(work, FOUND) > 0.0:
+        for lane in range(LANES):
+            found = work[FOUND * LANES + lane] != 0.0
+            p0, p1 = _rotated(load(work, F, lane), load(work, F + 3, lane), low, high)
+            save(work, P, lane, choose(found, load(work, P, lane), p0))
+            save(work, P + 3, lane, choose(found, load(work, P + 3, lane), p1))
 
 
 @local_kernel
 def _project(y, p, record, part):
-    return project(y, p, record, part, 2, gradients, _nearest)
+    return singular_values.project(y, p, record, part, 2, gradients, _nearest)
 
 
 @local_kernel
 def _accumulate(y, rhs, record, part):
-    return accumulate(y, rhs, record, part, 2, gradients, _nearest, forces)
+    return singular_values.accumulate(y, rhs, record, part, 2, gradients, _nearest, forces)
 
 
 @gradient_kernel
 def _project_gradients(d, allowed, p, m):
-    project_gradients(d, allowed, p, m, 2, WORK, _nearest)
+    singular_values.project_gradients(d, allowed, p, m, 2, WORK, _nearest)
 
 
 def rest_frames(points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -201,10 +172,10 @@ def rest_frames(points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, 
     return inverse, area
 
 
-class TriangleStrain(SingularValueGroup):
+class TriangleStrain(singular_values.SingularValueGroup):
     """One constraint per triangle, weight w A_t."""
 
-    class Config(StrainConfig):
+    class Config(singular_values.StrainConfig):
         """Weight w per area, N/m (times the clamped strain)."""
 
         effect: Literal["strain"] = "strain"

@@ -7,7 +7,6 @@ the more zeros it stores. Which columns go together is decided by dynamic progra
 processor cycles.
 """
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -27,9 +26,15 @@ from pdrom.model.dynamics.sweeps import SWEEP, WIDTHS, load, sweep
 PANEL, ROW, ENTRY = 20.0, 1.0, 0.5
 
 
-@dataclass(frozen=True)
-class Panels:
-    """L D L^T = A with a unit lower triangular L (n, n), by panels.
+def panels(lower: sparse.csc_array, diagonal: np.ndarray) -> tuple[Any, ...]:
+    """L D L^T = A by panels, from L = ``lower`` (n, n) and D = ``diagonal`` (n,).
+
+    L is unit lower triangular with ascending row indices.
+
+    Returns
+    -------
+    The first argument of `pdrom.model.dynamics.sweeps.sweep`: the arrays, and the function's
+    address.
 
     first : (P + 1,) first column of each panel
     row_start, value_start : (P + 1,) where its rows and numbers begin
@@ -37,41 +42,27 @@ class Panels:
     values : of each panel with w columns 1 / D (w), the triangle of L row by row without its
         diagonal, then the rows below (m, w)
     """
-
-    first: np.ndarray
-    row_start: np.ndarray
-    value_start: np.ndarray
-    rows: np.ndarray
-    values: np.ndarray
-
-    @classmethod
-    def of(cls, lower: sparse.csc_array, diagonal: np.ndarray) -> "Panels":
-        """Panels of L = ``lower`` (n, n) with ascending row indices and D = ``diagonal`` (n,)."""
-        n = lower.shape[0]
-        below = np.zeros((max(WIDTHS) + 1, n), np.int64)
-        _count_rows_below(lower.indptr, lower.indices, np.full(n, -1), below)
-        ends = _partition(below)
-        width = np.diff(ends, prepend=0)
-        rows = below[width, ends - 1]
-        first = np.concatenate([[0], ends]).astype(np.int32)
-        row_start = np.concatenate([[0], np.cumsum(rows)])
-        own = width + width * (width - 1) // 2
-        value_start = np.concatenate([[0], np.cumsum(own + rows * width)])
-        panels = cls(
-            first, row_start, value_start, np.empty(row_start[-1], np.int32),
-            np.zeros(value_start[-1]),
-        )  # fmt: skip
-        _fill(
-            lower.indptr, lower.indices, lower.data, 1.0 / diagonal, first, row_start, value_start,
-            panels.rows, panels.values, np.full(n, -1),
-        )  # fmt: skip
-        return panels
-
-    @property
-    def factor(self) -> tuple[Any, ...]:
-        """First argument of `pdrom.model.dynamics.sweeps.sweep`."""
-        arrays = self.first, self.row_start, self.value_start, self.rows, self.values
-        return *arrays, SWEEP.address
+    n = lower.shape[0]
+    below = np.zeros((max(WIDTHS) + 1, n), np.int64)
+    _count_rows_below(lower.indptr, lower.indices, np.full(n, -1), below)
+    chosen, column, columns = np.zeros(n + 1, np.int64), n, []
+    _choose(below, np.array(WIDTHS), np.full(n + 1, np.inf), chosen)
+    while column > 0:
+        columns.append(column)
+        column -= int(chosen[column])
+    ends = np.array(columns[::-1], np.int64)
+    width = np.diff(ends, prepend=0)
+    count = below[width, ends - 1]
+    first = np.concatenate([[0], ends]).astype(np.int32)
+    row_start = np.concatenate([[0], np.cumsum(count)])
+    own = width + width * (width - 1) // 2
+    value_start = np.concatenate([[0], np.cumsum(own + count * width)])
+    rows, values = np.empty(row_start[-1], np.int32), np.zeros(value_start[-1])
+    _fill(
+        lower.indptr, lower.indices, lower.data, 1.0 / diagonal, first, row_start, value_start,
+        rows, values, np.full(n, -1),
+    )  # fmt: skip
+    return first, row_start, value_start, rows, values, SWEEP.address
 
 
 @compiled
@@ -91,19 +82,6 @@ def _count_rows_below(indptr, indices, seen, below):
                     seen[row] = j
                     count += 1
             below[width, j] = count
-
-
-def _partition(below: np.ndarray) -> np.ndarray:
-    """End column (exclusive) of each panel in the cheapest partition, ascending."""
-    n = below.shape[1]
-    chosen = np.zeros(n + 1, np.int64)
-    _choose(below, np.array(WIDTHS), np.full(n + 1, np.inf), chosen)
-    ends = []
-    end = n
-    while end > 0:
-        ends.append(end)
-        end -= int(chosen[end])
-    return np.array(ends[::-1], np.int64)
 
 
 @compiled
@@ -235,11 +213,10 @@ class SupernodalSolver(SuperLUSolver):
     def _take(self, factor: SuperLU) -> None:
         lower = sparse.csc_array(factor.L)
         lower.sort_indices()
-        panels = Panels.of(lower, factor.U.diagonal())
         unknowns = np.argsort(factor.perm_c)
         order = self._vertices[unknowns].astype(np.int32)
         loads, work = rows.zeros(rows.WIDTH * len(order)), rows.empty(rows.WIDTH * len(order))
-        self.factor = panels.factor, order, loads, work
+        self.factor = panels(lower, factor.U.diagonal()), order, loads, work
         if self._held is not None:
             own = sparse.csr_array(self._held[unknowns])
             # few unknowns have a held neighbour

@@ -23,7 +23,7 @@ from typing import Annotated, Any, ClassVar, Self
 import numpy as np
 from pydantic import BeforeValidator, Field, SerializeAsAny, ValidationError
 
-from pdrom.core.errors import ConfigurationError, SceneError
+from pdrom.core.errors import ConfigurationError
 from pdrom.core.yamlfile import ConfigModel, describe, shown
 from pdrom.model.effects import EFFECTS
 from pdrom.model.mesh.types import Length, Mesh
@@ -245,14 +245,6 @@ def _typed(entries: Any) -> tuple[EffectConfig, ...]:
 
 
 EffectConfigs = Annotated[tuple[SerializeAsAny[EffectConfig], ...], BeforeValidator(_typed)]
-
-
-def bind(config: EffectConfig, scene: str, mesh: Mesh, masses: np.ndarray) -> Effect:
-    """Effect ``config`` on a mesh of ``masses`` (N,) kg; SceneError names ``scene`` and effect."""
-    try:
-        return EFFECTS.load(config.effect)(config, mesh, masses)
-    except SceneError as error:
-        raise SceneError(f"scene '{scene}', effect '{config.effect}': {error}") from error
 
 
 def held_vertices(boundaries: Sequence[Boundary], frame: int) -> np.ndarray:

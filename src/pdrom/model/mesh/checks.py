@@ -6,6 +6,7 @@ from scipy.sparse import csgraph
 
 from pdrom.core.errors import DegenerateElementError, MeshError
 from pdrom.core.store import require_finite
+from pdrom.model.mesh.generators import boundary, orient
 from pdrom.model.mesh.types import MAX_LENGTH, MIN_LENGTH, Mesh
 
 # An element is degenerate when its measure is below this fraction of its longest edge's power.
@@ -34,6 +35,23 @@ def check_mesh(mesh: Mesh, name: str) -> Mesh:
     _check_vertices(mesh, cells, name)
     _check_measures(mesh, cells, kind, name)
     return mesh
+
+
+def mesh_of(points: np.ndarray, cells: np.ndarray, name: str) -> Mesh:
+    """Mesh of points (N, 3) m and of triangles (T, 3) or tetrahedra (E, 4), which are oriented.
+
+    Raises
+    ------
+    MeshError, DegenerateElementError
+        See `check_indices`; ``name`` opens the message.
+    """
+    if cells.shape[1] == 3:
+        check_indices(cells, len(points), "triangle", name=name)
+        return Mesh(points, cells.astype(np.int32))
+    check_indices(cells, len(points), "tetrahedron", name=name)
+    # formats differ in how they number the corners
+    tetrahedra = orient(points, cells)
+    return Mesh(points, boundary(tetrahedra), tetrahedra)
 
 
 def check_indices(cells: np.ndarray, vertices: int, kind: str, name: str) -> None:
@@ -150,19 +168,19 @@ def _check_measures(mesh: Mesh, cells: np.ndarray, kind: str, name: str) -> None
         )
 
 
-def turned_alike(triangles: np.ndarray, name: str) -> np.ndarray:
-    """Mark the triangles (T,) bool to turn over so that neighbours see a side from the same side.
+def turned_alike(mesh: Mesh, name: str) -> tuple[Mesh, np.ndarray]:
+    """Turn triangles over so that neighbours see a side from the same side; which ones (n,).
 
-    In each connected part the fewer ones are turned. Two copies of every triangle, as it is and
-    turned over, are joined with those of a neighbour that agree with them: a part of the surface
-    has two sides if this graph falls into two.
+    In each connected part of the surface ``mesh`` the fewer ones are turned. Two copies of every
+    triangle, as it is and turned over, are joined with those of a neighbour that agree with them: a
+    part of the surface has two sides if this graph falls into two.
 
     Raises
     ------
     MeshError
         A part has one side only, as Möbius' strip; ``name`` opens the message.
     """
-    t = len(triangles)
+    triangles, t = mesh.triangles, len(mesh.triangles)
     edges = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
     order = np.lexsort(np.sort(edges, axis=1).T)
     ends = np.sort(edges, axis=1)[order]
@@ -182,5 +200,7 @@ def turned_alike(triangles: np.ndarray, name: str) -> np.ndarray:
             "only, so that its triangles cannot be turned the same way"
         )
     part, side = np.min(labels, axis=0), labels[0] > labels[1]
-    turned = np.bincount(part, side, minlength=2 * t)
-    return side ^ (2.0 * turned > np.bincount(part, minlength=2 * t))[part]
+    count = np.bincount(part, side, minlength=2 * t)
+    turned = side ^ (2.0 * count > np.bincount(part, minlength=2 * t))[part]
+    alike = np.where(turned[:, None], triangles[:, ::-1], triangles)
+    return Mesh(mesh.points, alike), np.flatnonzero(turned)

@@ -6,16 +6,16 @@ import logging
 import re
 from math import prod
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field, field_validator, model_validator
 
 from pdrom.core.errors import MeshError
 from pdrom.core.yamlfile import ConfigModel, check_lengths
-from pdrom.model.mesh.checks import check_indices, check_mesh, check_range, turned_alike
+from pdrom.model.mesh.checks import check_mesh, check_range, mesh_of, turned_alike
 from pdrom.model.mesh.files import MAX_VERTICES, read_mesh_file
-from pdrom.model.mesh.generators import Plane, bar, boundary, cloth, orient
+from pdrom.model.mesh.generators import Plane, bar, cloth
 from pdrom.model.mesh.types import Length, Mesh, PositiveLength
 
 log = logging.getLogger(__name__)
@@ -26,7 +26,7 @@ class MeshModel(ConfigModel):
 
     @property
     def label(self) -> str:
-        """Name of the mesh in messages and file names."""
+        """Readable name of the mesh in messages and file names."""
         raise NotImplementedError(f"{type(self).__name__} has no label")
 
     @property
@@ -40,20 +40,46 @@ class MeshModel(ConfigModel):
         """Files of the project that the mesh is read from; none for one that is generated."""
         return []
 
+    def coarsened(self, factor: float) -> Self:
+        """The mesh itself, whatever ``factor``: a file, or given arrays, have one resolution."""
+        return self
+
+    def build(self, root: Path) -> Mesh:
+        """Generate the mesh, or read it below ``root``."""
+        raise NotImplementedError(f"{type(self).__name__} has no mesh")
+
 
 _DIGITS = 32  # of a digest
 Count = Annotated[int, Field(ge=2, le=2000)]
 
 
-def _check_size(**counts: int) -> None:
-    total = prod(counts.values())
-    if total > MAX_VERTICES:
-        product = " x ".join(f"{name} = {count}" for name, count in counts.items())
-        raise ValueError(f"{product} are {total} vertices, allowed: at most {MAX_VERTICES}")
+class GeneratedMesh(MeshModel):
+    """Vertices in rows along two or three sides, whose keys are `sides`."""
+
+    sides: ClassVar[tuple[str, ...]]
+    least: ClassVar[int]
+    """Vertices that a side keeps when the mesh is made coarser."""
+
+    @model_validator(mode="after")
+    def _not_too_large(self) -> Self:
+        counts = self.model_dump(include=set(self.sides))
+        total = prod(counts.values())
+        if total > MAX_VERTICES:
+            product = " x ".join(f"{name} = {count}" for name, count in counts.items())
+            raise ValueError(f"{product} are {total} vertices, allowed: at most {MAX_VERTICES}")
+        return self
+
+    def coarsened(self, factor: float) -> Self:
+        """Same shape with ``factor`` times the vertices along each side, at least `least`."""
+        sizes = {name: max(self.least, round(getattr(self, name) * factor)) for name in self.sides}
+        return self.model_copy(update=sizes)
 
 
-class ClothMesh(MeshModel):
+class ClothMesh(GeneratedMesh):
     """Sheet of the generator `pdrom.model.mesh.generators.cloth`; lengths in metres."""
+
+    sides = ("rows", "columns")
+    least = 4
 
     kind: Literal["cloth"]
     rows: Count = 20
@@ -63,30 +89,21 @@ class ClothMesh(MeshModel):
     lift: Length = 2.0
     wave: Length = 0.0
 
-    @model_validator(mode="after")
-    def _not_too_large(self) -> Self:
-        _check_size(rows=self.rows, columns=self.columns)
-        return self
-
-    def coarsened(self, factor: float) -> Self:
-        """Same sheet with ``factor`` times the vertices along each side, at least 4."""
-        sizes = {name: max(4, round(getattr(self, name) * factor)) for name in ("rows", "columns")}
-        return self.model_copy(update=sizes)
-
     def build(self, root: Path) -> Mesh:
-        """Generate the mesh; nothing is read below ``root``."""
         return cloth(
             self.rows, self.columns, self.plane, extent=self.extent, lift=self.lift, wave=self.wave
         )
 
     @property
     def label(self) -> str:
-        """Readable part of the mesh's file name."""
         return f"cloth_{self.rows}x{self.columns}_{self.plane}"
 
 
-class BarMesh(MeshModel):
+class BarMesh(GeneratedMesh):
     """Bar of the generator `pdrom.model.mesh.generators.bar`; lengths in metres."""
+
+    sides = ("nx", "ny", "nz")
+    least = 3
 
     kind: Literal["bar"]
     nx: Count = 40
@@ -95,23 +112,11 @@ class BarMesh(MeshModel):
     extent: PositiveLength = 1.0
     lift: Length = 2.0
 
-    @model_validator(mode="after")
-    def _not_too_large(self) -> Self:
-        _check_size(nx=self.nx, ny=self.ny, nz=self.nz)
-        return self
-
-    def coarsened(self, factor: float) -> Self:
-        """Same bar with ``factor`` times the vertices along each side, at least 3."""
-        sizes = {name: max(3, round(getattr(self, name) * factor)) for name in ("nx", "ny", "nz")}
-        return self.model_copy(update=sizes)
-
     def build(self, root: Path) -> Mesh:
-        """Generate the mesh; nothing is read below ``root``."""
         return bar(self.nx, self.ny, self.nz, extent=self.extent, lift=self.lift)
 
     @property
     def label(self) -> str:
-        """Readable part of the mesh's file name."""
         return f"bar_{self.nx}x{self.ny}x{self.nz}"
 
 
@@ -139,10 +144,6 @@ class MeshFile(MeshModel):
         """The mesh of a scene that lies in ``folder``, named from where that begins."""
         return self.model_copy(update={"path": f"{folder}/{self.path}"})
 
-    def coarsened(self, factor: float) -> Self:
-        """The mesh itself, whatever ``factor``: a mesh file has one resolution."""
-        return self
-
     def build(self, root: Path) -> Mesh:
         """Read the mesh file below ``root``, all triangles turned the same way round.
 
@@ -156,23 +157,19 @@ class MeshFile(MeshModel):
         check_range(mesh.points, self.scale, self.path)
         scaled = Mesh(mesh.points * self.scale, mesh.triangles, mesh.tetrahedra)
         check_mesh(scaled, self.path)
-        return scaled if len(scaled.tetrahedra) else self._turned(scaled)
-
-    def _turned(self, mesh: Mesh) -> Mesh:
-        turned = turned_alike(mesh.triangles, self.path)
-        if not turned.any():
-            return mesh
-        log.warning(
-            "%s: %d of %d triangles are listed the other way round than their neighbours, the "
-            "first is %d: they are turned over",
-            self.path, turned.sum(), len(turned), np.argmax(turned),
-        )  # fmt: skip
-        triangles = np.where(turned[:, None], mesh.triangles[:, ::-1], mesh.triangles)
-        return Mesh(mesh.points, triangles)
+        if len(scaled.tetrahedra):
+            return scaled
+        alike, turned = turned_alike(scaled, self.path)
+        if len(turned):
+            log.warning(
+                "%s: %d of %d triangles are listed the other way round than their neighbours, the "
+                "first is %d: they are turned over",
+                self.path, len(turned), len(alike.triangles), turned[0],
+            )  # fmt: skip
+        return alike
 
     @property
     def sources(self) -> list[str]:
-        """The mesh file."""
         return [self.path]
 
     def file(self, root: Path) -> Path:
@@ -188,7 +185,6 @@ class MeshFile(MeshModel):
 
     @property
     def label(self) -> str:
-        """Readable part of the mesh's file name."""
         return re.sub(r"[^A-Za-z0-9_-]", "_", Path(self.path).stem)[:40]
 
 
@@ -210,17 +206,12 @@ class GivenMesh(MeshModel):
             digest.update(np.ascontiguousarray(array).tobytes())
         return cls(kind="given", blake2b=digest.hexdigest())
 
-    def coarsened(self, factor: float) -> Self:
-        """The arrays themselves, whatever ``factor``: they have one resolution."""
-        return self
-
     def build(self, root: Path) -> Mesh:
         """MeshError, whatever ``root``: there are no arrays in a configuration."""
         raise MeshError("mesh.kind = 'given': its arrays come from Python (pdrom.api.build_scene)")
 
     @property
     def label(self) -> str:
-        """Readable part of the mesh's file name."""
         return "given"
 
 
@@ -244,14 +235,8 @@ def given_mesh(points: Any, cells: Any, name: str) -> Mesh:
     if not len(points) or not len(cells):
         raise MeshError(f"{name}: {len(points)} points and {len(cells)} cells, both are required")
     check_range(points, 1.0, name)
-    if cells.shape[1] == 4:
-        check_indices(cells, len(points), "tetrahedron", name=name)
-        tetrahedra = orient(points, cells)
-        return Mesh(points, boundary(tetrahedra), tetrahedra)
-    check_indices(cells, len(points), "triangle", name=name)
-    turned = turned_alike(cells, name)
-    triangles = np.where(turned[:, None], cells[:, ::-1], cells)
-    return Mesh(points, triangles.astype(np.int32))
+    mesh = mesh_of(points, cells, name)
+    return mesh if len(mesh.tetrahedra) else turned_alike(mesh, name)[0]
 
 
 def _array(values: Any, name: str, kind: type[np.generic], widths: tuple[int, ...]) -> np.ndarray:

@@ -16,8 +16,7 @@ import numpy as np
 from pdrom.core.errors import ConfigurationError, MeshError
 from pdrom.core.yamlfile import shown
 from pdrom.model.mesh import reader
-from pdrom.model.mesh.checks import check_indices
-from pdrom.model.mesh.generators import boundary, orient
+from pdrom.model.mesh.checks import mesh_of
 from pdrom.model.mesh.types import Mesh
 
 # A cloth of this size needs about 1 GB while its operators are built.
@@ -133,13 +132,7 @@ def read_mesh_file(path: Path) -> Mesh:
     except OSError as error:
         raise MeshError(f"{path}: cannot be read ({error.strerror})") from error
     points, cells = _arrays(path, digest, limits)
-    kind = "triangle" if cells.shape[1] == 3 else "tetrahedron"
-    check_indices(cells, len(points), kind, name=str(path))
-    if kind == "triangle":
-        return Mesh(points.copy(), cells.astype(np.int32))
-    # formats differ in how they number the corners
-    tetrahedra = orient(points, cells)
-    return Mesh(points.copy(), boundary(tetrahedra), tetrahedra)
+    return mesh_of(points.copy(), cells, str(path))
 
 
 @lru_cache(maxsize=8)

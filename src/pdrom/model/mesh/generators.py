@@ -47,14 +47,16 @@ def cloth(
     return Mesh(points, pairs.reshape(-1, 3).astype(np.int32))
 
 
-def bar(
-    nx: int, ny: int, nz: int, extent: float = 1.0, lift: float = 2.0, exchanged: bool = False
-) -> Mesh:
+# Corners of a cell are numbered by the bits of (di, dj, dk); the inner tetrahedron comes first.
+_EVEN = ((0, 3, 5, 6), (1, 0, 3, 5), (2, 0, 6, 3), (4, 0, 5, 6), (7, 3, 6, 5))
+_ODD = ((1, 2, 4, 7), (0, 1, 2, 4), (3, 1, 7, 2), (5, 1, 4, 7), (6, 2, 7, 4))
+
+
+def bar(nx: int, ny: int, nz: int, extent: float = 1.0, lift: float = 2.0) -> Mesh:
     """Bar of nx x ny x nz vertices with cubic cells, five tetrahedra a cell, alternating parity.
 
     Vertex (i, j, k) has index ``(i * ny + j) * nz + k``. Neighbouring cells mirror each other so
-    that their face diagonals meet; ``exchanged`` gives each cell the pattern of its neighbours.
-    Centred, longest side ``extent`` metres, lifted along y.
+    that their face diagonals meet. Centred, longest side ``extent`` metres, lifted along y.
 
     Parameters
     ----------
@@ -65,25 +67,15 @@ def bar(
     axes = [(np.arange(n) - 0.5 * (n - 1)) * spacing for n in counts]
     points = np.stack([a.ravel() for a in np.meshgrid(*axes, indexing="ij")], axis=1)
     points[:, 1] += lift
-    tetrahedra = orient(points, _bar_tetrahedra(nx, ny, nz, 0 if exchanged else 1))
-    return Mesh(points, boundary(tetrahedra), tetrahedra)
-
-
-# Corners of a cell are numbered by the bits of (di, dj, dk); the inner tetrahedron comes first.
-_EVEN = ((0, 3, 5, 6), (1, 0, 3, 5), (2, 0, 6, 3), (4, 0, 5, 6), (7, 3, 6, 5))
-_ODD = ((1, 2, 4, 7), (0, 1, 2, 4), (3, 1, 7, 2), (5, 1, 4, 7), (6, 2, 7, 4))
-
-
-def _bar_tetrahedra(nx: int, ny: int, nz: int, parity: int) -> np.ndarray:
-    cells = np.stack(
-        [a.ravel() for a in np.meshgrid(*(range(n - 1) for n in (nx, ny, nz)), indexing="ij")], 1
-    )
+    cells = np.indices((nx - 1, ny - 1, nz - 1)).reshape(3, -1).T
     shifts = np.array([[b >> 2 & 1, b >> 1 & 1, b & 1] for b in range(8)])
     corners = cells[:, None, :] + shifts
     index = (corners[..., 0] * ny + corners[..., 1]) * nz + corners[..., 2]
-    odd = cells.sum(axis=1) % 2 == parity
+    odd = cells.sum(axis=1) % 2 == 1
     pattern = np.where(odd[:, None, None], np.array(_ODD), np.array(_EVEN))
-    return np.take_along_axis(index[:, None, :].repeat(5, axis=1), pattern, axis=2).reshape(-1, 4)
+    found = np.take_along_axis(index[:, None, :].repeat(5, axis=1), pattern, axis=2)
+    tetrahedra = orient(points, found.reshape(-1, 4))
+    return Mesh(points, boundary(tetrahedra), tetrahedra)
 
 
 def orient(points: np.ndarray, tetrahedra: np.ndarray) -> np.ndarray:

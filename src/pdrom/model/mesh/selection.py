@@ -1,6 +1,6 @@
 """Selections of vertices, as the configuration names them, and their vertices in the rest shape."""
 
-from collections.abc import Callable
+from abc import abstractmethod
 from functools import reduce
 from typing import Annotated, Any, Literal, Self
 
@@ -17,7 +17,15 @@ Point = tuple[Length, Length, Length]
 Index = Annotated[int, Field(ge=0, le=1_000_000)]
 
 
-class Box(ConfigModel):
+class Shape(ConfigModel):
+    """Vertices by where they lie."""
+
+    @abstractmethod
+    def chosen(self, mesh: Mesh) -> np.ndarray:
+        """Vertices (n,) of ``mesh``, ascending; perhaps none."""
+
+
+class Box(Shape):
     """Vertices in the box from ``lower`` to ``upper`` (m), its surface included."""
 
     kind: Literal["box"] = "box"
@@ -28,16 +36,25 @@ class Box(ConfigModel):
     def _ordered(self) -> Self:
         return require_ordered(self)
 
+    def chosen(self, mesh: Mesh) -> np.ndarray:
+        slack = TOLERANCE * mesh.extent
+        above = mesh.points >= np.array(self.lower) - slack
+        return np.flatnonzero((above & (mesh.points <= np.array(self.upper) + slack)).all(axis=1))
 
-class Sphere(ConfigModel):
+
+class Sphere(Shape):
     """Vertices within ``radius`` of ``centre`` (m)."""
 
     kind: Literal["sphere"] = "sphere"
     centre: Point
     radius: PositiveLength
 
+    def chosen(self, mesh: Mesh) -> np.ndarray:
+        distance = np.linalg.norm(mesh.points - np.array(self.centre), axis=1)
+        return np.flatnonzero(distance <= self.radius + TOLERANCE * mesh.extent)
 
-class Plane(ConfigModel):
+
+class Plane(Shape):
     """Vertices on the plane through ``point`` (m) and on the side that ``normal`` points to."""
 
     kind: Literal["plane"] = "plane"
@@ -48,48 +65,79 @@ class Plane(ConfigModel):
     def _directed(self) -> Self:
         return require_direction(self)
 
+    def chosen(self, mesh: Mesh) -> np.ndarray:
+        normal = np.array(self.normal) / np.linalg.norm(self.normal)
+        height = (mesh.points - np.array(self.point)) @ normal
+        return np.flatnonzero(height >= -TOLERANCE * mesh.extent)
 
-class Nearest(ConfigModel):
+
+class Nearest(Shape):
     """The ``count`` vertices nearest to ``point`` (m); of equally near ones the first."""
 
     kind: Literal["nearest"] = "nearest"
     point: Point
     count: Annotated[int, Field(ge=1, le=1_000_000)] = 1
 
+    def chosen(self, mesh: Mesh) -> np.ndarray:
+        if self.count > mesh.vertices:
+            raise SceneError(f"selection nearest: count = {self.count} of {mesh.vertices} vertices")
+        distance = _distance(mesh.points, np.array(self.point))
+        return np.sort(np.argsort(distance, kind="stable")[: self.count])
 
-class BoundaryLoop(ConfigModel):
+
+class BoundaryLoop(Shape):
     """Vertices of a closed line of boundary edges; loop 0 is the longest at rest."""
 
     kind: Literal["boundary_loop"] = "boundary_loop"
     index: Index = 0
 
+    def chosen(self, mesh: Mesh) -> np.ndarray:
+        border = boundary_edges(mesh.triangles)
+        lengths = np.linalg.norm(mesh.points[border[:, 0]] - mesh.points[border[:, 1]], axis=1)
+        # half of an edge for each of its ends
+        shares = np.bincount(border.ravel(), np.repeat(lengths / 2.0, 2), minlength=mesh.vertices)
+        return _part(mesh, border, np.unique(border), shares, "boundary loop", self.index)
 
-class Component(ConfigModel):
+
+class Component(Shape):
     """Vertices of a connected part of the mesh; part 0 has the most vertices."""
 
     kind: Literal["component"] = "component"
     index: Index = 0
 
+    def chosen(self, mesh: Mesh) -> np.ndarray:
+        every = np.arange(mesh.vertices)
+        return _part(mesh, mesh.edges(), every, np.ones(len(every)), "component", self.index)
 
-class Union(ConfigModel):
+
+class Union(Shape):
     """Vertices in any of the selections ``of``."""
 
     kind: Literal["union"] = "union"
     of: Annotated[tuple["Selection", ...], Field(min_length=1)]
 
+    def chosen(self, mesh: Mesh) -> np.ndarray:
+        return reduce(np.union1d, [_chosen(mesh, part) for part in self.of])
 
-class Intersection(ConfigModel):
+
+class Intersection(Shape):
     """Vertices in all of the selections ``of``."""
 
     kind: Literal["intersection"] = "intersection"
     of: Annotated[tuple["Selection", ...], Field(min_length=1)]
 
+    def chosen(self, mesh: Mesh) -> np.ndarray:
+        return reduce(np.intersect1d, [_chosen(mesh, part) for part in self.of])
 
-class Complement(ConfigModel):
+
+class Complement(Shape):
     """Vertices that are not in the selection ``of``."""
 
     kind: Literal["complement"] = "complement"
     of: "Selection"
+
+    def chosen(self, mesh: Mesh) -> np.ndarray:
+        return np.setdiff1d(np.arange(mesh.vertices), _chosen(mesh, self.of))
 
 
 KINDS = (
@@ -180,16 +228,12 @@ def _chosen(mesh: Mesh, selection: Selection) -> np.ndarray:
     """Vertices by `select_vertices`, but a selection may be empty."""
     if isinstance(selection, str):
         return _side(mesh, selection)
-    if isinstance(selection, (tuple, list)):
-        return _listed(mesh, selection)
-    return _FINDERS[type(selection)](mesh, selection)
-
-
-def _listed(mesh: Mesh, indices: tuple[int, ...] | list[int]) -> np.ndarray:
-    outside = [index for index in indices if not 0 <= index < mesh.vertices]
+    if isinstance(selection, Shape):
+        return selection.chosen(mesh)
+    outside = [index for index in selection if not 0 <= index < mesh.vertices]
     if outside:
         raise SceneError(f"selection holds {outside[0]}: allowed are 0 to {mesh.vertices - 1}")
-    return np.unique(np.asarray(indices, dtype=np.int64))
+    return np.unique(np.asarray(selection, dtype=np.int64))
 
 
 def _side(mesh: Mesh, side: str) -> np.ndarray:
@@ -200,43 +244,6 @@ def _side(mesh: Mesh, side: str) -> np.ndarray:
     if np.ptp(coordinate) <= TOLERANCE * mesh.extent:
         raise SceneError(f"selection '{side}': selects nothing, the mesh is flat along this axis")
     return np.flatnonzero(coordinate >= coordinate.max() - TOLERANCE * mesh.extent)
-
-
-def _box(mesh: Mesh, box: Box) -> np.ndarray:
-    slack = TOLERANCE * mesh.extent
-    above = mesh.points >= np.array(box.lower) - slack
-    return np.flatnonzero((above & (mesh.points <= np.array(box.upper) + slack)).all(axis=1))
-
-
-def _sphere(mesh: Mesh, sphere: Sphere) -> np.ndarray:
-    distance = np.linalg.norm(mesh.points - np.array(sphere.centre), axis=1)
-    return np.flatnonzero(distance <= sphere.radius + TOLERANCE * mesh.extent)
-
-
-def _plane(mesh: Mesh, plane: Plane) -> np.ndarray:
-    normal = np.array(plane.normal) / np.linalg.norm(plane.normal)
-    height = (mesh.points - np.array(plane.point)) @ normal
-    return np.flatnonzero(height >= -TOLERANCE * mesh.extent)
-
-
-def _nearest(mesh: Mesh, nearest: Nearest) -> np.ndarray:
-    if nearest.count > mesh.vertices:
-        raise SceneError(f"selection nearest: count = {nearest.count} of {mesh.vertices} vertices")
-    distance = _distance(mesh.points, np.array(nearest.point))
-    return np.sort(np.argsort(distance, kind="stable")[: nearest.count])
-
-
-def _boundary_loop(mesh: Mesh, loop: BoundaryLoop) -> np.ndarray:
-    border = boundary_edges(mesh.triangles)
-    lengths = np.linalg.norm(mesh.points[border[:, 0]] - mesh.points[border[:, 1]], axis=1)
-    # half of an edge for each of its ends
-    shares = np.bincount(border.ravel(), np.repeat(lengths / 2.0, 2), minlength=mesh.vertices)
-    return _part(mesh, border, np.unique(border), shares, "boundary loop", loop.index)
-
-
-def _component(mesh: Mesh, component: Component) -> np.ndarray:
-    every = np.arange(mesh.vertices)
-    return _part(mesh, mesh.edges(), every, np.ones(len(every)), "component", component.index)
 
 
 def _part(
@@ -255,31 +262,6 @@ def _part(
     if index >= len(parts):
         raise SceneError(f"selection {what}: index = {index}, the mesh has {len(parts)}")
     return parts[index]
-
-
-def _union(mesh: Mesh, union: Union) -> np.ndarray:
-    return reduce(np.union1d, [_chosen(mesh, part) for part in union.of])
-
-
-def _intersection(mesh: Mesh, intersection: Intersection) -> np.ndarray:
-    return reduce(np.intersect1d, [_chosen(mesh, part) for part in intersection.of])
-
-
-def _complement(mesh: Mesh, complement: Complement) -> np.ndarray:
-    return np.setdiff1d(np.arange(mesh.vertices), _chosen(mesh, complement.of))
-
-
-_FINDERS: dict[type, Callable[[Mesh, Any], np.ndarray]] = {
-    Box: _box,
-    Sphere: _sphere,
-    Plane: _plane,
-    Nearest: _nearest,
-    BoundaryLoop: _boundary_loop,
-    Component: _component,
-    Union: _union,
-    Intersection: _intersection,
-    Complement: _complement,
-}
 
 
 def farthest_points(points: np.ndarray, candidates: np.ndarray, count: int) -> np.ndarray:

@@ -80,7 +80,7 @@ class Lift:
         # those of the lift have the order of the kernel's record
         own = vars(self).values()
         arrays = (*own, np.empty(sampled), clocks, sampler.record, *sampler.arrays)
-        return LocalKernel.of(
+        return LocalKernel(
             _accumulate,
             vertices,
             units=vertices,

@@ -18,9 +18,7 @@ from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.model.constraints.base import GroupConfig
 from pdrom.model.held_out import FIRST
-from pdrom.model.metrics import trajectory_error
 from pdrom.model.scene import Scene, SceneConfig
-from pdrom.reduction.rerun import displacement_norms
 from study.artifact.paths import ALTERNATIVE_TIMES, ALTERNATIVES, File
 from study.artifact.reads import Settings, SourcesOf
 from study.experiments.alternatives.candidates import Trained, candidates, trained
@@ -29,6 +27,7 @@ from study.experiments.alternatives.solvers.explicit import continuous
 from study.experiments.kit.converged import converged_run
 from study.experiments.kit.declaration import experiment
 from study.experiments.kit.measurement import Case, Variant, in_processes
+from study.experiments.kit.reruns import run_error
 from study.experiments.kit.settings import BlowupExtent
 
 TIME_COLUMNS = ["scene", "factor", "stiffness", *SETTING, "process", "ms_per_frame"]
@@ -62,25 +61,6 @@ class Options(ConfigModel):
     scene: SceneConfig
     alternatives: Comparison
     blowup_extent: BlowupExtent
-
-
-@dataclass(frozen=True)
-class References:
-    """Runs (F + 1, N, 3) that errors are taken against, and the error of the second one.
-
-    ``implicit`` is None where a frame did not converge, or where it would cost too much.
-    """
-
-    implicit: np.ndarray | None
-    continuous: np.ndarray
-    error: float
-
-    def errors(self, run: np.ndarray | None) -> dict[str, float | None]:
-        """Relative errors of a ``run`` (F + 1, N, 3) m, empty if it blew up."""
-        return {
-            "error_implicit": _error(run, self.implicit),
-            "error_continuous": _error(run, self.continuous),
-        }
 
 
 @experiment(
@@ -132,39 +112,33 @@ def sized(config: SceneConfig, factor: float, stiffness: float) -> SceneConfig:
 
 
 def _rows(scene: Scene, models: tuple[Trained, ...], settings: Options) -> Iterator[dict[str, Any]]:
-    """Errors of every candidate in the motion of ``scene``, those of the reference first."""
-    frames, against = scene.config.frames, references(scene, settings.alternatives)
-    common = {"vertices": scene.mesh.vertices, "frames": frames, "reference_error": against.error}
-    implicit = against.errors(against.implicit)
-    yield {**common, "method": CONVERGED, "substeps": 1, "finite": True, **implicit}
-    for candidate in candidates(scene, models, settings.alternatives):
-        with np.errstate(over="ignore", invalid="ignore"):
-            reached = candidate.run(frames, settings.blowup_extent, scene.mesh.extent)
-        made = {"finite": reached is not None, **against.errors(reached)}
-        yield {**common, **candidate.labels, **made}
+    """Errors of every candidate in the motion of ``scene``, those of the reference first.
 
-
-def references(scene: Scene, section: Comparison) -> References:
-    """Both references of a scene's own motion, with the limits of a ``section``."""
-    wanted = section.continuous
-    limit = wanted.limit // scene.mesh.vertices
-    exact = continuous(
-        scene, scene.config.frames, wanted.tolerance, substeps=wanted.substeps, limit=limit
-    )
-    name = scene.config.name
+    There is none against the implicit step where a frame of it did not converge, or where it would
+    cost too much, and none of a run that blew up.
+    """
+    section, name, vertices = settings.alternatives, scene.config.name, scene.mesh.vertices
+    frames, wanted, implicit = scene.config.frames, section.continuous, None
+    limit = wanted.limit // vertices
+    exact = continuous(scene, frames, wanted.tolerance, substeps=wanted.substeps, limit=limit)
     log.info("%s: %d explicit steps a frame, error %.1e", name, exact.substeps, exact.error)
-    if not exact.within(wanted.tolerance):
+    if not exact.error <= wanted.tolerance:
         log.warning("%s: motion in continuous time is known to %.1e only", name, exact.error)
-    implicit = None
-    if section.affords(CONVERGED, scene.mesh.vertices):
+    if section.affords(CONVERGED, vertices):
         implicit = converged_run(scene, section.implicit.tolerance, section.implicit.limit)
         if implicit is None:
             log.warning("%s: no convergence in %d evaluations", name, section.implicit.limit)
-    return References(implicit, exact.positions, exact.error)
+    against = {"error_implicit": implicit, "error_continuous": exact.positions}
 
+    def errors(run: np.ndarray | None) -> dict[str, float | None]:
+        return {
+            key: None if run is None or other is None else run_error(run, other)
+            for key, other in against.items()
+        }
 
-def _error(run: np.ndarray | None, reference: np.ndarray | None) -> float | None:
-    if run is None or reference is None:
-        return None
-    difference = np.linalg.norm((run - reference)[1:].reshape(len(run) - 1, -1), axis=1)
-    return trajectory_error(difference, displacement_norms(reference))
+    common = {"vertices": vertices, "frames": frames, "reference_error": exact.error}
+    yield {**common, "method": CONVERGED, "substeps": 1, "finite": True, **errors(implicit)}
+    for candidate in candidates(scene, models, section):
+        with np.errstate(over="ignore", invalid="ignore"):
+            reached = candidate.run(frames, settings.blowup_extent, scene.mesh.extent)
+        yield {**common, **candidate.labels, "finite": reached is not None, **errors(reached)}

@@ -8,15 +8,9 @@ import numpy as np
 
 from pdrom.core.yamlfile import validate
 from pdrom.model.dynamics.stepper import State
-from pdrom.model.effects import EFFECTS
 from pdrom.model.mesh.generators import bar, boundary, cloth
 from pdrom.model.mesh.types import Mesh
 from pdrom.model.scene import Scene, SceneConfig
-
-
-def at_rest(scene: Scene) -> State:
-    """The state that the scene itself starts from."""
-    return scene.initial_state()
 
 
 @dataclass(frozen=True)
@@ -26,17 +20,9 @@ class Recipe:
     mesh: Callable[[], Mesh]
     effects: tuple[dict, ...]
     settings: dict
-    masses: Callable[[Mesh], np.ndarray] | None = None
 
     def __call__(self) -> Scene:
-        mesh = self.mesh()
-        masses = None if self.masses is None else self.masses(mesh)
-        return build(mesh, *self.effects, masses=masses, **self.settings)
-
-    @property
-    def modules(self) -> list[str]:
-        """Places of the effects (for the code fingerprint), "module:attribute"."""
-        return sorted({EFFECTS[effect["effect"]] for effect in self.effects})
+        return build(self.mesh(), *self.effects, **self.settings)
 
 
 @dataclass(frozen=True)
@@ -55,7 +41,7 @@ class HardCase:
     scene: Recipe
     why: str
     holds: tuple[str, ...]
-    start: Callable[[Scene], State] = at_rest
+    start: Callable[[Scene], State] = Scene.initial_state
     bound: float = 2.0
     slow: bool = False
 
@@ -64,26 +50,17 @@ def build(
     mesh: Mesh,
     *effects: dict[str, Any],
     frames: int = 30,
-    masses: np.ndarray | None = None,
+    masses: Callable[[Mesh], np.ndarray] | None = None,
     **settings: Any,
 ) -> Scene:
     """Scene of ``effects`` on ``mesh``, with so many ``frames``.
 
-    ``masses`` (N,) kg replace equal ones, ``settings`` are further keys of `SceneConfig`.
+    ``masses`` of a mesh, (N,) kg, replace equal ones; ``settings`` are keys of `SceneConfig`.
     """
-    config = validate(
-        SceneConfig,
-        {
-            "name": "hard_case",
-            "title": "hard case",
-            "mesh": {"kind": "file", "path": "generated"},
-            "frames": frames,
-            "effects": list(effects),
-            **settings,
-        },
-        "hard case",
-    )
-    return Scene.build(config, mesh, masses=masses)
+    named = {"name": "hard_case", "title": "hard case"}
+    own = {"mesh": {"kind": "file", "path": "generated"}, "frames": frames, **settings}
+    config = validate(SceneConfig, {**named, **own, "effects": list(effects)}, "hard case")
+    return Scene.build(config, mesh, masses=None if masses is None else masses(mesh))
 
 
 Start = Callable[[Scene], State]
@@ -134,14 +111,18 @@ def both(first: Mesh, second: Mesh) -> Mesh:
     )
 
 
+def still(positions: np.ndarray) -> State:
+    """A state at ``positions`` (N, 3) without velocity."""
+    return State(positions, np.zeros_like(positions))
+
+
 def mapped(*rows: tuple[float, float, float]) -> Start:
     """Rest shape under the linear map with these three ``rows`` about its centre, at rest."""
-    matrix = np.array(rows)
 
     def start(scene: Scene) -> State:
         points = scene.mesh.points
         centre = points.mean(axis=0)
-        return still(centre + (points - centre) @ matrix.T)
+        return still(centre + (points - centre) @ np.array(rows).T)
 
     return start
 
@@ -149,11 +130,6 @@ def mapped(*rows: tuple[float, float, float]) -> Start:
 def scales(x: float, y: float, z: float) -> Start:
     """The rest shape scaled by ``x``, ``y``, ``z`` about its centre (negative: mirrored)."""
     return mapped((x, 0, 0), (0, y, 0), (0, 0, z))
-
-
-def still(positions: np.ndarray) -> State:
-    """A state at ``positions`` (N, 3) without velocity."""
-    return State(positions, np.zeros_like(positions))
 
 
 def scrambled(size: float = 1.0) -> Start:
@@ -192,26 +168,26 @@ def folded(scene: Scene) -> State:
     return still(points)
 
 
-def moving(velocity: tuple[float, float, float]) -> Start:
-    """The rest shape with one velocity for all vertices, m/s."""
-
-    def start(scene: Scene) -> State:
-        points = scene.mesh.points.copy()
-        return State(points, np.tile(np.array(velocity), (len(points), 1)))
-
-    return start
+def falling(speed: float) -> Start:
+    """The rest shape, all vertices moving down at ``speed``, m/s."""
+    return lambda scene: _vertical(scene, np.full(len(scene.mesh.points), -speed))
 
 
 def meeting(speed: float) -> Start:
     """The upper half of the vertices moves down and the lower half up at ``speed``, m/s."""
 
     def start(scene: Scene) -> State:
-        points = scene.mesh.points.copy()
-        velocities = np.zeros_like(points)
-        velocities[:, 1] = np.where(points[:, 1] > points[:, 1].mean(), -speed, speed)
-        return State(points, velocities)
+        y = scene.mesh.points[:, 1]
+        return _vertical(scene, np.where(y > y.mean(), -speed, speed))
 
     return start
+
+
+def _vertical(scene: Scene, speeds: np.ndarray) -> State:
+    points = scene.mesh.points.copy()
+    velocities = np.zeros_like(points)
+    velocities[:, 1] = speeds
+    return State(points, velocities)
 
 
 def lowered(offset: float) -> Start:

@@ -7,17 +7,18 @@ from typing import Any
 import numpy as np
 
 from pdrom.core.project import config_file
+from pdrom.model.effects import EFFECTS
 from pdrom.model.mesh.files import read_mesh_file
 from pdrom.model.mesh.types import Mesh
 from study.experiments.hard_cases.case import (
     HardCase,
     Recipe,
     both,
+    falling,
     folded,
     lowered,
     mapped,
     meeting,
-    moving,
     noisy,
     one_tetrahedron,
     one_triangle,
@@ -59,14 +60,10 @@ def _scene(mesh: Callable[[], Mesh], *effects: dict, **settings: Any) -> Recipe:
     return Recipe(mesh, effects, settings)
 
 
-def _heavy_and_light(mesh: Callable[[], Mesh], *effects: dict, **settings: Any) -> Recipe:
+def _heavy_and_light(mesh: Mesh) -> np.ndarray:
     """Masses over eight decades, heavy next to light."""
-
-    def masses(made: Mesh) -> np.ndarray:
-        order = np.random.default_rng(3).permutation(made.vertices)
-        return np.logspace(-4, 4, made.vertices)[order]
-
-    return Recipe(mesh, effects, settings, masses)
+    order = np.random.default_rng(3).permutation(mesh.vertices)
+    return np.logspace(-4, 4, mesh.vertices)[order]
 
 
 def _all_but(*free: int) -> dict:
@@ -95,32 +92,21 @@ def _one_bad_element() -> Mesh:
 
 def _squashed() -> list[HardCase]:
     """Sheets and bars flattened to a plane, a line, a point; needles and merged vertices."""
-    cases = []
+    bar = "every tetrahedron is flattened to a {}: F is singular"
+    flat = "every triangle is collinear: the sheet is a {}"
+    kinds = (
+        ("bar_{}_strain", small_bar, TETRAHEDRON, bar),
+        ("bar_{}_rotation", small_bar, ROTATION, bar),
+        ("sheet_{}_strain", sheet, STRAIN, flat),
+        ("sheet_{}_spring", sheet, SPRING, flat),
+    )
     to = {"plane": (1, 1, 0), "line": (1, 0, 0), "point": (0, 0, 0)}
-    for target, factors in to.items():
-        for label, group in (("strain", TETRAHEDRON), ("rotation", ROTATION)):
-            cases.append(
-                HardCase(
-                    f"bar_{target}_{label}",
-                    _scene(small_bar, group),
-                    f"every tetrahedron is flattened to a {target}: F is singular",
-                    CALM,
-                    scales(*factors),
-                )
-            )
-        if target == "plane":
-            continue
-        for label, group in (("strain", STRAIN), ("spring", SPRING)):
-            cases.append(
-                HardCase(
-                    f"sheet_{target}_{label}",
-                    _scene(sheet, group),
-                    f"every triangle is collinear: the sheet is a {target}",
-                    CALM,
-                    scales(*factors),
-                )
-            )
-    return cases
+    return [
+        HardCase(name.format(target), _scene(mesh, group), why.format(target), CALM, scales(*sides))
+        for target, sides in to.items()
+        for name, mesh, group, why in kinds
+        if mesh is not sheet or target != "plane"  # a sheet is a plane already
+    ]
 
 
 def _states() -> list[HardCase]:
@@ -270,9 +256,9 @@ def _settings() -> list[HardCase]:
                  "masses of nothing, held", FORCED, scales(1.1, 1, 1)),
         HardCase("overdamped", _scene(sheet, SPRING, {"effect": "damping", "rate": 1e3}),
                  "the explicit drag turns velocities round and enlarges them", ("refused",)),
-        HardCase("mass_ratio", _heavy_and_light(sheet, SPRING, STRAIN, *held),
+        HardCase("mass_ratio", _scene(sheet, SPRING, STRAIN, *held, masses=_heavy_and_light),
                  "masses over eight decades, held", FORCED, bound=4.0),
-        HardCase("mass_ratio_free", _heavy_and_light(small_bar, TETRAHEDRON),
+        HardCase("mass_ratio_free", _scene(small_bar, TETRAHEDRON, masses=_heavy_and_light),
                  "masses over eight decades, free", CALM, scales(1.3, 0.7, -1)),
         HardCase("smallest_step", _scene(sheet, SPRING, *held, time_step=1e-5),
                  "h = 1e-5 s: inertia is everything", FORCED),
@@ -314,7 +300,7 @@ def _boundaries() -> list[HardCase]:
         HardCase("nothing_free", _scene(sheet, SPRING, GRAVITY, _all_but()),
                  "every vertex is held: there is no system to solve", (*FORCED, "still")),
         HardCase("floor_at_speed", _scene(small_bar, TETRAHEDRON, GRAVITY, FLOOR),
-                 "the floor is hit at ten kilometres a second", FORCED, moving((0, -1e4, 0)),
+                 "the floor is hit at ten kilometres a second", FORCED, falling(1e4),
                  bound=20.0),
         HardCase("below_floor", _scene(sheet, SPRING, GRAVITY, FLOOR),
                  "the start lies below the floor", FORCED, lowered(-5.0)),
@@ -346,7 +332,7 @@ def _obstacles() -> list[HardCase]:
     around = {"effect": "box", "lower": [-2, 0, -2], "upper": [2, 4, 2]}
     slope = {"effect": "plane", "point": [0, 1.8, 0], "normal": [0.6, 0.8, 0]}
     wire = {"effect": "box", "lower": [-9, 1.9, 0.03], "upper": [9, 1.9, 0.03], "friction": 1.0}
-    fast, sticky = moving((0, -1e4, 0)), {"friction": float("inf")}
+    fast, sticky = falling(1e4), {"friction": float("inf")}
     return [
         HardCase("box_edge", _scene(sheet, SPRING, GRAVITY, edge),
                  "a sheet falls on the edges of a box narrower than its cells", FORCED),
@@ -451,4 +437,5 @@ def reducible_cases(slow: bool = False) -> list[str]:
 
 def modules_of(names: Iterable[str]) -> list[str]:
     """Places of the effects of cases ``names`` (for the code fingerprint), "module:attribute"."""
-    return sorted({module for name in names for module in CASES[name].scene.modules})
+    effects = {effect["effect"] for name in names for effect in CASES[name].scene.effects}
+    return sorted(EFFECTS[effect] for effect in effects)

@@ -1,7 +1,8 @@
 """Every reduction, made from a hard case's own run, its outcome, and the outcome expected."""
 
 import logging
-from collections.abc import Collection, Iterator, Mapping
+from collections import Counter
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Self
@@ -15,13 +16,11 @@ from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel, shown
 from pdrom.model.constraints.base import ConstraintGroup
 from pdrom.model.dynamics.stepper import State, Stepper
-from pdrom.model.scene import Scene
 from pdrom.reduction.basis import Basis, compute_basis
 from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.sampling import Reduction, select
 from pdrom.reduction.sampling.local_step import ReducedLocalStep, replace_group
 from pdrom.reduction.snapshots import row_masses
-from pdrom.reduction.subspace.columns import Columns
 from pdrom.reduction.subspace.hrpd import HrpdSpec, hrpd, sampled_space
 from pdrom.reduction.subspace.interpolation import Interpolation
 from pdrom.reduction.subspace.model import Samples, SubspaceModel, make_columns, sample_elements
@@ -80,36 +79,19 @@ class Expectation(ConfigModel):
 
     @model_validator(mode="after")
     def _listed_once(self) -> Self:
-        listed = [*self.fails, *self.may_fail]
-        for case in listed:
-            if listed.count(case) > 1:
+        for case, times in Counter((*self.fails, *self.may_fail)).items():
+            if times > 1:
                 raise ValueError(f"case '{case}' is listed twice")
         return self
 
 
 def surprise(outcome: str, case: str, expected: Expectation | None) -> str:
     """Contradiction of an ``outcome`` of ``case`` to what is ``expected``, "" if there is none."""
-    failed = outcome in FAILURES
-    must = expected is not None and case in expected.fails
-    may = expected is not None and case in expected.may_fail
-    if failed and not (must or may):
-        return f"{outcome}, but no entry expects a failure"
-    if must and not failed:
-        return f"{outcome}, but the entry expects a failure"
-    return ""
-
-
-def _samples(
-    sampling: str, scene: Scene, columns: Columns, start: State
-) -> Mapping[str, Samples | Interpolation]:
-    """Samples of each group in a position subspace; those of "ecsw" from a run from ``start``."""
-    if sampling == "full":
-        return {}
-    if sampling == "ecsw":
-        frames = np.arange(scene.config.frames)
-        return sample_elements(scene, columns, frames, tolerances=[TOLERANCE], start=start)[0]
-    points = scene.mesh.points
-    return {g.name: hrpd(g, columns, sampled_space(g, points, HRPD)) for g in scene.groups}
+    must, may = (expected.fails, expected.may_fail) if expected else ((), ())
+    if outcome in FAILURES:
+        listed = case in (*must, *may)
+        return "" if listed else f"{outcome}, but no entry expects a failure"
+    return f"{outcome}, but the entry expects a failure" if case in must else ""
 
 
 class Training:
@@ -123,6 +105,8 @@ class Training:
         self._roundoff: list[float] = []
         self.run = full_order(case, self.scene, self._observe)
         self._bases: dict[str, Basis] = {}
+        # largest extent of the run, of rest, start and held vertices, m
+        self.extent = max(self.run.extent, reach(self.scene, self.run))
 
     def _observe(self, frame: int, y: np.ndarray) -> None:
         if frame % 2 == 0 or self.scene.config.frames == 1:
@@ -141,10 +125,6 @@ class Training:
             )
         return self._bases[spec.basis_id]
 
-    def state(self) -> State:
-        """The start of the case."""
-        return self.case.start(self.scene)
-
 
 @dataclass(frozen=True)
 class ReducedRun:
@@ -157,8 +137,28 @@ class ReducedRun:
 
     run: Record | None
     r: int
-    k: int | None
-    gain: float | None
+    k: int | None = None
+    gain: float | None = None
+
+    def outcome(self, training: Training) -> str:
+        """One of `HOLDS`, `NOTHING`, `FAILURES`: the first that applies to the run."""
+        run = self.run
+        if run is None:
+            return NOTHING
+        if self.gain == np.inf:
+            return "singular"
+        if run.blowup_frame is not None:
+            return "blow-up"
+        if run.extent > DISTORTED * training.extent:
+            return "distorted"
+        # in a position subspace the objective has to fall in every iteration, as in the full order;
+        # interpolated projections of unreduced positions do not guarantee it
+        if self.k is not None and run.excess.max() > 0.0:
+            return "objective rises"
+        # S^T W p sums to zero whatever p is
+        if "momentum" in training.case.holds and momentum(training.case, training.scene, run):
+            return "momentum changes"
+        return HOLDS
 
 
 def names(methods: Mapping[str, MethodSpec]) -> list[str]:
@@ -178,81 +178,43 @@ def reduced_run(
     PdromError
         Where the reduction itself refuses.
     """
-    if name in methods:
-        return _local(training, methods[name], limit)
-    basis, _, sampling = name.partition("-")
-    return _subspace(training, basis, sampling, limit)
-
-
-def _local(training: Training, spec: MethodSpec, limit: float) -> ReducedRun:
-    scene, basis = training.scene, training.basis(spec)
+    if name not in methods:
+        kind, _, sampling = name.partition("-")
+        return _subspace(training, kind, sampling, limit)
+    scene, group, spec = training.scene, training.group, methods[name]
+    basis = training.basis(spec)
     r = min(R, basis.rank)
     if r == 0:
-        return ReducedRun(None, 0, None, None)
+        return ReducedRun(None, 0)
     reduction = Reduction(basis, select(basis, spec, r), spec, r=r)
-    step = Watched(ReducedLocalStep(training.group, reduction), training.group)
-    loop = scene.stepper(local_steps=replace_group(scene, training.group.name, step))
-    run = record(scene, loop, training.state(), roundoff=Roundoff(scene, loop), limit=limit)
-    return ReducedRun(run, r, None, reduction.gain)
+    step = Watched(ReducedLocalStep(group, reduction), group)
+    loop = scene.stepper(local_steps=replace_group(scene, group.name, step))
+    start = training.case.start(scene)
+    run = record(scene, loop, start, roundoff=Roundoff(scene, loop), limit=limit)
+    return ReducedRun(run, r, gain=reduction.gain)
 
 
 def _subspace(training: Training, kind: str, sampling: str, limit: float) -> ReducedRun:
+    """Run in a position subspace; samples of "ecsw" come from a run from the case's start."""
     scene = training.scene
     columns = make_columns(scene, training.run.positions[1::2], kind, k=K)
-    start = training.state()
+    start = training.case.start(scene)
     fields = (start.positions, start.velocities)
     state = State(*(coordinates(columns, scene.masses, field) for field in fields))
-    model = SubspaceModel(kind, columns, _samples(sampling, scene, columns, state))
+    samples: Mapping[str, Samples | Interpolation] = {}
+    if sampling == "ecsw":
+        frames = np.arange(scene.config.frames)
+        (samples,) = sample_elements(scene, columns, frames, tolerances=[TOLERANCE], start=state)
+    elif sampling == "hrpd":
+        points = scene.mesh.points
+        samples = {g.name: hrpd(g, columns, sampled_space(g, points, HRPD)) for g in scene.groups}
+    model = SubspaceModel(kind, columns, samples)
     untracked, _ = model.loop(scene)
-    loop = Stepper(
-        untracked.space,
-        untracked.time_step,
-        untracked.iterations,
-        local_steps=untracked.local_steps,
-    )
+    h, iterations = untracked.time_step, untracked.iterations
+    loop = Stepper(untracked.space, h, iterations, local_steps=untracked.local_steps)
     roundoff = Roundoff(scene, loop, columns)
     run = record(scene, loop, state, roundoff=roundoff, positions=model.positions, limit=limit)
-    return ReducedRun(run, model.elements_evaluated(scene), columns.B.shape[1], None)
-
-
-def scale_of(training: Training) -> float:
-    """Largest extent of the full-order run of ``training``, of rest, start and held vertices, m."""
-    return max(training.run.extent, reach(training.scene, training.run))
-
-
-def outcome_of(case: HardCase, training: Training, reduced: ReducedRun) -> str:
-    """One of `HOLDS`, `NOTHING`, `FAILURES`: the first that applies to ``reduced`` of ``case``."""
-    run = reduced.run
-    if run is None:
-        return NOTHING
-    if reduced.gain == np.inf:
-        return "singular"
-    if run.blowup_frame is not None:
-        return "blow-up"
-    if run.extent > DISTORTED * scale_of(training):
-        return "distorted"
-    # in a position subspace the objective has to fall in every iteration, as in the full order;
-    # interpolated projections of unreduced positions do not guarantee it
-    if reduced.k is not None and run.excess.max() > 0.0:
-        return "objective rises"
-    # S^T W p sums to zero whatever p is
-    if "momentum" in case.holds and momentum(case, training.scene, run):
-        return "momentum changes"
-    return HOLDS
-
-
-def rows(
-    case: HardCase, methods: Mapping[str, MethodSpec], expected: Mapping[str, Expectation]
-) -> Iterator[dict[str, Any]]:
-    """Rows of the table hard_cases: every reduction of ``methods`` in ``case``.
-
-    ``expected`` says which of them fail.
-    """
-    training = Training(case)
-    bounded = training.group.manifold in BOUNDED
-    for name in names(methods):
-        named = {"case": case.name, "method": name, "bounded_projections": bounded}
-        yield {**named, **row(training, name, methods, expected=expected)}
+    return ReducedRun(run, model.elements_evaluated(scene), k=columns.B.shape[1])
 
 
 def row(
@@ -262,27 +224,23 @@ def row(
     expected: Mapping[str, Expectation],
 ) -> dict[str, Any]:
     """Row of the reduction ``name``: sizes, what the run did, its outcome, why it failed."""
-    entry = expected.get(name)
-    extent = scale_of(training)
     try:
-        reduced = reduced_run(training, name, methods, limit=BLOWUP * extent)
+        reduced = reduced_run(training, name, methods, limit=BLOWUP * training.extent)
     except NotReducibleError as error:
         return {"frames": 0, "outcome": NOT_TAKEN, "why": str(error)}
     except PdromError as error:
         return {"frames": 0, "finite": False, "outcome": "refused", "why": str(error)}
-    outcome = outcome_of(training.case, training, reduced)
-    sizes = {"k": reduced.k, "r": reduced.r, "gain": reduced.gain}
-    if reduced.run is None:
-        return {**sizes, "frames": 0, "outcome": outcome, "why": "projections are round-off"}
-    run = reduced.run
+    run, outcome, entry = reduced.run, reduced.outcome(training), expected.get(name)
+    found = {"k": reduced.k, "r": reduced.r, "gain": reduced.gain, "outcome": outcome}
+    if run is None:
+        return {**found, "frames": 0, "why": "projections are round-off"}
     return {
-        **sizes,
+        **found,
         "frames": len(run.rise),
         "finite": run.blowup_frame is None,
         "blowup_frame": run.blowup_frame,
-        "max_extent": run.extent / extent,
+        "max_extent": run.extent / training.extent,
         "objective_rise": float(run.rise.max(initial=0.0)),
-        "outcome": outcome,
         "why": entry.why if entry and outcome in FAILURES else "",
     }
 
@@ -320,11 +278,14 @@ def hard_cases(
     """
     found = []
     for name in asked.cases or reducible_cases():
-        for row in rows(CASES[name], every_method, asked.expected):
-            found.append(row)
-            contradiction = surprise(row["outcome"], name, asked.expected.get(row["method"]))
+        training = Training(CASES[name])
+        bounded = training.group.manifold in BOUNDED
+        for method in names(every_method):
+            own = row(training, method, every_method, asked.expected)
+            found.append({"case": name, "method": method, "bounded_projections": bounded, **own})
+            contradiction = surprise(own["outcome"], name, asked.expected.get(method))
             if contradiction:
-                log.warning("%s, %s: %s", name, row["method"], contradiction)
+                log.warning("%s, %s: %s", name, method, contradiction)
         log.info("%s: done", name)
     whole = dict.fromkeys(["k", "r", "frames", "blowup_frame"], "Int64")
     write_table(pd.DataFrame(found, columns=COLUMNS).astype(whole), cases.path)

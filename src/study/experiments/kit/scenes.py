@@ -1,4 +1,4 @@
-"""Scene of a run bound to its mesh file, that run, and the scene at another time step."""
+"""Scene of a run bound to its mesh file, that run, other starts, and another time step."""
 
 from collections.abc import Sequence
 from typing import cast
@@ -7,6 +7,7 @@ import numpy as np
 
 from pdrom.core.store import open_hdf5
 from pdrom.model.constraints.base import GroupConfig
+from pdrom.model.dynamics.stepper import State, Stepper
 from pdrom.model.held_out import HeldOutMotion
 from pdrom.model.mesh.types import load_mesh
 from pdrom.model.scene import Scene, SceneConfig
@@ -27,6 +28,18 @@ def positions_of(run: File, frames: int | None = None) -> np.ndarray:
     """Positions (F + 1, N, 3) m of a full-order run, or of its first ``frames``."""
     with open_hdf5(run.path) as file:
         return file["positions"][: None if frames is None else frames + 1]
+
+
+def followed(loop: Stepper, state: State, frames: int) -> np.ndarray:
+    """Positions (F + 1, N, 3) m that ``loop`` reaches from ``state`` on, the first ones first."""
+    ends = [after.positions for after, _ in loop.run(state, range(frames))]
+    return np.stack([state.positions, *ends])
+
+
+def perturbation_field(scene: Scene, size: float, seed: int) -> np.ndarray:
+    """Random directions by ``seed``, of length ``size`` times the extent of ``scene``, (N, 3) m."""
+    field = np.random.default_rng(seed).standard_normal((scene.mesh.vertices, 3))
+    return size * scene.mesh.extent * field / np.linalg.norm(field, axis=1, keepdims=True)
 
 
 def varied(

@@ -10,7 +10,7 @@ from pdrom.model.effects import EFFECTS
 from pdrom.model.mesh.types import Mesh
 from pdrom.view.artists import Axes, Normalize, ScalarMappable
 from pdrom.view.camera import Camera
-from pdrom.view.mesh_render import Surface, draw_lines, draw_surface
+from pdrom.view.mesh_render import draw_lines, draw_surface
 
 NEUTRAL = "#E4E1DA"
 SIGNED = "RdBu_r"
@@ -47,11 +47,6 @@ class ElementMap:
     cells: np.ndarray
     mesh: Mesh
 
-    @property
-    def surface(self) -> Surface:
-        """Surface of the mesh, ready to be drawn."""
-        return Surface(self.mesh.triangles, open=len(self.mesh.tetrahedra) == 0)
-
     def centres(self, points: np.ndarray) -> np.ndarray:
         """Centre of each element (e, 3), m, with vertices at ``points`` (N, 3) m."""
         return points[self.cells].mean(axis=1)
@@ -59,14 +54,21 @@ class ElementMap:
     def face_values(self, values: np.ndarray) -> np.ndarray:
         """Values (e,) of the elements carried to the surface triangles (T,).
 
-        A triangle takes its own value, that of the tetrahedron behind it, or the mean of its
-        vertices that carry one; NaN where there is none. Edges have no face values.
+        A triangle takes its own value, that of the tetrahedron behind it, the mean of its vertices
+        that carry one, or of the means of the edges at its vertices; NaN where there is none.
         """
         triangles = self.mesh.triangles
         if self.kind == "triangle":
             return values
         if self.kind == "tetrahedron":
-            return values[_tetrahedron_behind(self.mesh)]
+            corners = self.mesh.tetrahedra[:, [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]]]
+            faces = np.sort(corners.reshape(-1, 3), axis=1).tolist()
+            behind = {tuple(face): place // 4 for place, face in enumerate(faces)}
+            return values[[behind[tuple(sorted(triangle))] for triangle in triangles.tolist()]]
+        if self.kind == "edge":
+            n, ends = self.mesh.vertices, self.cells.ravel()
+            total = np.bincount(ends, np.repeat(values, 2), minlength=n)
+            return (total / np.maximum(np.bincount(ends, minlength=n), 1))[triangles].mean(axis=1)
         field = np.full(self.mesh.vertices, np.nan)
         field[self.cells[:, 0]] = values
         corners = field[triangles]
@@ -87,20 +89,16 @@ class ElementMap:
 
         Its elements have ``values`` (e,), which ``colours`` maps to colours.
         """
-        if self.kind == "edge" and self.surface.open:
+        if self.kind == "edge" and not len(self.mesh.tetrahedra):
             draw_surface(
-                ax, points, self.surface, camera=camera, colour="#FFFFFF", wire=0.0, contrast=0.15
+                ax, points, self.mesh, camera=camera, colour="#FFFFFF", wire=0.0, contrast=0.15
             )
             draw_lines(ax, points[self.cells], camera, colours=colours.to_rgba(values))
             return
-        if self.kind == "edge":
-            values, faces = _edges_to_vertices(self, values), True
-        else:
-            faces = False
-        carried = self.face_values(values) if not faces else values[self.mesh.triangles].mean(1)
+        carried = self.face_values(values)
         rgb = colours.to_rgba(np.nan_to_num(carried))[:, :3]
         rgb[~np.isfinite(carried)] = (0.92, 0.91, 0.89)
-        draw_surface(ax, points, self.surface, camera=camera, colour=rgb, wire=0.12, contrast=0.35)
+        draw_surface(ax, points, self.mesh, camera=camera, colour=rgb, wire=0.12, contrast=0.35)
 
 
 def element_map(group: str, mesh: Mesh, elements: int, source: str) -> ElementMap:
@@ -132,24 +130,3 @@ def signed_entry(vector: np.ndarray, rows_per_element: int) -> tuple[np.ndarray,
     slot = int(np.argmax(np.abs(vector))) % (3 * rows_per_element)
     row = f", row {slot // 3 + 1}" if rows_per_element > 1 else ""
     return entries[:, slot], f"{'xyz'[slot % 3]}{row}"
-
-
-def _tetrahedron_behind(mesh: Mesh) -> np.ndarray:
-    """Tetrahedron (T,) that each boundary triangle belongs to."""
-    corners = mesh.tetrahedra[:, [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]]].reshape(-1, 3)
-    keys = _face_keys(corners, mesh.vertices)
-    order = np.argsort(keys, kind="stable")
-    position = np.searchsorted(keys[order], _face_keys(mesh.triangles, mesh.vertices))
-    return order[position] // 4
-
-
-def _face_keys(faces: np.ndarray, vertices: int) -> np.ndarray:
-    a, b, c = np.sort(faces.astype(np.int64), axis=1).T
-    return (a * vertices + b) * vertices + c
-
-
-def _edges_to_vertices(elements: ElementMap, values: np.ndarray) -> np.ndarray:
-    """Mean value of the edges at each vertex (N,)."""
-    n = elements.mesh.vertices
-    total = np.bincount(elements.cells.ravel(), np.repeat(values, 2), minlength=n)
-    return total / np.maximum(np.bincount(elements.cells.ravel(), minlength=n), 1)

@@ -15,10 +15,13 @@ from pdrom.view.camera import Camera, up_of
 from pdrom.view.text import plain_words
 from study.artifact.paths import File
 
-Rank = Annotated[int, Field(ge=0)] | Literal["full"]
-Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
-Split = Literal["train", "test", "heldout"]
 Names = tuple[str, ...]
+Ranks = tuple[Annotated[int, Field(ge=0)] | Literal["full"], ...]  # full: the numerical rank
+Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
+Instants = Annotated[tuple[Fraction, ...], Field(min_length=1)]  # 1 is the last frame of a run
+Columns = Annotated[int, Field(ge=1, le=6)]  # panels side by side
+Count = Annotated[int, Field(ge=1, le=12)]  # of modes or iterations
+AZIMUTH = 30.0  # of every camera, degrees
 
 
 class NothingToDraw(Exception):
@@ -56,71 +59,34 @@ class Scenes(Options):
     scenes: Names = ()
 
 
-class Experiments(Scenes):
-    """Scenes, and groups that are reduced in them."""
-
-    groups: Names = ()
-
-
-class Methods(Options):
-    """Reduction methods, in the order in which they are drawn."""
+class Methods(Scenes):
+    """Scenes and reduction methods, in the order in which they are drawn."""
 
     methods: Names = ()
 
 
-class Ranks(Options):
-    """Basis sizes; ``full`` is the full numerical rank."""
+class View(Methods):
+    """Elevation of the camera, degrees; up is against the gravity of a scene."""
 
-    ranks: tuple[Rank, ...] = ()
-
-
-class Instants(Options):
-    """Instants as fractions of the run (1 is its last frame)."""
-
-    frames: Annotated[tuple[Fraction, ...], Field(min_length=1)] = (0.1, 0.5, 0.9)
-
-
-class View(Options):
-    """Camera, degrees; up is against the gravity of a scene."""
-
-    azimuth: Annotated[float, Field(ge=-180.0, le=180.0)] = 30.0
     elevation: Annotated[float, Field(ge=-90.0, le=90.0)] = 20.0
 
     def camera(self, experiment: "Experiment") -> Camera:
         """Camera for the scene of an experiment."""
-        return Camera(self.azimuth, self.elevation, tuple(up_of(experiment.effects).tolist()))
+        return Camera(AZIMUTH, self.elevation, tuple(up_of(experiment.effects).tolist()))
 
 
-class Columns(Options):
-    """Panels side by side."""
-
-    columns: Annotated[int, Field(ge=1, le=6)] = 3
-
-
-class Count(Options):
-    """Number of modes or iterations that are drawn."""
-
-    count: Annotated[int, Field(ge=1, le=12)] = 6
-
-
-class Splits(Options):
-    """Sets of snapshots: used for the basis, between them, of another run."""
-
-    splits: tuple[Split, ...] = ("train", "test", "heldout")
-
-
-class Beside(Options):
+class Beside(Scenes):
     """Scene -> experiment of the published code whose output is drawn beside ours."""
 
+    columns: Columns = 3
     published: dict[str, str] = Field(default_factory=dict)
 
 
-class Reconstruction(Experiments, Methods, Splits, Columns, Beside):
-    """Errors of reconstructed snapshots."""
-
-
-class ReducedRuns(Experiments, Methods, Ranks, Instants, View):
+class ReducedRuns(View):
     """Full-order runs beside reduced ones."""
+
+    ranks: Ranks = ()
+    frames: Instants = (0.1, 0.5, 0.9)
 
 
 class _Plain(BaseModel):

@@ -24,6 +24,7 @@ from study.tables.claims.rules import (
 from study.tables.claims.verdicts import (
     VERDICTS,
     answer_of,
+    by_rules,
     close,
     combined,
     evaluate,
@@ -50,11 +51,6 @@ FRAGILE = 0.01
 _Rows = list[pd.DataFrame]
 _Keep = Callable[[pd.Series], pd.Series]
 _Variation = tuple[str, str, Sequence[TestRule], _Rows]  # what, how, the tests and their rows
-
-
-def _timed_of_claims(table: pd.DataFrame, **files: Path) -> list[set[str]]:
-    loaded = load_claims(files["rules"])
-    return [timed_columns(loaded[claim]) for claim in table.claim]
 
 
 @declare(
@@ -92,16 +88,12 @@ def _timed_of_claims(table: pd.DataFrame, **files: Path) -> list[set[str]]:
         text("history", "when and why the rules became what they are"),
     ),
     reads=READS,
-    timed_cells=_timed_of_claims,
+    timed_cells=by_rules(lambda rule, row: timed_columns(rule)),
 )
 def claims(rules: Path, added: Added = NONE_ADDED, **tables: pd.DataFrame) -> pd.DataFrame:
-    """One row per claim, in the order of the file ``rules``; see `claims_rows`."""
-    return claims_rows(load_claims(rules, added), tables)
-
-
-def claims_rows(rules: Mapping[str, ClaimRule], tables: Tables) -> pd.DataFrame:
-    """Rows of the table claims from ``rules`` and ``tables``, in the order of the file."""
-    return pd.DataFrame([_row(name, rule, tables) for name, rule in rules.items()])
+    """One row per claim, in the order of the file ``rules``."""
+    found = load_claims(rules, added)
+    return pd.DataFrame([_row(name, rule, tables) for name, rule in found.items()])
 
 
 def _row(name: str, rule: ClaimRule, tables: Tables) -> dict[str, Any]:
@@ -131,16 +123,9 @@ def _decided(tests: Sequence[TestRule], tables: Tables) -> dict[str, str]:
     }
 
 
-def _timed_of_tests(table: pd.DataFrame, **files: Path) -> list[set[str]]:
-    rules = load_claims(files["rules"])
-    tests = {
-        (claim, part, test.what): test
-        for claim, rule in rules.items()
-        for part in PARTS
-        for test in getattr(rule, part)
-    }
-    keys = zip(table.claim, table.part, table.what, strict=True)
-    return [set(FOUND) if tests[key].timed else set() for key in keys]
+def _timed_of_test(rule: ClaimRule, row: Any) -> set[str]:
+    test = next(test for test in getattr(rule, row.part) if test.what == row.what)
+    return {*FOUND} if test.timed else set()
 
 
 @table(
@@ -166,18 +151,13 @@ def _timed_of_tests(table: pd.DataFrame, **files: Path) -> list[set[str]]:
         timed(text("verdict", f"of this test, one of: {', '.join(VERDICTS)}", compared="exact")),
     ),
     reads=READS,
-    timed_cells=_timed_of_tests,
+    timed_cells=by_rules(_timed_of_test),
 )
 def claims_tests(rules: Path, added: Added = NONE_ADDED, **tables: pd.DataFrame) -> pd.DataFrame:
     """One row per claim, part and test, in the order of the file ``rules``; see `claims`."""
-    return outcome_rows(load_claims(rules, added), tables)
-
-
-def outcome_rows(rules: Mapping[str, ClaimRule], tables: Tables) -> pd.DataFrame:
-    """Rows of the table claims_tests from ``rules`` and ``tables``, in the order of the file."""
     rows = [
         {"claim": name, "part": part, **test.model_dump(include=SAID), **_found(test, tables)}
-        for name, rule in rules.items()
+        for name, rule in load_claims(rules, added).items()
         for part in PARTS
         for test in getattr(rule, part)
     ]
@@ -241,20 +221,27 @@ def _verdict(tests: Sequence[TestRule], rows: _Rows) -> str:
     return combined([answer_of(test, values[VALUE].to_numpy(float)) for test, values in found])
 
 
+def _with(test: TestRule, **changes: Any) -> TestRule:
+    return test.model_copy(update=changes)
+
+
 def _variations(tests: Sequence[TestRule], rows: _Rows, tables: Tables) -> Iterator[_Variation]:
     """The tests with other numbers, then on a part of their rows, or on those of another split."""
     for factor in FACTORS:
-        changed = [_changed(t, threshold=factor * t.threshold) for t in tests]
+        changed = [_with(test, threshold=factor * test.threshold) for test in tests]
         yield "threshold", f"x {factor:g}", changed, rows
     for share in SHARES:
-        yield "share", f"{share:g}", [_changed(test, share=share) for test in tests], rows
+        yield "share", f"{share:g}", [_with(test, share=share) for test in tests], rows
     for margin in MARGINS if any(test.timed for test in tests) else ():
-        changed = [_changed(test, margin=margin) if test.timed else test for test in tests]
+        changed = [_with(test, margin=margin) if test.timed else test for test in tests]
         yield "margin", f"{margin:g}", changed, rows
     sizes = {f"r up to {SMALL}": lambda r: ~(r > SMALL), f"r above {SMALL}": lambda r: r > SMALL}
     yield from _kept(tests, rows, "sizes", "r", sizes)
     for split in SPLITS:
-        changed = [_of_split(test, split) for test in tests]
+        changed = [
+            _with(test, where={**test.where, "split": (split,)}) if "split" in test.where else test
+            for test in tests
+        ]
         if changed != list(tests):
             yield "splits", split, changed, [values_of(test, tables) for test in changed]
     scenes = dict.fromkeys(s for values in rows if "scene" in values for s in values.scene)
@@ -270,14 +257,3 @@ def _kept(
         kept = [values[keep(values[column])] if column in values else values for values in rows]
         if sum(map(len, kept)) < sum(map(len, rows)):
             yield varied, name, tests, kept
-
-
-def _changed(test: TestRule, **changes: float) -> TestRule:
-    return test.model_copy(update=changes)
-
-
-def _of_split(test: TestRule, split: str) -> TestRule:
-    """Repeat the test over another split of the snapshots, where it is about one."""
-    if "split" not in test.where:
-        return test
-    return test.model_copy(update={"where": {**test.where, "split": (split,)}})

@@ -1,8 +1,9 @@
 """Verdicts: the tests of a claim, evaluated."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -76,7 +77,11 @@ def evaluate(test: TestRule, tables: Tables) -> Outcome:
     rows = values_of(test, tables)
     values = rows[VALUE].to_numpy(float)
     if len(values) == 0:
-        return Outcome(UNDECIDED, "no data", f"{test.what}: {_why_empty(test, tables)}")
+        why = "nothing to compare in this configuration"
+        where = {k: v for k, v in test.where.items() if k != "r"}
+        if test.metric == "rerun_error" and len(filtered(tables["reduced_reruns"], where)):
+            why = "no size can run, the numerical rank allows none"
+        return Outcome(UNDECIDED, "no data", f"{test.what}: {why}")
     passed = satisfied(test, values)
     good, total = int(passed.sum()), len(values)
     spread = _range(values)
@@ -101,15 +106,6 @@ def _broken_down(test: TestRule, rows: pd.DataFrame, passed: np.ndarray) -> str:
     counts = pd.Series(passed).groupby(rows[test.by].to_numpy(), sort=False)
     parts = [f"{value} {int(part.sum())} of {len(part)}" for value, part in counts]
     return ", ".join(parts).replace("_", " ")
-
-
-def _why_empty(test: TestRule, tables: Tables) -> str:
-    """Reason for a test without values: reruns that could not start, or none in this study."""
-    if test.metric == "rerun_error":
-        where = {k: v for k, v in test.where.items() if k != "r"}
-        if len(filtered(tables["reduced_reruns"], where)):
-            return "no size can run, the numerical rank allows none"
-    return "nothing to compare in this configuration"
 
 
 def _range(values: np.ndarray) -> str:
@@ -150,17 +146,21 @@ def timed_columns(rule: ClaimRule) -> set[str]:
     return found
 
 
-def timed_parts(*cells: str) -> TimedCells:
-    """The columns ``cells`` of a row are timed where the verdict of its claim and part is."""
+def by_rules(timed: Callable[[ClaimRule, Any], set[str]]) -> TimedCells:
+    """Timed columns of a row by the rule of its claim."""
 
     def timed_cells(table: pd.DataFrame, **files: Path) -> list[set[str]]:
-        loaded = load_claims(files["rules"])
-        return [
-            set(cells) if f"verdict{PARTS[part]}" in timed_columns(loaded[claim]) else set()
-            for claim, part in zip(table.claim, table.part, strict=True)
-        ]
+        rules = load_claims(files["rules"])
+        return [timed(rules[row.claim], row) for row in table.itertuples()]
 
     return timed_cells
+
+
+def timed_parts(*cells: str) -> TimedCells:
+    """The columns ``cells`` of a row are timed where the verdict of its claim and part is."""
+    return by_rules(
+        lambda rule, row: {*cells} if f"verdict{PARTS[row.part]}" in timed_columns(rule) else set()
+    )
 
 
 @table(
@@ -186,26 +186,17 @@ def timed_parts(*cells: str) -> TimedCells:
 def replication(claims: pd.DataFrame, rules: Path, recorded: Path) -> pd.DataFrame:
     """One row per claim and part that the study decides and the record holds."""
     loaded = load_claims(rules)
-    both = claims.merge(pd.read_csv(recorded), on="claim", suffixes=("", "_recorded"))
+    both = claims.merge(pd.read_csv(recorded), on="claim", suffixes=("", "_replication"))
+    unchanged = [
+        loaded[claim].fingerprint == rule
+        for claim, rule in zip(both.claim, both.rules, strict=True)
+    ]
+    both["rules_unchanged"] = unchanged
     rows = []
     for part, suffix in PARTS.items():
-        now, then = both[f"verdict{suffix}"], both[f"verdict{suffix}_recorded"]
-        rows.append(
-            pd.DataFrame(
-                {
-                    "claim": both.claim,
-                    "part": part,
-                    "verdict": now,
-                    "verdict_replication": then,
-                    "same": now == then,
-                    "measured": both[f"measured{suffix}"],
-                    "measured_replication": both[f"measured{suffix}_recorded"],
-                    "rules_unchanged": [
-                        loaded[claim].fingerprint == rule
-                        for claim, rule in zip(both.claim, both.rules, strict=True)
-                    ],
-                    "date": both.date,
-                }
-            )
-        )
+        own = both[["claim", "rules_unchanged", "date"]].assign(part=part)
+        for name in ("verdict", "measured"):
+            own[name] = both[f"{name}{suffix}"]
+            own[f"{name}_replication"] = both[f"{name}{suffix}_replication"]
+        rows.append(own.assign(same=own.verdict == own.verdict_replication))
     return pd.concat(rows, ignore_index=True)

@@ -19,8 +19,7 @@ from pdrom.api import load_scene
 from pdrom.command.base import Status
 from pdrom.command.main import COMMANDS, parser, run
 from pdrom.command.new import template
-from pdrom.core.store import check_file
-from pdrom.core.store.atomic import MARK
+from pdrom.core.store import MARK, check_file
 from pdrom.model.mesh.generators import bar, cloth
 from pdrom.model.mesh.types import Mesh
 from pdrom.model.scene import Scene, SceneConfig

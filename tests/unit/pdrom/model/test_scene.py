@@ -40,7 +40,7 @@ def test_unlisted_groups_are_never_evaluated():
     calls = {}
     for group in scene.groups:
         own, calls[group.name] = group.local_kernel, np.zeros(1)
-        group.local_kernel = LocalKernel.of(
+        group.local_kernel = LocalKernel(
             _counted, scene.mesh.vertices, 1, [calls[group.name], own.record], [own.address]
         )
     trajectory(scene)

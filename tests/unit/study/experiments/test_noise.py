@@ -1,27 +1,21 @@
 """Bases of round-off: what a start's round-off reaches, and what becomes of the runs."""
 
-from pathlib import Path
-
 import numpy as np
 import pandas as pd
 import pytest
 
-from pdrom.core.store import read_table, write_table
-from pdrom.model.mesh.types import save_mesh
+from pdrom.core.store import write_hdf5
 from pdrom.reduction.method import load_methods
 from pdrom.view.read import rerun_infos
 from places import ROOT
-from study.artifact.paths import File
-from study.experiments.kit.settings import Horizon
-from study.experiments.noise import (
+from study.experiments.repetitions import (
     ALL,
     PLANE,
     VERTEX,
     NoiseRuns,
-    Options,
     kinds,
-    noise,
     noise_basis,
+    noisy_runs,
     roundoff_field,
 )
 from study.pipeline.scenes import Coarsen, load_bound_scene
@@ -56,24 +50,12 @@ def test_a_basis_of_noise_keeps_every_axis(rng):
 
 def test_the_joint_selection_fails_where_an_axis_carries_nothing(fall, tmp_path):
     """Its separate system is exactly singular; noise in that axis is harmless."""
-    labels = {"scene": "bend_fall", "group": "bending"}
-    floor = {"scene": "bend_fall", "perturbation": "1e-10", "frame": range(22)}
-    sensitivity = tmp_path / "sensitivity.csv"
-    write_table(pd.DataFrame({**floor, "relative_difference": 0.0}), sensitivity)
-    save_mesh(fall.mesh, tmp_path / "mesh.h5", {})
-    settings = Options(
-        scene=fall.config,
-        noise=NoiseRuns(sizes=(2, 5, 99), repetitions=2),
-        noise_methods={name: METHODS[name] for name in ("deim-joint", "published")},
-        horizon=Horizon(perturbation=1e-10, threshold=1e-3),
-        blowup_extent=100.0,
-    )
-    mesh = File(str(tmp_path / "mesh.h5"), {"mesh": "m"})
-    output = File(str(tmp_path / "noise.csv"), labels)
-    runs = File(str(tmp_path / "noise.h5"), labels)
-    floors = File(str(sensitivity), labels)
-    noise(mesh=mesh, sensitivity=floors, settings=settings, out=output, runs=runs)
-    table = read_table(Path(output.path))
+    asked = NoiseRuns(sizes=(2, 5, 99), repetitions=2)
+    methods = {name: METHODS[name] for name in ("deim-joint", "published")}
+    runs = tmp_path / "noise.h5"
+    with write_hdf5(runs) as file:
+        rows = noisy_runs(fall.changed(frames=22), "bending", asked, methods, 100.0, file)
+    table = pd.DataFrame(rows)
     assert len(table) == 3 * 2 * 2 * 3
     beyond = table.r == 99
     assert (table.frames[beyond] == 0).all()
@@ -83,7 +65,7 @@ def test_the_joint_selection_fails_where_an_axis_carries_nothing(fall, tmp_path)
     assert (table.blowup_frame[singular] == 0).all()
     runs_through = table.noisy_axes.isin((ALL, PLANE)) & ~singular & ~beyond
     assert (table.relative_error[runs_through] < 1e-10).all()
-    drawn = [rerun_infos(runs.path, f"{axes}/deim-joint") for axes in kinds(fall)]
+    drawn = [rerun_infos(runs, f"{axes}/deim-joint") for axes in kinds(fall)]
     assert [[(i.r, i.marked) for i in infos] for infos in drawn] == 3 * [
         [(2, False), (5, False), (99, True)]
     ]

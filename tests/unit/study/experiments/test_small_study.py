@@ -25,7 +25,7 @@ from study.artifact import paths
 from study.artifact.paths import File, Place
 from study.experiments.iterations import IterationSweep, iterations
 from study.experiments.kit.declaration import Experiment
-from study.experiments.repetitions import LadderSection, ladder
+from study.experiments.repetitions import LadderSection, Options, repetitions
 from study.experiments.stability import ShortRuns, stability
 from study.pipeline.resolve import Resolver
 from study.pipeline.study import Study
@@ -95,7 +95,8 @@ def again_at(study: Study, at: PathOf, folder: Path) -> Callable[..., dict[str, 
         given |= {k: t.validate_python(job.settings[k]) for k, t in asked.items()} | changes
         files = {name: File(str(folder / f"{name}.csv"), labels) for name in job.outputs}
         experiment.function(**given, **files)
-        return {name: read_table(file.path) for name, file in files.items()}
+        tables = [n for n, place in experiment.writes.items() if place.pattern.endswith(".csv")]
+        return {name: read_table(files[name].path) for name in tables}
 
     return made
 
@@ -345,11 +346,13 @@ def test_a_moved_start_changes_nothing_and_other_training_does(table):
     assert training[training.r == 2].error.min() > 1.1 * own
 
 
-def test_every_rung_of_a_ladder_is_run_and_judged(again, array):
+def test_every_rung_of_a_ladder_is_run_and_judged(study, again, array):
     """Whole elements with shared coefficients are worse than the best by their gain at most."""
     few = {"r": 2, "signs": 2, "repetitions": 3, "sizes": (2, 50), "repeated": (SCENE,)}
     asked = LadderSection(**read_yaml(CONFIG / "default.yaml")["ladder"]).model_copy(update=few)
-    rows = again(ladder, ladder=asked)["out"]
+    job = Resolver(study, "results").job(repetitions, {"scene": SCENE, "group": GROUP})
+    settings = Options(**{**job.settings["settings"], "repeated": (), "own_ladder": asked})
+    rows = again(repetitions, settings=settings)["rungs"]
     kinds = {"up": len(asked.up), "down": len(asked.down), "signs": 2, "square": len(asked.square)}
     assert rows.direction.value_counts(sort=False).to_dict() == kinds  # none at 50: three modes
     sigma, train = array(paths.BASIS, "singular_values"), array(paths.SNAPSHOTS, "train")

@@ -39,7 +39,6 @@ def test_a_figure_without_an_entry_has_its_defaults(tmp_path):
         ("bar_runs:\n  frames: [1.5]\n", "frames"),
         ("bar_runs:\n  frames: []\n", "frames"),
         ("bar_runs:\n  ranks: [-1]\n", "ranks"),
-        ("reconstruction_error:\n  splits: [validation]\n", "splits"),
         (ENTRY.replace("singular_values", "surprise"), "unknown figure 'surprise'"),
         ("- one\n- two\n", "mapping"),
     ],

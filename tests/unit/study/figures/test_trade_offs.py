@@ -16,14 +16,15 @@ from study.figures.accuracy_cost import (
     FAMILIES,
     HIGH,
     INTERPOLATED,
+    ITERATIONS,
     LOW,
     TIME,
     WEIGHTED,
-    Model,
     TradeOffs,
     draw_panel,
     handles,
     label_iterations,
+    look_of,
     markers,
 )
 from study.figures.kit.options import Drawn, Reduction
@@ -38,45 +39,38 @@ def everything():
 
 
 def test_every_method_of_the_project_has_a_family(everything):
-    families = {name: Model(name, "full").family(everything) for name in everything.methods}
-    assert set(families.values()) <= set(FAMILIES[1:])
+    families = {name: look_of(name, "full", everything)[0] for name in everything.methods}
+    assert set(families.values()) <= {*FAMILIES} - {ITERATIONS}
     assert {families[name] for name in ("deim", "deim-joint", "published")} == {ENTRIES}
-    assert Model("ecsw-1e-02", "pod").family(everything) == WEIGHTED
-    assert Model("full", "skinning").family(everything) == WEIGHTED
-    assert Model("block-deim", "pod").family(everything) == INTERPOLATED
-    assert Model("not drawn", "full").family(everything) is None
+    assert look_of("ecsw-1e-02", "pod", everything)[0] == WEIGHTED
+    assert look_of("full", "skinning", everything)[0] == WEIGHTED
+    assert look_of("block-deim", "pod", everything)[0] == INTERPOLATED
+    assert look_of("not drawn", "full", everything)[0] is None
 
 
 def test_models_that_differ_by_tolerance_or_basis_share_a_marker(everything):
-    names = [
-        ("full", "pod"), ("ecsw-1e-02", "pod"), ("ecsw-1e-03", "pod"), ("full", "skinning"),
-        ("ecsw-1e-02", "skinning"), ("deim", "full"), ("deim-joint", "full"),
-    ]  # fmt: skip
-    found = markers([Model(*name) for name in names], everything)
-    sampled = {found[Model("ecsw-1e-02", "pod")], found[Model("ecsw-1e-03", "pod")]}
-    assert sampled == {found[Model("ecsw-1e-02", "skinning")]}
-    assert sampled != {found[Model("full", "pod")]}
-    assert found[Model("full", "pod")] == found[Model("full", "skinning")]
-    assert Model("full", "skinning").hollow
-    assert not Model("full", "pod").hollow
-    assert found[Model("deim", "full")] != found[Model("deim-joint", "full")]
-    nothing = TradeOffs(everything, pd.DataFrame(), pd.DataFrame(), {}, {}, found)
-    legend = dict(handles(nothing))
-    assert [line.get_label() for line in legend[WEIGHTED.title]] == [
+    ecsw = look_of("ecsw-1e-02", "pod", everything)
+    assert ecsw == look_of("ecsw-1e-03", "skinning", everything)
+    assert look_of("full", "pod", everything) == look_of("full", "skinning", everything)
+    names = [("full", "pod"), ("ecsw-1e-02", "pod"), ("deim", "full"), ("deim-joint", "full")]
+    looks = [look_of(*name, everything) for name in names]
+    found = markers([*looks, ecsw])
+    assert list(found) == looks
+    assert [found[look] for look in looks] == ["o", "s", "o", "s"]
+    legend = dict(handles(TradeOffs(pd.DataFrame(), pd.DataFrame(), {}, {}, found)))
+    assert [line.get_label() for line in legend[WEIGHTED]] == [
         "all projections", "ecsw, by tolerance",
     ]  # fmt: skip
 
 
-def invented(errors, times, method="deim", blown_up=()):
+def invented(errors, times, method="deim", blown_up=(), position_basis="full"):
     """Points of one scene, of one method that samples single entries."""
-    names = {"scene": "a", "method": method, "position_basis": "full", "family": ENTRIES.title}
+    names = {"scene": "a", "method": method, "position_basis": position_basis}
+    names |= {"family": ENTRIES, "member": "deim"}
     points = pd.DataFrame({ERROR: errors, TIME: times, "iterations": range(1, len(errors) + 1)})
     lost = pd.DataFrame({ERROR: np.nan, TIME: blown_up})
-    marker = {Model("deim", "full"): "o"}
-    none = Drawn(
-        experiments=(), reductions={"deim": Reduction(title="deim", rows="scalar")}, groups=()
-    )
-    return TradeOffs(none, points.assign(**names), lost.assign(**names), {"a": 2.0}, {}, marker)
+    marker = {(ENTRIES, "deim"): "o"}
+    return TradeOffs(points.assign(**names), lost.assign(**names), {"a": 2.0}, {}, marker)
 
 
 def drawn(ax, marker):
@@ -85,7 +79,7 @@ def drawn(ax, marker):
     return [tuple(map(float, xy)) for line in lines for xy in line.get_xydata()]
 
 
-def test_points_outside_the_axis_are_arrows_on_its_rim(everything):
+def test_points_outside_the_axis_are_arrows_on_its_rim():
     ax = Figure().subplots()
     draw_panel(ax, invented([1e-9, 0.1, 1e5], [1.0, 2.0, 3.0], blown_up=[4.0]), "a")
     assert drawn(ax, BELOW) == [(1.0, LOW)]
@@ -97,7 +91,14 @@ def test_points_outside_the_axis_are_arrows_on_its_rim(everything):
     assert ax.get_xlim()[1] > 4.0
 
 
-def test_the_front_of_a_family_is_not_beaten(everything):
+@pytest.mark.parametrize(("basis", "fill"), [("pod", "full"), ("skinning", "none")])
+def test_points_in_a_subspace_of_skinning_weights_are_hollow(basis, fill):
+    ax = Figure().subplots()
+    draw_panel(ax, invented([0.1], [2.0], position_basis=basis), "a")
+    assert next(line.get_fillstyle() for line in ax.lines if len(line.get_xdata()) == 1) == fill
+
+
+def test_the_front_of_a_family_is_not_beaten():
     ax = Figure().subplots()
     draw_panel(ax, invented([0.5, 0.7, 0.1, 0.2], [1.0, 2.0, 3.0, 4.0]), "a")
     (front,) = [
@@ -106,7 +107,7 @@ def test_the_front_of_a_family_is_not_beaten(everything):
     assert front.get_xydata().tolist() == [[1.0, 0.5], [3.0, 0.1]]
 
 
-def test_near_numbers_of_iterations_share_a_label(everything):
+def test_near_numbers_of_iterations_share_a_label():
     ax = Figure().subplots()
     found = invented([0.3, 0.2, 0.1], [1.0, 1.01, 9.0], method="fewer-iterations")
     draw_panel(ax, found, "a")

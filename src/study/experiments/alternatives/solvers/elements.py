@@ -15,8 +15,8 @@ import numpy as np
 from pdrom.core.errors import SceneError
 from pdrom.model.compiled.functions import compiled
 from pdrom.model.compiled.rows import WIDTH
-from pdrom.model.constraints.base import StencilGroup
 from pdrom.model.constraints.lanes import cross, dot, lane_function, perpendicular, scaled
+from pdrom.model.constraints.simplex import SimplexGroup
 from pdrom.model.constraints.spring import EdgeSpring
 from pdrom.model.scene import Scene
 
@@ -50,7 +50,7 @@ class Elements:
         """All elements of a scene; SceneError if a group is none that ``method`` takes."""
         parts = []
         for group in scene.groups:
-            if group.manifold not in KINDS or not isinstance(group, StencilGroup):
+            if group.manifold not in KINDS or not isinstance(group, SimplexGroup):
                 raise SceneError(
                     f"scene '{scene.config.name}', effect '{group.name}': method '{method}' takes "
                     "springs, triangle strain and tetrahedra only"
@@ -63,10 +63,7 @@ class Elements:
     @property
     def arrays(self) -> tuple[np.ndarray, ...]:
         """Arrays for compiled code: rows, corners, operator, weights, low, high, fallback."""
-        return (
-            self.rows, self.corners, self.operator, self.weights, self.low, self.high,
-            self.fallback,
-        )  # fmt: skip
+        return tuple(getattr(self, each.name) for each in fields(self))
 
     def by_colour(self) -> "Elements":
         """The elements in an order in which neighbours in the list share no vertex.
@@ -76,7 +73,7 @@ class Elements:
         """
         colours = _colours(self.rows, self.corners, int(self.corners.max(initial=0)) + 1)
         order = np.argsort(colours, kind="stable")
-        return Elements(*(np.ascontiguousarray(getattr(self, f.name)[order]) for f in fields(self)))
+        return Elements(*(np.ascontiguousarray(array[order]) for array in self.arrays))
 
     def around(self, vertices: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Elements at each of ``vertices`` N: starts (N + 1,), elements, and which corner it is."""
@@ -88,7 +85,7 @@ class Elements:
         return starts, element[order], corner[order]
 
 
-def _arrays(group: StencilGroup) -> tuple[np.ndarray, ...]:
+def _arrays(group: SimplexGroup) -> tuple[np.ndarray, ...]:
     e, p, m = group.operator.shape
     corners = np.zeros((e, 4), np.int64)
     corners[:, :m] = group.stencil

@@ -18,6 +18,7 @@ from study.experiments.alternatives.solvers.substeps import (
     inverse_masses,
     multiply,
 )
+from study.experiments.kit.scenes import followed
 
 UNSTABLE = 1e100  # m; of a larger run, or one that is not finite, no change is estimated
 
@@ -67,10 +68,6 @@ class Continuous:
     error: float
     substeps: int
 
-    def within(self, tolerance: float) -> bool:
-        """Whether the estimate meets a tolerance."""
-        return self.error <= tolerance
-
 
 def continuous(
     scene: Scene, frames: int, tolerance: float, substeps: int, limit: int
@@ -106,12 +103,7 @@ def _remaining(change: float, last: float) -> float:
 
 
 def _positions(scene: Scene, frames: int, substeps: int) -> np.ndarray:
-    loop, state = Explicit(scene, substeps), scene.initial_state()
-    positions = [state.positions]
-    for frame in range(frames):
-        state, _ = loop.step(state, frame)
-        positions.append(state.positions)
-    return np.stack(positions)
+    return followed(Explicit(scene, substeps), scene.initial_state(), frames)
 
 
 def _change(before: np.ndarray, after: np.ndarray) -> float:

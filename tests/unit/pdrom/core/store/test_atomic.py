@@ -13,6 +13,7 @@ import pytest
 
 from pdrom.core.errors import StorageError
 from pdrom.core.store import (
+    MARK,
     atomic_path,
     check_file,
     checksum_path,
@@ -24,7 +25,6 @@ from pdrom.core.store import (
     write_table,
     write_text,
 )
-from pdrom.core.store.atomic import MARK
 
 
 def test_name_appears_only_when_complete(tmp_path):

@@ -106,9 +106,14 @@ MATRICES = {
     "rotation by pi": half_turn,
     "inverted": with_singular_values(1.2, 1.0, -0.6),
     "nearly mirrored (1e-6)": with_singular_values(1.2, 1.0, -1.0 + 1e-6),
+    "where a closed form begins (1e-30)": with_singular_values(2e-30, 8e-31, 4e-31),
+    "where a closed form ends (1e30)": with_singular_values(1e30, 4e29, 2e29),
     "ill-scaled": lambda rng, rows: rng.standard_normal((rows, 3)) * 10.0 ** rng.uniform(
         -8, 8, (rows, 3)
     ),
+    "where determinants overflow (1e103)": lambda rng, rows: 10.0 ** rng.uniform(
+        102.6, 103.2
+    ) * rng.standard_normal((rows, 3)),
     "huge (1e150)": lambda rng, rows: 1e150 * rng.standard_normal((rows, 3)),
     "tiny (1e-150)": lambda rng, rows: 1e-150 * rng.standard_normal((rows, 3)),
     "mirrored": mirror,

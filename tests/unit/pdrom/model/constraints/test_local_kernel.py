@@ -83,7 +83,7 @@ def recording(split: bool, prepares: bool) -> tuple[LocalKernel, np.ndarray]:
     """A kernel of five units that touch six vertices, and how often each part was called."""
     notes = np.zeros(3)
     touched = (lambda unit: np.arange(unit, 6)) if split else None
-    return LocalKernel.of(_recording, 6, 5, [notes], [], touched, prepares), notes
+    return LocalKernel(_recording, 6, 5, [notes], [], touched, prepares), notes
 
 
 @pytest.mark.parametrize("prepares", [True, False])

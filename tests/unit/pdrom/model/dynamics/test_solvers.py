@@ -8,8 +8,8 @@ from scipy import sparse
 
 from builders import make_scene
 from pdrom.core.errors import ConfigurationError, SolverError
-from pdrom.model.dynamics.solvers import SOLVERS, WIDTHS, Panels
-from pdrom.model.dynamics.sweeps import sweep
+from pdrom.model.dynamics.solvers import SOLVERS, panels
+from pdrom.model.dynamics.sweeps import WIDTHS, sweep
 from pdrom.model.dynamics.system import GlobalSystem
 
 NAMES = sorted(SOLVERS)
@@ -136,16 +136,15 @@ def test_panels_hold_the_factor(size, rng):
     diagonal = rng.uniform(0.5, 2.0, size)
     sparse_lower = sparse.csc_array(lower)
     sparse_lower.sort_indices()
-    panels = Panels.of(sparse_lower, diagonal)
-    assert panels.first[0] == 0
-    assert panels.first[-1] == size
-    assert set(np.diff(panels.first)) <= set(WIDTHS)
+    factor = panels(sparse_lower, diagonal)
+    assert factor[0][[0, -1]].tolist() == [0, size]
+    assert set(np.diff(factor[0])) <= set(WIDTHS)
     inverse = np.linalg.inv(lower @ np.diag(diagonal) @ lower.T)
     for column in range(size):
         rhs, y = np.zeros((2, 4 * size))
         rhs[4 * column] = 1.0
         order, zeros = np.arange(size, dtype=np.int32), np.zeros(4 * size)
-        sweep(panels.factor, order, zeros, np.empty(4 * size), rhs, y)
+        sweep(factor, order, zeros, np.empty(4 * size), rhs, y)
         scale = np.abs(inverse).max()
         np.testing.assert_allclose(y[::4], inverse[:, column], atol=1e-12 * scale)
         assert not y.reshape(-1, 4)[:, 1:].any()

@@ -9,11 +9,12 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from builders import frame
+from machines.same_results import without_times
 from pdrom.core.errors import ConfigurationError
 from pdrom.core.yamlfile import validate
 from places import ROOT
 from study.tables import declared
-from study.tables.claims.claims import claims, claims_rows
+from study.tables.claims.claims import claims
 from study.tables.claims.metrics import METRICS
 from study.tables.claims.rules import MARGIN, ClaimRule, TestRule, load_claims
 from study.tables.claims.verdicts import (
@@ -486,7 +487,7 @@ def test_the_claims_are_those_of_the_paper():
 def test_without_data_nothing_is_decided():
     """Every rule names columns that exist, and none passes for lack of rows."""
     empty = {name: table.checked(pd.DataFrame()) for name, table in declared().items()}
-    rows = claims_rows(RULES, empty)
+    rows = claims(ROOT / "config" / "claims.yaml", **empty)
     assert rows.claim.tolist() == list(RULES)
     assert (rows[["verdict", "verdict_beyond"]] == UNDECIDED).all(axis=None)
 
@@ -538,11 +539,11 @@ def test_another_verdict_is_seen_where_no_clock_decides():
         [{"claim": c, "verdict": HOLDS, "why": "a", "measured": "1"} for c in RULES]
     )
     made = made.reindex(columns=claims.column_names, fill_value="")
-    kept = claims.without_times(made, ROOT)
+    kept = without_times(claims, made, ROOT)
     for place, name in enumerate(RULES):
         other = made.copy()
         other.loc[place, "verdict"] = UNDECIDED
-        changed = not claims.without_times(other, ROOT).equals(kept)
+        changed = not without_times(claims, other, ROOT).equals(kept)
         assert changed == ("verdict" not in timed_columns(RULES[name])), name
 
 
@@ -550,7 +551,7 @@ def test_the_replication_is_judged_where_no_clock_decides_either():
     made = pd.DataFrame({"claim": ["C2", "C9"], "part": "published", "verdict": HOLDS})
     made = made.reindex(columns=replication.column_names, fill_value="")
     of_c2, of_c9 = made.assign(verdict=[FAILS, HOLDS]), made.assign(verdict=[HOLDS, FAILS])
-    kept, changed, timed = (replication.without_times(t, ROOT) for t in (made, of_c2, of_c9))
+    kept, changed, timed = (without_times(replication, t, ROOT) for t in (made, of_c2, of_c9))
     assert timed.equals(kept)
     assert not changed.equals(kept)
 

@@ -3,13 +3,13 @@
 import pandas as pd
 import pytest
 
+from machines.same_results import without_times
 from places import ROOT
 from study.tables import declared
-from study.tables.claims.claims import claims_rows, claims_tests, outcome_rows
-from study.tables.claims.rules import load_claims
+from study.tables.claims.claims import claims, claims_tests
 from study.tables.claims.verdicts import MACHINE, UNDECIDED, combined
 
-RULES = load_claims(ROOT / "config" / "claims.yaml")
+PATH = ROOT / "config" / "claims.yaml"
 SHARES = pd.DataFrame(
     {"scene": ["a", "b", "c"], "implementation": "compiled", "local_share": [0.2, 0.8, 0.9]}
 )
@@ -23,12 +23,12 @@ def tables() -> dict[str, pd.DataFrame]:
 
 @pytest.fixture(scope="module")
 def outcomes(tables: dict[str, pd.DataFrame]) -> pd.DataFrame:
-    return outcome_rows(RULES, tables)
+    return claims_tests(PATH, **tables)
 
 
 def test_what_a_test_found(outcomes):
-    found = claims_tests.checked(outcomes)
-    one = found[(found.claim == "C1") & (found.part == "beyond") & found.decides].iloc[0]
+    found = outcomes[(outcomes.claim == "C1") & (outcomes.part == "beyond")]
+    one = found[found.decides].iloc[0]
     assert (one.satisfied, one.of, one.close, one.verdict) == (2, 3, 2, MACHINE)
     assert one.margin == 4.0
     assert (one.least, one["median"], one.most) == (0.2, 0.8, 0.9)
@@ -41,7 +41,7 @@ def test_a_test_without_rows_is_undecided(outcomes):
 
 
 def test_the_tests_that_decide_give_the_verdicts(tables, outcomes):
-    for row in claims_rows(RULES, tables).itertuples():
+    for row in claims(PATH, **tables).itertuples():
         for part, verdict in (("published", row.verdict), ("beyond", row.verdict_beyond)):
             mine = outcomes[(outcomes.claim == row.claim) & (outcomes.part == part)]
             mine = mine[mine.decides]
@@ -56,7 +56,7 @@ def test_words_tell_the_tests_of_a_part_apart(outcomes):
 def test_a_clock_has_its_say_where_times_are_compared(claim, timed, outcomes):
     said = outcomes.query("claim == @claim").head(1)
     one, other = (
-        claims_tests.without_times(claims_tests.checked(said.assign(satisfied=n)), ROOT)
+        without_times(claims_tests, claims_tests.checked(said.assign(satisfied=n)), ROOT)
         for n in (1, 2)
     )
     assert one.equals(other) == timed

@@ -1,12 +1,17 @@
-"""A reduction from its files."""
+"""A reduction from its files; how a run ended, and its error."""
 
 import os
 from collections.abc import Sequence
 
+import h5py
+import numpy as np
+
 from pdrom.core.errors import StorageError
 from pdrom.core.store import open_hdf5
+from pdrom.model.metrics import trajectory_error
 from pdrom.reduction.basis import Basis
 from pdrom.reduction.method import MethodSpec
+from pdrom.reduction.rerun import Rerun, displacement_norms
 from pdrom.reduction.sampling.reduction import Reduction, Sampling
 from study.artifact.paths import File
 
@@ -28,3 +33,17 @@ def basis_of(sampling: File, method: MethodSpec, bases: Sequence[File]) -> File:
         if basis.labels == wanted:
             return basis
     raise StorageError(f"{sampling.path}: its basis {method.basis_id} is not among the files read")
+
+
+def run_error(run: np.ndarray, reference: np.ndarray) -> float | None:
+    """Relative error of a ``run`` against a ``reference``, positions (F + 1, N, 3) m of both."""
+    difference = np.linalg.norm((run - reference)[1:].reshape(len(run) - 1, -1), axis=1)
+    return trajectory_error(difference, displacement_norms(reference))
+
+
+def store_end(store: h5py.Group, outcome: Rerun, with_positions: bool = True) -> None:
+    """Store where a run ended, and in single precision what is drawn of it."""
+    blowup = -1 if outcome.blowup_frame is None else outcome.blowup_frame
+    store.attrs.update(blowup_frame=blowup, max_extent=outcome.max_extent)
+    if with_positions:
+        store["positions"] = outcome.positions.astype(np.float32)

@@ -1,0 +1,363 @@
+"""Cost of the parts of a run: phases, effects, larger meshes, reduced local steps."""
+
+import numpy as np
+import pandas as pd
+
+from pdrom.core.store import read_table
+from pdrom.view import style
+from pdrom.view.artists import Artist, Axes, Figure
+from pdrom.view.multiples import label_outer, plain_ticks, small_multiples
+from study.artifact.paths import CONTRIBUTIONS, File
+from study.artifact.reads import EachOf, Settings, TableOf
+from study.experiments.kit.settings import GLOBAL, REST, RIGHT
+from study.figures.kit.declaration import figure
+from study.figures.kit.options import Columns, Drawn, Methods, NothingToDraw, Scenes
+from study.tables.effects_cost import NOTHING
+
+# the local step, whose share is printed, is what has a shade of orange
+PHASES = {
+    "local_ms": ("local step: projections", style.ORANGE),
+    "assembly_ms": ("local step: right-hand side", "#F7D08A"),
+    "global_ms": ("global solve", style.BLUE),
+}
+TITLES = {"interpreted": "interpreted loop", "numpy": "vectorised NumPy", "compiled": "compiled"}
+CLAIM = 70.0  # per cent, claim C1
+CURVES = {
+    "ms_per_iteration": ("whole iteration", "-"),
+    "local_ms": ("local step", "--"),
+    "global_ms": ("global solve", ":"),
+}
+NAMES = {"fom": "full order", "ecsw": "POD subspace, ecsw"}  # whose exponent is printed
+SCALED = {"fom": (style.BLACK, "o"), "ecsw": ("#1B6E6E", ">")}
+ROOM = 2.6  # factor by which the axis goes on beyond the last mesh, for the exponents
+FRAMES = ["effect", "frame", "force"]
+SHOWN = 3  # scenes whose forces are drawn
+LOW, HIGH = 1e-12, 1e2
+ROUNDOFF = 1e-14  # of the largest force of a scene: what is smaller is not drawn
+OTHERS = ("#8C6D31", "#5A5A5A", "#B03A6B", "#2B2B80", "#3E8E7E", "#A0522D", "#7F7F00")
+MARKERS = "*dph8H|"  # no group has one of these: effects differ without colours, too
+UNLISTED = "forces, holds, contacts"
+COLOURS = {UNLISTED: style.VERMILLION, RIGHT: style.SKY, GLOBAL: "#3A5A78", REST: "#C9C4BA"}
+Looks = dict[str, tuple[str, str]]
+
+
+class BreakEven(Methods):
+    """Scenes, methods, panels side by side."""
+
+    columns: Columns = 3
+
+
+@figure(
+    title="Where the time of a frame goes",
+    caption=(
+        "Share of the local step and of the global solve in the time of a full-order frame, for "
+        "three implementations of the same local step. The printed number is the share of the "
+        "local step, that is of both shades of orange: the projections and the right-hand side "
+        "that is assembled from them, in one pass where they are compiled. The dashed line is the "
+        "70 % of claim C1; beside the bar stands the time per frame. An interpreted loop confirms "
+        "the claim everywhere, compiled code only where projections are expensive."
+    ),
+    reads={"drawn": Settings(Drawn), "table": TableOf("local_share")},
+)
+def local_share(options: Scenes, drawn: Drawn, table: pd.DataFrame) -> Figure:
+    """Draw a panel per implementation, a bar per scene with the time per frame at its end."""
+    scenes = drawn.scenes_of(table, "no timings")
+    present = set(table[table.scene.isin(scenes)].implementation)
+    implementations = [i for i in TITLES if i in present]
+    figure = style.new_figure(0.27 * len(scenes) + 1.15)
+    axes = figure.subplots(1, len(implementations), sharey=True, squeeze=False)[0]
+    for ax, implementation in zip(axes, implementations, strict=True):
+        rows = table[table.implementation == implementation].drop_duplicates("scene")
+        _draw_bars(ax, rows.set_index("scene"), scenes)
+        ax.set_title(TITLES[implementation])
+        ax.set_xlabel("share of a frame (%)")
+    style.label_rows(axes[0], [style.words(scene) for scene in scenes])
+    handles: list[Artist] = [style.patch(label, color=c) for label, c in PHASES.values()]
+    line = {"color": style.BLACK, "linestyle": "--"}
+    handles.append(style.handle(f"{CLAIM:.0f} % (claim C1)", **line))
+    style.legend(figure, handles, 4)
+    return figure
+
+
+def _draw_bars(ax: Axes, rows: pd.DataFrame, scenes: list[str]) -> None:
+    for y, scene in enumerate(scenes):
+        if scene not in rows.index:
+            continue
+        times = rows.loc[scene, list(PHASES)].to_numpy(float)
+        total = np.nansum(times)
+        start = 0.0
+        for time, (_, colour) in zip(times, PHASES.values(), strict=True):
+            share = 100.0 * np.nan_to_num(time) / total
+            ax.barh(y, share, left=start, color=colour, height=0.72)
+            start += share
+        printed = f"{100.0 * rows.local_share[scene]:.0f} %"
+        ax.text(2.0, y, printed, va="center", ha="left", fontsize=7.5, fontweight="bold")
+        words = f"{total:.2g} ms" if total < 99.5 else f"{total:.0f} ms"
+        ax.text(102.0, y, words, va="center", ha="left", fontsize=7)
+    ax.axvline(CLAIM, color=style.BLACK, linewidth=1.0, linestyle="--")
+    ax.set_xlim(0, 100)
+    ax.set_xticks([0, 25, 50, 75, 100])
+    ax.tick_params(axis="y", length=0)
+
+
+@figure(
+    title="Cost against mesh size",
+    caption=(
+        "Time of one local/global iteration against the number of vertices: the full-order "
+        "run, the same with only the local step reduced, and the hyper-reduced run in a position "
+        "subspace, whose cost hardly depends on the mesh. Beside "
+        "the ends of curves stands the exponent of a fitted power law, where there are three sizes "
+        "of the mesh or more. Assembly and "
+        "factorisation before the first frame are in the table `scaling`."
+    ),
+    reads={"drawn": Settings(Drawn), "table": TableOf("scaling")},
+)
+def scaling(options: Scenes, drawn: Drawn, table: pd.DataFrame) -> Figure:
+    """Draw a panel per scene: the time of an iteration, by phase."""
+    asked = options.scenes or tuple(dict.fromkeys(table.scene))
+    scenes = [scene for scene in asked if (table.scene == scene).any()]
+    if not scenes:
+        raise NothingToDraw("no mesh sizes")
+    figure = style.new_figure(2.9)
+    times = figure.subplots(1, len(scenes), sharex=True, sharey=True, squeeze=False)[0]
+    for ax, scene in zip(times, scenes, strict=True):
+        rows = table[table.scene == scene].sort_values("vertices")
+        _draw_times(ax, rows)
+        ax.set_title(style.words(scene))
+        ax.set_xlabel("vertices")
+    sizes = table[table.scene.isin(scenes)].vertices
+    times[0].set_xlim(0.75 * sizes.min(), ROOM * sizes.max())
+    for axis in (times[0].xaxis, times[0].yaxis):  # shared by all panels
+        low, high = np.log10(axis.get_view_interval())
+        plain_ticks(axis, high - low)
+    times[0].set_ylabel("time of an iteration (ms)")
+    named = {NAMES.get(m) or drawn.title(m): _look(m) for m in dict.fromkeys(table.method)}
+    lines = [style.handle(label, color="#555555", linestyle=s) for label, s in CURVES.values()]
+    style.legend(figure, [*style.handles(named), *lines], 4)
+    return figure
+
+
+def _look(method: str) -> tuple[str, str]:
+    """Colour and marker of a method."""
+    return SCALED.get(method) or style.method_styles([method])[method]
+
+
+def _draw_times(ax: Axes, rows: pd.DataFrame) -> None:
+    ax.set_xscale("log")
+    ax.set_yscale("log")
+    style.grid(ax)
+    for method, part in rows.groupby("method", sort=False):
+        colour, marker = _look(str(method))
+        for quantity, (_, line) in CURVES.items():
+            ax.plot(
+                part.vertices, part[quantity], line, color=colour,
+                marker=marker if line == "-" else None, linewidth=1.3 if line == "-" else 0.9,
+            )  # fmt: skip
+        end = part.iloc[-1]
+        if method in NAMES and end.exponent == end.exponent:
+            ax.annotate(
+                rf"$N^{{{end.exponent:.2f}}}$",
+                (end.vertices, end.ms_per_iteration), xytext=(5, 0),
+                textcoords="offset points", va="center", color=colour, fontsize=7.5,
+            )  # fmt: skip
+
+
+@figure(
+    title="When a reduced local step stops paying",
+    caption=(
+        "Time of the reduced local step over that of the full one, both compiled and on one "
+        "thread, against the number $r$ of basis vectors; one line per scene and method, timed "
+        "alone on states of the full-order run. Above the dashed line the reduction costs more "
+        "than all projections. Lines end at the numerical rank."
+    ),
+    reads={"drawn": Settings(Drawn), "table": TableOf("breakeven")},
+)
+def break_even(options: BreakEven, drawn: Drawn, table: pd.DataFrame) -> Figure:
+    """Draw a panel per constraint group, a line per scene and method; above 1 it costs more."""
+    table = drawn.rows(table)
+    table = table[table.factor == 1.0]
+    if table.empty:
+        raise NothingToDraw("no reduced local step was timed")
+    groups = [g for g in drawn.looks if (table.group == g).any()]
+    figure, axes = small_multiples(len(groups), options.columns, legend_rows=2, height=1.8)
+    styles = style.method_styles([m for m in drawn.methods if (table.method == m).any()])
+    for ax, group in zip(axes, groups, strict=True):
+        ax.set_title(style.words(group))
+        ax.set_yscale("log")
+        style.grid(ax)
+        ax.axhline(1.0, color=style.BLACK, linestyle="--", linewidth=1.0, zorder=1)
+        own = table[table.group == group]
+        for (_, method), curve in own.groupby(["scene", "method"], sort=False):
+            colour, marker = styles[str(method)]
+            curve = curve.sort_values("r")
+            ax.plot(
+                curve.r, curve.ratio, color=colour, marker=marker, markersize=2.6, linewidth=0.8,
+                alpha=0.75,
+            )  # fmt: skip
+        ax.set_xlim(left=0.0)
+    label_outer(axes, options.columns, "basis vectors r", "reduced over full local step")
+    one = style.handle("break-even", color=style.BLACK, linestyle="--")
+    style.legend(figure, [*drawn.handles(styles), one], 3)
+    return figure
+
+
+@figure(
+    title="What each effect contributes",
+    caption=(
+        "Left: norm of the force of each effect on the free vertices over the frames of a scene "
+        "(of a hold: on the vertices that it holds). Right: how far the run moves "
+        "when an effect is left out, before the horizon; the grey bar ends at the "
+        "sensitivity floor, below which nothing can be told from round-off. Open markers "
+        "lie below the floor, at the left edge where nothing changes at all. The only group of a "
+        "scene cannot be left out."
+    ),
+    reads={
+        "drawn": Settings(Drawn),
+        "table": TableOf("effects_cost"),
+        "contributions": EachOf(CONTRIBUTIONS, "experiments"),
+    },
+)
+def effects_contribution(
+    options: Scenes, drawn: Drawn, table: pd.DataFrame, contributions: list[File]
+) -> Figure:
+    """Draw the forces of the first scenes over time, and beside them every scene and effect."""
+    table = table.dropna(subset=["force"])
+    scenes = drawn.scenes_of(table, "no contributions of effects")
+    rows = table[table.scene.isin(scenes)]
+    forces = {file["scene"]: read_table(file.path, FRAMES) for file in contributions}
+    shown = sorted(scenes, key=lambda scene: -len(drawn.of(scene)))[:SHOWN]
+    looks = _looks(drawn, rows[rows.moved.notna() | rows.scene.isin(shown)])
+    figure = style.new_figure(0.24 * len(scenes) + 2.0)
+    left, right = figure.subfigures(1, 2, width_ratios=(1.0, 1.15))
+    axes = left.subplots(len(shown), 1, squeeze=False)[:, 0]
+    for ax, scene in zip(axes, shown, strict=True):
+        _draw_forces(ax, forces[scene], looks)
+        ax.set_title(style.words(scene))
+    axes[-1].set_xlabel("frame")
+    axes[len(axes) // 2].set_ylabel("norm of the force (N)")
+    _draw_moved(right.subplots(), rows, scenes, looks)
+    named = {style.words(effect): look for effect, look in looks.items()}
+    style.legend(figure, style.handles(named, markersize=4.5), 6)
+    return figure
+
+
+def _looks(drawn: Drawn, rows: pd.DataFrame) -> Looks:
+    """Colours and markers: those of a group as everywhere else, of other effects in their order."""
+    known = drawn.looks
+    others = [effect for effect in dict.fromkeys(rows.effect) if effect not in known]
+    groups = {effect: known[effect] for effect in dict.fromkeys(rows.effect) if effect in known}
+    return groups | {
+        effect: (OTHERS[i % len(OTHERS)], MARKERS[i % len(MARKERS)])
+        for i, effect in enumerate(others)
+    }
+
+
+def _draw_forces(ax: Axes, frames: pd.DataFrame, looks: Looks) -> None:
+    least = ROUNDOFF * frames.force.max()
+    for effect, rows in frames.groupby("effect", sort=False):
+        force = rows.force.where(rows.force > least)
+        colour, marker = looks[str(effect)]
+        if len(rows) > 1:
+            ax.plot(rows.frame, force, color=colour, linewidth=1.1)
+        else:
+            ax.plot(rows.frame, force, color=colour, marker=marker, markersize=3.5)
+    ax.set_yscale("log")
+    style.grid(ax)
+
+
+def _draw_moved(ax: Axes, rows: pd.DataFrame, scenes: list[str], looks: Looks) -> None:
+    for y, scene in enumerate(scenes):
+        own = rows[rows.scene == scene]
+        floor = float(own.sensitivity_floor.iloc[0])
+        ax.barh(y, floor - LOW, left=LOW, color="#DCD8D0", height=0.8, zorder=1)
+        for row in own[own.moved.notna()].itertuples():
+            colour, marker = looks[row.effect]
+            ax.plot(
+                [np.clip(row.moved, LOW, HIGH)], [y], marker=marker, markersize=4.5, zorder=3,
+                color=colour, markerfacecolor=colour if row.above_floor else "white",
+                clip_on=False,
+            )  # fmt: skip
+    style.label_rows(ax, [style.words(scene) for scene in scenes])
+    ax.set_xscale("log")
+    ax.set_xlim(LOW, HIGH)
+    ax.tick_params(axis="y", length=0)
+    ax.set_xlabel("drift of the run without the effect")
+    style.grid(ax)
+
+
+@figure(
+    title="What each effect costs",
+    caption=(
+        "Left: share of each effect in the time of a full-order frame, which is printed beside "
+        "the bar. Right: the frame of one scene built without some of its effects; the tick is "
+        "the whole less what these effects cost in it. A bar that ends at the tick pays nothing "
+        "for what the scene does not list."
+    ),
+    reads={"drawn": Settings(Drawn), "table": TableOf("effects_cost")},
+)
+def effects_cost(options: Scenes, drawn: Drawn, table: pd.DataFrame) -> Figure:
+    """Draw a bar per scene, divided by effect; on the right one scene without some of its effects.
+
+    On the right a tick marks the time of the whole scene less what the missing effects cost in it.
+    A bar that ends there pays nothing for what it does not list.
+    """
+    costs, removed = table.dropna(subset=["share"]), table.dropna(subset=["without_ms"])
+    removed = removed.sort_values("effect", key=lambda name: name != NOTHING, kind="stable")
+    scenes = drawn.scenes_of(costs, "no timings of effects")
+    several = [scene for scene in scenes if (removed.scene == scene).any()]
+    rows = removed[removed.scene == several[0]] if several else removed[:0]
+    height = 0.27 * max(len(scenes), len(rows)) + 1.3
+    figure = style.new_figure(height)
+    axes = figure.subplots(1, 2 if several else 1, squeeze=False)[0]
+    looks = drawn.looks
+    colours = {**{group: colour for group, (colour, _) in looks.items()}, **COLOURS}
+    parts = _draw_scenes(axes[0], costs, scenes, colours)
+    handles: list = [style.patch(style.words(part), color=colours[part]) for part in parts]
+    if several:
+        _draw_left_out(axes[1], rows, several[0])
+        tick = {"linestyle": "none", "marker": "|", "markersize": 9, "markeredgewidth": 1.4}
+        handles.append(style.handle("whole less its own cost", color=style.BLACK, **tick))
+    style.legend(figure, handles, 4)
+    return figure
+
+
+def _draw_scenes(
+    ax: Axes, costs: pd.DataFrame, scenes: list[str], colours: dict[str, str]
+) -> list[str]:
+    """Bars of shares; returns the parts that were drawn, in the order of the legend."""
+    costs = costs.assign(part=costs.effect.where(costs.effect.isin(list(colours)), UNLISTED))
+    parts = [part for part in colours if (costs.part == part).any()]
+    for y, scene in enumerate(scenes):
+        rows = costs[costs.scene == scene]
+        start = 0.0
+        for part, share in (100.0 * rows.groupby("part").share.sum()).reindex(parts).items():
+            if share > 0.0:
+                ax.barh(y, share, left=start, color=colours[str(part)], height=0.72)
+                start += share
+        total = rows.ms_per_frame.sum()
+        ax.text(101.0, y, f"{total:.2g} ms", va="center", ha="left", fontsize=7)
+    style.label_rows(ax, [style.words(scene) for scene in scenes])
+    ax.set_xlim(0, 100)
+    ax.tick_params(axis="y", length=0)
+    ax.set_xlabel("share of a full-order frame (%)")
+    ax.set_ylabel("scene")
+    return parts
+
+
+def _draw_left_out(ax: Axes, rows: pd.DataFrame, scene: str) -> None:
+    whole = float(rows.without_ms.iloc[0])
+    shades = {1: "#BFD3E0", 2: "#8FB2C9", 3: "#5F90B2"}
+    for y, row in enumerate(rows.itertuples()):
+        ax.barh(y, row.without_ms, color=shades.get(row.groups, "#5F90B2"), height=0.72)
+        if row.ms_per_frame > 0.0:
+            ax.plot(
+                [whole - row.ms_per_frame], [y], marker="|", color=style.BLACK, markersize=9,
+                markeredgewidth=1.4,
+            )  # fmt: skip
+    style.label_rows(
+        ax, [f"without {style.words(e)}" if e != NOTHING else "whole" for e in rows.effect]
+    )
+    ax.set_xlim(0.0, 1.15 * float(rows.without_ms.max()))
+    ax.tick_params(axis="y", length=0)
+    ax.set_xlabel("time per frame (ms)")
+    ax.set_title(style.words(scene))

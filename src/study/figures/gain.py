@@ -1,0 +1,185 @@
+"""The gain of the interpolation: it tells whether a run fails, and which choices raise it."""
+
+import numpy as np
+import pandas as pd
+
+from pdrom.view import style
+from pdrom.view.artists import Axes, Figure
+from pdrom.view.multiples import clipped, log_axes, rim_arrows
+from pdrom.view.text import plain_words
+from study.artifact.reads import Settings, TableOf
+from study.figures.kit.declaration import figure
+from study.figures.kit.options import Drawn, Methods, NothingToDraw, Scenes
+from study.tables.kit.reruns import FAILED, judged_runs
+
+GAINS = (1.0, 1e5)  # limits of the axes; points outside are drawn on the rim
+ERRORS, LADDER_ERRORS = (1e-5, 1e2), (1e-4, 1e2)
+ENDS = ("low", "median", "high")
+DECADES = 4  # gains above 10^4 are counted together
+_KEYS = ["scene", "group", "method", "r"]
+
+
+@figure(
+    title="Error of the run against the gain",
+    caption=(
+        "Left: every run of a sampled method whose basis suffices (the orthogonal projection does "
+        "not fail at the same size), over all scenes and sizes. Dashed: the error from which on a "
+        "run counts as failed. Arrows on the rim lie outside the axes. Crosses: range and median "
+        "over runs, in some scenes, that are trained on as many resampled frames. Right: how many "
+        "of them failed, by decade of the gain."
+    ),
+    reads={
+        "drawn": Settings(Drawn),
+        "reruns": TableOf("reduced_reruns"),
+        "errors": TableOf("reconstruction_error"),
+        "repetitions": TableOf("repetitions"),
+    },
+)
+def error_against_gain(
+    options: Methods,
+    drawn: Drawn,
+    reruns: pd.DataFrame,
+    errors: pd.DataFrame,
+    repetitions: pd.DataFrame,
+) -> Figure:
+    """Draw a dot per run, error within the horizon over gain, and failures by decade of gain.
+
+    Runs that ended before their horizon lie on the upper rim, singular interpolations on the right
+    one.
+    """
+    runs = drawn.rows(judged_runs(reruns, errors))
+    if runs.empty:
+        raise NothingToDraw("no run with a gain")
+    figure = style.new_figure(3.0)
+    left, right = figure.subplots(1, 2, width_ratios=(2.2, 1.0))
+    repeated = repetitions[repetitions.varied == "training"]
+    ranges = runs[[*_KEYS, "gain", "error"]].merge(repeated, on=_KEYS)
+    methods = [m for m in drawn.methods if (runs.method == m).any()]
+    styles = style.method_styles(methods)
+    for method in methods:
+        own = runs[runs.method == method]
+        _draw_method(left, own, ranges[ranges.method == method], *styles[method])
+    log_axes(left, GAINS, ERRORS)
+    left.set_xlabel("gain of the interpolation")
+    left.set_ylabel("error within the horizon (relative)")
+    left.axhline(FAILED, color="#333333", linewidth=0.8, linestyle="--", zorder=0)
+    left.text(GAINS[1], FAILED * 1.1, "failed ", ha="right", va="bottom", fontsize=7)
+    left.text(GAINS[0] * 1.1, ERRORS[1] * 0.8, "ended early: upper rim", va="top", fontsize=7)
+    _draw_decades(right, runs)
+    style.legend(figure, drawn.handles(styles, linestyle="none"), 4)
+    return figure
+
+
+def _draw_method(
+    ax: Axes, runs: pd.DataFrame, ranges: pd.DataFrame, colour: str, marker: str
+) -> None:
+    """Draw runs, and crosses from the least to the largest gain and error, at the medians."""
+    x, y = runs.gain.to_numpy(float), runs.error.to_numpy(float)
+    rim_arrows(ax, x, y, colour=colour, across=GAINS, along=ERRORS)
+    ax.plot(
+        clipped(x, *GAINS), clipped(y, *ERRORS), linestyle="none", color=colour, marker=marker,
+        markersize=3.2, alpha=0.7, markeredgewidth=0.0, clip_on=False,
+    )  # fmt: skip
+    gains = [clipped(ranges[f"gain_{e}"].to_numpy(float), *GAINS) for e in ENDS]
+    errors = [clipped(ranges[f"error_{e}"].to_numpy(float), *ERRORS) for e in ENDS]
+    bars = {"color": colour, "linewidth": 0.9, "zorder": 3}
+    ax.vlines(gains[1], errors[0], errors[2], **bars)
+    ax.hlines(errors[1], gains[0], gains[2], **bars)
+
+
+def _draw_decades(ax: Axes, runs: pd.DataFrame) -> None:
+    """Share of failed runs by decade of the gain, the number of runs above each bar."""
+    # the last decade holds all that is above, singular interpolations too
+    upper = np.ceil(np.log10(runs.gain.clip(upper=10.0**DECADES + 1.0))).clip(lower=1)
+    decades = runs.groupby(upper.astype(int)).failed.agg(["size", "mean"])
+    places = np.arange(len(decades))
+    ax.bar(places, 100.0 * decades["mean"], width=0.7, color=style.FAILED, alpha=0.75)
+    for place, count, share in zip(places, decades["size"], decades["mean"], strict=True):
+        ax.text(place, 100.0 * share + 1.5, f"{count}", ha="center", fontsize=7)
+    spans = {upper: rf"$10^{{{upper - 1}}}$ to $10^{{{upper}}}$" for upper in decades.index}
+    spans |= {upper: rf"over $10^{{{DECADES}}}$" for upper in spans if upper > DECADES}
+    ax.set_xticks(places, list(spans.values()))
+    ax.set_ylim(0, 112)
+    ax.set_yticks([0, 25, 50, 75, 100])
+    ax.tick_params(axis="x", labelrotation=35)
+    ax.set_xlabel("gain of the interpolation")
+    ax.set_ylabel("failed runs (%)")
+    ax.set_title("number of runs above each bar")
+    style.grid(ax)
+
+
+@figure(
+    title="One choice after the other",
+    caption=(
+        "Above the line one ingredient after the other is changed, from the published code to "
+        "whole elements with oversampling; below it each row takes a single ingredient away from "
+        "the complete method or exchanges it. Left the error of the rerun within the horizon, "
+        "right the gain of the interpolation; what blew up or is singular lies on the right rim. "
+        "Bars show the range over runs that are trained on as many resampled frames, on some "
+        "scenes; pale ones that over choices of the arbitrary signs of the singular vectors."
+    ),
+    reads={"table": TableOf("ladder")},
+)
+def ladder(options: Scenes, table: pd.DataFrame) -> Figure:
+    """Draw rungs from top (published) to bottom; left the error of the rerun, right the gain.
+
+    Below the line each row lacks one ingredient of the sound method. A bar shows the range over
+    other training frames, a broad pale one that over choices of the singular vectors' signs for the
+    published method. Runs that blew up before their horizon, and singular interpolations, lie on
+    the right rim.
+    """
+    table = options.rows(table)
+    table = table[table.gain.notna() & (table.direction != "square")]
+    if table.empty:
+        raise NothingToDraw("no scene that climbs the ladder")
+    climbed = table[table.direction.isin(["up", "down"])]
+    rungs = list(dict.fromkeys(zip(climbed.direction, climbed.rung, strict=True)))
+    scenes = list(dict.fromkeys(table.scene))
+    figure = style.new_figure(0.2 * len(rungs) + 1.2)
+    left, right = figure.subplots(1, 2, sharey=True)
+    error = ("relative_error_within_horizon", "error_low", "error_high")
+    _draw_quantity(left, table, rungs, scenes, error, LADDER_ERRORS)
+    _draw_quantity(right, table, rungs, scenes, ("gain", "gain_low", "gain_high"), GAINS)
+    left.set_xlabel("error of the rerun within the horizon (relative)")
+    right.set_xlabel("gain of the interpolation")
+    left.set_yticks(range(len(rungs)), [plain_words(rung) for _, rung in rungs])
+    left.invert_yaxis()
+    handles = style.scene_handles(scenes)
+    handles.append(style.handle("range: training frames", color=style.GREY, linewidth=0.9))
+    handles.append(style.handle("range: signs", color=style.GREY, linewidth=3.0, alpha=0.35))
+    style.legend(figure, handles, 4)
+    return figure
+
+
+def _draw_quantity(
+    ax: Axes,
+    table: pd.DataFrame,
+    rungs: list[tuple[str, str]],
+    scenes: list[str],
+    columns: tuple[str, str, str],
+    limits: tuple[float, float],
+) -> None:
+    ax.set_xscale("log")
+    ax.set_xlim(limits[0], limits[1] * 1.3)
+    style.grid(ax)
+    for i, scene in enumerate(scenes):
+        rows = table[table.scene == scene].set_index(["direction", "rung"])
+        found, low, high = (
+            np.array([rows[column].get(rung, np.nan) for rung in rungs], float)
+            for column in columns
+        )
+        values = clipped(np.nan_to_num(found, nan=np.inf), *limits)
+        heights = np.arange(len(rungs)) + 0.09 * (i - 0.5 * (len(scenes) - 1))
+        colour, marker = style.scene_style(i)
+        ax.plot(values, heights, linestyle="none", color=colour, marker=marker, markersize=3.2)
+        repeated = ~np.isnan(low)
+        ends = (clipped(bound[repeated], *limits) for bound in (low, high))
+        ax.hlines(heights[repeated], *ends, color=colour, linewidth=0.9)
+        signs = table[(table.scene == scene) & (table.direction == "signs")][columns[0]]
+        if len(signs):
+            spread = clipped(np.nan_to_num(signs.to_numpy(float), nan=np.inf), *limits)
+            ax.hlines(
+                heights[0], spread.min(), spread.max(), color=colour, linewidth=3.0, alpha=0.25
+            )
+    first_down = next((i for i, (d, _) in enumerate(rungs) if d == "down"), len(rungs))
+    ax.axhline(first_down - 0.5, color="#333333", linewidth=0.8)

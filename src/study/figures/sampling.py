@@ -1,0 +1,300 @@
+"""Samplings drawn on the mesh: the iterations of DEIM, the elements that its entries hit."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pdrom.core.errors import StorageError
+from pdrom.core.store import open_hdf5
+from pdrom.model.mesh.types import load_mesh
+from pdrom.view import style
+from pdrom.view.artists import Axes, Figure, ScalarMappable
+from pdrom.view.camera import Camera, window_of
+from pdrom.view.mesh_render import draw_surface, set_window
+from pdrom.view.multiples import panels, rows_of
+from pdrom.view.panels import fit_aspect
+from pdrom.view.read import SamplingView, read_basis, read_samplings
+from study.artifact.paths import BASIS, MESH, SAMPLING, SNAPSHOTS, File
+from study.artifact.reads import EachOf, Settings
+from study.figures.kit.declaration import figure
+from study.figures.kit.elements import NEUTRAL, ElementMap, element_map, magnitudes
+from study.figures.kit.options import Columns, Count, Drawn, NothingToDraw, Ranks, View
+
+EARLIER = {
+    "markerfacecolor": "#FFFFFF", "markeredgecolor": style.BLACK, "markeredgewidth": 0.8,
+    "markersize": 3.0,
+}  # fmt: skip
+NEWEST = {
+    "markerfacecolor": "none", "markeredgecolor": style.SKY, "markeredgewidth": 1.6,
+    "markersize": 8.5,
+}  # fmt: skip
+SEVERAL = "several"  # axes, of the entries that hit an element
+AXES = {**style.AXES, SEVERAL: "#333333"}
+ROW_HEIGHT = 1.85  # inches
+
+
+class Steps(View):
+    """Number of iterations; the first scene and method are drawn."""
+
+    count: Count = 6
+    columns: Columns = 3
+
+
+class Entries(View):
+    """The first size that exists is drawn on the mesh."""
+
+    ranks: Ranks = ()
+
+
+@dataclass(frozen=True)
+class Iteration:
+    """Step k of a greedy selection.
+
+    magnitude : (e,) on each element the residual of mode k in the measure that the selection
+        takes the largest of: its largest entry (``rows`` "scalar"), the largest norm of one of its
+        rows over x, y, z ("joint"), or the norm of all its entries ("element")
+    earlier, newest : elements picked before, and in this step
+    entry : vector index of the (first) entry picked in this step
+    """
+
+    k: int
+    magnitude: np.ndarray
+    earlier: np.ndarray
+    newest: int
+    entry: int
+
+
+@figure(
+    number=2,
+    title="The first iterations of DEIM",
+    caption=(
+        "In step $k$ the residual of mode $k$ is taken against the modes before it, interpolated "
+        "at the entries picked so far, and the entry where it is largest in absolute value is "
+        "picked next. An element has the colour of its largest entry, so that the ringed one, "
+        "which holds the picked entry, is the darkest; white dots are elements picked before. Each "
+        "step asks for one number, whose whole element has to be projected for it."
+    ),
+    reads={
+        "drawn": Settings(Drawn),
+        "meshes": EachOf(MESH, "first_run"),
+        "bases": EachOf(BASIS, "first_run"),
+        "samples": EachOf(SAMPLING, "first_run"),
+    },
+)
+def deim_iterations(
+    options: Steps, drawn: Drawn, meshes: list[File], bases: list[File], samples: list[File]
+) -> Figure:
+    """Draw per step the residual of the current mode on the mesh and the elements picked so far.
+
+    The first experiment and the first method that exist are drawn.
+    """
+    method, reduction = next(iter(drawn.reductions.items()), ("", None))
+    if not samples or reduction is None or reduction.rows == "all":
+        raise NothingToDraw(f"samples of {options.words()}")
+    experiment, path = drawn.experiments[0], samples[0].path
+    basis, samplings = read_basis(bases[0].path), read_samplings(path)
+    if not samplings:
+        raise NothingToDraw(f"nothing was sampled for {experiment.title}")
+    entries, camera = samplings[-1].entries, options.camera(experiment)
+    steps = iterations(basis.V, entries, basis.rows_per_element, reduction.rows, options.count)
+    mesh = load_mesh(meshes[0].path)
+    elements = element_map(experiment.group, mesh, basis.elements, source=str(path))
+    columns = min(options.columns, len(steps))
+    window = fit_aspect(window_of(camera, [mesh.points], 0.06))
+    height = style.WIDTH / columns * min(window.height / window.width, 1.0) * 0.9 + 0.45
+    figure = style.new_figure(rows_of(len(steps), columns) * height + 0.35)
+    figure.suptitle(f"{experiment.title}, {drawn.title(method)}", fontsize=9)
+    axes, colours = panels(figure, len(steps), columns), magnitudes()
+    for ax, step in zip(axes, steps, strict=True):
+        _draw_step(ax, step, elements, camera, colours)
+        set_window(ax, window)
+    bar = figure.colorbar(colours, ax=axes, aspect=25, pad=0.01, fraction=0.03)
+    bar.set_label("residual of the element / largest")
+    dots = {"picked before": EARLIER, "picked in this step": NEWEST}
+    marks = {"linestyle": "none", "marker": "o"}
+    style.legend(figure, [style.handle(label, **marks, **d) for label, d in dots.items()], 2)
+    return figure
+
+
+def _draw_step(
+    ax: Axes, step: Iteration, elements: ElementMap, camera: Camera, colours: ScalarMappable
+) -> None:
+    points, largest = elements.mesh.points, float(step.magnitude.max())
+    relative = step.magnitude / max(largest, np.finfo(float).tiny)
+    elements.draw(ax, points, relative, camera, colours)
+    centres = camera.project(elements.centres(points))
+    if len(step.earlier):
+        ax.plot(*centres[step.earlier].T, "o", zorder=5, **EARLIER)
+    ax.plot(*centres[step.newest], "o", zorder=6, **NEWEST)
+    ax.set_title(f"k = {step.k}: element {step.newest}, {'xyz'[step.entry % 3]} entry")
+    ax.set_xlabel(f"largest residual {largest:.2g}", fontsize=7.5)
+
+
+def iterations(
+    V: np.ndarray, entries: np.ndarray, rows_per_element: int, rows: str, count: int
+) -> list[Iteration]:
+    """First ``count`` steps of a greedy selection.
+
+    The residual of step k is v_k - V_{k-1} c with c from the equations sampled so far
+    (Chaturantabut and Sorensen 2010, algorithm 1); the next sample is where it is largest.
+
+    Parameters
+    ----------
+    V : (3 e p, rank) modes, p ``rows_per_element``
+    entries : vector indices as selected: one a step for ``rows`` "scalar" and "joint" (there the x
+        entry of a row stands for the row), 3 p a step for "element"
+
+    Raises
+    ------
+    StorageError
+        An entry lies outside the basis, or there are not enough for one step.
+    """
+    per_step = 3 * rows_per_element if rows == "element" else 1
+    if len(entries) < per_step or entries.min() < 0 or entries.max() >= len(V):
+        raise StorageError(f"{len(entries)} sampled entries do not fit a basis of {len(V)} rows")
+    residual_of = _joint_residual if rows == "joint" else _shared_residual
+    per_element = 3 * rows_per_element
+    length = {"scalar": 1, "joint": 3, "element": per_element}[rows]  # of what is measured
+    steps = []
+    for k in range(min(count, len(entries) // per_step, V.shape[1])):
+        residual = residual_of(V, entries[: k * per_step], k)
+        norms = np.linalg.norm(residual.reshape(-1, length), axis=1)
+        picked = entries[: (k + 1) * per_step : per_step] // per_element
+        steps.append(
+            Iteration(
+                k=k + 1,
+                magnitude=norms.reshape(-1, per_element // length).max(axis=1),
+                earlier=picked[:-1],
+                newest=int(picked[-1]),
+                entry=int(entries[k * per_step]),
+            )
+        )
+    return steps
+
+
+def _shared_residual(V: np.ndarray, entries: np.ndarray, k: int) -> np.ndarray:
+    """Residual of mode k with coefficients shared by all axes; least squares when oversampled."""
+    if k == 0:
+        return V[:, 0]
+    coefficients = np.linalg.lstsq(V[entries, :k], V[entries, k], rcond=None)[0]
+    return V[:, k] - V[:, :k] @ coefficients
+
+
+def _joint_residual(V: np.ndarray, entries: np.ndarray, k: int) -> np.ndarray:
+    """Residual of mode k with one set of coefficients per axis, from the same rows."""
+    split = V.reshape(-1, 3, V.shape[1])
+    residual = np.empty(split.shape[:2])
+    for axis in range(3):
+        residual[:, axis] = _shared_residual(split[:, axis], entries // 3, k)
+    return residual.ravel()
+
+
+@figure(
+    number=3,
+    title="Elements hit by the entries of vectorised DEIM",
+    caption=(
+        "Single entries, picked without regard to elements, scatter over the mesh. Left: the "
+        "elements they belong to, by axis. Middle: how many of its entries each touched element "
+        "contributes. Right: numbers that have to be computed for $r$ interpolation entries, "
+        "because a projection yields all entries of its element at once."
+    ),
+    reads={
+        "drawn": Settings(Drawn),
+        "meshes": EachOf(MESH, "experiments"),
+        "snapshots": EachOf(SNAPSHOTS, "experiments"),
+        "samples": EachOf(SAMPLING, "runs"),
+    },
+)
+def deim_entries(
+    options: Entries, drawn: Drawn, meshes: list[File], snapshots: list[File], samples: list[File]
+) -> Figure:
+    """Draw a row per experiment: the elements hit, entries per element, and numbers computed.
+
+    Single-entry methods are compared with the other methods of the specification, which sample
+    whole elements or rows; the first of them is drawn on the mesh, at the largest r.
+    """
+    methods = drawn.methods
+    scalar = [m for m in methods if drawn.reductions[m].rows == "scalar"]
+    if not scalar:
+        raise NothingToDraw("no method that samples single entries (deim, qdeim)")
+    sampled = []
+    for each in drawn.experiments:
+        samplings = {m: read_samplings(each.path(samples, method=m)) for m in methods}
+        if samplings[scalar[0]]:
+            sampled.append((each, samplings))
+    if not sampled:
+        raise NothingToDraw(f"samples of {options.words()}")
+    figure = style.new_figure(ROW_HEIGHT * len(sampled) + 0.55)
+    axes = figure.subplots(len(sampled), 3, squeeze=False, width_ratios=[1.25, 1.0, 1.1])
+    for row, (each, samplings) in zip(axes, sampled, strict=True):
+        source = each.path(snapshots)
+        with open_hdf5(source) as file:
+            count, rows = int(file.attrs["elements"]), int(file.attrs["rows_per_element"])
+        elements = element_map(each.group, load_mesh(each.path(meshes)), count, source=source)
+        views = samplings[scalar[0]]
+        asked = [view for rank in options.ranks for view in views if view.r == rank]
+        chosen = (asked or views[-1:])[0]
+        _draw_hits(row[0], elements, chosen.entries, 3 * rows, options.camera(each))
+        row[0].set_title(f"{each.title}\nr = {chosen.r} entries")
+        _draw_counts(row[1], chosen, 3 * rows)
+        _draw_evaluations(row[2], samplings, 3 * rows)
+    dots = {"linestyle": "none", "marker": "o", "markersize": 4.5}
+    named = {f"{axis} entry": colour for axis, colour in style.AXES.items()}
+    named["several axes"] = AXES[SEVERAL]
+    handles = [style.handle(label, color=c, **dots) for label, c in named.items()]
+    handles += drawn.handles(style.method_styles(methods))
+    handles.append(style.handle("numbers that DEIM uses (r)", color=style.GREY, linestyle="--"))
+    style.legend(figure, handles, 4)
+    return figure
+
+
+def _draw_hits(
+    ax: Axes, elements: ElementMap, entries: np.ndarray, per_element: int, camera: Camera
+) -> None:
+    """Draw a dot on each element that ``entries`` hit, in the colour of their axis."""
+    hit: dict[int, str] = {}
+    for entry in entries:
+        element, axis = int(entry) // per_element, "xyz"[int(entry) % 3]
+        hit[element] = axis if hit.get(element, axis) == axis else SEVERAL
+    points = elements.mesh.points
+    draw_surface(ax, points, elements.mesh, camera=camera, colour=NEUTRAL, wire=0.18)
+    centres = camera.project(elements.centres(points))
+    for axis, colour in AXES.items():
+        where = centres[[e for e, a in hit.items() if a == axis]]
+        if len(where):
+            ax.scatter(*where.T, s=15, color=colour, edgecolors="white", linewidths=0.4, zorder=5)
+    set_window(ax, window_of(camera, [points], 0.04))
+
+
+def _draw_counts(ax: Axes, chosen: SamplingView, per_element: int) -> None:
+    from matplotlib.ticker import MaxNLocator
+
+    counts = np.bincount(np.unique(chosen.entries // per_element, return_counts=True)[1])
+    values = np.zeros(per_element, dtype=int)
+    values[: len(counts) - 1] = counts[1 : per_element + 1]
+    bars = ax.bar(np.arange(1, per_element + 1), values, color=style.ORANGE, width=0.7)
+    ax.bar_label(bars, labels=[str(v) if v else "" for v in values], fontsize=7, padding=1)
+    ax.set_xlim(0.3, per_element + 0.7)
+    ax.set_ylim(0, 1.18 * values.max())
+    ax.set_xticks(np.arange(1, per_element + 1))
+    ax.yaxis.set_major_locator(MaxNLocator(integer=True, nbins=4))
+    ax.set_xlabel(f"entries used, of {per_element} per element")
+    ax.set_ylabel("elements")
+
+
+def _draw_evaluations(ax: Axes, samplings: dict[str, list[SamplingView]], per_element: int) -> None:
+    styles = style.method_styles(samplings)
+    largest = 1
+    for method, views in samplings.items():
+        if views:
+            r = np.array([view.r for view in views])
+            computed = per_element * np.array([len(view.elements) for view in views])
+            colour, marker = styles[method]
+            ax.plot(r, computed, color=colour, marker=marker, markevery=max(1, len(r) // 6))
+            largest = max(largest, int(r[-1]))
+    ax.plot([0, largest], [0, largest], color=style.GREY, linewidth=0.9, linestyle="--")
+    ax.set_xlim(0, None)
+    ax.set_ylim(0, None)
+    ax.set_xlabel("basis size r")
+    ax.set_ylabel("numbers computed")
+    style.grid(ax)
