@@ -156,11 +156,14 @@ def test_mean_in_modes_has_no_more_modes_than_rows(rng):
 # Hard input ---------------------------------------------------------------------------------
 
 
-def test_zero_snapshots_have_no_basis(spec):
+def test_zero_and_round_off_have_no_basis(spec, rng):
+    """Data of size 1e-14 are a full-rank matrix; only their round-off tells that they are noise."""
     basis = basis_of(np.zeros((5, ROWS, 3)), spec)
     assert basis.rank == 0
     assert basis.V.shape == (3 * ROWS, 0)
     assert basis.active_axes == (False, False, False)
+    p = 1e-14 * rng.standard_normal((7, ROWS, 3))
+    assert basis_of(p, spec, roundoff=1e-12).rank == 0
 
 
 @given(seed=SEEDS, n=st.integers(2, 40), exponent=st.integers(-8, 8))
@@ -175,12 +178,6 @@ def test_constant_snapshots_have_no_basis_but_a_mean(weighting, layout, seed, n,
         assert basis_of(p, spec, mass=mass).rank == 0
     basis = basis_of(p, BasisSpec(centring="affine"))
     np.testing.assert_allclose(basis.mean, p[0].ravel(), rtol=1e-13)
-
-
-def test_round_off_has_no_basis(spec, rng):
-    """Data of size 1e-14 are a full-rank matrix; only their round-off tells that they are noise."""
-    p = 1e-14 * rng.standard_normal((7, ROWS, 3))
-    assert basis_of(p, spec, roundoff=1e-12).rank == 0
 
 
 def test_a_flat_axis_gets_no_modes_and_is_flagged(spec, rng):
