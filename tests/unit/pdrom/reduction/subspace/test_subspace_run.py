@@ -290,6 +290,7 @@ def test_models_survive_a_file(tmp_path):
             for key, value in vars(own).items():
                 np.testing.assert_array_equal(getattr(model.samples[name], key), value)
         np.testing.assert_array_equal(model.columns.B, columns.B)
-        # round-off depends on the order in which the memory holds an array
+        # round-off of an interpolation depends on the order in which memory holds its arrays
         one, two = run_model(scene, model), run_model(scene, SubspaceModel("pod", columns, chosen))
-        np.testing.assert_allclose(one, two, atol=1e-13)
+        allowed = 1e-13 if labels["method"] == "hrpd" else 0.0
+        np.testing.assert_allclose(one, two, rtol=0.0, atol=allowed)
