@@ -17,9 +17,24 @@ import h5py
 import numpy as np
 import pandas as pd
 
+from study.artifact.reads import ProjectFile
 from study.tables import declared
+from study.tables.kit.declaration import Table
 
 ROOT = Path(__file__).resolve().parents[2]
+
+
+def without_times(made: Table, rows: pd.DataFrame, root: Path) -> pd.DataFrame:
+    """``rows`` of a table, as text, with every cell emptied that depends on timing.
+
+    ``root`` is the folder of the project, for the files that the table reads there.
+    """
+    cells = [made.timing_columns] * len(rows)
+    if made.timed_cells is not None:
+        files = {k: root / r.path for k, r in made.reads.items() if isinstance(r, ProjectFile)}
+        cells = made.timed_cells(rows, **files)
+    timed = [[name in of_row for name in rows] for of_row in cells]
+    return rows.astype(object).mask(np.array(timed, dtype=bool).reshape(rows.shape), "").astype(str)
 
 
 def table_digests(folder: Path) -> dict[str, str]:
@@ -28,7 +43,7 @@ def table_digests(folder: Path) -> dict[str, str]:
     for name, table in declared().items():
         path = folder / "tables" / f"{name}.csv"
         if path.is_file():
-            kept = table.without_times(pd.read_csv(path, dtype=str), ROOT)
+            kept = without_times(table, pd.read_csv(path, dtype=str), ROOT)
             found[f"tables/{name}.csv"] = hashlib.sha256(kept.to_csv().encode()).hexdigest()
     return found
 

@@ -17,6 +17,7 @@ import pandas as pd
 import yaml
 from checkout import ROOT, copy_repository
 
+from machines.same_results import without_times
 from pdrom.core.store import check_file
 from study.artifact.paths import MANIFEST
 from study.tables import declared
@@ -160,7 +161,7 @@ def _digest(path: Path, root: Path) -> str:
             file.visititems(lambda name, item: _update(content, name, item))
     elif path.parent.name == "tables" and path.suffix == ".csv":
         table = pd.read_csv(path, dtype=str)
-        kept = declared()[path.stem].without_times(table, root)
+        kept = without_times(declared()[path.stem], table, root)
         content.update(kept.to_csv().encode())
     else:
         content.update(path.read_bytes())

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 
 from pdrom.view import style
-from pdrom.view.artists import Axes, Figure, Line2D, SubFigure
+from pdrom.view.artists import Axes, Figure, Line2D
 from pdrom.view.multiples import clipped, label_counts, log_axis, time_axis
 from study.artifact.reads import Settings, TableOf
 from study.experiments.kit.settings import ANDERSON, FOM
@@ -142,7 +142,11 @@ def draw_panel(ax: Axes, found: TradeOffs, scene: str, size: float = 3.0) -> Non
             hollow = own.position_basis == "skinning"
             _points(ax, own[~hollow], colour, marker, size)
             _points(ax, own[hollow], colour, marker, size, "none")
-        _front(ax, part, colour)
+        unbeaten = np.array(pareto(part[ERROR].to_list(), part[TIME].to_list()), dtype=bool)
+        front = part[unbeaten].sort_values(TIME)
+        heights = clipped(front[ERROR].to_numpy(float), LOW, HIGH)
+        steps = {"linewidth": 1.3, "drawstyle": "steps-post", "zorder": 1.5}
+        ax.plot(front[TIME], heights, color=colour, **steps)
         ended = lost[lost.family == family]
         ax.plot(
             ended[TIME], np.full(len(ended), 0.6 * HIGH), BLOWN_UP, color=colour,
@@ -172,13 +176,6 @@ def _points(
         if outside.any():
             at = np.full(outside.sum(), rim)
             ax.plot(time[outside], at, marker=arrow, markersize=size + 2.5, **common)
-
-
-def _front(ax: Axes, rows: pd.DataFrame, colour: str) -> None:
-    unbeaten = np.array(pareto(rows[ERROR].to_list(), rows[TIME].to_list()), dtype=bool)
-    best = rows[unbeaten].sort_values(TIME)
-    heights = clipped(best[ERROR].to_numpy(float), LOW, HIGH)
-    ax.plot(best[TIME], heights, color=colour, linewidth=1.3, drawstyle="steps-post", zorder=1.5)
 
 
 def label_iterations(ax: Axes, found: TradeOffs, scene: str) -> None:
@@ -225,7 +222,6 @@ def handles(found: TradeOffs) -> list[Block]:
         "table": TableOf("accuracy_cost"),
         "runs": TableOf("reduced_reruns"),
     },
-    options=Methods,
 )
 def accuracy_cost(
     options: Methods, drawn: Drawn, table: pd.DataFrame, runs: pd.DataFrame
@@ -258,7 +254,12 @@ def accuracy_cost(
         axes[0].set_ylabel("relative error")
     top = 1.0
     for row, height in zip(rows, lines, strict=True):
-        _draw_legend(parts[-1], row, top)
+        for place, (title, entries) in enumerate(row):
+            parts[-1].legend(
+                handles=entries, title=title, loc="upper left", alignment="left",
+                bbox_to_anchor=(0.01 + place / COLUMNS, top), fontsize=7, title_fontsize=7.5,
+                borderpad=0.0, borderaxespad=0.1, labelspacing=0.3, handlelength=1.8,
+            )  # fmt: skip
         top -= height / sum(lines)
     return figure
 
@@ -280,13 +281,3 @@ def _label(ax: Axes, x: float, text: str) -> None:
         x, 0.99, text, transform=ax.get_xaxis_transform(), fontsize=6.5, va="top", ha="right",
         color="#6B675F",
     )  # fmt: skip
-
-
-def _draw_legend(figure: SubFigure, blocks: list[Block], top: float) -> None:
-    """Draw titled ``blocks`` of entries on ``figure`` side by side, below ``top``."""
-    for place, (title, entries) in enumerate(blocks):
-        figure.legend(
-            handles=entries, title=title, loc="upper left", alignment="left",
-            bbox_to_anchor=(0.01 + place / COLUMNS, top), fontsize=7, title_fontsize=7.5,
-            borderpad=0.0, borderaxespad=0.1, labelspacing=0.3, handlelength=1.8,
-        )  # fmt: skip

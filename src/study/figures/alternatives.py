@@ -56,7 +56,6 @@ LOOKS = {
         "$\\times 100$: the same scene with stiffer weights. Errors outside are drawn on the rim."
     ),
     reads={"table": TableOf("alternatives")},
-    options=Scenes,
 )
 def alternatives(options: Scenes, table: pd.DataFrame) -> Figure:
     """Draw a pair of panels for each scene, mesh and stiffness."""
@@ -89,7 +88,15 @@ def _draw_case(pair: list[Axes], labels: tuple[str, int, float], case: pd.DataFr
         if reference == "continuous" and len(own):
             ax.axhline(own.error.iloc[0], color="#555555", linestyle="--", linewidth=0.8)
         for method, (_, colour, marker) in LOOKS.items():
-            _draw_best(ax, best_points(rows[rows.method == method]), colour, marker)
+            points = best_points(rows[rows.method == method])
+            errors = clipped(points.error.to_numpy(float), LOW, HIGH)
+            ax.plot(points.ms_per_frame, errors, color=colour, linewidth=0.9)
+            divided = (points.substeps > 1).to_numpy(bool)
+            for chosen, face in ((~divided, colour), (divided, "white")):
+                ax.plot(
+                    points.ms_per_frame[chosen], errors[chosen], color=colour, marker=marker,
+                    markerfacecolor=face, linestyle="none", markersize=3.6, markeredgewidth=0.8,
+                )  # fmt: skip
 
 
 def best_points(rows: pd.DataFrame) -> pd.DataFrame:
@@ -97,17 +104,6 @@ def best_points(rows: pd.DataFrame) -> pd.DataFrame:
     ordered = rows.sort_values(["ms_per_frame", "error"], kind="stable")
     before = ordered.error.cummin().shift(fill_value=np.inf)
     return ordered[ordered.error < before]
-
-
-def _draw_best(ax: Axes, points: pd.DataFrame, colour: str, marker: str) -> None:
-    errors = clipped(points.error.to_numpy(float), LOW, HIGH)
-    ax.plot(points.ms_per_frame, errors, color=colour, linewidth=0.9)
-    divided = (points.substeps > 1).to_numpy(bool)
-    for chosen, face in ((~divided, colour), (divided, "white")):
-        ax.plot(
-            points.ms_per_frame[chosen], errors[chosen], color=colour, marker=marker,
-            markerfacecolor=face, linestyle="none", markersize=3.6, markeredgewidth=0.8,
-        )  # fmt: skip
 
 
 @figure(
@@ -119,7 +115,6 @@ def _draw_best(ax: Axes, points: pd.DataFrame, colour: str, marker: str) -> None
         "included. What lies outside is drawn on the rim."
     ),
     reads={"table": TableOf("requested_tolerances")},
-    options=Options,
 )
 def requested_tolerances(options: Options, table: pd.DataFrame) -> Figure:
     """Draw errors and times side by side."""

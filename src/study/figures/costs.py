@@ -41,8 +41,10 @@ COLOURS = {UNLISTED: style.VERMILLION, RIGHT: style.SKY, GLOBAL: "#3A5A78", REST
 Looks = dict[str, tuple[str, str]]
 
 
-class BreakEven(Methods, Columns):
+class BreakEven(Methods):
     """Scenes, methods, panels side by side."""
+
+    columns: Columns = 3
 
 
 @figure(
@@ -56,7 +58,6 @@ class BreakEven(Methods, Columns):
         "the claim everywhere, compiled code only where projections are expensive."
     ),
     reads={"drawn": Settings(Drawn), "table": TableOf("local_share")},
-    options=Scenes,
 )
 def local_share(options: Scenes, drawn: Drawn, table: pd.DataFrame) -> Figure:
     """Draw a panel per implementation, a bar per scene with the time per frame at its end."""
@@ -110,7 +111,6 @@ def _draw_bars(ax: Axes, rows: pd.DataFrame, scenes: list[str]) -> None:
         "factorisation before the first frame are in the table `scaling`."
     ),
     reads={"drawn": Settings(Drawn), "table": TableOf("scaling")},
-    options=Scenes,
 )
 def scaling(options: Scenes, drawn: Drawn, table: pd.DataFrame) -> Figure:
     """Draw a panel per scene: the time of an iteration, by phase."""
@@ -171,7 +171,6 @@ def _draw_times(ax: Axes, rows: pd.DataFrame) -> None:
         "than all projections. Lines end at the numerical rank."
     ),
     reads={"drawn": Settings(Drawn), "table": TableOf("breakeven")},
-    options=BreakEven,
 )
 def break_even(options: BreakEven, drawn: Drawn, table: pd.DataFrame) -> Figure:
     """Draw a panel per constraint group, a line per scene and method; above 1 it costs more."""
@@ -183,26 +182,23 @@ def break_even(options: BreakEven, drawn: Drawn, table: pd.DataFrame) -> Figure:
     figure, axes = small_multiples(len(groups), options.columns, legend_rows=2, height=1.8)
     styles = style.method_styles([m for m in drawn.methods if (table.method == m).any()])
     for ax, group in zip(axes, groups, strict=True):
-        _draw_group(ax, table[table.group == group], styles)
         ax.set_title(style.words(group))
+        ax.set_yscale("log")
+        style.grid(ax)
+        ax.axhline(1.0, color=style.BLACK, linestyle="--", linewidth=1.0, zorder=1)
+        own = table[table.group == group]
+        for (_, method), curve in own.groupby(["scene", "method"], sort=False):
+            colour, marker = styles[str(method)]
+            curve = curve.sort_values("r")
+            ax.plot(
+                curve.r, curve.ratio, color=colour, marker=marker, markersize=2.6, linewidth=0.8,
+                alpha=0.75,
+            )  # fmt: skip
+        ax.set_xlim(left=0.0)
     label_outer(axes, options.columns, "basis vectors r", "reduced over full local step")
     one = style.handle("break-even", color=style.BLACK, linestyle="--")
     style.legend(figure, [*drawn.handles(styles), one], 3)
     return figure
-
-
-def _draw_group(ax: Axes, rows: pd.DataFrame, styles: dict[str, tuple[str, str]]) -> None:
-    ax.set_yscale("log")
-    style.grid(ax)
-    ax.axhline(1.0, color=style.BLACK, linestyle="--", linewidth=1.0, zorder=1)
-    for (_, method), curve in rows.groupby(["scene", "method"], sort=False):
-        colour, marker = styles[str(method)]
-        curve = curve.sort_values("r")
-        ax.plot(
-            curve.r, curve.ratio, color=colour, marker=marker, markersize=2.6, linewidth=0.8,
-            alpha=0.75,
-        )  # fmt: skip
-    ax.set_xlim(left=0.0)
 
 
 @figure(
@@ -220,7 +216,6 @@ def _draw_group(ax: Axes, rows: pd.DataFrame, styles: dict[str, tuple[str, str]]
         "table": TableOf("effects_cost"),
         "contributions": EachOf(CONTRIBUTIONS, "experiments"),
     },
-    options=Scenes,
 )
 def effects_contribution(
     options: Scenes, drawn: Drawn, table: pd.DataFrame, contributions: list[File]
@@ -299,7 +294,6 @@ def _draw_moved(ax: Axes, rows: pd.DataFrame, scenes: list[str], looks: Looks) -
         "for what the scene does not list."
     ),
     reads={"drawn": Settings(Drawn), "table": TableOf("effects_cost")},
-    options=Scenes,
 )
 def effects_cost(options: Scenes, drawn: Drawn, table: pd.DataFrame) -> Figure:
     """Draw a bar per scene, divided by effect; on the right one scene without some of its effects.
@@ -360,12 +354,10 @@ def _draw_left_out(ax: Axes, rows: pd.DataFrame, scene: str) -> None:
                 [whole - row.ms_per_frame], [y], marker="|", color=style.BLACK, markersize=9,
                 markeredgewidth=1.4,
             )  # fmt: skip
-    style.label_rows(ax, [_words(row.effect) for row in rows.itertuples()])
+    style.label_rows(
+        ax, [f"without {style.words(e)}" if e != NOTHING else "whole" for e in rows.effect]
+    )
     ax.set_xlim(0.0, 1.15 * float(rows.without_ms.max()))
     ax.tick_params(axis="y", length=0)
     ax.set_xlabel("time per frame (ms)")
     ax.set_title(style.words(scene))
-
-
-def _words(left_out: str) -> str:
-    return "whole" if left_out == NOTHING else f"without {style.words(left_out)}"

@@ -34,7 +34,6 @@ _KEYS = ["scene", "group", "method", "r"]
         "errors": TableOf("reconstruction_error"),
         "repetitions": TableOf("repetitions"),
     },
-    options=Methods,
 )
 def error_against_gain(
     options: Methods,
@@ -53,50 +52,39 @@ def error_against_gain(
         raise NothingToDraw("no run with a gain")
     figure = style.new_figure(3.0)
     left, right = figure.subplots(1, 2, width_ratios=(2.2, 1.0))
-    ranges = _ranges(repetitions, runs)
+    repeated = repetitions[repetitions.varied == "training"]
+    ranges = runs[[*_KEYS, "gain", "error"]].merge(repeated, on=_KEYS)
     methods = [m for m in drawn.methods if (runs.method == m).any()]
     styles = style.method_styles(methods)
     for method in methods:
-        _draw_method(left, runs[runs.method == method], *styles[method])
-        _draw_ranges(left, ranges[ranges.method == method], styles[method][0])
-    _draw_limits(left)
+        own = runs[runs.method == method]
+        _draw_method(left, own, ranges[ranges.method == method], *styles[method])
+    log_axes(left, GAINS, ERRORS)
+    left.set_xlabel("gain of the interpolation")
+    left.set_ylabel("error within the horizon (relative)")
+    left.axhline(FAILED, color="#333333", linewidth=0.8, linestyle="--", zorder=0)
+    left.text(GAINS[1], FAILED * 1.1, "failed ", ha="right", va="bottom", fontsize=7)
+    left.text(GAINS[0] * 1.1, ERRORS[1] * 0.8, "ended early: upper rim", va="top", fontsize=7)
     _draw_decades(right, runs)
     style.legend(figure, drawn.handles(styles, linestyle="none"), 4)
     return figure
 
 
-def _draw_method(ax: Axes, runs: pd.DataFrame, colour: str, marker: str) -> None:
+def _draw_method(
+    ax: Axes, runs: pd.DataFrame, ranges: pd.DataFrame, colour: str, marker: str
+) -> None:
+    """Draw runs, and crosses from the least to the largest gain and error, at the medians."""
     x, y = runs.gain.to_numpy(float), runs.error.to_numpy(float)
     rim_arrows(ax, x, y, colour=colour, across=GAINS, along=ERRORS)
     ax.plot(
         clipped(x, *GAINS), clipped(y, *ERRORS), linestyle="none", color=colour, marker=marker,
         markersize=3.2, alpha=0.7, markeredgewidth=0.0, clip_on=False,
     )  # fmt: skip
-
-
-def _ranges(repetitions: pd.DataFrame, runs: pd.DataFrame) -> pd.DataFrame:
-    """Ranges over other training frames of those of the ``runs`` that were repeated."""
-    repeated = repetitions[repetitions.varied == "training"]
-    return runs[[*_KEYS, "gain", "error"]].merge(repeated, on=_KEYS)
-
-
-def _draw_ranges(ax: Axes, ranges: pd.DataFrame, colour: str) -> None:
-    """Draw for each run a cross from its least to its largest gain and error, at the medians."""
     gains = [clipped(ranges[f"gain_{e}"].to_numpy(float), *GAINS) for e in ENDS]
     errors = [clipped(ranges[f"error_{e}"].to_numpy(float), *ERRORS) for e in ENDS]
     bars = {"color": colour, "linewidth": 0.9, "zorder": 3}
     ax.vlines(gains[1], errors[0], errors[2], **bars)
     ax.hlines(errors[1], gains[0], gains[2], **bars)
-
-
-def _draw_limits(ax: Axes) -> None:
-    """Axes, and the error above which a run counts as failed."""
-    log_axes(ax, GAINS, ERRORS)
-    ax.set_xlabel("gain of the interpolation")
-    ax.set_ylabel("error within the horizon (relative)")
-    ax.axhline(FAILED, color="#333333", linewidth=0.8, linestyle="--", zorder=0)
-    ax.text(GAINS[1], FAILED * 1.1, "failed ", ha="right", va="bottom", fontsize=7)
-    ax.text(GAINS[0] * 1.1, ERRORS[1] * 0.8, "ended early: upper rim", va="top", fontsize=7)
 
 
 def _draw_decades(ax: Axes, runs: pd.DataFrame) -> None:
@@ -108,7 +96,9 @@ def _draw_decades(ax: Axes, runs: pd.DataFrame) -> None:
     ax.bar(places, 100.0 * decades["mean"], width=0.7, color=style.FAILED, alpha=0.75)
     for place, count, share in zip(places, decades["size"], decades["mean"], strict=True):
         ax.text(place, 100.0 * share + 1.5, f"{count}", ha="center", fontsize=7)
-    ax.set_xticks(places, [_span(decade) for decade in decades.index])
+    spans = {upper: rf"$10^{{{upper - 1}}}$ to $10^{{{upper}}}$" for upper in decades.index}
+    spans |= {upper: rf"over $10^{{{DECADES}}}$" for upper in spans if upper > DECADES}
+    ax.set_xticks(places, list(spans.values()))
     ax.set_ylim(0, 112)
     ax.set_yticks([0, 25, 50, 75, 100])
     ax.tick_params(axis="x", labelrotation=35)
@@ -116,13 +106,6 @@ def _draw_decades(ax: Axes, runs: pd.DataFrame) -> None:
     ax.set_ylabel("failed runs (%)")
     ax.set_title("number of runs above each bar")
     style.grid(ax)
-
-
-def _span(upper: int) -> str:
-    """Name of the decade that ends at 10 to the power of ``upper``."""
-    if upper > DECADES:
-        return rf"over $10^{{{DECADES}}}$"
-    return rf"$10^{{{upper - 1}}}$ to $10^{{{upper}}}$"
 
 
 @figure(
@@ -136,7 +119,6 @@ def _span(upper: int) -> str:
         "scenes; pale ones that over choices of the arbitrary signs of the singular vectors."
     ),
     reads={"table": TableOf("ladder")},
-    options=Scenes,
 )
 def ladder(options: Scenes, table: pd.DataFrame) -> Figure:
     """Draw rungs from top (published) to bottom; left the error of the rerun, right the gain.

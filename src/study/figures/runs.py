@@ -167,10 +167,7 @@ def obstacles_of(experiment: Experiment, positions: np.ndarray) -> list[Mesh] | 
 
 
 @figure(
-    title="The bar, reduced",
-    caption=f"Bars with tetrahedral constraints: {COMPARED}",
-    reads=RUNS,
-    options=ReducedRuns,
+    title="The bar, reduced", caption=f"Bars with tetrahedral constraints: {COMPARED}", reads=RUNS
 )
 def bar_runs(options: ReducedRuns, drawn: Drawn, horizon: Horizon, **files: list[File]) -> Figure:
     """Draw full-order runs beside reduced ones, see `Runs.draw`."""
@@ -182,7 +179,6 @@ def bar_runs(options: ReducedRuns, drawn: Drawn, horizon: Horizon, **files: list
     title="Springs only, reduced",
     caption=f"Sheets with edge springs only: {COMPARED}",
     reads=RUNS,
-    options=ReducedRuns,
 )
 def spring_runs(
     options: ReducedRuns, drawn: Drawn, horizon: Horizon, **files: list[File]
@@ -196,7 +192,6 @@ def spring_runs(
     title="Triangle strain only, reduced",
     caption=f"Sheets with triangle strain only: {COMPARED}",
     reads=RUNS,
-    options=ReducedRuns,
 )
 def strain_runs(
     options: ReducedRuns, drawn: Drawn, horizon: Horizon, **files: list[File]
@@ -217,7 +212,6 @@ def strain_runs(
         "reductions on bases of round-off). The curved sheet has projections that matter."
     ),
     reads={**RUNS, "noise": TableOf("noise"), "noise_runs": Every(NOISE_RUNS)},
-    options=ReducedRuns,
 )
 def bending_runs(
     options: ReducedRuns,
@@ -287,7 +281,6 @@ def _alike(table: pd.DataFrame) -> dict[tuple[tuple[int, str], ...], list[str]]:
         "strain changes little whatever the method."
     ),
     reads=RUNS,
-    options=ReducedRuns,
 )
 def cloth_all_grid(
     options: ReducedRuns, drawn: Drawn, horizon: Horizon, **files: list[File]
@@ -345,21 +338,17 @@ def _over_time(
     if info is None:
         return None
     plain = style.surface_colour(style.GREY)
-    panels = [
-        _coloured(view.run_panel(path, info, frame, colour=plain, title=""), q, mesh)
-        for frame, q in zip(frames, full, strict=True)
-    ]
+    panels = []
+    for frame, q in zip(frames, full, strict=True):
+        panel = view.run_panel(path, info, frame, colour=plain, title="")
+        if panel.positions is not None and not panel.failure:
+            distance = np.linalg.norm(panel.positions - q, axis=1) / mesh.extent
+            colour = _colours().to_rgba(distance[mesh.triangles].mean(axis=1))[:, :3]
+            panel = replace(panel, colour=colour)
+        panels.append(panel)
     middle = len(panels) // 2
     panels[middle] = replace(panels[middle], title=f"{title}, {info.title}")
     return panels
-
-
-def _coloured(panel: RunPanel, full: np.ndarray, mesh: Mesh) -> RunPanel:
-    """The panel with each triangle coloured by its distance to the full-order run."""
-    if panel.positions is None or panel.failure:
-        return panel
-    distance = np.linalg.norm(panel.positions - full, axis=1) / mesh.extent
-    return replace(panel, colour=_colours().to_rgba(distance[mesh.triangles].mean(axis=1))[:, :3])
 
 
 def _colours() -> ScalarMappable:
@@ -383,7 +372,6 @@ def _colours() -> ScalarMappable:
         "subspaces": EachOf(SUBSPACES, "drawn_subspaces"),
         "errors": TableOf("reduced_reruns"),
     },
-    options=ReducedRuns,
 )
 def teaser(
     options: ReducedRuns,

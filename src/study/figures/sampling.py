@@ -18,7 +18,7 @@ from study.artifact.paths import BASIS, MESH, SAMPLING, SNAPSHOTS, File
 from study.artifact.reads import EachOf, Settings
 from study.figures.kit.declaration import figure
 from study.figures.kit.elements import NEUTRAL, ElementMap, element_map, magnitudes
-from study.figures.kit.options import Columns, Count, Drawn, Methods, NothingToDraw, Ranks, View
+from study.figures.kit.options import Columns, Count, Drawn, NothingToDraw, Ranks, View
 
 EARLIER = {
     "markerfacecolor": "#FFFFFF", "markeredgecolor": style.BLACK, "markeredgewidth": 0.8,
@@ -33,12 +33,17 @@ AXES = {**style.AXES, SEVERAL: "#333333"}
 ROW_HEIGHT = 1.85  # inches
 
 
-class Steps(Methods, Count, Columns, View):
+class Steps(View):
     """Number of iterations; the first scene and method are drawn."""
 
+    count: Count = 6
+    columns: Columns = 3
 
-class Entries(Methods, Ranks, View):
+
+class Entries(View):
     """The first size that exists is drawn on the mesh."""
+
+    ranks: Ranks = ()
 
 
 @dataclass(frozen=True)
@@ -75,7 +80,6 @@ class Iteration:
         "bases": EachOf(BASIS, "first_run"),
         "samples": EachOf(SAMPLING, "first_run"),
     },
-    options=Steps,
 )
 def deim_iterations(
     options: Steps, drawn: Drawn, meshes: list[File], bases: list[File], samples: list[File]
@@ -200,7 +204,6 @@ def _joint_residual(V: np.ndarray, entries: np.ndarray, k: int) -> np.ndarray:
         "snapshots": EachOf(SNAPSHOTS, "experiments"),
         "samples": EachOf(SAMPLING, "runs"),
     },
-    options=Entries,
 )
 def deim_entries(
     options: Entries, drawn: Drawn, meshes: list[File], snapshots: list[File], samples: list[File]
@@ -254,7 +257,7 @@ def _draw_hits(
         element, axis = int(entry) // per_element, "xyz"[int(entry) % 3]
         hit[element] = axis if hit.get(element, axis) == axis else SEVERAL
     points = elements.mesh.points
-    draw_surface(ax, points, elements.surface, camera=camera, colour=NEUTRAL, wire=0.18)
+    draw_surface(ax, points, elements.mesh, camera=camera, colour=NEUTRAL, wire=0.18)
     centres = camera.project(elements.centres(points))
     for axis, colour in AXES.items():
         where = centres[[e for e, a in hit.items() if a == axis]]

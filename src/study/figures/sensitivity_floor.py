@@ -7,13 +7,14 @@ import numpy as np
 from pdrom.core.store import read_table
 from pdrom.model.effects import EFFECTS
 from pdrom.view import style
-from pdrom.view.artists import Axes, Figure
+from pdrom.view.artists import Figure
 from pdrom.view.multiples import clipped, label_outer, log_axis, small_multiples
 from study.artifact.paths import SENSITIVITY, File
 from study.artifact.reads import EachOf, Read, Setting, Settings
 from study.experiments.kit.settings import Horizon, floor_of, horizon
 from study.figures.kit.declaration import figure
 from study.figures.kit.options import Columns, Drawn, NothingToDraw, Scenes
+from study.tables.kit.reruns import TWIN
 
 # What a figure with sensitivity floors reads.
 FLOORS: dict[str, Read] = {
@@ -64,11 +65,12 @@ class Floors:
 
 
 LOW, HIGH = 1e-12, 1e2
-TWIN = "_twin"
 
 
-class Options(Scenes, Columns):
-    """Options of the figure."""
+class Floored(Scenes):
+    """Scenes, and panels side by side."""
+
+    columns: Columns = 3
 
 
 @figure(
@@ -80,10 +82,9 @@ class Options(Scenes, Columns):
         "judged by its error. Dashed lines are twins, scenes that end before."
     ),
     reads={"drawn": Settings(Drawn), **FLOORS},
-    options=Options,
 )
 def sensitivity_floor(
-    options: Options, drawn: Drawn, sensitivity: list[File], horizon: Horizon
+    options: Floored, drawn: Drawn, sensitivity: list[File], horizon: Horizon
 ) -> Figure:
     """Draw a panel per kind of scene, a line per scene: its spread under a perturbed start.
 
@@ -102,20 +103,28 @@ def sensitivity_floor(
     for ax, (kind, scenes) in zip(axes, kinds.items(), strict=True):
         log_axis(ax, LOW, HIGH)
         ax.axhline(floors.threshold, color=style.GREY, linewidth=0.9)
-        for scene, colour in _colours(scenes).items():
-            _draw_scene(ax, scene, floors, colour)
+        families = list(dict.fromkeys(scene.removesuffix(TWIN) for scene in scenes))
+        for scene in scenes:
+            family = families.index(scene.removesuffix(TWIN))
+            colour = style.CYCLE[family % len(style.CYCLE)]
+            floor, end = floors.of(scene), floors.horizon(scene)
+            label = f"{style.words(scene)}: {f'beyond {len(floor)}' if end is None else end}"
+            line = "--" if scene.endswith(TWIN) else "-"
+            shown = clipped(floor, LOW, HIGH)
+            ax.plot(np.arange(len(shown)), shown, color=colour, label=label, linestyle=line)
+            if end is not None:
+                dot = {"marker": "o", "markersize": 4.5, "zorder": 5}
+                ax.plot([end], [floors.threshold], color=colour, **dot)
         ax.set_title(kind)
         ax.legend(
             loc="upper center", bbox_to_anchor=(0.5, -0.31), fontsize=7.5, handlelength=1.6,
             labelspacing=0.25,
         )  # fmt: skip
-    label_outer(axes, columns, "frame", y="relative difference")
-    for ax in axes:
         ax.set_xlabel("frame")
-    dot = {"color": "#555555", "marker": "o", "linestyle": "none"}
+    label_outer(axes, columns, "frame", y="relative difference")
     handles = [
         style.handle(f"threshold {floors.threshold:g}", color=style.GREY),
-        style.handle("horizon (frame given)", **dot),
+        style.handle("horizon (frame given)", color="#555555", marker="o", linestyle="none"),
     ]
     style.legend(figure, handles, 2)
     return figure
@@ -127,21 +136,3 @@ def _kind(drawn: Drawn, scene: str) -> str:
         return "several groups"
     on_volume = EFFECTS.load(groups[0]).cells == "tetrahedron"
     return "tetrahedra" if on_volume else style.words(groups[0])
-
-
-def _colours(scenes: list[str]) -> dict[str, str]:
-    """Colour of each scene; a twin shares that of its scene."""
-    families = list(dict.fromkeys(scene.removesuffix(TWIN) for scene in scenes))
-    colours = {name: style.CYCLE[i % len(style.CYCLE)] for i, name in enumerate(families)}
-    return {scene: colours[scene.removesuffix(TWIN)] for scene in scenes}
-
-
-def _draw_scene(ax: Axes, scene: str, floors: Floors, colour: str) -> None:
-    floor, end = floors.of(scene), floors.horizon(scene)
-    beyond = f"beyond {len(floor)}"
-    label = f"{style.words(scene)}: {beyond if end is None else end}"
-    shown = clipped(floor, LOW, HIGH)
-    line = "--" if scene.endswith(TWIN) else "-"
-    ax.plot(np.arange(len(shown)), shown, color=colour, label=label, linestyle=line)
-    if end is not None:
-        ax.plot([end], [floors.threshold], color=colour, marker="o", markersize=4.5, zorder=5)

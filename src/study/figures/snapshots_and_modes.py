@@ -14,14 +14,7 @@ from study.artifact.paths import BASIS, MESH, SNAPSHOTS, TRAIN, File
 from study.artifact.reads import EachOf, Settings
 from study.figures.kit.declaration import figure
 from study.figures.kit.elements import SIGNED, ElementMap, element_map, signed, signed_entry
-from study.figures.kit.options import (
-    Count,
-    Drawn,
-    Instants,
-    Methods,
-    NothingToDraw,
-    View,
-)
+from study.figures.kit.options import Count, Drawn, Instants, NothingToDraw, View
 
 # inches: (left end, width, height) of the four matrices, whose upper ends are level
 BLOCKS = ((0.75, 1.6, 1.9), (2.8, 1.6, 1.9), (4.8, 0.85, 0.85), (6.0, 0.85, 0.85))
@@ -30,8 +23,11 @@ ABOVE, TITLE, FOOTER = 0.36, 0.34, 0.44  # room for two lines, for a title, for 
 LEFT, TALLEST = 0.75, 1.45  # where pictures begin, and how high they may be
 
 
-class Options(Methods, Instants, Count, View):
-    """Options of the figure."""
+class Snapshots(View):
+    """Instants, and the number of modes."""
+
+    frames: Instants = (0.1, 0.5, 0.9)
+    count: Count = 6
 
 
 @figure(
@@ -51,10 +47,9 @@ class Options(Methods, Instants, Count, View):
         "sets": EachOf(SNAPSHOTS, "first_run"),
         "bases": EachOf(BASIS, "first_run"),
     },
-    options=Options,
 )
 def snapshots_and_modes(
-    options: Options,
+    options: Snapshots,
     drawn: Drawn,
     meshes: list[File],
     full_order: list[File],
@@ -77,7 +72,9 @@ def snapshots_and_modes(
     frames, positions = positions_at(full_order[0].path, options.frames)
     camera = options.camera(experiment)
     taken = [int(np.argmin(np.abs(snapshots.frames["train"] - (f - 1)))) for f in frames]
-    moving = _same_size([window_of(camera, [q], 0.04) for q in positions])
+    moving = [window_of(camera, [q], 0.04) for q in positions]
+    size = (max(w.width for w in moving), max(w.height for w in moving))
+    moving = [window.resized(*size) for window in moving]
     resting = fit_aspect(window_of(camera, [mesh.points], 0.05))
     count = min(options.count, basis.rank)
     heights = [_height(moving[0], len(frames)), _height(resting, count) if count else 0.3]
@@ -113,7 +110,13 @@ def _draw_product(figure: Figure, basis: BasisView, centred: np.ndarray, title: 
     values = np.maximum(basis.singular_values[:rank], tiny)
     coefficients = np.linalg.lstsq(basis.V, centred, rcond=None)[0] / values[:, None]
     order = np.arange(len(centred)).reshape(-1, 3).T.ravel()
-    axes = [_block(figure, *block) for block in BLOCKS]
+    whole, axes = figure.get_figheight(), []
+    for left, width, height in BLOCKS:
+        place = (left / style.WIDTH, (whole - ABOVE - height) / whole, width / style.WIDTH)
+        ax = figure.add_axes((*place, height / whole), xticks=[], yticks=[])
+        ax.tick_params(length=0)
+        ax.spines[:].set_visible(True)
+        axes.append(ax)
     _draw_matrix(axes[0], centred[order], f"{title}: snapshots\nless mean")
     _draw_matrix(axes[1], basis.V[order], "modes")
     _draw_matrix(axes[3], coefficients, "coefficients")
@@ -129,22 +132,9 @@ def _draw_product(figure: Figure, basis: BasisView, centred: np.ndarray, title: 
         for i in (1, 2):
             ax.axhline(third * i - 0.5, color="black", linewidth=0.5)
     axes[0].set_ylabel("rows of p, by axis", labelpad=5)
-    top = figure.get_figheight() - ABOVE
     for x, sign in SIGNS:
-        y = (top - 0.5 * BLOCKS[2][2]) / figure.get_figheight()
+        y = (whole - ABOVE - 0.5 * BLOCKS[2][2]) / whole
         figure.text(x / style.WIDTH, y, sign, ha="center", va="center", fontsize=14)
-
-
-def _block(figure: Figure, left: float, width: float, height: float) -> Axes:
-    whole = figure.get_figheight()
-    bottom = (whole - ABOVE - height) / whole
-    ax = figure.add_axes((left / style.WIDTH, bottom, width / style.WIDTH, height / whole))
-    ax.set_xticks([])
-    ax.set_yticks([])
-    ax.tick_params(length=0)
-    for spine in ax.spines.values():
-        spine.set_visible(True)
-    return ax
 
 
 def _draw_matrix(ax: Axes, matrix: np.ndarray, title: str) -> None:
@@ -195,8 +185,3 @@ def _draw_scale(figure: Figure) -> None:
     bar.set_label("the named entry of each element / largest", labelpad=1)
     bar.set_ticks([-1.0, 0.0, 1.0])
     bar.outline.set_linewidth(0.4)
-
-
-def _same_size(windows: list[Window]) -> list[Window]:
-    size = (max(w.width for w in windows), max(w.height for w in windows))
-    return [w.resized(*size) for w in windows]

@@ -64,7 +64,6 @@ def _published(path: Path, columns: list[str], options: Beside, each: Experiment
         "table": TableOf("singular_values"),
         "published": ProjectFile(f"{PUBLISHED_CODE}/singular_values.csv"),
     },
-    options=Beside,
 )
 def singular_values(options: Beside, drawn: Drawn, table: pd.DataFrame, published: Path) -> Figure:
     """Draw a panel per experiment: singular values relative to the first one.
@@ -129,7 +128,6 @@ def _draw_values(ax: Axes, rows: pd.DataFrame, colour: str, marker: str) -> None
         "table": TableOf("reconstruction_error"),
         "published": ProjectFile(f"{PUBLISHED_CODE}/reconstruction_error.csv"),
     },
-    options=Reconstruction,
 )
 def reconstruction_error(
     options: Reconstruction, drawn: Drawn, table: pd.DataFrame, published: Path

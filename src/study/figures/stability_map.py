@@ -92,8 +92,7 @@ class Strip:
         ax.tick_params(length=0, pad=2)
         ax.set_xlabel(self.xlabel, fontsize=7)
         ax.set_ylabel("scene", fontsize=7)
-        for spine in ax.spines.values():
-            spine.set_visible(False)
+        ax.spines[:].set_visible(False)
 
 
 def _draw_cell(ax: Axes, x: float, y: float, found: pd.Series) -> None:
@@ -108,8 +107,10 @@ def _draw_cell(ax: Axes, x: float, y: float, found: pd.Series) -> None:
         ax.text(x + 0.5, y + 0.52, mark, ha="center", va="center", fontsize=6, color=look.ink)
 
 
-class Options(Methods, Ranks):
-    """Options of the figure."""
+class Sizes(Methods):
+    """Scenes, methods and basis sizes."""
+
+    ranks: Ranks = ()
 
 
 @figure(
@@ -122,9 +123,8 @@ class Options(Methods, Ranks):
         "frame. Groups whose projections are round-off are left out."
     ),
     reads={"drawn": Settings(Drawn), "table": TableOf("stability")},
-    options=Options,
 )
-def stability_map(options: Options, drawn: Drawn, table: pd.DataFrame) -> Figure:
+def stability_map(options: Sizes, drawn: Drawn, table: pd.DataFrame) -> Figure:
     """Draw strips of blocks: a block per method, its columns are sizes; a row per experiment.
 
     Runs with unreduced positions come first, then those in position subspaces. Experiments in which
@@ -153,7 +153,7 @@ def stability_map(options: Options, drawn: Drawn, table: pd.DataFrame) -> Figure
     return figure
 
 
-def _local_strips(table: pd.DataFrame, drawn: Drawn, options: Options) -> list[Strip]:
+def _local_strips(table: pd.DataFrame, drawn: Drawn, options: Sizes) -> list[Strip]:
     part = table[table.position_basis == "full"]
     ran = part[part.outcome != "not run"]
     held = set(zip(ran.scene, ran.group, strict=True))

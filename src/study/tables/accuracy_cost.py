@@ -21,7 +21,7 @@ import pandas as pd
 
 from study.artifact import paths
 from study.artifact.paths import File
-from study.artifact.reads import Every, PerScene, TableOf
+from study.artifact.reads import Every, Setting, TableOf
 from study.experiments.kit.settings import ANDERSON, FOM
 from study.tables.kit.declaration import flag, integer, number, table, text, timed
 from study.tables.kit.parts import joined, timings_in_one_time
@@ -57,7 +57,7 @@ CONVERGED, OWN = "converged", "own iterations"
         "frame_times": TableOf("frame_times"),
         "sweeps": Every(paths.ITERATIONS),
         "models": Every(paths.SUBSPACES_CONVERGED),
-        "iterations": PerScene("iterations"),
+        "iterations": Setting("scene_iterations"),
     },
 )
 def accuracy_cost(
@@ -114,13 +114,10 @@ def _sweep(errors: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
     errors = errors.merge(cost, on=["scene", "method", "iterations"])
     own = full[full.method.isna()].set_index("scene").iterations
     early = (errors.iterations < errors.scene.map(own)) & (errors.method == FOM)
-    parts = [(errors.method, errors, "error_converged")]
-    parts.append((FEWER, errors[early], "error_scene"))
-    named = [
-        rows.assign(method=method, relative_error_within_horizon=rows[column])
-        for method, rows, column in parts
-    ]
-    points = pd.concat(named, ignore_index=True).assign(position_basis="full", k=None, r=None)
+    every = errors.assign(relative_error_within_horizon=errors.error_converged)
+    fewer = errors[early].assign(method=FEWER, relative_error_within_horizon=errors.error_scene)
+    points = pd.concat([every, fewer], ignore_index=True)
+    points = points.assign(position_basis="full", k=None, r=None)
     return points.dropna(subset=["relative_error_within_horizon", "ms_per_frame"])
 
 

@@ -68,11 +68,7 @@ LIMIT = number("limit", "error that is allowed", compared="exact")
         timed(number("ms_high", "the same in the slowest process", "ms")),
         integer("processes", "processes that timed it, all in the first motion"),
         number("error_implicit", "against the converged step", tolerance=LOOSE),
-        number(
-            "error_continuous",
-            "against continuous time: the total",
-            tolerance=LOOSE,
-        ),
+        number("error_continuous", "against continuous time: the total", tolerance=LOOSE),
         number("reference_error", "estimated error of that motion"),
     ),
     reads={"parts": Every(paths.ALTERNATIVES), "times": Every(paths.ALTERNATIVE_TIMES)},

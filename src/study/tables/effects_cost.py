@@ -6,7 +6,7 @@ import pandas as pd
 from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, Setting, TableOf
-from study.experiments.kit.settings import FOM, GLOBAL, REST, RIGHT, floor_of, horizons
+from study.experiments.kit.settings import FOM, GLOBAL, REST, RIGHT, Horizon, floor_of, horizons
 from study.experiments.sensitivity import without
 from study.tables.kit.declaration import flag, integer, number, table, text, timed
 from study.tables.kit.parts import in_one_time, joined, timings_in_one_time
@@ -59,8 +59,7 @@ FEWEST = 3  # meshes, for an exponent
         "contributions": Every(paths.CONTRIBUTIONS),
         "frame_times": TableOf("frame_times"),
         "sensitivity": TableOf("sensitivity"),
-        "perturbation": Setting("sensitivity.reference"),
-        "threshold": Setting("sensitivity.threshold"),
+        "horizon": Setting("horizon"),
     },
 )
 def effects_cost(
@@ -69,8 +68,7 @@ def effects_cost(
     contributions: list[File],
     frame_times: pd.DataFrame,
     sensitivity: pd.DataFrame,
-    perturbation: float,
-    threshold: float,
+    horizon: Horizon,
 ) -> pd.DataFrame:
     """Effects and phases of each scene, then what was left out together in scenes of many groups.
 
@@ -79,7 +77,7 @@ def effects_cost(
     parts, left_out : times of effects, and of scenes without some of them; they are brought to
         those of the table ``frame_times``
     contributions : forces and energies by frame
-    sensitivity, perturbation, threshold : see `horizons`; ``moved`` is empty for the only group of
+    sensitivity, horizon : see `horizons`; ``moved`` is empty for the only group of
         a scene, which cannot be left out
     """
     costs, removed = joined(parts), joined(left_out)
@@ -99,7 +97,7 @@ def effects_cost(
         tables[0] = costs.merge(removed[[*KEYS, *single]], on=KEYS, how="left")
     frames = joined(contributions)
     if len(frames):
-        acting = _acting(frames, sensitivity, perturbation, threshold)
+        acting = _acting(frames, sensitivity, horizon)
         tables[0] = tables[0].merge(acting, on=KEYS, how="left")
         tables.append(acting[_absent(acting, costs)])
     made = pd.concat(tables, ignore_index=True)
@@ -114,42 +112,30 @@ def _absent(rows: pd.DataFrame, others: pd.DataFrame) -> np.ndarray:
     return ~keys.isin(known)
 
 
-def _acting(
-    frames: pd.DataFrame, sensitivity: pd.DataFrame, perturbation: float, threshold: float
-) -> pd.DataFrame:
+def _acting(frames: pd.DataFrame, sensitivity: pd.DataFrame, horizon: Horizon) -> pd.DataFrame:
     """Force and energy of each effect in ``frames``, and how far the run moves without it."""
     made = frames.groupby([*KEYS, "role"], sort=False, as_index=False).agg(
         force=("force", lambda force: float(np.sqrt(np.mean(np.square(force))))),
         acting_frames=("force", lambda force: int((force > 0.0).sum())),
-        energy=("energy", _range),
+        energy=("energy", lambda of: float(of.max() - of.min() if len(of) > 1 else of.iloc[0])),
     )
     length = frames.groupby("scene").frame.max() + 1
     # a start has a row in the first frame only
     starts = made.role == "start"
     made.loc[starts, "force"] /= np.sqrt(made.scene[starts].map(length).to_numpy(float))
     made["force_share"] = made.force / made.groupby("scene").force.transform("sum")
-    ends = horizons(sensitivity, perturbation, threshold)
-    made["sensitivity_floor"] = [
-        _largest(sensitivity, scene, perturbation, ends) for scene in made.scene
-    ]
-    made["moved"] = [
-        _largest(sensitivity, row.scene, without(row.effect), ends) for row in made.itertuples()
-    ]
+    ends = horizons(sensitivity, horizon.perturbation, horizon.threshold)
+
+    def largest(scene: str, label: float | str) -> float | None:
+        """Largest drift before the horizon; None where there was no such run or no such frame."""
+        drift = floor_of(sensitivity, scene, label)[: ends[scene]]
+        return float(drift.max()) if len(drift) else None
+
+    made["sensitivity_floor"] = [largest(scene, horizon.perturbation) for scene in made.scene]
+    made["moved"] = [largest(row.scene, without(row.effect)) for row in made.itertuples()]
     judged = made.moved.notna()
     made["above_floor"] = (made.moved > made.sensitivity_floor).where(judged, None).astype(object)
     return made
-
-
-def _range(values: pd.Series) -> float:
-    return float(values.max() - values.min()) if len(values) > 1 else float(values.iloc[0])
-
-
-def _largest(
-    sensitivity: pd.DataFrame, scene: str, label: float | str, ends: dict[str, int]
-) -> float | None:
-    """Largest drift before the horizon; None where there was no such run, or no such frame."""
-    drift = floor_of(sensitivity, scene, label)[: ends[scene]]
-    return float(drift.max()) if len(drift) else None
 
 
 @table(
@@ -221,14 +207,8 @@ def scaling(parts: list[File]) -> pd.DataFrame:
     for quantity, name in EXPONENTS.items():
         rows[name] = np.nan
         for _, curve in curves:
-            rows.loc[curve.index, name] = _exponent(curve.vertices, curve[quantity])
+            measured = curve[curve[quantity] > 0.0]
+            if measured.vertices.nunique() >= FEWEST:
+                x, y = np.log(measured[["vertices", quantity]].to_numpy(float)).T
+                rows.loc[curve.index, name] = float(np.polyfit(x, y, 1)[0])
     return rows
-
-
-def _exponent(vertices: pd.Series, values: pd.Series) -> float:
-    """Slope of the logarithms of what was measured; nan of fewer than three meshes."""
-    measured = values > 0.0
-    if vertices[measured].nunique() < FEWEST:
-        return np.nan
-    x, y = (np.log(series[measured].to_numpy(float)) for series in (vertices, values))
-    return float(np.polyfit(x, y, 1)[0])

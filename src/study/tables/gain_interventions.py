@@ -146,15 +146,19 @@ def _summary(pairs: pd.DataFrame) -> Mapping[str, float]:
     by_scene = pairs.groupby("scene").error
     by_family = pairs.groupby(families(pairs.scene)).error
     fallen = int((by_family.median() < 1.0).sum())
-    low, high = _interval([values.to_numpy(float) for _, values in by_family])
+    values = [own.to_numpy(float) for _, own in by_family]
+    # percentiles of the median over all values, with whole families drawn with replacement
+    drawn = np.random.default_rng(SEED).integers(len(values), size=(RESAMPLES, len(values)))
+    medians = [np.median(np.concatenate([values[i] for i in row])) for row in drawn]
+    low, high = np.percentile(medians, [2.5, 97.5], method="inverted_cdf")
     known = len(pairs) > 2 and pairs.gain.nunique() > 1 and pairs.error.nunique() > 1
     return {
         "pairs": len(pairs),
         "scenes": by_scene.ngroups,
         "gain_ratio": float(pairs.gain.median()),
         "error_ratio": float(pairs.error.median()),
-        "error_ratio_low": low,
-        "error_ratio_high": high,
+        "error_ratio_low": float(low),
+        "error_ratio_high": float(high),
         "fallen_share": float((pairs.error < 1.0).mean()),
         "scenes_fallen": int((by_scene.median() < 1.0).sum()),
         "p_value": float(binomtest(fallen, by_family.ngroups).pvalue),
@@ -163,11 +167,3 @@ def _summary(pairs: pd.DataFrame) -> Mapping[str, float]:
         "rank_correlation": float(pairs.gain.rank().corr(pairs.error.rank())) if known else np.nan,
         "unexplained_share": float(((pairs.gain < 1.0) != (pairs.error < 1.0)).mean()),
     }
-
-
-def _interval(families: list[np.ndarray]) -> tuple[float, float]:
-    """Percentiles of the median over all values, with whole families drawn with replacement."""
-    drawn = np.random.default_rng(SEED).integers(len(families), size=(RESAMPLES, len(families)))
-    medians = [np.median(np.concatenate([families[i] for i in row])) for row in drawn]
-    low, high = np.percentile(medians, [2.5, 97.5], method="inverted_cdf")
-    return float(low), float(high)

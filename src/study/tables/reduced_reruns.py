@@ -12,7 +12,7 @@ from pdrom.reduction.deviations import DEVIATIONS, ERRORS, REFERENCE, Series, er
 from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, Setting, TableOf
-from study.experiments.kit.settings import floor_of, horizons
+from study.experiments.kit.settings import Horizon, floor_of, horizons
 from study.tables.kit.declaration import table, text
 from study.tables.kit.parts import timings_in_one_time
 from study.tables.kit.reruns import KEYS, TRAIN
@@ -41,8 +41,7 @@ from study.tables.kit.vocabulary import shared
         "timings": Every(paths.TIMINGS),
         "frame_times": TableOf("frame_times"),
         "sensitivity": TableOf("sensitivity"),
-        "perturbation": Setting("sensitivity.reference"),
-        "threshold": Setting("sensitivity.threshold"),
+        "horizon": Setting("horizon"),
     },
 )
 def reduced_reruns(
@@ -55,8 +54,7 @@ def reduced_reruns(
     timings: list[File],
     frame_times: pd.DataFrame,
     sensitivity: pd.DataFrame,
-    perturbation: float,
-    threshold: float,
+    horizon: Horizon,
 ) -> pd.DataFrame:
     """Runs of the training motion with their times, then those of each held-out motion.
 
@@ -69,17 +67,15 @@ def reduced_reruns(
     ----------
     runs, rows, rows_heldout : HDF5 files of the runs, and their tables in the same order
     subspaces, subspace_rows, subspace_rows_heldout : the same in position subspaces
-    sensitivity, perturbation, threshold : see `horizons`; held-out motions have labels of their own
+    sensitivity, horizon : see `horizons`; held-out motions have labels of their own
     """
     judged: list[pd.DataFrame] = []
     for motion in (TRAIN, *MOTIONS):
-        own = motion == TRAIN
-        label = perturbation if own else motion
-        ends = horizons(sensitivity, label, threshold)
-        local = zip(runs, rows if own else rows_heldout, strict=True)
-        inside = zip(subspaces, subspace_rows if own else subspace_rows_heldout, strict=True)
-        parts = [_local_only(run, row, ends, motion) for run, row in local]
-        parts += [_subspace(run, row, ends, motion) for run, row in inside]
+        label = horizon.perturbation if motion == TRAIN else motion
+        ends = horizons(sensitivity, label, horizon.threshold)
+        tables = rows + subspace_rows if motion == TRAIN else rows_heldout + subspace_rows_heldout
+        files = zip(runs + subspaces, tables, strict=True)
+        parts = [_judged(run, row, ends[run["scene"]], motion) for run, row in files]
         found = pd.concat(parts, ignore_index=True).assign(motion=motion)
         floors = {s: floor_of(sensitivity, s, label)[:end] for s, end in ends.items()}
         floor = {scene: float(drift.max(initial=0.0)) for scene, drift in floors.items()}
@@ -90,32 +86,22 @@ def reduced_reruns(
     return pd.concat(judged, ignore_index=True)
 
 
-def _local_only(run: File, row: File, ends: dict[str, int], motion: str) -> pd.DataFrame:
-    """Rows of runs whose positions are not reduced."""
-    table, end = _of_motion(row, motion), ends[run["scene"]]
-    with open_hdf5(run.path) as file:
-        store = file if motion == TRAIN else file[motion]
-        runs = [store[f"r{r:04d}"] for r in table.r]
-        reference = {series: store[series][...] for series in REFERENCE}
-        table = table.assign(**_errors(runs, reference, end, file.attrs))
-    return table.assign(position_basis="full", k=None)
-
-
-def _of_motion(row: File, motion: str) -> pd.DataFrame:
-    """Rows of a motion; a table of training runs has no column that names one."""
+def _judged(run: File, row: File, end: int, motion: str) -> pd.DataFrame:
+    """Rows of the runs of a motion, whose positions are reduced where the files know no group."""
     table = read_table(row.path)
-    return table if motion == TRAIN else table[table.motion == motion]
-
-
-def _subspace(run: File, row: File, ends: dict[str, int], motion: str) -> pd.DataFrame:
-    """Rows of runs in position subspaces."""
-    table, end = _of_motion(row, motion), ends[run["scene"]]
+    if motion != TRAIN:  # a table of training runs has no column that names one
+        table = table[table.motion == motion]
     with open_hdf5(run.path) as file:
-        models = [f"{t.position_basis}_k{t.k:03d}_{t.method}" for t in table.itertuples()]
-        runs = [file[f"models/{model}/{motion}"] for model in models]
-        reference = {series: file[f"{series}/{motion}"][...] for series in REFERENCE}
-        table = table.assign(**_errors(runs, reference, end, file.attrs))
-    return table
+        if "group" in run.labels:
+            table = table.assign(position_basis="full", k=None)
+            store = file if motion == TRAIN else file[motion]
+            runs = [store[f"r{r:04d}"] for r in table.r]
+            reference = {series: store[series][...] for series in REFERENCE}
+        else:
+            models = [f"{t.position_basis}_k{t.k:03d}_{t.method}" for t in table.itertuples()]
+            runs = [file[f"models/{model}/{motion}"] for model in models]
+            reference = {series: file[f"{series}/{motion}"][...] for series in REFERENCE}
+        return table.assign(**_errors(runs, reference, end, file.attrs))
 
 
 def _errors(

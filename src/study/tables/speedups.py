@@ -56,22 +56,20 @@ def frame_times(parts: list[File]) -> pd.DataFrame:
     vertices = rows.groupby("scene").vertices.first()
     made = []
     for scene in rows.scene.unique():
-        row = {"scene": scene, "vertices": vertices[scene], "processes": len(full)}
-        row |= _named(("ms_per_frame", "low_ms", "high_ms"), full[scene])
-        row |= _named(
-            ("control_ratio", "control_low", "control_high"), control[scene] / full[scene]
-        )
-        row["confirmed"] = confirmed(row["control_low"], row["control_high"])
-        row["control_agrees"] = row["control_low"] <= 1.0 <= row["control_high"]
+        values = {
+            ("ms_per_frame", "low_ms", "high_ms"): full[scene],
+            ("control_ratio", "control_low", "control_high"): control[scene] / full[scene],
+        }
         if f"{scene}{TWIN}" in full:
             twin = full[f"{scene}{TWIN}"] / full[scene]
-            row |= _named(("twin_ratio", "twin_low", "twin_high"), twin)
+            values["twin_ratio", "twin_low", "twin_high"] = twin
+        row = {"scene": scene, "vertices": vertices[scene], "processes": len(full)}
+        for names, measured in values.items():
+            row |= zip(names, median_interval(measured.to_numpy(float)), strict=True)
+        row["confirmed"] = confirmed(row["control_low"], row["control_high"])
+        row["control_agrees"] = row["control_low"] <= 1.0 <= row["control_high"]
         made.append(row)
-    return pd.DataFrame(made).reindex(columns=[c.name for c in frame_times.columns])
-
-
-def _named(names: tuple[str, str, str], values: pd.Series) -> dict:
-    return dict(zip(names, median_interval(values.to_numpy(float)), strict=True))
+    return pd.DataFrame(made).reindex(columns=frame_times.column_names)
 
 
 @table(

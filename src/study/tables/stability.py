@@ -1,7 +1,6 @@
 """Limits of trust in each method: over scenes, sizes, time step, stiffness, and in hard cases."""
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -9,7 +8,7 @@ import pandas as pd
 from pdrom.core.store import open_hdf5
 from study.artifact import paths
 from study.artifact.paths import File
-from study.artifact.reads import Every, PerScene, Setting, TableOf
+from study.artifact.reads import Every, Setting, TableOf
 from study.tables.kit.declaration import flag, number, table, text
 from study.tables.kit.parts import joined
 from study.tables.kit.reruns import KEYS, trained
@@ -39,7 +38,7 @@ FRAGILE = 0.005
         "subspaces": Every(paths.SUBSPACES_TRAIN),
         "sweeps": Every(paths.STABILITY),
         "reduced_reruns": TableOf("reduced_reruns"),
-        "time_steps": PerScene("time_step"),
+        "time_steps": Setting("scene_time_steps"),
         "wrong": Setting("stability.wrong"),
         "departure": Setting("stability.left"),
     },
@@ -75,23 +74,16 @@ def stability(
 def outcomes(runs: pd.DataFrame, wrong: float, departure: float) -> list[str]:
     """One of `OUTCOMES` for each row of ``runs``, by the limits ``wrong`` and ``departure``."""
     full = runs[(runs.method == "full") & (runs.position_basis == "full")]
-    extents = full.set_index(SETTING).max_extent.to_dict()
-    return [
-        _outcome(row, extents[tuple(getattr(row, key) for key in SETTING)], wrong, departure)
-        for row in runs.itertuples()
-    ]
-
-
-def _outcome(row: Any, full_extent: float, wrong: float, departure: float) -> str:
-    if pd.isna(row.finite):
-        return "not run"
-    if not row.finite:
-        return "blow-up"
-    if row.max_extent > departure * full_extent:
-        return "left the scene"
-    if pd.isna(row.relative_error):
-        return "not judged"
-    return "wrong" if row.relative_error > wrong else "accurate"
+    extents = full.set_index(SETTING).max_extent.rename("full_extent")
+    error = runs.relative_error.astype(float)
+    classes = {
+        "not run": runs.finite.isna(),
+        "blow-up": ~runs.finite.astype("boolean").fillna(True).to_numpy(bool),
+        "left the scene": runs.max_extent > departure * runs.join(extents, on=SETTING).full_extent,
+        "not judged": error.isna(),
+        "wrong": error > wrong,
+    }
+    return np.select(list(classes.values()), list(classes), "accurate").tolist()
 
 
 def _full_order_rows(files: list[File]) -> pd.DataFrame:
@@ -100,18 +92,10 @@ def _full_order_rows(files: list[File]) -> pd.DataFrame:
     for run in files:
         with open_hdf5(run.path) as file:
             extents = np.ptp(file["positions"][...], axis=1).max(axis=1)
-        rows.append(
-            {
-                "scene": run["scene"],
-                "method": "full",
-                "position_basis": "full",
-                "finite": bool(np.isfinite(extents).all()),
-                "max_extent": float(extents[1:].max() / extents[0]),
-                "energy_ratio": 1.0,
-                "relative_error": 0.0,
-            }
-        )
-    return pd.DataFrame(rows)
+        finite = bool(np.isfinite(extents).all())
+        rows.append((run["scene"], finite, float(extents[1:].max() / extents[0])))
+    made = pd.DataFrame(rows, columns=["scene", "finite", "max_extent"])
+    return made.assign(method="full", position_basis="full", energy_ratio=1.0, relative_error=0.0)
 
 
 def _rerun_rows(

@@ -6,7 +6,6 @@ A figure is a function under its declaration in a module of `study.figures`::
         title="Rest shapes",
         caption="Vertices of each mesh.",
         reads={"drawn": Settings(Drawn), "meshes": EachOf(MESH, "experiments")},
-        options=Scenes,
     )
     def rest_shapes(options: Scenes, drawn: Drawn, meshes: list[File]) -> Figure: ...
 """
@@ -25,9 +24,9 @@ from pdrom.core.yamlfile import read_yaml, validate
 from pdrom.view import style
 from pdrom.view.artists import Figure
 from study.artifact.artifact import Artifact, declare, declared_in
-from study.artifact.markup import filled, keys, to_plain
+from study.artifact.markup import filled, to_plain
 from study.artifact.paths import FIGURE, FIGURE_PICTURE
-from study.artifact.reads import Labels, Paths, Read, Setting, Sources
+from study.artifact.reads import Read, Setting
 from study.figures.kit.options import NothingToDraw, Options
 
 log = logging.getLogger(__name__)
@@ -42,18 +41,23 @@ ELSEWHERE = "the full study (config/default.yaml) draws it"
 class Declaration(Artifact):
     """A figure, named as the function that draws it.
 
-    The function gets its ``options`` and what it reads. It raises `NothingToDraw` where the
-    configuration holds nothing of what the figure shows, StorageError for a file that is damaged.
+    The function gets what it reads and its ``options``, whose type says what a user may choose in
+    config/figures.yaml, with the defaults. It raises `NothingToDraw` where the configuration holds
+    nothing of what the figure shows, StorageError for a file that is damaged.
 
     title, caption : in light mark-up (`study.artifact.markup`); ``{key}`` in a caption stands for
         a setting of the configuration
-    options : what a user may choose in config/figures.yaml, with the defaults
     number : number in the preprint that is reproduced; None for a figure of this study
     """
 
     caption: str = ""
-    options: type[Options] = Options
     number: int | None = None
+
+    @property
+    def options(self) -> type[Options]:
+        """Type of the options."""
+        chosen: type[Options] = self.function.__annotations__["options"]
+        return chosen
 
     @property
     def rule(self) -> str:
@@ -68,15 +72,7 @@ class Declaration(Artifact):
         ConfigurationError
             A setting does not exist.
         """
-        return self.title, filled(self.caption, {key: value(key) for key in keys(self.caption)})
-
-    def inputs(self, sources: Sources, labels: Labels) -> dict[str, Paths]:
-        """Paths by name; the figure's own name is a label, by which its options are found."""
-        return super().inputs(sources, {**labels, "figure": self.name})
-
-    def settings(self, sources: Sources, labels: Labels) -> dict[str, Any]:
-        """Typed settings by name, see `inputs`."""
-        return super().settings(sources, {**labels, "figure": self.name})
+        return self.title, filled(self.caption, value)
 
     def perform(
         self, settings: Mapping[str, Any], inputs: Mapping[str, Any], outputs: Mapping[str, str]
@@ -102,12 +98,7 @@ class Declaration(Artifact):
 
 
 def figure(
-    *,
-    title: str,
-    caption: str,
-    reads: Mapping[str, Read],
-    options: type[Options],
-    number: int | None = None,
+    *, title: str, caption: str, reads: Mapping[str, Read], number: int | None = None
 ) -> Callable[[Callable[..., Figure]], Declaration]:
     """Declare the function below as a figure; it gets ``options``, and what it reads by name.
 
@@ -121,9 +112,7 @@ def figure(
         name = function.__name__
         writes = {"pdf": FIGURE.where(name=name), "png": FIGURE_PICTURE.where(name=name)}
         given = {"options": Setting("options"), **reads}
-        made = Declaration(
-            name, title, given, writes, function, caption=caption, options=options, number=number
-        )
+        made = Declaration(name, title, given, writes, function, caption=caption, number=number)
         return declare(made)
 
     return decorate

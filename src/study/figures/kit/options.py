@@ -15,9 +15,12 @@ from pdrom.view.camera import Camera, up_of
 from pdrom.view.text import plain_words
 from study.artifact.paths import File
 
-Rank = Annotated[int, Field(ge=0)] | Literal["full"]
-Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
 Names = tuple[str, ...]
+Ranks = tuple[Annotated[int, Field(ge=0)] | Literal["full"], ...]  # full: the numerical rank
+Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
+Instants = Annotated[tuple[Fraction, ...], Field(min_length=1)]  # 1 is the last frame of a run
+Columns = Annotated[int, Field(ge=1, le=6)]  # panels side by side
+Count = Annotated[int, Field(ge=1, le=12)]  # of modes or iterations
 AZIMUTH = 30.0  # of every camera, degrees
 
 
@@ -62,19 +65,7 @@ class Methods(Scenes):
     methods: Names = ()
 
 
-class Ranks(Options):
-    """Basis sizes; ``full`` is the full numerical rank."""
-
-    ranks: tuple[Rank, ...] = ()
-
-
-class Instants(Options):
-    """Instants as fractions of the run (1 is its last frame)."""
-
-    frames: Annotated[tuple[Fraction, ...], Field(min_length=1)] = (0.1, 0.5, 0.9)
-
-
-class View(Options):
+class View(Methods):
     """Elevation of the camera, degrees; up is against the gravity of a scene."""
 
     elevation: Annotated[float, Field(ge=-90.0, le=90.0)] = 20.0
@@ -84,26 +75,18 @@ class View(Options):
         return Camera(AZIMUTH, self.elevation, tuple(up_of(experiment.effects).tolist()))
 
 
-class Columns(Options):
-    """Panels side by side."""
-
-    columns: Annotated[int, Field(ge=1, le=6)] = 3
-
-
-class Count(Options):
-    """Number of modes or iterations that are drawn."""
-
-    count: Annotated[int, Field(ge=1, le=12)] = 6
-
-
-class Beside(Scenes, Columns):
+class Beside(Scenes):
     """Scene -> experiment of the published code whose output is drawn beside ours."""
 
+    columns: Columns = 3
     published: dict[str, str] = Field(default_factory=dict)
 
 
-class ReducedRuns(Methods, Ranks, Instants, View):
+class ReducedRuns(View):
     """Full-order runs beside reduced ones."""
+
+    ranks: Ranks = ()
+    frames: Instants = (0.1, 0.5, 0.9)
 
 
 class _Plain(BaseModel):

@@ -164,28 +164,20 @@ def load_claims(path: Path, added: Added = NONE_ADDED) -> dict[str, ClaimRule]:
         For any fault of the file, and for a set that it does not have.
     """
     content = read_yaml(path)
-    if not isinstance(content, dict) or not content:
+    if not isinstance(content, dict) or not {*content} - {SETS}:
         raise ConfigurationError(f"{path}: a mapping of claims is required")
-    sets = dict(_sets(content.get(SETS, {}), f"{path}: {SETS}"))
+    sets = content.pop(SETS, {})
+    if not isinstance(sets, dict) or not all(isinstance(v, list) for v in sets.values()):
+        raise ConfigurationError(f"{path}: {SETS}: a mapping of lists is required")
     for name, values in added.items():
         if name not in sets:
             raise ConfigurationError(f"claim_sets: no set '{name}'{choices(name, sets)}")
         sets[name] = [*sets[name], *values]
-    rules = {str(claim): rule for claim, rule in content.items() if claim != SETS}
-    if not rules:
-        raise ConfigurationError(f"{path}: a mapping of claims is required")
-    places = {claim: f"{path}: {claim}" for claim in rules}
+    places = {claim: f"{path}: {claim}" for claim in content}
     return {
-        claim: validate(ClaimRule, _resolved(rule, sets, places[claim]), places[claim])
-        for claim, rule in rules.items()
+        str(claim): validate(ClaimRule, _resolved(rule, sets, places[claim]), places[claim])
+        for claim, rule in content.items()
     }
-
-
-def _sets(content: Any, place: str) -> Mapping[str, list[Value]]:
-    """Named lists of values, which tests may name."""
-    if not isinstance(content, dict) or not all(isinstance(v, list) for v in content.values()):
-        raise ConfigurationError(f"{place}: a mapping of lists is required")
-    return content
 
 
 def _resolved(entry: Any, sets: Mapping[str, list[Value]], place: str) -> Any:

@@ -25,7 +25,7 @@ from pdrom.core.errors import StorageError
 from pdrom.core.store import write_table
 from study.artifact.artifact import Artifact, declare, declared_in
 from study.artifact.paths import TABLE
-from study.artifact.reads import ProjectFile, Read
+from study.artifact.reads import Read
 
 # Six kinds of what a column may hold, and how far two machines may differ in each, by measurements:
 # docs/decisions/0010-six-kinds.md.
@@ -173,25 +173,6 @@ class Table(Artifact):
         except (TypeError, ValueError) as error:
             place = f"table {self.name}: column '{column.name}'"
             raise StorageError(f"{place} is no {column.kind} ({error})") from error
-
-    def without_times(self, table: pd.DataFrame, root: Path) -> pd.DataFrame:
-        """``table``, as text, with every cell emptied that depends on timing.
-
-        Parameters
-        ----------
-        root : folder of the project, for the files that the table reads there
-        """
-        cells: Sequence[Collection[str]] = [self.timing_columns] * len(table)
-        if self.timed_cells is not None:
-            files = {k: r.path for k, r in self.reads.items() if isinstance(r, ProjectFile)}
-            cells = self.timed_cells(table, **{name: root / path for name, path in files.items()})
-        kept = table.astype(object)
-        for name in self.timing_columns:
-            kept[name] = [
-                "" if name in of_row else value
-                for value, of_row in zip(kept[name], cells, strict=True)
-            ]
-        return kept.astype(str)
 
 
 def table(

@@ -1,6 +1,6 @@
 """Results of invented studies in the documented formats: bent sheets, a bar, random bases."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from functools import partial
 from pathlib import Path
@@ -10,11 +10,13 @@ import pandas as pd
 import pytest
 from matplotlib.figure import Figure
 
+from builders import frame
 from pdrom.core.store import write_hdf5, write_table
 from pdrom.core.yamlfile import read_yaml
 from pdrom.model.effects import EFFECTS
 from pdrom.model.mesh.generators import bar, cloth
 from pdrom.model.mesh.types import Mesh, save_mesh
+from pdrom.reduction.method import load_methods
 from pdrom.reduction.sampling.deim import block_elements, deim_entries
 from places import CONFIG, ROOT
 from study.artifact.paths import (
@@ -30,9 +32,11 @@ from study.artifact.paths import (
     TRAIN,
     Place,
 )
+from study.artifact.reads import TableOf
 from study.figures.kit.declaration import declarations
 from study.pipeline.resolve import Job, Resolver
 from study.pipeline.study import Study
+from study.tables import declared
 
 FRAMES = 20
 METHODS = ("pod", "deim", "qdeim", "deim-joint", "published", "block-deim")
@@ -80,9 +84,9 @@ class Invented:
         job = self.job(name, root, **changes)
         return job.artifact.read(job.settings, job.inputs)
 
-    def draw(self, name: str, **changes: object) -> Figure:
-        """Draw a figure."""
-        return declarations()[name].draw(**self.read(name, **changes))
+    def draw(self, name: str, tables: Mapping[str, object] = {}, **changes: object) -> Figure:
+        """Draw a figure from other ``tables``, by the names of what it reads."""
+        return declarations()[name].draw(**{**self.read(name, **changes), **tables})
 
 
 def mesh_of(scene: str) -> Mesh:
@@ -99,7 +103,7 @@ def element_count(mesh: Mesh, group: str) -> int:
 
 def make_results(results: Invented) -> None:
     """Write the results of a study."""
-    rng = np.random.default_rng(7)
+    rng, effects = np.random.default_rng(7), reference("effects_cost")
     for scene, config in results.study.scenes.items():
         mesh = mesh_of(scene)
         save_mesh(mesh, results.path(MESH, scene))
@@ -113,8 +117,11 @@ def make_results(results: Invented) -> None:
                 path = results.path(SAMPLING, scene, group, method)
                 _write_sampling(path, bases, group, spec.rows)
                 _write_reruns(results, scene, group, method, positions, rank, rng)
-    scenes = {name: tuple(config.reduce) for name, config in results.study.scenes.items()}
-    _write_tables(results, scenes, list(results.study.methods), rng)
+        if scene in FLAT:
+            _write_noise_runs(results, scene)
+        _write_sensitivity(results, scene)
+        _write_contributions(results, scene, effects)
+    _write_tables(results)
 
 
 def _trajectory(mesh: Mesh) -> np.ndarray:
@@ -179,188 +186,30 @@ def _write_reruns(results, scene, group, method, positions, rank, rng) -> None:
             store.attrs.update(finite=not failed, blowup_frame=blowup, max_extent=1.1)
 
 
-def _outcome(scene: str, method: str, r: int) -> tuple[float, float, float]:
-    """Frame of a blow-up, error of the run, error within the horizon."""
-    if (scene, method) == BLOWN_UP[:2]:
-        return BLOWUP_FRAME, np.nan, np.nan
-    error = 1e-3 if method == "pod" else 1e-2 * r
-    return np.nan, error, error
+def reference(name: str) -> pd.DataFrame:
+    """The tracked table of the full study, else of the tiny one, with times that are invented."""
+    folders = (ROOT / "results/reference/tables", ROOT / "results/reference/studies/tiny/tables")
+    path = next(path for folder in folders for path in folder.glob(f"{name}.csv*"))
+    table, made = pd.read_csv(path), declared()[name]
+    invented = {"text": "a", "flag": True, "integer": 9}
+    for column in made.columns:
+        if column.name not in table:
+            values = np.random.default_rng(len(column.name)).uniform(0.5, 2.0, len(table))
+            table[column.name] = invented.get(column.kind, values)
+    return made.checked(table)
 
 
-def _write_tables(results, scenes, methods, rng) -> None:
-    pairs = [(scene, group) for scene, groups in scenes.items() for group in groups]
-    values, errors = [], []
-    for scene, group in pairs:
-        flat = scene in FLAT
-        for k in range(1, 15):
-            relative = 0.05 ** (k - 1)
-            values.append((scene, group, k, 3 * relative, relative, not flat and relative > 1e-13))
-        for method in methods:
-            for r in (1, 2, 4, 8, 14):
-                for split in ("train", "test", "heldout"):
-                    error = np.nan if flat else 1e5 / 10.0**r
-                    gain = 1.0 if method == "pod" else 3.0 * r
-                    errors.append((scene, group, method, r, split, error, gain, r))
-    times = [
-        (scene, implementation, 42, local, 0.1, 1.0, local / (local + 1.1))
-        for scene in scenes
-        for implementation, local in (("compiled", 0.6), ("numpy", 4.0), ("interpreted", 90.0))
-    ]
-    costs = [
-        (scene, method, "full", np.nan, r, 10, 1.0 / r, 0.2 * r, r == 14)
-        for scene in scenes
-        for method in methods
-        for r in (6, 14)
-    ]
-    costs += [(scene, "full", "full", np.nan, np.nan, 10, 0.0, 4.0, True) for scene in scenes]
-    for k, time in ((2, 1.0), (5, 2.0), (10, 4.0), (40, 16.0)):
-        costs += [
-            (scene, "fom", "full", np.nan, np.nan, k, 1.0 / k**2, time, True) for scene in scenes
-        ]
-        costs += [
-            (scene, "fom-anderson", "full", np.nan, np.nan, k, 1.0 / k**3, 1.1 * time, True)
-            for scene in scenes
-            if k > 2
-        ]
-        if k < 10:
-            early = ("fewer-iterations", "full", np.nan, np.nan, k, 0.5 / k, time, k == 2)
-            costs += [(scene, *early) for scene in scenes]
-    ratios = [
-        (scene, group, method, factor, 400 * factor**2, r, *_ratio(method, r))
-        for scene, group in pairs
-        for method in methods
-        for factor in (1, 2, 5)
-        for r in (6, 14, 40)
-    ]
-    effects = [
-        (scene, effect, "", time, time / 4.0, *6 * [None])
-        for scene, groups in scenes.items()
-        for effect, time in (
-            *((group, 2.0 / len(groups)) for group in groups), ("gravity", 0.5), ("pins", 0.5),
-            ("global solve", 0.7), ("rest of the frame", 0.3),
-        )
-    ]  # fmt: skip
-    effects += [
-        (scene, name, "several", 4.0 - time, None, number, time, *4 * [None])
-        for scene, groups in scenes.items()
-        if len(groups) > 1
-        for name, number, time in (("gravity", 3, 3.5), ("a + b", 1, 2.0), ("nothing", 3, 4.0))
-    ]
-    rungs = [("up", "published code"), ("up", "+ affine"), ("down", "- QR"), ("signs", "signs 1")]
-    others = [
-        (scene, 400, stiffness, motion, method, n, 0.1 * n, None if n > 4 else 0.1 / n, 0.3 / n)
-        for scene in scenes
-        for stiffness in (1.0, 100.0)
-        for motion in ("heldout", "kick")
-        for method in ("converged", "projective", "newton", "ecsw")
-        for n in (1, 2, 5)
-    ]
-    ladder = [
-        (
-            scene,
-            direction,
-            rung,
-            10.0**i if i < 2 else np.inf,
-            0.1 * i if i else np.nan,
-            *((0.05, np.inf, 1.0, 50.0) if i < 2 else 4 * (np.nan,)),
-        )
-        for scene in scenes
-        for i, (direction, rung) in enumerate(rungs)
-    ]
-    outcome = {6: "wrong", 14: "accurate", 20: "not run"}
-    runs = [
-        (scene, group, method, "full", np.nan, r, "rerun", outcome[r], np.nan, 0.016, 1.0)
-        for scene, group in pairs
-        for method in methods
-        for r in outcome
-        if scene not in FLAT
-    ]
-    runs += [
-        (scene, "all", "full", "pod", 10, 99, "rerun", "left the scene", np.nan, 0.016, 1.0)
-        for scene in scenes
-    ]
-    failed = {0.016: "accurate", 0.2: "blow-up"}
-    runs += [
-        (scene, group, method, "full", np.nan, 6, "sweep", failed[h],
-         np.nan if h < 0.1 else BLOWUP_FRAME, h, ratio)
-        for scene, group in pairs
-        for method in methods
-        for h, ratio in ((0.016, 1.0), (0.2, 1.0), (0.016, 100.0))
-    ]  # fmt: skip
-    reruns = [
-        (scene, group, method, r, "full", 1.0, *_outcome(scene, method, r), 0.2 * r, None, "train")
-        for scene, group in pairs
-        if scene not in FLAT
-        for method in methods
-        for r in (8, 14)
-    ]
-    repetitions = [
-        (scene, group, method, r, "training", 0.01, 0.1, np.inf, 1.0, 2.0, 3.0)
-        for scene, group, method, r, *_ in reruns
-    ]
-    noise = [
-        (scene, "bending", axes, method, r, 9, None if axes in fails else 1e-12)
-        for scene in FLAT
-        for axes, fails in (("all", ()), ("plane", ("plane",)), ("vertex", ()))
-        for method in ("deim-joint", "published")
-        for r in (6, 10)
-    ]
-    effects += [
-        (scene, effect, role, *4 * [None], 1.0, drift, 1e-6, drift and drift > 1e-6)
-        for scene, groups in scenes.items()
-        for effect, role, drift in (
-            *((group, "constraint group", None) for group in groups[:1]),
-            *((group, "constraint group", 1e-9) for group in groups[1:]),
-            ("gravity", "force", 0.5),
-            ("kick", "start", 1e-15),
-        )
-    ]  # fmt: skip
-    requests = [
-        (scene, tolerance, met, reduced, 0.5 * tolerance if met else 2.0, time)
-        for scene in scenes
-        for tolerance in (0.1, 0.01)
-        for met, reduced, time in ((True, True, 0.1), (True, False, 1.5), (False, False, 2.2))
-    ]
-    made = {
-        "requested_tolerances": (requests, "scene tolerance met reduced error over_own"),
-        "singular_values": (values, "scene group component singular_value relative above_roundoff"),
-        "reconstruction_error": (errors, "scene group method r split relative_error gain"
-         " elements_sampled"),
-        "local_share": (times, "scene implementation vertices local_ms assembly_ms global_ms"
-         " local_share"),
-        "accuracy_cost": (costs, "scene method position_basis k r iterations"
-         " relative_error_within_horizon ms_per_frame pareto"),
-        "ladder": (ladder, "scene direction rung gain relative_error_within_horizon error_low"
-         " error_high gain_low gain_high"),
-        "repetitions": (repetitions, "scene group method r varied error_low error_median"
-         " error_high gain_low gain_median gain_high"),
-        "stability": (runs, "scene group method position_basis k r experiment outcome"
-         " blowup_frame h stiffness_ratio"),
-        "breakeven": (ratios, "scene group method factor vertices r ratio breakeven_r"),
-        "effects_cost": (effects, "scene effect role ms_per_frame share groups without_ms force"
-         " moved sensitivity_floor above_floor"),
-        "reduced_reruns": (reruns, "scene group method r position_basis max_extent blowup_frame"
-         " relative_error relative_error_within_horizon ms_per_frame k motion"),
-        "noise": (noise, "scene group noisy_axes method r rank relative_error"),
-        "alternatives": (others, "scene vertices stiffness motion method substeps"
-         " ms_per_frame"
-         " error_implicit error_continuous"),
-    }  # fmt: skip
-    for name, (rows, header) in made.items():
-        _write(results.table(name), header, rows)
-    _write_scaling(results, scenes)
-    for scene in FLAT:
-        if scene in scenes:
-            _write_noise_runs(results, scene)
-    for scene in scenes:
-        _write_sensitivity(results, scene)
-        _write_contributions(results, scene)
-
-
-def _write(path: str, columns: str, rows: list[tuple]) -> pd.DataFrame:
-    table = pd.DataFrame(rows, columns=columns.split())
-    write_table(table, path)
-    return table
+def _write_tables(results: Invented) -> None:
+    """The rows of the study's scenes and methods in the tables that figures read."""
+    others = {*load_methods(CONFIG / "methods.yaml")} - {*results.study.methods}
+    reads = [read for made in declarations().values() for read in made.reads.values()]
+    for name in {read.name for read in reads if isinstance(read, TableOf)}:
+        table = reference(name)
+        if "scene" in table and name != "requested_tolerances":
+            table = table[table.scene.isin(list(results.study.scenes))]
+        if "method" in table:
+            table = table[~table.method.isin(others)]
+        write_table(table, results.table(name))
 
 
 def _write_noise_runs(results, scene) -> None:
@@ -375,46 +224,26 @@ def _write_noise_runs(results, scene) -> None:
                 store.attrs["max_extent"] = 1.0
 
 
-def _write_contributions(results, scene) -> None:
-    """Gravity always pulls, the groups ever more; a kick acts once."""
-    names = [*results.study.scenes[scene].reduce, "gravity"]
+def _write_contributions(results, scene, effects) -> None:
+    """Forces of the effects of a scene; a start acts once."""
     rows = [
-        (scene, effect, "force", frame, 1.0 if effect == "gravity" else float(frame), None)
-        for effect in names
-        for frame in range(FRAMES)
+        (scene, row.effect, row.role, i, 1.0 + i, None)
+        for row in effects[effects.force.notna() & (effects.scene == scene)].itertuples()
+        for i in range(1 if row.role == "start" else FRAMES)
     ]
-    rows.append((scene, "kick", "start", 0, 5.0, 1.0))
-    _write(results.path(CONTRIBUTIONS, scene), "scene effect role frame force energy", rows)
+    names = "scene effect role frame force energy"
+    write_table(frame(names, *rows), results.path(CONTRIBUTIONS, scene))
 
 
 def _write_sensitivity(results, scene) -> None:
     """Floors of springs rise tenfold every other frame, others hardly."""
     rows = [
-        (scene, label, frame, 10.0 ** (-9 + (0.5 * frame if "spring" in scene else 0.05)))
+        (scene, label, i, 10.0 ** (-9 + (0.5 * i if "spring" in scene else 0.05)))
         for label in ("1e-10", "1e-08", "solver")
-        for frame in range(FRAMES)
+        for i in range(FRAMES)
     ]
-    _write(results.path(SENSITIVITY, scene), "scene perturbation frame relative_difference", rows)
-
-
-def _ratio(method, r):
-    """Ratio and break-even size: block-deim pays always, qdeim never, the others up to 20."""
-    if method == "block-deim":
-        return 0.01 * r, np.nan
-    return (0.2 * r, 6) if method == "qdeim" else (0.05 * r, 20)
-
-
-def _write_scaling(results, scenes) -> None:
-    header = "scene method vertices ms_per_iteration local_ms global_ms exponent"
-    rows = [
-        (scene, method, n, n * cost, 0.6 * n * cost, 0.4 * n * cost, exponent)
-        for scene in scenes
-        for n in (400, 1600, 10000)
-        for method, cost, exponent in (
-            ("fom", 1e-4, 1.0), ("block-deim", 5e-5, 1.0), ("ecsw", 1e-2 / n, 0.0)
-        )
-    ]  # fmt: skip
-    _write(results.table("scaling"), header, rows)
+    names = "scene perturbation frame relative_difference"
+    write_table(frame(names, *rows), results.path(SENSITIVITY, scene))
 
 
 @pytest.fixture(scope="session")

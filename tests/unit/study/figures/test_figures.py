@@ -17,6 +17,7 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from builders import frame
 from pdrom.core.errors import StorageError
 from pdrom.core.store import checksum_path, write_hdf5
 from pdrom.core.store.checksum import write_block
@@ -32,7 +33,7 @@ from study.figures.kit.declaration import declarations, write_figure
 from study.figures.runs import obstacles_of
 from study.pipeline.study import Study
 
-from .conftest import BLOWN_UP, BLOWUP_FRAME, FRAMES, ROOT, SCENES, mesh_of
+from .conftest import BLOWN_UP, BLOWUP_FRAME, FRAMES, ROOT, SCENES, mesh_of, reference
 
 PICTURES = ("snapshots_and_modes", "deim_iterations", "cloth_all_grid", "bending_runs",
             "spring_runs", "strain_runs", "bar_runs", "teaser")  # fmt: skip
@@ -148,8 +149,18 @@ def test_a_failed_run_is_marked_and_never_drawn_with_nan(study):
 
 def test_a_run_that_ended_early_lies_on_the_rim(study):
     """Error against gain: as high as the axis goes, and counted among the runs."""
-    scene, method, _ = BLOWN_UP
-    figure = study.draw("error_against_gain", scenes=(scene,), methods=(method,))
+    names = "scene group method r position_basis motion max_extent blowup_frame relative_error"
+    runs = [
+        ("spring_twist", "spring", method, r, "full", "train", 1.0, ended, error)
+        for method, ended, error in (("pod", None, 1e-3), ("deim-joint", 4, None))
+        for r in (8, 14)
+    ]
+    reruns = frame(names, *runs)
+    reruns["relative_error_within_horizon"] = reruns.relative_error
+    errors = reruns.assign(split="train", gain=3.0 * reruns.r, elements_sampled=reruns.r)
+    repeated = reference("repetitions")[:0]
+    tables = {"reruns": reruns, "errors": errors, "repetitions": repeated}
+    figure = study.draw("error_against_gain", tables, methods=("deim-joint",))
     left, right = figure.axes
     (dots,) = (
         line for line in left.lines if len(line.get_xdata()) > 0 and line.get_marker() == "D"
@@ -169,7 +180,16 @@ def test_a_failure_later_than_the_drawn_instant_is_no_failure(study):
 
 def test_starts_that_fail_are_counted_below_runs_on_bases_of_round_off(study):
     """Kinds of starts with equal counts share a row; sizes beyond the rank are left out."""
-    shown = texts(study.draw("bending_runs", scenes=("bend_fall",), methods=("deim-joint",)))
+    runs = [
+        ("bend_fall", "bending", axes, "deim-joint", r, 9, None if axes == "plane" else 1e-12)
+        for axes in ("all", "plane", "vertex")
+        for r in (6, 10)
+    ]
+    noise = frame("scene group noisy_axes method r rank relative_error", *runs)
+    figure = study.draw(
+        "bending_runs", {"noise": noise}, scenes=("bend_fall",), methods=("deim-joint",)
+    )
+    shown = texts(figure)
     assert sum("0 of 1 starts fail" in text for text in shown) == 1
     assert sum("1 of 1 starts fail" in text for text in shown) == 1
     labels = [" ".join(text.split()) for text in shown if "noise" in text]
@@ -271,18 +291,22 @@ def test_the_teaser_shows_a_sampled_subspace_as_far_as_it_ran(small_study, k, ra
 
 
 def test_singular_values_below_round_off_are_hollow(study):
-    figure = study.draw("singular_values", scenes=("bend_fall", "spring_twist"))
-    flat, spring = figure.axes
-    for ax, hollow in ((flat, 14), (spring, 4)):
+    scenes, table = ("bend_fall", "spring_stretch"), reference("singular_values")
+    figure = study.draw("singular_values", scenes=scenes)
+    for ax, scene in zip(figure.axes, scenes, strict=True):
+        hollow = (~table[table.scene == scene].above_roundoff).sum()
+        assert hollow > 0
         lines = [line for line in ax.lines if line.get_markerfacecolor() == "white"]
         assert sum(len(line.get_xdata()) for line in lines) == hollow
 
 
 def test_errors_above_the_axis_are_marked_on_its_rim(study):
-    figure = study.draw("reconstruction_error", scenes=("strain_twist",), methods=("deim",))
+    errors = [("strain_twist", "strain", "deim", r, "train", 1e5 / 10.0**r) for r in (1, 2, 4)]
+    table = frame("scene group method r split relative_error", *errors)
+    figure = study.draw("reconstruction_error", {"table": table}, scenes=("strain_twist",))
     (ax,) = figure.axes
     arrows = [line for line in ax.lines if line.get_marker() == 6]
-    assert [list(line.get_xdata()) for line in arrows] == [[1.0]]  # 1e5 / 10^r at r = 1
+    assert [list(line.get_xdata()) for line in arrows] == [[1.0]]
     assert max(line.get_ydata().max() for line in ax.lines) <= ax.get_ylim()[1]
 
 
@@ -314,13 +338,18 @@ def test_a_mesh_that_does_not_fit_is_refused(small_study):
 
 def test_points_with_another_reference_are_no_dots(study):
     """Errors against the converged run are one line; no dot or ring lies at their times."""
-    figure = study.draw("accuracy_cost", scenes=("strain_oop",))
+    names = "scene method position_basis iterations relative_error_within_horizon ms_per_frame"
+    points = [("full", 10, 0.0, 4.0), ("deim", 10, 0.5, 2.0)]
+    points += [("fom", k, 1.0 / k**2, 0.4 * k) for k in (2, 10, 40)]
+    points += [("fewer-iterations", k, 0.5 / k, 0.5 * k) for k in (2, 4)]
+    table = frame(names, *(("strain_oop", method, "full", *rest) for method, *rest in points))
+    figure = study.draw("accuracy_cost", {"table": table}, scenes=("strain_oop",))
     (ax,) = figure.axes
     lines = [line for line in ax.lines if line.get_linestyle() == "-."]
     assert [line.get_ydata()[0] for line in lines] == [0.01]  # fom, K = 10
     times = {float(x) for line in ax.lines if line.get_marker() == "o" for x in line.get_xdata()}
     assert 16.0 not in times  # fom, K = 40
-    (fewer,) = [line for line in ax.lines if line.get_marker() == "X"]
+    fewer, _ = [line for line in ax.lines if line.get_marker() == "X"]
     assert list(fewer.get_xdata()) == [1.0, 2.0]
 
 
@@ -340,18 +369,27 @@ def test_break_even_has_a_panel_per_group(study):
 
 def test_what_an_effect_moves_stands_beside_the_floor(study):
     """Below the floor the marker is open; a group that cannot be left out has none."""
-    figure = study.draw("effects_contribution", scenes=("strain_oop", "cloth_all"))
+    scenes, table = ("strain_oop", "cloth_all"), reference("effects_cost")
+    figure = study.draw("effects_contribution", scenes=scenes)
     *forces, moved = figure.axes
     assert [ax.get_title() for ax in forces] == ["cloth all", "strain oop"]
     assert [t.get_text() for t in moved.get_yticklabels()] == ["strain oop", "cloth all"]
     found = [(line.get_xdata()[0], line.get_markerfacecolor() == "white") for line in moved.lines]
-    of_strain = [(0.5, False), (1e-12, True)]
-    assert found == [*of_strain, (1e-9, True), (1e-9, True), *of_strain]
-    assert {bar.get_x() + bar.get_width() for bar in moved.patches} == {1e-6}
+    rows = pd.concat([table[table.scene == scene] for scene in scenes])
+    rows = rows[rows.moved.notna()]
+    below = ~rows.above_floor.astype(bool)
+    assert found == list(zip(rows.moved.clip(lower=1e-12), below, strict=True))
+    assert set(below) == {True, False}
+    ends = [bar.get_x() + bar.get_width() for bar in moved.patches]
+    assert ends == pytest.approx(list(dict.fromkeys(rows.sensitivity_floor)))
 
 
 def test_a_scene_without_effects_ends_at_the_tick(study):
-    figure = study.draw("effects_cost", scenes=("strain_oop", "cloth_all"))
+    shares = [(s, "gravity", 1.0, 1.0, None, None) for s in ("strain_oop", "cloth_all")]
+    left_out = [("gravity", 3, 3.5), ("a + b", 1, 2.0), ("nothing", 3, 4.0)]
+    shares += [("cloth_all", name, 4.0 - ms, None, groups, ms) for name, groups, ms in left_out]
+    table = frame("scene effect ms_per_frame share groups without_ms", *shares)
+    figure = study.draw("effects_cost", {"table": table}, scenes=("strain_oop", "cloth_all"))
     shares, without = figure.axes
     assert [t.get_text() for t in shares.get_yticklabels()] == ["strain oop", "cloth all"]
     assert [t.get_text() for t in without.get_yticklabels()] == [

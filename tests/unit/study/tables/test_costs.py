@@ -6,9 +6,11 @@ import pytest
 
 from pdrom.core.store import write_table
 from study.artifact.paths import File
+from study.experiments.kit.settings import Horizon
 from study.tables.effects_cost import effects_cost
 from study.tables.payoff import breakeven
 
+HORIZON = Horizon(perturbation=1e-10, threshold=1e-3)
 NOT_TIMED = pd.DataFrame(columns=["scene", "ms_per_frame"])  # table frame_times without rows
 
 
@@ -70,11 +72,11 @@ def test_effects_are_joined_in_one_time(tmp_path):
     write_table(pd.DataFrame([cost | {"scene": "b"}]), tmp_path / "b.csv")
     files = [File(str(tmp_path / f"{name}.csv"), {}) for name in "ab"]
     times = pd.DataFrame({"scene": ["b"], "ms_per_frame": [3.0]})
-    table = effects_cost(files, [], [], times, NO_RUNS, 1e-10, 1e-3)
+    table = effects_cost(files, [], [], times, NO_RUNS, HORIZON)
     assert table.scene.tolist() == ["a", "b"]
     # the one time of scene b; a was not timed in several processes
     assert table.ms_per_frame.tolist() == [1.0, 3.0]
-    assert effects_cost([], [], [], times, NO_RUNS, 1e-10, 1e-3).empty
+    assert effects_cost([], [], [], times, NO_RUNS, HORIZON).empty
 
 
 def test_contributions_are_judged_before_the_horizon_and_bring_their_times(tmp_path):
@@ -119,7 +121,7 @@ def test_contributions_are_judged_before_the_horizon_and_bring_their_times(tmp_p
     write_table(costs, tmp_path / "costs.csv")
     write_table(removed, tmp_path / "removed.csv")
     files = [[File(str(tmp_path / f"{n}.csv"), {})] for n in ("costs", "removed", "all")]
-    made = effects_cost(*files, NOT_TIMED, sensitivity, 1e-10, 1e-3)
+    made = effects_cost(*files, NOT_TIMED, sensitivity, HORIZON)
     assert made.effect.tolist() == [
         "bending", "global solve", "nothing", "bending + spring", "spring", "strain", "kick",
     ]  # fmt: skip

@@ -14,7 +14,7 @@ from pdrom.model.held_out import MOTIONS
 from pdrom.reduction.basis import Basis, save_basis
 from study.artifact import paths
 from study.artifact.paths import REQUESTED_TOLERANCES, File, Place
-from study.experiments.kit.settings import floor_of
+from study.experiments.kit.settings import Horizon, floor_of
 from study.experiments.requested_tolerances import COLUMNS
 from study.tables.accuracy_cost import accuracy_cost, pareto, reference_of, requested_tolerances
 from study.tables.effects_cost import local_share
@@ -153,8 +153,7 @@ class Files:
             timings=self.timings,
             frame_times=NOT_TIMED,
             sensitivity=self.sensitivity,
-            perturbation=1e-10,
-            threshold=1e-3,
+            horizon=Horizon(perturbation=1e-10, threshold=1e-3),
         )
 
     def trained(self) -> pd.DataFrame:

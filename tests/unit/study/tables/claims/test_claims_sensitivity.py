@@ -3,6 +3,7 @@
 import pandas as pd
 import pytest
 
+from machines.same_results import without_times
 from pdrom.core.yamlfile import validate
 from places import ROOT
 from study.tables import declared
@@ -97,7 +98,7 @@ def test_a_claim_without_data_has_no_variations():
 def test_a_clock_has_its_say_in_the_verdicts_that_it_decides(claim, timed):
     row = {"claim": claim, "part": "published", "varied": VARIED[0], "variation": "x 2"}
     one, other = (
-        claims_sensitivity.without_times(pd.DataFrame([row | {"verdict": v}]).reindex(
+        without_times(claims_sensitivity, pd.DataFrame([row | {"verdict": v}]).reindex(
             columns=claims_sensitivity.column_names), ROOT)
         for v in ("holds", "depends")
     )  # fmt: skip

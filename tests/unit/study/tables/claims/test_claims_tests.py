@@ -3,6 +3,7 @@
 import pandas as pd
 import pytest
 
+from machines.same_results import without_times
 from places import ROOT
 from study.tables import declared
 from study.tables.claims.claims import claims, claims_tests
@@ -55,7 +56,7 @@ def test_words_tell_the_tests_of_a_part_apart(outcomes):
 def test_a_clock_has_its_say_where_times_are_compared(claim, timed, outcomes):
     said = outcomes.query("claim == @claim").head(1)
     one, other = (
-        claims_tests.without_times(claims_tests.checked(said.assign(satisfied=n)), ROOT)
+        without_times(claims_tests, claims_tests.checked(said.assign(satisfied=n)), ROOT)
         for n in (1, 2)
     )
     assert one.equals(other) == timed

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from machines.same_results import without_times
 from pdrom.core.errors import StorageError
 from pdrom.core.store import read_table, write_table
 from places import ROOT
@@ -120,7 +121,7 @@ def test_a_faulty_declaration_is_refused(columns, reads, message):
 
 def test_only_times_may_differ(tmp_path):
     def seen(**changes):
-        return invented([ROW | changes]).pipe(invented.without_times, tmp_path)
+        return without_times(invented, invented([ROW | changes]), tmp_path)
 
     assert seen(seconds=9.0).equals(seen())
     assert seen(seconds=None).equals(seen())
