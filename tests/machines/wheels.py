@@ -12,7 +12,7 @@ import tempfile
 from itertools import product
 from pathlib import Path
 
-from study.pipeline.platforms import Machine
+from study.pipeline.platforms import obstacle
 
 ROOT = Path(__file__).resolve().parents[2]
 LOCKS = ("requirements.lock", "requirements-cluster.lock")
@@ -46,12 +46,12 @@ def main() -> None:
     wrong = 0
     with tempfile.TemporaryDirectory() as folder:
         for (platform, (system, processor, libc)), python in product(PLATFORMS.items(), PYTHONS):
-            obstacle = Machine(system, processor, python, libc).obstacle()
+            refusal = obstacle(system, processor, python, libc)
             found = [text for lock in LOCKS if (text := missing(platform, python, lock, folder))]
-            agree = bool(obstacle) == bool(found)
+            agree = bool(refusal) == bool(found)
             wrong += not agree
-            state = "refused" if obstacle else "supported"
-            what = "; ".join([*([obstacle] if obstacle else []), *found]) or "all wheels are there"
+            state = "refused" if refusal else "supported"
+            what = "; ".join([*([refusal] if refusal else []), *found]) or "all wheels are there"
             name = f"{platform}, Python {python[0]}.{python[1]}"
             sys.stdout.write(f"{'' if agree else 'DISAGREE '}{name}: {state}: {what}\n")
     sys.exit(1 if wrong else 0)

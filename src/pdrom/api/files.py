@@ -10,15 +10,9 @@ import numpy as np
 
 from pdrom.api.arguments import file_path, require
 from pdrom.api.records import AnyRun, FullRun, ReducedRun, RequestedRun, full_run
+from pdrom.core import store
 from pdrom.core.errors import ConfigurationError, PdromError, StorageError
 from pdrom.core.provenance import made_by
-from pdrom.core.store import (
-    open_hdf5,
-    require_finite,
-    require_own,
-    require_self_contained,
-    write_hdf5,
-)
 from pdrom.core.yamlfile import named, read_yaml, validate
 from pdrom.model.mesh.config import GivenMesh, MeshFile, given_mesh
 from pdrom.model.mesh.types import store_mesh, stored_mesh
@@ -98,14 +92,14 @@ def save(reduced: ReducedRun | RequestedRun, path: str | os.PathLike[str]) -> No
     """
     require((ReducedRun, RequestedRun), reduced, "reduced", source="pdrom.api.reduce makes one")
     path = file_path(path)
-    require_own(path)
+    store.require_own(path)
     if isinstance(reduced, RequestedRun):
         _save_requested(reduced, path)
         return
     config = reduced.full.scene.config.model_dump(mode="json")
     labels = {"group": reduced.group, "method": reduced.method, "r": reduced.r}
     outcome = reduced.outcome
-    with made_by("pdrom.api.save", {"scene": config, **labels}), write_hdf5(path) as file:
+    with made_by("pdrom.api.save", {"scene": config, **labels}), store.write_hdf5(path) as file:
         file.attrs.update(labels | {"gain": reduced.gain, "ms_per_frame": reduced.ms})
         file.attrs["blowup_frame"] = -1 if outcome.blowup_frame is None else outcome.blowup_frame
         store_mesh(reduced.full.scene.mesh, file.create_group("mesh"))
@@ -121,7 +115,7 @@ def save(reduced: ReducedRun | RequestedRun, path: str | os.PathLike[str]) -> No
 def _save_requested(run: RequestedRun, path: Path) -> None:
     config, done = run.scene.config.model_dump(mode="json"), run.outcome
     wish = {"quantity": run.request.quantity, "requested_error": run.request.error}
-    with made_by("pdrom.api.save", {"scene": config, **wish}), write_hdf5(path) as file:
+    with made_by("pdrom.api.save", {"scene": config, **wish}), store.write_hdf5(path) as file:
         file.attrs.update({**wish, "frames_met": done.frames, "limit": done.limit})
         file.attrs.update({"level": done.level, "failed": done.failed, "expected": done.expected})
         file.attrs.update({"reduced": done.reduced, "checks": done.checks, "full_ms": done.full_ms})
@@ -149,8 +143,8 @@ def load(path: str | os.PathLike[str], unchecked: bool = False) -> AnyRun:
     """
     path = file_path(path)
     try:
-        with open_hdf5(path, unchecked) as file:
-            require_self_contained(file, path)
+        with store.open_hdf5(path, unchecked) as file:
+            store.require_self_contained(file, path)
             found = _run(file, path)
         if found is not None:
             _require_sound(found)
@@ -197,7 +191,7 @@ def _require_sound(found: AnyRun) -> None:
     for name, (array, shape) in arrays.items():
         if array.shape != shape or array.dtype.kind != "f":
             raise ValueError(f"{name} of {array.dtype} {array.shape}, required: float {shape}")
-        require_finite(name, array, ValueError)
+        store.require_finite(name, array, ValueError)
 
 
 def _store(file: h5py.File, name: str, values: np.ndarray, unit: str) -> None:

@@ -10,14 +10,7 @@ from typing import overload
 
 import numpy as np
 
-from pdrom.api.arguments import (
-    file_path,
-    fitting_basis,
-    method_spec,
-    modes,
-    require,
-    require_positions,
-)
+from pdrom.api import arguments
 from pdrom.api.records import FullRun, ReducedRun, RequestedRun, full_run
 from pdrom.core.errors import ConfigurationError, SnapshotError
 from pdrom.core.provenance import made_by
@@ -32,9 +25,8 @@ from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.requested import run as requested
 from pdrom.reduction.requested.levels import OnFrame, silent
 from pdrom.reduction.rerun import compare
-from pdrom.reduction.sampling import Reduction
+from pdrom.reduction.sampling import Reduction, select
 from pdrom.reduction.sampling.local_step import ReducedLocalStep, replace_group
-from pdrom.reduction.sampling.select import select
 from pdrom.reduction.snapshots import row_masses, training_frames
 
 SNAPSHOTS = 100  # training snapshots of a group, at most, where the scene gives no number
@@ -67,9 +59,9 @@ def run(
     ConfigurationError, StorageError
         No scene; ``out`` cannot be written, which is found before anything runs.
     """
-    require(Scene, scene, "scene", source="build_scene and load_scene make one")
+    arguments.require(Scene, scene, "scene", source="build_scene and load_scene make one")
     if out is not None:
-        require_place(file_path(out))
+        require_place(arguments.file_path(out))
         require_own(out)
     count, plans = scene.config.frames, scene.config.reduce
     usual = min((count + 1) // 2, SNAPSHOTS)
@@ -106,9 +98,9 @@ def basis(full: FullRun, group: str, method: str | MethodSpec = "pod") -> Basis:
     ConfigurationError, SceneError, SnapshotError
         No run, no such method, no such group, or its snapshots are too few or not finite.
     """
-    require(FullRun, full, "full", source=FULL_RUN)
-    chosen = full.scene.group(require(str, group, "group", source=GROUP))
-    spec = method_spec(method)
+    arguments.require(FullRun, full, "full", source=FULL_RUN)
+    chosen = full.scene.group(arguments.require(str, group, "group", source=GROUP))
+    spec = arguments.method_spec(method)
     if group not in full.snapshots:
         raise SnapshotError(f"group '{group}': the run stored no snapshots of it")
     data, masses = full.snapshots[group], row_masses(chosen, full.scene.masses)
@@ -178,21 +170,21 @@ def reduce(
     RankError
         The snapshots have fewer than r modes above round-off.
     """
-    require(FullRun, full, "full", source=FULL_RUN)
+    arguments.require(FullRun, full, "full", source=FULL_RUN)
     if error is not None:
         if group is not None:
             raise ConfigurationError("error: of the whole scene, without a group")
         return _within(full, error, scene or full.scene, on_frame)
     if scene is not None:
         raise ConfigurationError("scene: only together with an error")
-    group = require(str, group, "group", source=GROUP)
-    scene, spec = full.scene, method_spec(method)
-    r, chosen = modes(r), scene.group(group)
-    require_positions(full)
+    group = arguments.require(str, group, "group", source=GROUP)
+    scene, spec = full.scene, arguments.method_spec(method)
+    r, chosen = arguments.modes(r), scene.group(group)
+    arguments.require_positions(full)
     if basis_of_group is None:
         made = basis(full, group, spec)
     else:
-        made = fitting_basis(basis_of_group, chosen, spec)
+        made = arguments.fitting_basis(basis_of_group, chosen, spec)
     reduction = Reduction(made, select(made, spec, r), spec, r=r)
     steps = replace_group(scene, group, ReducedLocalStep(chosen, reduction))
     loop = scene.stepper(scene.system, steps, track_objective=False)
@@ -212,7 +204,7 @@ def _within(full: FullRun, error: Wish, scene: Scene, on_frame: OnFrame) -> Requ
     The calibration has the material, the masses, the step and the frames of ``scene``.
     """
     request = requested.read_request(error)
-    require(Scene, scene, "scene", source="load_scene makes one")
+    arguments.require(Scene, scene, "scene", source="load_scene makes one")
     training = requested.transferred(full.scene, scene)
     started = perf_counter()
     calibration = requested.calibrate(training, requested.ToleranceSettings(), request, on_frame)

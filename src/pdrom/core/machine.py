@@ -6,21 +6,17 @@ import subprocess
 from importlib import import_module
 from pathlib import Path
 
-from pydantic import BaseModel, ConfigDict
 from threadpoolctl import threadpool_info
 
 from pdrom import __version__
 from pdrom.core.provenance import library_versions
+from pdrom.core.yamlfile import ConfigModel
 
 # what loads the linear algebra that the study uses: NumPy and SciPy bring a library each
 LINEAR_ALGEBRA = ("numpy.linalg", "scipy.linalg")
 
 
-class _Record(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class Kernels(_Record):
+class Kernels(ConfigModel):
     """A library of linear algebra, or of threads, as it is loaded.
 
     file : name of the shared library
@@ -36,7 +32,7 @@ class Kernels(_Record):
     threads: int
 
 
-class Units(_Record):
+class Units(ConfigModel):
     """Seconds of three loops that anyone can measure, see `study.experiments.machine`."""
 
     unit_scalar_s: float
@@ -49,7 +45,7 @@ class Units(_Record):
         return (self.unit_scalar_s * self.unit_vector_s * self.unit_memory_s) ** (1 / 3)
 
 
-class Machine(_Record):
+class Machine(ConfigModel):
     """The machine that timings and last digits belong to, and the code that ran on it.
 
     threads : the most that one of the libraries would use

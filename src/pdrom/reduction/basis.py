@@ -112,7 +112,7 @@ def compute_basis(
     _check(snapshots, row_mass, rows_per_element, spec)
     matrix = snapshots.reshape(len(snapshots), -1).T
     scale = np.ones(3 * len(row_mass))  # square root of the inner product's diagonal
-    if spec.weighting != "none":
+    if spec.weighting == "mass":
         scale = np.repeat(np.sqrt(row_mass), 3)
     mean, error, shown = np.zeros(len(matrix)), roundoff, matrix
     if spec.centring == "affine":
@@ -123,7 +123,10 @@ def compute_basis(
         mean = matrix[:, 0].copy()
     centred = (matrix - mean[:, None]) * scale[:, None]
     noise = error * float(scale.max())
-    active = _active_axes(shown, error)
+    # axes that hold more than round-off, of the data or relative to the largest axis
+    norms = np.array([np.linalg.norm(shown[axis::3]) for axis in range(3)])
+    least = max(error, max(shown.shape) * np.finfo(float).eps * norms.max())
+    active = tuple(bool(norm > least) for norm in norms)
     if spec.layout == "per-axis":
         modes, sigma, ranks = _per_axis(centred, noise)
         active = tuple(a and own > 0 for a, own in zip(active, ranks, strict=True))
@@ -131,23 +134,19 @@ def compute_basis(
     else:
         modes, sigma = pod(centred)
         rank = numerical_rank(sigma, centred.shape, noise)
-    if not any(active):
-        rank = 0
+    v = modes[:, : rank if any(active) else 0]
     if spec.centring == "mean-in-modes":
         # orthonormal axis by axis: no more modes than rows
-        rank = min(rank, len(row_mass))
-    v = modes[:, :rank]
-    if spec.centring == "mean-in-modes":
-        v = _mean_in_modes(v, centred, mean * scale, active, signs)
+        v = _mean_in_modes(v[:, : len(row_mass)], centred, mean * scale, active, signs)
         mean = np.zeros_like(mean)
     return Basis(
         V=np.ascontiguousarray(v / scale[:, None]),
         mean=mean,
         singular_values=sigma,
-        rank=rank,
+        rank=v.shape[1],
         roundoff=noise,
         rows_per_element=rows_per_element,
-        separate_axes=spec.layout == "per-axis" or spec.centring == "mean-in-modes",
+        separate_axes=spec.separate_axes,
         active_axes=active,
     )
 
@@ -202,13 +201,6 @@ def _mean_error(matrix: np.ndarray) -> float:
     snapshot makes no such error.
     """
     return 0.5 * np.finfo(float).eps * matrix.shape[1] * float(np.linalg.norm(matrix))
-
-
-def _active_axes(matrix: np.ndarray, roundoff: float) -> tuple[bool, ...]:
-    """Axes that hold more than round-off (of the data, or relative to the largest axis)."""
-    norms = np.array([np.linalg.norm(matrix[axis::3]) for axis in range(3)])
-    relative = max(matrix.shape) * np.finfo(float).eps * norms.max()
-    return tuple(bool(norm > max(roundoff, relative)) for norm in norms)
 
 
 def _per_axis(centred: np.ndarray, noise: float) -> tuple[np.ndarray, np.ndarray, list[int]]:

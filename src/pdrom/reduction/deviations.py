@@ -13,7 +13,7 @@ import numpy as np
 from pdrom.model.energy import STRIDE, EnergyScale
 from pdrom.model.metrics import shape_differences, trajectory_error
 from pdrom.model.scene import Scene
-from pdrom.reduction.rerun import Rerun, displacement_norms, extent_norm, step_norms
+from pdrom.reduction.rerun import Rerun, displacement_norms, step_norms
 
 # Frames that are compared at a time: the memory for it does not grow with the run.
 BLOCK = 32
@@ -68,9 +68,12 @@ class Yardstick:
 
     @property
     def units(self) -> dict[str, float]:
-        """Extent norm, m, and time step, s, which `errors_within` needs with the series."""
-        extent = extent_norm(self.reference, self.scene.mesh.extent)
-        return {"extent_norm": extent, "time_step": self.scene.config.time_step}
+        """Extent norm, m, and time step, s, which `errors_within` needs with the series.
+
+        The norm is that of a frame whose vertices are all off by the extent of the mesh.
+        """
+        norm = self.scene.mesh.extent * float(np.sqrt(self.reference.shape[1]))
+        return {"extent_norm": norm, "time_step": self.scene.config.time_step}
 
     def deviations(self, outcome: Rerun) -> dict[str, np.ndarray]:
         """Series of a run, its ``outcome``.
@@ -137,26 +140,21 @@ def errors_within(
         float(np.argmax(touched)) if np.any(touched) else np.inf
         for touched in (run["contact"][:end], reference["contact"][:end])
     )
+
+    def over_extent(difference: np.ndarray) -> float | None:
+        """Root mean square over the extent norm."""
+        return float(np.sqrt(np.mean(np.square(difference[:end] / extent_norm)))) if end else None
+
     found = (
         error_within(run["difference"], displacement, end),
-        rms_within(run["difference"], extent_norm, end),
-        rms_within(shape, extent_norm, end),
+        over_extent(run["difference"]),
+        over_extent(shape),
         error_within(shape, displacement, end),
         error_within(run["step_difference"], reference["step"], end),
         drift,
         None if first == wanted == np.inf else time_step * (first - wanted),
     )
     return dict(zip(ERRORS, found, strict=True))
-
-
-def rms_within(difference: np.ndarray, norm: float, end: int) -> float | None:
-    """Root mean square of ``difference`` (F',) m before frame ``end``, over ``norm`` m.
-
-    None as `error_within`.
-    """
-    if len(difference) < end or end == 0:
-        return None
-    return float(np.sqrt(np.mean(np.square(difference[:end] / norm))))
 
 
 def error_within(difference: np.ndarray, displacement: np.ndarray, end: int) -> float | None:

@@ -51,6 +51,11 @@ class BasisSpec(ConfigModel):
         """Name of the basis file."""
         return f"{self.weighting}-{self.centring}-{self.layout}"
 
+    @property
+    def separate_axes(self) -> bool:
+        """Whether the basis itself is orthonormal axis by axis, not as a whole."""
+        return self.layout == "per-axis" or self.centring == "mean-in-modes"
+
 
 class MethodSpec(BasisSpec):
     """A reduction of one group's projections.
@@ -136,11 +141,6 @@ class MethodSpec(BasisSpec):
         if self.coefficients is not None:
             return self.coefficients == "per-axis"
         return self.rows == "joint" or self.separate_axes
-
-    @property
-    def separate_axes(self) -> bool:
-        """Whether the basis itself is orthonormal axis by axis, not as a whole."""
-        return self.layout == "per-axis" or self.centring == "mean-in-modes"
 
 
 def load_methods(path: Path) -> dict[str, MethodSpec]:

@@ -87,11 +87,6 @@ def compare(run: BoundedRun, reference: np.ndarray) -> Rerun:
     )
 
 
-def extent_norm(reference: np.ndarray, extent: float) -> float:
-    """Norm, m, of a frame of ``reference`` (F + 1, N, 3) with each vertex off by ``extent`` m."""
-    return extent * float(np.sqrt(reference.shape[1]))
-
-
 def displacement_norms(reference: np.ndarray) -> np.ndarray:
     """|| Q_fom - rest ||_F of the frames of ``reference`` (F + 1, N, 3) but the first, (F,) m."""
     return np.linalg.norm((reference[1:] - reference[0]).reshape(len(reference) - 1, -1), axis=1)

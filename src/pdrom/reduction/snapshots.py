@@ -4,6 +4,7 @@ import os
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import sparse
 
 from pdrom.core.errors import SnapshotError
 from pdrom.core.store import open_hdf5, require_finite, write_hdf5
@@ -34,15 +35,17 @@ def row_masses(group: ConstraintGroup, masses: np.ndarray) -> np.ndarray:
     Every vertex hands its mass out in equal parts to the elements that touch it, so that the masses
     of the elements sum to those of the touched vertices; each row of an element carries it.
     """
-    touches = (group.S != 0).astype(np.float64)
-    rows = group.rows_per_element
-    element = touches[::rows]
-    for row in range(1, rows):
-        element = element + touches[row::rows]
-    element = (element != 0).astype(np.float64)
+    element = touched_vertices(group)
     valence = np.asarray(element.sum(axis=0)).ravel()
     share = np.divide(masses, valence, out=np.zeros_like(masses), where=valence > 0)
-    return np.repeat(element @ share, rows)
+    return np.repeat(element @ share, group.rows_per_element)
+
+
+def touched_vertices(group: ConstraintGroup) -> sparse.csr_array:
+    """Matrix (e, N): 1 where an element of ``group`` touches a vertex, else 0."""
+    rows = group.rows_per_element
+    touches = (group.S != 0).astype(np.float64)
+    return (sum(touches[row::rows] for row in range(rows)) != 0).astype(np.float64)
 
 
 @dataclass(frozen=True)

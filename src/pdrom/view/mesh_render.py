@@ -4,10 +4,9 @@ Faces are painted from far to near (painter's algorithm) and lit from both sides
 a sheet shows its folds whichever side it turns to the camera.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from pdrom.model.mesh.types import Mesh
 from pdrom.view.artists import Axes, PolyCollection
 from pdrom.view.camera import Camera, Window
 
@@ -18,17 +17,9 @@ SHARP = np.cos(np.radians(80.0))  # edges between faces that turn more are drawn
 LIGHTS = (((-0.35, 0.45, 0.82), 0.85), ((0.80, -0.10, 0.59), 0.30))
 BACK = 0.78  # how much of the colour the back of an open surface keeps
 FLOOR, FLOOR_LINE, SHADOW = "#F4F2EE", "#DEDAD2", "#D3CFC6"
-
+GHOST = "#4D4D4D"  # an outline to compare with
 
 Colour = str | tuple[float, float, float]
-
-
-@dataclass(frozen=True)
-class Surface:
-    """Triangles (T, 3); ``open`` surfaces are shaded smoothly and show a darker back."""
-
-    triangles: np.ndarray
-    open: bool = True
 
 
 def face_normals(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
@@ -73,17 +64,19 @@ def depth_order(points: np.ndarray, triangles: np.ndarray, camera: Camera) -> np
 def draw_surface(
     ax: Axes,
     points: np.ndarray,
-    surface: Surface,
+    mesh: Mesh,
     camera: Camera,
     colour: Colour | np.ndarray,
     wire: float = 0.14,
     contrast: float = 1.0,
 ) -> PolyCollection:
-    """Draw a shaded surface on ``ax``, as ``camera`` sees it.
+    """Draw the shaded surface of ``mesh`` on ``ax``, as ``camera`` sees it.
+
+    That of a volume is closed; an open one is shaded smoothly and shows a darker back.
 
     Parameters
     ----------
-    points : (N, 3) m, finite
+    points : (N, 3) m, finite, of the vertices
     colour : one colour, or one RGB row per face (T, 3)
     wire : opacity of the wireframe, 0 for none
     contrast : 1 for the full shading, less where colours carry numbers
@@ -91,12 +84,12 @@ def draw_surface(
     from matplotlib.collections import PolyCollection
     from matplotlib.colors import to_rgb
 
-    triangles = surface.triangles
+    triangles, is_open = mesh.triangles, len(mesh.tetrahedra) == 0
     raw = face_normals(points, triangles)
-    normals = smooth_normals(points, triangles) if surface.open else raw
+    normals = smooth_normals(points, triangles) if is_open else raw
     brightness = 1.0 - contrast * (1.0 - shade(normals, camera))
     base = colour if isinstance(colour, np.ndarray) else np.tile(to_rgb(colour), (len(raw), 1))
-    if surface.open and contrast == 1.0:
+    if is_open and contrast == 1.0:
         back = raw @ camera.basis[2] < 0.0
         base = np.where(back[:, None], BACK * base + (1.0 - BACK) * 0.55, base)
     faces = np.clip(base * brightness[:, None], 0.0, 1.0)
@@ -114,42 +107,37 @@ def draw_surface(
     return collection
 
 
-def draw_floor(
-    ax: Axes, points: np.ndarray, surface: Surface, camera: Camera, window: Window
-) -> bool:
-    """Draw the floor y = 0 under the mesh, with its shadow, where it is in view; whether it is.
+def draw_floor(ax: Axes, points: np.ndarray, mesh: Mesh, camera: Camera, window: Window) -> None:
+    """Draw the floor y = 0 under ``mesh``, with its shadow, where it is in view.
 
     Parameters
     ----------
     ax, camera, window : picture and its view
-    points, surface : (N, 3) m of the mesh, and its triangles
+    points : (N, 3) m of the vertices
     """
     from matplotlib.collections import PolyCollection
 
     margin = 0.25 * max(window.width, window.height)
     near = camera.project(points * [1.0, 0.0, 1.0])
     if camera.elevation < 3.0 or not window.contains(near).any():
-        return False
+        return
     low, high = points.min(axis=0) - margin, points.max(axis=0) + margin
-    corners = np.array(
-        [[x, 0.0, z] for x, z in ((low[0], low[2]), (high[0], low[2]), (high[0], high[2]))]
-        + [[low[0], 0.0, high[2]]]
-    )
+    (west, _, south), (east, _, north) = low, high
+    corners = np.array([[west, 0, south], [east, 0, south], [east, 0, north], [west, 0, north]])
     quad = PolyCollection(
         [camera.project(corners)], facecolors=FLOOR, edgecolors=FLOOR_LINE, linewidths=0.5
     )
     quad.set_zorder(0.1)
     ax.add_collection(quad)
     shadow = PolyCollection(
-        near[surface.triangles],
+        near[mesh.triangles],
         facecolors=SHADOW,
         edgecolors=SHADOW,
         linewidths=0.25,
-        rasterized=len(surface.triangles) > RASTER_ABOVE,
+        rasterized=len(mesh.triangles) > RASTER_ABOVE,
     )
     shadow.set_zorder(0.2)
     ax.add_collection(shadow)
-    return True
 
 
 def outline_edges(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
@@ -185,33 +173,29 @@ def _edges_between(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.nd
     return edges, owner[order[start]], owner[order[start + np.minimum(count - 1, 1)]]
 
 
-def draw_outline(
-    ax: Axes, points: np.ndarray, edges: np.ndarray, camera: Camera, colour: str = "#4D4D4D"
-) -> None:
+def draw_outline(ax: Axes, points: np.ndarray, edges: np.ndarray, camera: Camera) -> None:
     """Draw a thin outline on ``ax``, the ghost of a shape to compare with.
 
-    ``points`` (N, 3) m are joined by ``edges`` (n, 2), as ``camera`` sees them, in one ``colour``.
+    ``points`` (N, 3) m are joined by ``edges`` (n, 2), as ``camera`` sees them.
     """
     from matplotlib.collections import LineCollection
 
-    lines = LineCollection(camera.project(points)[edges], colors=colour, linewidths=0.6)
+    lines = LineCollection(camera.project(points)[edges], colors=GHOST, linewidths=0.6)
     lines.set_zorder(0.5)
     ax.add_collection(lines)
 
 
-def draw_lines(
-    ax: Axes, segments: np.ndarray, camera: Camera, colours: np.ndarray, width: float = 1.2
-) -> None:
+def draw_lines(ax: Axes, segments: np.ndarray, camera: Camera, colours: np.ndarray) -> None:
     """Draw coloured ``segments`` (n, 2, 3) m on ``ax`` from far to near, as ``camera`` sees them.
 
-    ``colours`` (n, 4) are theirs, RGBA, ``width`` is in points.
+    ``colours`` (n, 4) are theirs, RGBA.
     """
     from matplotlib.collections import LineCollection
 
     order = np.argsort(camera.depth(segments.mean(axis=1)), kind="stable")
     flat = camera.project(segments.reshape(-1, 3)).reshape(-1, 2, 2)
     lines = LineCollection(
-        flat[order], colors=colours[order], linewidths=width, capstyle="round",
+        flat[order], colors=colours[order], linewidths=1.2, capstyle="round",
         rasterized=len(segments) > RASTER_ABOVE,
     )  # fmt: skip
     lines.set_zorder(2.0)

@@ -90,24 +90,20 @@ def write_page(scenes: Sequence[ViewedScene], path: str | os.PathLike[str]) -> N
     StorageError
         The page would be larger than a browser opens with ease.
     """
-    text = page([pack_scene(scene) for scene in scenes])
+    parts = {
+        "STYLE": _read("viewer.css"),
+        "SCENES": safe_json([pack_scene(scene) for scene in scenes]),
+        "PACKED": _read("packed.js"),
+        "DRAWING": _read("drawing.js"),
+        "SCRIPT": _read("viewer.js"),
+    }
+    text = filled(_read("viewer.html"), parts)
     size = len(text.encode())
     if size > LARGEST:
         raise StorageError(
             f"{path}: {size / 1e6:.0f} MB, allowed are {LARGEST / 1e6:.0f}: choose fewer runs"
         )
     write_text(text, path, with_checksum=False)
-
-
-def page(packed: Sequence[dict]) -> str:
-    """The whole page of packed scenes."""
-    parts = {
-        "STYLE": _read("viewer.css"),
-        "SCRIPT": _read("viewer.js"),
-        "SCENES": safe_json(packed),
-    }
-    parts |= {"PACKED": _read("packed.js"), "DRAWING": _read("drawing.js")}
-    return filled(_read("viewer.html"), parts)
 
 
 def _read(name: str) -> str:

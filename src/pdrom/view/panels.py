@@ -9,20 +9,9 @@ from typing import Any
 import numpy as np
 
 from pdrom.model.mesh.types import Mesh
-from pdrom.view import style
+from pdrom.view import mesh_render, style
 from pdrom.view.artists import Axes, Figure
 from pdrom.view.camera import Camera, Window, bounds, window_of
-from pdrom.view.mesh_render import (
-    FLOOR,
-    Colour,
-    Surface,
-    draw_floor,
-    draw_outline,
-    draw_surface,
-    outline_edges,
-    set_window,
-    silhouette_edges,
-)
 from pdrom.view.read import RerunInfo, rerun_positions
 from pdrom.view.style import FAILED
 
@@ -45,7 +34,7 @@ class RunPanel:
     """
 
     title: str
-    colour: Colour | np.ndarray
+    colour: mesh_render.Colour | np.ndarray
     positions: np.ndarray | None
     failure: str | None = None
     remark: str | None = None
@@ -70,11 +59,6 @@ class RunPanel:
     def scale(self, window: Window) -> float:
         """Factor, at least 1, by which the run is drawn smaller than in ``window``."""
         return self.zoomed(window).width / window.width
-
-
-def mesh_surface(mesh: Mesh) -> Surface:
-    """Surface of a mesh; that of a volume is closed."""
-    return Surface(mesh.triangles, open=len(mesh.tetrahedra) == 0)
 
 
 def shared_window(
@@ -121,27 +105,24 @@ def draw_run(
         look = {"facecolor": "#FBEDEB", "edgecolor": "#EBB9B4", "hatch": "////", "linewidth": 0.0}
         _cover(ax, zorder=-5, **look)
     if panel.positions is None:
-        set_window(ax, window)
+        mesh_render.set_window(ax, window)
         note = panel.failure or panel.remark or ""
         centre_note(ax, note, FAILED if panel.failure else "#666666")
         return
     shown, zoom = panel.zoomed(window), panel.scale(window)
-    surface = mesh_surface(mesh)
     for body in panel.obstacles or ():
-        faces = Surface(body.triangles)
-        draw_surface(ax, body.points, faces, camera, FLOOR, wire=0.05).set_zorder(0.1)
+        look = {"colour": mesh_render.FLOOR, "wire": 0.05}
+        mesh_render.draw_surface(ax, body.points, body, camera, **look).set_zorder(0.1)
     if panel.obstacles is None and not panel.failure:
-        draw_floor(ax, panel.positions, surface, camera=camera, window=shown)
+        mesh_render.draw_floor(ax, panel.positions, mesh, camera, shown)
     if ghost is not None:
-        edges = outline_edges(mesh.points, mesh.triangles)
+        edges = mesh_render.outline_edges(mesh.points, mesh.triangles)
         if not len(edges):  # a round body has no edges of its own
-            edges = silhouette_edges(ghost, mesh.triangles, camera)
-        draw_outline(ax, ghost, edges, camera=camera)
+            edges = mesh_render.silhouette_edges(ghost, mesh.triangles, camera)
+        mesh_render.draw_outline(ax, ghost, edges, camera=camera)
     contrast = 0.5 if isinstance(panel.colour, np.ndarray) else 1.0
-    draw_surface(
-        ax, panel.positions, surface, camera=camera, colour=panel.colour, contrast=contrast
-    )
-    set_window(ax, shown)
+    mesh_render.draw_surface(ax, panel.positions, mesh, camera, panel.colour, contrast=contrast)
+    mesh_render.set_window(ax, shown)
     lines = [text for text in (panel.failure, panel.remark) if text]
     if zoom > SLACK:
         lines.append(f"scale 1 : {zoom:.{1 if zoom < 10.0 else 0}f}")

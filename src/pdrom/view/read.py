@@ -53,7 +53,6 @@ class RerunInfo:
     full: bool
     marked: bool
     blowup_frame: int
-    max_extent: float
     entries: int
 
     @property
@@ -83,7 +82,6 @@ def _info(label: str, group: h5py.Group) -> RerunInfo:
         full=bool(attrs.get("full", False)),
         marked=marked,
         blowup_frame=-1 if marked else int(attrs["blowup_frame"]),
-        max_extent=0.0 if marked else float(attrs["max_extent"]),
         entries=len(group["positions"]) if "positions" in group else 0,
     )
 

@@ -30,7 +30,7 @@ from study.article.tree import (
     words,
 )
 from study.article.verified import INDEX, write_verified
-from study.artifact.files import Files
+from study.artifact.artifact import Files
 from study.artifact.paths import ARTICLE, FIGURE_PICTURE, File, Place
 from study.artifact.reads import Every, ProjectFile, Setting, TableOf
 from study.figures.kit.declaration import declarations

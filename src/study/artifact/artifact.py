@@ -89,13 +89,7 @@ class Artifact:
         return {name: read.paths(sources, labels) for name, read in self.files.items()}
 
     def settings(self, sources: Sources, labels: Labels) -> dict[str, Any]:
-        """Typed settings from ``sources`` of a job with these ``labels``, by name.
-
-        Raises
-        ------
-        ConfigurationError
-            If a key does not exist.
-        """
+        """Typed settings of a job by name; ConfigurationError if a key does not exist."""
         found: dict[str, Any] = {}
         for name, read in self.reads.items():
             if isinstance(read, SettingRead):
@@ -126,6 +120,19 @@ class Artifact:
         return content | {k: t.validate_python(settings[k]) for k, t in self.types.items()}
 
 
+class Files(Artifact):
+    """An artifact whose function gets as ``outputs`` the paths that it writes, by name.
+
+    It looks after its own files: many of them, or in places that may vary.
+    """
+
+    def perform(
+        self, settings: Mapping[str, Any], inputs: Mapping[str, Any], outputs: Mapping[str, str]
+    ) -> None:
+        """Write all of them."""
+        self.function(**self.read(settings, inputs), outputs=outputs)
+
+
 def make(
     address: str,
     rule: str,
@@ -149,13 +156,7 @@ def make(
 
 
 def declare(made: A, *parameters: str) -> A:
-    """Return ``made``, whose function takes what it reads and ``parameters``.
-
-    Raises
-    ------
-    TypeError
-        If the function takes something else.
-    """
+    """Return ``made``; TypeError if its function does not take reads and ``parameters``."""
     try:
         inspect.signature(made.function).bind(**made.reads, **dict.fromkeys(parameters))
     except TypeError as error:

@@ -4,6 +4,7 @@ import errno
 import faulthandler
 import logging
 import sys
+import time
 import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -14,7 +15,7 @@ from threadpoolctl import threadpool_limits
 
 from pdrom.core.errors import INTERRUPTED, PdromError
 from pdrom.core.store.checksum import damaged_set_aside
-from study.artifact.usage import Meter
+from study.artifact.usage import usage_since
 
 PACKAGES = ("pdrom", "study")
 FORMAT = "%(asctime)s %(levelname)-7s %(name)s: %(message)s"
@@ -43,7 +44,7 @@ def job_log(path: str) -> Iterator[logging.Logger]:
 
     Damaged results that the job reads are set aside (`pdrom.core.store.checksum`).
     """
-    meter = Meter()
+    start = time.monotonic()
     loggers = [logging.getLogger(name) for name in PACKAGES]
     logger = loggers[0]
     try:
@@ -60,7 +61,7 @@ def job_log(path: str) -> Iterator[logging.Logger]:
     try:
         with threadpool_limits(limits=1), damaged_set_aside():
             yield logger
-        logger.info("%s", meter.read())
+        logger.info("%s", usage_since(start))
     except PdromError as error:
         logger.error("%s", error)
         sys.exit(f"pdrom: {error}")

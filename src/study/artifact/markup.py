@@ -5,9 +5,8 @@ in with a setting of the configuration (`filled`).
 """
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 
-from pdrom.core.errors import ConfigurationError, choices
 from pdrom.view.text import escape
 
 _Words = Callable[[str], str]
@@ -22,21 +21,9 @@ _RAISED = str.maketrans("0123456789−", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 _LOWERED = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 
 
-def keys(text: str) -> list[str]:
-    """Settings that a text names."""
-    return list(dict.fromkeys(_KEY.findall(text)))
-
-
-def filled(text: str, settings: Mapping[str, float]) -> str:
-    """``text`` with the settings that it names; ConfigurationError for one that is not there."""
-
-    def value(found: re.Match[str]) -> str:
-        key = found[1]
-        if key not in settings:
-            raise ConfigurationError(f"caption: no setting '{key}'{choices(key, settings)}")
-        return number(settings[key])
-
-    return _KEY.sub(value, text)
+def filled(text: str, value: Callable[[str], float]) -> str:
+    """``text`` with the settings that it names; ``value`` returns one by its key."""
+    return _KEY.sub(lambda found: number(value(found[1])), text)
 
 
 def number(value: float) -> str:

@@ -5,7 +5,8 @@ into labels. The results folder itself is chosen by the pipeline, one for each c
 """
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from string import Formatter
@@ -43,7 +44,10 @@ class Place:
 
     def where(self, **labels: str) -> "Place":
         """Fix some of the labels."""
-        return Place(self.pattern.format_map(_Fixed(labels)))
+        pattern = self.pattern
+        for label, value in labels.items():
+            pattern = pattern.replace(f"{{{label}}}", value)
+        return Place(pattern)
 
     @property
     def labels(self) -> list[str]:
@@ -69,13 +73,6 @@ class Place:
             if label is not None:
                 parts.append(f"(?P<{label}>{LABELS[label]})")
         return re.compile(rf"(?:^|/){''.join(parts)}$")
-
-
-class _Fixed(dict[str, str]):
-    """Mapping for `str.format_map` with some labels; the others stay in braces."""
-
-    def __missing__(self, label: str) -> str:
-        return f"{{{label}}}"
 
 
 @dataclass(frozen=True)
@@ -140,3 +137,12 @@ ARTICLE = Place("article/{name}")
 LIVE_PAGE = Place("article/live.html")
 
 PLACES = tuple(place for place in vars().copy().values() if isinstance(place, Place))
+
+
+def labels_in(path: str, results: str) -> Iterator[dict[str, str]]:
+    """Labels of a file below ``results``, for each kind of file that it can be."""
+    for place in PLACES:
+        with suppress(StorageError):
+            labels = place.file(path).labels
+            if place.at(results, **labels) == path:
+                yield labels

@@ -27,15 +27,6 @@ class Sources(Protocol):
         """Return every file of a kind (``place``) that agrees with the ``labels`` of a job."""
         ...
 
-    def first(self, place: Place, label: str, value: str) -> list[str]:
-        """Return a file of ``place`` for each set of other labels, see `Preferred`.
-
-        Parameters
-        ----------
-        label, value : the preferred value of a label
-        """
-        ...
-
     def table(self, name: str) -> str:
         """Return the file of the table ``name``."""
         ...
@@ -44,15 +35,9 @@ class Sources(Protocol):
         """Return the value of ``key`` in the configuration, or derived for a job's ``labels``."""
         ...
 
-    def per_scene(self, key: str) -> dict[str, Any]:
-        """Return the value of ``key`` in every scene's configuration, by the scene's name."""
-        ...
-
 
 class FileRead:
     """Something that is read from files."""
-
-    edited = False  # edited by people: a change of the content counts, not of the date
 
     def paths(self, sources: Sources, labels: Labels) -> Paths:
         """Return the path, or all paths, among ``sources`` for a job with these ``labels``."""
@@ -112,20 +97,6 @@ class EachOf(Every):
 
 
 @dataclass(frozen=True)
-class Preferred(Every):
-    """One file of a kind for each set of its other labels.
-
-    The one whose ``label`` has this ``value``, where the configuration holds it, else the first.
-    """
-
-    label: str
-    preferred: str
-
-    def paths(self, sources: Sources, labels: Labels) -> Paths:
-        return sources.first(self.place, self.label, self.preferred)
-
-
-@dataclass(frozen=True)
 class TableOf(FileRead):
     """A table of the study, by name."""
 
@@ -138,12 +109,18 @@ class TableOf(FileRead):
         return read_table(str(paths))
 
 
+class EditedFiles(FileRead):
+    """Files that people edit: a change of their content counts, not of their dates."""
+
+    def content(self, paths: Any) -> Any:
+        return [Path(path) for path in paths]
+
+
 @dataclass(frozen=True)
-class ProjectFile(FileRead):
+class ProjectFile(EditedFiles):
     """A file that people edit, by its path in the project."""
 
     path: str
-    edited = True
 
     def paths(self, sources: Sources, labels: Labels) -> Paths:
         return self.path
@@ -153,31 +130,23 @@ class ProjectFile(FileRead):
 
 
 @dataclass(frozen=True)
-class ProjectFiles(FileRead):
+class ProjectFiles(EditedFiles):
     """Files that people edit, by their paths in the project."""
 
     named: tuple[str, ...]
-    edited = True
 
     def paths(self, sources: Sources, labels: Labels) -> Paths:
         return list(self.named)
 
-    def content(self, paths: Any) -> Any:
-        return [Path(path) for path in paths]
-
 
 @dataclass(frozen=True)
-class SourcesOf(FileRead):
+class SourcesOf(EditedFiles):
     """Files that people edit and that a setting names by its property ``sources``."""
 
     key: str
-    edited = True
 
     def paths(self, sources: Sources, labels: Labels) -> Paths:
         return list(sources.value(self.key, labels).sources)
-
-    def content(self, paths: Any) -> Any:
-        return [Path(path) for path in paths]
 
 
 @dataclass(frozen=True)
@@ -188,16 +157,6 @@ class Setting(SettingRead):
 
     def value(self, sources: Sources, labels: Labels) -> Any:
         return sources.value(self.key, labels)
-
-
-@dataclass(frozen=True)
-class PerScene(SettingRead):
-    """A value of every scene's configuration, as a mapping from the scene's name."""
-
-    key: str
-
-    def value(self, sources: Sources, labels: Labels) -> Any:
-        return sources.per_scene(self.key)
 
 
 @dataclass(frozen=True)

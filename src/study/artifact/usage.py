@@ -39,23 +39,17 @@ class Usage:
         )
 
 
-class Meter:
-    """Measures from its creation on; processor time and memory are those of the whole process.
+def usage_since(start: float) -> Usage:
+    """Usage from the monotonic clock's ``start`` on; all but ``wall`` is of the whole process.
 
     A job that is a fork begins with no processor time of its own.
     """
-
-    def __init__(self) -> None:
-        self._start = time.monotonic()
-
-    def read(self) -> Usage:
-        """Usage until now."""
-        used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
-        return Usage(
-            wall=time.monotonic() - self._start,
-            processor=sum(one.ru_utime + one.ru_stime for one in used),
-            memory=max(one.ru_maxrss for one in used) * _PEAK / MB,
-        )
+    used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return Usage(
+        wall=time.monotonic() - start,
+        processor=sum(one.ru_utime + one.ru_stime for one in used),
+        memory=max(one.ru_maxrss for one in used) * _PEAK / MB,
+    )
 
 
 def usage_of(log: str | Path) -> Usage | None:

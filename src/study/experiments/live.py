@@ -17,7 +17,6 @@ from pdrom.reduction.basis import load_basis
 from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.rerun import mean_motion
 from pdrom.reduction.sampling import Reduction
-from pdrom.reduction.subspace.columns import Columns
 from pdrom.reduction.subspace.exported import (
     export_basis,
     export_model,
@@ -137,13 +136,21 @@ def live(
         size = min(settings.live.joint_rows, basis.rank)
         reduction = load_reduction(basis, sampling.path, case.method, size)
         chosen += list(_joint(scene, case.group, reduction, chosen))
+    used, triangles = np.unique(scene.mesh.triangles, return_inverse=True)
+    stride = max(1, ceil((len(reference) - 1) * len(used) / GHOST))
     content = {
         "format": FORMAT,
         "scene": settings.scene.name,
         "title": settings.title,
         **export_scene(scene),
         **_models(scene, chosen),
-        "shown": _shown(scene, reference),
+        # the surface, and every so many frames of the full-order run at its vertices
+        "shown": {
+            "vertices": pack_array(used, "u4"),
+            "triangles": pack_array(triangles.reshape(-1, 3), "u4"),
+            "stride": stride,
+            "full": pack_positions(reference[::stride, used]),
+        },
         "motion": mean_motion(reference),
     }
     text = f"pdromLive({json.dumps(content, separators=(',', ':'), allow_nan=False)});\n"
@@ -181,30 +188,17 @@ def _joint(
 
 def _models(scene: Scene, chosen: list[Labelled]) -> dict[str, Any]:
     """Bases and models; a model knows the place of its basis."""
-    columns: dict[int, Columns] = {id(model.columns): model.columns for _, model in chosen}
-    places = {key: place for place, key in enumerate(columns)}
-    needed = [
-        needed_vertices(scene, [m for _, m in chosen if id(m.columns) == key]) for key in columns
-    ]
+    by_basis: dict[int, list[SubspaceModel]] = {}
+    for _, model in chosen:
+        by_basis.setdefault(id(model.columns), []).append(model)
+    places = {key: place for place, key in enumerate(by_basis)}
     return {
         "bases": [
-            export_basis(scene, own, rows)
-            for own, rows in zip(columns.values(), needed, strict=True)
+            export_basis(scene, own[0].columns, needed_vertices(scene, own))
+            for own in by_basis.values()
         ],
         "models": [
             {**labels, "basis": places[id(model.columns)], **export_model(scene, model)}
             for labels, model in chosen
         ],
-    }
-
-
-def _shown(scene: Scene, reference: np.ndarray) -> dict[str, Any]:
-    """Surface, and every so many frames of the full-order run at its vertices."""
-    used, triangles = np.unique(scene.mesh.triangles, return_inverse=True)
-    stride = max(1, ceil((len(reference) - 1) * len(used) / GHOST))
-    return {
-        "vertices": pack_array(used, "u4"),
-        "triangles": pack_array(triangles.reshape(-1, 3), "u4"),
-        "stride": stride,
-        "full": pack_positions(reference[::stride, used]),
     }

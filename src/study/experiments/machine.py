@@ -22,7 +22,8 @@ from study.artifact.paths import MACHINE, File
 from study.experiments.kit.declaration import experiment
 
 AT_ONCE = 8  # independent vectors, enough to hide the latency of what is measured
-SCALAR_STEPS, VECTOR_TIMES, MEMORY_BYTES = 10**7, 10**6, 2**28
+SCALAR_STEPS, VECTOR_TIMES = 10**7, 10**6
+MEMORY_BYTES = 2**28  # read at a time, more than every cache holds
 REPEATS = 15
 
 
@@ -34,15 +35,9 @@ def machine(out: File) -> None:
     write_text(this.machine(units()).model_dump_json(indent=2) + "\n", out.path)
 
 
-def units(repeats: int = REPEATS, memory_bytes: int = MEMORY_BYTES) -> Units:
-    """Measure this machine.
-
-    Parameters
-    ----------
-    repeats : measurements, of which the fastest counts
-    memory_bytes : size of the array that is read, larger than every cache
-    """
-    numbers = np.ones(memory_bytes // 8)
+def units() -> Units:
+    """Measure this machine; of some repeats the fastest counts."""
+    numbers = np.ones(MEMORY_BYTES // 8)
     # amount of one call in units of 1e9, and the call
     trials: list[tuple[float, Callable[[int], object]]] = [
         (1e-9 * SCALAR_STEPS, lambda share: _chain(SCALAR_STEPS // share)),
@@ -54,7 +49,7 @@ def units(repeats: int = REPEATS, memory_bytes: int = MEMORY_BYTES) -> Units:
     ]
     for _, run in trials:
         run(1000)  # compiles
-    found = [[_seconds(run) / amount for amount, run in trials] for _ in range(repeats)]
+    found = [[_seconds(run) / amount for amount, run in trials] for _ in range(REPEATS)]
     scalar, vector, memory = np.min(found, axis=0).tolist()
     return Units(unit_scalar_s=scalar, unit_vector_s=vector, unit_memory_s=memory)
 

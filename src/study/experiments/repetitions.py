@@ -1,15 +1,17 @@
-"""Reduced runs repeated, and the ladder from the published choices to sound ones.
+"""Reduced runs repeated, the ladder from the published choices to sound ones, bases of round-off.
 
 A run is one draw of what nobody means to choose: which frames train, and the last digits of the
-start. Where an error of the run decides something, its repetitions say how much of it is that.
+start. Where an error of the run decides something, its repetitions say how much of it is that. A
+group whose projections are round-off is reduced on bases of that noise.
 """
 
 import logging
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Annotated, Any, Literal
 
+import h5py
 import numpy as np
 import pandas as pd
 from pydantic import Field
@@ -18,34 +20,44 @@ from pdrom.core.store import write_hdf5, write_table
 from pdrom.core.yamlfile import ConfigModel, SceneName
 from pdrom.model.metrics import relative_errors
 from pdrom.model.scene import Scene, SceneConfig
-from pdrom.reduction.basis import Basis, basis_of
+from pdrom.reduction.basis import Basis, basis_of, compute_basis
 from pdrom.reduction.deviations import error_within
 from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.rerun import Rerun, displacement_norms
 from pdrom.reduction.sampling import Reduction, reductions
 from pdrom.reduction.sampling.local_step import rerun_reduced
-from pdrom.reduction.snapshots import SPLITS, SnapshotSet, load_snapshots
+from pdrom.reduction.snapshots import (
+    SPLITS,
+    SnapshotSet,
+    load_snapshots,
+    row_masses,
+    training_frames,
+)
 from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Settings
 from study.experiments.kit.declaration import experiment
+from study.experiments.kit.reruns import store_end
 from study.experiments.kit.scenes import perturbation_field, positions_of, scene_of
 from study.experiments.kit.settings import BlowupExtent, Horizon, Modes, Tolerance
-from study.experiments.noise import COLUMNS as NOISE_COLUMNS
-from study.experiments.noise import NoiseRuns, noisy_runs
 
-Varied = Literal["start", "training", "both"]
+Varied = Literal["start", "training"]
 log = logging.getLogger(__name__)
 COLUMNS = [
     "scene", "group", "method", "r", "varied", "seed", "gain", "finite", "error",
 ]  # fmt: skip
-VARIED: tuple[Varied, ...] = ("start", "training")
 LADDER_COLUMNS = [
     "scene", "group", "direction", "rung", "rows_per_element", "entries", "r", "condition", "gain",
     "error_train", "error_test",
     "error_heldout", "finite", "blowup_frame", "relative_error_within_horizon", "repetitions",
     "error_median", "error_low", "error_high", "gain_low", "gain_high",
 ]  # fmt: skip
+NOISE_COLUMNS = [
+    "scene", "group", "noisy_axes", "seed", "method", "r", "rank", "gain", "frames", "finite",
+    "blowup_frame", "relative_error",
+]  # fmt: skip
+ALL, PLANE, VERTEX = "all", "plane", "vertex"
+Runs = list[tuple[dict[str, Any], Rerun | None]]  # rows of one start, and its runs
 Rungs = Annotated[tuple[MethodSpec, ...], Field(min_length=1)]
 
 
@@ -58,17 +70,6 @@ class Repetitions(ConfigModel):
 
     repetitions: Annotated[int, Field(ge=1, le=1000)] = 5
     perturbation: Tolerance = 1e-10
-
-
-@dataclass(frozen=True)
-class Repetition:
-    """One repeated run; ``error`` up to the horizon, inf for a run that ended earlier."""
-
-    r: int
-    seed: int
-    gain: float
-    error: float
-    finite: bool
 
 
 @dataclass(frozen=True)
@@ -123,25 +124,26 @@ class ReducedRuns:
 
     def repeat(
         self, method: MethodSpec, sizes: Sequence[int], varied: Varied, asked: Repetitions
-    ) -> Iterator[Repetition]:
-        """Every repetition of ``method`` at each of ``sizes`` that its basis has.
+    ) -> list[dict[str, Any]]:
+        """Every repetition of ``method`` at each of ``sizes`` that its basis has, by size.
 
-        ``varied`` says what the seed draws: the start, or the training snapshots.
+        ``varied`` says what the seed draws: the start, or the training snapshots. The error is that
+        before the end, inf for a run that ended earlier.
         """
-        own = reductions(self.basis(method), method, sizes) if varied == "start" else None
+        rows, made, offset = [], {}, None
+        if varied == "start":
+            made = reductions(self.basis(method), method, sizes)
         for seed in range(1, asked.repetitions + 1):
-            made = own
-            if made is None:
-                made = reductions(self.basis(method, frames=seed), method, sizes)
-            offset = None
-            if varied != "training":
+            if varied == "start":
                 offset = perturbation_field(self.scene, asked.perturbation, seed)
+            else:
+                made = reductions(self.basis(method, frames=seed), method, sizes)
             for r, reduction in made.items():
                 outcome = self.run(reduction, offset)
                 error = self.error(outcome)
-                yield Repetition(
-                    r, seed, reduction.gain, np.inf if error is None else error, outcome.finite
-                )
+                row = {"r": r, "seed": seed, "gain": reduction.gain, "finite": outcome.finite}
+                rows.append({**row, "error": np.inf if error is None else error})
+        return sorted(rows, key=lambda row: row["r"])
 
 
 def drawn(data: SnapshotSet, seed: int) -> np.ndarray:
@@ -159,7 +161,7 @@ class Cells(ConfigModel):
     scenes: Annotated[tuple[SceneName, ...], Field(min_length=1)]
     methods: Annotated[tuple[str, ...], Field(min_length=1)]
     sizes: Annotated[tuple[Modes, ...], Field(min_length=1)]
-    varied: tuple[Varied, ...] = VARIED
+    varied: tuple[Varied, ...] = ("start", "training")
 
 
 class RepetitionSection(Repetitions):
@@ -215,6 +217,26 @@ class LadderSection(Ladder):
     """Section ``ladder``: the rungs, and ``scenes`` whose reduced groups are run with them."""
 
     scenes: tuple[str, ...] = ()
+
+
+class NoiseRuns(ConfigModel):
+    """Runs on bases of round-off.
+
+    sizes : numbers of modes
+    repetitions : starts, each with another round-off
+    perturbation : length by which they move a vertex, over the extent: a few units of round-off
+    """
+
+    sizes: Annotated[tuple[Modes, ...], Field(min_length=1)] = (6, 10, 20)
+    repetitions: Annotated[int, Field(ge=1, le=1000)] = 20
+    perturbation: Annotated[float, Field(gt=0.0, le=1e-12)] = 1e-15
+
+
+class Noise(NoiseRuns):
+    """Section ``noise``: ``cases`` are scenes with a group each, as far as the study holds them."""
+
+    cases: dict[str, str] = Field(default_factory=dict)
+    methods: tuple[str, ...] = ("deim-joint", "published")
 
 
 class Options(ConfigModel):
@@ -276,7 +298,7 @@ def repetitions(
         for varied in own.varied:
             found = short.repeat(own.spec, own.sizes, varied, settings.repetitions)
             cell = {**labels, "method": own.method, "varied": varied}
-            rows += [cell | vars(run) for run in sorted(found, key=lambda run: run.r)]
+            rows += [cell | row for row in found]
         log.info("%s", own.method)
     write_table(pd.DataFrame(rows, columns=COLUMNS), out.path)
     climbed = [] if settings.own_ladder is None else _ladder(runs, short, settings.own_ladder)
@@ -296,7 +318,7 @@ def _ladder(runs: ReducedRuns, short: ReducedRuns, ladder: Ladder) -> Iterator[d
     data = runs.data
     for direction, method, seed, r in ladder.rungs(data.rows_per_element):
         rung = method.title if seed is None else f"signs {seed}"
-        row = {"direction": direction, "rung": rung, "r": r}
+        row: dict[str, Any] = {"direction": direction, "rung": rung, "r": r}
         row["rows_per_element"] = data.rows_per_element
         basis = runs.basis(method, signs=seed)
         if direction == "square" and r > basis.rank:
@@ -305,34 +327,139 @@ def _ladder(runs: ReducedRuns, short: ReducedRuns, ladder: Ladder) -> Iterator[d
         # a group that is round-off has no reduction
         for reduction in reductions(basis, method, [size] if size else []).values():
             outcome = runs.run(reduction)
-            row |= {**outcome.row(runs.displacement), "r": size, **_measures(reduction, data)}
+            row |= {**outcome.row(runs.displacement), "r": size}
             row["relative_error_within_horizon"] = runs.error(outcome)
+            row["entries"] = sum(len(block.entries) for block in reduction.blocks)
+            row |= {"condition": reduction.condition, "gain": reduction.gain}
+            for split in SPLITS:
+                p = getattr(data, split)
+                found = relative_errors(p, reduction.reconstruct(p), data.roundoff)
+                row[f"error_{split}"] = found[0]
             repeated = runs.scene.config.name in ladder.repeated
             if repeated and seed is None and direction != "square":
-                row |= _ranges(list(short.repeat(method, [size], "training", ladder)))
+                again = short.repeat(method, [size], "training", ladder)
+                errors, gains = ([own[name] for own in again] for name in ("error", "gain"))
+                if again:
+                    row |= {"repetitions": len(again), "error_median": float(np.median(errors))}
+                    row |= {"error_low": min(errors), "error_high": max(errors)}
+                    row |= {"gain_low": min(gains), "gain_high": max(gains)}
         yield row
         log.info("%s, %s", direction, rung)
 
 
-def _measures(reduction: Reduction, data: SnapshotSet) -> dict[str, Any]:
-    errors = {}
-    for split in SPLITS:
-        p = getattr(data, split)
-        errors[f"error_{split}"] = relative_errors(p, reduction.reconstruct(p), data.roundoff)[0]
-    entries = sum(len(block.entries) for block in reduction.blocks)
-    return {"entries": entries, "condition": reduction.condition, "gain": reduction.gain, **errors}
+def noisy_runs(
+    scene: Scene,
+    group: str,
+    asked: NoiseRuns,
+    methods: Mapping[str, MethodSpec],
+    blowup_extent: float,
+    file: h5py.File,
+) -> list[dict[str, Any]]:
+    """Perturb the start of ``scene``, run, make bases without a cutoff, rerun.
+
+    Returned are the rows of all runs with the ``group`` reduced by each of ``methods``. The runs of
+    one start of each kind go to ``file``, in the layout of `study.experiments.reruns`; marked where
+    r exceeds the rank.
+    """
+    rows = []
+    for axes in kinds(scene):
+        kept: Runs = []
+        for seed in range(1, asked.repetitions + 1):
+            start = roundoff_field(scene, axes, asked.perturbation, seed=seed)
+            found = list(_noisy(scene, group, start, asked.sizes, methods, blowup_extent))
+            rows += [{"noisy_axes": axes, "seed": seed, **row} for row, _ in found]
+            if not kept or (irregular(found) and not irregular(kept)):
+                kept = found
+        for row, outcome in kept:
+            store = file.create_group(f"{axes}/{row['method']}/r{row['r']:04d}")
+            store.attrs.update(r=row["r"], marked=outcome is None)
+            if outcome is not None:
+                store_end(store, outcome)
+        log.info("%s: %d starts", axes, asked.repetitions)
+    return rows
 
 
-def _ranges(runs: list[Repetition]) -> dict[str, Any]:
-    """Ranges over the repetitions; a run that ended before the horizon has an infinite error."""
-    if not runs:
-        return {}
-    errors, gains = [run.error for run in runs], [run.gain for run in runs]
-    return {
-        "repetitions": len(runs),
-        "error_median": float(np.median(errors)),
-        "error_low": min(errors),
-        "error_high": max(errors),
-        "gain_low": min(gains),
-        "gain_high": max(gains),
-    }
+def irregular(runs: Runs) -> bool:
+    """Whether a method runs at some sizes and blows up at others."""
+    ends: dict[str, set[bool]] = {}
+    for row, outcome in runs:
+        if outcome is not None:
+            ends.setdefault(row["method"], set()).add(outcome.finite)
+    return any(len(seen) > 1 for seen in ends.values())
+
+
+def kinds(scene: Scene) -> tuple[str, ...]:
+    """Names of the sets of coordinates of ``scene`` that a start perturbs.
+
+    Of a flat mesh, too, those of its plane alone, and these with the axis across it at a single
+    vertex.
+    """
+    return (ALL, PLANE, VERTEX) if np.ptp(scene.mesh.points, axis=0).min() == 0.0 else (ALL,)
+
+
+def roundoff_field(scene: Scene, axes: str, size: float, seed: int) -> np.ndarray:
+    """Displacement (N, 3) m of a start, zero where ``axes`` of `kinds` say.
+
+    ``scene``, ``size`` and ``seed`` as in `perturbation_field`; the seed draws the vertex, too.
+    """
+    field = perturbation_field(scene, size, seed)
+    if axes != ALL:
+        still = np.ones(len(field), dtype=bool)
+        if axes == VERTEX:
+            moved = np.flatnonzero(field.any(axis=1))
+            still[np.random.default_rng(seed).choice(moved)] = False
+        field[np.ix_(still, np.ptp(scene.mesh.points, axis=0) == 0.0)] = 0.0
+    return field
+
+
+def noise_basis(
+    projections: np.ndarray, row_mass: np.ndarray, rows_per_element: int, method: MethodSpec
+) -> Basis:
+    """Basis of all that is stored, be it round-off: no cutoff, and no axis is left out.
+
+    A method with separate systems then has one for an axis in which nothing moves, as its text
+    says; elsewhere in this study such an axis has none.
+
+    Parameters
+    ----------
+    projections : (n, e p, 3) snapshots
+    row_mass, rows_per_element : see `compute_basis`
+    """
+    basis = compute_basis(
+        projections, row_mass, 0.0, rows_per_element=rows_per_element, spec=method
+    )
+    return replace(basis, active_axes=(True, True, True))
+
+
+def _noisy(
+    scene: Scene,
+    name: str,
+    start: np.ndarray,
+    sizes: Sequence[int],
+    methods: Mapping[str, MethodSpec],
+    blowup_extent: float,
+) -> Iterator[tuple[dict[str, Any], Rerun | None]]:
+    """Rows and runs from one ``start`` (N, 3) m, which is added to the initial positions.
+
+    The reductions are trained on its full-order run.
+    """
+    group, plan, frames = scene.group(name), scene.config.reduce[name], scene.config.frames
+    loop, state = scene.stepper(), scene.initial_state(start)
+    positions, projections = [state.positions], []
+    for frame in range(frames):
+        state, _ = loop.step(state, frame, lambda y: projections.append(group.project(y)))
+        positions.append(state.positions)
+    reference = np.stack(positions)
+    even = training_frames(frames, min(plan.train, (frames + 1) // 2))
+    trained_on, masses = np.stack(projections)[even], row_masses(group, scene.masses)
+    displacement = displacement_norms(reference)
+    for method, spec in methods.items():
+        basis = noise_basis(trained_on, masses, group.rows_per_element, method=spec)
+        made = reductions(basis, spec, sizes)
+        for r in sizes:
+            row = {"method": method, "r": r, "rank": basis.rank, "frames": 0}
+            outcome = None
+            if r in made:
+                outcome = rerun_reduced(scene, name, made[r], reference, blowup_extent)
+                row |= {"gain": made[r].gain, **outcome.row(displacement)}
+            yield row, outcome

@@ -12,22 +12,8 @@ from pydantic import Field
 from pdrom.core.store import write_table
 from pdrom.model.held_out import MOTIONS, HeldOutMotion
 from pdrom.model.scene import Scene, SceneConfig
-from pdrom.reduction.requested.levels import (
-    Level,
-    Motion,
-    Quantity,
-    Trajectory,
-    last_within,
-    relative_errors,
-)
-from pdrom.reduction.requested.run import (
-    Calibration,
-    CheckedRun,
-    Request,
-    ToleranceSettings,
-    calibrate,
-    transferred,
-)
+from pdrom.reduction.requested import levels, run
+from pdrom.reduction.requested.levels import Level, Motion, Quantity, Trajectory
 from study.artifact.paths import REQUESTED_TOLERANCES, File
 from study.artifact.reads import Setting, SourcesOf
 from study.experiments.kit.declaration import experiment
@@ -43,7 +29,7 @@ COLUMNS = [
 REPEATS = 2  # runs of a request, for the time
 
 
-class RequestedRuns(ToleranceSettings):
+class RequestedRuns(run.ToleranceSettings):
     """Every tolerance of ``errors``, requested on each of ``motions``."""
 
     errors: Annotated[tuple[Tolerance, ...], Field(min_length=1)] = (0.1, 0.03, 0.01)
@@ -78,31 +64,31 @@ def requested_tolerances(
     out : table of the runs
     """
     training = Scene.build(config, config.mesh.build(Path()))
-    made: list[Calibration] = []
+    made: list[run.Calibration] = []
     rows: list[dict[str, Any]] = []
     for name in section.motions:
         variant = Scene.build(config.heldout_variant(name), training.mesh, masses=training.masses)
-        own = transferred(training, variant)
+        own = run.transferred(training, variant)
         if not made or made[-1].motions[0].scene.config.effects != own.config.effects:
-            made.append(calibrate(own, section, Request(error=min(section.errors))))
+            made.append(run.calibrate(own, section, run.Request(error=min(section.errors))))
         rows += ({"motion": name, **row} for row in _rows(variant, made[-1], section))
         log.info("%s: %s done", config.name, name)
     write_table(pd.DataFrame(rows, columns=COLUMNS), out.path)
 
 
-def _rows(scene: Scene, own: Calibration, section: RequestedRuns) -> Iterator[dict[str, Any]]:
+def _rows(scene: Scene, own: run.Calibration, section: RequestedRuns) -> Iterator[dict[str, Any]]:
     frames = scene.config.frames
     motion = Motion(scene, min(section.errors) / section.factor, "position")
     judged = motion.unconverged, motion.sensitivity
     own_run = Trajectory(Level(scene.config.iterations), scene).to(frames)
     known: dict[str, Trajectory] = {}
     for error in section.errors:
-        outcomes = [CheckedRun(own, scene, error).outcome() for _ in range(REPEATS)]
+        outcomes = [run.CheckedRun(own, scene, error).outcome() for _ in range(REPEATS)]
         done, full = outcomes[0], own.full_order(error).level
         if full.title not in known:
             known[full.title] = Trajectory(full, scene).to(frames)
         alone = known[full.title]
-        end = done.frames or min(last_within(errors, error) for errors in judged)
+        end = done.frames or min(levels.last_within(errors, error) for errors in judged)
         yield {
             "scene": scene.config.name,
             "tolerance": error,
@@ -124,7 +110,9 @@ def _rows(scene: Scene, own: Calibration, section: RequestedRuns) -> Iterator[di
         }
 
 
-def _error(motion: Motion, run: np.ndarray, end: int, quantity: Quantity) -> float | None:
-    """Error of ``run`` (F + 1, N, 3) over the first frames, up to ``end``; None without any."""
-    differences = run[1:] - motion.reference[1:]
-    return float(relative_errors(differences, motion.reference, quantity)[end - 1]) if end else None
+def _error(motion: Motion, reached: np.ndarray, end: int, quantity: Quantity) -> float | None:
+    """Error of ``reached`` (F + 1, N, 3) over the first frames, up to ``end``; None without any."""
+    if not end:
+        return None
+    differences = reached[1:] - motion.reference[1:]
+    return float(levels.relative_errors(differences, motion.reference, quantity)[end - 1])

@@ -10,11 +10,11 @@ from pydantic import Field, model_validator
 
 from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel
-from pdrom.model.energy import EnergyScale
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.basis import load_basis
+from pdrom.reduction.deviations import Yardstick
 from pdrom.reduction.method import MethodSpec
-from pdrom.reduction.rerun import Rerun, displacement_norms
+from pdrom.reduction.rerun import Rerun
 from pdrom.reduction.sampling import Reduction
 from pdrom.reduction.sampling.local_step import rerun, rerun_reduced
 from pdrom.reduction.subspace.model import SubspaceModel, load_models, rerun_model
@@ -111,47 +111,34 @@ def stability(
     Bases and samplings are those of the scene's own setting: how far do they carry?
     """
     scene = scene_of(config, mesh)
-    local = list(_reductions(methods, short.ranks, bases, samplings))
-    models = []
+    local: list[tuple[dict[str, Any], Reduction | None]] = []
+    for file in samplings:
+        spec = methods[file["method"]]
+        basis = load_basis(basis_of(file, spec, bases).path)
+        for r in resolve_ranks(short.ranks, basis.rank):
+            labels = {"group": file["group"], "method": file["method"], "r": r}
+            known = r <= basis.rank
+            reduction = load_reduction(basis, file.path, spec, r=r) if known else None
+            local.append((labels | {"position_basis": "full"}, reduction))
+    models: list[tuple[dict[str, Any], SubspaceModel]] = []
     for file in subspaces:
         found: list[tuple[dict[str, Any], SubspaceModel]] = load_models(file.path)
         largest = max(labels["k"] for labels, _ in found)
         models += [(labels, model) for labels, model in found if labels["k"] == largest]
+    # one of time step and stiffness at a time leaves the scene's own setting
+    h, limits = scene.config.time_step, (short.min_frames, short.max_frames)
+    ratios = sorted({1.0, *short.stiffness_ratios} - {1.0})
+    grid = [(step, 1.0) for step in sorted({h, *short.time_steps})] + [(h, own) for own in ratios]
     rows = []
-    for h, ratio in _grid(scene.config.time_step, short):
-        limits = (short.min_frames, short.max_frames)
-        other = varied(scene.config, h, ratio, duration=short.duration, frames=limits)
+    for step, ratio in grid:
+        other = varied(scene.config, step, ratio, duration=short.duration, frames=limits)
         case = Scene.build(other, scene.mesh)
-        own = {"scene": config.name, "h": h, "stiffness_ratio": ratio}
+        own = {"scene": config.name, "h": step, "stiffness_ratio": ratio}
         rows += [own | row for row in _rows(case, local, models, solver, blowup_extent)]
-        log.info("h = %g s, stiffness times %g: %d frames", h, ratio, other.frames)
+        log.info("h = %g s, stiffness times %g: %d frames", step, ratio, other.frames)
     table = pd.DataFrame(rows, columns=COLUMNS)
     whole = ["r", "blowup_frame", "k", "frames"]
     write_table(table.astype(dict.fromkeys(whole, "Int64")), out.path)
-
-
-def _grid(own: float, chosen: ShortRuns) -> list[tuple[float, float]]:
-    """(h, stiffness ratio) pairs: one of them at a time leaves the scene's own setting."""
-    steps = sorted({own, *chosen.time_steps})
-    ratios = sorted({1.0, *chosen.stiffness_ratios})
-    return [(h, 1.0) for h in steps] + [(own, ratio) for ratio in ratios if ratio != 1.0]
-
-
-def _reductions(
-    methods: dict[str, MethodSpec],
-    ranks: tuple[Rank, ...],
-    bases: list[File],
-    samplings: list[File],
-) -> Iterator[tuple[dict[str, Any], Reduction | None]]:
-    """Labels and reductions of single groups; None where the basis has fewer modes."""
-    for file in samplings:
-        spec = methods[file["method"]]
-        basis = load_basis(basis_of(file, spec, bases).path)
-        for r in resolve_ranks(ranks, basis.rank):
-            labels = {"group": file["group"], "method": file["method"], "r": r}
-            known = r <= basis.rank
-            reduction = load_reduction(basis, file.path, spec, r=r) if known else None
-            yield labels | {"position_basis": "full"}, reduction
 
 
 def _rows(
@@ -160,33 +147,33 @@ def _rows(
     models: list[tuple[dict[str, Any], SubspaceModel]],
     solver: str,
     limit: float,
-) -> list[dict[str, Any]]:
+) -> Iterator[dict[str, Any]]:
     """Rows of the full order of ``scene`` and, if that is finite, of everything else.
 
-    ``limit`` is the extent of a blow-up over that of the rest shape.
+    ``limit`` is the extent of a blow-up over that of the rest shape; a reduction is None where the
+    basis has fewer modes.
     """
     system = scene.system_with(solver)
     nothing = np.zeros((scene.config.frames + 1, *scene.mesh.points.shape))
     full = rerun(scene, system, scene.groups, reference=nothing, blowup_extent=limit)
-    reference, displacement = full.positions, displacement_norms(full.positions)
-    scale = EnergyScale.of(scene, reference)
+    own = Yardstick(scene, full.positions)
 
     def row(labels: dict[str, Any], outcome: Rerun) -> dict[str, Any]:
-        energy = {"energy_ratio": scale.ratio(outcome.positions)}
-        return {**labels, **outcome.row(displacement), **energy}
+        energy = {"energy_ratio": own.scale.ratio(outcome.positions)}
+        return {**labels, **outcome.row(own.displacement), **energy}
 
-    rows = [row({"method": "full", "position_basis": "full"}, full)]
+    whole = row({"method": "full", "position_basis": "full"}, full)
     if not full.finite:
         log.warning("the full-order run blew up: nothing to compare with")
-        return rows
-    rows[0]["relative_error"] = 0.0
+        yield whole
+        return
+    yield {**whole, "relative_error": 0.0}
     for labels, reduction in local:
         if reduction is None:
-            rows.append({**labels, "frames": 0})
+            yield {**labels, "frames": 0}
             continue
-        outcome = rerun_reduced(scene, labels["group"], reduction, reference, limit, system)
-        rows.append(row({**labels, "gain": reduction.gain}, outcome))
+        outcome = rerun_reduced(scene, labels["group"], reduction, own.reference, limit, system)
+        yield row({**labels, "gain": reduction.gain}, outcome)
     for labels, model in models:
-        outcome = rerun_model(scene, model, reference, blowup_extent=limit)
-        rows.append(row({"group": "all", **labels}, outcome))
-    return rows
+        outcome = rerun_model(scene, model, own.reference, blowup_extent=limit)
+        yield row({"group": "all", **labels}, outcome)

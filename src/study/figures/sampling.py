@@ -255,7 +255,7 @@ def _draw_hits(
         element, axis = int(entry) // per_element, "xyz"[int(entry) % 3]
         hit[element] = axis if hit.get(element, axis) == axis else SEVERAL
     points = elements.mesh.points
-    draw_surface(ax, points, elements.surface, camera=camera, colour=NEUTRAL, wire=0.18)
+    draw_surface(ax, points, elements.mesh, camera=camera, colour=NEUTRAL, wire=0.18)
     centres = camera.project(elements.centres(points))
     for axis, colour in AXES.items():
         where = centres[[e for e, a in hit.items() if a == axis]]

@@ -8,8 +8,7 @@ from pathlib import Path
 from pdrom.core.errors import StorageError
 from pdrom.core.store import read_text, write_text
 from pdrom.view.page import filled, safe_json
-from study.artifact.artifact import declare
-from study.artifact.files import Files
+from study.artifact.artifact import Files, declare
 from study.artifact.paths import LIVE_MODEL, LIVE_PAGE, File
 from study.artifact.reads import Every, ProjectFile
 

@@ -20,7 +20,7 @@ from pdrom.core.machine import Machine
 from pdrom.core.store import read_table, read_text, require_intact, write_text
 from pdrom.core.yamlfile import describe
 from pdrom.view.text import replaced
-from study.artifact.files import Files
+from study.artifact.artifact import Files
 from study.artifact.paths import FIGURE, MACHINE, PAPER_INPUT, TABLE, File
 from study.artifact.reads import Every, One, ProjectFile, Setting, SourcesOf
 from study.paper.macros import captions, decisions, keys_of, macros, number_of, provenance

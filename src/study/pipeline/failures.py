@@ -86,7 +86,8 @@ def cause(said: str, folder: Path) -> str:
     if found is None:
         return "it ended without a word"
     status = int(found["status"] or 0)
-    name = found["signal"] or (_signal(status - 128) if status > 128 else "")
+    signals = {number.value + 128: number.name for number in signal.Signals}
+    name = found["signal"] or signals.get(status, "")
     if name:
         return _CAUSES.get(name, f"crashed ({name})")
     return _STATUSES.get(status, f"exit status {status}, without a word")
@@ -103,25 +104,11 @@ def crash(written: str, log: str) -> str:
     return f" at {frame['file']}:{frame['line']} in {frame['function']} (log: {log})"
 
 
-def _signal(number: int) -> str:
-    try:
-        return signal.Signals(number).name
-    except ValueError:
-        return ""
-
-
-@dataclass(frozen=True)
-class Batch:
-    """Jobs that a cluster ran as one, which it ended: name, and log of the whole."""
-
-    name: str
-    log: str
-
-    def line(self) -> str:
-        """Name of the batch and the cause, on one line."""
-        found = _BY_SLURM.search(_content(self.log))
-        how = (found["why"] or found["status"]).lower() if found else "a job of it failed"
-        return f"pdrom: batch {self.name} failed: {how} (log: {self.log})"
+def batch(name: str, log: str) -> str:
+    """Line about jobs that a cluster ran as one and ended: the cause, from the log of the whole."""
+    found = _BY_SLURM.search(_content(log))
+    how = (found["why"] or found["status"]).lower() if found else "a job of it failed"
+    return f"pdrom: batch {name} failed: {how} (log: {log})"
 
 
 class Failures(logging.Handler):
@@ -131,7 +118,7 @@ class Failures(logging.Handler):
         super().__init__(logging.INFO)
         self._begun = time.time()
         self.jobs: list[Failure] = []
-        self.batches: list[Batch] = []
+        self.batches: list[tuple[str, str]] = []
         self.other: list[str] = []
         self.stopped: str | None = None
         # last message of each thread: why a job failed is said before which job it was
@@ -142,7 +129,7 @@ class Failures(logging.Handler):
         event = getattr(record, "event", None)
         text = record.getMessage()
         if event == LogEvent.GROUP_ERROR:
-            self.batches.append(Batch(record.groupid, _first(record.aux_logs)))
+            self.batches.append((record.groupid, _first(record.aux_logs)))
         elif event == LogEvent.JOB_ERROR:
             said = self._said.pop(record.thread, "") or getattr(record, "rule_msg", None) or ""
             log, output = (_first(getattr(record, name, ())) for name in ("log", "output"))
@@ -169,7 +156,7 @@ class Failures(logging.Handler):
         Snakemake prints its own account after a job's message, so every failed job is named once
         more with the error in its log.
         """
-        lines = [batch.line() for batch in self.batches]
+        lines = [batch(name, log) for name, log in self.batches]
         lines += [job.line(self._begun) for job in self.jobs]
         if self.stopped:
             # jobs that were ended together with the run did not fail themselves
@@ -177,13 +164,6 @@ class Failures(logging.Handler):
             lines.append(f"pdrom: {self.stopped}")
         text = "\n".join([*dict.fromkeys([*lines, *self.other]), ADVICE]) + "\n"
         return text, INTERRUPTED if self.stopped else 1
-
-
-def listen() -> Failures:
-    """Failures of this process's run, from now on."""
-    failures = Failures()
-    logging.getLogger("snakemake.logging").addHandler(failures)
-    return failures
 
 
 def _first(names: Iterable[str]) -> str:

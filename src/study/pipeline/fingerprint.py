@@ -10,12 +10,11 @@ import ast
 import dis
 import hashlib
 import re
-from dataclasses import dataclass
 from functools import cache
 from opcode import opmap
 from pathlib import Path
 from types import CodeType
-from typing import Any, cast
+from typing import Any
 
 import pdrom
 import study
@@ -29,7 +28,6 @@ PACKAGES = {
 # compares the paths of a job's files itself. So adding a kind of file makes no job run again.
 LAYOUT = {"study.artifact.paths", "study.artifact.reads"}
 SCRIPTS = Path("workflow/scripts")
-_REGISTRY = Registry.__name__
 _LINE = "__firstlineno__"
 _MODULE = rf"(?:{'|'.join(PACKAGES)})\b[\w.]*"
 # ``from NAME import (NAMES)``, ``from NAME import NAMES`` or ``import NAME``, inside functions too;
@@ -39,6 +37,7 @@ _IMPORT = re.compile(
 )
 
 
+@cache
 def fingerprint(*places: str) -> str:
     """SHA-256 over the named modules and everything of the package that they import.
 
@@ -59,34 +58,20 @@ def fingerprint(*places: str) -> str:
     for place in sorted({place for place in places if ":" in place}):
         digest.update(f"{place}\n".encode())
     for name in closure(*places):
-        digest.update(f"{name} {_read(name).digest}\n".encode())
+        digest.update(f"{name} {_read(name)[1]}\n".encode())
     return digest.hexdigest()
 
 
 def closure(*places: str) -> list[str]:
     """Names of the modules that `fingerprint` of ``places`` covers, sorted."""
-    return sorted(_closure(tuple(place.partition(":")[0] for place in places)))
-
-
-def _closure(modules: tuple[str, ...]) -> set[str]:
     reached: set[str] = set()
-    waiting = list(modules)
+    waiting = [place.partition(":")[0] for place in places]
     while waiting:
         name = waiting.pop()
-        if name in reached:
-            continue
-        reached.add(name)
-        waiting += _read(name).imports
-    return reached
-
-
-@cache
-def _source(module: str) -> Path:
-    """File of a module of the package."""
-    path = _locate(module)
-    if path is None:
-        raise ConfigurationError(f"fingerprint: no module '{module}' in the packages")
-    return path
+        if name not in reached:
+            reached.add(name)
+            waiting += _read(name)[0]
+    return sorted(reached)
 
 
 @cache
@@ -101,18 +86,14 @@ def _locate(module: str) -> Path | None:
     return None
 
 
-@dataclass(frozen=True)
-class _Module:
-    """Content of a file: modules of the package that it imports, and the hash of its code."""
-
-    imports: tuple[str, ...]
-    digest: str
-
-
 @cache
-def _read(module: str) -> _Module:
-    source = _source(module).read_text(encoding="utf-8")
-    return _Module(_imports(source, module), digest_of_source(source, module))
+def _read(module: str) -> tuple[tuple[str, ...], str]:
+    """Modules of the package that a module imports, and the hash of its code."""
+    path = _locate(module)
+    if path is None:
+        raise ConfigurationError(f"fingerprint: no module '{module}' in the packages")
+    source = path.read_text(encoding="utf-8")
+    return _imports(source, module), digest_of_source(source, module)
 
 
 def _imports(source: str, module: str) -> tuple[str, ...]:
@@ -124,15 +105,11 @@ def _imports(source: str, module: str) -> tuple[str, ...]:
         else:
             listed = re.sub("#.*", "", enclosed or names).split(",")
             found |= {name, *(f"{name}.{entry.split()[0]}" for entry in listed if entry.strip())}
-    parents = {parent for name in found for parent in _packages_above(name)}
-    known = {name for name in found | parents if _locate(name) is not None}
+    for parts in [name.split(".") for name in found]:
+        found |= {".".join(parts[:i]) for i in range(1, len(parts))}
+    known = {name for name in found if _locate(name) is not None}
     # the packages' own __init__ hold the version only
     return tuple(sorted(known - {*PACKAGES, module} - LAYOUT))
-
-
-def _packages_above(name: str) -> list[str]:
-    parts = name.split(".")
-    return [".".join(parts[:i]) for i in range(1, len(parts))]
 
 
 def digest_of_source(source: str, module: str = "") -> str:
@@ -141,7 +118,7 @@ def digest_of_source(source: str, module: str = "") -> str:
     The latter are the entries of a registry that lie outside of ``module``. The compiler leaves out
     what does not count (assertions, too), far faster than a walk over the syntax tree.
     """
-    program = _without_others(ast.parse(source), module) if _REGISTRY in source else source
+    program = _without_others(ast.parse(source), module) if Registry.__name__ in source else source
     code = compile(program, "", "exec", dont_inherit=True, optimize=2)
     return hashlib.sha256(_text(code).encode()).hexdigest()
 
@@ -193,26 +170,17 @@ def _constant(value: object) -> object:
 def _without_others(tree: ast.Module, module: str) -> ast.Module:
     """The tree without entries of registries that are code of other modules."""
     for node in ast.walk(tree):
-        if isinstance(node, ast.Call) and _is_registry(node):
-            _drop_others(cast(ast.Dict, node.args[1]), module)
+        match node:
+            case ast.Call(ast.Name(Registry.__name__), [_, ast.Dict(keys, values) as entries]):
+                kept = [
+                    (key, value)
+                    for key, value in zip(keys, values, strict=True)
+                    if not (isinstance(value, ast.Constant) and isinstance(value.value, str))
+                    or value.value.partition(":")[0] == module
+                ]
+                entries.keys = [key for key, _ in kept]
+                entries.values = [value for _, value in kept]
     return tree
-
-
-def _is_registry(call: ast.Call) -> bool:
-    """``Registry(kind, {name: place, ...})``."""
-    named = isinstance(call.func, ast.Name) and call.func.id == _REGISTRY
-    return named and len(call.args) == 2 and isinstance(call.args[1], ast.Dict)
-
-
-def _drop_others(entries: ast.Dict, module: str) -> None:
-    """Keep the entries that name code of ``module`` or are no plain text."""
-    kept = [
-        (key, value)
-        for key, value in zip(entries.keys, entries.values, strict=True)
-        if not (isinstance(value, ast.Constant) and isinstance(value.value, str))
-        or value.value.partition(":")[0] == module
-    ]
-    entries.keys, entries.values = [key for key, _ in kept], [value for _, value in kept]
 
 
 def digest(root: Path, *names: str) -> str:

@@ -48,7 +48,8 @@ def folders(configfiles: Iterable[str | Path], settings: Iterable[str]) -> Folde
     ConfigurationError
         If the name is no plain word.
     """
-    files, pairs = [str(f) for f in configfiles if not _is_default(f)], list(settings)
+    default, pairs = Path(DEFAULT).resolve(), list(settings)
+    files = [str(file) for file in configfiles if Path(file).resolve() != default]
     if not files and not pairs:
         return Folders()
     name = _name(files, pairs)
@@ -77,7 +78,3 @@ def _name(files: list[str], settings: list[str]) -> str:
         if isinstance(content, dict) and content.get(KEY) is not None:
             return str(content[KEY])
     return Path(files[-1]).stem if files else OWN
-
-
-def _is_default(file: str | Path) -> bool:
-    return Path(file).resolve() == Path(DEFAULT).resolve()

@@ -61,16 +61,12 @@ def _made(command: CommandLine) -> dict[str, list[str]]:
     own = folders(command.configfiles, command.settings)
     if not command.targets:
         return {}
-    # late, as above
-    from study.figures.kit.declaration import declarations
-    from study.pipeline.targets import Names, described
-    from study.tables import declared
+    from study.pipeline.targets import described, files  # late, as above
 
-    names = Names(list(declarations()), declared())
-    made = {target: names.files(target, own) for target in command.targets}
-    for target, files in made.items():
-        if files != [target]:
-            _say(f"{described(target)}: {', '.join(files)}")
+    made = {target: files(target, own) for target in command.targets}
+    for target, found in made.items():
+        if found != [target]:
+            _say(f"{described(target)}: {', '.join(found)}")
     return made
 
 

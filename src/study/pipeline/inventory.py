@@ -9,18 +9,17 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from pdrom.core.store import Condition, check_file, read_table, write_text
 from study.artifact.paths import FIGURE, RESULTS, TABLE, Place
-from study.artifact.reads import Every, PerScene, Preferred, ProjectFile, Read, Setting, TableOf
+from study.artifact.reads import Every, ProjectFile, Read, Setting, TableOf
 from study.artifact.usage import usage_of
 from study.figures.kit.declaration import declarations
 from study.paper.figure_numbers import figures_page
 from study.paper.macros import keys_of
 from study.paper.source import source_files
-from study.pipeline.commandline import recall
+from study.pipeline.commandline import CommandLine
 from study.pipeline.folders import Folders
-from study.pipeline.plan import Plan
-from study.pipeline.targets import PREPRINT
+from study.pipeline.summary import configuration, verdicts_in
+from study.pipeline.targets import PREPRINT, own_file
 from study.tables import declared
 from study.tables.claims.rules import load_claims
 from study.tables.kit.declaration import Column, Table
@@ -80,14 +79,12 @@ def _row(column: Column) -> str:
 
 def _source(read: Read) -> str:
     match read:
-        case Every(place) | Preferred(place):
+        case Every(place):
             return f"`{place.pattern}`"
         case TableOf(name):
             return f"table [{name}](#{name})"
         case Setting(key):
             return f"setting `{key}`"
-        case PerScene(key):
-            return f"`{key}` of every scene"
         case ProjectFile(path):
             return f"`{path}`"
     raise TypeError(f"{read} has no words")
@@ -107,16 +104,9 @@ class Entry(NamedTuple):
     words: tuple[str, ...]
 
 
-class Cost(NamedTuple):
-    """Jobs that an entry needs from nothing, and their processor time; None if not measured."""
-
-    jobs: int
-    minutes: float | None
-
-
-def entries(root: Path = Path()) -> Iterator[Entry]:
-    """Claims, figures (the preprint's first), tables, sections, manuscript; read from ``root``."""
-    for name in load_claims(root / "config" / "claims.yaml"):
+def entries() -> Iterator[Entry]:
+    """Claims, figures (the preprint's first), tables, sections, manuscript."""
+    for name in load_claims(Path("config/claims.yaml")):
         yield Entry("claim", name, (TABLE.at(RESULTS, name=CLAIMS),), (CLAIMS,))
     for name, figure in declarations().items():
         number = f"{PREPRINT}{figure.number}" if figure.number else name
@@ -126,8 +116,8 @@ def entries(root: Path = Path()) -> Iterator[Entry]:
     words = {name: path if name in declarations() else name for name, path in tables.items()}
     for name, path in tables.items():
         yield Entry("table", name, (path,), (words[name],))
-    for source in source_files(root):
-        keys = keys_of((root / source).read_text(encoding="utf-8"))
+    for source in source_files(Path()):
+        keys = keys_of(Path(source).read_text(encoding="utf-8"))
         if held := sorted({key.partition("|")[0] for key in keys} & tables.keys()):
             files, targets = (tuple(names[name] for name in held) for names in (tables, words))
             yield Entry("section", Path(source).stem, files, targets)
@@ -135,62 +125,39 @@ def entries(root: Path = Path()) -> Iterator[Entry]:
     yield Entry("manuscript", documents[0], documents, ())
 
 
-def write_contents(configuration: str, dag: Any, plan: Plan, folders: Folders) -> None:
-    """Write the page of a run of a ``configuration`` that has made everything.
+def contents(command: CommandLine, dag: Any, folders: Folders) -> str:
+    """Text of the page of a run that has made everything.
 
     Parameters
     ----------
+    command : line that started the run
     dag : Snakemake's graph of all jobs of the study
-    plan, folders : of the study
+    folders : of the study
     """
-    text = contents(configuration, dag, folders, recall(), plan.root)
-    write_text(text, CONTENTS.at(folders.results))
-
-
-def contents(
-    configuration: str, dag: Any, folders: Folders, options: Sequence[str], root: Path = Path()
-) -> str:
-    """Text of the page, see `write_contents`.
-
-    Parameters
-    ----------
-    options : those of the command line that name the configuration
-    root : folder that has the manuscript's source
-    """
-    listed, verdicts = list(entries(root)), _verdicts(folders.results)
+    listed, verdicts = list(entries()), verdicts_in(folders.results)
     lines = []
-    for entry, cost in zip(listed, costs(listed, dag, folders), strict=True):
-        command = shlex.join(["./reproduce", *entry.words, *options])
-        minutes = "" if cost.minutes is None else f"{cost.minutes:.1f}"
+    for entry, (jobs, minutes) in zip(listed, costs(listed, dag, folders), strict=True):
+        words = shlex.join(["./reproduce", *entry.words, *command.configuration])
+        measured = "" if minutes is None else f"{minutes:.1f}"
         judged = verdicts.get(entry.name, ("", "")) if entry.kind == "claim" else ("", "")
-        cells = (entry.kind, entry.name, f"`{command}`", f"{cost.jobs}", minutes, *judged)
+        cells = (entry.kind, entry.name, f"`{words}`", f"{jobs}", measured, *judged)
         lines.append(f"| {' | '.join(cells)} |\n")
-    head = HEAD.format(configuration=configuration) + "".join(lines)
-    return "\n".join([head, figures_page(root), document(declared().values())])
+    head = HEAD.format(configuration=configuration(command)) + "".join(lines)
+    return "\n".join([head, figures_page(Path()), document(declared().values())])
 
 
-def costs(listed: Sequence[Entry], dag: Any, folders: Folders) -> Iterator[Cost]:
-    """Cost of each entry, by the logs of the jobs that it needs in Snakemake's graph ``dag``."""
+def costs(
+    listed: Sequence[Entry], dag: Any, folders: Folders
+) -> Iterator[tuple[int, float | None]]:
+    """Jobs that each entry needs from nothing, and their processor minutes; None if not measured.
+
+    They follow from Snakemake's graph ``dag`` and the logs of its jobs.
+    """
     makers = {str(file): job for job in dag.jobs for file in job.output}
     used = {job: usage_of(job.log[0]) for job in makers.values()}
     for entry in listed:
-        own = {makers[file] for file in files_of(entry, folders)}
+        own = {makers[own_file(file, folders)] for file in entry.files}
         needed = [used[job] for job in dag.bfs(dag.dependencies, *own)]
         measured = [usage.processor for usage in needed if usage is not None]
         whole = len(measured) == len(needed)
-        yield Cost(len(needed), sum(measured) / 60.0 if whole else None)
-
-
-def files_of(entry: Entry, folders: Folders) -> list[str]:
-    """Files of an entry in the ``folders`` of a study."""
-    own = dict(zip(Folders().documents.values(), folders.documents.values(), strict=True))
-    return [own.get(f, folders.results + f.removeprefix(RESULTS)) for f in entry.files]
-
-
-def _verdicts(results: str) -> dict[str, tuple[str, str]]:
-    path = TABLE.at(results, name=CLAIMS)
-    # only looked at: a job sets a damaged one aside
-    if not Path(path).is_file() or check_file(path) is not Condition.INTACT:
-        return {}
-    table = read_table(path, ["claim", "verdict", "verdict_beyond"])
-    return {row.claim: (row.verdict, row.verdict_beyond) for row in table.itertuples()}
+        yield len(needed), sum(measured) / 60.0 if whole else None

@@ -67,8 +67,8 @@ class Manifest(_Record):
     files: dict[str, Entry]
 
 
-def write_manifest(plan: Plan, folders: Folders, options: Iterable[str]) -> tuple[Manifest, bool]:
-    """Write the manifest of a study whose run has succeeded; say whether it is another now."""
+def write_manifest(plan: Plan, folders: Folders, options: Iterable[str]) -> None:
+    """Write the manifest of a study whose run has succeeded."""
     environments: dict[str, dict[str, str]] = {}
     files = {}
     for path in sorted(study_files(plan, folders)):
@@ -78,20 +78,11 @@ def write_manifest(plan: Plan, folders: Folders, options: Iterable[str]) -> tupl
             files[inside] = _entry(Path(path), checksum, environments)
     made = Manifest(options=tuple(options), environments=environments, files=files)
     text = f"{made.model_dump_json(indent=1, exclude_none=True)}\n"
-    place = Path(paths.MANIFEST.at(folders.results))
-    changed = not place.is_file() or place.read_bytes() != text.encode()
-    write_text(text, place)
-    return made, changed
+    write_text(text, paths.MANIFEST.at(folders.results))
 
 
 def read_manifest(results: str) -> Manifest:
-    """The manifest in a folder of results; nothing is changed.
-
-    Raises
-    ------
-    StorageError
-        It is missing, damaged, or of another layout.
-    """
+    """The manifest in a folder; StorageError if it is missing, damaged, or of another layout."""
     path = Path(paths.MANIFEST.at(results))
     if check_file(path) is Condition.DAMAGED:
         raise StorageError(f"{path}: damaged, its content and its checksum differ")
@@ -114,11 +105,17 @@ def study_files(plan: Plan, folders: Folders) -> Iterator[str]:
 
 
 def asked_for(found: Iterable[str], plan: Plan, folders: Folders) -> Iterator[str]:
-    """Paths among ``found`` that a target may name and that are not the study's own files."""
+    """Paths among ``found`` that are not the study's own files, and that a target may name.
+
+    They are something of a scene that there is.
+    """
     own = own_files(plan)
-    scenes, methods = set(scene_names(plan.root)), set(plan.study.methods)
+    scenes, methods = set(scene_names(plan.root)), {*plan.study.methods, ""}
     for path in found:
-        if path not in own and _is_target(path, folders.results, scenes, methods):
+        if path not in own and any(
+            labels.get("scene") in scenes and labels.get("method", "") in methods
+            for labels in paths.labels_in(path, folders.results)
+        ):
             yield path
 
 
@@ -128,19 +125,6 @@ def _visible(results: str) -> Iterator[str]:
         if folder == results:
             below[:] = [name for name in below if name not in ("logs", "studies")]
         yield from (f"{folder}/{name}" for name in names if not name.startswith("."))
-
-
-def _is_target(path: str, results: str, scenes: set[str], methods: set[str]) -> bool:
-    """Whether a target may name the file: something of a scene that there is."""
-    for place in paths.PLACES:
-        try:
-            labels = place.file(path).labels
-        except StorageError:
-            continue
-        known = labels.get("scene") in scenes and labels.get("method", "") in {*methods, ""}
-        if known and place.at(results, **labels) == path:
-            return True
-    return False
 
 
 def _entry(path: Path, checksum: Checksum, environments: dict[str, dict[str, str]]) -> Entry:

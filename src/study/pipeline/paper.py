@@ -1,12 +1,12 @@
 """Facts of a study that the manuscript states beside its results."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from types import SimpleNamespace
 from typing import Any
 
 from pdrom.model.constraints.base import GroupConfig
 from pdrom.view.text import require_typeset
 from study.artifact.markup import to_tex
+from study.artifact.reads import Labels
 from study.figures.kit.declaration import declarations
 from study.paper.build import PAGES, Facts
 from study.paper.source import source_files
@@ -14,29 +14,20 @@ from study.pipeline.folders import DEFAULT
 from study.pipeline.study import Study
 from study.tables.claims.rules import load_claims
 
-Labels = Mapping[str, str]
 Row = dict[str, Any]
 
 
-@dataclass(frozen=True)
-class Manuscript:
-    """Files of the manuscript's source: both documents, then what they read."""
-
-    sources: list[str]
-
-
-def manuscript(study: Study, labels: Labels) -> Manuscript:
-    """Files of the manuscript's source below the root of ``study``."""
-    return Manuscript(source_files(study.root, study.is_own))
+def manuscript(study: Study, labels: Labels) -> SimpleNamespace:
+    """The manuscript's ``sources`` below the root of ``study``: both documents, what they read."""
+    return SimpleNamespace(sources=source_files(study.root, study.is_own))
 
 
 def facts(study: Study, labels: Labels) -> Facts:
     """Facts that the manuscript states beside results of ``study``; one of its own is no part."""
     own = study.is_own
+    said = [(name, each.words(study.value)) for name, each in declarations().items()]
     return Facts(
-        captions={
-            name: _caption(*each.words(study.value)) for name, each in declarations().items()
-        },
+        captions={name: f"{to_tex(title)}. {to_tex(text)}" for name, (title, text) in said},
         part=None if study.is_full or own else study.configuration,
         full_study=study.configuration if own else DEFAULT,
         pages={} if own else PAGES,
@@ -49,10 +40,6 @@ def facts(study: Study, labels: Labels) -> Facts:
             "scenes": [_scene(study, name) for name in study.scenes],
         },
     )
-
-
-def _caption(title: str, caption: str) -> str:
-    return f"{to_tex(title)}. {to_tex(caption)}"
 
 
 def check_texts(study: Study) -> None:
@@ -110,6 +97,3 @@ def _scene(study: Study, name: str) -> Row:
         "time_step": config.time_step,
         "vertex_mass": config.vertex_mass,
     }
-
-
-DERIVED = {"manuscript": manuscript, "facts": facts}

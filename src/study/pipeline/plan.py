@@ -6,27 +6,24 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 from pdrom.core.errors import ConfigurationError, SceneError
 from pdrom.reduction.subspace.exported import DOUBLES, require_known
 from study.article.build import article
-from study.artifact.artifact import Artifact
 from study.artifact.logs import planning_log
 from study.artifact.paths import LIVE_MODEL
-from study.artifact.reads import Labels
 from study.experiments.kit.declaration import experiments
 from study.experiments.live import LARGEST
 from study.figures.kit.declaration import declarations
 from study.live.page import live_page
 from study.paper.build import paper, paper_inputs
-from study.pipeline.contents import labels_of, paths_of
+from study.pipeline.contents import labels_of
 from study.pipeline.folders import DEFAULT, Folders
 from study.pipeline.paper import check_texts
 from study.pipeline.resolve import Job, Resolver
 from study.pipeline.scenes import not_taken, require_scenes
-from study.pipeline.study import Study, StudySettings
+from study.pipeline.study import Study
 from study.pipeline.values import scaled_methods
 from study.tables import declared
 from study.tables.claims.rules import load_claims
@@ -35,19 +32,20 @@ log = logging.getLogger(__name__)
 
 
 def check_subspaces(study: Study) -> None:
-    """Say which scenes of ``study`` go without subspaces.
-
-    Raises
-    ------
-    ConfigurationError
-        One of them is named where a subspace is asked for.
-    """
+    """Say which scenes go without subspaces; ConfigurationError if one is asked for."""
     outside = {
         name: effects
         for name, config in {**study.scenes, **study.online}.items()
         if (effects := not_taken(config))
     }
-    for key, scenes in _asking(study).items():
+    settings = study.settings
+    asking = {
+        "subspace.scenes": settings.subspace.scenes,
+        "scaling.scenes": settings.scaling.scenes,
+        "online.scenes": settings.online.scenes,
+        "alternatives.scenes": settings.alternatives.scenes,
+    }
+    for key, scenes in asking.items():
         for name in scenes:
             if name in outside:
                 raise ConfigurationError(
@@ -60,17 +58,6 @@ def check_subspaces(study: Study) -> None:
             name,
             "', '".join(effects),
         )
-
-
-def _asking(study: Study) -> dict[str, tuple[str, ...]]:
-    """Scenes of which each key of the configuration requests a subspace."""
-    settings = study.settings
-    return {
-        "subspace.scenes": settings.subspace.scenes,
-        "scaling.scenes": tuple(settings.scaling.scenes),
-        "online.scenes": settings.online.scenes,
-        "alternatives.scenes": tuple(settings.alternatives.scenes),
-    }
 
 
 def check_live(study: Study) -> None:
@@ -130,63 +117,50 @@ def load_plan(
     return plan
 
 
-class Plan:
+class Plan(Resolver):
     """Everything that depends on the configuration and is needed to write the rules."""
 
     def __init__(self, study: Study, folders: Folders = OF_STUDY) -> None:
-        self.study = study
+        super().__init__(study, folders.results)
         self.root = study.root
-        self.results = folders.results
+        self.settings = study.settings
         self.documents = folders.documents
         self.experiments = experiments()
         self.tables = declared()
-        self._resolver = Resolver(study, folders.results)
-
-    @property
-    def settings(self) -> StudySettings:
-        """Checked settings of the study."""
-        return self.study.settings
-
-    def job(self, artifact: Artifact, labels: Labels = MappingProxyType({})) -> Job:
-        """Job of an ``artifact`` with these ``labels``."""
-        return self._resolver.job(artifact, labels)
 
     def check(self) -> None:
         """Read every file of the configuration, so that a fault shows early."""
-        folder = self.root / "config"
-        load_claims(folder / "claims.yaml", self.settings.claim_sets)
-        self._check_scenes(folder)
-        check_subspaces(self.study)
-        check_live(self.study)
-        check_texts(self.study)
-        scaled_methods(self.study, {})
-        self._check_tables()
-        self.fixed  # noqa: B018 : every figure and text is checked
-
-    def _check_scenes(self, folder: Path) -> None:
         settings = self.settings
+        load_claims(self.root / "config" / "claims.yaml", settings.claim_sets)
         named = {
             "ladder.scenes": settings.ladder.scenes,
             "live.scenes": settings.live.scenes,
             "subspace.scenes": settings.subspace.scenes,
-            "scaling.scenes": tuple(settings.scaling.scenes),
+            "scaling.scenes": settings.scaling.scenes,
             "stability.scenes": settings.stability.scenes,
         }
         for place, scenes in named.items():
             require_scenes(self.root, scenes, place)
-
-    def _check_tables(self) -> None:
+        check_subspaces(self.study)
+        check_live(self.study)
+        check_texts(self.study)
+        scaled_methods(self.study, {})
         for table in self.tables.values():
             try:
                 self.job(table)
             except ConfigurationError as error:
                 raise ConfigurationError(f"table {table.name} reads {error}") from error
+        self.fixed  # noqa: B018 : every figure and text is checked
 
     @property
     def measured(self) -> list[str]:
         """Every file that an experiment of the study writes."""
         places = [place for made in self.experiments.values() for place in made.writes.values()]
-        return [path for place in places for path in paths_of(self.study, place, self.results)]
+        return [
+            place.at(self.results, **labels)
+            for place in places
+            for labels in labels_of(self.study, place)
+        ]
 
     @cached_property
     def fixed(self) -> dict[str, list[Job]]:

@@ -19,25 +19,19 @@ ENOUGH_JOBS, ENOUGH = 2, 0.05
 REST = 0.1
 
 
-@dataclass(frozen=True)
+@dataclass
 class Expected:
-    """Expected time of a job on the machine where jobs were measured.
+    """Job of a run, as expected on the machine where jobs were measured, and as it ran.
 
     seconds : of the job
     share : of this machine that it claims, 1 where there is no limit
     after : seconds of the longest chain of jobs that wait for it
+    start, end : seconds of the clock at which it started and ended, None before
     """
 
     seconds: float
     share: float
     after: float
-
-
-@dataclass
-class _Job:
-    """A job of the run; seconds of the clock at which it started and ended, None before."""
-
-    expected: Expected
     start: float | None = None
     end: float | None = None
 
@@ -47,24 +41,20 @@ class _Job:
 
     def rest(self, now: float, slower: float) -> float:
         """Seconds that it still takes where jobs take ``slower`` times what is expected."""
-        expected = self.expected.seconds * slower
+        expected = self.seconds * slower
         return 0.0 if self.end is not None else max(expected - self.ran(now), REST * expected)
 
 
 class Estimate:
-    """Seconds that a run still takes.
+    """Seconds that a run of ``jobs``, by their numbers, still takes.
 
     Finished jobs say how much longer jobs take than expected: the median of these quotients,
     weighted by work, so that the few which compile kernels do not count. What all jobs together
     claimed until now says how busy the machine is kept.
     """
 
-    def __init__(self) -> None:
-        self._jobs: dict[int, _Job] = {}
-
-    def expect(self, jobs: Mapping[int, Expected]) -> None:
-        """Set the expected times of all jobs of the run, by their numbers."""
-        self._jobs = {number: _Job(expected) for number, expected in jobs.items()}
+    def __init__(self, jobs: Mapping[int, Expected]) -> None:
+        self._jobs = jobs
 
     def start(self, job: int, now: float) -> None:
         """Note that ``job`` starts at the time ``now``, s."""
@@ -80,18 +70,16 @@ class Estimate:
         """Seconds that are left at the time ``now``, s; None while too little is done."""
         begun = [job for job in self._jobs.values() if job.start is not None]
         done = [job for job in begun if job.end is not None]
-        total = sum(job.expected.seconds for job in self._jobs.values())
-        finished = sum(job.expected.seconds for job in done)
+        total = sum(job.seconds for job in self._jobs.values())
+        finished = sum(job.seconds for job in done)
         if len(done) < ENOUGH_JOBS or finished < ENOUGH * total:
             return None
-        slower = _median(
-            (job.ran(now) / job.expected.seconds, job.expected.seconds) for job in done
-        )
+        slower = _median((job.ran(now) / job.seconds, job.seconds) for job in done)
         rests = [(job, job.rest(now, slower)) for job in self._jobs.values() if job.end is None]
-        work = sum(rest * job.expected.share for job, rest in rests)
-        busy = sum(job.ran(now) * job.expected.share for job in begun)
+        work = sum(rest * job.share for job, rest in rests)
+        busy = sum(job.ran(now) * job.share for job in begun)
         idle = (now - min(job.start or 0.0 for job in begun)) / busy
-        chain = max((rest + job.expected.after * slower for job, rest in rests), default=0.0)
+        chain = max((rest + job.after * slower for job, rest in rests), default=0.0)
         return max(work * idle, chain)
 
 
@@ -111,7 +99,7 @@ class Progress(logging.Handler):
         self._plans = plans
         self._started = self._total = 0
         self._messages: dict[int, str] = {}
-        self._estimate = Estimate()
+        self._estimate = Estimate({})
 
     def emit(self, record: logging.LogRecord) -> None:
         """Show what a user wants to see of a record."""
@@ -119,7 +107,7 @@ class Progress(logging.Handler):
         if event == LogEvent.RUN_INFO:
             self._total = record.stats["total"]
         elif hasattr(record, "expected"):
-            self._estimate.expect(record.expected)
+            self._estimate = Estimate(record.expected)
         elif event == LogEvent.JOB_INFO:
             if not self._plans:
                 self._show_job(record)

@@ -2,13 +2,13 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any
 
 from pdrom.core.errors import ConfigurationError, choices
-from pdrom.model.scene import SceneConfig
 from study.artifact.artifact import Artifact, make, modules_in
 from study.artifact.paths import TABLE, Place
-from study.artifact.reads import Labels, Paths
+from study.artifact.reads import EditedFiles, Labels, Paths
 from study.pipeline.contents import labels_of
 from study.pipeline.fingerprint import digest, fingerprint
 from study.pipeline.study import Study, part_of
@@ -61,16 +61,9 @@ class Resolver:
     def __init__(self, study: Study, results: str) -> None:
         self.study, self.results = study, results
         self._jobs: dict[tuple[str, ...], Job] = {}
-        self._prints: dict[tuple[str, ...], str] = {}
 
-    def job(self, artifact: Artifact, labels: Labels) -> Job:
-        """The job of an artifact with these labels.
-
-        Raises
-        ------
-        ConfigurationError
-            If it reads a table or a key that does not exist.
-        """
+    def job(self, artifact: Artifact, labels: Labels = MappingProxyType({})) -> Job:
+        """The job with these labels; ConfigurationError if it reads what does not exist."""
         key = (artifact.rule, *(labels[name] for name in artifact.labels))
         if key not in self._jobs:
             own = {name: labels[name] for name in artifact.labels}
@@ -78,9 +71,11 @@ class Resolver:
         return self._jobs[key]
 
     def _resolved(self, artifact: Artifact, labels: dict[str, str]) -> Job:
-        settings = artifact.settings(self, labels)
-        inputs = artifact.inputs(self, labels)
-        edited = [p for k, r in artifact.files.items() if r.edited for p in listed(inputs[k])]
+        known = {**labels, "figure": artifact.name}  # a figure's options are found by its name
+        settings = artifact.settings(self, known)
+        inputs = artifact.inputs(self, known)
+        edited = [k for k, read in artifact.files.items() if isinstance(read, EditedFiles)]
+        content = [path for name in edited for path in listed(inputs[name])]
         places = artifact.writes.items()
         return Job(
             artifact,
@@ -88,15 +83,9 @@ class Resolver:
             inputs,
             {name: place.at(self.results, **labels) for name, place in places},
             artifact.plain(settings),
-            digest(self.study.root, *edited) if edited else "",
-            self.code(artifact.module, *sorted(set(modules_in(settings)))),
+            digest(self.study.root, *content) if content else "",
+            fingerprint(artifact.module, *sorted(set(modules_in(settings)))),
         )
-
-    def code(self, *modules: str) -> str:
-        """Fingerprint of modules, see `study.pipeline.fingerprint`."""
-        if modules not in self._prints:
-            self._prints[modules] = fingerprint(*modules)
-        return self._prints[modules]
 
     # What declarations ask for (`Sources`) --------------------------------------------------
 
@@ -121,18 +110,6 @@ class Resolver:
             if all(held[name] == labels[name] for name in held.keys() & labels.keys())
         ]
 
-    def first(self, place: Place, label: str, value: str) -> list[str]:
-        """One path of ``place`` for each set of its other labels.
-
-        It is that whose ``label`` has this ``value``, else the first.
-        """
-        chosen: dict[tuple[str, ...], Labels] = {}
-        for labels in labels_of(self.study, place):
-            others = tuple(other for name, other in labels.items() if name != label)
-            if others not in chosen or labels[label] == value:
-                chosen[others] = labels
-        return [place.at(self.results, **labels) for labels in chosen.values()]
-
     def table(self, name: str) -> str:
         """File of the table ``name``; ConfigurationError if there is no such table."""
         if name not in declared():
@@ -146,13 +123,6 @@ class Resolver:
             return self.study.value(key)
         value = DERIVED[head](self.study, labels)
         return part_of(value, parts, key) if parts else value
-
-    def per_scene(self, key: str) -> dict[str, Any]:
-        """Value of ``key`` of every scene by its name."""
-        if key not in SceneConfig.model_fields:
-            known = choices(key, SceneConfig.model_fields)
-            raise ConfigurationError(f"the key '{key}' of scenes: unknown{known}")
-        return {name: getattr(scene, key) for name, scene in self.study.scenes.items()}
 
 
 def listed(paths: Paths) -> list[str]:

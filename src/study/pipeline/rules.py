@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from operator import attrgetter
 from typing import Any
 
 from study.artifact.markup import to_plain, to_rst
@@ -13,6 +14,8 @@ from study.pipeline.resolve import Job
 from study.tables.kit.declaration import Table
 
 UNNUMBERED = "–"
+# What a job depends on beside its files.
+PARAMETERS = ("settings", "content", "code")
 
 
 @dataclass(frozen=True)
@@ -66,9 +69,7 @@ def _experiment(plan: Plan, experiment: Experiment, cores: int) -> Rule:
         resources={"slurm_extra": "--exclusive"} if experiment.alone else {},
         params={
             "artifact": experiment.address,
-            "settings": of(lambda job: job.settings),
-            "content": of(lambda job: job.content),
-            "code": of(lambda job: job.code),
+            **{name: of(attrgetter(name)) for name in PARAMETERS},
         },
         message=f"{title} (alone on the machine)" if experiment.alone else title,
     )
@@ -77,12 +78,7 @@ def _experiment(plan: Plan, experiment: Experiment, cores: int) -> Rule:
 def _fixed(plan: Plan, job: Job, folder: str, numbers: Mapping[str, Numbers]) -> Rule:
     """Rule of a single job, without labels; ``numbers`` of the figures."""
     artifact = job.artifact
-    params = {
-        "artifact": artifact.address,
-        "settings": job.settings,
-        "content": job.content,
-        "code": job.code,
-    }
+    params = {"artifact": artifact.address, **{name: getattr(job, name) for name in PARAMETERS}}
     if isinstance(artifact, Declaration):
         title, caption = artifact.words(plan.study.value)
         params["rst"] = f"**{to_rst(title)}.** {to_rst(caption)}"

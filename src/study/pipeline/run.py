@@ -12,10 +12,10 @@ from pydantic import ValidationError
 
 from pdrom.core.errors import ConfigurationError, PdromError
 from pdrom.core.machine import Machine, Units
-from pdrom.core.store import read_table
+from pdrom.core.store import read_table, write_text
 from study.artifact.paths import MACHINE
 from study.pipeline.commandline import CommandLine, one_line, recall, remember
-from study.pipeline.failures import Failures, listen
+from study.pipeline.failures import Failures
 from study.pipeline.folders import Folders
 from study.pipeline.fork_server import hold_pipe, start_server
 from study.pipeline.manifest import write_manifest
@@ -31,7 +31,7 @@ from study.pipeline.running import (
 )
 from study.pipeline.scenes import Coarsen
 from study.pipeline.summary import configuration, preview, summary
-from study.pipeline.targets import known
+from study.pipeline.targets import check_targets
 from study.pipeline.tracked import COLUMNS, COSTS, kind_of
 
 RUN_TIMES = Path("config/reference/run_times.csv")
@@ -43,28 +43,22 @@ def units_of(study: str, root: Path) -> Units:
     return Units(**row[list(Units.model_fields)])
 
 
-def slower_here(plan: Plan, study: str) -> float:
-    """Time of this machine over that of `units_of` for ``study``; 1 if not known.
-
-    Its units stand in the record that ``plan`` names.
-    """
-    try:
-        record = (plan.root / MACHINE.at(plan.results)).read_bytes()
-        here = Machine.model_validate_json(record).units
-    except (OSError, ValidationError):
-        return 1.0  # before the first run, or a record of an older version
-    return 1.0 if here is None else here.unit_s / units_of(study, plan.root).unit_s
-
-
 def expected_seconds(plan: Plan) -> Callable[[str], float]:
     """Function that returns the expected processor seconds of a job of a plan, given its log.
 
-    A kind that was not measured takes the median of all.
+    A kind that was not measured takes the median of all. Times are scaled by the units of the
+    machine that the last run of the plan has recorded.
     """
     full = plan.settings.coarsen == Coarsen()
     study, column = ("full", "seconds") if full else ("tiny", "coarse_seconds")
     table = read_table(plan.root / COSTS, COLUMNS, result=False)
-    seconds = slower_here(plan, study) * table[column]
+    try:
+        record = (plan.root / MACHINE.at(plan.results)).read_bytes()
+        here = Machine.model_validate_json(record).units
+    except (OSError, ValidationError):
+        here = None  # before the first run, or a record of an older version
+    slower = 1.0 if here is None else here.unit_s / units_of(study, plan.root).unit_s
+    seconds = slower * table[column]
     known = dict(zip(table.kind, seconds, strict=True))
     usual = float(seconds.median())
     return lambda log: float(known.get(kind_of(log, plan.results), usual))
@@ -72,8 +66,6 @@ def expected_seconds(plan: Plan) -> Callable[[str], float]:
 
 def tell_expectation(workflow: Any, plan: Plan) -> None:
     """Log what every job of Snakemake's ``workflow`` is expected to take by ``plan``.
-
-    See `progress.Estimate.expect`.
 
     A job's share of this machine is 1 where it is alone, and where jobs run on a cluster.
     """
@@ -124,7 +116,9 @@ class Run:
                 hold()
                 settle_dates(DATED)
                 remember(command)
-        return cls(command, listen())
+        failures = Failures()
+        logging.getLogger("snakemake.logging").addHandler(failures)
+        return cls(command, failures)
 
     def check(self, plan: Plan, folders: Folders, rules: Iterable[Any], cores: int) -> None:
         """Check targets and report; a dry run says at its end what it would take on ``cores``.
@@ -136,7 +130,7 @@ class Run:
         ConfigurationError
             A target or the report cannot be made.
         """
-        known(plan).check(self.command.targets, list(rules))
+        check_targets(plan, self.command.targets, list(rules))
         reports = self.command.report and not self.command.targets
         if reports and not Path(folders.manuscript).is_file():
             last = " ".join(recall())
@@ -171,11 +165,12 @@ class Run:
     def succeed(self, workflow: Any, plan: Plan, folders: Folders) -> None:
         """End a run whose jobs all succeeded: it says what came of ``plan`` in ``folders``."""
         # late: a plan needs nothing of it
-        from study.pipeline.inventory import write_contents
+        from study.pipeline.inventory import CONTENTS, contents
 
         try:
             if not self.command.targets:
-                write_contents(configuration(self.command), workflow.dag, plan, folders)
+                text = contents(self.command, workflow.dag, folders)
+                write_text(text, CONTENTS.at(folders.results))
             write_manifest(plan, folders, self.command.configuration)
         except PdromError as error:
             say_last(f"pdrom: {error}\n")

@@ -47,7 +47,11 @@ def hold() -> int:
     AtWorkError
         Naming the process that holds it, or the fault of the disk.
     """
-    descriptor = _open()
+    try:
+        FOLDER.mkdir(exist_ok=True)
+        descriptor = os.open(LOCK, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
+    except OSError as error:
+        raise AtWorkError(f"{LOCK}: cannot be written ({error.strerror})") from error
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError as error:
@@ -71,14 +75,6 @@ def remove_stale_locks() -> None:
         os.close(hold())
     except AtWorkError:
         return
-
-
-def _open() -> int:
-    try:
-        FOLDER.mkdir(exist_ok=True)
-        return os.open(LOCK, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
-    except OSError as error:
-        raise AtWorkError(f"{LOCK}: cannot be written ({error.strerror})") from error
 
 
 def settle_dates(folders: Iterable[str | Path]) -> int:

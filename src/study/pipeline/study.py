@@ -20,15 +20,13 @@ from study.experiments.hard_cases.outcomes import HardCases
 from study.experiments.iterations import IterationSweep
 from study.experiments.kit.settings import BlowupExtent, Rank, Solver
 from study.experiments.live import Live
-from study.experiments.noise import Noise
-from study.experiments.repetitions import LadderSection, RepetitionSection
+from study.experiments.repetitions import LadderSection, Noise, RepetitionSection
 from study.experiments.requested_tolerances import RequestedTolerances
 from study.experiments.reruns import Sweep
-from study.experiments.scaling import Scaling
 from study.experiments.sensitivity import Sensitivity
 from study.experiments.stability import Stability
 from study.experiments.subspaces import Online, Subspace
-from study.experiments.timing import Timing
+from study.experiments.timing import Scaling, Timing
 from study.figures.kit.declaration import load_choices
 from study.figures.kit.options import Options
 from study.pipeline.folders import DEFAULT
@@ -159,13 +157,7 @@ class Study:
         return load_methods(self.root / "config" / "methods.yaml")
 
     def scene(self, name: str) -> SceneConfig:
-        """Configuration of scene ``name``; of one outside the study, too, if it has a file.
-
-        Raises
-        ------
-        ConfigurationError
-            If there is no such scene, or it is faulty.
-        """
+        """Scene ``name``, held or not; ConfigurationError if it has no file or is faulty."""
         for held in (self.scenes, self.online, self._others):
             if name in held:
                 return held[name]
@@ -228,34 +220,17 @@ class Study:
         return {scene.mesh.identifier: scene.mesh for scene in self.scenes.values()}
 
     def mesh(self, identifier: str) -> MeshConfig:
-        """Configuration of mesh ``identifier``; of one outside the study, too, if a scene has it.
-
-        Raises
-        ------
-        ConfigurationError
-            If no scene of config/scenes has it.
-        """
+        """Configuration of mesh ``identifier``, which a scene has; it may be outside the study."""
         if identifier in self.meshes:
             return self.meshes[identifier]
-        for name in scene_names(self.root):
-            mesh = read_scene(self.root, name, self.settings.changes).mesh
-            if mesh.identifier == identifier:
-                return mesh
-        raise ConfigurationError(f"no scene in config/scenes has the mesh '{identifier}'")
-
-    def method(self, name: str) -> MethodSpec:
-        """Method ``name`` of the study; ConfigurationError for another one."""
-        if name not in self.methods:
-            raise ConfigurationError(f"unknown method '{name}'{choices(name, self.methods)}")
-        return self.methods[name]
+        changes = self.settings.changes
+        every = (read_scene(self.root, name, changes).mesh for name in scene_names(self.root))
+        return next(mesh for mesh in every if mesh.identifier == identifier)
 
     def basis(self, identifier: str) -> BasisSpec:
-        """Specification of basis ``identifier`` by its first method, else ConfigurationError."""
-        for method in self.methods.values():
-            if method.basis_id == identifier:
-                return BasisSpec(**{key: getattr(method, key) for key in BasisSpec.model_fields})
-        known = [method.basis_id for method in self.methods.values()]
-        raise ConfigurationError(f"unknown basis '{identifier}'{choices(identifier, known)}")
+        """Specification of basis ``identifier`` by the first method that has it."""
+        method = next(m for m in self.methods.values() if m.basis_id == identifier)
+        return BasisSpec(**{key: getattr(method, key) for key in BasisSpec.model_fields})
 
     def named_methods(self, names: Iterable[str], key: str) -> dict[str, MethodSpec]:
         """Methods by ``names``; ConfigurationError, which ``key`` opens, for an unknown one."""
@@ -267,13 +242,7 @@ class Study:
 
 
 def part_of(value: Any, parts: str, key: str) -> Any:
-    """Part of a ``value`` that ``parts`` names, with dots between them.
-
-    Raises
-    ------
-    ConfigurationError
-        There is none; ``key`` is named.
-    """
+    """Part ``a.b`` of a ``value``; ConfigurationError, which names ``key``, if there is none."""
     for part in parts.split("."):
         if not hasattr(value, part):
             known = choices(part, getattr(type(value), "model_fields", ()))

@@ -76,7 +76,10 @@ def summary(
         others = [f"and {more} more"] if more > 0 else []
         lines.append(f"made: {', '.join([*command.targets[:LISTED], *others])}")
     else:
-        lines += _verdicts(folders, apart)
+        if verdicts := verdicts_in(folders.results):
+            words = f"as published / beyond; {apart}" if apart else "as published / beyond"
+            said = [f"{claim} {' / '.join(pair)}" for claim, pair in verdicts.items()]
+            lines.append(f"verdicts ({words}): {', '.join(said)}")
         lines.append(f"manuscript: {', '.join(folders.documents.values())}")
         lines.append(f"as pages: {paths.ARTICLE.at(folders.results, name='index.html')}")
         for kind, files in (("figures", figures), ("tables", tables)):
@@ -104,16 +107,14 @@ def configuration(command: CommandLine) -> str:
     return ", ".join([*names, *command.settings])
 
 
-def _verdicts(folders: Folders, apart: str) -> list[str]:
-    """All verdicts in one line; none where the table cannot be read."""
-    path = paths.TABLE.at(folders.results, name="claims")
+def verdicts_in(results: str) -> dict[str, tuple[str, str]]:
+    """Verdicts of each claim, as published and beyond; none where the table cannot be read."""
+    path = paths.TABLE.at(results, name="claims")
     # a damaged file is only reported here: the job that reads it renames it
     if not Path(path).is_file() or check_file(path) is not Condition.INTACT:
-        return []
+        return {}
     table = read_table(path, ["claim", "verdict", "verdict_beyond"])
-    verdicts = [f"{r.claim} {r.verdict} / {r.verdict_beyond}" for r in table.itertuples()]
-    words = f"as published / beyond; {apart}" if apart else "as published / beyond"
-    return [f"verdicts ({words}): {', '.join(verdicts)}"]
+    return {row.claim: (row.verdict, row.verdict_beyond) for row in table.itertuples()}
 
 
 class Preview(logging.Handler):

@@ -1,19 +1,19 @@
 """Targets on the command line: figures by number or name, tables and files; help if misspelt."""
 
-from collections.abc import Callable, Collection, Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
-from pdrom.core.errors import ConfigurationError, StorageError, choices, suggestion
+from pdrom.core.errors import ConfigurationError, choices, suggestion
 from study.artifact import paths
-from study.artifact.paths import RESULTS, Place
 from study.figures.kit.declaration import declarations
 from study.paper.figure_numbers import SUPPLEMENT, figure_numbers
 from study.pipeline.folders import Folders
 from study.pipeline.plan import Plan
 from study.pipeline.scenes import read_scene, scene_names
+from study.pipeline.study import Study
+from study.tables import declared
 
 WORD = "figure"
 PREPRINT = "preprint:"
@@ -24,7 +24,7 @@ def figure_arguments(arguments: Sequence[str]) -> list[str]:
 
     A number counts in the paper, one with an S before it in the supplement, ``preprint:NUMBER`` in
     the preprint; every figure has its name, too. A target reads ``figure NAME`` (one word), which
-    `Names` turns into its file.
+    `files` turns into its file.
 
     Raises
     ------
@@ -35,7 +35,9 @@ def figure_arguments(arguments: Sequence[str]) -> list[str]:
     options = [word for word in arguments[len(named) :] if word != "--"]
     numbers = figure_numbers(Path())
     by_place = {n.manuscript: name for name, n in numbers.items() if n.manuscript}
-    known = {number: by_place[number] for number in sorted(by_place, key=_order)}
+    # the paper's numbers, then the supplement's
+    ordered = sorted(by_place, key=lambda n: (SUPPLEMENT in n, int(n.removeprefix(SUPPLEMENT))))
+    known = {number: by_place[number] for number in ordered}
     known |= {f"{PREPRINT}{n.preprint}": name for name, n in numbers.items() if n.preprint}
     known |= {name: name for name in numbers}
     if not named:
@@ -46,116 +48,85 @@ def figure_arguments(arguments: Sequence[str]) -> list[str]:
     return [*options, "--", *(f"{WORD} {known[word]}" for word in named)]
 
 
-def _order(number: str) -> tuple[bool, int]:
-    """Key of a number for sorting: the paper's, then the supplement's."""
-    return number.startswith(SUPPLEMENT), int(number.removeprefix(SUPPLEMENT))
-
-
 def described(target: str) -> str:
     """A target with both numbers, if it is a figure that has one; else the target itself."""
     word, _, name = target.partition(" ")
     return f"{WORD} {figure_numbers(Path())[name].label(name)}" if word == WORD else target
 
 
-@dataclass(frozen=True)
-class Names:
-    """Names of figures and tables, which stand for their files."""
+def files(target: str, folders: Folders) -> list[str]:
+    """Files in ``folders`` to make for a ``target``; itself unless it is a name.
 
-    figures: Collection[str]
-    tables: Collection[str]
-
-    def files(self, target: str, folders: Folders) -> list[str]:
-        """Files in ``folders`` to make for a ``target``; itself unless it is a name.
-
-        A file below ``results`` is the study's own, wherever that has its results; ``figure NAME``
-        stands for that figure alone.
-        """
-        word, _, name = target.partition(" ")
-        alone = word == WORD and name in self.figures
-        name = name if alone else target
-        found = [paths.FIGURE.at(folders.results, name=name)] if name in self.figures else []
-        if name in self.tables and not alone:
-            found.append(paths.TABLE.at(folders.results, name=name))
-        return found or [_own(target, folders)]
-
-
-def _own(target: str, folders: Folders) -> str:
-    for document, file in Folders().documents.items():
-        if target == file:
-            return folders.documents[document]
-    inside = target.startswith(f"{RESULTS}/") and not target.startswith(f"{RESULTS}/studies/")
-    return folders.results + target.removeprefix(RESULTS) if inside else target
-
-
-@dataclass(frozen=True)
-class Known:
-    """Names and files of a study, to judge a target by.
-
-    files : files of the study, for suggestions
-    labels : what a label of a file may be (scene, group ...), by the labels before it
+    A file below ``results`` is the study's own, wherever that has its results; ``figure NAME``
+    stands for that figure alone.
     """
-
-    results: str
-    files: Sequence[str]
-    names: Names
-    labels: dict[str, Callable[[dict[str, str]], Iterable[str]]]
-
-    def check(self, targets: Iterable[str], rules: Sequence[Any]) -> None:
-        """ConfigurationError with a suggestion for a target that none of Snakemake's rules makes.
-
-        ``targets`` are those of the command line.
-        """
-        own = {rule.name for rule in rules if not rule.has_wildcards()}
-        for target in targets:
-            if target in own:
-                continue
-            named = any(rule.name == target for rule in rules)
-            if named or not any(rule.is_producer(target) for rule in rules):
-                raise ConfigurationError(f"target '{target}': {self._unknown(target, own)}")
-            for place in paths.PLACES:
-                self._check_labels(place, target)
-
-    def _check_labels(self, place: Place, target: str) -> None:
-        try:
-            labels = place.file(target).labels
-        except StorageError:
-            return  # no file of that kind
-        if place.at(self.results, **labels) != target:
-            return
-        for label, value in labels.items():
-            allowed = list(self.labels[label](labels)) if label in self.labels else [value]
-            if value not in allowed:
-                hint = suggestion(value, allowed)
-                raise ConfigurationError(f"target '{target}': unknown {label} '{value}'{hint}")
-
-    def _unknown(self, target: str, own: set[str]) -> str:
-        scenes = self.labels["scene"]({})
-        if target in scenes:
-            example = paths.FULL_ORDER.at(self.results, scene=target, run="train")
-            return f"a scene; name one of its files, as {example}"
-        names = [*self.names.figures, *self.names.tables, *own, *scenes]
-        return (
-            f"nothing makes it{suggestion(target, self.files if '/' in target else names)}; "
-            f"targets are names of figures and tables, and files below {self.results}"
-        )
+    word, _, name = target.partition(" ")
+    alone = word == WORD and name in declarations()
+    name = name if alone else target
+    found = [paths.FIGURE.at(folders.results, name=name)] if name in declarations() else []
+    if name in declared() and not alone:
+        found.append(paths.TABLE.at(folders.results, name=name))
+    return found or [own_file(target, folders)]
 
 
-def known(plan: Plan) -> Known:
-    """Collect the names and files of a plan's study."""
-    study = plan.study
+def own_file(path: str, folders: Folders) -> str:
+    """File of a study with these ``folders`` for one of the full study; another stays as it is."""
+    for document, file in Folders().documents.items():
+        if path == file:
+            return folders.documents[document]
+    inside = path.startswith(f"{paths.RESULTS}/")
+    others = path.startswith(f"{paths.RESULTS}/studies/")
+    return folders.results + path.removeprefix(paths.RESULTS) if inside and not others else path
 
-    def mesh(scene: str) -> str:
-        return read_scene(study.root, scene, study.settings.changes).mesh.identifier
 
-    return Known(
-        results=plan.results,
-        files=[*plan.table_paths, *plan.figures, *plan.measured],
-        names=Names(declarations(), plan.tables),
-        labels={
-            "scene": lambda labels: {*scene_names(study.root), *study.scenes},
-            "group": lambda labels: study.scene(labels["scene"]).reduce,
-            "method": lambda labels: study.methods,
-            "basis": lambda labels: {spec.basis_id for spec in study.methods.values()},
-            "mesh": lambda labels: {*map(mesh, scene_names(study.root)), *study.meshes},
-        },
+def check_targets(plan: Plan, targets: Iterable[str], rules: Sequence[Any]) -> None:
+    """ConfigurationError with a suggestion for a target that none of Snakemake's rules makes.
+
+    ``targets`` are those of the command line.
+    """
+    own = {rule.name for rule in rules if not rule.has_wildcards()}
+    for target in targets:
+        if target in own:
+            continue
+        named = any(rule.name == target for rule in rules)
+        if named or not any(rule.is_producer(target) for rule in rules):
+            raise ConfigurationError(f"target '{target}': {_unknown(plan, target, own)}")
+        for labels in paths.labels_in(target, plan.results):
+            for label, value in labels.items():
+                allowed = _allowed(plan.study, label, labels)
+                if allowed is not None and value not in allowed:
+                    hint = suggestion(value, allowed)
+                    raise ConfigurationError(f"target '{target}': unknown {label} '{value}'{hint}")
+
+
+def _allowed(study: Study, label: str, before: Mapping[str, str]) -> Collection[str] | None:
+    """Values that a label of a file may have, by the labels ``before`` it; None if any."""
+    match label:
+        case "scene":
+            return {*scene_names(study.root), *study.scenes}
+        case "group":
+            return study.scene(before["scene"]).reduce
+        case "method":
+            return study.methods
+        case "basis":
+            return {spec.basis_id for spec in study.methods.values()}
+        case "mesh":
+            changes = study.settings.changes
+            others = [read_scene(study.root, name, changes) for name in scene_names(study.root)]
+            return {*(scene.mesh.identifier for scene in others), *study.meshes}
+    return None
+
+
+def _unknown(plan: Plan, target: str, rules: Collection[str]) -> str:
+    """End of the message about a target that nothing makes; ``rules`` are those without labels."""
+    scenes = {*scene_names(plan.root), *plan.study.scenes}
+    if target in scenes:
+        example = paths.FULL_ORDER.at(plan.results, scene=target, run="train")
+        return f"a scene; name one of its files, as {example}"
+    known = [*declarations(), *plan.tables, *rules, *scenes]
+    if "/" in target:
+        known = [*plan.table_paths, *plan.figures, *plan.measured]
+    return (
+        f"nothing makes it{suggestion(target, known)}; "
+        f"targets are names of figures and tables, and files below {plan.results}"
     )

@@ -95,30 +95,19 @@ def _used(results: str) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def _costs() -> tuple[Path, pd.DataFrame]:
-    return COSTS, measured_costs(folders([], []).results, folders([COARSE], []).results)
-
-
-def _verdicts() -> tuple[Path, pd.DataFrame]:
-    claims = Path(TABLE.at(folders([SAMPLE], []).results, name="claims"))
-    return Path(REPLICATED), recorded_verdicts(claims, Path(RULES))
-
-
-KEPT = {"costs": _costs, "replication": _verdicts}
-
-
 def main(words: Sequence[str]) -> None:
-    """Write the measurements that ``words`` name again.
-
-    Raises
-    ------
-    ConfigurationError
-        There are no such ones.
-    """
+    """Write again what ``words`` name; ConfigurationError if there is no such measurement."""
     for word in words or [""]:
-        if word not in KEPT:
-            raise ConfigurationError(f"tracked: '{word}': unknown{choices(word, KEPT)}")
-        path, table = KEPT[word]()
+        if word == "costs":
+            path = COSTS
+            table = measured_costs(folders([], []).results, folders([COARSE], []).results)
+        elif word == "replication":
+            path = Path(REPLICATED)
+            claims = TABLE.at(folders([SAMPLE], []).results, name="claims")
+            table = recorded_verdicts(Path(claims), Path(RULES))
+        else:
+            known = choices(word, ["costs", "replication"])
+            raise ConfigurationError(f"tracked: '{word}': unknown{known}")
         write_tracked(path, table.to_csv(index=False).encode())
 
 

@@ -2,53 +2,42 @@
 
 A name that is not listed here is a key of the configuration. A setting of the type of a section's
 base class gets the fields of that class only, so that a job depends on nothing else.
+
+A figure has its own name as a label. Its options choose what it draws of the study.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any
 
-from pdrom.model.mesh.config import MeshConfig
-from pdrom.model.scene import SceneConfig
-from pdrom.reduction.method import BasisSpec, MethodSpec
+from pdrom.model import constraints
+from pdrom.model.effects import EFFECTS
+from pdrom.reduction.method import MethodSpec
 from study.artifact import paths
-from study.artifact.paths import Place
+from study.artifact.paths import File
+from study.artifact.reads import Labels
 from study.experiments.frame_times import NamedScene, ProjectionCase, SubspaceCase
 from study.experiments.kit.settings import Horizon, Rank
 from study.experiments.live import JOINT, JointRows, OfScene
-from study.experiments.noise import Noise
-from study.experiments.repetitions import LadderSection, Repeated
+from study.experiments.repetitions import Repeated
 from study.experiments.stability import Stability
-from study.pipeline import figures, paper
+from study.figures.kit.options import Experiment, Options, Reduction
+from study.pipeline import paper
 from study.pipeline.contents import labels_of
 from study.pipeline.study import Study
 
-Labels = Mapping[str, str]
-
-
-def _scene(study: Study, labels: Labels) -> SceneConfig:
-    return study.scene(labels["scene"])
-
-
-def _title(study: Study, labels: Labels) -> str:
-    return study.titles[study.scene(labels["scene"]).name]
-
-
-def _mesh(study: Study, labels: Labels) -> MeshConfig:
-    return study.mesh(labels["mesh"])
-
-
-def _method(study: Study, labels: Labels) -> MethodSpec:
-    return study.method(labels["method"])
-
-
-def _basis(study: Study, labels: Labels) -> BasisSpec:
-    """Specification of a basis by the first method that uses it."""
-    return study.basis(labels["basis"])
+# The basis of the tables that show one of each group.
+USUAL_BASIS = "none-none-vectorised"
 
 
 def _horizon(study: Study, labels: Labels) -> Horizon:
     section = study.settings.sensitivity
     return Horizon(perturbation=section.reference, threshold=section.threshold)
+
+
+def _heldout_ranks(study: Study, labels: Labels) -> tuple[Rank, ...]:
+    """Sizes that run on the first held-out motion: all, unless the configuration chooses."""
+    chosen = study.settings.heldout_ranks
+    return study.settings.ranks if chosen is None else chosen
 
 
 def _stability(study: Study, labels: Labels) -> Stability:
@@ -58,14 +47,24 @@ def _stability(study: Study, labels: Labels) -> Stability:
     return section.model_copy(update={"ranks": held})
 
 
-def _held(place: Place) -> Callable[[Study, Labels], tuple[OfScene, ...]]:
+def _usual_bases(study: Study, labels: Labels) -> list[File]:
+    """A basis of each reduced group: the usual one where a method has it, else the first."""
+    chosen: dict[tuple[str, str], Labels] = {}
+    for held in labels_of(study, paths.BASIS):
+        group = (held["scene"], held["group"])
+        if group not in chosen or held["basis"] == USUAL_BASIS:
+            chosen[group] = held
+    return [File("", dict(held)) for held in chosen.values()]
+
+
+def _holds(study: Study, place: paths.Place, labels: Labels) -> bool:
+    """Whether the study itself has the file of a kind that belongs to a job with these labels."""
+    return {name: labels[name] for name in place.labels} in labels_of(study, place)
+
+
+def _of_scene(study: Study, place: paths.Place, labels: Labels) -> tuple[OfScene, ...]:
     """The scene of a job if the study itself holds its file of a kind."""
-
-    def held(study: Study, labels: Labels) -> tuple[OfScene, ...]:
-        own = {"scene": labels["scene"]}
-        return (OfScene(**own),) if own in labels_of(study, place) else ()
-
-    return held
+    return (OfScene(scene=labels["scene"]),) if _holds(study, place, labels) else ()
 
 
 def _joint_rows(study: Study, labels: Labels) -> tuple[JointRows, ...]:
@@ -77,14 +76,6 @@ def _joint_rows(study: Study, labels: Labels) -> tuple[JointRows, ...]:
     return tuple(
         JointRows(scene=scene, group=group, method=method) for group in study.scenes[scene].reduce
     )
-
-
-def _timed_scenes(study: Study, labels: Labels) -> tuple[NamedScene, ...]:
-    return tuple(NamedScene(scene=scene) for scene in study.scenes.values())
-
-
-def _large_scenes(study: Study, labels: Labels) -> tuple[NamedScene, ...]:
-    return tuple(NamedScene(scene=scene) for scene in study.online.values())
 
 
 def _subspace_cases(study: Study, labels: Labels) -> tuple[SubspaceCase, ...]:
@@ -128,56 +119,119 @@ def _repeated(study: Study, labels: Labels) -> tuple[Repeated, ...]:
     )
 
 
-def _own_ladder(study: Study, labels: Labels) -> LadderSection | None:
-    """The ladder of a group; None where no ladder is asked for."""
-    return study.settings.ladder if dict(labels) in labels_of(study, paths.LADDER) else None
+class Run(Experiment):
+    """An experiment with a method."""
+
+    method: str
+
+    @property
+    def labels(self) -> dict[str, str]:
+        """Labels of its files."""
+        return {**super().labels, "method": self.method}
 
 
-def _own_noise(study: Study, labels: Labels) -> Noise | None:
-    """The runs on round-off of a group; None where none are asked for."""
-    return study.settings.noise if dict(labels) in labels_of(study, paths.NOISE) else None
+def _options(study: Study, labels: Labels) -> Options:
+    """Options of a figure with the scenes that the study holds.
+
+    A list of scenes or methods of which it holds none becomes empty, which means all.
+    """
+    chosen = study.figures[labels["figure"]]
+    update: dict[str, tuple[str, ...]] = {}
+    if {*chosen.names("methods")}.isdisjoint(study.methods) and chosen.names("methods"):
+        update["methods"] = ()
+    if scenes := chosen.names("scenes"):
+        update["scenes"] = tuple(scene for scene in scenes if scene in study.scenes)
+    return chosen.model_copy(update=update)
 
 
-def _noise_methods(study: Study, labels: Labels) -> dict[str, MethodSpec]:
-    """The methods of the noise runs; they need not be among the study's."""
-    return study.named_methods(study.settings.noise.methods, "noise.methods")
+def _experiments(study: Study, labels: Labels) -> tuple[Experiment, ...]:
+    """Reduced groups that a figure's options choose, in the order asked for."""
+    chosen = _options(study, labels)
+    found = []
+    for scene in chosen.names("scenes") or tuple(study.scenes):
+        config = study.scenes[scene]
+        reduced = tuple(config.reduce)
+        found += [
+            Experiment(
+                scene=scene,
+                group=group,
+                mesh=config.mesh.identifier,
+                effects=config.effects,
+                only=len(reduced) == 1,
+            )
+            for group in reduced
+        ]
+    return tuple(found)
 
 
-def _projection_methods(study: Study, labels: Labels) -> dict[str, MethodSpec]:
-    return {case.method: study.methods[case.method] for case in _projection_cases(study, labels)}
+def _reductions(study: Study, labels: Labels) -> dict[str, Reduction]:
+    """Methods that a figure's options choose, by name, in the order asked for."""
+    named = _options(study, labels).names("methods") or tuple(study.methods)
+    held = {name: study.methods[name] for name in named if name in study.methods}
+    return {name: Reduction(title=spec.title, rows=spec.rows) for name, spec in held.items()}
 
 
-def _heldout_ranks(study: Study, labels: Labels) -> tuple[Rank, ...]:
-    """Sizes that run on the first held-out motion: all, unless the configuration chooses."""
-    chosen = study.settings.heldout_ranks
-    return study.settings.ranks if chosen is None else chosen
+def _runs(study: Study, labels: Labels) -> tuple[Run, ...]:
+    """Every experiment of a figure with every method of it."""
+    methods = _reductions(study, labels)
+    return tuple(
+        Run(**experiment.model_dump(), method=method)
+        for experiment in _experiments(study, labels)
+        for method in methods
+    )
+
+
+def _drawn_subspaces(study: Study, labels: Labels) -> tuple[Experiment, ...]:
+    """Experiments of a figure in scenes of which the study has models in position subspaces."""
+    held = {found["scene"] for found in labels_of(study, paths.SUBSPACES)}
+    return tuple(each for each in _experiments(study, labels) if each.scene in held)
 
 
 DERIVED: dict[str, Callable[[Study, Labels], Any]] = {
-    **figures.DERIVED,
-    **paper.DERIVED,
-    "scene": _scene,
-    "title": _title,
-    "mesh": _mesh,
-    "method": _method,
+    "scene": lambda study, labels: study.scene(labels["scene"]),
+    "title": lambda study, labels: study.titles[study.scene(labels["scene"]).name],
+    "mesh": lambda study, labels: study.mesh(labels["mesh"]),
+    "method": lambda study, labels: study.methods[labels["method"]],
+    "basis": lambda study, labels: study.basis(labels["basis"]),
     "methods": lambda study, labels: study.methods,
-    "every_scene": lambda study, labels: study.scenes,
     "every_method": lambda study, labels: study.every_method,
-    "scaled_methods": scaled_methods,
-    "own_ladder": _own_ladder,
-    "own_noise": _own_noise,
-    "noise_methods": _noise_methods,
-    "repeated": _repeated,
-    "basis": _basis,
+    "scene_time_steps": lambda study, _: {k: v.time_step for k, v in study.scenes.items()},
+    "scene_iterations": lambda study, _: {k: v.iterations for k, v in study.scenes.items()},
+    "usual_bases": _usual_bases,
+    "own_ladder": lambda study, labels: (
+        study.settings.ladder if _holds(study, paths.LADDER, labels) else None
+    ),
+    "own_noise": lambda study, labels: (
+        study.settings.noise if _holds(study, paths.NOISE, labels) else None
+    ),
     "horizon": _horizon,
+    "heldout_ranks": _heldout_ranks,
     "stability": _stability,
-    "with_subspaces": _held(paths.SUBSPACES),
-    "with_online_models": _held(paths.ONLINE_MODELS),
+    "scaled_methods": scaled_methods,
+    "noise_methods": lambda study, labels: study.named_methods(
+        study.settings.noise.methods, "noise.methods"
+    ),
+    "repeated": _repeated,
+    "with_subspaces": lambda study, labels: _of_scene(study, paths.SUBSPACES, labels),
+    "with_online_models": lambda study, labels: _of_scene(study, paths.ONLINE_MODELS, labels),
     "joint_rows": _joint_rows,
-    "timed_scenes": _timed_scenes,
-    "large_scenes": _large_scenes,
+    "timed_scenes": lambda study, _: [NamedScene(scene=each) for each in study.scenes.values()],
+    "large_scenes": lambda study, _: [NamedScene(scene=each) for each in study.online.values()],
     "subspace_cases": _subspace_cases,
     "projection_cases": _projection_cases,
-    "projection_methods": _projection_methods,
-    "heldout_ranks": _heldout_ranks,
+    "projection_methods": lambda study, labels: {
+        case.method: study.methods[case.method] for case in _projection_cases(study, labels)
+    },
+    "options": _options,
+    "experiments": _experiments,
+    "reductions": _reductions,
+    "runs": _runs,
+    "first_run": lambda study, labels: _runs(study, labels)[:1],
+    "drawn_subspaces": _drawn_subspaces,
+    # names of all constraint groups
+    "groups": lambda study, labels: [
+        name for name in EFFECTS if EFFECTS[name].startswith(constraints.__name__)
+    ],
+    "manuscript": paper.manuscript,
+    "facts": paper.facts,
 }

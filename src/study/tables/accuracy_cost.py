@@ -21,7 +21,7 @@ import pandas as pd
 
 from study.artifact import paths
 from study.artifact.paths import File
-from study.artifact.reads import Every, PerScene, TableOf
+from study.artifact.reads import Every, Setting, TableOf
 from study.experiments.kit.settings import ANDERSON, FOM
 from study.tables.kit.declaration import flag, integer, number, table, text, timed
 from study.tables.kit.parts import joined, timings_in_one_time
@@ -57,7 +57,7 @@ CONVERGED, OWN = "converged", "own iterations"
         "frame_times": TableOf("frame_times"),
         "sweeps": Every(paths.ITERATIONS),
         "models": Every(paths.SUBSPACES_CONVERGED),
-        "iterations": PerScene("iterations"),
+        "iterations": Setting("scene_iterations"),
     },
 )
 def accuracy_cost(

@@ -5,7 +5,7 @@ import pandas as pd
 from pdrom.reduction.basis import load_basis
 from study.artifact import paths
 from study.artifact.paths import File
-from study.artifact.reads import Every, Preferred
+from study.artifact.reads import EachOf, Every
 from study.tables.kit.declaration import flag, integer, number, table, text
 from study.tables.kit.parts import joined
 from study.tables.kit.vocabulary import shared
@@ -23,7 +23,7 @@ _SMALL = "empty at round-off level"
         flag("above_roundoff", "larger than the rounding errors of the projections"),
     ),
     # of an experiment's bases the one without weights and centring: every study may hold others
-    reads={"bases": Preferred(paths.BASIS, "basis", "none-none-vectorised")},
+    reads={"bases": EachOf(paths.BASIS, "usual_bases")},
 )
 def singular_values(bases: list[File]) -> pd.DataFrame:
     """Rows of all bases, in order."""

@@ -8,7 +8,7 @@ import pandas as pd
 from pdrom.core.store import open_hdf5
 from study.artifact import paths
 from study.artifact.paths import File
-from study.artifact.reads import Every, PerScene, Setting, TableOf
+from study.artifact.reads import Every, Setting, TableOf
 from study.tables.kit.declaration import flag, number, table, text
 from study.tables.kit.parts import joined
 from study.tables.kit.reruns import KEYS, trained
@@ -38,7 +38,7 @@ FRAGILE = 0.005
         "subspaces": Every(paths.SUBSPACES_TRAIN),
         "sweeps": Every(paths.STABILITY),
         "reduced_reruns": TableOf("reduced_reruns"),
-        "time_steps": PerScene("time_step"),
+        "time_steps": Setting("scene_time_steps"),
         "wrong": Setting("stability.wrong"),
         "departure": Setting("stability.left"),
     },

@@ -6,8 +6,11 @@ from pathlib import Path
 from zlib import crc32
 
 import numpy as np
+from llvmlite import ir
 from numba import cfunc, njit, types
+from numba.extending import intrinsic
 
+_INTEGER = ir.IntType(types.intp.bitwidth)
 KERNELS = ("compiled", "constraints", "dynamics")  # folders whose functions others inline
 
 
@@ -81,6 +84,21 @@ class Callback:
     def address(self):
         """Address of the compiled function."""
         return self._compiled.address
+
+
+def caller(result):
+    """An intrinsic of an address and a tuple of integers: calls a `Callback` with ``result``."""
+
+    def typed(_context, address, arguments):
+        def generate(context, builder, _signature, values):
+            kind = ir.FunctionType(context.get_value_type(result), [_INTEGER] * len(arguments))
+            own = [builder.extract_value(values[1], k) for k in range(len(arguments))]
+            returned = builder.call(builder.inttoptr(values[0], kind.as_pointer()), own)
+            return context.get_dummy_value() if result == types.void else returned
+
+        return result(address, arguments), generate
+
+    return intrinsic(typed)
 
 
 _CLOCK = time.CLOCK_MONOTONIC

@@ -9,12 +9,10 @@ second to an array of its own that is added afterwards.
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from llvmlite import ir
 from numba import types
-from numba.extending import intrinsic
 
 from pdrom.model.compiled import rows
-from pdrom.model.compiled.functions import Callback, compiled
+from pdrom.model.compiled.functions import Callback, caller, compiled, inner
 
 # Entries of every record: number of vertices, and the units of part k are those from FIRST + k to
 # FIRST + k + 1. What a kernel has of its own begins at OWN.
@@ -38,16 +36,13 @@ def local_kernel(function):
     return Callback(function, _SIGNATURE)
 
 
-@intrinsic
-def call(_context, _address, _y, _rhs, _record, _part):
+_call_local, _call_gradients = caller(types.float64), caller(types.void)
+
+
+@inner(forceinline=True)
+def call(address, y, rhs, record, part):
     """Call a local kernel by its address, with y, rhs, record and part as in `local_kernel`."""
-
-    def generate(_target, builder, _signature, arguments):
-        integer = ir.IntType(types.intp.bitwidth)
-        kind = ir.FunctionType(ir.DoubleType(), [integer] * 4)
-        return builder.call(builder.inttoptr(arguments[0], kind.as_pointer()), arguments[1:])
-
-    return types.float64(*(types.intp,) * 5), generate
+    return _call_local(address, (y, rhs, record, part))
 
 
 @compiled(nogil=True)
@@ -190,20 +185,10 @@ def gradient_kernel(function):
     return Callback(function, _GRADIENTS)
 
 
-@intrinsic
-def call_gradients(typing_context, address, d, parameters, p, m):
+@inner(forceinline=True)
+def call_gradients(address, d, parameters, p, m):
     """Call a gradient kernel by its ``address``.
 
     ``d``, ``parameters`` and ``p``, see `gradient_kernel`, are addresses; ``m`` elements.
-    ``typing_context`` is Numba's own: callers leave it out.
     """
-    integers = (types.intp,) * 5
-
-    def generate(context, builder, signature, arguments):
-        integer = ir.IntType(types.intp.bitwidth)
-        kind = ir.FunctionType(ir.VoidType(), [integer] * 4)
-        function = builder.inttoptr(arguments[0], kind.as_pointer())
-        builder.call(function, arguments[1:])
-        return context.get_dummy_value()
-
-    return types.void(*integers), generate
+    _call_gradients(address, (d, parameters, p, m))

@@ -19,19 +19,9 @@ from pydantic import Field, model_validator
 
 from pdrom.model.compiled.functions import template
 from pdrom.model.compiled.rows import doubles
+from pdrom.model.constraints import simplex
 from pdrom.model.constraints.base import GroupConfig
 from pdrom.model.constraints.lanes import LANES, take
-from pdrom.model.constraints.simplex import (
-    ENERGY,
-    F,
-    SimplexGroup,
-    arguments,
-    copy_rows,
-    gather_edges,
-    samples,
-    scatter,
-    store_projections,
-)
 from pdrom.model.mesh.types import Mesh
 
 
@@ -46,19 +36,19 @@ def project(y_place, p_place, record, part, rows, gradients, nearest):
     gradients, nearest : functions of a block: S q from edges, p from S q and the allowed range
     """
     corners, numbers = rows + 1, 1 + rows * rows
-    y, _, packed, geometry, allowed, work, _, _ = arguments(
+    y, _, packed, geometry, allowed, work, _, _ = simplex.arguments(
         y_place, p_place, record, part, corners, numbers
     )
-    elements, taken, taken_geometry = samples(record, corners, numbers)
+    elements, taken, taken_geometry = simplex.samples(record, corners, numbers)
     p = doubles(p_place, 3 * rows * len(elements))
     low, high = allowed[0], allowed[1]
     for start in range(0, len(elements), LANES):
         take(packed, corners, elements, start, taken)
         take(geometry, numbers, elements, start, taken_geometry)
-        gather_edges(y, taken, 0, rows, work)
+        simplex.gather_edges(y, taken, 0, rows, work)
         gradients(work, taken_geometry, 0)
         nearest(work, low, high)
-        store_projections(work, rows, start, p)
+        simplex.store_projections(work, rows, start, p)
     return 0.0
 
 
@@ -71,21 +61,21 @@ def accumulate(y_place, rhs_place, record, part, rows, gradients, nearest, force
     y_place, rhs_place, record : addresses
     gradients, nearest, forces : functions of a block, as in `project`, and the forces from p
     """
-    y, rhs, corners, geometry, allowed, work, first, last = arguments(
+    y, rhs, corners, geometry, allowed, work, first, last = simplex.arguments(
         y_place, rhs_place, record, part, rows + 1, 1 + rows * rows
     )
     low, high = allowed[0], allowed[1]
     for lane in range(LANES):
-        work[ENERGY * LANES + lane] = 0.0
+        work[simplex.ENERGY * LANES + lane] = 0.0
     for block in range(first, last):
-        gather_edges(y, corners, block, rows, work)
+        simplex.gather_edges(y, corners, block, rows, work)
         gradients(work, geometry, block)
         nearest(work, low, high)
         forces(work, geometry, block)
-        scatter(work, corners, block, rows, rhs)
+        simplex.scatter(work, corners, block, rows, rhs)
     energy = 0.0
     for lane in range(LANES):
-        energy += work[ENERGY * LANES + lane]
+        energy += work[simplex.ENERGY * LANES + lane]
     return 0.5 * energy
 
 
@@ -103,9 +93,9 @@ def project_gradients(d_pointer, range_pointer, p_pointer, m, rows, work_size, n
     allowed = carray(range_pointer, (2,))
     work = np.zeros(work_size * LANES)
     for start in range(0, m, LANES):
-        copy_rows(d, rows, start, work, F)
+        simplex.copy_rows(d, rows, start, work, simplex.F)
         nearest(work, allowed[0], allowed[1])
-        store_projections(work, rows, start, p)
+        simplex.store_projections(work, rows, start, p)
 
 
 class StrainConfig(GroupConfig):
@@ -121,7 +111,7 @@ class StrainConfig(GroupConfig):
         return self
 
 
-class SingularValueGroup(SimplexGroup):
+class SingularValueGroup(simplex.SimplexGroup):
     """A group whose kernels are made of `project`, `accumulate` and `project_gradients`."""
 
     manifold = "clamped"

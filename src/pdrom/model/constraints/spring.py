@@ -20,33 +20,17 @@ from pdrom.model.compiled.arithmetic import (
     transposed,
 )
 from pdrom.model.compiled.rows import WIDTH
+from pdrom.model.constraints import simplex
 from pdrom.model.constraints.base import GroupConfig, directions
 from pdrom.model.constraints.lanes import LANES, SMALLEST, lane_function, pack, take
 from pdrom.model.constraints.local_kernel import gradient_kernel, local_kernel
-from pdrom.model.constraints.simplex import (
-    ARRAYS,
-    EDGE,
-    SIZE,
-    WEIGHT,
-    P,
-    SimplexGroup,
-    add_to,
-    arguments,
-    copy_rows,
-    corner_rows,
-    edge_columns,
-    gather_edges,
-    samples,
-    store_projections,
-    take_from,
-)
 from pdrom.model.mesh.types import Mesh
 
 # numbers of a lane in the packed geometry: weight, rest length; and in that of the rest edges
 LENGTH, GEOMETRY = 1, 2
 REST = 3
 # entries of the record: rest edges, those of a block of elements to project
-REST_EDGES, TAKEN_REST = ARRAYS, ARRAYS + 1
+REST_EDGES, TAKEN_REST = simplex.ARRAYS, simplex.ARRAYS + 1
 # squares of lengths that neither overflow nor lose digits
 LOW, HIGH = 1e-280, 1e280
 
@@ -83,7 +67,7 @@ def _rest_lengths(x, y, z, length, rest, place):
 def _project_block(work, geometry, geometry_block, rest, rest_block):
     """Projections of the edges in the working array."""
     for lane in range(0, LANES, WIDTH):
-        edge, p = EDGE * LANES + lane, P * LANES + lane
+        edge, p = simplex.EDGE * LANES + lane, simplex.P * LANES + lane
         px, py, pz = _rest_lengths(
             rows.load(work, edge),
             rows.load(work, edge + LANES),
@@ -99,10 +83,10 @@ def _project_block(work, geometry, geometry_block, rest, rest_block):
 
 @local_kernel
 def _project(y_place, p_place, record, part):
-    y, _, corners, geometry, _, work, _, last = arguments(
+    y, _, corners, geometry, _, work, _, last = simplex.arguments(
         y_place, p_place, record, part, 2, GEOMETRY
     )
-    elements, taken, taken_geometry = samples(record, 2, GEOMETRY)
+    elements, taken, taken_geometry = simplex.samples(record, 2, GEOMETRY)
     entries = rows.indices(record, TAKEN_REST + 1)
     rest = rows.doubles(entries[REST_EDGES], last * REST * LANES)
     taken_rest = rows.doubles(entries[TAKEN_REST], REST * LANES)
@@ -111,15 +95,15 @@ def _project(y_place, p_place, record, part):
         take(corners, 2, elements, start, taken)
         take(geometry, GEOMETRY, elements, start, taken_geometry)
         take(rest, REST, elements, start, taken_rest)
-        gather_edges(y, taken, 0, 1, work)
+        simplex.gather_edges(y, taken, 0, 1, work)
         _project_block(work, taken_geometry, 0, taken_rest, 0)
-        store_projections(work, 1, start, p)
+        simplex.store_projections(work, 1, start, p)
     return 0.0
 
 
 @local_kernel
 def _accumulate(y_place, rhs_place, record, part):
-    y, rhs, corners, geometry, _, _, first, last = arguments(
+    y, rhs, corners, geometry, _, _, first, last = simplex.arguments(
         y_place, rhs_place, record, part, 2, GEOMETRY
     )
     rest = rows.doubles(rows.indices(record, REST_EDGES + 1)[REST_EDGES], last * REST * LANES)
@@ -130,16 +114,17 @@ def _accumulate(y_place, rhs_place, record, part):
         for lane in range(0, LANES, WIDTH):
             a = block * 2 * LANES + lane
             b = a + LANES
-            dx, dy, dz, _ = edge_columns(corner_rows(y, corners, a), corner_rows(y, corners, b))
+            start, end = simplex.corner_rows(y, corners, a), simplex.corner_rows(y, corners, b)
+            dx, dy, dz, _ = simplex.edge_columns(start, end)
             length = rows.load(geometry, numbers + LENGTH * LANES + lane)
             place = block * REST * LANES + lane
             px, py, pz = _rest_lengths(dx, dy, dz, length, rest, place)
-            w = rows.load(geometry, numbers + WEIGHT * LANES + lane)
+            w = rows.load(geometry, numbers + simplex.WEIGHT * LANES + lane)
             square = _squares(subtract(dx, px), subtract(dy, py), subtract(dz, pz))
             energies = add_product(energies, w, square)
             forces = transposed(multiply(w, px), multiply(w, py), multiply(w, pz), none)
-            add_to(rhs, corners, b, forces)
-            take_from(rhs, corners, a, forces)
+            simplex.add_to(rhs, corners, b, forces)
+            simplex.take_from(rhs, corners, a, forces)
     return 0.5 * arithmetic.total(energies)
 
 
@@ -149,14 +134,14 @@ def _project_gradients(d_pointer, parameters, p_pointer, m):
     packed = (m + LANES - 1) // LANES * LANES
     numbers = carray(parameters, (packed * (GEOMETRY + REST),))
     geometry, rest = numbers[: packed * GEOMETRY], numbers[packed * GEOMETRY :]
-    work = np.zeros(SIZE * LANES)
+    work = np.zeros(simplex.SIZE * LANES)
     for start in range(0, m, LANES):
-        copy_rows(d, 1, start, work, EDGE)
+        simplex.copy_rows(d, 1, start, work, simplex.EDGE)
         _project_block(work, geometry, start // LANES, rest, start // LANES)
-        store_projections(work, 1, start, p)
+        simplex.store_projections(work, 1, start, p)
 
 
-class EdgeSpring(SimplexGroup):
+class EdgeSpring(simplex.SimplexGroup):
     """One constraint per edge of the mesh (of a volume: every edge of its tetrahedra).
 
     p keeps the direction of the edge and takes its rest length. An edge of length zero has no

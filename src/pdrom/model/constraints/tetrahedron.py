@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 
 from pdrom.model.compiled.rows import at
-from pdrom.model.constraints import svd3
+from pdrom.model.constraints import singular_values, svd3
 from pdrom.model.constraints.base import GroupConfig, require_cells
 from pdrom.model.constraints.lanes import (
     LANES,
@@ -32,13 +32,6 @@ from pdrom.model.constraints.lanes import (
 )
 from pdrom.model.constraints.local_kernel import gradient_kernel, local_kernel
 from pdrom.model.constraints.simplex import EDGE, ENERGY, FORCE, OPERATOR, WEIGHT, F, P
-from pdrom.model.constraints.singular_values import (
-    SingularValueGroup,
-    StrainConfig,
-    accumulate,
-    project,
-    project_gradients,
-)
 from pdrom.model.constraints.svd3 import FOUND
 from pdrom.model.mesh.types import Mesh
 
@@ -170,20 +163,20 @@ def forces(work, geometry, block):
 
 @local_kernel
 def _project(y, p, record, part):
-    return project(y, p, record, part, 3, gradients, _nearest)
+    return singular_values.project(y, p, record, part, 3, gradients, _nearest)
 
 
 @local_kernel
 def _accumulate(y, rhs, record, part):
-    return accumulate(y, rhs, record, part, 3, gradients, _nearest, forces)
+    return singular_values.accumulate(y, rhs, record, part, 3, gradients, _nearest, forces)
 
 
 @gradient_kernel
 def _project_gradients(d, allowed, p, m):
-    project_gradients(d, allowed, p, m, 3, svd3.SIZE, _nearest)
+    singular_values.project_gradients(d, allowed, p, m, 3, svd3.SIZE, _nearest)
 
 
-class TetrahedronGroup(SingularValueGroup):
+class TetrahedronGroup(singular_values.SingularValueGroup):
     """One constraint per tetrahedron on the signed singular values of F, weight w V_t."""
 
     cells = "tetrahedron"
@@ -206,7 +199,7 @@ class TetrahedronGroup(SingularValueGroup):
 class TetrahedronStrain(TetrahedronGroup):
     """Clamps to [minimum, maximum] > 0: an inverted tetrahedron is turned right side out."""
 
-    class Config(StrainConfig):
+    class Config(singular_values.StrainConfig):
         """Weight w per volume, N/m^2."""
 
         effect: Literal["tetrahedron_strain"] = "tetrahedron_strain"

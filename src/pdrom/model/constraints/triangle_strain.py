@@ -16,6 +16,7 @@ from typing import Literal
 import numpy as np
 
 from pdrom.model.compiled.rows import at
+from pdrom.model.constraints import singular_values
 from pdrom.model.constraints.base import require_cells
 from pdrom.model.constraints.lanes import (
     LANES,
@@ -33,13 +34,6 @@ from pdrom.model.constraints.lanes import (
 )
 from pdrom.model.constraints.local_kernel import gradient_kernel, local_kernel
 from pdrom.model.constraints.simplex import EDGE, ENERGY, FORCE, OPERATOR, SIZE, WEIGHT, F, P
-from pdrom.model.constraints.singular_values import (
-    SingularValueGroup,
-    StrainConfig,
-    accumulate,
-    project,
-    project_gradients,
-)
 from pdrom.model.constraints.svd3 import rotated_pair
 from pdrom.model.mesh.types import Mesh
 
@@ -144,17 +138,17 @@ def _nearest(work, low, high):
 
 @local_kernel
 def _project(y, p, record, part):
-    return project(y, p, record, part, 2, gradients, _nearest)
+    return singular_values.project(y, p, record, part, 2, gradients, _nearest)
 
 
 @local_kernel
 def _accumulate(y, rhs, record, part):
-    return accumulate(y, rhs, record, part, 2, gradients, _nearest, forces)
+    return singular_values.accumulate(y, rhs, record, part, 2, gradients, _nearest, forces)
 
 
 @gradient_kernel
 def _project_gradients(d, allowed, p, m):
-    project_gradients(d, allowed, p, m, 2, WORK, _nearest)
+    singular_values.project_gradients(d, allowed, p, m, 2, WORK, _nearest)
 
 
 def rest_frames(points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -178,10 +172,10 @@ def rest_frames(points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, 
     return inverse, area
 
 
-class TriangleStrain(SingularValueGroup):
+class TriangleStrain(singular_values.SingularValueGroup):
     """One constraint per triangle, weight w A_t."""
 
-    class Config(StrainConfig):
+    class Config(singular_values.StrainConfig):
         """Weight w per area, N/m (times the clamped strain)."""
 
         effect: Literal["strain"] = "strain"

@@ -1,14 +1,15 @@
 """Tetrahedra that keep their volume: det F within a range (Bouaziz et al. 2014, 5.1).
 
-The set of such F is unbounded: a tetrahedron may become as long and thin as it likes, so that
-the projections have no bound.
+Triangles keep their area in the same way, in their plane: the product of F's singular values lies
+within a range. The set of such F is unbounded: an element may become as long and thin as it likes,
+so that the projections have no bound.
 """
 
 from typing import Literal
 
 import numpy as np
 
-from pdrom.model.constraints import products, svd3
+from pdrom.model.constraints import products, singular_values, svd3, triangle_strain
 from pdrom.model.constraints.lanes import (
     LANES,
     cross,
@@ -16,19 +17,15 @@ from pdrom.model.constraints.lanes import (
     lane_function,
     load,
     load_matrix,
+    mix,
     save,
     save_matrix,
+    scaled,
     unmarked,
 )
 from pdrom.model.constraints.local_kernel import gradient_kernel, local_kernel
-from pdrom.model.constraints.simplex import F, P
-from pdrom.model.constraints.singular_values import (
-    StrainConfig,
-    accumulate,
-    project,
-    project_gradients,
-)
-from pdrom.model.constraints.svd3 import FOUND, SIGMA
+from pdrom.model.constraints.simplex import SIZE, F, P
+from pdrom.model.constraints.svd3 import FOUND, SIGMA, rotated_pair
 from pdrom.model.constraints.tetrahedron import TetrahedronGroup, forces, gradients
 
 # where the working array of products begins
@@ -57,17 +54,17 @@ def _nearest(work, low, high):
 
 @local_kernel
 def _project(y, p, record, part):
-    return project(y, p, record, part, 3, gradients, _nearest)
+    return singular_values.project(y, p, record, part, 3, gradients, _nearest)
 
 
 @local_kernel
 def _accumulate(y, rhs, record, part):
-    return accumulate(y, rhs, record, part, 3, gradients, _nearest, forces)
+    return singular_values.accumulate(y, rhs, record, part, 3, gradients, _nearest, forces)
 
 
 @gradient_kernel
 def _project_gradients(d, allowed, p, m):
-    project_gradients(d, allowed, p, m, 3, WORK, _nearest)
+    singular_values.project_gradients(d, allowed, p, m, 3, WORK, _nearest)
 
 
 class TetrahedronVolume(TetrahedronGroup):
@@ -76,7 +73,7 @@ class TetrahedronVolume(TetrahedronGroup):
     An inverted tetrahedron is turned right side out.
     """
 
-    class Config(StrainConfig):
+    class Config(singular_values.StrainConfig):
         """Weight w per volume, N/m^2; allowed volumes [minimum, maximum] over that at rest."""
 
         effect: Literal["volume"] = "volume"
@@ -85,6 +82,69 @@ class TetrahedronVolume(TetrahedronGroup):
     project_kernel = _project
     accumulate_kernel = _accumulate
     gradient_kernel = _project_gradients
+    manifold = "size"
+
+    def _reference_values(self, sigma: np.ndarray) -> np.ndarray:
+        return products.reference_nearest(sigma, *self.allowed)
+
+
+# numbers of a lane of an area after those of every simplex: the columns of U, the rotation V; then
+# the working array of products begins
+U, COSINE, SINE = SIZE, SIZE + 6, SIZE + 7
+AREA_VALUES, AREA_WORK = SIZE + 8, SIZE + 8 + products.SIZE
+
+
+@lane_function
+def _nearest_area(work, low, high):
+    """Projections of a block."""
+    values = work[AREA_VALUES * LANES :]
+    for lane in range(LANES):
+        f0, f1 = load(work, F, lane), load(work, F + 3, lane)
+        scale, c, s, swapped, pair = rotated_pair(f0, f1, -1.0)
+        u0, u1, s0, s1 = pair
+        save(work, U, lane, u0)
+        save(work, U + 3, lane, u1)
+        # a quarter turn more puts the longer column first
+        work[COSINE * LANES + lane] = s if swapped else c
+        work[SINE * LANES + lane] = -c if swapped else s
+        save(values, products.VALUES, lane, (scale * s0, 1.0, scale * s1))
+    products.nearest_block(values, low, high, False)
+    for lane in range(LANES):
+        sigma = load(values, products.VALUES, lane)
+        a, b = scaled(sigma[0], load(work, U, lane)), scaled(sigma[2], load(work, U + 3, lane))
+        c, s = work[COSINE * LANES + lane], work[SINE * LANES + lane]
+        save(work, P, lane, mix(c, a, s, b))
+        save(work, P + 3, lane, mix(c, b, -s, a))
+
+
+@local_kernel
+def _project_area(y, p, record, part):
+    return singular_values.project(y, p, record, part, 2, triangle_strain.gradients, _nearest_area)
+
+
+@local_kernel
+def _accumulate_area(y, rhs, record, part):
+    gradients, forces = triangle_strain.gradients, triangle_strain.forces
+    return singular_values.accumulate(y, rhs, record, part, 2, gradients, _nearest_area, forces)
+
+
+@gradient_kernel
+def _project_area_gradients(d, allowed, p, m):
+    singular_values.project_gradients(d, allowed, p, m, 2, AREA_WORK, _nearest_area)
+
+
+class TriangleArea(triangle_strain.TriangleStrain):
+    """One constraint per triangle on its area over that at rest, weight w A_t."""
+
+    class Config(singular_values.StrainConfig):
+        """Weight w per area, N/m; allowed areas [minimum, maximum] over that at rest."""
+
+        effect: Literal["area"] = "area"
+
+    work_size = AREA_WORK
+    project_kernel = _project_area
+    accumulate_kernel = _accumulate_area
+    gradient_kernel = _project_area_gradients
     manifold = "size"
 
     def _reference_values(self, sigma: np.ndarray) -> np.ndarray:

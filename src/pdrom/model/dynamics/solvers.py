@@ -45,7 +45,12 @@ def panels(lower: sparse.csc_array, diagonal: np.ndarray) -> tuple[Any, ...]:
     n = lower.shape[0]
     below = np.zeros((max(WIDTHS) + 1, n), np.int64)
     _count_rows_below(lower.indptr, lower.indices, np.full(n, -1), below)
-    ends = _partition(below)
+    chosen, column, columns = np.zeros(n + 1, np.int64), n, []
+    _choose(below, np.array(WIDTHS), np.full(n + 1, np.inf), chosen)
+    while column > 0:
+        columns.append(column)
+        column -= int(chosen[column])
+    ends = np.array(columns[::-1], np.int64)
     width = np.diff(ends, prepend=0)
     count = below[width, ends - 1]
     first = np.concatenate([[0], ends]).astype(np.int32)
@@ -77,19 +82,6 @@ def _count_rows_below(indptr, indices, seen, below):
                     seen[row] = j
                     count += 1
             below[width, j] = count
-
-
-def _partition(below: np.ndarray) -> np.ndarray:
-    """End column (exclusive) of each panel in the cheapest partition, ascending."""
-    n = below.shape[1]
-    chosen = np.zeros(n + 1, np.int64)
-    _choose(below, np.array(WIDTHS), np.full(n + 1, np.inf), chosen)
-    ends = []
-    end = n
-    while end > 0:
-        ends.append(end)
-        end -= int(chosen[end])
-    return np.array(ends[::-1], np.int64)
 
 
 @compiled

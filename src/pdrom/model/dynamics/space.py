@@ -10,14 +10,7 @@ from pdrom.model.compiled.rows import copied, flat, unflat
 from pdrom.model.dynamics.acceleration import Anderson
 from pdrom.model.dynamics.frames import CompiledIterations, WholeFrames, end, predict, weighted
 from pdrom.model.dynamics.system import GlobalSystem
-from pdrom.model.effects.base import (
-    Boundary,
-    Contact,
-    Force,
-    held_path,
-    held_targets,
-    held_vertices,
-)
+from pdrom.model.effects import base
 
 
 class Solve(Protocol):
@@ -48,18 +41,12 @@ class Space(ABC):
 
     def compiled(
         self, local_steps: Sequence[Any], acceleration: Anderson | None = None
-    ) -> CompiledIterations | None:
-        """Compiled iterations with ``local_steps`` and ``acceleration``, None if there are none."""
-        return None
+    ) -> tuple[CompiledIterations | None, WholeFrames | None]:
+        """Compiled iterations with ``local_steps`` and ``acceleration``, and whole frames of these.
 
-    def whole(
-        self, local_steps: Sequence[Any], loop: Any, acceleration: Anderson | None
-    ) -> WholeFrames | None:
-        """Whole frames in compiled code around a compiled ``loop``, None if there are none.
-
-        ``local_steps`` and ``acceleration`` are those of the loop, see `compiled`.
+        Each is None if there are none.
         """
-        return None
+        return None, None
 
     @abstractmethod
     def acceleration(self, positions: np.ndarray, velocities: np.ndarray) -> np.ndarray:
@@ -98,9 +85,9 @@ class VertexSpace(Space):
     def __init__(
         self,
         system: GlobalSystem,
-        forces: Sequence[Force] = (),
-        boundaries: Sequence[Boundary] = (),
-        contacts: Sequence[Contact] = (),
+        forces: Sequence[base.Force] = (),
+        boundaries: Sequence[base.Boundary] = (),
+        contacts: Sequence[base.Contact] = (),
     ) -> None:
         self.system = system
         self._forces, self._boundaries, self._contacts = forces, boundaries, contacts
@@ -112,14 +99,14 @@ class VertexSpace(Space):
         return total
 
     def fixed(self, frame: int, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        return held_targets(self._boundaries, frame, positions)
+        return base.held_targets(self._boundaries, frame, positions)
 
     def held_path(self, frames: range, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Coordinates that are held in the first ``frames``, and their values (n, m, 3).
 
         ``positions`` (N, 3) are those at the beginning of the first one.
         """
-        return held_path(self._boundaries, frames, positions)
+        return base.held_path(self._boundaries, frames, positions)
 
     def eliminate(self, fixed: np.ndarray, targets: np.ndarray) -> Solve:
         elimination = self.system.eliminate(fixed)
@@ -140,19 +127,15 @@ class VertexSpace(Space):
 
     def compiled(
         self, local_steps: Sequence[Any], acceleration: Anderson | None = None
-    ) -> CompiledIterations | None:
+    ) -> tuple[CompiledIterations | None, WholeFrames | None]:
         if any(getattr(step, "local_kernel", None) is None for step in local_steps):
-            return None
-        return CompiledIterations(local_steps, self.system.inertia, acceleration)
-
-    def whole(
-        self, local_steps: Sequence[Any], loop: Any, acceleration: Anderson | None
-    ) -> WholeFrames | None:
+            return None, None
+        loop = CompiledIterations(local_steps, self.system.inertia, acceleration)
         effects = self._forces, self._boundaries, self._contacts
         # a subclass may do any part of a frame in its own way
         if type(self) is not VertexSpace or not WholeFrames.suits(local_steps, *effects):
-            return None
-        return WholeFrames(self, loop, self._forces, self._contacts, acceleration)
+            return loop, None
+        return loop, WholeFrames(self, loop, self._forces, self._contacts, acceleration)
 
     def inertia(self, s: np.ndarray) -> np.ndarray:
         return unflat(weighted(self.system.inertia, flat(s)))
@@ -164,6 +147,6 @@ class VertexSpace(Space):
     def correct(self, y: np.ndarray, before: np.ndarray, frame: int) -> None:
         if not self._contacts:
             return
-        held = held_vertices(self._boundaries, frame)
+        held = base.held_vertices(self._boundaries, frame)
         for contact in self._contacts:
             contact.apply(y, before, held)

@@ -74,11 +74,9 @@ class Stepper:
         self.local_steps = list(local_steps)
         self._acceleration = acceleration
         self._track = track_objective
-        self._compiled = space.compiled(self.local_steps, acceleration)
-        # has the method `run` of `pdrom.model.dynamics.frames.WholeFrames`
-        self._whole: Any = None
-        if self._compiled is not None:
-            self._whole = space.whole(self.local_steps, self._compiled, acceleration)
+        # a subclass may have whole frames of its own, with the method `run` of `WholeFrames`
+        self._whole: Any
+        self._compiled, self._whole = space.compiled(self.local_steps, acceleration)
 
     def step(
         self, state: State, frame: int, on_last_iterate: Callable[[np.ndarray], None] | None = None

@@ -11,7 +11,7 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 
 from pdrom.model.compiled.arithmetic import multiply_add, spread, subtract
-from pdrom.model.compiled.functions import Callback, compiled
+from pdrom.model.compiled.functions import Callback, caller, compiled
 from pdrom.model.compiled.rows import NUMBERS, WIDTH, at, doubles, indices, integers, store
 from pdrom.model.compiled.rows import load as load_row
 
@@ -187,22 +187,9 @@ def _sweep(
         store(y, WIDTH * at(vertices, i), load_row(x, WIDTH * i))
 
 
-_ARGUMENTS = 12
 # Called by its address: as a part of each loop it would be compiled with each of them.
-SWEEP = Callback(_sweep, types.void(*(types.intp,) * _ARGUMENTS))
-
-
-@intrinsic
-def _call(_context, address, arguments):
-    """Call `SWEEP` by its ``address`` with a tuple of ``arguments``."""
-
-    def generate(_target, builder, _signature, values):
-        kind = ir.FunctionType(ir.VoidType(), [_INDEX] * _ARGUMENTS)
-        own = [builder.extract_value(values[1], k) for k in range(_ARGUMENTS)]
-        builder.call(builder.inttoptr(values[0], kind.as_pointer()), own)
-        return _target.get_dummy_value()
-
-    return types.void(address, arguments), generate
+SWEEP = Callback(_sweep, types.void(*(types.intp,) * 12))
+_call = caller(types.void)
 
 
 @compiled(nogil=True)

@@ -26,6 +26,6 @@ EFFECTS = Registry(
         "tetrahedron_strain": "pdrom.model.constraints.tetrahedron:TetrahedronStrain",
         "deformation_gradient": "pdrom.model.constraints.tetrahedron:DeformationGradient",
         "volume": "pdrom.model.constraints.volume:TetrahedronVolume",
-        "area": "pdrom.model.constraints.area:TriangleArea",
+        "area": "pdrom.model.constraints.volume:TriangleArea",
     },
 )

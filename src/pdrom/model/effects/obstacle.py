@@ -13,6 +13,10 @@ from pdrom.model.mesh.types import Length, Mesh, PositiveLength
 # A vertex that began a frame no deeper than this part of the extent began it outside.
 SLACK = 1e-9
 
+Entries = tuple[np.ndarray, np.ndarray, np.ndarray]
+"""Hits (n,) bool, points (n, 3) m, outward unit normals (n, 3) of paths into a body; the latter two
+mean nothing for a path that does not enter."""
+
 
 class ObstacleConfig(EffectConfig):
     """``friction`` mu: 0 glides, ``.inf`` sticks."""
@@ -75,16 +79,8 @@ class Obstacle(Contact):
         """Outward unit normals (n, 3) at the surface points nearest to ``points`` (n, 3) inside."""
 
     @abstractmethod
-    def entries(
-        self, start: np.ndarray, end: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Entry of straight paths from ``start`` to ``end`` (n, 3), begun outside, into the body.
-
-        Returns
-        -------
-        hits (n,) bool, points (n, 3) m, outward unit normals (n, 3); the latter two mean nothing
-        for a path that does not enter.
-        """
+    def entries(self, start: np.ndarray, end: np.ndarray) -> Entries:
+        """Entry into the body of straight paths from ``start`` outside to ``end`` (n, 3)."""
 
 
 class Plane(Obstacle):
@@ -115,9 +111,7 @@ class Plane(Obstacle):
     def normals(self, points: np.ndarray) -> np.ndarray:
         return np.tile(self._normal, (len(points), 1))
 
-    def entries(
-        self, start: np.ndarray, end: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def entries(self, start: np.ndarray, end: np.ndarray) -> Entries:
         above, below = np.maximum(-self.depths(start), 0.0), self.depths(end)
         hits = below > 0.0
         fraction = np.where(hits, above / np.where(hits, above + below, 1.0), 0.0)
@@ -153,9 +147,7 @@ class Sphere(Obstacle):
         length = np.linalg.norm(arm, axis=1)[:, None]
         return np.where(length > 0.0, arm / np.where(length > 0.0, length, 1.0), UP)
 
-    def entries(
-        self, start: np.ndarray, end: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def entries(self, start: np.ndarray, end: np.ndarray) -> Entries:
         """Smaller root t of |start + t (end - start) - centre| = radius, if in [0, 1]."""
         arm, path = start - self._centre, end - start
         square = np.einsum("ij,ij->i", path, path)
@@ -203,10 +195,8 @@ class Box(Obstacle):
         face = self._to_faces(points).argmin(axis=1)
         return _axis_vectors(face % 3, np.where(face < 3, -1.0, 1.0))
 
-    def entries(
-        self, start: np.ndarray, end: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Entries of straight paths from ``start`` to ``end`` (n, 3), see `Obstacle.entries`.
+    def entries(self, start: np.ndarray, end: np.ndarray) -> Entries:
+        """Entries of straight paths from ``start`` to ``end`` (n, 3), see `Entries`.
 
         A path enters where it has crossed the nearer faces of all three axes.
         """

@@ -29,9 +29,9 @@ def oversample(v: np.ndarray, size: int, elements: np.ndarray, count: int) -> np
         An element is repeated or out of range.
     """
     growing = _Growing(v, size, elements)
-    while growing.count < min(count, growing.total):
+    while len(growing.picked) < min(count, growing.total):
         growing.add()
-    return growing.chosen
+    return np.array(growing.picked, dtype=np.int64)
 
 
 def bound_gain(v: np.ndarray, size: int, elements: np.ndarray, bound: float) -> np.ndarray:
@@ -42,13 +42,17 @@ def bound_gain(v: np.ndarray, size: int, elements: np.ndarray, bound: float) -> 
     `oversample`, and so are ``v`` and ``size``.
     """
     growing = _Growing(v, size, elements)
-    while growing.count < growing.total and growing.gain > bound:
+    while len(growing.picked) < growing.total and growing.gain > bound:
         growing.add()
-    return growing.chosen
+    return np.array(growing.picked, dtype=np.int64)
 
 
 class _Growing:
-    """Sampled elements and the Gram matrix G = (P^T V)^T P^T V of their rows."""
+    """Sampled elements and the Gram matrix G = (P^T V)^T P^T V of their rows.
+
+    picked : sampled elements in order of selection
+    total : number of all elements
+    """
 
     def __init__(self, v: np.ndarray, size: int, elements: np.ndarray) -> None:
         self._rows = np.ascontiguousarray(v)
@@ -56,35 +60,17 @@ class _Growing:
         # a tenth of the numbers of the blocks say all but a few digits of the growth
         self._squares = self._blocks @ self._blocks.transpose(0, 2, 1)
         self._sizes = np.trace(self._squares, axis1=1, axis2=2)
-        self._picked = [int(e) for e in elements]
-        self._check()
-        rows = self._blocks[self._picked].reshape(-1, v.shape[1])
-        self._gram = rows.T @ rows
-        self._decompose()
-
-    def _check(self) -> None:
-        if len(set(self._picked)) < len(self._picked):
-            raise SamplingError(f"{self.count} elements to start with, some of them repeated")
-        if self._picked and not 0 <= min(self._picked) <= max(self._picked) < self.total:
+        self.picked, self.total = [int(e) for e in elements], len(self._blocks)
+        if len(set(self.picked)) < len(self.picked):
+            raise SamplingError(f"{len(elements)} elements to start with, some of them repeated")
+        if self.picked and not 0 <= min(self.picked) <= max(self.picked) < self.total:
             raise SamplingError(
-                f"elements {min(self._picked)} to {max(self._picked)} to start with: allowed are "
+                f"elements {min(self.picked)} to {max(self.picked)} to start with: allowed are "
                 f"0 to {self.total - 1}"
             )
-
-    @property
-    def total(self) -> int:
-        """Number of elements e."""
-        return len(self._blocks)
-
-    @property
-    def count(self) -> int:
-        """Number of sampled elements."""
-        return len(self._picked)
-
-    @property
-    def chosen(self) -> np.ndarray:
-        """Sampled elements in order of selection."""
-        return np.array(self._picked, dtype=np.int64)
+        rows = self._blocks[self.picked].reshape(-1, v.shape[1])
+        self._gram = rows.T @ rows
+        self._decompose()
 
     @property
     def gain(self) -> float:
@@ -94,9 +80,9 @@ class _Growing:
 
     def add(self) -> None:
         """Sample the element with the largest bound on the growth of the smallest eigenvalue."""
-        new = self._strongest()
-        self._picked.append(new)
-        self._gram += self._blocks[new].T @ self._blocks[new]
+        self.picked.append(self._strongest())
+        block = self._blocks[self.picked[-1]]
+        self._gram += block.T @ block
         self._decompose()
 
     def _decompose(self) -> None:
@@ -118,7 +104,7 @@ class _Growing:
         """
         products = (self._rows @ self._weakest).reshape(self.total, -1)
         strength = np.einsum("es,es->e", products, products)
-        strength[self._picked] = -1.0
+        strength[self.picked] = -1.0
         first = int(np.argmax(strength))
         bound = self._growth(np.array([first]), products)[0]
         if bound == 0.0:

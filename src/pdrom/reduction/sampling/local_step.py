@@ -4,7 +4,7 @@ Its compiled part gets the coefficients from sampled entries and reconstructs ("
 come in sets: one that all axes share, or one an axis. A column of the lift adds the coefficients of
 its set to one axis of the right-hand side."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -69,32 +69,24 @@ class Lift:
     offset: np.ndarray
     seconds: np.ndarray
 
-    @property
-    def arrays(self) -> Sequence[np.ndarray]:
-        """All of them, in the order of the kernel's record."""
-        return tuple(getattr(self, name) for name in self.__dataclass_fields__)
-
-    @property
-    def split(self) -> bool:
-        """Whether its rows are in two parts."""
-        _, vertices, modes = self.lifted.shape
-        return bool(vertices * modes >= SPLIT_FROM)
-
     def kernel(self, sampler: LocalKernel, sampled: int) -> LocalKernel:
         """Local kernel that adds the lift; ``sampler`` writes so many ``sampled`` numbers."""
         columns, vertices, modes = self.lifted.shape
+        split = vertices * modes >= SPLIT_FROM
         numbers = (
             modes, len(self.shifts), columns, sampled, sampler.address, sampler.record.ctypes.data
         )  # fmt: skip
         clocks = np.stack([clock(), clock()])
-        arrays = (*self.arrays, np.empty(sampled), clocks, sampler.record, *sampler.arrays)
+        # those of the lift have the order of the kernel's record
+        own = vars(self).values()
+        arrays = (*own, np.empty(sampled), clocks, sampler.record, *sampler.arrays)
         return LocalKernel(
             _accumulate,
             vertices,
             units=vertices,
             arrays=arrays,
             numbers=numbers,
-            touched=(lambda first: np.arange(first, vertices)) if self.split else None,
+            touched=(lambda first: np.arange(first, vertices)) if split else None,
             prepares=True,
         )
 
@@ -276,7 +268,12 @@ def _lift(group: ConstraintGroup, reduction: Reduction) -> Lift:
     mean, blocks, r = reduction.basis.mean, reduction.blocks, reduction.r
     operator = group.S.T.multiply(group.row_weights[None, :]).tocsr()
     vertices = operator.shape[0]
-    place = _local_positions(reduction)
+    # from entries of the full vector to those of the sampled elements' vector
+    size = 3 * reduction.basis.rows_per_element
+    entries = np.concatenate([np.empty(0, np.int64), *(block.entries for block in blocks)])
+    element, inside = np.divmod(entries, size)
+    order = np.argsort(reduction.elements, kind="stable")
+    places = order[np.searchsorted(reduction.elements[order], element)]
     every = [range(3) if block.axis is None else (block.axis,) for block in blocks]
     columns = [(axis, k) for k, axes in enumerate(every) for axis in axes]
     lifted = np.zeros((len(columns), vertices, r))
@@ -284,9 +281,9 @@ def _lift(group: ConstraintGroup, reduction: Reduction) -> Lift:
         own[...] = operator @ reduction.v[axis::3]
     return Lift(
         starts=np.cumsum([0, *(len(block.entries) for block in blocks)], dtype=np.int64),
-        positions=_joined([place(block.entries) for block in blocks], np.int64),
-        packed=np.empty(sum(len(block.entries) for block in blocks)),
-        operators=_joined([block.operator.ravel() for block in blocks], np.float64),
+        positions=size * places + inside,
+        packed=np.empty(len(entries)),
+        operators=np.concatenate([np.empty(0), *(block.operator.ravel() for block in blocks)]),
         shifts=np.array([b.operator @ mean[b.entries] for b in blocks]).reshape(-1, r),
         coefficients=np.zeros((len(blocks), r)),
         axes=np.array([axis for axis, _ in columns], dtype=np.int64),
@@ -295,23 +292,6 @@ def _lift(group: ConstraintGroup, reduction: Reduction) -> Lift:
         offset=flat(as_vertices(operator @ mean.reshape(-1, 3))),
         seconds=np.zeros(2),
     )
-
-
-def _joined(parts: list[np.ndarray], kind: type) -> np.ndarray:
-    return np.concatenate([np.empty(0, kind), *parts]).astype(kind)
-
-
-def _local_positions(reduction: Reduction) -> Callable[[np.ndarray], np.ndarray]:
-    """Map from entries of the full vector to entries of the sampled elements' vector."""
-    size = 3 * reduction.basis.rows_per_element
-    order = np.argsort(reduction.elements, kind="stable")
-    ordered = reduction.elements[order]
-
-    def place(entries: np.ndarray) -> np.ndarray:
-        element, inside = np.divmod(entries, size)
-        return size * order[np.searchsorted(ordered, element)] + inside
-
-    return place
 
 
 def replace_group(scene: Scene, group: str, replacement: LocalStep) -> list[LocalStep]:

@@ -1,5 +1,6 @@
 """A reduced projection: p(q) is replaced by mean + V c, with c from sampled entries of p."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -8,7 +9,9 @@ from scipy import linalg
 
 from pdrom.core.errors import SamplingError
 from pdrom.reduction.basis import Basis
-from pdrom.reduction.method import MethodSpec, Solve
+from pdrom.reduction.method import SELECTIONS, MethodSpec, Solve
+from pdrom.reduction.sampling.deim import Selection, joint_rows
+from pdrom.reduction.sampling.gappy_pod_e import bound_gain
 
 
 def solution_operator(a: np.ndarray, solve: Solve, tikhonov: float) -> np.ndarray:
@@ -197,3 +200,56 @@ class Reduction:
             sampled = matrix[:, block.entries] - self.basis.mean[block.entries]
             result[:, block.output] += sampled @ block.operator.T @ self.v[block.output].T
         return result.reshape(snapshots.shape)
+
+
+def select(basis: Basis, spec: MethodSpec, r: int) -> Sampling:
+    """Sampling of ``spec`` for the first r modes of ``basis``."""
+    return select_path(basis, spec, [r])[r]
+
+
+def select_path(basis: Basis, spec: MethodSpec, ranks: Sequence[int]) -> dict[int, Sampling]:
+    """Samplings of ``basis`` by ``spec`` for several ``ranks``, nested where they are greedy.
+
+    Blocks beyond the modes are not nested in r: they depend on where the first r modes are weak.
+
+    Raises
+    ------
+    RankError
+        If an r is below 1 or exceeds the numerical rank of the basis.
+    """
+    if not ranks:
+        return {}
+    basis.truncated(min(ranks))
+    v, counts = basis.truncated(max(ranks)), (basis.rows_per_element, basis.elements)
+    if spec.rows == "all":
+        everything = Sampling.of_elements(np.arange(basis.elements), *counts)
+        return dict.fromkeys(ranks, everything)
+    size = {"scalar": 1, "joint": 3, "element": 3 * basis.rows_per_element}[spec.rows]
+    if spec.rows == "joint":
+        path = joint_rows(v, basis.active_axes, spec.repeat_rows)
+        starts = {r: path[:r] for r in ranks}
+    else:
+        selection: Selection = SELECTIONS.load(spec.selection)()
+        starts = selection.one_a_mode(v, size, ranks)
+    samplings = {}
+    for r, chosen in starts.items():
+        if spec.oversampling > 1:
+            count = min(spec.oversampling * r, len(v) // size)
+            selection = SELECTIONS.load(spec.selection)()
+            chosen = selection.extend(v[:, :r], size, chosen, count)
+        if spec.gain_bound is not None:
+            chosen = bound_gain(v[:, :r], size, chosen, bound=spec.gain_bound)
+        if spec.rows == "element":
+            samplings[r] = Sampling.of_elements(chosen, *counts)
+        else:
+            # the x entry of each row stands for the row
+            entries = 3 * chosen if spec.rows == "joint" else chosen
+            samplings[r] = Sampling.of_entries(entries, *counts, repeats=spec.repeat_rows)
+    return samplings
+
+
+def reductions(basis: Basis, spec: MethodSpec, sizes: Sequence[int]) -> dict[int, Reduction]:
+    """Reductions of those of ``sizes`` that ``basis`` has, by ``spec``; see `select_path`."""
+    known = [r for r in sizes if r <= basis.rank]
+    path = select_path(basis, spec, known)
+    return {r: Reduction(basis, path[r], spec, r=r) for r in known}

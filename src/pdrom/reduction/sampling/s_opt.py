@@ -39,28 +39,7 @@ def s_opt_path(v: np.ndarray, size: int) -> np.ndarray:
     state = _Sampled(v, size)
     for mode in range(min(v.shape[1], state.total)):
         state.add(state.best_with(mode), mode)
-    return state.chosen
-
-
-def extend(v: np.ndarray, size: int, elements: np.ndarray, count: int) -> np.ndarray:
-    """``elements`` followed by those that raise the S-measure of all modes, ``count`` in all.
-
-    Ends with all e elements if there are fewer. Raises SamplingError if the modes depend on each
-    other at the elements to start with.
-
-    Parameters
-    ----------
-    v : (rows, r) basis
-    elements : (m,) blocks to start with
-    size : rows of a block
-    """
-    count = min(count, len(v) // size)
-    if count <= len(elements):
-        return np.asarray(elements, dtype=np.int64)
-    state = _Sampled(v, size, elements)
-    while len(state.chosen) < count:
-        state.add(state.best())
-    return state.chosen
+    return np.array(state.picked, dtype=np.int64)
 
 
 class SOpt(Selection):
@@ -71,7 +50,18 @@ class SOpt(Selection):
         return {r: path[:r] for r in ranks}
 
     def extend(self, v: np.ndarray, size: int, chosen: np.ndarray, count: int) -> np.ndarray:
-        return extend(v, size, chosen, count=count)
+        """``chosen`` followed by those that raise the S-measure of all modes, ``count`` in all.
+
+        Ends with all e elements if there are fewer. Raises SamplingError if the modes depend on
+        each other at the elements to start with.
+        """
+        count = min(count, len(v) // size)
+        if count <= len(chosen):
+            return np.asarray(chosen, dtype=np.int64)
+        state = _Sampled(v, size, chosen)
+        while len(state.picked) < count:
+            state.add(state.best())
+        return np.array(state.picked, dtype=np.int64)
 
 
 class _Sampled:
@@ -84,9 +74,11 @@ class _Sampled:
     candidate q + z^T (I + M)^-1 z: q from the rows that are sampled already, z the candidate's part
     of the residual; afterwards M <- M + z z^T / q. One step costs O(s e (s + k)) instead of a
     determinant for each element.
+
+    picked : sampled elements in order of selection
     """
 
-    def __init__(self, v: np.ndarray, size: int, elements: np.ndarray | None = None) -> None:
+    def __init__(self, v: np.ndarray, size: int, elements: Sequence[int] | np.ndarray = ()) -> None:
         # the measure does not depend on the lengths of the columns, round-off does
         norms = np.linalg.norm(v, axis=0)
         if not norms.all():
@@ -94,18 +86,13 @@ class _Sampled:
         self._blocks = (v / norms).reshape(-1, size, v.shape[1])
         self.total = len(self._blocks)
         self._squares = np.einsum("esk,esk->ek", self._blocks, self._blocks)
-        self._picked = [] if elements is None else [int(e) for e in elements]
+        self.picked = [int(e) for e in elements]
         self._products = np.zeros((self.total, size, size))
         self._modes, self._fit = 0, GrowingFit(v.shape[1])
-        if self._picked:
-            self._fit.add(self._blocks[self._picked].reshape(-1, v.shape[1]))
+        if self.picked:
+            self._fit.add(self._blocks[self.picked].reshape(-1, v.shape[1]))
             self._modes = v.shape[1]
             self._products = self._blocks @ self._inverse() @ self._blocks.transpose(0, 2, 1)
-
-    @property
-    def chosen(self) -> np.ndarray:
-        """Sampled elements in order of selection."""
-        return np.array(self._picked, dtype=np.int64)
 
     def best(self) -> int:
         """Element with the largest S-measure of the modes that are in."""
@@ -114,7 +101,7 @@ class _Sampled:
 
     def best_with(self, mode: int) -> int:
         """Element with the largest S-measure when ``mode`` joins the columns."""
-        if not self._picked:
+        if not self.picked:
             return int(np.argmax(self._squares[:, mode]))
         z, q = self._residual()
         solved = np.linalg.solve(self._shifted(), z[:, :, None])[:, :, 0]
@@ -134,7 +121,7 @@ class _Sampled:
         cross = columns @ (inverse @ rows.T)
         solved = np.linalg.solve(small, cross.reshape(-1, len(rows)).T).T.reshape(cross.shape)
         self._products -= cross @ solved.transpose(0, 2, 1)
-        self._picked.append(element)
+        self.picked.append(element)
         self._fit.add(self._blocks[element])
         if mode is not None:
             z, q = self._residual()
@@ -149,16 +136,16 @@ class _Sampled:
         """Residual (e, s) of the next mode fitted at the sampled rows, its squared norm there."""
         known, new = self._blocks[:, :, : self._modes], self._blocks[:, :, self._modes]
         z = new - known @ self._fit.coefficients(self._modes)
-        return z, float(np.sum(z[self._picked] ** 2))
+        return z, float(np.sum(z[self.picked] ** 2))
 
     def _inverse(self) -> np.ndarray:
         """G^-1 (k, k) of the sampled rows."""
         factor = self._fit.triangle(self._modes)
-        diagonal, rows = np.abs(np.diag(factor)), len(self._picked) * self._blocks.shape[1]
+        diagonal, rows = np.abs(np.diag(factor)), len(self.picked) * self._blocks.shape[1]
         if rows < self._modes or diagonal.min(initial=1.0) <= DEPENDENT * diagonal.max(initial=0.0):
             raise SamplingError(
                 f"S-OPT: the first {self._modes} modes depend on each other at the "
-                f"{len(self._picked)} sampled elements"
+                f"{len(self.picked)} sampled elements"
             )
         half = linalg.solve_triangular(factor, np.eye(self._modes), check_finite=False)
         return half @ half.T
@@ -173,11 +160,11 @@ class _Sampled:
 
     def _column_norms(self, modes: int) -> np.ndarray:
         """Squared norms (e, modes) of the sampled columns with each element added."""
-        return self._squares[self._picked, :modes].sum(axis=0) + self._squares[:, :modes]
+        return self._squares[self.picked, :modes].sum(axis=0) + self._squares[:, :modes]
 
     def _argmax(self, measure: np.ndarray) -> int:
         """First element with the largest measure among those that are not sampled."""
-        measure[self._picked] = -np.inf
+        measure[self.picked] = -np.inf
         if np.isneginf(measure).all():
             raise SamplingError("S-OPT: no element makes the sampled modes independent")
         return int(np.argmax(measure))

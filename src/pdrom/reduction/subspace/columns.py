@@ -93,22 +93,16 @@ def build_columns(
     masses : (N,) kg
     """
     n = len(points)
-    held = np.zeros(n, dtype=bool)
-    for atom in atoms:
-        held[atom] = True
-    free_vertices = np.flatnonzero(~held)
+    free_vertices = np.setdiff1d(np.arange(n), np.concatenate([np.empty(0, np.int64), *atoms]))
     weight = np.sqrt(masses[free_vertices])[:, None]
     raw = np.hstack([affine_columns(points), modes])[free_vertices]
     blocks = [(free_vertices, orthonormal(weight * raw) / weight)]
     blocks += [(a, _atom_columns(a, points, trajectory, modes.shape[1])) for a in atoms]
-    total = sum(block.shape[1] for _, block in blocks)
-    b = np.zeros((n, total))
-    ranges, start = [], 0
-    for vertices, block in blocks:
-        stop = start + block.shape[1]
-        b[vertices, start:stop] = block
-        ranges.append(np.arange(start, stop))
-        start = stop
+    ends = np.cumsum([block.shape[1] for _, block in blocks])
+    ranges = np.split(np.arange(ends[-1]), ends[:-1])
+    b = np.zeros((n, ends[-1]))
+    for (vertices, block), own in zip(blocks, ranges, strict=True):
+        b[np.ix_(vertices, own)] = block
     return Columns(b, ranges[0], list(atoms), ranges[1:], modes.shape[1])
 
 

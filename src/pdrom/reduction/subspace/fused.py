@@ -19,7 +19,6 @@ what that needs (`vectors`). The order of every sum is that of the columns, what
 
 from collections.abc import Callable, Sequence
 from time import perf_counter
-from typing import TypeGuard
 
 import numpy as np
 
@@ -53,9 +52,11 @@ class FusedStepper(Stepper):
     ) -> None:
         super().__init__(space, time_step, iterations, local_steps, False, acceleration)
         self._fused: _Fused | None = None
-        if _fusible(local_steps):
-            self._fused = _Fused(space, _Sampled(local_steps), acceleration)
-            if space.whole_frames and not any(s.group.frame_lagged for s in local_steps):
+        steps = [step for step in local_steps if isinstance(step, SubspaceLocalStep)]
+        kernels = [step.group.gradient_kernel for step in steps]
+        if len(steps) == len(local_steps) and None not in kernels:
+            self._fused = _Fused(space, _Sampled(steps), acceleration)
+            if space.whole_frames and not any(step.group.frame_lagged for step in steps):
                 self._whole = self._fused
 
     def _iterate(
@@ -73,13 +74,6 @@ class FusedStepper(Stepper):
         y = self._fused.iterate(elimination, s, base, self.iterations)
         seconds[1] += perf_counter() - before
         return y, np.empty(0)
-
-
-def _fusible(steps: Sequence[LocalStep]) -> TypeGuard[Sequence[SubspaceLocalStep]]:
-    return all(
-        isinstance(step, SubspaceLocalStep) and step.group.gradient_kernel is not None
-        for step in steps
-    )
 
 
 class _Fused:
@@ -116,7 +110,7 @@ class _Fused:
             iterations, len(free), own.rows, own.iterated, sampled.arrays, self._history(free)
         )
         y = s.copy()
-        y[free] = read(own.z, len(free))
+        y[free] = own.z[: 3 * len(free)].reshape(-1, 3)
         return y
 
     def _history(self, free: np.ndarray) -> History | None:
@@ -235,11 +229,6 @@ def vectors(count: int) -> np.ndarray:
 def write(values: np.ndarray, to: np.ndarray) -> None:
     """Copy vectors ``values`` (n, 3) ``to`` where `product` reads them."""
     to[: values.size] = values.ravel()
-
-
-def read(vectors: np.ndarray, count: int) -> np.ndarray:
-    """The first ``count`` of ``vectors`` as a view (count, 3)."""
-    return vectors[: 3 * count].reshape(count, 3)
 
 
 @compiled(nogil=True)

@@ -13,7 +13,7 @@ from typing import Annotated
 
 import numpy as np
 from pydantic import Field
-from scipy import linalg, sparse
+from scipy import linalg
 
 from pdrom.core.errors import SamplingError
 from pdrom.core.yamlfile import ConfigModel
@@ -21,6 +21,7 @@ from pdrom.model.constraints.base import ConstraintGroup
 from pdrom.model.mesh.selection import farthest_points
 from pdrom.reduction.basis import pod
 from pdrom.reduction.sampling.reduction import norm_and_condition, solution_operator
+from pdrom.reduction.snapshots import touched_vertices
 from pdrom.reduction.subspace.columns import DEPENDENT, Columns, orthonormal, skinning_weights
 from pdrom.reduction.subspace.interpolation import Interpolation, element_rows, reduced_strain
 
@@ -130,9 +131,5 @@ def projection_space(
 
 def element_centres(group: ConstraintGroup, points: np.ndarray) -> np.ndarray:
     """Mean (e, 3) m of the ``points`` (N, 3) m that each element of ``group`` touches."""
-    touched = sparse.csr_array((group.S != 0).astype(np.float64))
-    by_element = sum(
-        touched[row :: group.rows_per_element] for row in range(group.rows_per_element)
-    )
-    by_element = (by_element != 0).astype(np.float64)
-    return (by_element @ points) / np.asarray(by_element.sum(axis=1)).reshape(-1, 1)
+    touched = touched_vertices(group)
+    return (touched @ points) / np.asarray(touched.sum(axis=1)).reshape(-1, 1)

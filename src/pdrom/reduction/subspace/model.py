@@ -64,7 +64,7 @@ class SubspaceModel:
         return sum(self.evaluated(group) for group in scene.groups)
 
     def chosen(self, group: ConstraintGroup) -> Samples | Interpolation:
-        """Sample of a group, as a local step evaluates it."""
+        """Samples of a group, perhaps all elements, or its interpolation."""
         every = Samples(np.arange(group.elements), np.ones(group.elements))
         return self.samples.get(group.name, every)
 

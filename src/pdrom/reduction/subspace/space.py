@@ -16,7 +16,14 @@ from pdrom.core.errors import NotReducibleError, SolverError
 from pdrom.model.dynamics.space import Solve, Space
 from pdrom.model.dynamics.stepper import State
 from pdrom.model.dynamics.system import require_accurate
-from pdrom.model.effects.base import Boundary, Contact, held_path, held_targets, held_vertices
+from pdrom.model.effects.base import (
+    Boundary,
+    Contact,
+    Force,
+    held_path,
+    held_targets,
+    held_vertices,
+)
 from pdrom.model.scene import Scene
 from pdrom.reduction.subspace.columns import Columns
 
@@ -102,7 +109,7 @@ class ReducedSpace(Space):
         mass = columns.B.T @ (scene.masses[:, None] * columns.B)
         self.matrix = mass / h**2 + sum(matrices, np.zeros_like(mass))
         self.inertia_matrix = mass / h**2
-        self.forces = [_reduce_force(f, columns, mass, scene) for f in scene.forces]
+        self.forces = [_reduce_force(force, columns, scene) for force in scene.forces]
         # they answer as boundaries do, of coordinates in place of vertices
         self._boundaries: Any = [_ReducedBoundary(b, columns) for b in scene.boundaries]
         self._contacts = [_ReducedContact(c, columns, scene) for c in scene.contacts]
@@ -202,7 +209,7 @@ def reduced_state(scene: Scene, columns: Columns) -> State:
     )
 
 
-def _reduce_force(force, columns: Columns, mass: np.ndarray, scene: Scene):
+def _reduce_force(force: Force, columns: Columns, scene: Scene) -> tuple[np.ndarray, Any]:
     """A force as (constant coordinates (K, 3), rate): a = constant + rate v.
 
     It has to be affine in the velocity, with one rate for all vertices (a number) or one for each
@@ -212,17 +219,15 @@ def _reduce_force(force, columns: Columns, mass: np.ndarray, scene: Scene):
     rng = np.random.default_rng(0)
     q, v = rng.standard_normal(shape), rng.standard_normal(shape)
     constant = np.broadcast_to(force.acceleration(scene.mesh.points, np.zeros(shape)), shape)
-    rate = float(np.sum((force.acceleration(q, v) - constant) * v) / np.sum(v * v))
     found = force.acceleration(q, v)
+    rate = float(np.sum((found - constant) * v) / np.sum(v * v))
+    reduced = coordinates(columns, scene.masses, constant)
     if np.allclose(found, constant + rate * v, rtol=1e-12, atol=1e-12):
-        return coordinates(columns, scene.masses, constant), rate
+        return reduced, rate
     rates = (force.acceleration(q, np.ones(shape)) - constant)[:, :1]
     if not np.allclose(found, constant + rates * v, rtol=1e-12, atol=1e-12):
         raise NotReducibleError(f"effect '{force.name}' is not affine in the velocity")
-    return (
-        coordinates(columns, scene.masses, constant),
-        coordinates(columns, scene.masses, rates * columns.B),
-    )
+    return reduced, coordinates(columns, scene.masses, rates * columns.B)
 
 
 class _ReducedBoundary:
@@ -244,22 +249,17 @@ class _ReducedBoundary:
         return inverse @ self.boundary.path(frames, rows @ current)
 
     def _of(self, frame: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Coordinates of what is held in ``frame``, the rows of B there, and their inverse."""
         vertices = self.boundary.held(frame)
         key = vertices.tobytes()
         if key not in self._parts:
-            self._parts[key] = self._prepare(vertices)
+            held = set(vertices.tolist())
+            atoms = zip(self._columns.atoms, self._columns.atom_columns, strict=True)
+            touched = [own for atom, own in atoms if int(atom[0]) in held]
+            indices = np.sort(np.concatenate(touched))
+            rows = self._columns.B[np.ix_(vertices, indices)]
+            self._parts[key] = indices, rows, np.linalg.pinv(rows)
         return self._parts[key]
-
-    def _prepare(self, vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        held = set(vertices.tolist())
-        touched = [
-            c
-            for atom, c in zip(self._columns.atoms, self._columns.atom_columns, strict=True)
-            if int(atom[0]) in held
-        ]
-        indices = np.sort(np.concatenate(touched))
-        rows = self._columns.B[np.ix_(vertices, indices)]
-        return indices, rows, np.linalg.pinv(rows)
 
 
 def probe_vertices(n: int) -> np.ndarray:

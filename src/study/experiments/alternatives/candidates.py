@@ -9,8 +9,7 @@ from pdrom.model.dynamics.stepper import State, Stepper
 from pdrom.model.dynamics.system import GlobalSystem
 from pdrom.model.runs import BoundedRun, trajectory
 from pdrom.model.scene import Scene
-from pdrom.reduction.subspace.columns import Columns
-from pdrom.reduction.subspace.model import Samples, SubspaceModel, make_columns, sample_elements
+from pdrom.reduction.subspace.model import SubspaceModel, make_columns, sample_elements
 from study.experiments.alternatives.settings import (
     ACCELERATED,
     CONVERGED,
@@ -119,42 +118,30 @@ def trained(training: Scene, settings: Comparison) -> Iterator[Trained]:
     the training motion in these columns, for every number of substeps that a reduction takes. Of
     converged frames there is a coarse level, too, with more samples.
     """
-    vertices = training.mesh.vertices
+    vertices, own = training.mesh.vertices, settings.implicit
     taken, coarse = (
         sorted({n for m in methods for n, _ in settings.pairs(m, vertices)})
         for methods in (REDUCTIONS, (TWO_LEVEL,))
     )
-    for trained_on, seen in _training_frames(training, settings) if taken or coarse else ():
+    for trained_on in settings.trained_on if taken or coarse else ():
+        run: np.ndarray | None = None
+        if trained_on == OWN:
+            run = trajectory(training, track_objective=False)
+        elif settings.affords(CONVERGED, vertices):
+            run = converged_run(training, own.tolerance, own.limit)
+        if run is None:
+            continue
         for k in settings.modes:
-            columns = make_columns(training, seen, "pod", k=k)
+            columns = make_columns(training, run[1:], "pod", k=k)
             for substeps in sorted({*taken, *coarse}):
                 level = trained_on == CONVERGED and substeps in coarse
                 tolerances = [settings.tau, *([settings.coarse_tau] if level else [])]
-                for tau, samples in _samples(training, columns, substeps, tolerances).items():
+                scene = substepped(training, substeps, training.config.iterations)
+                ends = np.arange(substeps - 1, scene.config.frames, substeps)
+                made = sample_elements(scene, columns, ends, tolerances=tolerances)
+                for tau, samples in dict(zip(tolerances, made, strict=True)).items():
                     model = SubspaceModel("pod", columns, samples)
                     yield Trained(trained_on, substeps, model, coarse=tau != settings.tau)
-
-
-def _training_frames(training: Scene, settings: Comparison) -> Iterator[tuple[str, np.ndarray]]:
-    """Frames (F, N, 3) m of each kind that is asked for and can be had."""
-    for kind in settings.trained_on:
-        if kind == OWN:
-            yield kind, trajectory(training, track_objective=False)[1:]
-        elif settings.affords(CONVERGED, training.mesh.vertices):
-            own = settings.implicit
-            found = converged_run(training, own.tolerance, own.limit)
-            if found is not None:
-                yield kind, found[1:]
-
-
-def _samples(
-    training: Scene, columns: Columns, substeps: int, tolerances: Sequence[float]
-) -> dict[float, dict[str, Samples]]:
-    """Samples of each group for each of ``tolerances``."""
-    own = substepped(training, substeps, training.config.iterations)
-    ends = np.arange(substeps - 1, own.config.frames, substeps)
-    found = sample_elements(own, columns, ends, tolerances=tolerances)
-    return dict(zip(tolerances, found, strict=True))
 
 
 def substepped(scene: Scene, substeps: int, iterations: int, window: int = 0) -> Scene:

@@ -63,26 +63,6 @@ class Options(ConfigModel):
     blowup_extent: BlowupExtent
 
 
-@dataclass(frozen=True)
-class References:
-    """Runs (F + 1, N, 3) that errors are taken against, and the error of the second one.
-
-    ``implicit`` is None where a frame did not converge, or where it would cost too much.
-    """
-
-    implicit: np.ndarray | None
-    continuous: np.ndarray
-    error: float
-
-    def errors(self, run: np.ndarray | None) -> dict[str, float | None]:
-        """Relative errors of a ``run`` (F + 1, N, 3) m, empty if it blew up."""
-        against = {"implicit": self.implicit, "continuous": self.continuous}
-        return {
-            f"error_{name}": None if run is None or other is None else run_error(run, other)
-            for name, other in against.items()
-        }
-
-
 @experiment(
     "Alternatives to projective dynamics in {scene} with {factor} times the vertices along a side",
     reads={"sources": SourcesOf("scene.mesh"), "settings": Settings(Options)},
@@ -132,32 +112,33 @@ def sized(config: SceneConfig, factor: float, stiffness: float) -> SceneConfig:
 
 
 def _rows(scene: Scene, models: tuple[Trained, ...], settings: Options) -> Iterator[dict[str, Any]]:
-    """Errors of every candidate in the motion of ``scene``, those of the reference first."""
-    frames, against = scene.config.frames, references(scene, settings.alternatives)
-    common = {"vertices": scene.mesh.vertices, "frames": frames, "reference_error": against.error}
-    implicit = against.errors(against.implicit)
-    yield {**common, "method": CONVERGED, "substeps": 1, "finite": True, **implicit}
-    for candidate in candidates(scene, models, settings.alternatives):
-        with np.errstate(over="ignore", invalid="ignore"):
-            reached = candidate.run(frames, settings.blowup_extent, scene.mesh.extent)
-        made = {"finite": reached is not None, **against.errors(reached)}
-        yield {**common, **candidate.labels, **made}
+    """Errors of every candidate in the motion of ``scene``, those of the reference first.
 
-
-def references(scene: Scene, section: Comparison) -> References:
-    """Both references of a scene's own motion, with the limits of a ``section``."""
-    wanted = section.continuous
-    limit = wanted.limit // scene.mesh.vertices
-    exact = continuous(
-        scene, scene.config.frames, wanted.tolerance, substeps=wanted.substeps, limit=limit
-    )
-    name = scene.config.name
+    There is none against the implicit step where a frame of it did not converge, or where it would
+    cost too much, and none of a run that blew up.
+    """
+    section, name, vertices = settings.alternatives, scene.config.name, scene.mesh.vertices
+    frames, wanted, implicit = scene.config.frames, section.continuous, None
+    limit = wanted.limit // vertices
+    exact = continuous(scene, frames, wanted.tolerance, substeps=wanted.substeps, limit=limit)
     log.info("%s: %d explicit steps a frame, error %.1e", name, exact.substeps, exact.error)
-    if not exact.within(wanted.tolerance):
+    if not exact.error <= wanted.tolerance:
         log.warning("%s: motion in continuous time is known to %.1e only", name, exact.error)
-    implicit = None
-    if section.affords(CONVERGED, scene.mesh.vertices):
+    if section.affords(CONVERGED, vertices):
         implicit = converged_run(scene, section.implicit.tolerance, section.implicit.limit)
         if implicit is None:
             log.warning("%s: no convergence in %d evaluations", name, section.implicit.limit)
-    return References(implicit, exact.positions, exact.error)
+    against = {"error_implicit": implicit, "error_continuous": exact.positions}
+
+    def errors(run: np.ndarray | None) -> dict[str, float | None]:
+        return {
+            key: None if run is None or other is None else run_error(run, other)
+            for key, other in against.items()
+        }
+
+    common = {"vertices": vertices, "frames": frames, "reference_error": exact.error}
+    yield {**common, "method": CONVERGED, "substeps": 1, "finite": True, **errors(implicit)}
+    for candidate in candidates(scene, models, section):
+        with np.errstate(over="ignore", invalid="ignore"):
+            reached = candidate.run(frames, settings.blowup_extent, scene.mesh.extent)
+        yield {**common, **candidate.labels, "finite": reached is not None, **errors(reached)}

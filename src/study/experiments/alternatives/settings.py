@@ -47,24 +47,18 @@ def _without_converged(steps: dict[str, Any]) -> dict[str, Any]:
     return steps
 
 
-def _sweep(*iterations: int) -> tuple[Steps, ...]:
-    return tuple((1, count) for count in iterations)
-
-
-def _small(*substeps: int) -> tuple[Steps, ...]:
-    return tuple((count, 1) for count in substeps)
-
-
-def default_steps() -> dict[str, tuple[Steps, ...]]:
-    """More iterations of one step, and more steps of one iteration; the others are slower."""
-    return {
-        "projective": (*_sweep(1, 2, 3, 4, 5, 10, 20, 40, 80), *_small(2, 5, 10, 20, 40), (5, 4)),
-        "anderson": (*_sweep(5, 10, 20, 40, 80), (5, 5), (10, 5)),
-        "chebyshev": _sweep(10, 20, 40, 80),
-        TWO_LEVEL: _sweep(2, 3, 5, 10, 20),
-        REDUCED: _sweep(5, 10, 20, 40, 80, 160),
-        ACCELERATED: _sweep(5, 10, 20),
-    }
+# More iterations of one step, and more steps of one iteration; the others are slower.
+STEPS: dict[str, tuple[Steps, ...]] = {
+    "projective": (
+        (1, 1), (1, 2), (1, 3), (1, 4), (1, 5), (1, 10), (1, 20), (1, 40), (1, 80),
+        (2, 1), (5, 1), (10, 1), (20, 1), (40, 1), (5, 4),
+    ),
+    "anderson": ((1, 5), (1, 10), (1, 20), (1, 40), (1, 80), (5, 5), (10, 5)),
+    "chebyshev": ((1, 10), (1, 20), (1, 40), (1, 80)),
+    TWO_LEVEL: ((1, 2), (1, 3), (1, 5), (1, 10), (1, 20)),
+    REDUCED: ((1, 5), (1, 10), (1, 20), (1, 40), (1, 80), (1, 160)),
+    ACCELERATED: ((1, 5), (1, 10), (1, 20)),
+}  # fmt: skip
 
 
 class ContinuousReference(ConfigModel):
@@ -106,7 +100,7 @@ class Comparison(Processes):
     stiffness: dict[str, Factors] = Field(default_factory=dict)
     steps: Annotated[
         dict[str, tuple[Steps, ...]], AfterValidator(_known), AfterValidator(_without_converged)
-    ] = Field(default_factory=default_steps)
+    ] = STEPS
     work: Annotated[dict[str, Work], AfterValidator(_known)] = Field(default_factory=dict)
     modes: Annotated[tuple[Modes, ...], Field(min_length=1)] = (40,)
     tau: Tolerance = 1e-2

@@ -189,9 +189,9 @@ def record(
                 group.begin_frame(q)
             groups = sum(group.accumulate(q, np.zeros_like(q)) for group in scene.groups)
             energies.append(kinetic + groups)
-    positions_of, velocities = (np.stack(parts) for parts in zip(*states, strict=True))
-    rest = (np.array(rises), np.array(excesses), np.array(energies), run.blowup_frame)
-    return Record(positions_of, velocities, *rest)
+    q, v = (np.stack(parts) for parts in zip(*states, strict=True))
+    rose, beyond = np.array(rises), np.array(excesses)
+    return Record(q, v, rose, beyond, np.array(energies), run.blowup_frame)
 
 
 def full_order(

@@ -6,7 +6,7 @@ Kavan 2017, section 4) has the same stationary points and reaches them in far fe
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy import sparse
@@ -24,8 +24,7 @@ SHORTEST = 1e-4  # a shorter step is given up for a plain iteration, which canno
 Evaluate = Callable[[np.ndarray], tuple[float, np.ndarray]]
 
 
-@dataclass(frozen=True)
-class Minimum:
+class Minimum(NamedTuple):
     """End of a minimisation.
 
     y : (n, 3) last iterate
@@ -75,15 +74,17 @@ def minimise(
                 evaluations += 1
                 break
         after = target - trial
-        pair = _Pair.of(matrix, trial - y, d - after)
-        if pair.curvature > 0.0:
-            pairs = [*pairs, pair][-MEMORY:]
+        moved, change = trial - y, d - after
+        both = matrix @ np.hstack([moved, change])
+        a_moved, a_change = both[:, :3].copy(), both[:, 3:].copy()  # in one piece: read often
+        curvature = float(np.vdot(moved, a_change))
+        if curvature > 0.0:
+            pairs = [*pairs, _Pair(moved, change, a_moved, a_change, curvature)][-MEMORY:]
         y, d, objective = trial, after, value
     return Minimum(y, float(np.abs(d).max(initial=0.0)), evaluations)
 
 
-@dataclass(frozen=True)
-class _Pair:
+class _Pair(NamedTuple):
     """A step and the change of A^-1 gradient along it, each also multiplied by A."""
 
     step: np.ndarray
@@ -91,12 +92,6 @@ class _Pair:
     a_step: np.ndarray
     a_change: np.ndarray
     curvature: float
-
-    @classmethod
-    def of(cls, matrix: sparse.csr_array, step: np.ndarray, change: np.ndarray) -> "_Pair":
-        both = matrix @ np.hstack([step, change])
-        a_step, a_change = both[:, :3].copy(), both[:, 3:].copy()  # in one piece: read often
-        return cls(step, change, a_step, a_change, float(np.vdot(step, a_change)))
 
 
 def _direction(d: np.ndarray, pairs: list[_Pair]) -> np.ndarray:
@@ -132,10 +127,7 @@ class ConvergedStepper(Stepper):
     def step(
         self, state: State, frame: int, on_last_iterate: Callable[[np.ndarray], None] | None = None
     ) -> tuple[State, FrameReport]:
-        """Do ``frame`` from ``state``, see `Stepper.step`, ``on_last_iterate`` included.
-
-        The report holds the objective at the end only.
-        """
+        """Do ``frame`` from ``state``; no objective, and no iterate for ``on_last_iterate``."""
         s, elimination, base = self._begin(state, frame)
         rhs = np.empty_like(s)
 
@@ -151,8 +143,6 @@ class ConvergedStepper(Stepper):
         )
         self.changes.append(end.change)
         self.evaluations.append(end.evaluations)
-        if on_last_iterate is not None:
-            on_last_iterate(end.y)
         return self._finish(state, end.y, frame), FrameReport(np.empty(0), np.zeros(4))
 
 

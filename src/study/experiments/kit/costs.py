@@ -30,7 +30,7 @@ COLUMNS = [
     "scene", "group", "method", "vertices", "elements", "r", "local_ms", "full_ms", "solve_ms",
     "lift_ms",
 ]  # fmt: skip
-COSTS = ["scene", "effect", "elements", "ms_per_frame", "share", "us_per_iteration"]
+COSTS = ["scene", "effect", "elements", "ms_per_frame", "share"]
 LEFT_OUT = ["scene", "left_out", "groups", "elements", "ms_per_frame", "saved_ms", "own_ms"]
 # Questions that the step loop asks an effect of each role.
 _QUESTIONS: dict[type[Effect], tuple[str, ...]] = {
@@ -156,9 +156,8 @@ def effect_costs(
     """Table of `COSTS` of the full-order run: effects, right-hand side, global solve, the rest.
 
     An effect that a scene lists several times has one row. Elements are those of a group, the
-    vertices that a hold may ever hold, else all vertices. The shares add up to one. What the
-    compiled loop does in each iteration has its time there, too; the right-hand side is what the
-    loop's local steps take in addition to the groups.
+    vertices that a hold may ever hold, else all vertices. The shares add up to one. The right-hand
+    side is what the compiled loop's local steps take in addition to the groups.
 
     Parameters
     ----------
@@ -169,8 +168,7 @@ def effect_costs(
     questions = zip(roles, _QUESTIONS.values(), strict=True)
     by_role: Any = [[Timed(effect, asked) for effect in role] for role, asked in questions]
     groups, *others = by_role
-    space = VertexSpace(system, *others)
-    config = scene.config
+    space, config = VertexSpace(system, *others), scene.config
     loop = Stepper(
         space, config.time_step, config.iterations, local_steps=groups, track_objective=False
     )
@@ -179,30 +177,28 @@ def effect_costs(
     samples = [_profile(loop, scene, frames, stands, names) for _ in range(warmup + repeats)]
     total, *parts = median_frames(np.array(samples[warmup:]))
     phases = [*names, RIGHT, GLOBAL, REST]
-    costs = pd.DataFrame({"scene": config.name, "effect": phases})
+    costs = pd.DataFrame({"scene": config.name, "effect": phases, "ms_per_frame": parts})
     costs["elements"] = [_elements(scene, phase) for phase in phases]
-    costs["ms_per_frame"], inside = np.reshape(parts, (2, -1))
     costs["share"] = costs.ms_per_frame / total
-    costs["us_per_iteration"] = np.where(inside > 0.0, 1e3 * inside / config.iterations, np.nan)
     return costs[COSTS]
 
 
 def _profile(
     loop: Stepper, scene: Scene, frames: int, stands: list[Timed], names: list[str]
 ) -> list[list[float]]:
-    """Milliseconds of each frame: total, all phases, then of each what the compiled loop takes."""
+    """Milliseconds of each frame: total, then all phases."""
     state, rows = scene.initial_state(), []
     for frame in range(frames):
         for stand in stands:
             stand.reset()
         state, report = loop.step(state, frame)
         own = [sum(stand.seconds for stand in stands if stand.name == name) for name in names]
-        inside = [sum(s.kernel_seconds for s in stands if s.name == name) for name in names]
+        inside = sum(stand.kernel_seconds for stand in stands)
         total, (_, local, solve, _) = float(report.seconds.sum()), report.seconds.tolist()
         # a loop outside compiled code asks the groups themselves
-        right = local - sum(inside) if sum(inside) > 0.0 else 0.0
+        right = local - inside if inside > 0.0 else 0.0
         parts = [*own, right, solve, total - sum(own) - right - solve]
-        rows.append([1e3 * part for part in (total, *parts, *inside, right, solve, 0.0)])
+        rows.append([1e3 * part for part in (total, *parts)])
     return rows
 
 

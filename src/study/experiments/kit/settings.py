@@ -78,10 +78,9 @@ class Horizon(ConfigModel):
     perturbation: Tolerance
     threshold: Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 
-    def frames(self, perturbed: File, run: str = "train") -> int:
-        """Frames before the horizon of a scene's ``run``, from the table of its perturbed runs."""
-        label = self.perturbation if run == "train" else run
-        spread = floor_of(read_table(perturbed.path), perturbed["scene"], label)
+    def frames(self, perturbed: File) -> int:
+        """Frames before the horizon of a scene, from the table of its perturbed runs."""
+        spread = floor_of(read_table(perturbed.path), perturbed["scene"], self.perturbation)
         return horizon(spread, self.threshold)
 
 

@@ -24,9 +24,9 @@ from pdrom.core.yamlfile import read_yaml, validate
 from pdrom.view import style
 from pdrom.view.artists import Figure
 from study.artifact.artifact import Artifact, declare, declared_in
-from study.artifact.markup import filled, keys, to_plain
+from study.artifact.markup import filled, to_plain
 from study.artifact.paths import FIGURE, FIGURE_PICTURE
-from study.artifact.reads import Labels, Paths, Read, Setting, Settings, Sources
+from study.artifact.reads import Read, Setting, Settings
 from study.figures.kit.options import Drawn, NothingToDraw, Options
 
 log = logging.getLogger(__name__)
@@ -72,15 +72,7 @@ class Declaration(Artifact):
         ConfigurationError
             A setting does not exist.
         """
-        return self.title, filled(self.caption, {key: value(key) for key in keys(self.caption)})
-
-    def inputs(self, sources: Sources, labels: Labels) -> dict[str, Paths]:
-        """Paths by name; the figure's own name is a label, by which its options are found."""
-        return super().inputs(sources, {**labels, "figure": self.name})
-
-    def settings(self, sources: Sources, labels: Labels) -> dict[str, Any]:
-        """Typed settings by name, see `inputs`."""
-        return super().settings(sources, {**labels, "figure": self.name})
+        return self.title, filled(self.caption, value)
 
     def perform(
         self, settings: Mapping[str, Any], inputs: Mapping[str, Any], outputs: Mapping[str, str]

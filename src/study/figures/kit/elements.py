@@ -10,8 +10,7 @@ from pdrom.model.effects import EFFECTS
 from pdrom.model.mesh.types import Mesh
 from pdrom.view.artists import Axes, Normalize, ScalarMappable
 from pdrom.view.camera import Camera
-from pdrom.view.mesh_render import Surface, draw_lines, draw_surface
-from pdrom.view.panels import mesh_surface
+from pdrom.view.mesh_render import draw_lines, draw_surface
 
 NEUTRAL = "#E4E1DA"
 SIGNED = "RdBu_r"
@@ -47,11 +46,6 @@ class ElementMap:
     kind: str
     cells: np.ndarray
     mesh: Mesh
-
-    @property
-    def surface(self) -> Surface:
-        """Surface of the mesh, ready to be drawn."""
-        return mesh_surface(self.mesh)
 
     def centres(self, points: np.ndarray) -> np.ndarray:
         """Centre of each element (e, 3), m, with vertices at ``points`` (N, 3) m."""
@@ -95,16 +89,16 @@ class ElementMap:
 
         Its elements have ``values`` (e,), which ``colours`` maps to colours.
         """
-        if self.kind == "edge" and self.surface.open:
+        if self.kind == "edge" and not len(self.mesh.tetrahedra):
             draw_surface(
-                ax, points, self.surface, camera=camera, colour="#FFFFFF", wire=0.0, contrast=0.15
+                ax, points, self.mesh, camera=camera, colour="#FFFFFF", wire=0.0, contrast=0.15
             )
             draw_lines(ax, points[self.cells], camera, colours=colours.to_rgba(values))
             return
         carried = self.face_values(values)
         rgb = colours.to_rgba(np.nan_to_num(carried))[:, :3]
         rgb[~np.isfinite(carried)] = (0.92, 0.91, 0.89)
-        draw_surface(ax, points, self.surface, camera=camera, colour=rgb, wire=0.12, contrast=0.35)
+        draw_surface(ax, points, self.mesh, camera=camera, colour=rgb, wire=0.12, contrast=0.35)
 
 
 def element_map(group: str, mesh: Mesh, elements: int, source: str) -> ElementMap:

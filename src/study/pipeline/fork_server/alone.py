@@ -1,7 +1,7 @@
 """Run a script in an interpreter of its own, which ends when the run that wants it has ended.
 
-A killed run closes its end of a pipe (`study.pipeline.fork_server.start`), on every platform. This
-file is run by its path and imports little.
+A killed run closes its end of a pipe (`study.pipeline.fork_server.hold_pipe`), on every platform.
+This file is run by its path and imports little.
 """
 
 import os

@@ -25,7 +25,11 @@ from typing import NoReturn
 from study.pipeline.fork_server.client import of_this_user
 
 HEADER = 20  # characters of the line that says how many bytes follow
+NUMBER = b"%20d"
 LARGEST = 1 << 24  # bytes of a request; systems allow environments less
+# Seconds that a client may take for its request, which it sends as soon as it is connected.
+PATIENCE = 30.0
+_DIES_WITH_PARENT = 1  # PR_SET_PDEATHSIG of <sys/prctl.h>
 
 
 class Request:
@@ -44,8 +48,8 @@ class Request:
         self.streams: list[int] = []
         self._content = b""
 
-    def read(self) -> bool:
-        """Whether the request is complete, with what there is to read now.
+    def read(self) -> list[str]:
+        """Folder, script and environment, once there is all of it to read; nothing before.
 
         Raises
         ------
@@ -58,14 +62,12 @@ class Request:
         if not more:
             raise OSError("the client is gone")
         if len(self._content) < HEADER:
-            return False
+            return []
         size = int(self._content[:HEADER])
         if not 0 < size <= LARGEST:
             raise ValueError(f"a request of {size} bytes")
-        return len(self._content) >= HEADER + size
-
-    def parts(self) -> list[str]:
-        """Folder, script and environment; ValueError if something is missing."""
+        if len(self._content) < HEADER + size:
+            return []
         found = self._content[HEADER:].decode("utf-8", "surrogateescape").split("\0")
         if len(found) < 2 or len(self.streams) != 3:
             raise ValueError("no folder, script or streams")
@@ -77,29 +79,10 @@ class Request:
             os.close(stream)
 
 
-NUMBER = b"%20d"
-# Seconds that a client may take for its request, which it sends as soon as it is connected.
-PATIENCE = 30.0
-_DIES_WITH_PARENT = 1  # PR_SET_PDEATHSIG of <sys/prctl.h>
-
-
-class Job:
-    """A fork that runs a script, and the client that waits for it."""
-
-    def __init__(self, process: int, client: socket.socket) -> None:
-        self.process = process
-        self.client = client
-
-    def end(self, status: int) -> None:
-        """Tell the client the exit ``status`` of the job; the client may be gone."""
-        with suppress(OSError):
-            self.client.sendall(NUMBER % status)
-        self.client.close()
-
-    def kill(self) -> None:
-        """Kill the job with everything that it started."""
-        with suppress(ProcessLookupError):
-            os.killpg(self.process, signal.SIGKILL)
+def kill(process: int) -> None:
+    """Kill a job with everything that it started."""
+    with suppress(ProcessLookupError):
+        os.killpg(process, signal.SIGKILL)
 
 
 class Server:
@@ -117,7 +100,8 @@ class Server:
         self.owner = owner
         self.patience = patience
         self.requests: list[Request] = []
-        self.jobs: dict[int, Job] = {}
+        # the client that waits for a fork, by the number of that process
+        self.jobs: dict[int, socket.socket] = {}
         # a signal wakes the loop up by a byte in this pipe
         self.wake, self._waker = os.pipe()
         os.set_blocking(self._waker, False)
@@ -131,17 +115,17 @@ class Server:
         while True:
             ready = self._wait()
             if self.owner in ready:
-                for job in self.jobs.values():
-                    job.kill()
+                for process in self.jobs:
+                    kill(process)
                 return None
             if self.wake in ready:
                 os.read(self.wake, 4096)
             self._collect()
-            for job in self.jobs.values():
+            for process, client in self.jobs.items():
                 # a client sends nothing after its request, so that something to read means that it
                 # is gone: its job is ended, too
-                if job.client.fileno() in ready:
-                    job.kill()
+                if client.fileno() in ready:
+                    kill(process)
             for request in [r for r in self.requests if r.client.fileno() in ready]:
                 if script := self._answer(request):
                     return script
@@ -152,8 +136,7 @@ class Server:
 
     def _clients(self) -> list[socket.socket]:
         """Sockets of clients: those of running jobs and of incomplete requests."""
-        jobs = [job.client for job in self.jobs.values()]
-        return jobs + [request.client for request in self.requests]
+        return [*self.jobs.values(), *(request.client for request in self.requests)]
 
     def _wait(self) -> set[int]:
         """Descriptors with something to read, or none when a client's patience ends."""
@@ -164,11 +147,12 @@ class Server:
         return set(select.select(waiting, [], [], limit)[0])
 
     def _collect(self) -> None:
-        """Report the jobs that have ended."""
+        """Tell the clients of the jobs that have ended their exit status; a client may be gone."""
         for process in list(self.jobs):
             done, status = os.waitpid(process, os.WNOHANG)
             if done:
-                self.jobs.pop(process).end(status)
+                with self.jobs.pop(process) as client, suppress(OSError):
+                    client.sendall(NUMBER % status)
 
     def _accept(self) -> None:
         """Begin to listen to a client."""
@@ -187,9 +171,9 @@ class Server:
     def _answer(self, request: Request) -> str | None:
         """Fork a job once its request is complete; the script in the fork, None in the server."""
         try:
-            if not request.read():
+            parts = request.read()
+            if not parts:
                 return None
-            parts = request.parts()
             process = os.fork()
         except (OSError, ValueError):
             self._drop(request)
@@ -201,11 +185,11 @@ class Server:
         os.setpgid(process, process)
         self.requests.remove(request)
         request.close_streams()
-        self.jobs[process] = job = Job(process, request.client)
+        self.jobs[process] = request.client
         try:
-            job.client.sendall(NUMBER % process)
+            request.client.sendall(NUMBER % process)
         except OSError:
-            job.kill()
+            kill(process)
         return None
 
     def _become_job(self, parts: list[str], request: Request) -> None:

@@ -21,6 +21,7 @@ from pdrom.core.errors import StorageError
 from pdrom.core.store.checksum import write_block
 from pdrom.model.effects.forces import Gravity
 from pdrom.model.effects.obstacle import Sphere
+from pdrom.view import mesh_render
 from pdrom.view.camera import rotation_to
 from pdrom.view.frames import write_frames
 
@@ -76,7 +77,7 @@ def test_the_page_the_picture_and_the_files_for_paraview_have_all_runs(runs, tmp
 
 def test_a_picture_is_upright_and_has_the_obstacles(runs, tmp_path, monkeypatch):
     turn, drawn = rotation_to(np.array([0.0, 0.0, 1.0])), []
-    monkeypatch.setattr("pdrom.view.panels.draw_surface", lambda *a, **k: drawn.append(a) or Mock())
+    monkeypatch.setattr(mesh_render, "draw_surface", lambda *a, **_: drawn.append(a) or Mock())
     (scene,) = viewed_scenes(load(files(runs)[0]))
     gravity = Gravity.Config(acceleration=(0.0, 0.0, -9.81))
     effects = (gravity, Sphere.Config(centre=(0.0, 0.0, 1.6), radius=0.4))

@@ -15,8 +15,6 @@ from study.artifact.paths import File, Place
 from study.artifact.reads import (
     EachOf,
     Every,
-    PerScene,
-    Preferred,
     ProjectFile,
     Setting,
     Settings,
@@ -72,20 +70,11 @@ class Sources:
     def files(self, place, labels):
         return [place.at("r", scene=scene) for scene in ("s", "t")]
 
-    def first(self, place, label, value):
-        return [place.at("r", scene="s", **{label: value})]
-
     def table(self, name):
         return f"r/tables/{name}.csv"
 
-    def published(self, name):
-        return [f"{name}.csv"]
-
     def value(self, key, labels):
         return self.values[key]
-
-    def per_scene(self, key):
-        return {"s": key}
 
 
 def test_a_job_runs_from_plain_data_and_says_what_made_it(tmp_path):
@@ -119,7 +108,6 @@ def test_faulty_settings_are_refused(settings, tmp_path):
     [
         (GROUP, "r/b/s/g.csv"),
         (Every(SCENE), ["r/a/s.csv", "r/a/t.csv"]),
-        (Preferred(GROUP, "group", "h"), ["r/b/s/h.csv"]),
         (TableOf("payoff"), "r/tables/payoff.csv"),
         (ProjectFile("config/claims.yaml"), "config/claims.yaml"),
         (SourcesOf("section"), ["mesh.obj"]),
@@ -139,7 +127,6 @@ def test_one_file_for_each_entry_of_a_setting():
 def test_settings_that_go_together_are_one_model():
     read = Settings(Section)
     assert read.value(Sources({"factor": 3.0}), {}) == Section(factor=3.0)
-    assert PerScene("frames").value(Sources(), {}) == {"s": "frames"}
 
 
 def test_labels_are_those_of_what_is_written():

@@ -21,7 +21,9 @@ def path(tmp_path):
     return tmp_path / "logs" / "rule" / "job.log"
 
 
-def test_messages_of_the_package_are_in_the_log(path):
+def test_messages_of_the_package_are_in_the_log_of_the_last_job(path):
+    with job_log(str(path)) as logger:
+        logger.info("an earlier job")
     with job_log(str(path)):
         logging.getLogger("pdrom.model.mesh").info("made %d", 3)
         logging.getLogger("pdrom.model.mesh").debug("hidden")
@@ -55,22 +57,6 @@ def test_damaged_results_are_set_aside_in_a_job_and_nowhere_else(path):
     assert not sets_aside()
 
 
-def test_a_new_job_starts_a_new_log(path):
-    for message in ("first", "second"):
-        with job_log(str(path)) as logger:
-            logger.info(message)
-    assert "second" in path.read_text()
-    assert "first" not in path.read_text()
-
-
-def test_any_other_failure_keeps_its_traceback_in_the_log(path):
-    with pytest.raises(SystemExit) as caught, job_log(str(path)):
-        raise ZeroDivisionError("by zero")
-    assert caught.value.code == f"pdrom: ZeroDivisionError: by zero (traceback in {path})"
-    assert "Traceback" in path.read_text()
-    assert "test_logs.py" in path.read_text()
-
-
 @pytest.mark.parametrize("failure", [None, MeshError("x"), ValueError("x"), KeyboardInterrupt()])
 def test_logger_is_as_before_whatever_happened(path, failure):
     before = (list(LOGGER.handlers), LOGGER.level)
@@ -92,11 +78,12 @@ def test_logger_is_as_before_whatever_happened(path, failure):
         (OSError(errno.ENOSPC, "No space left on device", "a.h5"), "no space left on the disk ("),
         (OSError(errno.EDQUOT, "Disk quota exceeded"), "no space left on the disk ("),
         (OSError(errno.EIO, "Input/output error"), "OSError: [Errno 5] Input/output error"),
+        (ZeroDivisionError("by zero"), "ZeroDivisionError: by zero (traceback in "),
         (MeshError("a.obj: vertex 3 is nan"), "a.obj: vertex 3 is nan"),
     ],
 )
 def test_mistakes_and_lack_of_memory_or_space_are_said_in_words(path, failure, said):
-    """Those of the user in one line without a traceback."""
+    """Those of the user in one line without a traceback, which the log has of all others."""
     with pytest.raises(SystemExit) as caught, job_log(str(path)):
         raise failure
     assert caught.value.code.startswith(f"pdrom: {said}")
@@ -104,6 +91,9 @@ def test_mistakes_and_lack_of_memory_or_space_are_said_in_words(path, failure, s
     if isinstance(failure, MeshError):
         assert caught.value.code == f"pdrom: {said}"
         assert "Traceback" not in path.read_text()
+    else:
+        assert caught.value.code.endswith(f" (traceback in {path})")
+        assert "test_logs.py" in path.read_text()
 
 
 def test_an_interrupted_job_ends_without_a_traceback(path, capfd):

@@ -8,7 +8,7 @@ from pdrom.core.store import write_hdf5
 from pdrom.reduction.method import load_methods
 from pdrom.view.read import rerun_infos
 from places import ROOT
-from study.experiments.noise import (
+from study.experiments.repetitions import (
     ALL,
     PLANE,
     VERTEX,

@@ -10,9 +10,7 @@ from pdrom.core.store import read_table, write_table
 from pdrom.core.yamlfile import validate
 from pdrom.model.dynamics.system import DEFAULT_SOLVER
 from pdrom.model.held_out import MOTIONS
-from pdrom.model.runs import trajectory
 from pdrom.model.scene import SceneConfig
-from pdrom.reduction.subspace.model import load_models
 from study.artifact.paths import File
 from study.experiments import subspaces as experiment
 from study.experiments.frame_times import COLUMNS as TIME_COLUMNS
@@ -23,7 +21,6 @@ from study.experiments.subspaces import (
     LARGE_COLUMNS,
     Hrpd,
     LargeModels,
-    LargeOptions,
     Online,
 )
 from study.tables.speedups import frame_times, online, speedups
@@ -49,8 +46,7 @@ def written(tmp_path_factory):
     )
     models = path.with_suffix(".h5")
     out, stored = File(str(path), {"scene": "test"}), File(str(models), {})
-    settings = LargeOptions(scene=config, online=asked, blowup_extent=10.0)
-    experiment.online(sources=[], settings=settings, out=out, models=stored)
+    experiment.online([], config, asked, blowup_extent=10.0, out=out, models=stored)
     timed = TimedScene(config, DEFAULT_SOLVER, frames=3, models={str(models): None})
     rows = pd.DataFrame(in_processes([timed], ONCE), columns=TIME_COLUMNS)
     write_table(rows, path.with_name("times.csv"))
@@ -123,20 +119,6 @@ def test_no_scene_leaves_an_empty_table():
     empty = online([], [], frame_times([]))
     assert tuple(empty.columns) == online.column_names
     assert len(empty) == 0
-
-
-def test_error_is_that_of_the_trajectories(written):
-    scene, path, _ = written
-    (_, model), *_ = load_models(path.with_suffix(".h5"))
-    reference = trajectory(scene)
-    loop, state = model.loop(scene)
-    run = [reference[0]]
-    for frame in range(scene.config.frames):
-        state, _ = loop.step(state, frame)
-        run.append(model.positions(state.positions))
-    moved = np.linalg.norm(reference - reference[0])
-    expected = np.linalg.norm(np.stack(run) - reference) / moved
-    assert read_table(path).relative_error[0] == pytest.approx(expected, rel=1e-9)
 
 
 def test_faulty_settings_are_refused():

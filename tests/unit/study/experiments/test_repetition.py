@@ -1,17 +1,19 @@
-"""Repetitions of reduced runs: what is resampled, and what stays."""
+"""Repetitions of reduced runs: what is resampled, and what stays; the ladder's combinations."""
 
 import numpy as np
 import pytest
 
 from builders import make_scene
+from pdrom.core.yamlfile import read_yaml
 from pdrom.model.runs import trajectory
 from pdrom.model.scene import Scene
+from pdrom.reduction.basis import compute_basis
 from pdrom.reduction.method import MethodSpec
-from pdrom.reduction.sampling import reductions
+from pdrom.reduction.sampling import Reduction, reductions, select
 from pdrom.reduction.snapshots import SnapshotSet
-from study.experiments.repetitions import ReducedRuns, Repetitions, drawn
+from places import ROOT
+from study.experiments.repetitions import LadderSection, ReducedRuns, Repetitions, drawn
 
-FULL = MethodSpec(title="all", centring="affine", rows="all")
 BLOCK = MethodSpec(title="elements", centring="affine", rows="element", solve="qr")
 END = 9
 TWICE = Repetitions(repetitions=2)
@@ -57,19 +59,19 @@ def test_drawn_frames_are_stored_ones_in_order(sheet):
 
 
 def test_a_moved_start_keeps_the_reduction_and_hardly_moves_a_tame_run(short):
-    runs = list(short.repeat(BLOCK, [3], "start", TWICE))
-    assert [run.seed for run in runs] == [1, 2]
-    assert runs[0].gain == runs[1].gain
-    assert runs[0].error != runs[1].error
-    assert runs[0].error == pytest.approx(runs[1].error, rel=1e-4)
+    runs = short.repeat(BLOCK, [3], "start", TWICE)
+    assert [run["seed"] for run in runs] == [1, 2]
+    assert runs[0]["gain"] == runs[1]["gain"]
+    assert runs[0]["error"] != runs[1]["error"]
+    assert runs[0]["error"] == pytest.approx(runs[1]["error"], rel=1e-4)
 
 
 def test_other_training_frames_are_another_basis(short):
-    one, other = short.repeat(BLOCK, [3], "training", TWICE)
-    assert one.gain != other.gain
-    assert abs(one.error - other.error) > 1e-3 * one.error
-    again = [run.error for run in short.repeat(BLOCK, [3], "training", TWICE)]
-    assert again == [one.error, other.error]
+    one, other = short.repeat(BLOCK, [3, 999], "training", TWICE)
+    assert one["gain"] != other["gain"]
+    assert abs(one["error"] - other["error"]) > 1e-3 * one["error"]
+    assert short.repeat(BLOCK, [3], "training", TWICE) == [one, other]
+    assert short.scene.config.frames == END
 
 
 def test_the_error_is_that_of_the_frames_before_the_end(sheet, short):
@@ -100,11 +102,46 @@ def test_a_run_that_ends_early_is_wrong_without_bound(sheet):
     scene, reference, data = sheet
     narrow = ReducedRuns(scene, "spring", data, reference, END, 0.5).until_the_end()
     (run,) = narrow.repeat(BLOCK, [3], "start", Repetitions(repetitions=1))
-    assert np.isinf(run.error)
-    assert not run.finite
+    assert np.isinf(run["error"])
+    assert not run["finite"]
 
 
-def test_sizes_beyond_the_rank_are_left_out(short):
-    sizes = {run.r for run in short.repeat(FULL, [2, 999], "training", TWICE)}
-    assert sizes == {2}
-    assert short.scene.config.frames == END
+LADDER = LadderSection(**read_yaml(ROOT / "config" / "default.yaml")["ladder"])
+
+
+@pytest.mark.parametrize("direction", ["up", "down"])
+def test_every_rung_reproduces_what_is_in_its_space(direction, rng):
+    """Each rung's operator is exact on its own affine space, as long as it is no Tikhonov solve."""
+    snapshots = rng.standard_normal((12, 40, 3))
+    for method in getattr(LADDER, direction):
+        basis = compute_basis(snapshots, np.ones(40), 0.0, 2, method)
+        reduction = Reduction(basis, select(basis, method, 5), method, 5)
+        assert np.isfinite(reduction.gain)
+        if method.solve == "tikhonov":
+            continue
+        axes = 3 if method.per_axis else 1
+        space = reduction.v.reshape(40, 3, 5) * rng.standard_normal((axes, 5))
+        p = basis.mean.reshape(40, 3) + space.sum(axis=2)
+        assert reduction.reconstruct(p[None])[0] == pytest.approx(p, abs=1e-8 * reduction.gain)
+
+
+def test_rungs_change_one_ingredient_at_a_time():
+    """Between two rungs of `up` differ at most the fields that one ingredient is made of."""
+    for lower, upper in zip(LADDER.up[:-1], LADDER.up[1:], strict=True):
+        a, b = lower.model_dump(exclude={"title"}), upper.model_dump(exclude={"title"})
+        changed = {key for key in a if a[key] != b[key]}
+        assert (changed - {"coefficients"} and len(changed - {"coefficients"}) <= 1) or changed == {
+            "coefficients"
+        }
+
+
+@pytest.mark.parametrize("p", [1, 2, 3])
+def test_the_square_samples_as_many_entries_in_each_of_its_places(p, rng):
+    snapshots = rng.standard_normal((12, 20 * p, 3))
+    entries = set()
+    for direction, method, _, _ in LADDER.rungs(p):
+        if direction == "square":
+            basis = compute_basis(snapshots, np.ones(20 * p), 0.0, p, method)
+            reduction = Reduction(basis, select(basis, method, 5), method, 5)
+            entries.add(sum(len(block.entries) for block in reduction.blocks))
+    assert entries == {3 * p * 5}

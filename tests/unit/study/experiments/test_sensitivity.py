@@ -1,4 +1,4 @@
-"""Sensitivity floor and horizon: chaos is found, and calm runs are left whole."""
+"""Sensitivity floor and horizon, and what effects do: forces, energies and runs without them."""
 
 from functools import partial
 
@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from builders import make_scene
+from builders import GRAVITY, make_scene
+from builders import TOP as PINS
 from pdrom.core.store import read_table, write_table
 from pdrom.model.runs import trajectory
 from pdrom.reduction.deviations import error_within
@@ -16,9 +17,13 @@ from study.experiments.kit.scenes import perturbation_field
 from study.experiments.kit.settings import floor_of, horizon, horizons
 from study.experiments.sensitivity import (
     COLUMNS,
+    EFFECTS,
+    contributions,
     perturbed,
     relative_difference,
+    removable,
     sensitivities,
+    without,
 )
 
 
@@ -36,7 +41,7 @@ SPRING = {"effect": "spring", "weight": 1e5}
 COMPRESSED = partial(
     make_scene,
     SPRING,
-    {"effect": "gravity"},
+    GRAVITY,
     {"effect": "pins", "select": "bottom"},
     {"effect": "translate", "select": "top", "offset": [0.0, -0.4, 0.0], "over": 10},
     frames=60,
@@ -45,7 +50,7 @@ HORIZONTAL = partial(
     make_scene,
     SPRING,
     {"effect": "gravity", "acceleration": [0.0, 0.0, -9.81]},
-    {"effect": "pins", "select": "top"},
+    PINS,
     frames=60,
 )
 
@@ -73,7 +78,7 @@ def test_perturbation_has_its_size_and_its_seed():
 
 
 def test_table_has_every_perturbation_seed_variant_and_frame():
-    scene = make_scene(SPRING, {"effect": "gravity"}, {"effect": "pins", "select": "top"}, frames=4)
+    scene = make_scene(SPRING, GRAVITY, PINS, frames=4)
     table = sensitivities(scene, (1e-10, 1e-6), (1, 2))
     assert list(table.columns) == COLUMNS
     labels = table.groupby(["perturbation", "seed"], sort=False).frame.agg(list)
@@ -87,28 +92,11 @@ def test_table_has_every_perturbation_seed_variant_and_frame():
     assert largest["solver"] < 1e-9 < largest["iterations x4"]
     assert 1e-5 < largest["h/2"] < 1.0
     assert np.isfinite(table.relative_difference).all()
-
-
-def test_small_perturbations_act_in_proportion():
-    scene = make_scene(SPRING, {"effect": "gravity"}, {"effect": "pins", "select": "top"}, frames=4)
-    assert floor(scene, 2e-6) == pytest.approx(2.0 * floor(scene, 1e-6), rel=1e-2)
-
-
-def test_held_out_floor_is_labelled_as_such():
-    scene = make_scene(SPRING, {"effect": "gravity"}, {"effect": "pins", "select": "top"}, frames=3)
-    table = pd.concat(perturbed(scene, trajectory(scene), 1e-10, (1, 2, 3), "kick"))
-    assert set(table.perturbation) == {"kick"}
-    assert table.seed.tolist() == [1, 1, 1, 2, 2, 2, 3, 3, 3]
-    assert table.relative_difference[table.seed == 2].to_numpy() == pytest.approx(
-        relative_difference(
-            trajectory(scene, perturbation_field(scene, 1e-10, 2)), trajectory(scene)
-        )
-    )
-
-
-def test_a_scene_can_be_measured_twice():
-    """Handles remember where they took hold; a second run must not start from there."""
-    np.testing.assert_array_equal(trajectory(COMPRESSED()), trajectory(COMPRESSED()))
+    labelled = pd.concat(perturbed(scene, trajectory(scene), 1e-10, (1, 2, 3), "kick"))
+    assert set(labelled.perturbation) == {"kick"}
+    assert labelled.seed.tolist() == [1] * 4 + [2] * 4 + [3] * 4
+    own = table[(table.perturbation == "1e-10") & (table.seed == 2)].relative_difference
+    assert labelled.relative_difference[labelled.seed == 2].tolist() == own.tolist()
 
 
 PERTURBED = {
@@ -138,32 +126,24 @@ def test_floor_is_the_largest_over_the_seeds(floors):
         assert len(floor_of(table, "b", 1e-6)) == 0
 
 
-def test_horizons_of_every_scene(floors):
-    assert horizons(floors, 1e-10, 1e-3) == {"a": 2, "b": 4}
-    assert horizons(floors, 1e-10, 1e-2) == {"a": 3, "b": 4}
-    assert horizons(floors, 1e-6, 1e-3)["a"] == 0
-    assert horizons(floors, "heldout", 1e-3) == {"a": 1, "b": 4}
-
-
 @pytest.mark.parametrize("kept", [["1e-10"], ["1e-10", "solver"]])
 def test_horizons_survive_a_file(floors, kept, tmp_path):
     """Labels are found whether they are read back as text or, without words, as numbers."""
     write_table(floors[floors.perturbation.isin(kept)], tmp_path / "sensitivity.csv")
-    assert horizons(read_table(tmp_path / "sensitivity.csv"), 1e-10, 1e-3) == {"a": 2, "b": 4}
+    for table in (floors, read_table(tmp_path / "sensitivity.csv")):
+        assert horizons(table, 1e-10, 1e-3) == {"a": 2, "b": 4}
+        assert horizons(table, 1e-10, 1e-2) == {"a": 3, "b": 4}
+    assert horizons(floors, 1e-6, 1e-3)["a"] == 0
+    assert horizons(floors, "heldout", 1e-3) == {"a": 1, "b": 4}
 
 
 @pytest.mark.parametrize(
     ("floor", "expected"),
     [
-        ([], 0),
-        ([0.0, 0.0], 2),
-        ([1e-3, 1e-3], 2),
-        ([0.0, 2e-3, 0.0, 5e-3], 1),
-        ([1.0], 0),
-        ([0.0, np.nan, 0.0], 1),
+        ([], 0), ([1e-3, 1e-3], 2), ([0.0, 2e-3, 0.0, 5e-3], 1), ([0.0, np.nan, 0.0], 1),
         ([0.0, 0.0, np.inf], 2),
     ],
-)
+)  # fmt: skip
 def test_horizon_is_the_first_frame_above(floor, expected):
     assert horizon(np.array(floor), 1e-3) == expected
 
@@ -183,3 +163,75 @@ def test_the_error_counts_frames_before_the_end_only():
     assert error_within(difference, displacement, 3) == np.inf
     assert error_within(difference, displacement, 4) is None
     assert error_within(difference, displacement, 0) is None
+
+
+SOFT = {"effect": "spring", "weight": 1e3}
+
+
+def contributed(*effects, **settings):
+    scene = make_scene(*effects, **settings)
+    return scene, contributions(scene)
+
+
+def test_a_free_fall_is_gravity_alone():
+    scene, made = contributed(
+        SOFT, GRAVITY, mesh={"kind": "cloth", "rows": 4, "columns": 4}, frames=5
+    )
+    assert made.columns.tolist() == EFFECTS
+    weight = 9.81 * np.sqrt(np.square(scene.masses).sum())
+    force = made.set_index(["effect", "frame"]).force
+    assert force["gravity"].to_numpy() == pytest.approx(np.full(5, weight))
+    assert force["spring"].max() < 1e-9 * weight
+    energy = made[made.effect == "gravity"].energy.to_numpy()
+    fallen = 9.81 * 0.016**2 * np.arange(1, 6) * np.arange(2, 7) / 2
+    lost = energy[0] - energy
+    assert lost == pytest.approx(9.81 * scene.masses.sum() * (fallen - fallen[0]), rel=1e-9)
+
+
+def test_what_hangs_still_is_carried_by_its_pins():
+    """Two vertices below two pins, which in the end carry their own weight, too."""
+    mesh = {"kind": "cloth", "rows": 2, "columns": 2}
+    damping = {"effect": "damping", "rate": 5.0}
+    longer = {"mesh": mesh, "frames": 400, "iterations": 200}
+    scene, made = contributed(SOFT, GRAVITY, PINS, damping, **longer)
+    last = made[made.frame == 399].set_index("effect")
+    hanging = np.full(2, 9.81 * scene.masses[0])
+    assert last.force["spring"] == pytest.approx(np.linalg.norm(hanging), rel=1e-3)
+    assert last.force["pins"] == pytest.approx(2.0 * np.linalg.norm(hanging), rel=1e-2)
+    assert last.force["damping"] < 1e-3 * last.force["spring"]
+    assert np.isnan(last.energy["damping"])
+    assert last.energy["spring"] > 0.0
+
+
+def test_a_contact_acts_where_it_touches_and_a_start_once():
+    floor = {"effect": "floor", "height": 1.9}
+    scene, made = contributed(SOFT, GRAVITY, floor, {"effect": "kick", "speed": 1.0, "seed": 1},
+                        frames=40)  # fmt: skip
+    positions = trajectory(scene)
+    touching = made[made.effect == "floor"].force.to_numpy() > 0.0
+    on_floor = (np.abs(positions[1:, :, 1] - 1.9) < 1e-12).any(axis=1)
+    assert touching.any()
+    assert (on_floor | ~touching).all()
+    start = made[made.effect == "kick"]
+    assert start.frame.tolist() == [0]
+    v = scene.starts[0].velocity()
+    assert start.energy.item() == pytest.approx(0.5 * float(scene.masses @ (v**2).sum(axis=1)))
+
+
+def test_effects_of_one_name_are_one():
+    again = {"effect": "pins", "select": "bottom", "start": 3}
+    _, made = contributed(SOFT, GRAVITY, PINS, again, frames=6)
+    assert (made.groupby(["effect", "frame"]).size() == 1).all()
+    assert set(made.role) == {"constraint group", "force", "hold"}
+
+
+def test_every_effect_but_the_only_group_is_left_out_in_turn():
+    bending = {"effect": "bending", "weight": 1e-12}
+    mesh = {"kind": "cloth", "rows": 5, "columns": 5, "wave": 0.1}
+    scene = make_scene(SOFT, bending, GRAVITY, PINS, mesh=mesh, frames=8)
+    assert removable(scene.config) == ["spring", "bending", "gravity", "pins"]
+    assert removable(make_scene(SOFT, GRAVITY).config) == ["gravity"]
+    made = sensitivities(scene, (1e-10,), (1,))
+    drift = made.groupby("perturbation").relative_difference.max()
+    assert drift[without("bending")] < 1e-8 < 1e-2 < drift[without("gravity")]
+    assert drift[without("spring")] > 1e-3

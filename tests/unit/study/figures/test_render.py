@@ -1,155 +1,19 @@
-"""The renderer: projection, depth order, shading; elements on the mesh; styles; residuals."""
-
-from itertools import combinations
+"""Elements on the mesh, residuals of the selections, and the runs that figures read."""
 
 import numpy as np
 import pytest
-from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
 from pdrom.core.errors import ConfigurationError, StorageError
-from pdrom.model.mesh.files import read_mesh_file
 from pdrom.model.mesh.generators import bar, cloth
 from pdrom.reduction.sampling.deim import block_elements, deim_entries
-from pdrom.view import style
-from pdrom.view.camera import Camera, Window, bounds, window_of
-from pdrom.view.mesh_render import (
-    AMBIENT,
-    RASTER_ABOVE,
-    Surface,
-    depth_order,
-    draw_floor,
-    draw_surface,
-    face_normals,
-    outline_edges,
-    shade,
-    silhouette_edges,
-)
-from pdrom.view.panels import RunPanel, fit_aspect
-from pdrom.view.read import choose_ranks, frame_numbers, positions_at, rerun_infos, rerun_positions
-from places import CONFIG
+from pdrom.view.camera import Camera
+from pdrom.view.read import choose_ranks, positions_at, rerun_infos, rerun_positions
 from study.artifact.paths import RERUNS, TRAIN
 from study.figures.kit.elements import element_map, magnitudes, signed_entry
 from study.figures.sampling import iterations
 
 from .conftest import BLOWN_UP, BLOWUP_FRAME
-
-CAMERAS = [Camera(), Camera(0.0, 0.0), Camera(-120.0, 60.0), Camera(90.0, -30.0),
-           Camera(up=(0.0, 0.0, 1.0))]  # fmt: skip
-
-
-@pytest.mark.parametrize("camera", CAMERAS)
-def test_camera_is_a_rotation_with_its_direction_up(camera):
-    assert np.allclose(camera.basis @ camera.basis.T, np.eye(3))
-    assert np.linalg.det(camera.basis) == pytest.approx(1.0)
-    x, y = camera.project(np.array([camera.up]))[0]
-    assert x == pytest.approx(0.0)
-    assert y == pytest.approx(np.cos(np.radians(camera.elevation)))
-
-
-def test_front_camera_sees_x_right_and_z_near():
-    camera = Camera(0.0, 0.0)
-    assert np.allclose(camera.project(np.array([[2.0, 3.0, 4.0]])), [[2.0, 3.0]])
-    assert camera.depth(np.array([[2.0, 3.0, 4.0]]))[0] == pytest.approx(4.0)
-
-
-@pytest.mark.parametrize("camera", CAMERAS)
-def test_faces_are_painted_from_far_to_near(camera):
-    mesh = bar(6, 3, 3)
-    order = depth_order(mesh.points, mesh.triangles, camera)
-    depth = camera.depth(mesh.points)[mesh.triangles].mean(axis=1)[order]
-    assert sorted(order) == list(range(len(mesh.triangles)))
-    assert (np.diff(depth) >= 0.0).all()
-
-
-def test_nearest_face_covers_the_others():
-    near, far = (
-        np.array([[0, 0, 1], [1, 0, 1], [0, 1, 1]]),
-        np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]]),
-    )
-    points = np.concatenate([near, far]).astype(float)
-    ax = Figure().subplots()
-    colours = np.array([to_rgb("red"), to_rgb("blue")])
-    triangles = np.array([[0, 1, 2], [3, 4, 5]])
-    drawn = draw_surface(ax, points, Surface(triangles, False), Camera(0.0, 0.0), colours, wire=0.0)
-    last = drawn.get_facecolors()[-1]
-    assert last[0] > last[2]
-
-
-@pytest.mark.parametrize("camera", CAMERAS)
-def test_shading_is_bounded_and_two_sided(camera):
-    normals = np.random.default_rng(0).standard_normal((500, 3))
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    brightness = shade(normals, camera)
-    assert brightness.min() >= AMBIENT
-    assert brightness.max() <= 1.0
-    assert np.ptp(brightness) > 0.3
-    assert np.allclose(brightness, shade(-normals, camera))
-    assert np.allclose(shade(np.zeros((1, 3)), camera), AMBIENT)
-
-
-def test_normals_are_unit_or_zero():
-    points = np.array([[0.0, 0, 0], [1, 0, 0], [0, 2, 0], [2, 0, 0]])
-    normals = face_normals(points, np.array([[0, 1, 2], [0, 1, 3]]))
-    assert np.allclose(normals, [[0, 0, 1], [0, 0, 0]])
-
-
-def test_big_meshes_are_rasterised():
-    small, big = cloth(5, 5), cloth(40, 40)
-    assert len(big.triangles) > RASTER_ABOVE > len(small.triangles)
-    for mesh, expected in ((small, False), (big, True)):
-        ax = Figure().subplots()
-        drawn = draw_surface(ax, mesh.points, Surface(mesh.triangles), Camera(), "grey")
-        assert bool(drawn.get_rasterized()) is expected
-
-
-def test_outline_of_sheet_and_bar():
-    sheet, box = cloth(4, 5), bar(4, 3, 3)
-    assert len(outline_edges(sheet.points, sheet.triangles)) == 2 * (3 + 4)
-    # the twelve edges of the box, with 3 and twice 2 segments
-    assert len(outline_edges(box.points, box.triangles)) == 4 * (3 + 2 + 2)
-
-
-def test_the_silhouette_of_a_round_body_is_a_closed_line_around_it():
-    ball = read_mesh_file(CONFIG / "scenes" / "meshes" / "ball.obj")
-    points = ball.points - [0.0, 2.0, 0.0]
-    assert len(outline_edges(points, ball.triangles)) == 0
-    camera = Camera(30.0, 20.0)
-    edges = silhouette_edges(points, ball.triangles, camera)
-    assert (np.unique(edges, return_counts=True)[1] % 2 == 0).all()
-    radii = np.linalg.norm(camera.project(points)[edges.ravel()], axis=1)
-    assert radii.min() > 0.45
-
-
-def test_floor_is_drawn_only_in_view():
-    mesh, camera = cloth(4, 4, lift=2.0), Camera()
-    for shift, expected in ((0.0, False), (-1.5, True)):
-        points = mesh.points + np.array([0.0, shift, 0.0])
-        window = window_of(camera, [points])
-        ax = Figure().subplots()
-        assert draw_floor(ax, points, Surface(mesh.triangles), camera, window) is expected
-
-
-def test_windows():
-    window = Window(0.0, 2.0, 0.0, 1.0)
-    inside = window.contains(np.array([[1.0, 0.5], [3.0, 0.5]]))
-    assert list(inside) == [True, False]
-    assert bounds(np.array([[0.0, 0.0], [2.0, 1.0]]), 0.0) == window
-    thin = fit_aspect(Window(0.0, 1.0, 0.0, 0.01))
-    assert thin.height / thin.width == pytest.approx(0.35)
-    tall = fit_aspect(Window(0.0, 0.1, 0.0, 1.0))
-    assert tall.height / tall.width == pytest.approx(1.5)
-
-
-def test_a_run_outside_is_seen_together_with_the_window():
-    window = Window(-1.0, 1.0, -1.0, 1.0)
-    inside = RunPanel("", "grey", np.zeros((1, 3))).seen_by(Camera())
-    assert inside.zoomed(window) == window
-    far = RunPanel("", "grey", np.array([[0.0, 0.0, 0.0], [9.0, 0.0, 0.0]])).seen_by(Camera(0, 0))
-    larger = far.zoomed(window)
-    assert larger.left <= -1.0
-    assert larger.right >= 9.0
-    assert far.scale(window) == pytest.approx(10.0 * 1.06 / 2.0)
 
 
 @pytest.mark.parametrize(
@@ -197,16 +61,6 @@ def test_vertex_values_reach_the_faces_around():
     touched = np.isin(mesh.triangles, elements.cells[:, 0]).any(axis=1)
     assert np.allclose(values[touched], 1.0)
     assert np.isnan(values[~touched]).all()
-
-
-def test_colours_and_markers_are_unique():
-    for looks in (style.METHODS.values(), style.GROUP_LOOKS):
-        for first, second in combinations(looks, 2):
-            assert first[0] != second[0]
-            assert first[1] != second[1]
-    named = style.method_styles(["pod", "mine", "yours"])
-    assert len(set(named.values())) == 3
-    assert named["mine"] == style.method_styles(["yours", "mine"])["mine"]
 
 
 def test_the_signed_entry_is_the_largest():
@@ -284,7 +138,3 @@ def test_runs_are_read_only_where_finite(study):
     assert rerun_positions(path, infos[20], 15) is None
     assert [i.r for i in choose_ranks(list(infos.values()), ("full", 14, 6, 99))] == [14, 6]
     assert choose_ranks(list(infos.values()), (99,)) == list(infos.values())
-
-
-def test_instants_are_fractions_of_a_run():
-    assert frame_numbers((0.0, 0.1, 0.11, 1.0), 20) == [0, 2, 20]

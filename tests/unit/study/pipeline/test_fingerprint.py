@@ -1,19 +1,15 @@
 """Fingerprints: what changes a result changes them, what does not leaves them alone."""
 
 import shutil
-import subprocess
-import sys
-from pathlib import Path
 
 import pytest
 
-import pdrom
 from pdrom.core.errors import ConfigurationError
 from pdrom.model.effects import EFFECTS
 from pdrom.reduction.method import SELECTIONS, MethodSpec
+from study.pipeline import fingerprint as module
 from study.pipeline.fingerprint import closure, digest_of_source, fingerprint
 
-PACKAGE = Path(pdrom.__file__).parent
 SOURCE = '''"""Module."""
 
 import os
@@ -92,7 +88,6 @@ def test_effects_are_in_no_closure_that_does_not_list_them():
         "pdrom.model.effects.poke",
     }
     assert not kernels & set(closure("study.experiments.fom"))
-    assert not kernels & set(closure("study.experiments.fom"))
     with_spring = closure("study.experiments.fom", "pdrom.model.constraints.spring")
     assert kernels & set(with_spring) == {"pdrom.model.constraints.spring"}
 
@@ -135,10 +130,10 @@ def test_selections_are_in_no_closure_that_does_not_list_them():
     own = set(map(SELECTIONS.module, SELECTIONS))
     for name in SELECTIONS:
         method = MethodSpec(title="test", rows="element", selection=name)
-        found = closure("pdrom.reduction.sampling.select", *method.modules)
+        found = closure("pdrom.reduction.sampling.reduction", *method.modules)
         assert own & set(found) == {SELECTIONS.module(name)}
     everything = MethodSpec(title="test", rows="all")
-    assert not own & set(closure("pdrom.reduction.sampling.select", *everything.modules))
+    assert not own & set(closure("pdrom.reduction.sampling.reduction", *everything.modules))
 
 
 def test_order_and_repetition_of_modules_do_not_matter():
@@ -153,64 +148,43 @@ def test_unknown_modules_are_named(name):
         fingerprint(name)
 
 
-@pytest.fixture(scope="module")
-def prints(tmp_path_factory):
-    """Fingerprints of a copy of the package after each of some edits."""
-    root = tmp_path_factory.mktemp("copy")
-    copy = root / "pdrom"
-    for package in (PACKAGE, PACKAGE.with_name("study")):
+FOM, SPRING = "study.experiments.fom", "pdrom.model.constraints.spring"
+
+
+@pytest.fixture
+def copy(tmp_path, monkeypatch):
+    """A copy of the packages, of which fingerprints are taken."""
+    original = fingerprint(FOM)
+    for name, folder in module.PACKAGES.items():
         ignored = shutil.ignore_patterns("__pycache__")
-        shutil.copytree(package, root / package.name, ignore=ignored)
-
-    def taken() -> tuple[str, ...]:
-        code = (
-            "from study.pipeline.fingerprint import fingerprint as f; import pdrom;"
-            "print(pdrom.__file__, f('study.experiments.fom'),"
-            "f('study.experiments.fom', 'pdrom.model.constraints.spring'))"
-        )
-        done = subprocess.run(
-            [sys.executable, "-c", code],
-            env={"PYTHONPATH": str(root), "PYTHONDONTWRITEBYTECODE": "1"},
-            cwd=root,
-            capture_output=True,
-            text=True,
-            check=True,
-        )
-        place, *found = done.stdout.split()
-        assert Path(place).parent == copy
-        return tuple(found)
-
-    def edited(name: str, text: str) -> tuple[str, ...]:
-        path = copy / name
-        before = path.read_text()
-        path.write_text(before + text)
-        result = taken()
-        path.write_text(before)
-        return result
-
-    return {
-        "none": taken(),
-        "comment": edited("model/constraints/spring.py", "\n# a comment\n"),
-        "spring": edited("model/constraints/spring.py", "\nADDED = 1\n"),
-        "bending": edited("model/constraints/bending.py", "\nADDED = 1\n"),
-        "mesh": edited("model/mesh/generators.py", "\nADDED = 1\n"),
-        "store": edited("core/store/__init__.py", "\nADDED = 1\n"),
-    }
+        shutil.copytree(folder, tmp_path / name, ignore=ignored)
+    monkeypatch.setattr(module, "PACKAGES", {name: tmp_path / name for name in module.PACKAGES})
+    assert taken()[0] == original
+    yield tmp_path
+    forget()
 
 
-def test_copy_has_the_fingerprint_of_the_original(prints):
-    assert prints["none"][0] == fingerprint("study.experiments.fom")
+def forget() -> None:
+    for kept in (module._locate, module._read, fingerprint):
+        kept.cache_clear()
+
+
+def taken() -> tuple[str, str]:
+    forget()
+    return fingerprint(FOM), fingerprint(FOM, SPRING)
 
 
 @pytest.mark.parametrize(
-    ("edit", "changed"),
+    ("name", "text", "changed"),
     [
-        ("comment", (False, False)),
-        ("spring", (False, True)),
-        ("bending", (False, False)),
-        ("mesh", (True, True)),
-        ("store", (True, True)),
+        ("model/constraints/spring.py", "\n# a comment\n", (False, False)),
+        ("model/constraints/spring.py", "\nADDED = 1\n", (False, True)),
+        ("model/constraints/bending.py", "\nADDED = 1\n", (False, False)),
+        ("model/mesh/generators.py", "\nADDED = 1\n", (True, True)),
+        ("core/store/__init__.py", "\nADDED = 1\n", (True, True)),
     ],
 )
-def test_edit_changes_what_uses_the_module(prints, edit, changed):
-    assert tuple(a != b for a, b in zip(prints[edit], prints["none"], strict=True)) == changed
+def test_an_edit_changes_what_uses_the_module(copy, name, text, changed):
+    before, path = taken(), copy / "pdrom" / name
+    path.write_text(path.read_text() + text)
+    assert tuple(a != b for a, b in zip(taken(), before, strict=True)) == changed

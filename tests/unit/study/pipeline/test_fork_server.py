@@ -13,9 +13,8 @@ import psutil
 import pytest
 
 from study.pipeline import run as running
-from study.pipeline.fork_server import interpreter
+from study.pipeline.fork_server import SUPPORTED, interpreter
 from study.pipeline.fork_server.client import ADDRESS, of_this_user, place_of
-from study.pipeline.fork_server.start import SUPPORTED
 
 pytestmark = pytest.mark.skipif(not SUPPORTED, reason="no safe forks on this platform")
 
@@ -138,19 +137,23 @@ begun.set()
 
 @pytest.mark.parametrize("victim", ["client", "owner"])
 def test_no_job_outlives_its_client_or_the_owner(tmp_path, victim):
-    """A pipe that the job holds closes when the job is gone, and only then."""
+    """A pipe that the job holds closes when the job is gone, and only then; no file is left."""
     code = """
 import os, signal
 print(os.getpid(), flush=True)
 signal.pause()
 """
+    temporary = tmp_path / "temporary"
+    temporary.mkdir()
     told = "import os; os.execv('/bin/sh', ['sh', '-c', 'echo $$; exec ' + os.environ['JOB']])"
-    owner = start(f"exec {shlex.join([sys.executable, '-c', told])}", JOB=script(tmp_path, code))
+    surroundings = {"JOB": script(tmp_path, code), "TMPDIR": str(temporary)}
+    owner = start(f"exec {shlex.join([sys.executable, '-c', told])}", **surroundings)
     client, _job = int(owner.stdout.readline()), int(owner.stdout.readline())
     os.kill(client if victim == "client" else owner.pid, signal.SIGKILL)
     rest = owner.stdout.read()
     assert rest == ("ended -9\n" if victim == "client" else "")
     owner.communicate()
+    assert list(temporary.iterdir()) == []
 
 
 # A process that is a server: its address, its patience; its owner holds its standard input.
@@ -308,20 +311,6 @@ def test_without_a_server_the_client_is_a_plain_interpreter(tmp_path):
             ran, shell=True, capture_output=True, text=True, env={**os.environ, **environment}
         )
         assert done.stdout == said
-
-
-def test_a_killed_run_leaves_no_file_behind(tmp_path):
-    """Its job says when it runs; everything that the run might have written lies in TMPDIR."""
-    scripts, temporary = tmp_path / "scripts", tmp_path / "temporary"
-    scripts.mkdir()
-    temporary.mkdir()
-    command = script(scripts, "import signal; print('ready', flush=True); signal.pause()")
-    owner = start(command, TMPDIR=str(temporary))
-    assert owner.stdout.readline() == "ready\n"
-    os.kill(owner.pid, signal.SIGKILL)
-    assert owner.stdout.read() == ""
-    owner.communicate()
-    assert list(temporary.iterdir()) == []
 
 
 def test_only_the_same_user_is_answered(monkeypatch):

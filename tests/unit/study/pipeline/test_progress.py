@@ -26,8 +26,7 @@ def jobs(count: int, seconds: float = 10.0, share: float = 0.5) -> dict[int, Exp
 
 def estimate(expected: dict[int, Expected], ran: Iterable[tuple[int, float, float]]) -> Estimate:
     """After some jobs that ran, each with its start and end."""
-    made = Estimate()
-    made.expect(expected)
+    made = Estimate(expected)
     for job, start, end in ran:
         made.start(job, start)
         made.finish(job, end)
@@ -35,7 +34,7 @@ def estimate(expected: dict[int, Expected], ran: Iterable[tuple[int, float, floa
 
 
 def test_nothing_is_said_before_jobs_have_ended():
-    assert Estimate().left(0.0) is None
+    assert Estimate({}).left(0.0) is None
     assert estimate(jobs(4), []).left(5.0) is None
     assert estimate(jobs(4), [(0, 0.0, 10.0)]).left(10.0) is None
 
@@ -75,9 +74,8 @@ def seconds_of(words: str) -> float:
 def quotients(name: str, slower: float) -> tuple[list[float], float]:
     """Said over true seconds of a recorded run, at every job's start; share of the run before."""
     run = pd.read_csv(RUNS / f"{name}.csv")
-    made = Estimate()
     rows = list(run.itertuples())
-    made.expect({job.Index: Expected(job.expected, job.share, job.after) for job in rows})
+    made = Estimate({job.Index: Expected(job.expected, job.share, job.after) for job in rows})
     starts = [(slower * job.start, made.start, job.Index) for job in rows]
     ends = [(slower * job.end, made.finish, job.Index) for job in rows]
     found, silent, end = [], 0.0, slower * run.end.max()

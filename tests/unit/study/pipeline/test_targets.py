@@ -6,17 +6,19 @@ from dataclasses import dataclass
 import pytest
 
 from pdrom.core.errors import ConfigurationError
+from places import ROOT
 from study.pipeline.folders import Folders
-from study.pipeline.targets import Known, Names
+from study.pipeline.plan import Plan
+from study.pipeline.study import Study
+from study.pipeline.targets import check_targets, files
 
-NAMES = Names(["scaling", "floor"], ["scaling", "claims"])
 TINY = Folders("results/studies/tiny", "results/studies/tiny/paper/main.pdf")
 
 
 @pytest.mark.parametrize(
     ("target", "names"),
     [
-        ("floor", ["figures/floor.pdf"]),
+        ("teaser", ["figures/teaser.pdf"]),
         ("claims", ["tables/claims.csv"]),
         ("scaling", ["figures/scaling.pdf", "tables/scaling.csv"]),
         ("figure scaling", ["figures/scaling.pdf"]),
@@ -25,15 +27,15 @@ TINY = Folders("results/studies/tiny", "results/studies/tiny/paper/main.pdf")
 )
 def test_files_of_a_target(target, names):
     for place in (Folders(), TINY):
-        assert NAMES.files(target, place) == [f"{place.results}/{name}" for name in names]
+        assert files(target, place) == [f"{place.results}/{name}" for name in names]
 
 
 def test_files_that_have_a_place_of_their_own():
-    for name in ("results/studies/tiny/x", "figure_floor", "figure none"):
-        assert NAMES.files(name, Folders()) == NAMES.files(name, TINY) == [name]
+    for name in ("results/studies/tiny/x", "figure_teaser", "figure none"):
+        assert files(name, Folders()) == files(name, TINY) == [name]
     for name in ("paper/main.pdf", "paper/supplement.pdf"):
-        assert NAMES.files(name, Folders()) == [name]
-        assert NAMES.files(name, TINY) == [f"results/studies/tiny/{name}"]
+        assert files(name, Folders()) == [name]
+        assert files(name, TINY) == [f"results/studies/tiny/{name}"]
 
 
 @dataclass
@@ -52,30 +54,31 @@ class Rule:
 
 
 RULES = [
-    Rule("fom", r"results/fom/[a-z_]+/(train|heldout)\.h5", True),
-    Rule("pod", r"results/snapshots/[a-z_]+/[a-z_]+\.h5", True),
+    Rule("fom", r"results/fom/[a-z_0-9]+/(train|heldout)\.h5", True),
+    Rule("mesh", r"results/meshes/[A-Za-z0-9_.-]+\.h5", True),
+    Rule("snapshots", r"results/snapshots/[a-z_]+/[a-z_]+\.h5", True),
+    Rule("reruns", r"results/reruns/[a-z_]+/[a-z_]+/[a-z-]+\.h5", True),
     Rule("scaling_table", r"results/tables/scaling\.csv"),
 ]
-GROUPS = {"sheet": ("spring",), "bar": ("strain", "bending")}
-KNOWN = Known(
-    results="results",
-    files=["results/tables/scaling.csv", "results/tables/claims.csv"],
-    names=NAMES,
-    labels={"scene": lambda labels: GROUPS, "group": lambda labels: GROUPS[labels["scene"]]},
-)
 
 
-@pytest.mark.parametrize(
-    "target",
-    [
-        "scaling_table",
-        "results/tables/scaling.csv",
-        "results/fom/bar/heldout.h5",
-        "results/snapshots/bar/strain.h5",
-    ],
-)
-def test_what_a_rule_makes_is_a_target(target):
-    KNOWN.check([target], RULES)
+@pytest.fixture(scope="module")
+def plan():
+    """A plan of a study with a variant."""
+    config = {
+        "scenes": ["strain_oop"], "methods": ["deim"], "variants": {"scenes": ["spring_oop"]},
+        "coarsen": {"resolution": 0.3, "frames": 0.1},
+    }  # fmt: skip
+    return Plan(Study.load(config, ROOT))
+
+
+def test_what_a_rule_makes_is_a_target(plan):
+    """Files of the study, of its variant, and of scenes outside it."""
+    scenes = [*plan.study.scenes, "bar_twist"]
+    wanted = [f"results/fom/{scene}/heldout.h5" for scene in scenes]
+    wanted += [f"results/meshes/{mesh}.h5" for mesh in plan.study.meshes]
+    wanted += ["results/snapshots/bar_twist/tetrahedron_strain.h5", "results/tables/scaling.csv"]
+    check_targets(plan, [*wanted, "scaling_table"], RULES)
 
 
 @pytest.mark.parametrize(
@@ -84,16 +87,18 @@ def test_what_a_rule_makes_is_a_target(target):
         ("results/tabels/scaling.csv", "did you mean 'results/tables/scaling.csv'?"),
         ("scalign", "did you mean 'scaling'?"),
         ("scaling_tabel", "did you mean 'scaling_table'?"),
-        ("results/fom/baar/train.h5", "unknown scene 'baar', did you mean 'bar'?"),
-        ("results/snapshots/bar/strian.h5", "unknown group 'strian', did you mean 'strain'?"),
-        ("results/snapshots/sheet/strain.h5", "unknown group 'strain'"),
-        ("bar", "a scene; name one of its files, as results/fom/bar/train.h5"),
+        ("results/fom/strain_opo/train.h5", "unknown scene 'strain_opo', did you mean 'strain_"),
+        ("results/meshes/none.h5", "unknown mesh 'none'"),
+        ("results/snapshots/strain_oop/strian.h5", "group 'strian', did you mean 'strain'?"),
+        ("results/snapshots/strain_oop/spring.h5", "unknown group 'spring'"),
+        ("results/reruns/strain_oop/strain/deem.h5", "method 'deem', did you mean 'deim'?"),
+        ("bar_twist", "a scene; name one of its files, as results/fom/bar_twist/train.h5"),
         ("fom", "nothing makes it"),
         ("something/quite/different", "targets are names of figures and tables"),
     ],
 )
-def test_what_nobody_makes_is_named_with_a_suggestion(target, words):
+def test_what_nobody_makes_is_named_with_a_suggestion(target, words, plan):
     with pytest.raises(ConfigurationError) as caught:
-        KNOWN.check([target], RULES)
+        check_targets(plan, [target], RULES)
     assert words in str(caught.value)
     assert f"'{target}'" in str(caught.value)

@@ -8,8 +8,8 @@ from pdrom.core.store import write_table
 from pdrom.reduction.method import MethodSpec
 from places import ROOT
 from study.artifact.paths import File
-from study.experiments.scaling import ITERATIONS, Options, Sized, SizedBreakEven
-from study.experiments.scaling import scaling as experiment
+from study.experiments.timing import ITERATIONS, Sized, SizedBreakEven, SizedOptions
+from study.experiments.timing import scaling as experiment
 from study.pipeline.scenes import read_scene
 from study.tables.effects_cost import EXPONENTS, scaling
 from study.tables.payoff import CURVE, breakeven
@@ -54,7 +54,7 @@ def test_no_scene_gives_an_empty_table():
 def test_every_size_is_measured(tmp_path, name):
     scene = read_scene(ROOT, name).coarsened(0.4, 1.0)
     alone = SizedBreakEven(sizes=(2, 3, 1000), training_frames=9, repeats=2)
-    settings = Options(
+    settings = SizedOptions(
         scene=scene,
         scaled_methods={"block-deim": SPEC, "deim-joint": JOINT},
         scaling=Sized(r=4, k=5, training_frames=8, frames=1, repeats=2, breakeven=alone),

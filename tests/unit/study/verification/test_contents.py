@@ -12,7 +12,8 @@ from study.artifact.usage import Usage
 from study.figures.kit.declaration import declarations
 from study.pipeline.commandline import CommandLine
 from study.pipeline.front import completed
-from study.pipeline.inventory import contents, costs, entries, files_of
+from study.pipeline.inventory import contents, costs, entries
+from study.pipeline.targets import own_file
 from study.tables import declared
 from study.verification.subject import Subject
 
@@ -46,25 +47,30 @@ class Dag:
 
 def test_every_command_makes_what_its_entry_names(subject, monkeypatch):
     monkeypatch.chdir(ROOT)
-    listed = list(entries(ROOT))
+    listed = list(entries())
     assert {entry.kind for entry in listed} == {
         "claim", "figure", "table", "section", "manuscript",
     }  # fmt: skip
     for entry in listed:
         command = CommandLine.parse(completed([*entry.words, *TINY]))
         assert command.configfiles == ("config/tiny.yaml",)
-        wanted = [] if entry.kind == "manuscript" else files_of(entry, subject.folders)
+        wanted = (
+            []
+            if entry.kind == "manuscript"
+            else [own_file(file, subject.folders) for file in entry.files]
+        )
         assert list(command.targets) == wanted, entry
 
 
 def test_costs_are_those_of_all_jobs_that_are_needed(subject, tmp_path, monkeypatch):
     dag = Dag(subject)
+    monkeypatch.chdir(ROOT)
+    listed = [entry for entry in entries() if entry.name == "singular_values"]
     monkeypatch.chdir(tmp_path)
     for job in dag.jobs:
         for file in (*job.log, *job.output):
             Path(file).parent.mkdir(parents=True, exist_ok=True)
         Path(job.log[0]).write_text(f"pdrom: {Usage(1.0, 60.0, 100.0)}\n")
-    listed = [entry for entry in entries(ROOT) if entry.name == "singular_values"]
     assert [*costs(listed, dag, subject.folders)] == [(3, 3.0)] * 2
     # one job that was not measured: nothing is claimed about what needs it
     Path("logs/run.log").write_text("interrupted\n")
@@ -73,9 +79,9 @@ def test_costs_are_those_of_all_jobs_that_are_needed(subject, tmp_path, monkeypa
 
 def test_the_contents_name_every_entry_and_describe_every_figure_and_column(subject, monkeypatch):
     monkeypatch.chdir(ROOT)
-    page = contents("config/tiny.yaml", Dag(subject), subject.folders, TINY)
+    page = contents(CommandLine.parse(TINY), Dag(subject), subject.folders)
     assert "run of config/tiny.yaml" in page
-    for entry in entries(ROOT):
+    for entry in entries():
         command = shlex.join(["./reproduce", *entry.words, *TINY])
         assert f"| {entry.kind} | {entry.name} | `{command}` | " in page
     assert [name for name in declarations() if f"## `{name}`" not in page] == []

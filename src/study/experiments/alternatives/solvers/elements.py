@@ -63,10 +63,7 @@ class Elements:
     @property
     def arrays(self) -> tuple[np.ndarray, ...]:
         """Arrays for compiled code: rows, corners, operator, weights, low, high, fallback."""
-        return (
-            self.rows, self.corners, self.operator, self.weights, self.low, self.high,
-            self.fallback,
-        )  # fmt: skip
+        return tuple(getattr(self, each.name) for each in fields(self))
 
     def by_colour(self) -> "Elements":
         """The elements in an order in which neighbours in the list share no vertex.
@@ -76,7 +73,7 @@ class Elements:
         """
         colours = _colours(self.rows, self.corners, int(self.corners.max(initial=0)) + 1)
         order = np.argsort(colours, kind="stable")
-        return Elements(*(np.ascontiguousarray(getattr(self, f.name)[order]) for f in fields(self)))
+        return Elements(*(np.ascontiguousarray(array[order]) for array in self.arrays))
 
     def around(self, vertices: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Elements at each of ``vertices`` N: starts (N + 1,), elements, and which corner it is."""

@@ -68,10 +68,6 @@ class Continuous:
     error: float
     substeps: int
 
-    def within(self, tolerance: float) -> bool:
-        """Whether the estimate meets a tolerance."""
-        return self.error <= tolerance
-
 
 def continuous(
     scene: Scene, frames: int, tolerance: float, substeps: int, limit: int

@@ -65,7 +65,10 @@ class Newton(Alternative):
         floor = 0.0
         for _ in range(self.iterations):
             while True:
-                found = self._search(y, s, pattern, floor, value, gradient)
+                step = pattern.solve(y, self.space.system.inertia, gradient, floor)
+                direction = np.zeros_like(y)
+                direction.reshape(-1, WIDTH)[pattern.free, :3] = -step
+                found = self._search(y, s, direction, value, gradient)
                 if found is not None:
                     break
                 if floor == 1.0:
@@ -78,16 +81,11 @@ class Newton(Alternative):
         self,
         y: np.ndarray,
         s: np.ndarray,
-        pattern: "_Pattern",
-        floor: float,
+        direction: np.ndarray,
         value: float,
         gradient: np.ndarray,
     ) -> tuple[float, np.ndarray] | None:
         """Move ``y`` to where the objective is lower; its value and gradient there, or None."""
-        direction = np.zeros_like(y)
-        inertia = self.space.system.inertia
-        step = pattern.solve(y, inertia, gradient, floor)
-        direction.reshape(-1, WIDTH)[pattern.free, :3] = -step
         slope = float(direction @ gradient)
         for halving in range(HALVINGS + 1):
             length = 0.5**halving

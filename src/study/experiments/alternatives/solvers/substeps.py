@@ -85,8 +85,13 @@ class Alternative(Stepper):
     def __init__(
         self, scene: Scene, substeps: int, iterations: int = 1, system: GlobalSystem | None = None
     ) -> None:
-        self._require_constant(scene)
-        self._require_groups(scene)
+        named = f"scene '{scene.config.name}', effect '%s': method '{self.name}' "
+        for force in scene.forces:
+            if not isinstance(force, Gravity):
+                raise SceneError(named % force.name + "takes no force but gravity")
+        for group in scene.groups:
+            if group.local_kernel is None:
+                raise SceneError(named % group.name + "needs a compiled local step")
         step = scene.config.time_step / substeps
         system = system or GlobalSystem(scene.masses, step, scene.groups)
         super().__init__(scene.space(system), step, iterations, scene.groups, False)
@@ -97,22 +102,6 @@ class Alternative(Stepper):
 
     def _prepare(self, scene: Scene) -> None:
         """Make what the method keeps from frame to frame; nothing by default."""
-
-    def _require_constant(self, scene: Scene) -> None:
-        for force in scene.forces:
-            if not isinstance(force, Gravity):
-                raise SceneError(
-                    f"scene '{scene.config.name}', effect '{force.name}': method '{self.name}' "
-                    "takes no force but gravity"
-                )
-
-    def _require_groups(self, scene: Scene) -> None:
-        for group in scene.groups:
-            if group.local_kernel is None:
-                raise SceneError(
-                    f"scene '{scene.config.name}', effect '{group.name}': method '{self.name}' "
-                    "needs a compiled local step"
-                )
 
     def step(
         self, state: State, frame: int, on_last_iterate: Callable[[np.ndarray], None] | None = None
@@ -136,22 +125,17 @@ class Alternative(Stepper):
                     *(self.iterations, fixed, now),
                 )
             )
-        after = self._contacts(positions, velocities, q, frame)
+        # contacts set the velocity of what they move by the whole frame
+        free = positions.copy()
+        self.space.correct(positions, q, frame)
+        moved = (positions != free).any(axis=1)
+        if moved.any():
+            whole = self.time_step * self.substeps
+            velocities[moved] = (positions[moved] - q[moved]) / whole
+        after = State(np.ascontiguousarray(positions), np.ascontiguousarray(velocities))
         seconds = np.zeros(len(PHASES))
         seconds[1] = perf_counter() - started
         return after, FrameReport(np.empty(0), seconds)
-
-    def _contacts(
-        self, positions: np.ndarray, velocities: np.ndarray, q: np.ndarray, number: int
-    ) -> State:
-        """State after contacts, which set the velocity of what they move by the whole frame."""
-        free = positions.copy()
-        self.space.correct(positions, q, number)
-        moved = (positions != free).any(axis=1)
-        if moved.any():
-            frame = self.time_step * self.substeps
-            velocities[moved] = (positions[moved] - q[moved]) / frame
-        return State(np.ascontiguousarray(positions), np.ascontiguousarray(velocities))
 
     @abstractmethod
     def _advance(self, part: Substeps) -> None:

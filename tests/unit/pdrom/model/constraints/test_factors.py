@@ -39,16 +39,6 @@ def test_all_elements_times_a_factor_are_another_weight(group):
     assert np.array_equal(runs[0], runs[1])
 
 
-def test_the_energy_is_that_of_the_elements(rng):
-    """1/2 sum_e w_e |S_e q - p_e|^2 with the element weights, of the compiled kernel."""
-    scene = scene_with("strain", {"select": BOX, "factor": 30.0})
-    (group,) = scene.groups
-    q = scene.mesh.points + 0.1 * rng.standard_normal(scene.mesh.points.shape)
-    residual = group.S @ q - group.project(q)
-    expected = 0.5 * float(np.sum(group.row_weights[:, None] * residual**2))
-    assert group.accumulate(q, np.zeros_like(q)) == pytest.approx(expected)
-
-
 def test_another_stiffness_keeps_the_factors():
     config = scene_with("spring", {"select": BOX, "factor": 7.0}).config
     config = config.model_copy(update={"reduce": {"spring": None}})

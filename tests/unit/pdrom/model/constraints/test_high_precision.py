@@ -111,6 +111,9 @@ MATRICES = {
     "ill-scaled": lambda rng, rows: rng.standard_normal((rows, 3)) * 10.0 ** rng.uniform(
         -8, 8, (rows, 3)
     ),
+    "where determinants overflow (1e103)": lambda rng, rows: 10.0 ** rng.uniform(
+        102.6, 103.2
+    ) * rng.standard_normal((rows, 3)),
     "huge (1e150)": lambda rng, rows: 1e150 * rng.standard_normal((rows, 3)),
     "tiny (1e-150)": lambda rng, rows: 1e-150 * rng.standard_normal((rows, 3)),
     "mirrored": mirror,

@@ -70,20 +70,6 @@ def test_every_implementation_accumulates_the_same(group_scene, rng, implementat
     assert energy == pytest.approx(other_energy, rel=1e-10)
 
 
-def test_accumulate_is_the_weighted_transpose(group_scene, rng):
-    group = group_scene.groups[0]
-    y = group_scene.mesh.points + 0.05 * rng.standard_normal(group_scene.mesh.points.shape)
-    rhs = rng.standard_normal(y.shape)
-    p = group.project(y)
-    expected = rhs + group.S.T @ (group.row_weights[:, None] * p)
-    energy = group.accumulate(y, rhs)
-    assert rhs == pytest.approx(expected, rel=1e-10, abs=1e-9)
-    residual = group.S @ y - p
-    assert energy == pytest.approx(
-        0.5 * float(group.row_weights @ (residual**2).sum(axis=1)), rel=1e-10
-    )
-
-
 def test_some_elements_equal_all_elements(group_scene, rng):
     group = group_scene.groups[0]
     y = rng.standard_normal(group_scene.mesh.points.shape)

@@ -6,58 +6,9 @@ import subprocess
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 import pdrom
-from pdrom.model.constraints.lanes import (
-    LANES,
-    blocks,
-    kernel,
-    pack,
-    perpendicular,
-    take,
-    workspace,
-)
-
-
-@kernel
-def _take(packed, numbers, elements, start, out):
-    take(packed, numbers, elements, start, out)
-
-
-@kernel
-def _perpendicular(x, y, z):
-    return perpendicular((x, y, z))
-
-
-@pytest.mark.parametrize("elements", [1, LANES - 1, LANES, LANES + 1, 3 * LANES])
-def test_packed_numbers_are_where_they_should_be(elements, rng):
-    numbers = rng.standard_normal((elements, 4))
-    packed = pack(numbers)
-    assert packed.shape == (blocks(elements) * 4 * LANES,)
-    for e in range(elements):
-        for i in range(4):
-            assert packed[(e // LANES * 4 + i) * LANES + e % LANES] == numbers[e, i]
-    filled = packed.reshape(-1, 4, LANES)[-1].T[(elements - 1) % LANES :]
-    assert (filled == numbers[-1]).all()
-
-
-def test_taken_elements_are_the_picked_ones(rng):
-    numbers = rng.standard_normal((2 * LANES + 5, 3))
-    picked, out = rng.permutation(len(numbers)), workspace(3)
-    for start in range(0, len(picked), LANES):
-        _take(pack(numbers), 3, picked, start, out)
-        wanted = picked[np.minimum(start + np.arange(LANES), len(picked) - 1)]
-        assert np.array_equal(out.reshape(3, LANES).T, numbers[wanted])
-
-
-@pytest.mark.parametrize("axis", [(1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 1), (-1, 2, 0.5)])
-def test_perpendicular_is_a_unit_vector_at_right_angles(axis):
-    unit = np.array(axis) / np.linalg.norm(axis)
-    other = np.array(_perpendicular(*unit))
-    assert abs(other @ unit) < 1e-15
-    assert np.linalg.norm(other) == pytest.approx(1.0, rel=1e-15)
 
 
 def test_an_edit_of_an_inlined_function_reaches_every_kernel(tmp_path):

@@ -25,17 +25,6 @@ def iterate(matrix, shift, window, iterations):
     return y
 
 
-def test_affine_map_ends_after_as_many_steps_as_it_has_eigenvalues(rng):
-    matrix, shift = affine_map(rng)
-    # one coordinate of each of the three right-hand sides: 4 eigenvalues times 3 independent parts
-    shift[:, 1:] = shift[:, :1]
-    exact = np.linalg.solve(np.eye(12) - matrix, shift)
-    error = np.linalg.norm(iterate(matrix, shift, 8, 6) - exact)
-    plain = np.linalg.norm(iterate(matrix, shift, 1, 6) - exact)
-    assert error < 1e-7 * np.linalg.norm(exact)
-    assert plain > 1e-4 * np.linalg.norm(exact)
-
-
 def test_residual_is_that_of_gmres(rng):
     """With an unlimited window step m + 1 is the image of the m-th iterate of GMRES (here by dense
     least squares over the Krylov space)."""

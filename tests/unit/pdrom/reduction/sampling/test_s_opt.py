@@ -8,11 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pdrom.core.errors import SamplingError
-from pdrom.reduction.sampling.s_opt import extend, s_opt_path
+from pdrom.reduction.sampling.s_opt import SOpt, s_opt_path
 
 SIZES = st.tuples(
     st.integers(2, 20), st.sampled_from([1, 3, 6]), st.integers(1, 9), st.integers(0, 2**32 - 1)
 ).filter(lambda s: s[2] <= s[0])
+extend = SOpt().extend
 KINDS = ("orthonormal", "scaled", "dependent")
 
 

@@ -12,8 +12,7 @@ from pdrom.model.constraints.lanes import LANES
 from pdrom.model.runs import trajectory
 from pdrom.reduction.basis import compute_basis
 from pdrom.reduction.method import MethodSpec
-from pdrom.reduction.sampling.reduction import Reduction
-from pdrom.reduction.sampling.select import select
+from pdrom.reduction.sampling import Reduction, select
 from pdrom.reduction.subspace.columns import skinning_weights
 from pdrom.reduction.subspace.hrpd import (
     HrpdSpec,

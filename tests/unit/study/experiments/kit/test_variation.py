@@ -1,4 +1,4 @@
-"""Scenes at another time step and stiffness: what changes, and what stays in physical units."""
+"""Scenes at another time step and stiffness, and basis sizes: what changes, and what stays."""
 
 import numpy as np
 import pytest
@@ -7,6 +7,7 @@ from builders import make_scene
 from pdrom.model.runs import trajectory
 from pdrom.model.scene import Scene
 from study.experiments.kit.scenes import varied
+from study.experiments.kit.settings import resolve_ranks
 
 EFFECTS = (
     {"effect": "gravity"},
@@ -52,3 +53,19 @@ def test_a_smaller_step_converges_to_the_same_motion():
     coarse = np.linalg.norm(ends[0.016] - ends[0.001])
     fine = np.linalg.norm(ends[0.004] - ends[0.001])
     assert fine / coarse == pytest.approx(0.003 / 0.015, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("asked", "rank", "sizes"),
+    [
+        ([6, 10, 20, "full"], 69, [6, 10, 20, 69]),
+        (["full", 10, 6], 8, [6, 8, 10]),
+        ([6, "full"], 6, [6]),
+        ([6, 6], 9, [6]),
+        ([6, "full"], 0, [6]),
+        (["full"], 0, []),
+        ([6, 10], 3, [6, 10]),
+    ],
+)
+def test_sizes_ascend_and_full_is_the_rank(asked, rank, sizes):
+    assert resolve_ranks(asked, rank) == sizes

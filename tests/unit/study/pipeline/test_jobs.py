@@ -1,0 +1,144 @@
+"""What jobs get of a study, and what makes them run again."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from bad_input.project import MESH, SCENE, SQUARE, STUDY, Replace, load_project, make_project
+from pdrom.core.errors import ConfigurationError
+from places import ROOT
+from study.artifact.reads import Setting, TableOf
+from study.experiments.fom import mesh
+from study.experiments.subspaces import online
+from study.experiments.timing import scaling
+from study.pipeline.contents import labels_of
+from study.pipeline.folders import Folders
+from study.pipeline.plan import Plan
+from study.pipeline.resolve import Job
+from study.pipeline.study import Study
+from study.tables import declared
+
+CONFIG = {"scenes": ["spring_oop", "strain_oop"], "methods": ["deim", "block-deim"]}
+
+
+def plan(**changes) -> Plan:
+    return Plan(Study.load(CONFIG | changes, ROOT), Folders("out"))
+
+
+@pytest.fixture(scope="module")
+def made() -> dict[str, Job]:
+    """Jobs of the tables by name."""
+    return {job.artifact.name: job for job in plan().fixed["tables"]}
+
+
+@pytest.mark.parametrize("name", declared())
+def test_every_table_finds_what_it_reads(name, made):
+    job = made[name]
+    assert job.inputs.keys() | job.settings.keys() == declared()[name].reads.keys()
+    assert not job.inputs.keys() & job.settings.keys()
+    assert job.outputs == {"table": f"out/tables/{name}.csv"}
+
+
+def test_inputs_are_files_of_the_study_in_its_order(made):
+    assert made["sensitivity"].inputs == {
+        "parts": ["out/sensitivity/spring_oop.csv", "out/sensitivity/strain_oop.csv"]
+    }
+    assert made["payoff"].inputs == {"reruns": "out/tables/reduced_reruns.csv"}
+    assert made["online"].inputs["parts"] == []
+    assert made["claims"].inputs["rules"] == "config/claims.yaml"
+
+
+@pytest.mark.parametrize(
+    ("methods", "basis"),
+    [
+        (["block-deim", "published"], "none-affine-vectorised"),
+        (["deim", "published", "deim-joint"], "none-none-vectorised"),
+    ],
+)
+def test_of_each_experiments_bases_one_is_read(methods, basis):
+    """The one without weights and centring where a method has it, else the first."""
+    assert plan(methods=methods).job(declared()["singular_values"]).inputs["bases"] == [
+        f"out/pod/spring_oop/spring/{basis}.h5",
+        f"out/pod/strain_oop/strain/{basis}.h5",
+    ]
+
+
+def test_a_setting_is_a_parameter_of_those_who_read_it_only():
+    before, after = plan(), plan(stability={"wrong": 0.3})
+    tables = declared().values()
+    changed = {t.name for t in tables if before.job(t).settings != after.job(t).settings}
+    assert changed == {"stability"}
+
+
+@pytest.mark.parametrize(
+    ("read", "message"),
+    [
+        (Setting("stability.wrogn"), "table payoff reads the key 'stability.wrogn'.*wrong"),
+        (Setting("ranks.more"), "reads the key 'ranks.more'"),
+        (TableOf("sensitivty"), "reads 'sensitivty'.*sensitivity"),
+    ],
+)
+def test_what_does_not_exist_is_named(read, message):
+    asked = plan()
+    asked.tables = {"payoff": replace(declared()["payoff"], reads={"reruns": read})}
+    with pytest.raises(ConfigurationError, match=message):
+        asked.check()
+
+
+# with a page of models, which prints titles
+LIVE = "live: {scenes: [small]}\nsubspace: {scenes: [small], sizes: [2]}\n"
+
+
+def changed(root: Path, old: str, new: str) -> set[str]:
+    """Names of what is made again when one text of the scene's file is another one."""
+
+    def jobs() -> dict[tuple, tuple]:
+        plan = load_project(root)
+        made = {
+            (name, *labels.values()): plan.job(experiment, labels)
+            for name, experiment in plan.experiments.items()
+            for labels in labels_of(plan.study, next(iter(experiment.writes.values())))
+        }
+        made |= {(job.artifact.name,): job for jobs in plan.fixed.values() for job in jobs}
+        return {key: (job.inputs, job.settings, job.content, job.code) for key, job in made.items()}
+
+    before, scene = jobs(), root / SCENE
+    text = scene.read_text()
+    assert old in text
+    scene.write_text(text.replace(old, new))
+    after = jobs()
+    assert before.keys() == after.keys()
+    return {key[0] for key in before if before[key] != after[key]}
+
+
+def test_an_edited_title_plans_only_what_prints_it(tmp_path: Path) -> None:
+    root = make_project(tmp_path, {})
+    (root / STUDY).write_text((root / STUDY).read_text() + LIVE)
+    assert changed(root, "title: A small sheet", "title: Another one") == {"live"}
+
+
+def test_an_edited_weight_plans_the_simulation(tmp_path: Path) -> None:
+    root = make_project(tmp_path, {})
+    found = changed(root, "weight: 1.0e+5", "weight: 2.0e+5")
+    assert {"fom", "timing", "sensitivity"} <= found
+    assert "mesh" not in found
+
+
+USED = Replace("{kind: cloth, rows: 5, columns: 4, plane: xz}", f"{{kind: file, path: {MESH}}}")
+
+
+@pytest.mark.parametrize("experiment", [mesh, online, scaling], ids=lambda e: e.name)
+def test_an_edited_mesh_has_another_checksum(tmp_path: Path, experiment) -> None:
+    root = make_project(tmp_path, {SCENE: USED})
+    (root / STUDY).write_text((root / STUDY).read_text() + "online: {scenes: [small]}\n")
+
+    def content() -> str:
+        plan = load_project(root)
+        labels = {"scene": "small", "mesh": plan.study.mesh_of("small"), "factor": "1"}
+        return plan.job(experiment, labels).content
+
+    before = content()
+    assert before == content()
+    (root / "config" / "scenes" / MESH).write_text(SQUARE.replace("v 1 0 1", "v 1 0 2"))
+    assert content() != before

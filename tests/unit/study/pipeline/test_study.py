@@ -1,0 +1,253 @@
+"""Studies: settings and defaults, scenes made out of others, and those that no subspace takes."""
+
+import re
+import shutil
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+import yaml
+from pydantic import ValidationError
+
+from pdrom.core.errors import ConfigurationError
+from pdrom.core.yamlfile import read_yaml, validate
+from pdrom.model.constraints.base import GroupConfig
+from pdrom.model.scene import Scene, SceneConfig
+from places import CONFIG, ROOT
+from study.artifact import paths
+from study.artifact.paths import LABELS
+from study.experiments.kit.declaration import experiments
+from study.experiments.stability import stability
+from study.pipeline.contents import labels_of
+from study.pipeline.plan import check_live, check_subspaces
+from study.pipeline.resolve import Resolver
+from study.pipeline.scenes import Replicate, Variants, read_scene
+from study.pipeline.study import Study, StudySettings
+
+STUDY = {"scenes": ["spring_oop", "strain_oop"], "methods": ["deim", "gappy"], "ranks": [6, "full"]}
+
+
+def study(**sections) -> Study:
+    return Study.load(STUDY | sections, ROOT)
+
+
+@pytest.mark.parametrize(
+    ("section", "message"),
+    [
+        ({"stability": {"time_steps": [0.0]}}, "stability.time_steps"),
+        ({"stability": {"stiffness_ratios": [-1.0]}}, "stability.stiffness_ratios"),
+        ({"stability": {"min_frames": 50, "max_frames": 40}}, "max_frames = 40: at least"),
+        ({"stability": {"left": 1.0}}, "stability.left = 1.0"),
+        ({"stability": {"departure": 3.0}}, "unknown key 'stability.departure'"),
+    ],
+)
+def test_faults_are_named(section, message):
+    with pytest.raises(ConfigurationError) as error:
+        validate(StudySettings, STUDY | section, "study")
+    assert message in str(error.value)
+
+
+def test_short_runs_are_planned_where_the_study_holds_them():
+    asked = {"scenes": ["strain_oop", "bar_release"], "ranks": [6, 20]}
+    made = study(stability=asked)
+    assert labels_of(made, paths.STABILITY) == [{"scene": "strain_oop"}]
+    job = Resolver(made, "results").job(stability, {"scene": "strain_oop"})
+    plain = job.settings["short"]
+    assert plain["ranks"] == [6]
+    # which scenes have short runs and how they are judged makes no run again
+    assert not {"scenes", "wrong", "left", "departure"} & set(plain)
+    assert labels_of(study(), paths.STABILITY) == []
+
+
+@pytest.mark.parametrize("name", ["default", "tiny"])
+def test_the_configurations_hold_what_they_ask_for(name):
+    """Nothing in these two files is left out without a word."""
+    config = read_yaml(CONFIG / "default.yaml")
+    if name == "tiny":
+        tiny = read_yaml(CONFIG / "tiny.yaml")
+        config |= tiny | {"stability": config["stability"] | tiny.get("stability", {})}
+    settings = validate(StudySettings, config, name)
+    assert set(settings.stability.scenes) <= set(settings.scenes)
+    assert set(settings.stability.ranks) <= set(settings.ranks)
+
+
+# scenes and methods have no default
+GIVEN = {"scenes", "methods"}
+
+
+def defaults() -> dict[str, Any]:
+    study = StudySettings(scenes=["spring_oop"], methods=["pod"])
+    return study.model_dump(mode="json", by_alias=True, exclude=GIVEN)
+
+
+def given(content: dict[str, Any], known: Any) -> Iterator[tuple[str, Any, Any]]:
+    """(key, value, default) of every value that a configuration gives, inside sections too."""
+    for key, value in content.items():
+        default = known.get(key) if isinstance(known, dict) else None
+        if isinstance(value, dict) and isinstance(default, dict) and default:
+            for inner, *rest in given(value, default):
+                yield f"{key}.{inner}", *rest
+        else:
+            yield key, value, default
+
+
+def test_the_study_repeats_no_default() -> None:
+    content = read_yaml(CONFIG / "default.yaml")
+    repeated = [key for key, value, default in given(content, defaults()) if value == default]
+    assert repeated == []
+
+
+@pytest.mark.parametrize(("key", "value"), [("sweep", 10), ("timing", 10), ("stability", 120)])
+def test_what_the_study_was_made_with(key: str, value: int) -> None:
+    """Values that the code once had differently from the file."""
+    assert value in defaults()[key].values()
+
+
+SECTION = Variants(
+    scenes=("spring_oop",), resolutions=(0.5, 1.5), stiffness_ratios=(0.01, 1), seeds=(1, 2)
+)
+
+
+def read(name: str) -> SceneConfig:
+    return read_scene(ROOT, name)
+
+
+@pytest.fixture(scope="module")
+def made() -> dict[str, SceneConfig]:
+    return {scene.name: scene for scene in SECTION.of(read)}
+
+
+def test_every_combination_has_a_name_that_a_path_takes(made: dict[str, SceneConfig]) -> None:
+    assert len(made) == 2 * 2 * 2
+    assert "spring_oop_m1p5_w0p01_s2" in made
+    assert all(re.fullmatch(LABELS["scene"], name) for name in made)
+
+
+def test_a_variant_differs_in_mesh_weight_and_start_alone(made: dict[str, SceneConfig]) -> None:
+    scene, base = made["spring_oop_m1p5_w0p01_s2"], read("spring_oop")
+    assert scene.mesh == base.mesh.coarsened(1.5)
+    weights = [e.weight for e in scene.effects if isinstance(e, GroupConfig)]
+    before = [e.weight for e in base.effects if isinstance(e, GroupConfig)]
+    assert weights == [0.01 * weight for weight in before]
+    assert scene.effects[-1].model_dump()["seed"] == 2
+    assert len(scene.effects) == len(base.effects) + 1
+    same = set(SceneConfig.model_fields) - {"name", "title", "mesh", "effects"}
+    assert all(getattr(scene, key) == getattr(base, key) for key in same)
+
+
+def test_seeds_are_other_starts_of_the_same_motion(made: dict[str, SceneConfig]) -> None:
+    pair = [made[f"spring_oop_m0p5_w1_s{seed}"] for seed in (1, 2)]
+    mesh = pair[0].mesh.build(ROOT)
+    first, second = (Scene.build(scene, mesh).initial_state().velocities for scene in pair)
+    assert (first != second).any()
+
+
+def test_a_study_holds_its_variants_beside_its_scenes() -> None:
+    config = {"scenes": ["strain_oop"], "methods": ["deim"], "variants": SECTION.model_dump()}
+    study = Study.load({**config, "coarsen": {"resolution": 0.3, "frames": 0.1}}, ROOT)
+    assert len(study.scenes) == 1 + 8
+    fine, coarse = (study.bound[f"spring_oop_m{m}_w1_s1"].mesh for m in ("1p5", "0p5"))
+    assert fine.vertices > coarse.vertices
+
+
+def test_a_replicated_scene_is_faster_and_starts_elsewhere() -> None:
+    change = Replicate(frames_factor=0.8, kick=0.1, seed=100)
+    base, scene = read("bar_twist"), read_scene(ROOT, "bar_twist", change)
+    turns = [[e.over for e in s.effects if e.effect == "rotate"] for s in (base, scene)]
+    assert turns == [[100, 100], [80, 80]]
+    assert scene.effects[-1].model_dump() == {
+        "effect": "kick", "speed": 0.1, "seed": 100, "axes": ("x", "y", "z"),
+    }  # fmt: skip
+    assert scene.held_out.seed == base.held_out.seed + 100
+    assert (scene.frames, scene.mesh, scene.reduce) == (base.frames, base.mesh, base.reduce)
+    starts = [s.effects[-1].seed for s in (scene.heldout_variant("kick"),)]
+    assert starts == [102]
+    assert read_scene(ROOT, "bar_twist", Replicate()) == base
+
+
+def test_an_unknown_scene_is_named() -> None:
+    config = {"scenes": ["strain_oop"], "methods": ["deim"], "variants": {"scenes": ["spring_oup"]}}
+    with pytest.raises(ConfigurationError, match="spring_oup"):
+        Study.load(config, ROOT)
+
+
+def test_an_entry_that_is_given_twice_is_refused() -> None:
+    with pytest.raises(ValidationError, match="twice"):
+        Variants(seeds=(1, 1))
+
+
+# What only a position subspace has.
+INSIDE = (
+    paths.SUBSPACES, paths.SUBSPACES_TRAIN, paths.SUBSPACES_HELDOUT, paths.SUBSPACES_SECONDS,
+)  # fmt: skip
+
+
+@pytest.fixture
+def root(tmp_path):
+    """A project with a scene of its own, in which wind blows."""
+    scenes = tmp_path / "config" / "scenes"
+    scenes.mkdir(parents=True)
+    files = ("methods.yaml", "scenes/spring_oop.yaml")
+    for name in files:
+        shutil.copy(ROOT / "config" / name, tmp_path / "config" / name)
+    scene = yaml.safe_load((scenes / "spring_oop.yaml").read_text())
+    scene["name"] = "windy"
+    scene["effects"].append({"effect": "wind", "velocity": [1.0, 0.0, 0.0]})
+    (scenes / "windy.yaml").write_text(yaml.safe_dump(scene))
+    return tmp_path
+
+
+def windy(root, **sections) -> Study:
+    base = {"scenes": ["spring_oop", "windy"], "methods": ["deim"], "ranks": [6]}
+    return Study.load(base | sections, root)
+
+
+def test_what_no_subspace_takes_has_all_but_what_is_of_a_subspace(root):
+    held = windy(root)
+    without = {
+        place
+        for experiment in experiments().values()
+        for place in experiment.writes.values()
+        if {"scene": "spring_oop"} in labels_of(held, place)
+        and {"scene": "windy"} not in labels_of(held, place)
+    }
+    assert without == set(INSIDE)
+
+
+def test_one_line_says_what_the_scene_goes_without(root, caplog):
+    check_subspaces(windy(root))
+    assert caplog.messages == ["windy: no position subspaces, since none takes the effect 'wind'"]
+    caplog.clear()
+    check_subspaces(windy(root, scenes=["spring_oop"]))
+    assert caplog.messages == []
+
+
+@pytest.mark.parametrize(
+    ("key", "section"),
+    [
+        ("subspace.scenes", {"subspace": {"scenes": ["windy"]}}),
+        ("scaling.scenes", {"scaling": {"scenes": {"windy": [1.0]}}}),
+        ("online.scenes", {"online": {"scenes": ["windy"]}}),
+        ("alternatives.scenes", {"alternatives": {"scenes": {"windy": [1.0]}}}),
+    ],
+)
+def test_where_a_subspace_is_asked_for_the_scene_is_refused(root, key, section):
+    with pytest.raises(ConfigurationError, match=rf"{key}: scene 'windy' has the effect 'wind'"):
+        check_subspaces(windy(root, **section))
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"anderson_window": 3}, "anderson_window = 3: the page's engine has no acceleration"),
+        ({"effects": [{"effect": "bending", "weight": 1.0}], "reduce": {}}, "has no 'bending'"),
+        ({"mesh": {"kind": "cloth", "rows": 150, "columns": 150}}, r"7.9 MB .* allowed are 3.0"),
+    ],
+)
+def test_a_scene_that_the_page_cannot_hold_is_refused_by_the_plan(root, changes, words):
+    path = root / "config" / "scenes" / "spring_oop.yaml"
+    check_live(windy(root, live={"scenes": ["spring_oop"]}))
+    path.write_text(yaml.safe_dump(yaml.safe_load(path.read_text()) | changes))
+    check_live(windy(root, live={"scenes": []}))
+    with pytest.raises(ConfigurationError, match=f"^live.scenes: scene 'spring_oop'.*{words}"):
+        check_live(windy(root, live={"scenes": ["spring_oop"]}))
