@@ -103,11 +103,6 @@ def load_project(root: Path, overrides: Mapping[str, Any] | None = None) -> Plan
     return plan
 
 
-def small_scene() -> dict[str, Any]:
-    """The valid scene as plain data."""
-    return yaml.safe_load(SMALL_SCENE)
-
-
 def small_study() -> dict[str, Any]:
     """The valid study as plain data."""
     return yaml.safe_load(SMALL_STUDY)

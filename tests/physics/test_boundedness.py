@@ -2,8 +2,6 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from builders import GRAVITY, GROUPS, LEFT, Pushing, make_scene
 from pdrom.model.constraints.base import ConstraintGroup
@@ -17,7 +15,6 @@ MESHES = {"spring": SHEET, "strain": SHEET, "bending": SHEET, "deformation_gradi
 FRAMES = 16
 SCENES = 300
 RIGHT = {"effect": "pins", "select": "right"}
-RELEASED = [{**LEFT, "until": 20}, {**RIGHT, "start": 10, "until": 30}]
 MOVED = {"effect": "translate", "select": "left", "over": 6, "offset": [0.3, 0.0, 0.2]}
 HOLDS: list[list[dict]] = [
     [],
@@ -176,16 +173,6 @@ def test_growth_for_ever_is_that_of_a_resonance(tangent):
     assert x == pytest.approx(growth(np.array([angle]), len(m)), rel=1e-9)
     closed = 1.0 / np.tan(angle / 2.0)
     assert 0.6 * closed < x <= closed
-
-
-@given(st.floats(1e-3, 50.0))
-def test_the_poles_of_a_frame_lie_inside_the_unit_circle(tangent):
-    """a z^2 - 2 z + 1 with a = 1 + t^2 has the roots cos(t) exp(+-i t)."""
-    roots = np.roots([1.0 + tangent**2, -2.0, 1.0])
-    angle = np.arctan(tangent)
-    expected = np.cos(angle) * np.exp(1j * angle)
-    assert np.sort_complex(roots)[-1] == pytest.approx(expected, rel=1e-6)
-    assert np.abs(roots).max() < 1.0
 
 
 @pytest.mark.parametrize("group", sorted(GROUPS))

@@ -71,7 +71,18 @@ def run(
     with write_hdf5(path) as file:
         if with_mesh:
             store_mesh(scene.mesh, file.create_group("mesh"))
-        series = _create_series(file, scene)
+        n = scene.mesh.vertices
+        shapes = {
+            "positions": ((frames + 1, n, 3), "m"),
+            "velocities": ((frames + 1, n, 3), "m/s"),
+            "objective": ((frames, scene.config.iterations), "J"),
+            "timings": ((frames, len(PHASES)), "ms"),
+        }
+        series = {}
+        for name, (shape, unit) in shapes.items():
+            series[name] = file.create_dataset(name, shape, dtype="f8")
+            series[name].attrs["unit"] = unit
+        series["timings"].attrs["phases"] = PHASES
         recorder = _SnapshotRecorder(file, scene, snapshot_frames)
         series["positions"][0], series["velocities"][0] = state.positions, state.velocities
         for frame in range(frames):
@@ -85,22 +96,6 @@ def run(
             if (frame + 1) % max(1, frames // 10) == 0:
                 log.info("%s: frame %d of %d", scene.config.name, frame + 1, frames)
         file.attrs["factorisations"] = system.factorisations
-
-
-def _create_series(file: h5py.File, scene: Scene) -> dict[str, h5py.Dataset]:
-    frames, n = scene.config.frames, scene.mesh.vertices
-    shapes = {
-        "positions": ((frames + 1, n, 3), "m"),
-        "velocities": ((frames + 1, n, 3), "m/s"),
-        "objective": ((frames, scene.config.iterations), "J"),
-        "timings": ((frames, len(PHASES)), "ms"),
-    }
-    series = {}
-    for name, (shape, unit) in shapes.items():
-        series[name] = file.create_dataset(name, shape, dtype="f8")
-        series[name].attrs["unit"] = unit
-    series["timings"].attrs["phases"] = PHASES
-    return series
 
 
 class _SnapshotRecorder:

@@ -21,17 +21,7 @@ from pdrom.model.dynamics.acceleration import Anderson
 from pdrom.model.dynamics.space import VertexSpace
 from pdrom.model.dynamics.stepper import LocalStep, State, Stepper
 from pdrom.model.dynamics.system import DEFAULT_SOLVER, GlobalSystem
-from pdrom.model.effects import EFFECTS
-from pdrom.model.effects.base import (
-    Boundary,
-    Contact,
-    EffectConfig,
-    EffectConfigs,
-    Force,
-    Start,
-    held_targets,
-    held_vertices,
-)
+from pdrom.model.effects import EFFECTS, base
 from pdrom.model.held_out import FIRST, HeldOut, HeldOutMotion
 from pdrom.model.mesh.checks import check_mesh
 from pdrom.model.mesh.config import MeshConfig
@@ -104,7 +94,7 @@ class SceneConfig(ConfigModel):
     frames: Annotated[int, Field(ge=1, le=1_000_000)]
     vertex_mass: Mass = 10.0
     masses: tuple[MassConfig, ...] = ()
-    effects: EffectConfigs
+    effects: base.EffectConfigs
     reduce: dict[str, ReductionPlan] = Field(default_factory=dict)
     requested_error: float | str | None = None
     held_out: HeldOut = HeldOut()
@@ -157,7 +147,7 @@ class SceneConfig(ConfigModel):
                 masses[chosen] = entry.density * vertex_measures(mesh)[chosen]
         return masses
 
-    def effects_without(self, *names: str) -> tuple[EffectConfig, ...]:
+    def effects_without(self, *names: str) -> tuple[base.EffectConfig, ...]:
         """Effects of the scene without those called one of ``names``, in their order."""
         return tuple(e for e in self.effects if e.effect not in names)
 
@@ -196,10 +186,10 @@ class Scene:
     mesh: Mesh
     masses: np.ndarray
     groups: list[ConstraintGroup]
-    forces: list[Force]
-    boundaries: list[Boundary]
-    contacts: list[Contact]
-    starts: list[Start]
+    forces: list[base.Force]
+    boundaries: list[base.Boundary]
+    contacts: list[base.Contact]
+    starts: list[base.Start]
 
     def __repr__(self) -> str:
         size = f"{self.mesh.vertices} vertices, {self.config.frames} frames"
@@ -246,10 +236,10 @@ class Scene:
             mesh,
             masses,
             groups=[e for e in effects if isinstance(e, ConstraintGroup)],
-            forces=[e for e in effects if isinstance(e, Force)],
-            boundaries=[e for e in effects if isinstance(e, Boundary)],
-            contacts=[e for e in effects if isinstance(e, Contact)],
-            starts=[e for e in effects if isinstance(e, Start)],
+            forces=[e for e in effects if isinstance(e, base.Force)],
+            boundaries=[e for e in effects if isinstance(e, base.Boundary)],
+            contacts=[e for e in effects if isinstance(e, base.Contact)],
+            starts=[e for e in effects if isinstance(e, base.Start)],
         )
         scene._check_holds()
         for force in scene.forces:
@@ -304,7 +294,7 @@ class Scene:
 
         Vertices that are held in the first frame do not count.
         """
-        held = held_vertices(self.boundaries, 0)
+        held = base.held_vertices(self.boundaries, 0)
         free = np.setdiff1d(np.arange(self.mesh.vertices), held)
         for contact in self.contacts if len(free) else []:
             doubt = contact.doubt(self.mesh.points, free)
@@ -378,7 +368,7 @@ def log_obstructed(scene: Scene) -> None:
     boundaries, positions = deepcopy(scene.boundaries), scene.mesh.points.copy()
     slack = SLACK * scene.mesh.extent
     for frame in range(scene.config.frames if obstacles and boundaries else 0):
-        held, targets = held_targets(boundaries, frame, positions)
+        held, targets = base.held_targets(boundaries, frame, positions)
         positions[held] = targets
         for obstacle in obstacles:
             obstacle.correct(positions, positions.copy())

@@ -178,7 +178,10 @@ def frame_times(
     for own, basis, sampling, data in cases:
         spec = settings.projection_methods[own.method]
         scenes[own.scene].projections.append((own, spec, basis.path, sampling.path))
-        rows.append((own.scene, own.group, own.method, own.r, _seconds(data, spec, own.r)))
+        known = load_snapshots(data.path)
+        before = process_time()
+        select(basis_of(known, spec), spec, own.r)
+        rows.append((*own.model_dump().values(), process_time() - before))
     chosen: dict[str, list[tuple[str, str, int]]] = defaultdict(list)
     for case, file in zip(settings.subspace_cases, subspaces, strict=True):
         chosen[file.path].append((case.method, case.position_basis, case.k))
@@ -190,11 +193,3 @@ def frame_times(
     table = pd.DataFrame(in_processes([*scenes.values(), *alone], asked), columns=COLUMNS)
     write_table(table.astype({"k": "Int64", "r": "Int64"}), times.path)
     write_table(pd.DataFrame(rows, columns=SECONDS_COLUMNS), seconds.path)
-
-
-def _seconds(snapshots: File, spec: MethodSpec, r: int) -> float:
-    """Processor time of basis and sampling, s."""
-    data = load_snapshots(snapshots.path)
-    before = process_time()
-    select(basis_of(data, spec), spec, r)
-    return process_time() - before

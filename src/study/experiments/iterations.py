@@ -1,6 +1,7 @@
 """Error of K iterations against the limit K -> infinity."""
 
 import logging
+from dataclasses import replace
 from typing import Annotated
 
 import numpy as np
@@ -9,7 +10,6 @@ from pydantic import Field
 
 from pdrom.core.store import open_hdf5, write_table
 from pdrom.core.yamlfile import ConfigModel
-from pdrom.model.dynamics.acceleration import Anderson
 from pdrom.model.dynamics.stepper import Stepper
 from pdrom.model.dynamics.system import GlobalSystem
 from pdrom.model.scene import Scene, SceneConfig
@@ -132,11 +132,6 @@ def accelerated(counts: list[int], window: int) -> list[tuple[int, int]]:
 
 def stepper_of(scene: Scene, system: GlobalSystem, iterations: int, window: int) -> Stepper:
     """Full-order step loop of ``scene``, with ``iterations`` and a ``window`` of acceleration."""
-    return Stepper(
-        scene.space(system),
-        scene.config.time_step,
-        iterations,
-        local_steps=scene.groups,
-        track_objective=False,
-        acceleration=Anderson(window) if window else None,
-    )
+    changes = {"iterations": iterations, "anderson_window": window}
+    other = replace(scene, config=scene.config.model_copy(update=changes))
+    return other.stepper(system, track_objective=False)

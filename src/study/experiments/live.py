@@ -39,6 +39,7 @@ LARGEST = 3_000_000  # bytes of a file
 GHOST = 250_000  # positions of the full-order run that a file holds, about
 JOINT = "deim-joint"
 FORMAT = 1
+Labelled = tuple[dict[str, Any], SubspaceModel]
 
 
 class LiveModels(ConfigModel):
@@ -128,12 +129,20 @@ def live(
     """
     scene = scene_of(settings.scene, mesh)
     reference = positions_of(train)
-    own = [found for file in (*subspaces, *online) for found in load_models(file.path)]
-    chosen = list(_chosen(own, settings.live))
+    asked = settings.live
+    chosen: list[Labelled] = []
+    tolerances = {ecsw_name(tolerance): tolerance for tolerance in asked.tolerances}
+    for file in (*subspaces, *online):
+        for own, model in load_models(file.path):
+            method, kind, k = own["method"], own["position_basis"], own["k"]
+            # models with sampled elements on snapshot bases
+            if method in tolerances and kind == "pod" and k in asked.sizes:
+                labels = {"family": "elements", "k": k, "tau": tolerances[method]}
+                chosen.append((labels, model))
     for case, file, sampling in zip(settings.joint_rows, bases, samplings, strict=True):
         basis = load_basis(file.path)
         # of the size asked for, or of the largest that exists
-        size = min(settings.live.joint_rows, basis.rank)
+        size = min(asked.joint_rows, basis.rank)
         reduction = load_reduction(basis, sampling.path, case.method, size)
         chosen += list(_joint(scene, case.group, reduction, chosen))
     used, triangles = np.unique(scene.mesh.triangles, return_inverse=True)
@@ -161,18 +170,6 @@ def live(
         )
     write_text(text, out.path)
     log.info("%s: %d models, %.1f MB", settings.scene.name, len(chosen), len(text) / 1e6)
-
-
-Labelled = tuple[dict[str, Any], SubspaceModel]
-
-
-def _chosen(models: list[Labelled], asked: LiveModels) -> Iterator[Labelled]:
-    """Models with sampled elements on snapshot bases, of the sizes and tolerances asked for."""
-    tolerances = {ecsw_name(tolerance): tolerance for tolerance in asked.tolerances}
-    for labels, model in models:
-        method, kind, k = labels["method"], labels["position_basis"], labels["k"]
-        if method in tolerances and kind == "pod" and k in asked.sizes:
-            yield {"family": "elements", "k": k, "tau": tolerances[method]}, model
 
 
 def _joint(

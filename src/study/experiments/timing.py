@@ -46,6 +46,7 @@ from study.experiments.kit.settings import (
     Modes,
     Rank,
     Repeats,
+    Sizes,
     Solver,
     Tolerance,
     resolve_ranks,
@@ -217,7 +218,10 @@ def timing(
     write_table(pd.DataFrame(results, columns=COLUMNS), out.path)
     log.info("%s: %d reduced local steps alone", name, len(alone))
     often = {"warmup": asked.warmup, "repeats": asked.breakeven_repeats}
-    times = local_costs(scene, alone, _states(fom), **often)
+    with open_hdf5(fom.path) as file:  # states spread over the run
+        positions = file["positions"]
+        ends = [positions[i * (len(positions) - 1) // STATES] for i in range(STATES)]
+    times = local_costs(scene, alone, np.stack(ends), **often)
     write_table(times.assign(factor=1.0), breakeven.path)
     log.info("%s: effects", name)
     often = {"warmup": asked.warmup, "repeats": asked.repeats}
@@ -261,13 +265,6 @@ def _other_counts(
     return variants
 
 
-def _states(run: File) -> np.ndarray:
-    """Positions (n, N, 3) spread over a full-order run."""
-    with open_hdf5(run.path) as file:
-        positions = file["positions"]
-        return np.stack([positions[i * (len(positions) - 1) // STATES] for i in range(STATES)])
-
-
 class SizedBreakEven(ConfigModel):
     """Reduced local steps timed alone on every mesh size: methods, sizes r, short repeats.
 
@@ -299,9 +296,7 @@ class Sized(Protocol):
 class Scaling(Sized):
     """Section ``scaling``: factors on the vertices along a side for each of ``scenes``."""
 
-    scenes: dict[str, tuple[Annotated[float, Field(gt=0.0, le=100.0)], ...]] = Field(
-        default_factory=dict
-    )
+    scenes: Sizes = Field(default_factory=dict)
 
 
 class SizedOptions(ConfigModel):

@@ -9,7 +9,7 @@ import pandas as pd
 from pdrom.view import style
 from pdrom.view.artists import Axes, Figure, Line2D
 from pdrom.view.multiples import clipped, label_counts, log_axis, time_axis
-from study.artifact.reads import Settings, TableOf
+from study.artifact.reads import TableOf
 from study.experiments.kit.settings import ANDERSON, FOM
 from study.figures.kit.declaration import figure
 from study.figures.kit.options import Drawn, Methods
@@ -218,7 +218,6 @@ def handles(found: TradeOffs) -> list[Block]:
         "runs that blew up. Below, a scene for each other constraint group."
     ),
     reads={
-        "drawn": Settings(Drawn),
         "table": TableOf("accuracy_cost"),
         "runs": TableOf("reduced_reruns"),
     },

@@ -8,7 +8,7 @@ from pdrom.view import style
 from pdrom.view.artists import Artist, Axes, Figure
 from pdrom.view.multiples import label_outer, plain_ticks, small_multiples
 from study.artifact.paths import CONTRIBUTIONS, File
-from study.artifact.reads import EachOf, Settings, TableOf
+from study.artifact.reads import EachOf, TableOf
 from study.experiments.kit.settings import GLOBAL, REST, RIGHT
 from study.figures.kit.declaration import figure
 from study.figures.kit.options import Columns, Drawn, Methods, NothingToDraw, Scenes
@@ -57,7 +57,7 @@ class BreakEven(Methods):
         "70 % of claim C1; beside the bar stands the time per frame. An interpreted loop confirms "
         "the claim everywhere, compiled code only where projections are expensive."
     ),
-    reads={"drawn": Settings(Drawn), "table": TableOf("local_share")},
+    reads={"table": TableOf("local_share")},
 )
 def local_share(options: Scenes, drawn: Drawn, table: pd.DataFrame) -> Figure:
     """Draw a panel per implementation, a bar per scene with the time per frame at its end."""
@@ -110,7 +110,7 @@ def _draw_bars(ax: Axes, rows: pd.DataFrame, scenes: list[str]) -> None:
         "of the mesh or more. Assembly and "
         "factorisation before the first frame are in the table `scaling`."
     ),
-    reads={"drawn": Settings(Drawn), "table": TableOf("scaling")},
+    reads={"table": TableOf("scaling")},
 )
 def scaling(options: Scenes, drawn: Drawn, table: pd.DataFrame) -> Figure:
     """Draw a panel per scene: the time of an iteration, by phase."""
@@ -170,7 +170,7 @@ def _draw_times(ax: Axes, rows: pd.DataFrame) -> None:
         "alone on states of the full-order run. Above the dashed line the reduction costs more "
         "than all projections. Lines end at the numerical rank."
     ),
-    reads={"drawn": Settings(Drawn), "table": TableOf("breakeven")},
+    reads={"table": TableOf("breakeven")},
 )
 def break_even(options: BreakEven, drawn: Drawn, table: pd.DataFrame) -> Figure:
     """Draw a panel per constraint group, a line per scene and method; above 1 it costs more."""
@@ -212,7 +212,6 @@ def break_even(options: BreakEven, drawn: Drawn, table: pd.DataFrame) -> Figure:
         "scene cannot be left out."
     ),
     reads={
-        "drawn": Settings(Drawn),
         "table": TableOf("effects_cost"),
         "contributions": EachOf(CONTRIBUTIONS, "experiments"),
     },
@@ -293,7 +292,7 @@ def _draw_moved(ax: Axes, rows: pd.DataFrame, scenes: list[str], looks: Looks) -
         "the whole less what these effects cost in it. A bar that ends at the tick pays nothing "
         "for what the scene does not list."
     ),
-    reads={"drawn": Settings(Drawn), "table": TableOf("effects_cost")},
+    reads={"table": TableOf("effects_cost")},
 )
 def effects_cost(options: Scenes, drawn: Drawn, table: pd.DataFrame) -> Figure:
     """Draw a bar per scene, divided by effect; on the right one scene without some of its effects.

@@ -7,7 +7,7 @@ from pdrom.view import style
 from pdrom.view.artists import Axes, Figure
 from pdrom.view.multiples import clipped, log_axes, rim_arrows
 from pdrom.view.text import plain_words
-from study.artifact.reads import Settings, TableOf
+from study.artifact.reads import TableOf
 from study.figures.kit.declaration import figure
 from study.figures.kit.options import Drawn, Methods, NothingToDraw, Scenes
 from study.tables.kit.reruns import FAILED, judged_runs
@@ -29,7 +29,6 @@ _KEYS = ["scene", "group", "method", "r"]
         "of them failed, by decade of the gain."
     ),
     reads={
-        "drawn": Settings(Drawn),
         "reruns": TableOf("reduced_reruns"),
         "errors": TableOf("reconstruction_error"),
         "repetitions": TableOf("repetitions"),

@@ -15,7 +15,7 @@ from pdrom.view.camera import Camera, Window, obstacles
 from pdrom.view.panels import NOTHING_RAN, Row, RunPanel
 from pdrom.view.read import RerunInfo, choose_ranks, positions_at, rerun_infos
 from study.artifact.paths import MESH, NOISE_RUNS, RERUNS, SUBSPACES, TRAIN, File
-from study.artifact.reads import EachOf, Every, Read, Settings, TableOf
+from study.artifact.reads import EachOf, Every, Read, TableOf
 from study.experiments.kit.settings import Horizon
 from study.figures.kit.declaration import figure
 from study.figures.kit.elements import magnitudes
@@ -30,7 +30,6 @@ FOOTER = 0.55  # inches, for the scale of colours
 TOLERANCE = "ecsw-1e-02"  # of the sampled subspace of the teaser
 MODES = 20  # at most, of that subspace
 RUNS: dict[str, Read] = {
-    "drawn": Settings(Drawn),
     "meshes": EachOf(MESH, "experiments"),
     "full_order": EachOf(TRAIN, "experiments"),
     "reruns": EachOf(RERUNS, "runs"),

@@ -15,7 +15,7 @@ from pdrom.view.multiples import panels, rows_of
 from pdrom.view.panels import fit_aspect
 from pdrom.view.read import SamplingView, read_basis, read_samplings
 from study.artifact.paths import BASIS, MESH, SAMPLING, SNAPSHOTS, File
-from study.artifact.reads import EachOf, Settings
+from study.artifact.reads import EachOf
 from study.figures.kit.declaration import figure
 from study.figures.kit.elements import NEUTRAL, ElementMap, element_map, magnitudes
 from study.figures.kit.options import Columns, Count, Drawn, NothingToDraw, Ranks, View
@@ -75,7 +75,6 @@ class Iteration:
         "step asks for one number, whose whole element has to be projected for it."
     ),
     reads={
-        "drawn": Settings(Drawn),
         "meshes": EachOf(MESH, "first_run"),
         "bases": EachOf(BASIS, "first_run"),
         "samples": EachOf(SAMPLING, "first_run"),
@@ -199,7 +198,6 @@ def _joint_residual(V: np.ndarray, entries: np.ndarray, k: int) -> np.ndarray:
         "because a projection yields all entries of its element at once."
     ),
     reads={
-        "drawn": Settings(Drawn),
         "meshes": EachOf(MESH, "experiments"),
         "snapshots": EachOf(SNAPSHOTS, "experiments"),
         "samples": EachOf(SAMPLING, "runs"),

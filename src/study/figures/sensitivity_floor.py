@@ -10,7 +10,7 @@ from pdrom.view import style
 from pdrom.view.artists import Figure
 from pdrom.view.multiples import clipped, label_outer, log_axis, small_multiples
 from study.artifact.paths import SENSITIVITY, File
-from study.artifact.reads import EachOf, Read, Setting, Settings
+from study.artifact.reads import EachOf, Read, Setting
 from study.experiments.kit.settings import Horizon, floor_of, horizon
 from study.figures.kit.declaration import figure
 from study.figures.kit.options import Columns, Drawn, NothingToDraw, Scenes
@@ -81,7 +81,7 @@ class Floored(Scenes):
         "frame above the threshold of {sensitivity.threshold}: beyond it a reduced run cannot be "
         "judged by its error. Dashed lines are twins, scenes that end before."
     ),
-    reads={"drawn": Settings(Drawn), **FLOORS},
+    reads={**FLOORS},
 )
 def sensitivity_floor(
     options: Floored, drawn: Drawn, sensitivity: list[File], horizon: Horizon

@@ -11,7 +11,7 @@ from pdrom.view.mesh_render import set_window
 from pdrom.view.panels import fit_aspect
 from pdrom.view.read import BasisView, positions_at, read_basis
 from study.artifact.paths import BASIS, MESH, SNAPSHOTS, TRAIN, File
-from study.artifact.reads import EachOf, Settings
+from study.artifact.reads import EachOf
 from study.figures.kit.declaration import figure
 from study.figures.kit.elements import SIGNED, ElementMap, element_map, signed, signed_entry
 from study.figures.kit.options import Count, Drawn, Instants, NothingToDraw, View
@@ -41,7 +41,6 @@ class Snapshots(View):
         "whose axis and row are named, relative to the largest."
     ),
     reads={
-        "drawn": Settings(Drawn),
         "meshes": EachOf(MESH, "first_run"),
         "full_order": EachOf(TRAIN, "first_run"),
         "sets": EachOf(SNAPSHOTS, "first_run"),

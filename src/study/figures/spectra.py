@@ -9,7 +9,7 @@ from pdrom.core.store import read_table
 from pdrom.view import style
 from pdrom.view.artists import Axes, Figure
 from pdrom.view.multiples import clipped, label_outer, log_axis, small_multiples
-from study.artifact.reads import ProjectFile, Settings, TableOf
+from study.artifact.reads import ProjectFile, TableOf
 from study.figures.kit.declaration import figure
 from study.figures.kit.options import Beside, Drawn, Experiment, Methods, NothingToDraw
 
@@ -60,7 +60,6 @@ def _published(path: Path, columns: list[str], options: Beside, each: Experiment
         "published code for the scene that comes closest."
     ),
     reads={
-        "drawn": Settings(Drawn),
         "table": TableOf("singular_values"),
         "published": ProjectFile(f"{PUBLISHED_CODE}/singular_values.csv"),
     },
@@ -124,7 +123,6 @@ def _draw_values(ax: Axes, rows: pd.DataFrame, colour: str, marker: str) -> None
         "Errors above the axis are drawn on its rim with an arrow head."
     ),
     reads={
-        "drawn": Settings(Drawn),
         "table": TableOf("reconstruction_error"),
         "published": ProjectFile(f"{PUBLISHED_CODE}/reconstruction_error.csv"),
     },

@@ -7,7 +7,7 @@ import pandas as pd
 
 from pdrom.view import style
 from pdrom.view.artists import Axes, Figure
-from study.artifact.reads import Settings, TableOf
+from study.artifact.reads import TableOf
 from study.figures.kit.declaration import figure
 from study.figures.kit.options import Drawn, Methods, NothingToDraw, Ranks
 
@@ -122,7 +122,7 @@ class Sizes(Methods):
         "run; blow-up: numbers that are not finite, or an extent beyond the limit, in the printed "
         "frame. Groups whose projections are round-off are left out."
     ),
-    reads={"drawn": Settings(Drawn), "table": TableOf("stability")},
+    reads={"table": TableOf("stability")},
 )
 def stability_map(options: Sizes, drawn: Drawn, table: pd.DataFrame) -> Figure:
     """Draw strips of blocks: a block per method, its columns are sizes; a row per experiment.

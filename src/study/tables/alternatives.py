@@ -25,23 +25,15 @@ ITERATIONS = integer("iterations", "iterations of each substep")
 MOTION = text("motion", f"held-out motion, one of: {', '.join(MOTIONS)}")
 # What tells candidates apart, whatever the motion.
 CANDIDATE = ["scene", "factor", "stiffness", *settings.SETTING]
-TRAINED_ON = text(
-    "trained_on", f"frames that a reduction is trained on: {settings.OWN}, {settings.CONVERGED}"
-)
 
 # Rounding decides which iterate of a two-level iteration is refused: its errors have few digits.
 LOOSE = 0.3
 REFERENCES = ("implicit", "continuous")
 CASE = ["scene", "vertices", "stiffness", "motion"]
-PAYS = (
-    "from_plain", "from_best", "motions", "reached", "speedup", "speedup_low", "speedup_high",
-)  # fmt: skip
 SPEEDUP = ("reduced_speedup", "reduced_speedup_low", "reduced_speedup_high")
 CURVE = ["scene", "stiffness", "reference", "limit"]
 PLAIN = "projective"
 KNOWN = 3.0  # a motion decides about an error only if it is known this many times better
-REFERENCE = text("reference", "what the error is taken against: implicit or continuous")
-LIMIT = number("limit", "error that is allowed", compared="exact")
 
 
 @table(
@@ -58,7 +50,10 @@ LIMIT = number("limit", "error that is allowed", compared="exact")
         ),
         SUBSTEPS,
         ITERATIONS,
-        TRAINED_ON,
+        text(
+            "trained_on",
+            f"frames that a reduction is trained on: {settings.OWN}, {settings.CONVERGED}",
+        ),
         *shared("k elements_sampled"),
         MOTION,
         integer("frames", "frames that errors are taken over"),
@@ -106,8 +101,8 @@ def beside(rows: pd.DataFrame, times: pd.DataFrame) -> tuple[pd.DataFrame, list[
         *shared("scene vertices"),
         STIFFNESS,
         MOTION,
-        REFERENCE,
-        LIMIT,
+        text("reference", "what the error is taken against: implicit or continuous"),
+        number("limit", "error that is allowed", compared="exact"),
         *map(timed, shared("method")),
         timed(SUBSTEPS),
         timed(ITERATIONS),
@@ -164,10 +159,12 @@ def winners(rows: pd.DataFrame, times: list[File], limits: Sequence[float]) -> p
                     continue
                 row = {**named, "reference": reference, "limit": limit}
                 found.append({**row, **_best(known, limit, processes)})
-    made = pd.DataFrame(found, columns=winners.column_names).drop(columns=list(PAYS))
-    pays = [{**dict(zip(CURVE, key, strict=True)), **_pays(own)}
-            for key, own in made.groupby(CURVE, sort=False)]  # fmt: skip
-    return made.merge(pd.DataFrame(pays, columns=[*CURVE, *PAYS]), on=CURVE, how="left")
+    made = pd.DataFrame(found, columns=winners.column_names)
+    if made.empty:
+        return made
+    curves = made.groupby(CURVE, sort=False)
+    pays = pd.DataFrame([{**dict(zip(CURVE, k, strict=True)), **_pays(own)} for k, own in curves])
+    return made.drop(columns=pays.columns.difference(CURVE)).merge(pays, on=CURVE, how="left")
 
 
 def _best(rows: pd.DataFrame, limit: float, processes: list[int]) -> dict[str, object]:
@@ -201,7 +198,7 @@ def _best(rows: pd.DataFrame, limit: float, processes: list[int]) -> dict[str, o
 
 
 def _pays(curve: pd.DataFrame) -> dict[str, object]:
-    """Columns `PAYS`: smallest mesh from which on a reduction pays in every motion, or none."""
+    """Smallest mesh from which on a reduction pays in every motion, or none, and by how much."""
     # NaN where one motion is not reached
     every = curve.assign(plain=curve.plain_ms / curve.reduced_ms)
     worst = every.groupby("vertices")[["plain", "reduced_speedup"]].agg(
@@ -210,16 +207,15 @@ def _pays(curve: pd.DataFrame) -> dict[str, object]:
     sizes = worst.index.to_numpy(float)
     plain, best = worst.to_numpy(float).T
     last = every[every.vertices == sizes[-1]]
-    values = (
-        _pays_from(sizes, plain),
-        _pays_from(sizes, best),
-        len(last),
-        int(last.reduced_speedup.notna().sum()),
-        last.reduced_speedup.median(),
-        last.reduced_speedup_low.min(),
-        last.reduced_speedup_high.max(),
-    )
-    return dict(zip(PAYS, values, strict=True))
+    return {
+        "from_plain": _pays_from(sizes, plain),
+        "from_best": _pays_from(sizes, best),
+        "motions": len(last),
+        "reached": int(last.reduced_speedup.notna().sum()),
+        "speedup": last.reduced_speedup.median(),
+        "speedup_low": last.reduced_speedup_low.min(),
+        "speedup_high": last.reduced_speedup_high.max(),
+    }
 
 
 def _pays_from(sizes: np.ndarray, speedups: np.ndarray) -> int | None:

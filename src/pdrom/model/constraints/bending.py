@@ -76,16 +76,6 @@ def _curvature(y, e, start, indices, data):
 
 
 @lane_function
-def _save_columns(work, first, lane, a, b, c, d):
-    """Save the vectors of four lanes."""
-    x, y, z, _ = arithmetic.transposed(a, b, c, d)
-    place = first * LANES + lane
-    rows.store(work, place, x)
-    rows.store(work, place + LANES, y)
-    rows.store(work, place + 2 * LANES, z)
-
-
-@lane_function
 def _without(a, part, n):
     """Direction and length of a - part n."""
     rest = mix(1.0, a, -part, n)
@@ -192,13 +182,16 @@ def accumulate_vertices(y_place, rhs_place, record, part):
         used = min(LANES, elements - begin)
         for lane in range(0, used, WIDTH):
             e, last = begin + lane, elements - 1
-            _save_columns(
-                work, H, lane,
+            hx, hy, hz, _ = arithmetic.transposed(
                 _curvature(y, e, start, indices, data),
                 _curvature(y, min(e + 1, last), start, indices, data),
                 _curvature(y, min(e + 2, last), start, indices, data),
                 _curvature(y, min(e + 3, last), start, indices, data),
-            )  # fmt: skip
+            )
+            place = H * LANES + lane
+            rows.store(work, place, hx)
+            rows.store(work, place + LANES, hy)
+            rows.store(work, place + 2 * LANES, hz)
         _half_spheres(work, manifold, block)
         for lane in range(used):
             w = at(manifold, (block * MANIFOLD + WEIGHT) * LANES + lane)
@@ -353,16 +346,8 @@ class VertexBending(ConstraintGroup):
         laplacian = cotangent_laplacian(mesh.points, self._triangles)[self.vertices]
         self.S = sparse.csr_array(laplacian.multiply(0.5 / area[:, None]))
         self.S.sort_indices()
-        self._set_rest(mesh.points)
-        self._set_kernel()
-
-    @classmethod
-    def element_vertices(cls, mesh: Mesh) -> np.ndarray:
-        return interior_vertices(mesh.triangles, mesh.vertices)[:, None]
-
-    def _set_rest(self, points: np.ndarray) -> None:
-        curvature = self.S @ points
-        self.rest = curvature
+        points = mesh.points
+        curvature = self.rest = self.S @ points
         self.magnitude = np.linalg.norm(curvature, axis=1)
         cancelling = np.linalg.norm(abs(self.S) @ np.abs(points), axis=1)
         normals = np.zeros_like(curvature)
@@ -374,6 +359,11 @@ class VertexBending(ConstraintGroup):
         self.side = np.where(self.magnitude > FLAT * cancelling, side, 0.0)
         self._curved = np.flatnonzero(self.side)
         self.normals = normals
+        self._set_kernel()
+
+    @classmethod
+    def element_vertices(cls, mesh: Mesh) -> np.ndarray:
+        return interior_vertices(mesh.triangles, mesh.vertices)[:, None]
 
     def begin_frame(self, q: np.ndarray, elements: np.ndarray | None = None) -> None:
         """Take the vertex normals of ``q`` (N, 3) m; curved ``elements`` (m,) alone need them."""
@@ -436,12 +426,10 @@ class VertexBending(ConstraintGroup):
             blocks(self.elements),
             arrays=self._arrays(np.empty(0, np.int64)),
             numbers=(self.elements, 0),
-            touched=self._touched if self.elements >= self.split_from else None,
+            touched=(lambda block: self.S.indices[self.S.indptr[block * LANES] :])
+            if self.elements >= self.split_from
+            else None,
         )
-
-    def _touched(self, block: int) -> np.ndarray:
-        """Vertices of a block and all later ones."""
-        return self.S.indices[self.S.indptr[block * LANES] :]
 
     def kernel_parameters(self) -> np.ndarray:
         return self._manifold

@@ -102,15 +102,6 @@ def _advance(work, place, side, solid):
 
 
 @lane_function
-def _reopen(work):
-    """Open the lanes whose smallest solution is still to be found."""
-    for lane in range(LANES):
-        mark = work[MARK * LANES + lane]
-        again = mark == _CLOSED and work[LEAST * LANES + lane] > 0.0
-        work[MARK * LANES + lane] = _OPEN if again else mark
-
-
-@lane_function
 def _distance(t, values, target, solid):
     """Squared distance to the values that belong to t; infinite where t is no solution."""
     product, _, first, second = _product(t, values, solid)
@@ -159,7 +150,11 @@ def nearest_block(work, low, high, solid):
         if _advance(work, LARGEST, 1.0, solid) == 0.0:
             break
     if several > 0.0:
-        _reopen(work)
+        # open the lanes whose smallest solution is still to be found
+        for lane in range(LANES):
+            mark = work[MARK * LANES + lane]
+            again = mark == _CLOSED and work[LEAST * LANES + lane] > 0.0
+            work[MARK * LANES + lane] = _OPEN if again else mark
         for _ in range(STEPS):
             if _advance(work, LEAST, -1.0, solid) == 0.0:
                 break

@@ -58,6 +58,10 @@ class SimplexGroup(ConstraintGroup):
 
     work_size = SIZE
     """Numbers of a lane in the working array."""
+    allowed: Any = ()
+    """Further numbers that the kernels need."""
+    _own_arrays: tuple[np.ndarray, ...] = ()
+    """Further arrays of the kernels."""
     reordered: ClassVar[bool] = True
     """Whether the kernel may visit the elements in another order than that of the mesh."""
 
@@ -112,20 +116,12 @@ class SimplexGroup(ConstraintGroup):
         )
 
     def _arrays(self, elements: np.ndarray) -> tuple[np.ndarray, ...]:
-        data = (self._corners, self._geometry, np.array(self._constants()), self._work)
-        return (*data, elements, *self._taken, *self._own_arrays())
+        data = (self._corners, self._geometry, np.array(self.allowed), self._work)
+        return (*data, elements, *self._taken, *self._own_arrays)
 
     def _extra(self) -> list[np.ndarray]:
         """Numbers of an element after its weight: the operator without the corner 0."""
         return [self.operator[:, :, 1:].reshape(self.elements, self.rows_per_element**2)]
-
-    def _constants(self) -> tuple[float, ...]:
-        """Further arguments of the kernels."""
-        return ()
-
-    def _own_arrays(self) -> tuple[np.ndarray, ...]:
-        """Further arrays of the kernel."""
-        return ()
 
 
 @lane_function

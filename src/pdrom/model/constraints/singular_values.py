@@ -128,9 +128,6 @@ class SingularValueGroup(simplex.SimplexGroup):
         self.operator = np.concatenate([-transposed.sum(axis=2, keepdims=True), transposed], axis=2)
         self._assemble(mesh.vertices)
 
-    def _constants(self) -> tuple[float, ...]:
-        return self.allowed
-
     def kernel_parameters(self) -> np.ndarray:
         return np.array(self.allowed)
 

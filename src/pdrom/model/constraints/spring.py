@@ -174,18 +174,14 @@ class EdgeSpring(simplex.SimplexGroup):
 
     def _assemble(self, vertices: int) -> None:
         # not part of the geometry: only an edge of length zero needs its rest edge
-        self._rest = pack(self.rest)
-        self._taken_rest = np.empty(REST * LANES)
+        self._own_arrays = pack(self.rest), np.empty(REST * LANES)
         super()._assemble(vertices)
 
     def _extra(self) -> list[np.ndarray]:
         return [np.linalg.norm(self.rest, axis=1)]
 
-    def _own_arrays(self) -> tuple[np.ndarray, ...]:
-        return self._rest, self._taken_rest
-
     def kernel_parameters(self) -> np.ndarray:
-        return np.concatenate([self._geometry, self._rest])
+        return np.concatenate([self._geometry, self._own_arrays[0]])
 
     def reference_project(self, d: np.ndarray, elements: np.ndarray) -> np.ndarray:
         rest = self.rest[elements, None, :]

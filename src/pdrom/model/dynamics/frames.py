@@ -138,13 +138,6 @@ class CompiledIterations:
         )  # fmt: skip
 
 
-@inner
-def _second_part(kernels, y, other, start, stop):
-    """The second parts of all local steps into an array of their own; their energy."""
-    other[WIDTH * start : WIDTH * stop] = 0.0
-    return add_part(kernels, y.ctypes.data, other.ctypes.data)
-
-
 @compiled(nogil=True)
 def all_iterations(
     which, y, s, base, rhs, inertia, tables, second, factor, history, objective,
@@ -173,7 +166,9 @@ def all_iterations(
         add_part(preparing, y.ctypes.data, rhs.ctypes.data)
         energy = add_part(local, y.ctypes.data, rhs.ctypes.data)
         if stop > start:
-            energy += _second_part(kernels, y, other, start, stop)
+            # the second parts of all local steps, into an array of their own
+            other[WIDTH * start : WIDTH * stop] = 0.0
+            energy += add_part(kernels, y.ctypes.data, other.ctypes.data)
             for i in range(WIDTH * start, WIDTH * stop):
                 rhs[i] += other[i]
         between = now(watch)

@@ -337,8 +337,12 @@ def ends_noticed() -> Iterator[None]:
     def noticing(path: Any, mode: str = "r", *more: Any, **named: Any) -> Any:
         if more or named or mode not in ("r", "rb"):
             return opened(path, mode, *more, **named)
-        file = _Bytes(io.FileIO(path), ends)
-        return file if mode == "rb" else _Text(file, ends)
+        file: Any = _Bytes(io.FileIO(path))
+        file.ends = ends
+        if mode == "r":
+            file = _Text(file, encoding="utf-8")
+            file.ends = ends
+        return file
 
     def whole(file: Any, *more: Any, **named: Any) -> np.ndarray:
         count = named.get("count", more[1] if len(more) > 1 else -1)
@@ -362,45 +366,36 @@ def ends_noticed() -> Iterator[None]:
         builtins.open, np.fromfile = opened, fromfile
 
 
-class _Text(io.TextIOWrapper):
-    """A text file that notes in ``ends`` how often it was read behind its end."""
+class _Noticing:
+    """A file that notes in ``ends`` how often it was read behind its end."""
 
-    def __init__(self, file: io.BufferedReader, ends: list[int]) -> None:
-        super().__init__(file, encoding="utf-8")
-        self._ends = ends
+    ends: list[int]
 
-    def readline(self, size: int = -1, /) -> str:  # type: ignore[override]
-        line = super().readline(size)
+    def readline(self, size: int | None = -1, /) -> Any:
+        line = super().readline(size)  # type: ignore[misc]
         if not line:
-            _note(self._ends)
+            self.note()
         return line
 
+    def note(self) -> None:
+        self.ends.append(1)
+        if len(self.ends) > PATIENCE:
+            raise EOFError("a reader that goes on for ever")
 
-class _Bytes(io.BufferedReader):
-    """A binary file that notes in ``ends`` how often it was read behind its end."""
 
-    def __init__(self, file: io.FileIO, ends: list[int]) -> None:
-        super().__init__(file)
-        self._ends = ends
+class _Text(_Noticing, io.TextIOWrapper):
+    """A text file."""
 
-    def readline(self, size: int | None = -1, /) -> bytes:
-        line = super().readline(size)
-        if not line:
-            _note(self._ends)
-        return line
+
+class _Bytes(_Noticing, io.BufferedReader):
+    """A binary file."""
 
     def read(self, size: int | None = -1, /) -> bytes:
         content = super().read(size)
         # readers of the whole file ask for all, or for large pieces
         if size and len(content) < size < PIECE:
-            _note(self._ends)
+            self.note()
         return content
-
-
-def _note(ends: list[int]) -> None:
-    ends.append(1)
-    if len(ends) > PATIENCE:
-        raise EOFError("a reader that goes on for ever")
 
 
 # Statements that say nothing about the positions of vertices or the corners of faces. All others

@@ -85,18 +85,16 @@ def barycentric_areas(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     return np.bincount(triangles.ravel(), np.repeat(area / 3.0, 3), minlength=len(points))
 
 
-def barycentric_volumes(points: np.ndarray, tetrahedra: np.ndarray) -> np.ndarray:
-    """A quarter of the volume of the adjacent ``tetrahedra`` at ``points`` (N, 3) m, (N,) m^3."""
-    corner = points[tetrahedra]
-    volume = np.abs(np.linalg.det(corner[:, 1:] - corner[:, :1])) / 6.0
-    return np.bincount(tetrahedra.ravel(), np.repeat(volume / 4.0, 4), minlength=len(points))
-
-
 def vertex_measures(mesh: Mesh) -> np.ndarray:
-    """Share of each vertex in the rest shape (N,): m^3 of a volume mesh, m^2 of a surface."""
-    if len(mesh.tetrahedra):
-        return barycentric_volumes(mesh.points, mesh.tetrahedra)
-    return barycentric_areas(mesh.points, mesh.triangles)
+    """Share of each vertex in the rest shape (N,): m^3 of a volume mesh, m^2 of a surface.
+
+    A vertex has a quarter of the adjacent tetrahedra, a third of the adjacent triangles.
+    """
+    if len(mesh.tetrahedra) == 0:
+        return barycentric_areas(mesh.points, mesh.triangles)
+    corner = mesh.points[mesh.tetrahedra]
+    volume = np.abs(np.linalg.det(corner[:, 1:] - corner[:, :1])) / 6.0
+    return np.bincount(mesh.tetrahedra.ravel(), np.repeat(volume / 4.0, 4), minlength=mesh.vertices)
 
 
 def boundary_edges(triangles: np.ndarray) -> np.ndarray:

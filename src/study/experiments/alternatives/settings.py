@@ -9,7 +9,7 @@ from pdrom.core.yamlfile import ConfigModel
 from pdrom.model.held_out import FIRST, MOTIONS, HeldOutMotion
 from study.experiments.alternatives.solvers.substeps import METHODS
 from study.experiments.kit.measurement import Processes
-from study.experiments.kit.settings import Count, Modes, Tolerance
+from study.experiments.kit.settings import Count, Modes, Sizes, Tolerance
 
 REDUCED, ACCELERATED = REDUCTIONS = "ecsw", "ecsw-anderson"  # the others are full-order ones
 OWN: Final = "own iterations"  # frames that a reduction may be trained on, as may converged ones
@@ -132,7 +132,5 @@ class Alternatives(Comparison):
     ``errors``.
     """
 
-    scenes: dict[str, tuple[Annotated[float, Field(gt=0.0, le=100.0)], ...]] = Field(
-        default_factory=dict
-    )
+    scenes: Sizes = Field(default_factory=dict)
     errors: tuple[Tolerance, ...] = (1e-1, 1e-2, 1e-3)

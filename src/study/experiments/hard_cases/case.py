@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -11,6 +11,9 @@ from pdrom.model.dynamics.stepper import State
 from pdrom.model.mesh.generators import bar, boundary, cloth
 from pdrom.model.mesh.types import Mesh
 from pdrom.model.scene import Scene, SceneConfig
+
+Start = Callable[[Scene], State]
+SEED = 7
 
 
 @dataclass(frozen=True)
@@ -41,7 +44,7 @@ class HardCase:
     scene: Recipe
     why: str
     holds: tuple[str, ...]
-    start: Callable[[Scene], State] = Scene.initial_state
+    start: Start = Scene.initial_state
     bound: float = 2.0
     slow: bool = False
 
@@ -63,15 +66,9 @@ def build(
     return Scene.build(config, mesh, masses=None if masses is None else masses(mesh))
 
 
-Start = Callable[[Scene], State]
-SEED = 7
-
-
-def sheet(
-    plane: Literal["xy", "xz"] = "xz", wave: float = 0.0, rows: int = 6, columns: int = 6
-) -> Mesh:
-    """A sheet of ``rows`` times ``columns`` vertices in ``plane``, with ``wave`` as in `cloth`."""
-    return cloth(rows, columns, plane, wave=wave)
+def sheet(wave: float = 0.0) -> Mesh:
+    """A lying sheet of 36 vertices, with ``wave`` as in `cloth`."""
+    return cloth(6, 6, "xz", wave=wave)
 
 
 def small_bar() -> Mesh:

@@ -20,7 +20,7 @@ from pdrom.model.constraints.local_kernel import OWN, PREPARE, LocalKernel, call
 from pdrom.model.dynamics.space import VertexSpace
 from pdrom.model.dynamics.stepper import LocalStep, Stepper
 from pdrom.model.dynamics.system import GlobalSystem
-from pdrom.model.effects.base import Boundary, Contact, Effect, Force
+from pdrom.model.effects.base import Effect
 from pdrom.model.scene import Scene
 from pdrom.reduction.sampling.local_step import ReducedLocalStep
 from study.experiments.kit.measurement import Variant, measure, measure_calls, median_frames
@@ -32,13 +32,11 @@ COLUMNS = [
 ]  # fmt: skip
 COSTS = ["scene", "effect", "elements", "ms_per_frame", "share"]
 LEFT_OUT = ["scene", "left_out", "groups", "elements", "ms_per_frame", "saved_ms", "own_ms"]
-# Questions that the step loop asks an effect of each role.
-_QUESTIONS: dict[type[Effect], tuple[str, ...]] = {
-    ConstraintGroup: ("begin_frame", "accumulate"),
-    Force: ("acceleration",),
-    Boundary: ("active", "held", "takes_hold", "path"),
-    Contact: ("apply",),
-}
+# Questions that the step loop asks an effect of each role, see `_roles`.
+_QUESTIONS = (
+    ("begin_frame", "accumulate"), ("acceleration",), ("active", "held", "takes_hold", "path"),
+    ("apply",),
+)  # fmt: skip
 # Entries of the record: address and record of the kernel, the places of the seconds and clocks of
 # its two parts and of its preparation.
 KERNEL, RECORD, SECONDS, CLOCKS, SIZE = range(OWN, OWN + 5)
@@ -163,15 +161,11 @@ def effect_costs(
     ----------
     warmup, repeats : runs before the timed ones, and timed ones
     """
-    roles: list[Sequence[Effect]] = []
-    roles += [scene.groups, scene.forces, scene.boundaries, scene.contacts]
-    questions = zip(roles, _QUESTIONS.values(), strict=True)
+    questions = zip(_roles(scene), _QUESTIONS, strict=True)
     by_role: Any = [[Timed(effect, asked) for effect in role] for role, asked in questions]
     groups, *others = by_role
     space, config = VertexSpace(system, *others), scene.config
-    loop = Stepper(
-        space, config.time_step, config.iterations, local_steps=groups, track_objective=False
-    )
+    loop = Stepper(space, config.time_step, config.iterations, groups, track_objective=False)
     stands = [stand for role in by_role for stand in role]
     names = list(dict.fromkeys(stand.name for stand in stands))
     samples = [_profile(loop, scene, frames, stands, names) for _ in range(warmup + repeats)]
@@ -181,6 +175,10 @@ def effect_costs(
     costs["elements"] = [_elements(scene, phase) for phase in phases]
     costs["share"] = costs.ms_per_frame / total
     return costs[COSTS]
+
+
+def _roles(scene: Scene) -> tuple[Sequence[Effect], ...]:
+    return scene.groups, scene.forces, scene.boundaries, scene.contacts
 
 
 def _profile(
@@ -220,8 +218,7 @@ def left_out_sets(scene: Scene) -> list[tuple[str, ...]]:
     groups = scene.config.groups
     if len(groups) < 2:
         return []
-    roles = (scene.groups, scene.forces, scene.boundaries, scene.contacts)
-    lasting = {effect.name for role in roles for effect in role}
+    lasting = {effect.name for role in _roles(scene) for effect in role}
     listed = dict.fromkeys(e.effect for e in scene.config.effects)
     single = [(name,) for name in listed if name in lasting]
     several = combinations(groups, len(groups) - 1) if len(groups) > 2 else ()

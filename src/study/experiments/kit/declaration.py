@@ -36,6 +36,6 @@ def experiment(
     return decorate
 
 
-def experiments(package: str = "study.experiments") -> dict[str, Experiment]:
-    """Return every experiment of a package by name."""
-    return declared_in(package, Experiment)
+def experiments() -> dict[str, Experiment]:
+    """Return every experiment of the study by name."""
+    return declared_in("study.experiments", Experiment)

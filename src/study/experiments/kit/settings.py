@@ -28,6 +28,8 @@ Count = Annotated[int, Field(ge=1, le=100_000)]
 Repeats = Annotated[int, Field(ge=1, le=1000)]
 Modes = Annotated[int, Field(ge=1, le=1000)]
 Tolerance = Annotated[float, Field(gt=0.0, lt=1.0)]
+# factors on the vertices along a side, for scenes by name
+Sizes = dict[str, tuple[Annotated[float, Field(gt=0.0, le=100.0)], ...]]
 PositionBasis = Literal["pod", "skinning"]
 Rank = Annotated[int, Field(ge=1, le=100_000)] | Literal["full"]
 

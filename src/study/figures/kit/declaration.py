@@ -5,7 +5,7 @@ A figure is a function under its declaration in a module of `study.figures`::
     @figure(
         title="Rest shapes",
         caption="Vertices of each mesh.",
-        reads={"drawn": Settings(Drawn), "meshes": EachOf(MESH, "experiments")},
+        reads={"meshes": EachOf(MESH, "experiments")},
     )
     def rest_shapes(options: Scenes, drawn: Drawn, meshes: list[File]) -> Figure: ...
 """
@@ -26,8 +26,8 @@ from pdrom.view.artists import Figure
 from study.artifact.artifact import Artifact, declare, declared_in
 from study.artifact.markup import filled, to_plain
 from study.artifact.paths import FIGURE, FIGURE_PICTURE
-from study.artifact.reads import Read, Setting
-from study.figures.kit.options import NothingToDraw, Options
+from study.artifact.reads import Read, Setting, Settings
+from study.figures.kit.options import Drawn, NothingToDraw, Options
 
 log = logging.getLogger(__name__)
 
@@ -100,7 +100,9 @@ class Declaration(Artifact):
 def figure(
     *, title: str, caption: str, reads: Mapping[str, Read], number: int | None = None
 ) -> Callable[[Callable[..., Figure]], Declaration]:
-    """Declare the function below as a figure; it gets ``options``, and what it reads by name.
+    """Declare the function below as a figure; it gets what it reads by name, and its ``options``.
+
+    Where it takes ``drawn``, it also gets the part of the study that the options choose.
 
     Raises
     ------
@@ -111,7 +113,8 @@ def figure(
     def decorate(function: Callable[..., Figure]) -> Declaration:
         name = function.__name__
         writes = {"pdf": FIGURE.where(name=name), "png": FIGURE_PICTURE.where(name=name)}
-        given = {"options": Setting("options"), **reads}
+        drawn = {"drawn": Settings(Drawn)} if "drawn" in function.__annotations__ else {}
+        given = {"options": Setting("options"), **drawn, **reads}
         made = Declaration(name, title, given, writes, function, caption=caption, number=number)
         return declare(made)
 

@@ -17,7 +17,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, Literal, Protocol
+from typing import Any, Literal
 
 import pandas as pd
 
@@ -110,10 +110,8 @@ def timed(column: Column) -> Column:
     return replace(column, timed=True)
 
 
-class TimedCells(Protocol):
-    """Names of the timed columns of each row, from the table and the project files it reads."""
-
-    def __call__(self, table: pd.DataFrame, **files: Path) -> Sequence[Collection[str]]: ...
+# Names of the timed columns of each row, from the table and by name the project files it reads.
+TimedCells = Callable[..., Sequence[Collection[str]]]
 
 
 @dataclass(frozen=True)

@@ -16,9 +16,6 @@ from study.artifact.paths import File
 
 PHASES = ("ms_per_frame", "inertia_ms", "local_ms", "assembly_ms", "lift_ms", "global_ms")
 RESAMPLES, SEED, LEVEL = 2000, 1, 0.95
-# The control compares a run with itself; where it differs by more than half, a time says nothing.
-# Fixed on 2026-11-22, before any control had been measured.
-CONFIRMED = 1.5
 
 
 def joined(files: Iterable[File]) -> pd.DataFrame:
@@ -70,16 +67,6 @@ def median_interval(values: Sequence[float] | np.ndarray) -> tuple[float, float,
         rng=np.random.default_rng(SEED),
     ).confidence_interval  # fmt: skip
     return float(np.median(x)), float(found.low), float(found.high)
-
-
-def confirmed(low: float, high: float) -> bool:
-    """Whether a control confirms a ratio of times.
-
-    Parameters
-    ----------
-    low, high : interval of the time of a run over that of the same run
-    """
-    return low >= 1.0 / CONFIRMED and high <= CONFIRMED
 
 
 def in_words(median: float, low: float, high: float) -> str:

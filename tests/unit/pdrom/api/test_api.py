@@ -135,24 +135,15 @@ FAULTY = {
     "no snapshots": (
         lambda full, _: api.basis(replace(full, snapshots={}), "spring"), "stored no snapshots",
     ),
-    "scene not there": (lambda *_: api.load_scene(Path("none.yaml")), "no such configuration file"),
-    "run not there": (lambda _, p: api.load(p / "none.h5"), "no such file"),
     "mesh not there": (
-        lambda _, p: api.build_scene(
-            p, mesh={"kind": "file", "path": "none.obj"}, frames=4, effects=EFFECTS,
-        ), r"none\.obj",
+        lambda _, p: given({"kind": "file", "path": "none.obj"}, folder=p), r"none\.obj",
     ),
-    "mesh no pair": (
-        lambda *_: api.build_scene(mesh=(1, 2, 3), frames=4, effects=EFFECTS), "mesh of 3 parts",
-    ),
+    "mesh no pair": (lambda *_: given((1, 2, 3)), "mesh of 3 parts"),
     "r a fraction": (lambda full, _: api.reduce(full, "spring", r=1.5), "r = 1.5: a whole number"),
     "r a text": (lambda full, _: api.reduce(full, "spring", r="3"), "r = '3': a whole number"),
-    "r nothing": (lambda full, _: api.reduce(full, "spring", r=None), "r = None: a whole"),
     "r true": (lambda full, _: api.reduce(full, "spring", r=True), "r = True: a whole number"),
-    "r NaN": (lambda full, _: api.reduce(full, "spring", r=np.nan), "r = nan: a whole number"),
     "r zero": (lambda full, _: api.reduce(full, "spring", r=0), "r = 0, the snapshots have"),
     "no run": (lambda full, _: api.reduce(full.scene, "spring"), "full = Scene.*a FullRun is"),
-    "no run of a basis": (lambda *_: api.basis(None, "spring"), "full = None: a FullRun"),
     "no scene": (lambda full, _: api.run(full), "scene = FullRun.*a Scene is required"),
     "group nothing": (lambda full, _: api.reduce(full, None), "group = None"),
     "method nothing": (lambda full, _: api.reduce(full, "spring", None), "unknown method None"),
@@ -168,9 +159,8 @@ FAULTY = {
         lambda full, _: api.reduce(full, "spring", scene=full.scene), "scene: only together with",
     ),
     "motion of another mesh": (
-        lambda full, _: api.reduce(full, error=0.1, scene=api.build_scene(
-            **(KEYS | {"mesh": {"kind": "cloth", "rows": 4, "columns": 4}}), effects=EFFECTS,
-        )), "another mesh or other constraint groups",
+        lambda full, _: api.reduce(full, error=0.1, scene=given((SQUARE, [[0, 1, 2], [0, 3, 2]]))),
+        "another mesh or other constraint groups",
     ),
     "motion of other groups": (
         lambda full, _: api.reduce(full, error=0.1, scene=api.build_scene(
@@ -183,13 +173,10 @@ FAULTY = {
     "plot of a run": (lambda full, _: api.plot(full), "plot = FullRun.*a ReducedRun"),
     "plot of nothing": (lambda *_: api.plot(), "at least one run"),
     "view of nothing": (lambda _, p: api.view(p / "v"), "view"),
-    "view of a text": (lambda _, p: api.view(p / "v", "text"), "view"),
-    "view of None": (lambda _, p: api.view(p / "v", None), "view"),
     "view of a scene": (lambda full, p: api.view(p / "v", full.scene), "view = Scene"),
     "view into a folder": (lambda full, p: api.view(p, full), "cannot be written .a folder"),
     "save of a run": (lambda full, p: api.save(full, p / "s"), "reduced = FullRun"),
     "load of a folder": (lambda _, p: api.load(p), "is a folder"),
-    "load of nothing": (lambda *_: api.load(None), "None: the name of a file"),
     "load of a zero": (lambda *_: api.load("a\0b"), "the name of a file is required"),
     "run into a folder": (lambda full, p: api.run(full.scene, p), "cannot be written .a folder"),
     "scene of nothing": (lambda *_: api.load_scene(None), "None: the name of a file"),
@@ -197,7 +184,7 @@ FAULTY = {
     "mass NaN": (
         lambda *_: api.build_scene(**KEYS, effects=EFFECTS, vertex_mass=np.nan), "vertex_mass",
     ),
-    "mesh nothing": (lambda *_: api.build_scene(effects=EFFECTS, frames=3), "key 'mesh' is"),
+    "mesh nothing": (lambda *_: given(None), "key 'mesh' is"),
 }  # fmt: skip
 
 
@@ -230,18 +217,18 @@ SQUARE = [[0.0, 1.0, 0.0], [1.0, 1.0, 0.0], [1.0, 1.0, 1.0], [0.0, 1.0, 1.0]]
 CORNER = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
 
 
-def given(points, cells) -> Scene:
-    """A scene on arrays, without a side that is held."""
-    return api.build_scene(mesh=(points, cells), frames=4, effects=[EFFECTS[0], EFFECTS[2]])
+def given(mesh, folder=".") -> Scene:
+    """A scene on a mesh, without a side that is held."""
+    return api.build_scene(folder, mesh=mesh, frames=4, effects=[EFFECTS[0], EFFECTS[2]])
 
 
 def test_a_mesh_is_given_as_arrays(tmp_path):
-    scene = given(SQUARE, [[0, 1, 2], [0, 3, 2]])
+    scene = given((SQUARE, [[0, 1, 2], [0, 3, 2]]))
     assert np.array_equal(scene.mesh.points, SQUARE)
     assert len(scene.mesh.edges()) == 5
-    solid = given(np.array(CORNER), np.array([[0, 2, 1, 3]], dtype=np.uint64))
+    solid = given((np.array(CORNER), np.array([[0, 2, 1, 3]], dtype=np.uint64)))
     assert (len(solid.mesh.tetrahedra), len(solid.mesh.triangles)) == (1, 4)
-    larger = given(2.0 * np.array(SQUARE), [[0, 1, 2], [0, 3, 2]])
+    larger = given((2.0 * np.array(SQUARE), [[0, 1, 2], [0, 3, 2]]))
     assert larger.config != scene.config  # or two meshes would count as one scene
     run = api.run(scene, tmp_path / "given.h5")
     read = api.load(tmp_path / "given.h5")
@@ -271,7 +258,7 @@ def test_a_mesh_is_given_as_arrays(tmp_path):
 )
 def test_faults_of_given_arrays_are_named(points, cells, words):
     with pytest.raises(PdromError, match=words) as caught:
-        given(points, cells)
+        given((points, cells))
     assert len(str(caught.value).splitlines()) == 1
 
 
@@ -357,27 +344,6 @@ def test_records_are_compared_and_hashed_by_identity(reduced, name):
     assert record == record
     assert record != replace(record)
     assert len({record, reduced.full.scene}) == 2
-
-
-@pytest.mark.parametrize("fault", ["cut", "nan", "times", "reduced"])
-def test_a_sealed_run_is_looked_at_like_any_other(reduced, tmp_path, fault):
-    """With a right checksum, by whoever wrote it."""
-    full = reduced.full
-    positions = np.array(full.positions)
-    if fault == "cut":
-        full = replace(full, positions=positions[:-1])
-    elif fault == "nan":
-        positions[3, 2, 1] = np.nan
-        full = replace(full, positions=positions)
-    elif fault == "times":
-        full = replace(full, ms=full.ms[:-1])
-    outcome = reduced.outcome
-    if fault == "reduced":
-        outcome = replace(outcome, positions=outcome.positions[:, :-1])
-    path = tmp_path / "sealed.h5"
-    api.save(replace(reduced, full=full, outcome=outcome), path)
-    with pytest.raises(StorageError, match=r"sealed\.h5"):
-        api.load(path)
 
 
 def test_a_run_from_elsewhere_reads_no_other_file(reduced, tmp_path):

@@ -5,7 +5,6 @@ import re
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import h5py
@@ -20,6 +19,7 @@ from pdrom.command.base import Status
 from pdrom.command.main import COMMANDS, parser, run
 from pdrom.command.new import template
 from pdrom.core.store import MARK, check_file
+from pdrom.core.store.checksum import BLOCK
 from pdrom.model.mesh.generators import bar, cloth
 from pdrom.model.mesh.types import Mesh
 from pdrom.model.scene import Scene, SceneConfig
@@ -130,19 +130,9 @@ def test_a_damaged_run_is_refused_and_left_where_it_is(folder, finished, positio
     assert content(folder) == before
 
 
-def without_checksum(path: Path, change: Callable[[h5py.File], None]) -> None:
-    """Replace a run by the one that an older pdrom wrote, changed."""
-    with h5py.File(path) as old, h5py.File("new", "w", track_order=True) as new:
-        for name in old:
-            old.copy(name, new)
-        new.attrs.update(old.attrs)
-        change(new)
-    Path("new").rename(path)
-
-
 def test_a_run_without_a_checksum_is_read_if_that_is_asked_for(folder, finished, capsys):
-    shutil.copy(finished / "small.h5", ".")
-    without_checksum(Path("small.h5"), lambda file: None)
+    whole = (finished / "small.h5").read_bytes()[BLOCK:]
+    Path("small.h5").write_bytes(whole)
     before = content(folder)
     assert run([*REDUCE, "--run", "small.h5"]) == Status.FAULTY
     (told,) = capsys.readouterr().err.splitlines()
@@ -151,36 +141,12 @@ def test_a_run_without_a_checksum_is_read_if_that_is_asked_for(folder, finished,
     assert content(folder) == before
     assert run([*REDUCE, "--run", "small.h5", "--unchecked"]) == Status.DONE
     assert run(["view", "small.h5", "--unchecked"]) == Status.DONE
-
-
-def first_of(name: str, value: float) -> Callable[[h5py.File], None]:
-    """A change of a file: another first number of its dataset ``name``."""
-    return lambda file: file[name].__setitem__((0,) * file[name].ndim, value)
-
-
-def shortened(file: h5py.File) -> None:
-    """A run that ends early."""
-    file["positions"] = file.pop("positions")[:-1]
-
-
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        (shortened, "positions of float64 (12, 30, 3), required: float (13, 30, 3)"),
-        (first_of("snapshots/spring/p", np.nan), "snapshots of spring: entry (0, 0, 0) is nan"),
-        (lambda file: file.attrs.modify("configuration", "{"), "holds no sound run"),
-        (lambda file: file.attrs.modify("configuration", "[]"), "holds no sound run"),
-        (lambda file: file.pop("timings"), "holds no run"),
-        (lambda file: file["mesh"].pop("points"), "points"),
-    ],
-)
-def test_an_unchecked_run_has_to_be_sound(folder, finished, change, words, capsys):
-    shutil.copy(finished / "small.h5", ".")
-    without_checksum(Path("small.h5"), change)
+    with h5py.File("small.h5", "r+") as file:
+        del file["timings"]
+    capsys.readouterr()
     assert run([*REDUCE, "--run", "small.h5", "--unchecked"]) == Status.FAULTY
     (told,) = capsys.readouterr().err.splitlines()
-    assert told.startswith("pdrom: small.h5: ")
-    assert words in told
+    assert told.startswith("pdrom: small.h5: holds no run that could be opened")
 
 
 def test_a_table_is_shown_with_what_its_columns_hold(folder, capsys):
@@ -301,21 +267,13 @@ ASK = ["reduce", "small.yaml", "--error"]
         (["reduce", "small.yaml", "--group", "spring", "--r", "99"], "r = 99"),
         (["run", "small.yaml", "--out", "nowhere.d/../small.yaml/x.h5"], "cannot be written"),
         (["new", "nowhere/x"], "No such file"),
-        (["run", f"{'a' * 5000}.yaml"], "File name too long"),
         (["show", "a" * 5000], "File name too long"),
-        (["view", "none.h5"], "none.h5: no such file"),
         (["show", "."], "is a folder"),
-        (["view", "."], "is a folder"),
         (["run", "."], "no such configuration file"),
-        (["reduce", ".", "--group", "spring"], "no such configuration file"),
         (["reduce", "small.yaml"], "--group or --error: one is required"),
         ([*ASK, "0"], "--error = '0': a number above 0 and below 1 is required"),
-        ([*ASK, "1.0"], "--error = '1.0': a number above 0 and below 1"),
         ([*ASK, "nan"], "--error = 'nan': a number above 0 and below 1"),
-        (
-            [*ASK, "velocty=0.1"],
-            "unknown quantity 'velocty' (allowed: position, velocity), did you",
-        ),
+        ([*ASK, "velocty=0.1"], "unknown quantity 'velocty' (allowed: position, velocity), did"),
         ([*ASK, "0.1"], "--error: --run is required with it: a training run"),
         ([*ASK, "0.1", "--plot", "a.png"], "--plot: only together with --group"),
     ],
@@ -328,10 +286,7 @@ def test_faults_are_one_line_and_code_1(folder, arguments, words, capsys):
 
 
 UNWRITABLE = [
-    (
-        [*REDUCE, "--plot", "x.exe"],
-        "--plot x.exe: no kind of picture 'exe' (allowed: pdf, png, svg",
-    ),
+    ([*REDUCE, "--plot", "x.exe"], "--plot x.exe: no kind of picture 'exe' (allowed: pdf, png"),
     ([*REDUCE, "--plot", "x.pgn"], "did you mean 'png'?"),
     ([*REDUCE, "--plot", "."], "--plot .: no kind of picture ''"),
     ([*REDUCE, "--plot", "folder.png"], "folder.png: cannot be written (a folder)"),
@@ -340,7 +295,6 @@ UNWRITABLE = [
     ([*REDUCE, "--out", "small.yaml"], "is read by this command"),
     ([*REDUCE, "--out", "e.png", "--plot", "e.png"], "is read by this command"),
     (["run", "small.yaml", "--out", "."], ".: cannot be written (a folder)"),
-    (["run", "small.yaml", "--out", "folder.png"], "cannot be written (a folder)"),
     (["run", "small.yaml", "--out", "small.yaml"], "is read by this command"),
     (["run", "small.yaml", "--out", "a" * 5000], "File name too long"),
     (["view", "x.h5", "--png", "x.h5"], "is read by this command"),
@@ -358,11 +312,8 @@ def test_files_of_others_and_the_mesh_of_the_scene_are_not_overwritten(folder, c
     ):
         before = Path(out).read_bytes()
         reduce = ["reduce", scene, "--run", "none.h5"]
-        for command in (
-            ["run", scene],
-            [*reduce, "--group", "spring"],
-            [*reduce, "--error", "0.1"],
-        ):
+        wishes = (["--group", "spring"], ["--error", "0.1"])
+        for command in (["run", scene], *([*reduce, *wish] for wish in wishes)):
             assert run([*command, "--out", out]) == Status.FAULTY
             assert f"{out}: {words}" in capsys.readouterr().err
         assert Path(out).read_bytes() == before

@@ -102,14 +102,31 @@ def test_files_for_paraview_replace_and_remove_only_their_own(runs, tmp_path, ca
 
 
 def first_of(name, value):
-    """A change of a file: another first entry of its dataset ``name``."""
-    return lambda file: file[name].__setitem__(0, value)
+    """A change of a file: another first number of its dataset ``name``."""
+    return lambda file: file[name].__setitem__((0,) * file[name].ndim, value)
+
+
+def shortened(*names):
+    """A change of a file: the last entry of its datasets ``names`` is missing."""
+    return lambda file: [file.__setitem__(name, file.pop(name)[:-1]) for name in names]
+
+
+SHORT = r"positions of float64 \(12, 30, 3\), required: float \(13, 30, 3\)"
 
 
 @pytest.mark.parametrize(
     ("name", "change", "words"),
     [
+        ("small", shortened("positions"), SHORT),
+        ("small", first_of("positions", np.nan), r"positions: entry \(0, 0, 0\) is nan"),
+        ("small", shortened("timings"), "ms of float64"),
+        ("small", first_of("snapshots/spring/p", np.nan), "snapshots of spring: entry"),
         ("small", first_of("snapshots/spring/roundoff", np.nan), "round-off of spring"),
+        ("small", lambda file: file.attrs.modify("configuration", "{"), "holds no sound run"),
+        ("small", lambda file: file.attrs.modify("configuration", "[]"), "holds no sound run"),
+        ("small", lambda file: file["mesh"].pop("points"), "points"),
+        ("small_spring_gappy_2", shortened("full"), SHORT),
+        ("small_spring_gappy_2", shortened("reduced"), "reduced of float64"),
         ("small_spring_gappy_2", first_of("difference", np.nan), "difference"),
         ("small_spring_gappy_2", first_of("mesh/triangles", 999), "triangle 0 names vertex"),
         ("small_requested", lambda f: f.attrs.modify("frames_met", 99), "met for 99 of 12"),
@@ -121,5 +138,5 @@ def test_a_right_checksum_does_not_make_a_run_sound(runs, tmp_path, name, change
     with h5py.File(path, "r+") as file:
         change(file)
     write_block(path)
-    with pytest.raises(StorageError, match=f"run.h5: holds no sound run .*{words}"):
+    with pytest.raises(StorageError, match=rf"run\.h5: .*{words}"):
         load(path)

@@ -58,14 +58,6 @@ def test_drawn_frames_are_stored_ones_in_order(sheet):
     assert not np.array_equal(drawn(data, 1), drawn(data, 2))
 
 
-def test_a_moved_start_keeps_the_reduction_and_hardly_moves_a_tame_run(short):
-    runs = short.repeat(BLOCK, [3], "start", TWICE)
-    assert [run["seed"] for run in runs] == [1, 2]
-    assert runs[0]["gain"] == runs[1]["gain"]
-    assert runs[0]["error"] != runs[1]["error"]
-    assert runs[0]["error"] == pytest.approx(runs[1]["error"], rel=1e-4)
-
-
 def test_other_training_frames_are_another_basis(short):
     one, other = short.repeat(BLOCK, [3, 999], "training", TWICE)
     assert one["gain"] != other["gain"]

@@ -169,30 +169,19 @@ def test_errors_of_projections_are_tails_of_the_singular_values(at, array, table
     assert (sampled.elements_sampled < best.elements_sampled).any()
 
 
-def first_motion(rows: pd.DataFrame) -> pd.DataFrame:
-    """Rows of the training run, or of the first held-out motion."""
-    return rows[rows.motion == "heldout"] if "motion" in rows else rows
-
-
-@pytest.mark.parametrize(
-    ("place", "run", "kept"),
-    [
-        (paths.RERUNS_TRAIN, paths.TRAIN, ["r0002", "r0003"]),
-        (paths.RERUNS_HELDOUT, paths.HELDOUT, ["heldout/r0002", "heldout/r0003"]),
-    ],
-)
-def test_a_rerun_differs_from_the_full_order_by_what_its_table_says(
-    at, array, table, place, run, kept
-):
-    reference = array(run, "positions")
+@pytest.mark.parametrize("run", ["train", "heldout"])
+def test_a_rerun_differs_from_the_full_order_by_what_its_table_says(array, table, run):
+    reference = array(paths.FULL_ORDER.where(run=run), "positions")
     moved = norms(reference[1:] - reference[0])
-    rows = first_motion(table(place))
-    assert [f"r{r:04d}" for r in rows.r] == [name.rpartition("/")[2] for name in kept]
-    for name, row in zip(kept, rows.itertuples(), strict=True):
+    heldout = table(paths.RERUNS_HELDOUT).query("motion == @run")
+    rows = table(paths.RERUNS_TRAIN) if run == "train" else heldout
+    assert rows.r.tolist() == [2, 3]
+    for row in rows.itertuples():
+        name = f"r{row.r:04d}" if run == "train" else f"{run}/r{row.r:04d}"
         difference = array(paths.RERUNS, f"{name}/difference")
         assert row.relative_error == pytest.approx(whole(difference, moved))
         assert (row.frames, row.finite) == (8, True)
-        if run is paths.HELDOUT:
+        if run != "train":
             continue  # positions are kept of the training motion
         positions = array(paths.RERUNS, f"{name}/positions")  # in single precision
         assert difference == pytest.approx(norms(positions[1:] - reference[1:]), abs=1e-5)
@@ -340,6 +329,7 @@ def test_a_moved_start_changes_nothing_and_other_training_does(table):
     rows = table(paths.REPETITIONS)
     start, training = (rows[rows.varied == varied] for varied in ("start", "training"))
     assert start.groupby("r").gain.nunique().eq(1).all()
+    assert start.groupby("r").error.nunique().eq(3).all()
     assert training.groupby("r").gain.nunique().eq(3).all()
     own = table(paths.RERUNS_TRAIN).set_index("r").relative_error[2]
     assert start[start.r == 2].error.to_numpy() == pytest.approx(np.full(3, own), rel=1e-4)

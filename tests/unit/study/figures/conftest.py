@@ -68,10 +68,6 @@ class Invented:
         labels = {"scene": scene, "group": group, "method": method}
         return Resolver(self.study, str(self.root)).file(place, labels)
 
-    def table(self, name: str) -> str:
-        """Path of a table."""
-        return TABLE.at(str(self.root), name=name)
-
     def job(self, name: str, root: Path | None = None, **changes: object) -> Job:
         """Job of a figure whose options have ``changes``."""
         study = copy(self.study)
@@ -96,11 +92,6 @@ def mesh_of(scene: str) -> Mesh:
     return cloth(7, 6, wave=0.1 if scene == "bend_curved" else 0.0)
 
 
-def element_count(mesh: Mesh, group: str) -> int:
-    """Elements of a group on a mesh."""
-    return len(EFFECTS.load(group).element_vertices(mesh))
-
-
 def make_results(results: Invented) -> None:
     """Write the results of a study."""
     rng, effects = np.random.default_rng(7), reference("effects_cost")
@@ -112,7 +103,8 @@ def make_results(results: Invented) -> None:
             file["positions"] = positions
         for group in config.reduce:
             rank = 0 if scene in FLAT else 14
-            bases = _write_bases(results, scene, group, element_count(mesh, group), rank, rng)
+            count = len(EFFECTS.load(group).element_vertices(mesh))
+            bases = _write_bases(results, scene, group, count, rank, rng)
             for method, spec in results.study.methods.items():
                 path = results.path(SAMPLING, scene, group, method)
                 _write_sampling(path, bases, group, spec.rows)
@@ -209,7 +201,7 @@ def _write_tables(results: Invented) -> None:
             table = table[table.scene.isin(list(results.study.scenes))]
         if "method" in table:
             table = table[~table.method.isin(others)]
-        write_table(table, results.table(name))
+        write_table(table, TABLE.at(str(results.root), name=name))
 
 
 def _write_noise_runs(results, scene) -> None:

@@ -1,4 +1,4 @@
-"""What git keeps of runs: times of jobs, as a cluster is asked for them, and recorded verdicts."""
+"""Beginning of a run; what git keeps of runs: times of jobs, and recorded verdicts."""
 
 from pathlib import Path
 from types import SimpleNamespace
@@ -13,7 +13,10 @@ from pdrom.core.store import write_table
 from places import ROOT
 from study.artifact.usage import Usage
 from study.experiments.kit.declaration import experiments
-from study.pipeline.run import RUN_TIMES, expected_seconds, units_of
+from study.pipeline import run
+from study.pipeline.commandline import CommandLine
+from study.pipeline.failures import Failures
+from study.pipeline.run import RUN_TIMES, Run, expected_seconds, say_compilation, units_of
 from study.pipeline.scenes import Coarsen
 from study.pipeline.summary import minutes
 from study.pipeline.tracked import COLUMNS, COSTS, main, measured_costs, recorded_verdicts
@@ -55,6 +58,9 @@ def test_a_job_takes_what_jobs_of_its_kind_took_on_meshes_like_its_own(log, kind
     assert expected_seconds(plan())(place) == TABLE.seconds[kind]
     coarse = expected_seconds(plan(resolution=0.5))
     assert coarse(place) == TABLE.coarse_seconds[kind]
+    # a kind that was not measured takes the median
+    unknown = "results/studies/logs/logs/never_seen/a.log"
+    assert expected_seconds(plan())(unknown) == TABLE.seconds.median()
 
 
 def test_times_are_scaled_by_the_units_of_the_last_run(tmp_path):
@@ -81,11 +87,6 @@ def test_pages_say_the_times_of_the_record_and_the_unit(page):
     for study in times.itertuples():
         processor = f"({minutes(study.processor_s)} of processor time)"
         assert f"{minutes(study.wall_s)} with the set-up {processor}" in text
-
-
-def test_a_kind_that_was_not_measured_takes_the_median():
-    found = expected_seconds(plan())("results/studies/logs/logs/never_seen/a.log")
-    assert found == TABLE.seconds.median()
 
 
 def test_every_experiment_was_measured_and_takes_time():
@@ -151,3 +152,23 @@ def test_another_verdict_is_not_the_same(tmp_path: Path) -> None:
 
 def test_the_kept_record_has_every_claim() -> None:
     assert pd.read_csv(ROOT / RECORDED).claim.tolist() == list(load_claims(ROOT / RULES))
+
+
+def test_kernels_are_compiled_once(tmp_path, capsys):
+    say_compilation(str(tmp_path))
+    assert capsys.readouterr().err == "pdrom: the first jobs compile kernels (once, some minutes)\n"
+    (tmp_path / "dynamics_1").mkdir()
+    (tmp_path / "dynamics_1" / "loop.iterate_0-1.py312.nbi").touch()
+    say_compilation(str(tmp_path))
+    assert capsys.readouterr().err == ""
+
+
+def test_choices_among_jobs_start_no_timers(monkeypatch):
+    """Snakemake's scheduler starts one after every choice where it limits the rate of jobs."""
+    for name in ("stop_at_sigterm", "say_compilation", "tell_expectation"):
+        monkeypatch.setattr(run, name, lambda *_: None)
+    scheduler = SimpleNamespace(job_rate_limiter="1000 jobs in 20 seconds")
+    workflow = SimpleNamespace(scheduler=scheduler, local_exec=False)
+    begun = Run(CommandLine.parse(["--executor", "touch"]), Failures())
+    begun.start(workflow, plan=None)
+    assert scheduler.job_rate_limiter is None

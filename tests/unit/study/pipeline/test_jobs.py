@@ -1,4 +1,4 @@
-"""What jobs get of a study, and what makes them run again."""
+"""What jobs get of a study, what makes them run again, and which files belong to it."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -8,12 +8,14 @@ import pytest
 from bad_input.project import MESH, SCENE, SQUARE, STUDY, Replace, load_project, make_project
 from pdrom.core.errors import ConfigurationError
 from places import ROOT
+from study.artifact import paths
 from study.artifact.reads import Setting, TableOf
 from study.experiments.fom import mesh
 from study.experiments.subspaces import online
 from study.experiments.timing import scaling
 from study.pipeline.contents import labels_of
 from study.pipeline.folders import Folders
+from study.pipeline.manifest import study_files
 from study.pipeline.plan import Plan
 from study.pipeline.resolve import Job
 from study.pipeline.study import Study
@@ -142,3 +144,30 @@ def test_an_edited_mesh_has_another_checksum(tmp_path: Path, experiment) -> None
     assert before == content()
     (root / "config" / "scenes" / MESH).write_text(SQUARE.replace("v 1 0 1", "v 1 0 2"))
     assert content() != before
+
+
+def test_files_of_the_study_and_what_was_asked_for_beside_them(tmp_path, monkeypatch):
+    smallest = Plan(Study.load(CONFIG | {"scenes": ["bend_fall"]}, ROOT))
+    monkeypatch.chdir(tmp_path)
+    own = [
+        paths.TABLE.at("results", name="claims"),
+        paths.FIGURE_PICTURE.at("results", name="ladder"),
+        paths.TRAIN.at("results", scene="bend_fall"),
+        paths.PAPER_INPUT.at("results", name="macros.tex"),
+        "results/machine.json",
+        "paper/main.pdf",
+        "paper/supplement.pdf",
+    ]
+    asked_for = [paths.TRAIN.at("results", scene="spring_oop")]
+    others = [
+        paths.TRAIN.at("results", scene="no_such_scene"),
+        paths.RERUNS.at("results", scene="bend_fall", group="bending", method="no-such-method"),
+        paths.TRAIN.at("results/studies/tiny", scene="bend_fall"),
+        "results/logs/fom/spring_oop.log",
+        "results/tables/old.csv",
+        "results/notes.txt",
+    ]
+    for name in (*own, *asked_for, *others):
+        Path(name).parent.mkdir(parents=True, exist_ok=True)
+        Path(name).touch()
+    assert sorted(study_files(smallest, Folders())) == sorted([*own, *asked_for])

@@ -10,7 +10,7 @@ from scipy.stats import binom
 from pdrom.core.store import write_table
 from study.artifact.paths import File
 from study.experiments.frame_times import COLUMNS
-from study.tables.kit.parts import confirmed, in_one_time, in_words, median_interval
+from study.tables.kit.parts import in_one_time, in_words, median_interval
 from study.tables.sensitivity import repetitions
 from study.tables.speedups import frame_times, speedups
 
@@ -31,13 +31,6 @@ def test_interval_is_that_of_the_binomial_distribution():
     share = binom.sf(n // 2, n, np.arange(1, n + 1) / n)
     assert abs(low - (1 + np.searchsorted(share, 0.025))) <= 1.0
     assert abs(high - (1 + np.searchsorted(share, 0.975))) <= 1.0
-
-
-@pytest.mark.parametrize(
-    ("low", "high", "agrees"), [(0.9, 1.01, True), (1.06, 1.1, True), (0.5, 1.0, False)]
-)
-def test_a_control_confirms_what_it_repeats(low, high, agrees):
-    assert confirmed(low, high) == agrees
 
 
 def test_words_show_the_median_and_its_interval():

@@ -66,10 +66,7 @@ def test_every_run_has_its_row_and_outcome(files):
     assert (full.energy_ratio == 1.0).all()
     keys = ["experiment", "scene", "h", "stiffness_ratio", "method", "position_basis", "k", "r"]
     assert not table.duplicated(keys).any()
-
-
-def test_errors_are_those_within_the_horizon(files):
-    table = stability(*files, {"a": 0.016}, 0.1, 2.0)
+    # errors are those within the horizon
     rerun = table[(table.experiment == "rerun") & (table.method == "deim")]
     assert rerun.relative_error.tolist()[0] == 0.05
     assert rerun.relative_error.isna().tolist() == [False, True, True]

@@ -19,31 +19,14 @@ from study.experiments.requested_tolerances import COLUMNS
 from study.tables.accuracy_cost import accuracy_cost, pareto, reference_of, requested_tolerances
 from study.tables.effects_cost import local_share
 from study.tables.kit.reruns import TRAIN, trained
-from study.tables.reconstruction_error import reconstruction_error, singular_values
+from study.tables.reconstruction_error import singular_values
 from study.tables.reduced_reruns import reduced_reruns
 from study.tables.sensitivity import sensitivity
 
-TIMING = [
-    "scene", "group", "method", "position_basis", "k", "r", "iterations", "vertices",
-    "implementation", "ms_per_frame", "inertia_ms", "local_ms", "assembly_ms", "lift_ms",
-    "global_ms", "repeats",
-]  # fmt: skip
-SWEEP = [
-    "scene", "iterations", "window", "frames", "error_converged", "error_scene", "residual",
-]  # fmt: skip
-RERUN = [
-    "scene", "group", "method", "r", "frames", "finite", "blowup_frame", "max_extent",
-    "relative_error",
-]  # fmt: skip
-HYPER = [
-    "scene", "group", "method", "position_basis", "k", "r", "frames", "finite", "blowup_frame",
-    "max_extent", "relative_error",
-]  # fmt: skip
 
-
-def written(path, columns, *rows) -> File:
+def written(path, *rows) -> File:
     """CSV of rows given as mappings; missing cells stay empty."""
-    write_table(pd.DataFrame(list(rows), columns=columns), path)
+    write_table(pd.DataFrame(list(rows)), path)
     return File(str(path), {})
 
 
@@ -72,26 +55,6 @@ def test_singular_values_with_their_share_and_round_off(tmp_path):
     assert table.above_roundoff.tolist() == [True, True, False, False, False]
 
 
-# Reconstruction -----------------------------------------------------------------------------------
-
-
-def test_reconstruction_keeps_order_and_empty_cells(tmp_path):
-    columns = reconstruction_error.column_names
-    row = dict.fromkeys(columns, 1.0) | {"scene": "s", "group": "g", "method": "deim"}
-    empty = row | {"rows_sampled": None, "elements_sampled": None, "relative_error_z": None}
-    parts = [
-        written(tmp_path / "one.csv", columns, row | {"r": 20}, empty | {"r": 30}),
-        written(tmp_path / "two.csv", columns, row | {"r": 6}),
-    ]
-    table = reconstruction_error(parts)
-    assert table.r.tolist() == [20, 30, 6]
-    assert table.rows_sampled.dtype == "Int64"
-    assert table.elements_sampled.isna().tolist() == [False, True, False]
-    write_table(table, tmp_path / "t.csv")
-    cells = (tmp_path / "t.csv").read_text().splitlines()[2].split(",")
-    assert cells[columns.index("rows_sampled")] == cells[columns.index("relative_error_z")] == ""
-
-
 # Sensitivity --------------------------------------------------------------------------------------
 
 
@@ -114,7 +77,7 @@ def sensitivity_files(tmp_path) -> list[File]:
             if key[0] == scene
             for frame, v in enumerate(series)
         ]
-        parts.append(written(tmp_path / f"sensitivity_{scene}.csv", columns, *rows))
+        parts.append(written(tmp_path / f"sensitivity_{scene}.csv", *rows))
     return parts
 
 
@@ -206,7 +169,7 @@ def files(tmp_path) -> Files:
                 }  # fmt: skip
             rows.append(row)
         for name, more in {"deim.csv": {}, "deim_heldout.csv": {"motion": "heldout"}}.items():
-            written(folder / name, [*RERUN, *more], *({**row, **more} for row in rows))
+            written(folder / name, *({**row, **more} for row in rows))
         reruns.append(str(folder / "deim.h5"))
     folder = tmp_path / "subspaces" / "b"
     folder.mkdir(parents=True)
@@ -227,7 +190,7 @@ def files(tmp_path) -> Files:
         for p, k, m in models
     ]  # fmt: skip
     for name, more in {"models.csv": {}, "models_heldout.csv": {"motion": "heldout"}}.items():
-        written(folder / name, [*HYPER, *more], *({**row, **more} for row in rows))
+        written(folder / name, *({**row, **more} for row in rows))
     subspaces = [str(folder / "models.h5")]
 
     def time(scene, implementation="compiled", ms=8.0, **labels):
@@ -240,14 +203,14 @@ def files(tmp_path) -> Files:
     local = {"group": "spring", "method": "deim"}
     timings = [
         written(
-            tmp_path / "timing_a.csv", TIMING, time("a"), time("a", "numpy", 80.0),
+            tmp_path / "timing_a.csv", time("a"), time("a", "numpy", 80.0),
             time("a", "interpreted", 900.0), time("a", ms=4.0, r=6, **local),
             time("a", ms=5.0, r=10, **local), time("a", ms=2.5, method="fom", iterations=2),
             time("a", ms=24.0, method="fom", iterations=40),
             time("a", ms=9.0, method="fom-anderson", iterations=10),
         ),
         written(
-            tmp_path / "timing_b.csv", TIMING, time("b", ms=10.0), time("b", ms=2.0, r=6, **local),
+            tmp_path / "timing_b.csv", time("b", ms=10.0), time("b", ms=2.0, r=6, **local),
             time("b", ms=1.0, group="all", method="full", position_basis="pod", k=8),
             time("b", ms=0.5, group="all", method="ecsw-1e-02", position_basis="pod", k=8),
         ),
@@ -337,13 +300,6 @@ def test_damaged_runs_are_named(files):
 # Accuracy against cost ----------------------------------------------------------------------------
 
 
-def test_pareto_by_hand():
-    assert pareto([0.0, 1.0, 2.0, 1.0], [5.0, 3.0, 1.0, 4.0]) == [True, True, True, False]
-    assert pareto([1.0, 1.0], [2.0, 2.0]) == [True, True]
-    assert pareto([1.0, 1.0], [2.0, 3.0]) == [True, False]
-    assert pareto([], []) == []
-
-
 POINTS = st.lists(st.tuples(st.integers(0, 5), st.integers(0, 5)), min_size=1, max_size=12)
 
 
@@ -358,34 +314,8 @@ def test_pareto_keeps_what_nothing_beats(points):
         assert keep != beaten
 
 
-def no_sweep(folder) -> File:
-    return written(folder / "sweep.csv", SWEEP, {"scene": "absent"})
-
-
-def test_accuracy_cost_holds_full_runs_and_reruns(files, tmp_path):
-    runs, timings = files.reduced(), files.timings
-    table = accuracy_cost(runs, timings, NOT_TIMED, [no_sweep(tmp_path)], [], {"a": 10, "b": 20})
-    points = list(zip(table.scene, table.method, table.ms_per_frame, strict=True))
-    assert points == [
-        ("a", "full", 8.0), ("a", "deim", 4.0),
-        ("b", "full", 10.0), ("b", "deim", 2.0), ("b", "full", 1.0), ("b", "ecsw-1e-02", 0.5),
-    ]  # fmt: skip
-    assert table.position_basis.tolist() == ["full", "full", "full", "full", "pod", "pod"]
-    assert table.iterations.tolist() == [10, 10, 20, 20, 20, 20]
-    assert table.relative_error_within_horizon[[0, 2]].tolist() == [0.0, 0.0]
-    assert table.pareto.tolist() == [True] * 6
-    slow = runs.assign(ms_per_frame=100.0)
-    table = accuracy_cost(slow, timings, NOT_TIMED, [no_sweep(tmp_path)], [], {"a": 1, "b": 1})
-    assert table.pareto.tolist() == [True, False, True, False, False, False]
-    table = accuracy_cost(
-        trained(runs), timings, NOT_TIMED, [no_sweep(tmp_path)], [], {"a": 1, "b": 1}
-    )
-    # nothing is said of a reduction that no held-out motion judged
-    assert table.pareto_heldout.tolist() == [True, False, True, False, False, False]
-
-
 def sweep(folder, **changes) -> File:
-    """Scene a with K = 2, 10 (its own) and 40, and the converged run."""
+    """Scene a with K = 2, 10 (its own) and 40, and the converged run, or with ``changes``."""
     rows = [
         {"iterations": 2, "window": 0, "error_converged": 0.4, "error_scene": 0.3},
         {"iterations": 10, "window": 0, "error_converged": 0.1, "error_scene": 0.0},
@@ -394,16 +324,39 @@ def sweep(folder, **changes) -> File:
         {"error_converged": 0.0, "error_scene": 0.1, "residual": 1e-9},
     ]
     rows = [{"scene": "a", "frames": 2} | row | changes for row in rows]
-    return written(folder / "sweep.csv", SWEEP, *rows)
+    return written(folder / "sweep.csv", *rows)
+
+
+def points(files, runs, *parts) -> pd.DataFrame:
+    """The table accuracy_cost of these runs, with files of other iterations and of models."""
+    sweeps, models = list(parts[:1]), list(parts[1:])
+    return accuracy_cost(runs, files.timings, NOT_TIMED, sweeps, models, {"a": 10, "b": 20})
+
+
+def test_accuracy_cost_holds_full_runs_and_reruns(files, tmp_path):
+    runs, nothing = files.reduced(), sweep(tmp_path, scene="absent")
+    table = points(files, runs, nothing)
+    found = list(zip(table.scene, table.method, table.ms_per_frame, strict=True))
+    assert found == [
+        ("a", "full", 8.0), ("a", "deim", 4.0),
+        ("b", "full", 10.0), ("b", "deim", 2.0), ("b", "full", 1.0), ("b", "ecsw-1e-02", 0.5),
+    ]  # fmt: skip
+    assert table.position_basis.tolist() == ["full", "full", "full", "full", "pod", "pod"]
+    assert table.iterations.tolist() == [10, 10, 20, 20, 20, 20]
+    assert table.relative_error_within_horizon[[0, 2]].tolist() == [0.0, 0.0]
+    assert table.pareto.tolist() == [True] * 6
+    slow = points(files, runs.assign(ms_per_frame=100.0), nothing)
+    assert slow.pareto.tolist() == [True, False, True, False, False, False]
+    # nothing is said of a reduction that no held-out motion judged
+    unseen = points(files, trained(runs), nothing)
+    assert unseen.pareto_heldout.tolist() == [True, False, True, False, False, False]
 
 
 def test_runs_with_other_iterations_have_their_own_reference(files, tmp_path):
-    runs, timings = files.reduced(), files.timings
     model = {"scene": "b", "position_basis": "pod", "k": 8, "method": "ecsw-1e-02"}
     model["error_converged"] = 0.3
-    inside = written(tmp_path / "models.csv", list(model), model)
-    own = {"a": 10, "b": 20}
-    table = accuracy_cost(runs, timings, NOT_TIMED, [sweep(tmp_path)], [inside], own)
+    inside = written(tmp_path / "models.csv", model)
+    table = points(files, files.reduced(), sweep(tmp_path), inside)
     assert table[table.position_basis == "pod"].error_converged.tolist()[1:] == [0.3]
     assert table[table.method == "full"].error_converged.tolist()[:1] == [0.1]
     fom = table[table.method == "fom"]
@@ -430,9 +383,7 @@ def test_runs_with_other_iterations_have_their_own_reference(files, tmp_path):
 
 
 def test_without_a_converged_run_there_is_no_point_against_it(files, tmp_path):
-    runs, timings = files.reduced(), files.timings
-    sweeps = [sweep(tmp_path, error_converged=None)]
-    table = accuracy_cost(runs, timings, NOT_TIMED, sweeps, [], {"a": 10, "b": 20})
+    table = points(files, files.reduced(), sweep(tmp_path, error_converged=None))
     assert "fom" not in set(table.method)
     assert (table.method == "fewer-iterations").sum() == 1
 
@@ -446,8 +397,8 @@ def test_local_share_counts_assembly_with_the_local_step(tmp_path, files):
     assert table.implementation.tolist() == ["interpreted", "numpy", "compiled", "compiled"]
     assert table.local_share.tolist() == pytest.approx([0.6] * 4)
     row = {"scene": "c", "implementation": "numpy", "vertices": 4, "local_ms": 2.0,
-           "assembly_ms": 1.0, "global_ms": 1.0}  # fmt: skip
-    path = written(tmp_path / "c.csv", TIMING, row)
+           "assembly_ms": 1.0, "global_ms": 1.0, "method": None, "ms_per_frame": 4.0}  # fmt: skip
+    path = written(tmp_path / "c.csv", row)
     assert local_share([path], NOT_TIMED).local_share.tolist() == [0.75]
 
 

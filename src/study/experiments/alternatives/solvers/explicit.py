@@ -80,30 +80,20 @@ def continuous(
     substeps : of a frame, to begin with; an unstable run is halved like an inaccurate one
     limit : on the substeps; the last run is returned, whatever its error
     """
-    before, last = _positions(scene, frames, substeps), np.inf
+    start, before, last = scene.initial_state(), None, np.inf
     while True:
-        substeps *= 2
-        after = _positions(scene, frames, substeps)
-        change = _change(before, after)
-        error = _remaining(change, last)
-        if error <= tolerance or 2 * substeps > limit:
-            return Continuous(after, error, substeps)
-        before, last = after, change
-
-
-def _remaining(change: float, last: float) -> float:
-    """Richardson estimate of the remaining error from two halvings.
-
-    A third of the last ``change`` where changes fall to a quarter, as with a method of second
-    order; all of it where they do not fall to a half, because the motion is not smooth or not yet
-    resolved.
-    """
-    ratio = last / change if change > 0.0 and np.isfinite(last) else 1.0
-    return change / min(max(ratio - 1.0, 1.0), 3.0)
-
-
-def _positions(scene: Scene, frames: int, substeps: int) -> np.ndarray:
-    return followed(Explicit(scene, substeps), scene.initial_state(), frames)
+        after = followed(Explicit(scene, substeps), start, frames)
+        if before is not None:
+            change = _change(before, after)
+            # Richardson's estimate of what remains: a third of the last change where changes fall
+            # to a quarter, as with a method of second order; all of it where they do not fall to a
+            # half, because the motion is not smooth or not yet resolved
+            ratio = last / change if change > 0.0 and np.isfinite(last) else 1.0
+            error = change / min(max(ratio - 1.0, 1.0), 3.0)
+            if error <= tolerance or 2 * substeps > limit:
+                return Continuous(after, error, substeps)
+            last = change
+        before, substeps = after, 2 * substeps
 
 
 def _change(before: np.ndarray, after: np.ndarray) -> float:

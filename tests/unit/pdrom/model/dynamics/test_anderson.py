@@ -8,11 +8,10 @@ from pdrom.model.dynamics.acceleration import Anderson
 from pdrom.model.runs import simulate, trajectory
 
 
-def affine_map(rng, n=12, distinct=4):
-    """(A, b) of y -> A y + b with a symmetric contraction that has few distinct eigenvalues."""
-    q, _ = np.linalg.qr(rng.standard_normal((n, n)))
-    values = np.resize(np.linspace(0.3, 0.95, distinct), n)
-    return q * values @ q.T, rng.standard_normal((n, 3))
+def affine_map(rng):
+    """(A, b) of y -> A y + b with a symmetric contraction."""
+    q, _ = np.linalg.qr(rng.standard_normal((12, 12)))
+    return q * np.linspace(0.3, 0.95, 12) @ q.T, rng.standard_normal((12, 3))
 
 
 def iterate(matrix, shift, window, iterations):
@@ -28,7 +27,7 @@ def iterate(matrix, shift, window, iterations):
 def test_residual_is_that_of_gmres(rng):
     """With an unlimited window step m + 1 is the image of the m-th iterate of GMRES (here by dense
     least squares over the Krylov space)."""
-    matrix, shift = affine_map(rng, distinct=12)
+    matrix, shift = affine_map(rng)
     shift[:, 1:] = shift[:, :1]
     steps, operator = 5, np.eye(12) - matrix
     powers = [np.linalg.matrix_power(operator, i) @ shift[:, 0] for i in range(steps)]

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy import sparse
 
 from builders import make_scene
-from pdrom.core.errors import ConfigurationError, SolverError
+from pdrom.core.errors import SolverError
 from pdrom.model.dynamics.solvers import SOLVERS, panels
 from pdrom.model.dynamics.sweeps import WIDTHS, sweep
 from pdrom.model.dynamics.system import GlobalSystem
@@ -102,11 +102,6 @@ def test_numbers_that_are_none_are_refused():
     masses[4] = np.inf
     with pytest.raises(SolverError, match="global system"):
         GlobalSystem(masses, 0.016, SCENE.groups)
-
-
-def test_unknown_solver_lists_the_known_ones():
-    with pytest.raises(ConfigurationError, match=r"splu, splu-columns"):
-        SCENE.system_with("lu").eliminate(np.array([0]))
 
 
 @pytest.mark.parametrize("name", NAMES)

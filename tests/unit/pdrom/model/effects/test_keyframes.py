@@ -43,14 +43,6 @@ def test_every_key_is_met(interpolation, start):
         assert run[start + 11, held] == pytest.approx(halfway, abs=1e-12)
 
 
-def test_linear_is_a_translation_at_constant_speed():
-    """Same bits as the effect that does nothing else, up to rounding."""
-    keys = [{"at": 8, "offset": [0.0, 0.4, 0.1]}]
-    other = {"effect": "translate", "select": "top", "offset": [0.0, 0.4, 0.1], "over": 8}
-    expected = trajectory(make_scene(SPRING, other, frames=20))
-    assert trajectory(handle(keys=keys)) == pytest.approx(expected, abs=1e-10)
-
-
 def test_smooth_has_no_kink_and_no_overshoot():
     keys = [{"at": 10, "offset": [0, 1, 0]}, {"at": 20, "offset": [0, 1, 0]}]
     scene = handle(keys=keys, interpolation="smooth")

@@ -1,7 +1,5 @@
 """The reduced local step against the dense formula, on an invented group and on the real ones."""
 
-import itertools
-
 import numpy as np
 import pytest
 from scipy import sparse
@@ -94,18 +92,6 @@ def test_adds_the_lifted_reconstruction(spec):
         group.projections = projections
         scale = np.abs(group.full(wanted)).max()
         np.testing.assert_allclose(added(step), group.full(wanted), atol=1e-11 * scale)
-
-
-@pytest.mark.parametrize("preset", [name for name in PRESETS if name != "published"])
-def test_projection_in_the_space_gives_the_full_right_hand_side(preset):
-    _, reduction = reduction_of(PRESETS[preset])
-    c = np.random.default_rng(6).standard_normal(R)
-    inside = (reduction.basis.mean + reduction.v @ c).reshape(ROWS, 3)
-    group = InventedGroup(inside)
-    scale = np.abs(group.full(inside)).max() * reduction.gain
-    np.testing.assert_allclose(
-        added(ReducedLocalStep(group, reduction)), group.full(inside), atol=1e-12 * scale
-    )
 
 
 def test_evaluates_sampled_elements_only(spec):
@@ -206,10 +192,3 @@ def test_real_groups_reproduce_their_full_local_step(group_scene, preset):
         step.accumulate(q, reduced)
         tolerance = 1e-11 * reduction.gain * np.abs(full).max()
         np.testing.assert_allclose(reduced, full, atol=tolerance)
-
-
-def test_variants_cover_shared_and_separate_coefficients():
-    shared = {name: reduction_of(s)[1].blocks[0].axis is None for name, s in VARIANTS.items()}
-    assert set(shared.values()) == {True, False}
-    for (one, s), (two, t) in itertools.combinations(VARIANTS.items(), 2):
-        assert s != t, (one, two)

@@ -76,14 +76,6 @@ def span_part(basis: Basis, v: np.ndarray, p: np.ndarray, per_axis: bool) -> np.
     return (best + basis.mean[:, None]).T.reshape(p.shape)
 
 
-def test_the_presets_are_those_of_the_study():
-    assert set(PRESETS) == {
-        "pod", "deim", "qdeim", "deim-joint", "published", "block-deim", "block-qdeim", "gappy",
-        "bounded", "s-opt", "block-s-opt",
-    }  # fmt: skip
-    assert len(EVERY) > 50
-
-
 @given(seed=SEEDS, name=st.sampled_from(list(PROJECTIONS)))
 def test_what_is_in_the_span_is_reproduced(name, seed):
     p, reduction = made(PROJECTIONS[name], seed)
@@ -154,29 +146,6 @@ def test_square_methods_interpolate_the_sampled_entries(preset):
     sampled = np.concatenate([b.entries for b in reduction.blocks])
     assert len(sampled) == (18 if spec.rows == "joint" else 6)
     np.testing.assert_allclose(result[:, sampled], flat[:, sampled], atol=1e-11 * reduction.gain)
-
-
-def test_pod_is_the_best_approximation_of_all_shared_methods():
-    p, mass = data(7)
-    errors = {}
-    for name, spec in PRESETS.items():
-        if spec.centring == "affine":
-            errors[name] = np.linalg.norm(p - reduction_of(p, mass, spec, 4).reconstruct(p))
-    pod = errors.pop("pod")
-    basis = compute_basis(p, mass, 0.0, P, PRESETS["pod"])
-    assert pod == pytest.approx(np.linalg.norm(basis.singular_values[4:]), rel=1e-12)
-    assert len(errors) == 8
-    assert all(error > pod for error in errors.values())
-
-
-def test_whole_elements_have_a_smaller_gain_than_single_entries():
-    gains = {"deim": [], "block-deim": [], "qdeim": [], "block-qdeim": []}
-    for seed in range(20):
-        for name, values in gains.items():
-            values.append(made(PRESETS[name], seed, 6)[1].gain)
-    mean = {name: np.mean(values) for name, values in gains.items()}
-    assert mean["block-deim"] < mean["deim"]
-    assert mean["block-qdeim"] < mean["qdeim"]
 
 
 @pytest.mark.parametrize("preset", PRESETS)
@@ -361,14 +330,6 @@ def test_whole_elements_have_all_their_entries():
     assert sampling.elements.tolist() == [3, 1]
 
 
-@given(st.integers(1, 3), st.lists(st.integers(0, 19), min_size=1, unique=True))
-def test_element_entries_lead_back_to_their_elements(rows, elements):
-    sampling = Sampling.of_elements(np.array(elements), rows, 20)
-    assert sampling.elements.tolist() == elements
-    assert len(sampling.entries) == 3 * rows * len(elements)
-    assert (np.unique(sampling.entries // (3 * rows)) == sorted(elements)).all()
-
-
 @pytest.mark.parametrize("entries", [[], [-1], [36], [0, 36]])
 def test_entries_out_of_range_are_named(entries):
     with pytest.raises(SamplingError, match="allowed are 0 to 35"):
@@ -391,19 +352,14 @@ def full_rank(rows: int, columns: int, seed: int) -> np.ndarray:
     return u * rng.uniform(0.1, 1.0, columns) @ w.T
 
 
-@given(st.integers(1, 12), SEEDS)
-def test_square_is_the_inverse(r, seed):
-    a = full_rank(r, r, seed)
-    before = a.copy()
-    operator = solution_operator(a, "square", 1e-8)
-    np.testing.assert_array_equal(a, before)
-    np.testing.assert_allclose(operator, np.linalg.inv(a), atol=1e-11)
-
-
 @given(st.integers(1, 12), st.integers(0, 20), SEEDS)
-def test_qr_is_the_pseudo_inverse(r, extra, seed):
+def test_square_and_qr_are_the_pseudo_inverse(r, extra, seed):
     a = full_rank(r + extra, r, seed)
-    np.testing.assert_allclose(solution_operator(a, "qr", 1e-8), np.linalg.pinv(a), atol=1e-11)
+    before = a.copy()
+    for solve in ("square", "qr") if extra == 0 else ("qr",):
+        operator = solution_operator(a, solve, 1e-8)
+        np.testing.assert_allclose(operator, np.linalg.pinv(a), atol=1e-11)
+        np.testing.assert_array_equal(a, before)
 
 
 @given(st.integers(1, 12), st.integers(0, 20), SEEDS)

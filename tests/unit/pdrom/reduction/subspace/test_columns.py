@@ -56,12 +56,6 @@ def test_atoms_partition_what_is_held(boundaries):
             assert one is other or not all(together)
 
 
-def test_atoms_of_overlapping_pins_by_hand():
-    found = atoms([Units({0, 1, 2, 3}), Units({2, 3, 4}), Units({9}, {8})], 10)
-    assert [a.tolist() for a in found] == [[0, 1], [2, 3], [4], [8], [9]]
-    assert atoms([], 10) == []
-
-
 @given(n=st.integers(1, 12), m=st.integers(1, 12), rank=st.integers(0, 12), seed=st.integers(0, 99))
 def test_orthonormal_keeps_the_span(n, m, rank, seed):
     rng = np.random.default_rng(seed)

@@ -199,14 +199,6 @@ def test_a_group_at_rest_keeps_its_stiffness(pulled):
         assert kept == pytest.approx(1.0, abs=0.2)
 
 
-def test_the_choice_is_repeatable(pulled):
-    scene, _, columns = pulled
-    training = training_run(scene, columns, [1, 2, 3])
-    one, two = (ecsw_elements(scene.groups[0], columns, training, [1e-2])[0] for _ in range(2))
-    np.testing.assert_array_equal(one[0], two[0])
-    np.testing.assert_array_equal(one[1], two[1])
-
-
 FRAME = 5
 
 

@@ -8,7 +8,6 @@ from test_subspace_run import GRAVITY, SPRING, hrpd_of, run_model, whole_space
 
 from builders import GROUPS, LEFT, TOP, make_scene, random_rotation
 from pdrom.core.errors import SamplingError
-from pdrom.model.constraints.lanes import LANES
 from pdrom.model.runs import trajectory
 from pdrom.reduction.basis import compute_basis
 from pdrom.reduction.method import MethodSpec
@@ -158,36 +157,6 @@ def test_hrpd_is_exact_for_the_rest_shape_in_every_orientation(group_scene, rng)
     one, two = right_hand_sides(scene, columns, found, y, y)
     assert np.abs(two).max() > 0.0
     np.testing.assert_allclose(one, two, atol=1e-9 * np.abs(two).max())
-
-
-def test_arrays_of_a_step_have_the_size_of_the_sample():
-    """Meshes of two sizes: nothing that the step holds grows."""
-    sizes = []
-    for rows in (10, 20):
-        scene = make_scene(SPRING, TOP, mesh={"kind": "cloth", "rows": rows, "columns": 10})
-        run = trajectory(scene)
-        columns = make_columns(scene, run[1:], "skinning", 4)
-        found = hrpd(
-            scene.groups[0],
-            columns,
-            sampled_space(scene.groups[0], scene.mesh.points, HrpdSpec(dimension=6, samples=8)),
-        )
-        step = InterpolatedLocalStep(scene.groups[0], columns, found)
-        held = [v for v in vars(step).values() if isinstance(v, np.ndarray)]
-        held += [v for v in vars(step.group).values() if isinstance(v, np.ndarray)]
-        held += [v for v in vars(found).values() if isinstance(v, np.ndarray)]
-        assert len(held) >= 9
-        sizes.append(sum(a.size for a in held))
-        # blocks are filled up
-        numbers = 5
-        assert max(a.shape[0] for a in held) <= max(2 * 8 * group_vertices(scene), numbers * LANES)
-    # the sampled edges share another number of vertices, nothing else differs
-    assert abs(sizes[1] - sizes[0]) <= 8 * columns.B.shape[1]
-
-
-def group_vertices(scene) -> int:
-    """Vertices of one element."""
-    return int(np.diff(scene.groups[0].S.indptr).max())
 
 
 def test_projections_that_are_round_off_need_no_element():

@@ -28,7 +28,10 @@ def test_without_tolerance_it_is_the_method_of_lawson_and_hanson(m, e, seed, sca
     rng = np.random.default_rng(seed)
     g = 10.0**scale * rng.standard_normal((m, e)) * 10.0 ** rng.uniform(-2, 2, e)
     b = rng.standard_normal(m)
+    before = g.copy(), b.copy()
     support, values = stopped(g, b, 0.0)
+    np.testing.assert_array_equal(g, before[0])
+    np.testing.assert_array_equal(b, before[1])
     x = dense(support, values, e)
     best, norm = nnls(g, b)
     assert (values > 0.0).all()
@@ -88,14 +91,6 @@ def test_support_is_bounded(rng):
     assert 7 < len(stopped(g, b, 0.0)[0]) <= 40
 
 
-def test_exact_sparse_combination_is_found(rng):
-    g = rng.standard_normal((50, 20))
-    truth = dense([3, 7, 15], [2.0, 0.5, 1.0], 20)
-    support, values = stopped(g, g @ truth, 1e-9)
-    np.testing.assert_allclose(dense(support, values, 20), truth, atol=1e-8)
-    assert support.tolist() == [3, 7, 15]
-
-
 @pytest.mark.parametrize(
     ("g", "b", "expected"),
     [
@@ -117,11 +112,3 @@ def test_repeated_columns_end(rng):
     support, values = stopped(g, 3.0 * column + 1e-3, 0.0)
     assert len(support) == 1
     assert g[:, support] @ values == pytest.approx(3.0 * column, rel=0.1)
-
-
-def test_inputs_are_kept(rng):
-    g, b = rng.standard_normal((9, 7)), rng.standard_normal(9)
-    before = g.copy(), b.copy()
-    stopped(g, b, 0.0)
-    np.testing.assert_array_equal(g, before[0])
-    np.testing.assert_array_equal(b, before[1])

@@ -14,7 +14,11 @@ from pdrom.model.runs import trajectory
 from pdrom.reduction.subspace.columns import atoms, build_columns
 from pdrom.reduction.subspace.fused import FusedStepper
 from pdrom.reduction.subspace.hrpd import HrpdSpec, hrpd, sampled_space
-from pdrom.reduction.subspace.interpolation import SubspaceLocalStep
+from pdrom.reduction.subspace.interpolation import (
+    InterpolatedLocalStep,
+    Interpolation,
+    SubspaceLocalStep,
+)
 from pdrom.reduction.subspace.model import (
     Samples,
     SubspaceModel,
@@ -120,16 +124,6 @@ def test_pins_and_handles_are_met_exactly(name, kind, made):
     assert checked >= scene.config.frames
 
 
-def test_snapshot_basis_error_falls_with_its_size():
-    scene = SCENES["handles"]()
-    reference = trajectory(scene)
-    errors = []
-    for k in (1, 4, 12):
-        model = SubspaceModel("pod", make_columns(scene, reference[1:], "pod", k))
-        errors.append(np.linalg.norm(run_model(scene, model) - reference))
-    assert errors[2] < 0.5 * errors[1] < 0.5 * errors[0]
-
-
 def test_released_pins_move_again():
     scene = make_scene(
         SPRING, GRAVITY, TOP, {"effect": "pins", "select": "bottom", "until": 3}, frames=8
@@ -183,22 +177,6 @@ def test_restriction_leaves_the_group_alone(group_scene, rng):
     np.testing.assert_array_equal(group.weights, weights)
 
 
-def test_step_of_all_elements_is_the_projected_full_step(group_scene, rng):
-    scene, group = group_scene, group_scene.groups[0]
-    columns = whole_space(scene)
-    step = SubspaceLocalStep(group, columns)
-    q = scene.mesh.points + 0.05 * rng.standard_normal(scene.mesh.points.shape)
-    z = coordinates(columns, scene.masses, q)
-    group.begin_frame(q)
-    step.begin_frame(z)
-    full, reduced = np.zeros_like(q), np.ones_like(z)
-    energy = group.accumulate(q, full)
-    assert step.accumulate(z, reduced) == pytest.approx(energy, rel=1e-9)
-    np.testing.assert_allclose(reduced, 1.0 + columns.B.T @ full, rtol=1e-7, atol=1e-4)
-    dense = columns.B.T @ (group.system_matrix() @ columns.B)
-    np.testing.assert_allclose(step.matrix, dense, atol=1e-10 * np.abs(dense).max())
-
-
 @pytest.mark.parametrize("made", [ecsw_of, hrpd_of])
 @pytest.mark.parametrize("name", ["handles", "bending", "bar", "poke", "damped"])
 def test_a_step_reads_nothing_of_the_mesh(name, made):
@@ -232,11 +210,19 @@ def test_arrays_of_a_step_have_the_size_of_the_sample():
         scene = make_scene(SPRING, TOP, mesh={"kind": "cloth", "rows": rows, "columns": 8})
         run = trajectory(scene)
         columns = make_columns(scene, run[1:], "skinning", 4)
-        step = SubspaceLocalStep(scene.groups[0], columns, np.array([3, 11]), np.ones(2))
-        held = [v for v in vars(step).values() if isinstance(v, np.ndarray)]
-        held += [v for v in vars(step.group).values() if isinstance(v, np.ndarray)]
-        sizes.append((step.group.S.shape, sorted(a.shape for a in held)))
-        assert len(held) >= 4
+        group, few, k = scene.groups[0], np.array([3, 11]), columns.B.shape[1]
+        fit = Interpolation(
+            few, np.ones((1, 2)), np.ones((k, 1)), np.zeros((k, 3)), np.eye(k), gain=1.0
+        )
+        sizes.append([])
+        for step in (
+            SubspaceLocalStep(group, columns, few, np.ones(2)),
+            InterpolatedLocalStep(group, columns, fit),
+        ):
+            held = [v for v in vars(step).values() if isinstance(v, np.ndarray)]
+            held += [v for v in vars(step.group).values() if isinstance(v, np.ndarray)]
+            sizes[-1].append((step.group.S.shape, sorted(a.shape for a in held)))
+            assert len(held) >= 4
     assert sizes[0] == sizes[1]
 
 
@@ -304,6 +290,7 @@ def test_models_survive_a_file(tmp_path):
             for key, value in vars(own).items():
                 np.testing.assert_array_equal(getattr(model.samples[name], key), value)
         np.testing.assert_array_equal(model.columns.B, columns.B)
-        # round-off depends on the order in which the memory holds an array
+        # round-off of an interpolation depends on the order in which memory holds its arrays
         one, two = run_model(scene, model), run_model(scene, SubspaceModel("pod", columns, chosen))
-        np.testing.assert_allclose(one, two, atol=1e-13)
+        allowed = 1e-13 if labels["method"] == "hrpd" else 0.0
+        np.testing.assert_allclose(one, two, rtol=0.0, atol=allowed)

@@ -1,18 +1,26 @@
-"""All methods: same implicit step as projective dynamics, momentum, order, hard cases."""
+"""All methods: same implicit step as projective dynamics, momentum, order, hard cases.
+
+Then the motion in continuous time, with the estimate of its own error, and the coarse level, which
+ends at the same step in fewer iterations.
+"""
 
 import numpy as np
 import pytest
 
-from builders import GROUPS, from_python, make_scene
+from builders import GRAVITY, GROUPS, LEFT, from_python, make_scene
 from pdrom.core.errors import ConfigurationError, SceneError
 from pdrom.model.compiled.rows import as_vertices, flat
 from pdrom.model.dynamics.frames import inertia_energy
 from pdrom.model.dynamics.stepper import State
+from pdrom.reduction.subspace.model import Samples, SubspaceModel, make_columns
+from study.experiments.alternatives.solvers.explicit import continuous
 from study.experiments.alternatives.solvers.substeps import METHODS, alternative
-from study.experiments.kit.converged import ConvergedStepper
+from study.experiments.alternatives.solvers.two_level import TwoLevel
+from study.experiments.kit.converged import ConvergedStepper, converged_run
+from study.experiments.kit.scenes import followed
 
 SHEET = {"kind": "cloth", "rows": 6, "columns": 5, "plane": "xz"}
-HELD = ({"effect": "gravity"}, {"effect": "pins", "select": "left"})
+HELD = (GRAVITY, LEFT)
 CLOSED_FORM = ("spring", "strain", "tetrahedron_strain", "deformation_gradient")
 # What minimises the objective of a frame, and iterations that suffice on these meshes.
 IMPLICIT = {
@@ -52,11 +60,8 @@ def test_compliant_constraints_come_near_the_implicit_step(group):
     """Their fixed point is the implicit step up to turns of the constraints within a frame."""
     scene = small(group, *HELD)
     loops = [ConvergedStepper(scene, scene.system, 1e-12, 4000), alternative("xpbd", scene, 1, 400)]
-    states = [scene.initial_state()] * 2
-    for frame in range(6):
-        states = [loop.step(s, frame)[0] for loop, s in zip(loops, states, strict=True)]
-    moved = np.linalg.norm(states[0].positions - scene.mesh.points)
-    assert np.linalg.norm(states[1].positions - states[0].positions) < 0.02 * moved
+    best, own = (followed(loop, scene.initial_state(), 6) for loop in loops)
+    assert np.linalg.norm(own[-1] - best[-1]) < 0.02 * np.linalg.norm(best[-1] - best[0])
 
 
 def test_what_compliant_constraints_miss_vanishes_with_the_step():
@@ -66,10 +71,9 @@ def test_what_compliant_constraints_miss_vanishes_with_the_step():
         scene = small("spring", *HELD, time_step=step)
         start = State(1.1 * scene.mesh.points, np.zeros_like(scene.mesh.points))
         best = ConvergedStepper(scene, scene.system, 1e-13, 4000)
-        expected, _ = best.step(start, 0)
-        after, _ = alternative("xpbd", scene, 1, 500).step(start, 0)
-        moved = np.linalg.norm(expected.positions - start.positions)
-        misses.append(np.linalg.norm(after.positions - expected.positions) / moved)
+        expected = followed(best, start, 1)[-1]
+        after = followed(alternative("xpbd", scene, 1, 500), start, 1)[-1]
+        misses.append(np.linalg.norm(after - expected) / np.linalg.norm(expected - start.positions))
     assert misses[0] > 2.0 * misses[1] > 4.0 * misses[2]
 
 
@@ -102,7 +106,7 @@ def test_objective_falls_with_every_iteration(method, rng):
 @pytest.mark.parametrize("method", sorted(set(METHODS) - {"vertex-descent"}))
 @pytest.mark.parametrize("group", ["spring", "strain", "deformation_gradient"])
 def test_a_free_body_gains_the_momentum_of_gravity_only(group, method, rng):
-    scene = small(group, {"effect": "gravity"}, weight=1e4)
+    scene = small(group, GRAVITY, weight=1e4)
     start = crumpled(scene, rng)
     loop, state = alternative(method, scene, 4, 3), start
     for frame in range(3):
@@ -129,17 +133,13 @@ def test_explicit_steps_keep_angular_momentum_and_energy(rng):
     first = angular(state), energy(state)
     for frame in range(40):
         state, _ = loop.step(state, frame)
-    np.testing.assert_allclose(
-        angular(state), first[0], rtol=0.0, atol=1e-9 * np.abs(first[0]).max()
-    )
+    assert angular(state) == pytest.approx(first[0], abs=1e-9 * np.abs(first[0]).max())
     assert energy(state) == pytest.approx(first[1], rel=1e-2)
 
 
-def last(method, scene, substeps, iterations=1, frames=5):
-    loop, state = alternative(method, scene, substeps, iterations), scene.initial_state()
-    for frame in range(frames):
-        state, _ = loop.step(state, frame)
-    return state.positions
+def last(method, scene, substeps, iterations=1):
+    loop = alternative(method, scene, substeps, iterations)
+    return followed(loop, scene.initial_state(), 5)[-1]
 
 
 def test_explicit_steps_are_of_second_order():
@@ -170,7 +170,7 @@ def test_two_runs_are_the_same_bit_for_bit(method, rng):
 @pytest.mark.parametrize("method", METHODS)
 def test_handles_and_floor_act_as_in_the_step_loop(method):
     handle = {"effect": "translate", "select": "left", "offset": [0.0, 0.3, 0.0], "over": 3}
-    scene = small("spring", handle, {"effect": "gravity"}, {"effect": "floor", "height": 2.0})
+    scene = small("spring", handle, GRAVITY, {"effect": "floor", "height": 2.0})
     loop, state = alternative(method, scene, 8, 2), scene.initial_state()
     held = scene.boundaries[0].vertices
     for frame in range(3):
@@ -209,6 +209,9 @@ def test_what_a_method_does_not_take_is_refused_by_name():
     windy = small("spring", {"effect": "drag", "coefficient": 0.1})
     with pytest.raises(SceneError, match="'drag': method 'explicit' takes no force but gravity"):
         alternative("explicit", windy, 1)
+    both = make_scene(*HELD, *({"effect": name, "weight": 1e5} for name in ("spring", "strain")))
+    with pytest.raises(SceneError, match="'two-level' takes one group"):
+        TwoLevel(both, 1, 1, model_of(hanging("spring"), 2))
     with pytest.raises(ConfigurationError, match=r"unknown method 'newtn'.*newton"):
         alternative("newtn", windy, 1)
 
@@ -219,3 +222,95 @@ def test_compiled_acceleration_is_that_of_the_step_loop(rng):
     expected, _ = scene.stepper().step(start, 0)
     after, _ = alternative("anderson", scene, 1, 15).step(start, 0)
     np.testing.assert_allclose(after.positions, expected.positions, rtol=0.0, atol=1e-10)
+
+
+def test_estimate_is_the_error():
+    scene = small("spring", *HELD, weight=1e5)
+    fine = continuous(scene, 10, 1e-12, 640, 1300)
+    found = continuous(scene, 10, 1e-5, 4, 1000)
+    moved = np.linalg.norm(found.positions - found.positions[0])
+    error = np.linalg.norm(found.positions - fine.positions) / moved
+    assert found.error <= 1e-5
+    assert found.error == pytest.approx(error, rel=0.2)
+    assert found.positions.shape == (11, 30, 3)
+
+
+def test_unstable_steps_are_halved():
+    """The first steps leave the floating-point numbers; what is returned is accurate."""
+    found = continuous(small("spring", *HELD, weight=1e9), 4, 1e-3, 2, 10_000)
+    assert found.error <= 1e-3
+    assert found.substeps > 100
+
+
+def test_limit_ends_the_search_and_is_reported():
+    found = continuous(small("spring", *HELD, weight=1e5), 4, 1e-15, 10, 40)
+    assert found.substeps == 40
+    assert found.error > 1e-15
+    assert continuous(small("spring", *HELD, weight=1e14), 4, 1e-3, 2, 8).error > 1e-3
+
+
+SHEET_8 = {"kind": "cloth", "rows": 8, "columns": 7, "plane": "xz"}
+
+
+def hanging(group: str):
+    mesh = SHEET_8 if GROUPS[group]["kind"] == "cloth" else GROUPS[group]
+    return make_scene(*HELD, {"effect": group, "weight": 1e5}, mesh=mesh, frames=8)
+
+
+def model_of(scene, modes: int, elements: np.ndarray | None = None) -> SubspaceModel:
+    """Columns of the scene's own converged run; elements count for as many as are left out."""
+    group = scene.groups[0]
+    chosen = np.arange(group.elements) if elements is None else elements
+    factors = np.full(len(chosen), group.elements / len(chosen))
+    run = converged_run(scene, 1e-10, 4000)
+    columns = make_columns(scene, run[1:], "pod", k=modes)
+    return SubspaceModel("pod", columns, {group.name: Samples(chosen, factors)})
+
+
+@pytest.mark.parametrize("group", ["spring", "strain", "tetrahedron_strain"])
+@pytest.mark.parametrize("every", [1, 7])
+def test_whatever_is_sampled_many_iterations_end_at_the_implicit_step(group, every, rng):
+    scene = hanging(group)
+    start = crumpled(scene, rng)
+    model = model_of(scene, 3, np.arange(0, scene.groups[0].elements, every))
+    best = ConvergedStepper(scene, scene.system, 1e-12, 4000)
+    expected, _ = best.step(start, 0)
+    after, _ = TwoLevel(scene, 1, 400, model).step(start, 0)
+    np.testing.assert_allclose(after.positions, expected.positions, rtol=0.0, atol=1e-8)
+
+
+def test_few_iterations_do_what_takes_many_without_the_coarse_level():
+    scene = hanging("spring")
+    model = model_of(scene, 6)
+    expected = converged_run(scene, 1e-10, 4000)[-1]
+    misses = []
+    for loop in (TwoLevel(scene, 1, 4, model), alternative("anderson", scene, 1, 4)):
+        reached = followed(loop, scene.initial_state(), scene.config.frames)[-1]
+        misses.append(np.linalg.norm(reached - expected))
+    assert misses[0] < 0.5 * misses[1]
+
+
+def objective_of(scene, state, y: np.ndarray) -> float:
+    """1/(2h^2) |M^1/2 (y - s)|^2 + W(y), J, of the frame that begins at ``state``."""
+    h = scene.config.time_step
+    s = state.positions + h * state.velocities + h**2 * np.array([0.0, -9.81, 0.0])
+    s[scene.mesh.points[:, 0] == scene.mesh.points[:, 0].min()] = 0.0
+    y = y.copy()
+    moved = np.where(s == 0.0, 0.0, y - s)
+    inertia = 0.5 * float(np.sum(scene.masses[:, None] * moved**2)) / h**2
+    return inertia + scene.groups[0].accumulate(y, np.zeros_like(y))
+
+
+@pytest.mark.parametrize("iterations", [2, 3, 5, 9])
+def test_a_subspace_of_noise_never_raises_the_objective(iterations, rng):
+    """Its corrections lead astray from the first image on: the frame does without them."""
+    scene = hanging("spring")
+    shape = scene.mesh.points.shape
+    noise = scene.mesh.points + 0.3 * rng.standard_normal((4, *shape))
+    chosen = np.arange(0, scene.groups[0].elements, 9)
+    samples = {"spring": Samples(chosen, np.full(len(chosen), 0.01))}
+    model = SubspaceModel("pod", make_columns(scene, noise, "pod", k=4), samples)
+    state = scene.initial_state(0.1 * rng.standard_normal(shape))
+    once = alternative("projective", scene, 1, 1).step(state, 0)[0]
+    after = TwoLevel(scene, 1, iterations, model).step(state, 0)[0]
+    assert objective_of(scene, state, after.positions) <= objective_of(scene, state, once.positions)

@@ -1,14 +1,12 @@
 """Verdicts under other rules: each variation by hand."""
 
 import pandas as pd
-import pytest
 
-from machines.same_results import without_times
 from pdrom.core.yamlfile import validate
 from places import ROOT
 from study.tables import declared
-from study.tables.claims.claims import VARIED, claims_sensitivity, sensitivity_rows
-from study.tables.claims.rules import PARTS, ClaimRule, load_claims
+from study.tables.claims.claims import sensitivity_rows
+from study.tables.claims.rules import PARTS, ClaimRule, TestRule, load_claims
 
 ERRORS = pd.DataFrame(
     {
@@ -20,9 +18,6 @@ ERRORS = pd.DataFrame(
         "relative_error": [0.9, 0.3, 0.8, 0.4],
         "gain": 1.0,
     }
-)
-WORDS = dict.fromkeys(
-    ("text", "source", "paper", "section", "shown", "qualifiers", "figure_or_table"), "w"
 )
 
 
@@ -36,9 +31,8 @@ def made(**rule) -> pd.DataFrame:
 
 def rows_of(test: dict, tables: dict[str, pd.DataFrame]) -> pd.DataFrame:
     """Variations of a claim with this test, published and beyond, and these tables."""
-    change = {"date": "2026-01-31", "after_data": False, "reason": "First version."}
-    content = {**WORDS, "published": [test], "beyond": [test], "changes": [change]}
-    rules = {"C1": validate(ClaimRule, content, "test")}
+    tests = (validate(TestRule, test, "test"),)
+    rules = {"C1": ClaimRule.model_construct(published=tests, beyond=tests)}
     rows = sensitivity_rows(rules, tables)
     assert set(rows.part) == set(PARTS)
     return rows[rows.part == "published"]
@@ -92,14 +86,3 @@ def test_splits_vary_where_a_test_names_one():
 def test_a_claim_without_data_has_no_variations():
     empty = {name: table.checked(pd.DataFrame()) for name, table in declared().items()}
     assert sensitivity_rows(load_claims(ROOT / "config" / "claims.yaml"), empty).empty
-
-
-@pytest.mark.parametrize(("claim", "timed"), [("C2", False), ("C9", True)])
-def test_a_clock_has_its_say_in_the_verdicts_that_it_decides(claim, timed):
-    row = {"claim": claim, "part": "published", "varied": VARIED[0], "variation": "x 2"}
-    one, other = (
-        without_times(claims_sensitivity, pd.DataFrame([row | {"verdict": v}]).reindex(
-            columns=claims_sensitivity.column_names), ROOT)
-        for v in ("holds", "depends")
-    )  # fmt: skip
-    assert one.equals(other) == timed

@@ -3,7 +3,6 @@
 import pandas as pd
 import pytest
 
-from machines.same_results import without_times
 from places import ROOT
 from study.tables import declared
 from study.tables.claims.claims import claims, claims_tests
@@ -50,13 +49,3 @@ def test_the_tests_that_decide_give_the_verdicts(tables, outcomes):
 
 def test_words_tell_the_tests_of_a_part_apart(outcomes):
     assert not outcomes.duplicated(["claim", "part", "what"]).any()
-
-
-@pytest.mark.parametrize(("claim", "timed"), [("C2", False), ("C9", True)])
-def test_a_clock_has_its_say_where_times_are_compared(claim, timed, outcomes):
-    said = outcomes.query("claim == @claim").head(1)
-    one, other = (
-        without_times(claims_tests, claims_tests.checked(said.assign(satisfied=n)), ROOT)
-        for n in (1, 2)
-    )
-    assert one.equals(other) == timed
