@@ -14,9 +14,8 @@ from importlib import import_module
 from pdrom import __version__
 from pdrom.command.base import Command, Status
 from pdrom.core.environment import settle
-from pdrom.core.errors import INTERRUPTED, PdromError, choices
+from pdrom.core.errors import INTERRUPTED, PdromError, choices, reason
 from pdrom.core.project import checkout
-from pdrom.core.store.checksum import reason
 
 COMMANDS = ("new", "run", "reduce", "view", "show")
 CODES = """exit codes: 0 done; 1 faulty input, or a file that cannot be read or written;

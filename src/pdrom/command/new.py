@@ -71,8 +71,7 @@ ARGUMENTS: dict[str, dict[str, Any]] = {
 
 def perform(arguments: argparse.Namespace) -> Status:
     """Write the scene that ``arguments`` name, with comments; an existing file is left alone."""
-    from pdrom.core.errors import ConfigurationError
-    from pdrom.core.store.checksum import reason
+    from pdrom.core.errors import ConfigurationError, reason
 
     path = Path(arguments.scene)
     path = path if path.suffix in (".yaml", ".yml") else path.with_name(f"{path.name}.yaml")

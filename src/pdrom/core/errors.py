@@ -1,5 +1,7 @@
 """Named errors; each carries one line: file or object, key, value, and what is allowed."""
 
+import errno
+import os
 import re
 from collections.abc import Iterable
 from difflib import get_close_matches
@@ -17,6 +19,13 @@ def suggestion(value: object, allowed: Iterable[str]) -> str:
     """End of a message about ``value``: the name among ``allowed`` that was probably meant."""
     close = get_close_matches(str(value), list(dict.fromkeys(allowed)), n=1)
     return f", did you mean '{close[0]}'?" if close else ""
+
+
+def reason(error: OSError) -> str:
+    """Words of the operating system for ``error``; HDF5 hides the number in a long text."""
+    hidden = re.search(r"errno = (\d+)", str(error))
+    number = error.errno or (int(hidden[1]) if hidden else 0)
+    return os.strerror(number) if number in errno.errorcode else " ".join(str(error).split())[:200]
 
 
 class PdromError(Exception):

@@ -85,6 +85,10 @@ class Shown:
         )
 
 
+class Teaser(ReducedRuns):
+    """Those of the first figure."""
+
+
 @dataclass(frozen=True)
 class Runs:
     """Files that figures of runs read: those of every scene, and ``reruns`` of every method."""
@@ -373,7 +377,7 @@ def _colours() -> ScalarMappable:
     },
 )
 def teaser(
-    options: ReducedRuns,
+    options: Teaser,
     drawn: Drawn,
     horizon: Horizon,
     subspaces: list[File],

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING
 import h5py
 import numpy as np
 
-from pdrom.core.errors import StorageError
+from pdrom.core.errors import StorageError, reason
 from pdrom.core.provenance import attributes
 from pdrom.core.store.checksum import (
     BLOCK,
@@ -36,7 +36,6 @@ from pdrom.core.store.checksum import (
     new_checksum,
     provenance_of,
     read_checksum,
-    reason,
     require_intact,
     write_block,
 )

@@ -19,7 +19,6 @@ import errno
 import hashlib
 import json
 import os
-import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -27,7 +26,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 
-from pdrom.core.errors import StorageError
+from pdrom.core.errors import StorageError, reason
 from pdrom.core.provenance import provenance
 
 _ASIDE: ContextVar[bool] = ContextVar("damaged results are set aside", default=False)
@@ -60,13 +59,6 @@ _LINE = b"pdrom: BLAKE2b of the bytes behind the first 2048, and what made them\
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 BLOCK_NAME = "-"  # of what `tail -c +2049 FILE | b2sum` reads
 UNCHECKED = "--unchecked (in Python unchecked=True) reads it if it is sound"
-
-
-def reason(error: OSError) -> str:
-    """Words of the operating system for ``error``; HDF5 hides the number in a long text."""
-    hidden = re.search(r"errno = (\d+)", str(error))
-    number = error.errno or (int(hidden[1]) if hidden else 0)
-    return os.strerror(number) if number in errno.errorcode else " ".join(str(error).split())[:200]
 
 
 @dataclass(frozen=True)

@@ -446,3 +446,9 @@ def test_the_module_is_the_program(tmp_path):
     assert (done.returncode, done.stderr) == (0, "")
     assert shell("pdrom --version", tmp_path).stdout == f"pdrom {__version__}\n"
     assert (tmp_path / "x.yaml").is_file()
+
+
+def test_threads_and_kernels_of_numpy_are_set_before_it_is_loaded():
+    code = "import sys, pdrom.command.main; sys.exit('numpy' in sys.modules)"
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    assert subprocess.run([sys.executable, "-c", code], env=environment).returncode == 0
