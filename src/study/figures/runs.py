@@ -86,7 +86,7 @@ class Shown:
 
 
 class Teaser(ReducedRuns):
-    """Those of the first figure."""
+    """Runs in the first figure."""
 
 
 @dataclass(frozen=True)
