@@ -5,6 +5,7 @@ Energy of a group (Bouaziz et al. 2014, eq. 4): W(q) = 1/2 sum_e w_e || S_e q - 
 
 from abc import abstractmethod
 from collections.abc import Callable
+from copy import copy
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
@@ -177,6 +178,39 @@ class ConstraintGroup(Effect):
     def roundoff(self, q: np.ndarray) -> float:
         """Round-off in S q of ``q`` (N, 3) m: eps times the norm of the cancelling |S| |q|."""
         return float(np.finfo(float).eps * np.linalg.norm(abs(self.S) @ np.abs(q)))
+
+
+class StencilGroup(ConstraintGroup):
+    """A group whose elements all have the same number m of vertices.
+
+    Attributes
+    ----------
+    stencil : (e, m) int32 vertex indices
+    operator : (e, p, m) dense element operators: S_e q = operator[e] @ q[stencil[e]]
+    """
+
+    stencil: np.ndarray
+    operator: np.ndarray
+    per_element: tuple[str, ...] = ()
+    """Names of further arrays with one entry per element."""
+
+    def restricted(
+        self, elements: np.ndarray, factors: np.ndarray
+    ) -> tuple[ConstraintGroup, np.ndarray]:
+        vertices, local = np.unique(self.stencil[elements], return_inverse=True)
+        part = copy(self)
+        part.stencil = local.reshape(len(elements), self.stencil.shape[1]).astype(np.int32)
+        part.weights = self.weights[elements] * factors
+        for name in ("operator", *self.per_element):
+            setattr(part, name, np.ascontiguousarray(getattr(self, name)[elements]))
+        part._assemble(len(vertices))
+        return part, vertices
+
+    def _assemble(self, vertices: int) -> None:
+        e, p, m = self.operator.shape
+        rows = np.repeat(np.arange(e * p), m)
+        columns = np.repeat(self.stencil[:, None, :], p, axis=1).ravel()
+        self.S = sparse.csr_array((self.operator.ravel(), (rows, columns)), shape=(e * p, vertices))
 
 
 def require_cells(mesh: Mesh, kind: str, effect: str) -> np.ndarray:

@@ -11,7 +11,6 @@ a group shows to others (S, weights, projections) keeps the order of the mesh; o
 its kernels do not.
 """
 
-from copy import copy
 from typing import Any, ClassVar
 
 import numpy as np
@@ -21,7 +20,7 @@ from scipy.sparse import csgraph
 from pdrom.model.compiled import rows
 from pdrom.model.compiled.arithmetic import add, constant, subtract, transposed
 from pdrom.model.compiled.rows import WIDTH, at
-from pdrom.model.constraints.base import ConstraintGroup
+from pdrom.model.constraints.base import StencilGroup
 from pdrom.model.constraints.lanes import LANES, blocks, lane_function, load, pack, save, workspaces
 from pdrom.model.constraints.local_kernel import FIRST, OWN, VERTICES, LocalKernel
 
@@ -35,24 +34,15 @@ WORK_SIZE, COUNT, CORNERS, GEOMETRY, CONSTANTS, WORK, ELEMENTS = range(OWN, OWN 
 TAKEN, TAKEN_GEOMETRY, ARRAYS = range(OWN + 7, OWN + 10)
 
 
-class SimplexGroup(ConstraintGroup):
-    """A group whose elements all have the same number m of vertices, and kernels of packed blocks.
+class SimplexGroup(StencilGroup):
+    """A group whose kernels work on packed blocks.
 
     A subclass gives two kernels and, if it has other numbers of an element, `_extra`:
 
     accumulate_kernel : a `pdrom.model.constraints.local_kernel.local_kernel` whose units are blocks
     project_kernel : the same form; writes the projections of some elements, see `samples`
-
-    Attributes
-    ----------
-    stencil : (e, m) int32 vertex indices
-    operator : (e, p, m) dense element operators: S_e q = operator[e] @ q[stencil[e]]
     """
 
-    stencil: np.ndarray
-    operator: np.ndarray
-    per_element: tuple[str, ...] = ()
-    """Names of further arrays with one entry per element."""
     accumulate_kernel: Any
     project_kernel: Any
 
@@ -65,23 +55,9 @@ class SimplexGroup(ConstraintGroup):
     reordered: ClassVar[bool] = True
     """Whether the kernel may visit the elements in another order than that of the mesh."""
 
-    def restricted(
-        self, elements: np.ndarray, factors: np.ndarray
-    ) -> tuple[ConstraintGroup, np.ndarray]:
-        vertices, local = np.unique(self.stencil[elements], return_inverse=True)
-        part = copy(self)
-        part.stencil = local.reshape(len(elements), self.stencil.shape[1]).astype(np.int32)
-        part.weights = self.weights[elements] * factors
-        for name in ("operator", *self.per_element):
-            setattr(part, name, np.ascontiguousarray(getattr(self, name)[elements]))
-        part._assemble(len(vertices))
-        return part, vertices
-
     def _assemble(self, vertices: int) -> None:
-        e, p, m = self.operator.shape
-        columns = np.repeat(self.stencil[:, None, :], p, axis=1).ravel()
-        places = np.repeat(np.arange(e * p), m), columns
-        self.S = sparse.csr_array((self.operator.ravel(), places), shape=(e * p, vertices))
+        super()._assemble(vertices)
+        e, m = self.stencil.shape
         self._order = visiting_order(self.stencil, vertices) if self.reordered else None
         visited = self._visited(np.asarray(self.stencil, dtype=np.int32))
         self._corners = pack(visited)

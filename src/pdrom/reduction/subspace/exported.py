@@ -11,8 +11,7 @@ import numpy as np
 
 from pdrom.core.errors import SceneError, choices
 from pdrom.core.packed import pack_array
-from pdrom.model.constraints.base import ConstraintGroup
-from pdrom.model.constraints.simplex import SimplexGroup
+from pdrom.model.constraints.base import ConstraintGroup, StencilGroup
 from pdrom.model.effects import EFFECTS
 from pdrom.model.effects.base import Force, Start
 from pdrom.model.effects.hold import Pins
@@ -73,7 +72,7 @@ def require_known(config: SceneConfig) -> None:
     """SceneError if the engine of the page cannot run a scene."""
     for name in (each.effect for each in config.effects):
         effect = EFFECTS.load(name)
-        projected = issubclass(effect, SimplexGroup) and effect.manifold in MANIFOLDS
+        projected = issubclass(effect, StencilGroup) and effect.manifold in MANIFOLDS
         if not (projected or issubclass(effect, (Floor, Pins, Force, Start))):
             allowed = ("spring", "strain", "tetrahedron_strain", "deformation_gradient")
             raise SceneError(
@@ -137,7 +136,7 @@ def _export_samples(group: ConstraintGroup, chosen: Samples | Interpolation) -> 
 
 def _stencil(group: ConstraintGroup, chosen: Samples | Interpolation) -> np.ndarray:
     """Vertices (m, corners) of the elements that are sampled."""
-    assert isinstance(group, SimplexGroup)  # others are refused
+    assert isinstance(group, StencilGroup)  # others are refused
     return group.stencil[chosen.elements]
 
 

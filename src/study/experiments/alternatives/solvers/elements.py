@@ -15,8 +15,8 @@ import numpy as np
 from pdrom.core.errors import SceneError
 from pdrom.model.compiled.functions import compiled
 from pdrom.model.compiled.rows import WIDTH
+from pdrom.model.constraints.base import StencilGroup
 from pdrom.model.constraints.lanes import cross, dot, lane_function, perpendicular, scaled
-from pdrom.model.constraints.simplex import SimplexGroup
 from pdrom.model.constraints.spring import EdgeSpring
 from pdrom.model.scene import Scene
 
@@ -50,7 +50,7 @@ class Elements:
         """All elements of a scene; SceneError if a group is none that ``method`` takes."""
         parts = []
         for group in scene.groups:
-            if group.manifold not in KINDS or not isinstance(group, SimplexGroup):
+            if group.manifold not in KINDS or not isinstance(group, StencilGroup):
                 raise SceneError(
                     f"scene '{scene.config.name}', effect '{group.name}': method '{method}' takes "
                     "springs, triangle strain and tetrahedra only"
@@ -85,7 +85,7 @@ class Elements:
         return starts, element[order], corner[order]
 
 
-def _arrays(group: SimplexGroup) -> tuple[np.ndarray, ...]:
+def _arrays(group: StencilGroup) -> tuple[np.ndarray, ...]:
     e, p, m = group.operator.shape
     corners = np.zeros((e, 4), np.int64)
     corners[:, :m] = group.stencil
