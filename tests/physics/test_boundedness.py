@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from builders import GRAVITY, GROUPS, LEFT, Pushing, make_scene
 from pdrom.model.constraints.base import ConstraintGroup
@@ -15,6 +17,7 @@ MESHES = {"spring": SHEET, "strain": SHEET, "bending": SHEET, "deformation_gradi
 FRAMES = 16
 SCENES = 300
 RIGHT = {"effect": "pins", "select": "right"}
+RELEASED = [{**LEFT, "until": 20}, {**RIGHT, "start": 10, "until": 30}]
 MOVED = {"effect": "translate", "select": "left", "over": 6, "offset": [0.3, 0.0, 0.2]}
 HOLDS: list[list[dict]] = [
     [],
@@ -91,6 +94,25 @@ def allowed(scene: Scene) -> np.ndarray:
         angles = np.arctan(scene.config.time_step * np.sqrt(modes(scene, free)[0]))
         bound = np.minimum(bound, growth(angles, frames) if len(angles) else 0.0)
     return bound
+
+
+@pytest.mark.parametrize("holds", [[], [LEFT], RELEASED], ids=["free", "held", "released"])
+@pytest.mark.parametrize("group", ["spring", "strain", "deformation_gradient"])
+def test_a_run_with_any_bounded_projections_stays_within_its_bound(group, holds, rng):
+    """Other random projections in every iteration, a hundred times as large as projections are."""
+    own = {"effect": group, "weight": 1e4}
+    scene = make_scene(GRAVITY, *holds, own, mesh=GROUPS[group], frames=60)
+    g = scene.group(group)
+    radii = 100.0 * largest_projections(g, scene.mesh.points)
+
+    def drawn() -> np.ndarray:
+        p = rng.standard_normal((g.elements, g.rows_per_element * 3))
+        p *= (radii / np.linalg.norm(p, axis=1))[:, None]
+        return g.S.T @ (g.row_weights[:, None] * p.reshape(-1, 3))
+
+    beta = float(np.sqrt(g.weights @ radii**2))  # | p |_W, which bounds | S^T W p |_{K^+}
+    energy = differences(scene, drawn, lambda: 0.0)
+    assert (energy <= (1 + 1e-9) * allowed(scene) * beta).all()
 
 
 def random_scene(rng: np.random.Generator) -> Scene:
@@ -173,6 +195,16 @@ def test_growth_for_ever_is_that_of_a_resonance(tangent):
     assert x == pytest.approx(growth(np.array([angle]), len(m)), rel=1e-9)
     closed = 1.0 / np.tan(angle / 2.0)
     assert 0.6 * closed < x <= closed
+
+
+@given(st.floats(1e-3, 50.0))
+def test_the_poles_of_a_frame_lie_inside_the_unit_circle(tangent):
+    """a z^2 - 2 z + 1 with a = 1 + t^2 has the roots cos(t) exp(+-i t)."""
+    roots = np.roots([1.0 + tangent**2, -2.0, 1.0])
+    angle = np.arctan(tangent)
+    expected = np.cos(angle) * np.exp(1j * angle)
+    assert np.sort_complex(roots)[-1] == pytest.approx(expected, rel=1e-6)
+    assert np.abs(roots).max() < 1.0
 
 
 @pytest.mark.parametrize("group", sorted(GROUPS))

@@ -50,3 +50,64 @@ def test_bending_operator_is_the_gradient_of_area(rng):
             direction[group.vertices[element], axis] = 1.0
             expected = curvature[element, axis] * group.weights[element]
             assert central(area, points, direction) == pytest.approx(expected, rel=1e-5, abs=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("group", "mesh", "edges"),
+    [
+        ("strain", {"kind": "cloth", "rows": 4, "columns": 4}, 2),
+        ("deformation_gradient", {"kind": "bar", "nx": 3, "ny": 3, "nz": 3}, 3),
+    ],
+)
+def test_deformation_gradient_is_the_derivative_of_a_smooth_map(group, mesh, edges, rng):
+    """For a smooth map F_e approaches its Jacobian as the map is observed on a smaller scale."""
+    scene = make_scene({"effect": group, "weight": 1.0}, mesh=mesh)
+    operator, points = scene.groups[0], scene.mesh.points
+    quadratic = 0.3 * rng.standard_normal((3, 3, 3))
+
+    def deform(x: np.ndarray) -> np.ndarray:
+        return x + np.einsum("abc,nb,nc->na", quadratic, x, x)
+
+    errors = []
+    for scale in (1e-2, 1e-3):
+        small = scale * (points - points.mean(axis=0))
+        f = (operator.S @ deform(small)).reshape(operator.elements, edges, 3) / scale
+        centre = small[operator.stencil].mean(axis=1)
+        jacobian = np.eye(3) + 2.0 * np.einsum(
+            "abc,nc->nab", 0.5 * (quadratic + quadratic.transpose(0, 2, 1)), centre
+        )
+        corner = (points[operator.stencil][:, 1:] - points[operator.stencil][:, :1]).transpose(
+            0, 2, 1
+        )
+        # F maps the rest edges in the element's frame (D, with D^-T inside S) as the Jacobian does
+        seen = np.einsum("eka,ebk->eab", f, np.linalg.inv(operator.operator[:, :, 1:]))
+        errors.append(np.abs(seen - jacobian @ corner).max())
+    assert errors[1] < 0.2 * errors[0]
+    assert errors[1] < 1e-2
+
+
+def test_global_step_minimises_the_objective(group_scene, rng):
+    """The solution of the global step is stationary: no direction lowers the quadratic."""
+    scene = group_scene
+    system = scene.system_with("supernodal")
+    points = scene.mesh.points
+    s = points + 0.05 * rng.standard_normal(points.shape)
+    p = [group.project(s) for group in scene.groups]
+    rhs = system.inertia[:, None] * s
+    for group, projection in zip(scene.groups, p, strict=True):
+        rhs += group.S.T @ (group.row_weights[:, None] * projection)
+    y = np.empty_like(points)
+    system.eliminate(np.empty(0, dtype=np.int64)).solve(rhs, y)
+
+    def objective(q: np.ndarray) -> float:
+        total = 0.5 * float(system.inertia @ ((q - s) ** 2).sum(axis=1))
+        for group, projection in zip(scene.groups, p, strict=True):
+            residual = group.S @ q - projection
+            total += 0.5 * float(group.row_weights @ (residual**2).sum(axis=1))
+        return total
+
+    scale = objective(y)
+    for _ in range(5):
+        direction = rng.standard_normal(points.shape)
+        assert abs(central(objective, y, direction)) < 1e-5 * scale
+        assert objective(y + 1e-3 * direction) > scale

@@ -5,7 +5,7 @@ import pytest
 
 from builders import GRAVITY, GROUPS, TOP, make_scene, random_rotation, with_effects
 from pdrom.model.dynamics.stepper import State
-from pdrom.model.runs import trajectory
+from pdrom.model.runs import simulate, trajectory
 
 
 def test_rest_state_stays_at_rest(group_scene):
@@ -105,6 +105,19 @@ def test_rotation_and_translation_equivariance(group_scene, rng):
     assert np.abs(other.positions - expected).max() < 1e-9
 
 
+def test_pins_hold_exactly_and_release():
+    scene = make_scene(
+        GRAVITY,
+        {"effect": "pins", "select": "top", "until": 10},
+        {"effect": "spring", "weight": 1e5},
+        frames=20,
+    )
+    positions = trajectory(scene)
+    top = np.flatnonzero(scene.mesh.points[:, 1] > scene.mesh.points[:, 1].max() - 1e-9)
+    assert np.array_equal(positions[10, top], positions[0, top])
+    assert (positions[12, top, 1] < positions[0, top, 1]).all()
+
+
 def test_handles_reach_their_target():
     scene = make_scene(
         {"effect": "translate", "select": "top", "offset": [0.1, 0.2, -0.3], "over": 5},
@@ -140,3 +153,17 @@ def test_energy_does_not_grow_without_forcing(group_scene, rng):
         energies.append(kinetic + potential)
     start = 0.5 * float(scene.masses @ (velocities**2).sum(axis=1))
     assert max(energies) <= start * (1 + 1e-9)
+
+
+def test_one_factorisation_per_pin_set():
+    scene = make_scene(
+        {"effect": "pins", "select": "top", "until": 4},
+        {"effect": "pins", "select": "bottom", "start": 6, "until": 8},
+        {"effect": "pins", "select": "top", "start": 8},
+        {"effect": "spring", "weight": 1e5},
+        frames=12,
+    )
+    system = scene.system_with("supernodal")
+    for _ in simulate(scene, system=system):
+        pass
+    assert system.factorisations == 3
