@@ -78,7 +78,7 @@ def outcomes(runs: pd.DataFrame, wrong: float, departure: float) -> list[str]:
     error = runs.relative_error.astype(float)
     classes = {
         "not run": runs.finite.isna(),
-        "blow-up": ~runs.finite.astype("boolean").fillna(True).to_numpy(bool),
+        "blow-up": runs.finite.astype(float) == 0.0,
         "left the scene": runs.max_extent > departure * runs.join(extents, on=SETTING).full_extent,
         "not judged": error.isna(),
         "wrong": error > wrong,
