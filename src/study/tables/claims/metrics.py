@@ -200,7 +200,7 @@ def over_the_rest(share: np.ndarray) -> np.ndarray:
 class Metric:
     """Metric of a test, computed from columns of one table.
 
-    of : function of chosen rows and the largest accurate error; returns labels and a `VALUE` per row
+    of : function of the chosen rows and ``accuracy``; returns labels and a `VALUE` for each row
     choose : function of the table and ``where`` (column -> allowed values) that selects the rows
     labels : columns allowed in ``where`` in addition to the columns of the table
     ratio : function that converts a value to a ratio of two times, for metrics based on times

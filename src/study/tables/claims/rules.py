@@ -156,7 +156,7 @@ def load_claims(path: Path, added: Added = NONE_ADDED) -> dict[str, ClaimRule]:
     Parameters
     ----------
     added : name of a set in the file -> values that a study appends to it, for scenes that the
-    rules were not written for
+        rules were not written for
 
     Raises
     ------

@@ -26,7 +26,7 @@ class Outcome:
     """Result of one test.
 
     verdict : one of `VERDICTS`; "cannot be decided" if nothing can be compared, "depends on the
-    machine" if ratios of times close to the threshold decide
+        machine" if ratios of times close to the threshold decide
     measured : range of the values, in words
     sentence : number of rows that satisfy the comparison, in words
     condition : if the verdict depends, that number for each value of the column ``by`` of the test

@@ -19,7 +19,7 @@ RESAMPLES, SEED, LEVEL = 2000, 1, 0.95
 
 
 def joined(files: Iterable[File]) -> pd.DataFrame:
-    """Rows of the tables in ``files``, in order; an empty frame without columns if none has rows."""
+    """Rows of the tables in ``files``, in order; an empty frame without columns if none exist."""
     parts = [part for part in (read_table(file.path) for file in files) if len(part)]
     return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame()
 

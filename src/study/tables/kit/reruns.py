@@ -39,7 +39,7 @@ def trained(reruns: pd.DataFrame) -> pd.DataFrame:
 def over_motions(reruns: pd.DataFrame, keys: Sequence[str] = KEYS) -> pd.DataFrame:
     """Median, least and largest error of each run over its held-out motions, and their number.
 
-    A run that ended before the horizon has an infinite error. Sizes beyond the numerical rank, which
+    A run that ended before the horizon has an infinite error. Sizes above the numerical rank, which
     cannot run, and motions whose horizon is frame 0 are left out.
 
     Parameters
