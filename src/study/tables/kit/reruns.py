@@ -70,7 +70,7 @@ def judged_runs(reruns: pd.DataFrame, reconstruction: pd.DataFrame) -> pd.DataFr
     gain : gain of the reduction
     error : error of the run within the horizon; inf if it blew up before
     orthogonal_error : error of orthogonal projection at its largest size up to r (bases without
-    centring have one mode more)
+        centring have one mode more)
     failed : whether the error exceeds `FAILED`
     """
     runs = trained(reruns)
