@@ -51,8 +51,8 @@ class Iteration:
     """Step k of a greedy selection of samples.
 
     magnitude : (e,) residual of mode k per element, in the measure that the selection maximises:
-    the largest entry (``rows`` "scalar"), the largest norm of a row over x, y, z ("joint"),
-    or the norm of all entries of the element ("element")
+        the largest entry (``rows`` "scalar"), the largest norm of a row over x, y, z ("joint"),
+        or the norm of all entries of the element ("element")
     earlier, newest : indices of the elements picked before, and of the element of this step
     entry : vector index of the (first) entry picked in this step
     """
@@ -141,7 +141,7 @@ def iterations(
     ----------
     V : (3 e p, rank) modes of e elements with p = ``rows_per_element``
     entries : vector indices in the order of selection: one per step for ``rows`` "scalar" and
-    "joint" (the x entry of a row represents the row), 3 p per step for "element"
+        "joint" (the x entry of a row represents the row), 3 p per step for "element"
 
     Raises
     ------

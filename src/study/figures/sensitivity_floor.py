@@ -59,7 +59,7 @@ class Floors:
         return end if end < len(floor) else None
 
     def instant(self, scene: str, frame: int) -> str:
-        """Label of ``frame``, marked if it is past the scene's horizon, where errors mean nothing."""
+        """Label of ``frame``, marked past the scene's horizon, where errors cannot be judged."""
         end = self.horizon(scene)
         return f"frame {frame}" if end is None or frame <= end else f"frame {frame}, past horizon"
 

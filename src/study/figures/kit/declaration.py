@@ -45,7 +45,7 @@ class Declaration(Artifact):
     figure in config/figures.yaml. It raises `NothingToDraw` if the configuration has no data for
     it, and StorageError for a damaged file.
 
-    title, caption : text in light mark-up (`study.artifact.markup`); ``{key}`` in a caption is for
+    title, caption : text in light mark-up (`study.artifact.markup`); ``{key}`` in a caption names
         a setting of the configuration
     number : number of the reproduced figure in the preprint; None for a figure of this study
     """
