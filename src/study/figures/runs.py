@@ -335,7 +335,7 @@ def cloth_all_grid(
 def _over_time(
     path: str, options: ReducedRuns, title: str, frames: list[int], full: np.ndarray, mesh: Mesh
 ) -> list[RunPanel] | None:
-    """Panels of a reduced run at ``frames``, coloured by distance to ``full``; None if none ran."""
+    """Panels of a reduced run at ``frames``, coloured by distance; None if no size ran."""
     infos = choose_ranks(rerun_infos(path), options.ranks)
     info = next((i for i in infos if not i.marked), None)
     if info is None:

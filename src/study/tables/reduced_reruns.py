@@ -61,7 +61,7 @@ def reduced_reruns(
     There is one row per motion, scene, group, method and r, followed by runs in position subspaces,
     in which all groups are reduced and r is the number of evaluated elements. The horizon is the
     first frame that perturbed runs make incomparable, per scene and motion. Errors within it use
-    earlier frames only; it is empty for a run that blew up before.
+    earlier frames only; they are empty for a run that blew up before.
 
     Parameters
     ----------

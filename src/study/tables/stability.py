@@ -72,7 +72,7 @@ def stability(
 
 
 def outcomes(runs: pd.DataFrame, wrong: float, departure: float) -> list[str]:
-    """One of `OUTCOMES` for each of ``runs``, by limits on error and (relative) extent."""
+    """Outcome of each of ``runs``: ``wrong`` limits the error, ``departure`` relative extent."""
     full = runs[(runs.method == "full") & (runs.position_basis == "full")]
     extents = full.set_index(SETTING).max_extent.rename("full_extent")
     error = runs.relative_error.astype(float)

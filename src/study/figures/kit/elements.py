@@ -107,8 +107,8 @@ def element_map(group: str, mesh: Mesh, elements: int, source: str) -> ElementMa
     Raises
     ------
     StorageError
-        If ``group`` is no constraint group, or the file ``source`` has another number of elements
-        mesh.
+        If ``group`` is no constraint group, or the mesh has another number of elements than the
+        file ``source`` says.
     ConfigurationError
         If no effect has the name ``group``.
     """

@@ -200,7 +200,7 @@ def claims_sensitivity(
 def sensitivity_rows(rules: Mapping[str, ClaimRule], tables: Tables) -> pd.DataFrame:
     """One row per claim, part and variation of the tests that decide the verdict.
 
-    A variation is left out if one of its tests has no rows, or if it changes none of the tests.
+    A variation is left out if a test has no rows; a split or filter also if it changes nothing.
     """
     made = []
     for claim, rule in rules.items():

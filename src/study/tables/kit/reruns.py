@@ -1,4 +1,4 @@
-"""Selections from the table reduced_reruns: training motion, held-out motions, gain.
+"""Selections from the table reduced_reruns by motion, and medians over held-out motions.
 
 Errors over held-out motions are summarised by their median, as fixed in config/claims.yaml.
 """
