@@ -1,4 +1,4 @@
-"""Figures of manuscript and report, one module each; see `study.figures.kit.declaration`.
+"""Figures of manuscript and report, one module per subject; see `study.figures.kit.declaration`.
 
-Every plan imports them, so that they load no plotting library before one is drawn.
+These modules import the plotting library only when drawing, as workflow planning imports them too.
 """

@@ -1,4 +1,4 @@
-"""Accuracy of reduced models against their time per frame, by family and constraint group."""
+"""Figure of the error of reduced models against their time per frame, by family of models."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -17,15 +17,15 @@ from study.tables.accuracy_cost import FEWER, pareto
 
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "*")
 ERROR, TIME = "relative_error_within_horizon", "ms_per_frame"
-LOW, HIGH = 1e-3, 1e2  # errors outside are arrows on the rim
-ABOVE, BELOW, BLOWN_UP = 6, 7, "x"  # markers: carets, and a cross
+LOW, HIGH = 1e-3, 1e2  # limits of the error axis; errors outside are arrows at its ends
+ABOVE, BELOW, BLOWN_UP = 6, 7, "x"  # Matplotlib markers: carets up and down, and a cross
 OWN = {"color": style.GREY, "linewidth": 1.2}
 BLIND = {"color": style.FAILED, "linewidth": 0.9, "linestyle": "-."}
-RATES = (60, 30)  # frames per second
-LARGE, SMALL = 2.6, 1.6  # inches, heights of panels
-LINE, GAP = 0.145, 0.06  # inches, of a line of the legend and between its rows of blocks
-COLUMNS = 4  # of the legend
-# Models of one kind, told apart from the others by their colour.
+RATES = (60, 30)  # frames per second that count as real time
+LARGE, SMALL = 2.6, 1.6  # heights of the large and of the small panels, inches
+LINE, GAP = 0.145, 0.06  # inches: height of a legend line, gap between rows of legend blocks
+COLUMNS = 4  # number of legend blocks side by side
+# Families of models, each with its colour.
 FAMILIES = {
     "full order, fewer iterations": style.BLACK,
     "orthogonal projection": style.PURPLE,
@@ -41,9 +41,9 @@ Block = tuple[str, list[Line2D]]
 
 
 def look_of(method: str, position_basis: str, drawn: Drawn) -> Look:
-    """Family of a model, and its name there, which tolerances and position bases share.
+    """Family of a model and its name in the family; tolerances and position bases share a name.
 
-    Titles of methods are those of ``drawn``. The family is None for a method that is not drawn.
+    Method titles are taken from ``drawn``. The family is None for a method that is not drawn.
     """
     if method == FEWER:
         return ITERATIONS, "K iterations"
@@ -56,7 +56,7 @@ def look_of(method: str, position_basis: str, drawn: Drawn) -> Look:
 
 
 def markers(looks: list[Look]) -> dict[Look, str]:
-    """A marker for each name within a family, in the order of ``looks``."""
+    """Marker of each (family, name), different within a family, in the order of ``looks``."""
     found: dict[Look, str] = {}
     for look in dict.fromkeys(looks):
         before = sum(family == look[0] for family, _ in found)
@@ -66,13 +66,13 @@ def markers(looks: list[Look]) -> dict[Look, str]:
 
 @dataclass(frozen=True)
 class TradeOffs:
-    """Points of every scene.
+    """Points (error, time) of reduced models in all scenes, with their markers.
 
-    points : rows of the table accuracy_cost whose errors are against the scene's own run
-    blown_up : reduced runs that ended before they had an error
-    own_ms : scene -> time per frame of its own full-order run
-    own_error : scene -> that run's own error, against the converged one
-    marker : of each family and name
+    points : rows of the table accuracy_cost whose errors refer to the scene's own full-order run
+    blown_up : reduced runs that blew up before an error could be computed
+    own_ms : scene -> time per frame of its own full-order run, ms
+    own_error : scene -> error of that full-order run against the converged run
+    marker : (family, name) -> Matplotlib marker
     """
 
     points: pd.DataFrame
@@ -82,14 +82,14 @@ class TradeOffs:
     marker: dict[Look, str]
 
     def members(self, family: str) -> dict[str, str]:
-        """Names of a ``family`` with their markers."""
+        """Names of the models in ``family`` with their markers."""
         return {name: marker for (own, name), marker in self.marker.items() if own == family}
 
 
 def trade_offs(
     drawn: Drawn, table: pd.DataFrame, runs: pd.DataFrame
 ) -> tuple[TradeOffs, list[str]]:
-    """Points of the scenes and methods ``drawn``, and these scenes.
+    """Points of the scenes and methods in ``drawn``, and the list of scenes with points.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ def trade_offs(
     Raises
     ------
     NothingToDraw
-        No reduced model has both an error and a time.
+        If no reduced model has both an error and a time.
     """
     table = table.dropna(subset=[ERROR, TIME])
     own = (table.method == "full") & (table.position_basis == "full")
@@ -116,7 +116,7 @@ def trade_offs(
 
 
 def _drawn(table: pd.DataFrame, drawn: Drawn) -> pd.DataFrame:
-    """Rows of models that are drawn, with their family and their name in it."""
+    """Rows of ``table`` whose models are drawn, with columns for their family and name in it."""
     names = zip(table.method, table.position_basis, strict=True)
     looks = pd.DataFrame(
         [look_of(*name, drawn) for name in names], table.index, ["family", "member"], dtype=object
@@ -125,11 +125,11 @@ def _drawn(table: pd.DataFrame, drawn: Drawn) -> pd.DataFrame:
 
 
 def draw_panel(ax: Axes, found: TradeOffs, scene: str, size: float = 3.0) -> None:
-    """Draw a scene's points, the front of each family, and the full-order run that they replace.
+    """Draw the points of ``scene``, the Pareto front of each family, and the full-order run.
 
-    ``ax`` gets those ``found``, with markers of ``size``.
+    The points are in ``found`` and are drawn on ``ax`` with markers of ``size`` (points).
 
-    An error outside the axis is an arrow on the rim; a run that blew up, a cross on the upper one.
+    Errors outside the axis are arrows at its ends; blown-up runs are crosses near the upper end.
     """
     ax.set_xscale("log")
     log_axis(ax, LOW, HIGH)
@@ -179,9 +179,9 @@ def _points(
 
 
 def label_iterations(ax: Axes, found: TradeOffs, scene: str) -> None:
-    """Write the number of iterations beside each run of ``scene`` that stops earlier.
+    """Write the number of iterations beside each full-order run with fewer iterations in ``scene``.
 
-    ``ax`` shows those ``found``; near ones share a label.
+    The runs are in ``found`` and are drawn on ``ax``; neighbouring runs share a label.
     """
     rows = found.points[(found.points.scene == scene) & (found.points.method == FEWER)]
     rows = rows.sort_values(TIME)
@@ -189,7 +189,7 @@ def label_iterations(ax: Axes, found: TradeOffs, scene: str) -> None:
 
 
 def handles(found: TradeOffs) -> list[Block]:
-    """Legend entries of those ``found`` by family: a colour, a marker a name."""
+    """Legend blocks of the families in ``found``: a colour per family, a marker per name."""
     common = {"linewidth": 1.0, "markersize": 4.0}
     entries = [
         ("full order", [
@@ -225,9 +225,9 @@ def handles(found: TradeOffs) -> list[Block]:
 def accuracy_cost(
     options: Methods, drawn: Drawn, table: pd.DataFrame, runs: pd.DataFrame
 ) -> Figure:
-    """Draw the first scene large; below it one scene for each other group, the next in order."""
+    """Draw the first scene in a large panel, and below it one scene per other constraint group."""
     found, (first, *rest) = trade_offs(drawn, table, runs)
-    groups = {}  # in words
+    groups = {}  # scene -> group in words
     for scene in (first, *rest):
         own = [each.group for each in drawn.of(scene)]
         groups[scene] = style.words(own[0]) if len(own) == 1 else "several groups"
@@ -264,7 +264,7 @@ def accuracy_cost(
 
 
 def _draw_rates(ax: Axes) -> None:
-    """Lines of real time, where the axis reaches them; otherwise they are named at its side."""
+    """Draw vertical lines at frame rates of real time; name rates beyond the axis at its end."""
     high = ax.get_xlim()[1]
     beyond = [rate for rate in RATES if 1e3 / rate >= high]
     for rate in set(RATES) - set(beyond):

@@ -1,4 +1,4 @@
-"""Error against time: alternatives to projective dynamics, and requested tolerances."""
+"""Figures of error against time: alternatives to projective dynamics, and tolerances."""
 
 import numpy as np
 import pandas as pd
@@ -20,10 +20,10 @@ from study.experiments.alternatives.settings import ACCELERATED, CONVERGED, REDU
 from study.figures.kit.declaration import figure
 from study.figures.kit.options import NothingToDraw, Options, Scenes
 
-LOW, HIGH = 1e-4, 1.0  # errors outside are drawn on the limit
-PAIRS = 2  # cases side by side
+LOW, HIGH = 1e-4, 1.0  # limits of the error axis; errors outside are drawn on them
+PAIRS = 2  # number of pairs of panels side by side
 TOLERANCES, TIMES, REACHED = (5e-3, 2e-1), (1e-2, 1e1), (1e-4, 1e0)
-# Colour of each kind of answer, and a factor that moves its dots along the axis of tolerances.
+# Colour of each outcome of a request, and a factor that shifts its dots along the tolerance axis.
 KINDS = {
     "reduction": (style.BLUE, 0.85),
     "full order": (style.VERMILLION, 1.0),
@@ -58,7 +58,7 @@ LOOKS = {
     reads={"table": TableOf("alternatives")},
 )
 def alternatives(options: Scenes, table: pd.DataFrame) -> Figure:
-    """Draw a pair of panels for each scene, mesh and stiffness."""
+    """Draw a pair of panels (two references of the error) per scene, mesh and stiffness."""
     table = options.rows(table[table.motion == FIRST])
     cases = list(table.groupby(["scene", "vertices", "stiffness"]))
     if not cases:
@@ -100,7 +100,7 @@ def _draw_case(pair: list[Axes], labels: tuple[str, int, float], case: pd.DataFr
 
 
 def best_points(rows: pd.DataFrame) -> pd.DataFrame:
-    """Points that no other one of ``rows`` beats in time and error, from cheap to accurate."""
+    """Pareto-optimal ``rows`` in time and error, sorted from the fastest to the most accurate."""
     ordered = rows.sort_values(["ms_per_frame", "error"], kind="stable")
     before = ordered.error.cummin().shift(fill_value=np.inf)
     return ordered[ordered.error < before]
@@ -117,7 +117,7 @@ def best_points(rows: pd.DataFrame) -> pd.DataFrame:
     reads={"table": TableOf("requested_tolerances")},
 )
 def requested_tolerances(options: Options, table: pd.DataFrame) -> Figure:
-    """Draw errors and times side by side."""
+    """Draw errors (left) and relative times (right) against the requested tolerances."""
     table = table[table.error.notna()]
     if table.empty:
         raise NothingToDraw("no tolerance was requested")
@@ -150,9 +150,9 @@ def requested_tolerances(options: Options, table: pd.DataFrame) -> Figure:
 def dots(
     ax: Axes, tolerances: pd.Series, values: pd.Series, limits: tuple[float, float], colour: str
 ) -> None:
-    """Draw a dot on ``ax`` for each pair; none, not clipped, would take all the room of the axes.
+    """Draw ``values`` against ``tolerances`` as dots on ``ax``, if there are any.
 
-    ``values`` beyond the ``limits`` are drawn on them.
+    ``values`` beyond the ``limits`` are drawn on them. Without values, nothing is drawn.
     """
     if not values.empty:
         ax.plot(

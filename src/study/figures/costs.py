@@ -1,4 +1,4 @@
-"""Cost of the parts of a run: phases, effects, larger meshes, reduced local steps."""
+"""Figures of the cost of a run: phases, effects, larger meshes, reduced local steps."""
 
 import numpy as np
 import pandas as pd
@@ -14,35 +14,35 @@ from study.figures.kit.declaration import figure
 from study.figures.kit.options import Columns, Drawn, Methods, NothingToDraw, Scenes
 from study.tables.effects_cost import NOTHING
 
-# the local step, whose share is printed, is what has a shade of orange
+# the first two phases are the local step, drawn in shades of orange; its share is printed
 PHASES = {
     "local_ms": ("local step: projections", style.ORANGE),
     "assembly_ms": ("local step: right-hand side", "#F7D08A"),
     "global_ms": ("global solve", style.BLUE),
 }
 TITLES = {"interpreted": "interpreted loop", "numpy": "vectorised NumPy", "compiled": "compiled"}
-CLAIM = 70.0  # per cent, claim C1
+CLAIM = 70.0  # percentage of the local step in claim C1 of the preprint
 CURVES = {
     "ms_per_iteration": ("whole iteration", "-"),
     "local_ms": ("local step", "--"),
     "global_ms": ("global solve", ":"),
 }
-NAMES = {"fom": "full order", "ecsw": "POD subspace, ecsw"}  # whose exponent is printed
+NAMES = {"fom": "full order", "ecsw": "POD subspace, ecsw"}  # methods with a printed exponent
 SCALED = {"fom": (style.BLACK, "o"), "ecsw": ("#1B6E6E", ">")}
-ROOM = 2.6  # factor by which the axis goes on beyond the last mesh, for the exponents
+ROOM = 2.6  # factor from the largest mesh to the end of the axis; leaves space for exponents
 FRAMES = ["effect", "frame", "force"]
-SHOWN = 3  # scenes whose forces are drawn
+SHOWN = 3  # number of scenes whose forces are drawn
 LOW, HIGH = 1e-12, 1e2
-ROUNDOFF = 1e-14  # of the largest force of a scene: what is smaller is not drawn
+ROUNDOFF = 1e-14  # smallest drawn force relative to the largest force of the scene
 OTHERS = ("#8C6D31", "#5A5A5A", "#B03A6B", "#2B2B80", "#3E8E7E", "#A0522D", "#7F7F00")
-MARKERS = "*dph8H|"  # no group has one of these: effects differ without colours, too
+MARKERS = "*dph8H|"  # different from the markers of constraint groups
 UNLISTED = "forces, holds, contacts"
 COLOURS = {UNLISTED: style.VERMILLION, RIGHT: style.SKY, GLOBAL: "#3A5A78", REST: "#C9C4BA"}
 Looks = dict[str, tuple[str, str]]
 
 
 class BreakEven(Methods):
-    """Scenes, methods, panels side by side."""
+    """Options: scenes, methods, and the number of panels side by side."""
 
     columns: Columns = 3
 
@@ -113,7 +113,7 @@ def _draw_bars(ax: Axes, rows: pd.DataFrame, scenes: list[str]) -> None:
     reads={"table": TableOf("scaling")},
 )
 def scaling(options: Scenes, drawn: Drawn, table: pd.DataFrame) -> Figure:
-    """Draw a panel per scene: the time of an iteration, by phase."""
+    """Draw a panel per scene with the times of an iteration and its phases over the mesh size."""
     asked = options.scenes or tuple(dict.fromkeys(table.scene))
     scenes = [scene for scene in asked if (table.scene == scene).any()]
     if not scenes:
@@ -127,7 +127,7 @@ def scaling(options: Scenes, drawn: Drawn, table: pd.DataFrame) -> Figure:
         ax.set_xlabel("vertices")
     sizes = table[table.scene.isin(scenes)].vertices
     times[0].set_xlim(0.75 * sizes.min(), ROOM * sizes.max())
-    for axis in (times[0].xaxis, times[0].yaxis):  # shared by all panels
+    for axis in (times[0].xaxis, times[0].yaxis):  # all panels share these axes
         low, high = np.log10(axis.get_view_interval())
         plain_ticks(axis, high - low)
     times[0].set_ylabel("time of an iteration (ms)")
@@ -173,7 +173,7 @@ def _draw_times(ax: Axes, rows: pd.DataFrame) -> None:
     reads={"table": TableOf("breakeven")},
 )
 def break_even(options: BreakEven, drawn: Drawn, table: pd.DataFrame) -> Figure:
-    """Draw a panel per constraint group, a line per scene and method; above 1 it costs more."""
+    """Draw a panel per constraint group, a line per scene and method, and the break-even line."""
     table = drawn.rows(table)
     table = table[table.factor == 1.0]
     if table.empty:
@@ -219,7 +219,7 @@ def break_even(options: BreakEven, drawn: Drawn, table: pd.DataFrame) -> Figure:
 def effects_contribution(
     options: Scenes, drawn: Drawn, table: pd.DataFrame, contributions: list[File]
 ) -> Figure:
-    """Draw the forces of the first scenes over time, and beside them every scene and effect."""
+    """Draw forces over time for a few scenes (left), and drifts of all scenes (right)."""
     table = table.dropna(subset=["force"])
     scenes = drawn.scenes_of(table, "no contributions of effects")
     rows = table[table.scene.isin(scenes)]
@@ -241,7 +241,7 @@ def effects_contribution(
 
 
 def _looks(drawn: Drawn, rows: pd.DataFrame) -> Looks:
-    """Colours and markers: those of a group as everywhere else, of other effects in their order."""
+    """Colour and marker of each effect in ``rows``; groups look as in all other figures."""
     known = drawn.looks
     others = [effect for effect in dict.fromkeys(rows.effect) if effect not in known]
     groups = {effect: known[effect] for effect in dict.fromkeys(rows.effect) if effect in known}
@@ -297,8 +297,8 @@ def _draw_moved(ax: Axes, rows: pd.DataFrame, scenes: list[str], looks: Looks) -
 def effects_cost(options: Scenes, drawn: Drawn, table: pd.DataFrame) -> Figure:
     """Draw a bar per scene, divided by effect; on the right one scene without some of its effects.
 
-    On the right a tick marks the time of the whole scene less what the missing effects cost in it.
-    A bar that ends there pays nothing for what it does not list.
+    On the right, a tick marks the time of the whole scene minus the cost of the missing effects in
+    it. If a bar ends at its tick, effects that a scene lacks cost it no time.
     """
     costs, removed = table.dropna(subset=["share"]), table.dropna(subset=["without_ms"])
     removed = removed.sort_values("effect", key=lambda name: name != NOTHING, kind="stable")
@@ -323,7 +323,7 @@ def effects_cost(options: Scenes, drawn: Drawn, table: pd.DataFrame) -> Figure:
 def _draw_scenes(
     ax: Axes, costs: pd.DataFrame, scenes: list[str], colours: dict[str, str]
 ) -> list[str]:
-    """Bars of shares; returns the parts that were drawn, in the order of the legend."""
+    """Draw bars of shares; return the parts that were drawn, in the order of the legend."""
     costs = costs.assign(part=costs.effect.where(costs.effect.isin(list(colours)), UNLISTED))
     parts = [part for part in colours if (costs.part == part).any()]
     for y, scene in enumerate(scenes):

@@ -1,4 +1,4 @@
-"""The gain of the interpolation: it tells whether a run fails, and which choices raise it."""
+"""Figures of the gain of the interpolation against errors, and of choices that raise it."""
 
 import numpy as np
 import pandas as pd
@@ -12,10 +12,10 @@ from study.figures.kit.declaration import figure
 from study.figures.kit.options import Drawn, Methods, NothingToDraw, Scenes
 from study.tables.kit.reruns import FAILED, judged_runs
 
-GAINS = (1.0, 1e5)  # limits of the axes; points outside are drawn on the rim
+GAINS = (1.0, 1e5)  # limits of the gain axis; points outside are drawn on them
 ERRORS, LADDER_ERRORS = (1e-5, 1e2), (1e-4, 1e2)
 ENDS = ("low", "median", "high")
-DECADES = 4  # gains above 10^4 are counted together
+DECADES = 4  # number of separate decades; gains above 10^4 are counted together
 _KEYS = ["scene", "group", "method", "r"]
 
 
@@ -43,8 +43,8 @@ def error_against_gain(
 ) -> Figure:
     """Draw a dot per run, error within the horizon over gain, and failures by decade of gain.
 
-    Runs that ended before their horizon lie on the upper rim, singular interpolations on the right
-    one.
+    Runs that ended before their horizon lie on the upper limit of the axes, singular interpolations
+    on the right limit.
     """
     runs = drawn.rows(judged_runs(reruns, errors))
     if runs.empty:
@@ -72,7 +72,7 @@ def error_against_gain(
 def _draw_method(
     ax: Axes, runs: pd.DataFrame, ranges: pd.DataFrame, colour: str, marker: str
 ) -> None:
-    """Draw runs, and crosses from the least to the largest gain and error, at the medians."""
+    """Draw runs as dots, and the ranges of gain and error over repetitions as crosses."""
     x, y = runs.gain.to_numpy(float), runs.error.to_numpy(float)
     rim_arrows(ax, x, y, colour=colour, across=GAINS, along=ERRORS)
     ax.plot(
@@ -87,8 +87,8 @@ def _draw_method(
 
 
 def _draw_decades(ax: Axes, runs: pd.DataFrame) -> None:
-    """Share of failed runs by decade of the gain, the number of runs above each bar."""
-    # the last decade holds all that is above, singular interpolations too
+    """Draw the share of failed runs by decade of the gain, with the number of runs per bar."""
+    # the last decade also counts all larger gains, including infinite ones
     upper = np.ceil(np.log10(runs.gain.clip(upper=10.0**DECADES + 1.0))).clip(lower=1)
     decades = runs.groupby(upper.astype(int)).failed.agg(["size", "mean"])
     places = np.arange(len(decades))
@@ -120,12 +120,12 @@ def _draw_decades(ax: Axes, runs: pd.DataFrame) -> None:
     reads={"table": TableOf("ladder")},
 )
 def ladder(options: Scenes, table: pd.DataFrame) -> Figure:
-    """Draw rungs from top (published) to bottom; left the error of the rerun, right the gain.
+    """Draw a row per choice of the method (rung): the error of the run left, the gain right.
 
-    Below the line each row lacks one ingredient of the sound method. A bar shows the range over
-    other training frames, a broad pale one that over choices of the singular vectors' signs for the
-    published method. Runs that blew up before their horizon, and singular interpolations, lie on
-    the right rim.
+    Rows above the line go from the published method to the sound one; rows below it lack one choice
+    of the sound method. A thin bar is the range over other training frames, a broad pale bar the
+    range over signs of the singular vectors for the published method. Runs that blew up before the
+    horizon, and singular interpolations, lie on the right limit of the axes.
     """
     table = options.rows(table)
     table = table[table.gain.notna() & (table.direction != "square")]

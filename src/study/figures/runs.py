@@ -1,4 +1,4 @@
-"""Reduced runs of the scenes of the preprint, beside the full-order ones, at chosen instants."""
+"""Figures of reduced runs of the preprint's scenes and their full-order runs."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -24,11 +24,11 @@ from study.figures.sensitivity_floor import FLOORS, Floors
 from study.tables.kit.reruns import trained
 
 NOISY = {"all": "all axes", "plane": "in the plane", "vertex": "one vertex across"}
-WRONG = 0.1  # of the motion: a run whose error is larger has failed, as one that does not start
-DISTANCES = (1e-4, 1.0)  # extents of the mesh, at the ends of the scale of colours
-FOOTER = 0.55  # inches, for the scale of colours
-TOLERANCE = "ecsw-1e-02"  # of the sampled subspace of the teaser
-MODES = 20  # at most, of that subspace
+WRONG = 0.1  # relative error above which a run has failed; a run that cannot start has failed, too
+DISTANCES = (1e-4, 1.0)  # limits of the colour scale, in extents of the mesh
+FOOTER = 0.55  # height of the colour scale, inches
+TOLERANCE = "ecsw-1e-02"  # method of the position-subspace run in the first figure
+MODES = 20  # largest number of modes k of that subspace
 RUNS: dict[str, Read] = {
     "meshes": EachOf(MESH, "experiments"),
     "full_order": EachOf(TRAIN, "experiments"),
@@ -43,11 +43,11 @@ COMPARED = (
 
 @dataclass(frozen=True)
 class Shown:
-    """An experiment at the instant that is drawn: words for it and the full-order positions there.
+    """Experiment at the drawn frame, with its full-order positions and a text for the frame.
 
-    full : (1, N, 3) m
-    colour : of reduced runs
-    bodies : obstacles, see `obstacles_of`
+    full : (1, N, 3) full-order positions, m
+    colour : RGB colour of the reduced runs
+    bodies : meshes of obstacles, see `obstacles_of`
     """
 
     experiment: Experiment
@@ -65,13 +65,13 @@ class Shown:
         return replace(panel, obstacles=self.bodies).seen_by(self.camera)
 
     def window(self, panels: list[RunPanel]) -> Window:
-        """Window of the full-order run and ``panels``."""
+        """Window of the camera that contains the full-order run and ``panels``."""
         return view.shared_window(self.camera, self.full[0], panels)
 
     def row(
         self, label: str, panels: list[RunPanel], window: Window, note: str | None = None
     ) -> Row:
-        """Row of ``panels`` behind that of the full-order run, with ``label`` below the title."""
+        """Row of the full-order panel followed by ``panels``, with ``label`` below the title."""
         first = RunPanel("full order", style.FULL_ORDER, self.full[0], reference=True)
         panels = [replace(panel, obstacles=self.bodies) for panel in (first, *panels)]
         return Row(
@@ -91,7 +91,7 @@ class Teaser(ReducedRuns):
 
 @dataclass(frozen=True)
 class Runs:
-    """Files that figures of runs read: those of every scene, and ``reruns`` of every method."""
+    """Inputs of figures of runs: files of each scene, and ``reruns`` per scene and method."""
 
     options: ReducedRuns
     drawn: Drawn
@@ -107,11 +107,11 @@ class Runs:
 
     @cached_property
     def floors(self) -> Floors:
-        """Sensitivity floors of the scenes."""
+        """Sensitivity floors and horizons of the scenes."""
         return Floors(self.sensitivity, self.horizon)
 
     def shown(self, experiment: Experiment) -> Shown:
-        """An experiment at the last instant of the options."""
+        """Data of ``experiment`` at the last of the instants in the options."""
         path, instant = experiment.path(self.full_order), self.options.frames[-1:]
         (frame,), full = positions_at(path, instant)
         return Shown(
@@ -126,7 +126,7 @@ class Runs:
         )
 
     def reduced(self, shown: Shown) -> dict[str, list[RunPanel]]:
-        """Panels of the reduced runs of an experiment by method, those of the chosen sizes."""
+        """Method -> panels of the experiment's reduced runs with the basis sizes in the options."""
         found = {}
         for method in self.drawn.methods:
             path = shown.experiment.path(self.reruns, method=method)
@@ -135,7 +135,7 @@ class Runs:
         return found
 
     def rows(self, experiment: Experiment) -> list[Row]:
-        """A row per method; a single one that says so where no method has anything to reduce."""
+        """One row per method, or a single row with a note if no method could run."""
         shown = self.shown(experiment)
         reduced = self.reduced(shown)
         everything = [panel for panels in reduced.values() for panel in panels]
@@ -148,22 +148,22 @@ class Runs:
         ]
 
     def draw(self) -> Figure:
-        """Draw a row per experiment and method: the full-order run, then the reduced by size.
+        """Draw a row per experiment and method: the full-order run, then reduced runs by size.
 
-        All pictures of an experiment show the same instant, the last one of the options, with the
-        same camera; one that does not fit is framed and its scale is given. The grey outline is
+        All pictures of an experiment show the last instant of the options with the same camera. A
+        picture that does not fit has a frame and its own scale, printed below. The grey outline is
         the full-order run.
         """
         return view.draw_rows([row for each in self.drawn.experiments for row in self.rows(each)])
 
 
 def nothing_ran(panels: list[RunPanel]) -> bool:
-    """Whether all ``panels`` are of sizes beyond the rank."""
+    """Whether all ``panels`` belong to basis sizes above the numerical rank, which cannot run."""
     return all(panel.positions is None and not panel.failure for panel in panels)
 
 
 def obstacles_of(experiment: Experiment, positions: np.ndarray) -> list[Mesh] | None:
-    """Obstacles near ``positions`` (F, N, 3) m; None for a floor alone, which has a shadow."""
+    """Obstacles near ``positions`` (F, N, 3) m; None for a floor alone, drawn as a shadow."""
     bodies = obstacles(positions, experiment.effects)
     floor = any(effect.effect == "floor" for effect in experiment.effects)
     return None if floor and len(bodies) == 1 else bodies
@@ -173,7 +173,7 @@ def obstacles_of(experiment: Experiment, positions: np.ndarray) -> list[Mesh] | 
     title="The bar, reduced", caption=f"Bars with tetrahedral constraints: {COMPARED}", reads=RUNS
 )
 def bar_runs(options: ReducedRuns, drawn: Drawn, horizon: Horizon, **files: list[File]) -> Figure:
-    """Draw full-order runs beside reduced ones, see `Runs.draw`."""
+    """Draw full-order and reduced runs in rows, see `Runs.draw`."""
     return Runs(options, drawn, horizon, **files).draw()
 
 
@@ -186,7 +186,7 @@ def bar_runs(options: ReducedRuns, drawn: Drawn, horizon: Horizon, **files: list
 def spring_runs(
     options: ReducedRuns, drawn: Drawn, horizon: Horizon, **files: list[File]
 ) -> Figure:
-    """Draw full-order runs beside reduced ones, see `Runs.draw`."""
+    """Draw full-order and reduced runs in rows, see `Runs.draw`."""
     return Runs(options, drawn, horizon, **files).draw()
 
 
@@ -199,7 +199,7 @@ def spring_runs(
 def strain_runs(
     options: ReducedRuns, drawn: Drawn, horizon: Horizon, **files: list[File]
 ) -> Figure:
-    """Draw full-order runs beside reduced ones, see `Runs.draw`."""
+    """Draw full-order and reduced runs in rows, see `Runs.draw`."""
     return Runs(options, drawn, horizon, **files).draw()
 
 
@@ -224,7 +224,7 @@ def bending_runs(
     noise_runs: list[File],
     **files: list[File],
 ) -> Figure:
-    """Draw reduced runs; where all projections are round-off, runs on bases of it, if any."""
+    """Draw reduced runs; if all projections are round-off, runs on bases of round-off, if any."""
     runs, rows = Runs(options, drawn, horizon, **files), []
     for each in drawn.experiments:
         found, path = runs.rows(each), each.find(noise_runs)
@@ -236,14 +236,14 @@ def bending_runs(
 
 
 def noise_rows(drawn: Drawn, shown: Shown, table: pd.DataFrame, path: str) -> list[Row]:
-    """A row per drawn method and kind of start; below each picture how many of all starts fail.
+    """One row per method and kind of perturbed start; pictures state the number of failed starts.
 
-    Kinds of which as many fail at every size share a row, with a run of the first of them.
+    Kinds of start with equal failure counts at every size share a row, with a run of the first.
 
     Parameters
     ----------
-    table : rows of the table ``noise`` of the experiment that is ``shown``
-    path : file of its runs on bases of round-off
+    table : rows of the table ``noise`` for the experiment in ``shown``
+    path : file of the experiment's runs on bases of round-off
     """
     shown, rows = replace(shown, bodies=None), []
     for method in drawn.methods:
@@ -261,7 +261,7 @@ def noise_rows(drawn: Drawn, shown: Shown, table: pd.DataFrame, path: str) -> li
 
 
 def _alike(table: pd.DataFrame) -> dict[tuple[tuple[int, str], ...], list[str]]:
-    """(r, how many of all starts fail) of every size -> kinds of starts with these counts."""
+    """(size r, text with the number of failed starts) for all sizes -> kinds of start."""
     table = table[table.r <= table["rank"]]
     failed = ~(table.relative_error <= WRONG)
     kinds: dict[tuple[tuple[int, str], ...], list[str]] = {}
@@ -288,11 +288,11 @@ def _alike(table: pd.DataFrame) -> dict[tuple[tuple[int, str], ...], list[str]]:
 def cloth_all_grid(
     options: ReducedRuns, drawn: Drawn, horizon: Horizon, **files: list[File]
 ) -> Figure:
-    """Draw a row per reduced group (first the full-order run), the methods side by side.
+    """Draw a row per reduced group, below a row of the full-order run; methods side by side.
 
-    A method has a column for each instant; instants are shares of the scene's horizon. All pictures
-    have the same camera and scale but for framed ones, whose scale is given. The size is the first
-    of ``options.ranks`` that ran.
+    Each method has a column per instant, a fraction of the scene's horizon. All pictures have the
+    same camera and scale, except framed ones, whose scale is printed. The basis size is the first
+    in ``options.ranks`` that ran.
     """
     runs, one = Runs(options, drawn, horizon, **files), drawn.experiments[0]
     mesh, camera = load_mesh(one.path(runs.meshes)), options.camera(one)
@@ -335,7 +335,7 @@ def cloth_all_grid(
 def _over_time(
     path: str, options: ReducedRuns, title: str, frames: list[int], full: np.ndarray, mesh: Mesh
 ) -> list[RunPanel] | None:
-    """A reduced run at every instant, coloured by its distance; None if no size ran."""
+    """Panels of a reduced run at ``frames``, coloured by distance; None if no size ran."""
     infos = choose_ranks(rerun_infos(path), options.ranks)
     info = next((i for i in infos if not i.marked), None)
     if info is None:
@@ -394,12 +394,12 @@ def teaser(
 def _teaser_row(
     runs: Runs, experiment: Experiment, errors: pd.DataFrame, subspace: str | None
 ) -> Row:
-    """The reduced runs of an experiment in one row, named by their methods.
+    """Row of the full-order and reduced runs of ``experiment``, with methods as titles.
 
     Parameters
     ----------
-    errors : training runs of the table reduced_reruns
-    subspace : file of the runs in position subspaces, if there is one
+    errors : rows of the table reduced_reruns for the training motion
+    subspace : file of the runs in position subspaces, or None
     """
     shown, panels = runs.shown(experiment), []
     reduced = runs.reduced(shown)
@@ -409,7 +409,7 @@ def _teaser_row(
     for method, found in reduced.items() if ran else ():
         own = errors[(errors.group == experiment.group) & (errors.method == method)]
         drawn = [panel for panel in found if panel.positions is not None]
-        # the largest sizes where the study has none of those that are chosen
+        # if no chosen size exists, the panels are those of the largest sizes
         sizes = (drawn or found)[-(len(runs.options.ranks) or 1) :]
         own = own[own.position_basis == "full"]
         panels += [_with_error(panel, method, own, "r") for panel in sizes]
@@ -421,7 +421,7 @@ def _teaser_row(
 
 
 def _with_error(panel: RunPanel, method: str, rows: pd.DataFrame, size: str) -> RunPanel:
-    """A panel with its method in the title, and its error before the horizon below."""
+    """``panel`` with its method in the title, and its error within the horizon below."""
     number = int(panel.title.split()[2])
     error = rows[rows[size] == number].relative_error_within_horizon.dropna()
     remark = f"error {error.iloc[0]:.2g}" if len(error) else panel.remark
@@ -429,7 +429,7 @@ def _with_error(panel: RunPanel, method: str, rows: pd.DataFrame, size: str) -> 
 
 
 def _subspace(frame: int, path: str) -> RunPanel | None:
-    """Panel of the run with sampled elements; None where a configuration has none that small."""
+    """Panel of the position-subspace run at ``frame``; None without a run of at most MODES."""
     colour = style.surface_colour(style.GREEN)
     with open_hdf5(path) as file:
         models = file["models"]

@@ -1,4 +1,4 @@
-"""Samplings drawn on the mesh: the iterations of DEIM, the elements that its entries hit."""
+"""Figures of samplings on the mesh: iterations of DEIM, and elements with sampled entries."""
 
 from dataclasses import dataclass
 
@@ -28,32 +28,32 @@ NEWEST = {
     "markerfacecolor": "none", "markeredgecolor": style.SKY, "markeredgewidth": 1.6,
     "markersize": 8.5,
 }  # fmt: skip
-SEVERAL = "several"  # axes, of the entries that hit an element
+SEVERAL = "several"  # label of elements with sampled entries of several axes
 AXES = {**style.AXES, SEVERAL: "#333333"}
-ROW_HEIGHT = 1.85  # inches
+ROW_HEIGHT = 1.85  # height of a row of panels, inches
 
 
 class Steps(View):
-    """Number of iterations; the first scene and method are drawn."""
+    """Options: view and number of iterations; only the first scene and method are drawn."""
 
     count: Count = 6
     columns: Columns = 3
 
 
 class Entries(View):
-    """The first size that exists is drawn on the mesh."""
+    """Options: view and basis sizes, of which the first that exists is drawn on the mesh."""
 
     ranks: Ranks = ()
 
 
 @dataclass(frozen=True)
 class Iteration:
-    """Step k of a greedy selection.
+    """Step k of a greedy selection of samples.
 
-    magnitude : (e,) on each element the residual of mode k in the measure that the selection
-        takes the largest of: its largest entry (``rows`` "scalar"), the largest norm of one of its
-        rows over x, y, z ("joint"), or the norm of all its entries ("element")
-    earlier, newest : elements picked before, and in this step
+    magnitude : (e,) residual of mode k per element, in the measure that the selection maximises:
+        the largest entry (``rows`` "scalar"), the largest norm of a row over x, y, z ("joint"),
+        or the norm of all entries of the element ("element")
+    earlier, newest : indices of the elements picked before, and of the element of this step
     entry : vector index of the (first) entry picked in this step
     """
 
@@ -85,7 +85,7 @@ def deim_iterations(
 ) -> Figure:
     """Draw per step the residual of the current mode on the mesh and the elements picked so far.
 
-    The first experiment and the first method that exist are drawn.
+    Only the first experiment and the first method that exist are drawn.
     """
     method, reduction = next(iter(drawn.reductions.items()), ("", None))
     if not samples or reduction is None or reduction.rows == "all":
@@ -132,28 +132,28 @@ def _draw_step(
 def iterations(
     V: np.ndarray, entries: np.ndarray, rows_per_element: int, rows: str, count: int
 ) -> list[Iteration]:
-    """First ``count`` steps of a greedy selection.
+    """First ``count`` steps of a greedy selection, recomputed from the selected entries.
 
-    The residual of step k is v_k - V_{k-1} c with c from the equations sampled so far
-    (Chaturantabut and Sorensen 2010, algorithm 1); the next sample is where it is largest.
+    The residual of step k is v_k - V_{k-1} c, with c from the equations at the samples so far
+    (Chaturantabut and Sorensen 2010, algorithm 1). The next sample is where it is largest.
 
     Parameters
     ----------
-    V : (3 e p, rank) modes, p ``rows_per_element``
-    entries : vector indices as selected: one a step for ``rows`` "scalar" and "joint" (there the x
-        entry of a row stands for the row), 3 p a step for "element"
+    V : (3 e p, rank) modes of e elements with p = ``rows_per_element``
+    entries : vector indices in the order of selection: one per step for ``rows`` "scalar" and
+        "joint" (the x entry of a row represents the row), 3 p per step for "element"
 
     Raises
     ------
     StorageError
-        An entry lies outside the basis, or there are not enough for one step.
+        If an entry lies outside the basis, or there are too few entries for one step.
     """
     per_step = 3 * rows_per_element if rows == "element" else 1
     if len(entries) < per_step or entries.min() < 0 or entries.max() >= len(V):
         raise StorageError(f"{len(entries)} sampled entries do not fit a basis of {len(V)} rows")
     residual_of = _joint_residual if rows == "joint" else _shared_residual
     per_element = 3 * rows_per_element
-    length = {"scalar": 1, "joint": 3, "element": per_element}[rows]  # of what is measured
+    length = {"scalar": 1, "joint": 3, "element": per_element}[rows]  # entries per norm
     steps = []
     for k in range(min(count, len(entries) // per_step, V.shape[1])):
         residual = residual_of(V, entries[: k * per_step], k)
@@ -180,7 +180,7 @@ def _shared_residual(V: np.ndarray, entries: np.ndarray, k: int) -> np.ndarray:
 
 
 def _joint_residual(V: np.ndarray, entries: np.ndarray, k: int) -> np.ndarray:
-    """Residual of mode k with one set of coefficients per axis, from the same rows."""
+    """Residual of mode k with separate coefficients for each axis, from the same rows."""
     split = V.reshape(-1, 3, V.shape[1])
     residual = np.empty(split.shape[:2])
     for axis in range(3):
@@ -206,10 +206,10 @@ def _joint_residual(V: np.ndarray, entries: np.ndarray, k: int) -> np.ndarray:
 def deim_entries(
     options: Entries, drawn: Drawn, meshes: list[File], snapshots: list[File], samples: list[File]
 ) -> Figure:
-    """Draw a row per experiment: the elements hit, entries per element, and numbers computed.
+    """Draw a row per experiment: sampled elements, entries per element, and numbers computed.
 
-    Single-entry methods are compared with the other methods of the specification, which sample
-    whole elements or rows; the first of them is drawn on the mesh, at the largest r.
+    The first method that samples single entries is drawn on the mesh, at the requested or largest
+    r. The right panel compares it with all other methods.
     """
     methods = drawn.methods
     scalar = [m for m in methods if drawn.reductions[m].rows == "scalar"]
@@ -249,7 +249,7 @@ def deim_entries(
 def _draw_hits(
     ax: Axes, elements: ElementMap, entries: np.ndarray, per_element: int, camera: Camera
 ) -> None:
-    """Draw a dot on each element that ``entries`` hit, in the colour of their axis."""
+    """Draw a dot on each element with sampled ``entries``, in the colour of their axis."""
     hit: dict[int, str] = {}
     for entry in entries:
         element, axis = int(entry) // per_element, "xyz"[int(entry) % 3]

@@ -1,4 +1,4 @@
-"""Drift of runs that start almost alike, and the horizons of scenes that follow."""
+"""Figure of the drift between full-order runs with perturbed starts, and of scene horizons."""
 
 from collections.abc import Sequence
 
@@ -16,7 +16,7 @@ from study.figures.kit.declaration import figure
 from study.figures.kit.options import Columns, Drawn, NothingToDraw, Scenes
 from study.tables.kit.reruns import TWIN
 
-# What a figure with sensitivity floors reads.
+# Inputs of a figure that needs sensitivity floors.
 FLOORS: dict[str, Read] = {
     "sensitivity": EachOf(SENSITIVITY, "experiments"),
     "horizon": Setting("horizon"),
@@ -25,16 +25,16 @@ COLUMNS = ["scene", "perturbation", "frame", "relative_difference"]
 
 
 class Floors:
-    """Floor and horizon of a scene at the study's reference perturbation.
+    """Sensitivity floor (drift of perturbed runs by frame) and horizon of each scene.
 
     Parameters
     ----------
-    sensitivity : table of the perturbed runs of each scene
+    sensitivity : files with tables of the perturbed runs, one per scene
 
     Raises
     ------
     StorageError
-        The file of a scene that is asked for is damaged or lacks a column.
+        If the file of a requested scene is damaged or lacks a column.
     """
 
     def __init__(self, sensitivity: Sequence[File], horizon: Horizon) -> None:
@@ -43,9 +43,9 @@ class Floors:
         self._floors: dict[str, np.ndarray] = {}
 
     def of(self, scene: str) -> np.ndarray:
-        """Largest relative difference of all seeds of ``scene`` by frame (F,).
+        """Largest relative difference by frame (F,) over all seeds of ``scene``.
 
-        It is empty without perturbed runs.
+        The array is empty if the scene has no perturbed runs.
         """
         if scene not in self._floors:
             table = read_table(self._paths[scene], COLUMNS)
@@ -59,7 +59,7 @@ class Floors:
         return end if end < len(floor) else None
 
     def instant(self, scene: str, frame: int) -> str:
-        """Label of a frame; one past the scene's horizon says so: there no run can be judged."""
+        """Label of ``frame``, marked past the scene's horizon, where errors cannot be judged."""
         end = self.horizon(scene)
         return f"frame {frame}" if end is None or frame <= end else f"frame {frame}, past horizon"
 
@@ -68,7 +68,7 @@ LOW, HIGH = 1e-12, 1e2
 
 
 class Floored(Scenes):
-    """Scenes, and panels side by side."""
+    """Options: scenes, and the number of panels side by side."""
 
     columns: Columns = 3
 
@@ -86,10 +86,10 @@ class Floored(Scenes):
 def sensitivity_floor(
     options: Floored, drawn: Drawn, sensitivity: list[File], horizon: Horizon
 ) -> Figure:
-    """Draw a panel per kind of scene, a line per scene: its spread under a perturbed start.
+    """Draw a panel per kind of scene, and in it the floor of each scene over the frames.
 
-    The grey line is the threshold; a dot marks the frame at which a scene crosses it, its horizon,
-    given in the legend. A twin has the colour of its scene and is dashed.
+    The grey line is the threshold. A dot marks the horizon, the frame at which a scene exceeds the
+    threshold. A variant of a scene ("twin") has the colour of the scene and is dashed.
     """
     floors = Floors(sensitivity, horizon)
     kinds: dict[str, list[str]] = {}

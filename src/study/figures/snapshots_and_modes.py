@@ -1,4 +1,4 @@
-"""Snapshots of a group's projections and the first POD modes, drawn on the mesh."""
+"""Figure of the snapshots of a group's projections and of their first POD modes on the mesh."""
 
 import numpy as np
 
@@ -16,15 +16,15 @@ from study.figures.kit.declaration import figure
 from study.figures.kit.elements import SIGNED, ElementMap, element_map, signed, signed_entry
 from study.figures.kit.options import Count, Drawn, Instants, NothingToDraw, View
 
-# inches: (left end, width, height) of the four matrices, whose upper ends are level
+# (left end, width, height) in inches of the four matrices, aligned at their upper ends
 BLOCKS = ((0.75, 1.6, 1.9), (2.8, 1.6, 1.9), (4.8, 0.85, 0.85), (6.0, 0.85, 0.85))
 SIGNS = ((2.575, "="), (4.6, "×"), (5.825, "×"))
-ABOVE, TITLE, FOOTER = 0.36, 0.34, 0.44  # room for two lines, for a title, for the scale
-LEFT, TALLEST = 0.75, 1.45  # where pictures begin, and how high they may be
+ABOVE, TITLE, FOOTER = 0.36, 0.34, 0.44  # inches for two lines, for a title, for the scale
+LEFT, TALLEST = 0.75, 1.45  # left end and largest height of pictures, inches
 
 
 class Snapshots(View):
-    """Instants, and the number of modes."""
+    """Options: view, instants of the snapshots, and the number of modes."""
 
     frames: Instants = (0.1, 0.5, 0.9)
     count: Count = 6
@@ -57,9 +57,9 @@ def snapshots_and_modes(
 ) -> Figure:
     """Draw snapshots less their mean = modes x singular values x coefficients, as matrices.
 
-    Below them columns of the first matrix, on the moving mesh, and of the second, on the mesh at
-    rest; each is coloured by one of the entries that an element has, with its sign: the one that is
-    largest somewhere. The first experiment and method that exist are drawn.
+    Below are columns of the snapshot matrix on the moving mesh, and modes on the mesh at rest. Each
+    element has the colour of one of its entries, the entry that is largest on some element. Only
+    the first experiment and method that exist are drawn.
     """
     if not bases:
         raise NothingToDraw(options.words())
@@ -102,7 +102,7 @@ def _height(window: Window, count: int) -> float:
 
 
 def _draw_product(figure: Figure, basis: BasisView, centred: np.ndarray, title: str) -> None:
-    """The four matrices; rows of the first two are sorted by axis, those of x first."""
+    """Draw the four matrices; rows of snapshots and modes are sorted by axis, first x."""
     from matplotlib.colors import LogNorm
 
     rank, tiny = basis.rank, np.finfo(float).tiny
@@ -148,7 +148,7 @@ def _draw_matrix(ax: Axes, matrix: np.ndarray, title: str) -> None:
 
 
 def _row(figure: Figure, count: int, bottom: float, height: float, label: str) -> list[Axes]:
-    """Axes of a row of pictures, inches from below, with a label on their left."""
+    """Axes for a row of pictures, ``bottom`` inches from below, with ``label`` on the left."""
     whole, step = figure.get_figheight(), (style.WIDTH - LEFT) / max(count, 1) / style.WIDTH
     middle = (bottom + 0.5 * height) / whole
     figure.text(0.008, middle, label, va="center", fontsize=7.5)
@@ -170,7 +170,7 @@ def _draw_column(
     rows: int,
     camera: Camera,
 ) -> str:
-    """Draw one signed entry of each element, relative to the largest; the words for the entry."""
+    """Draw one signed entry of each element, over the largest; return the name of the entry."""
     values, words = signed_entry(column, rows)
     largest = max(float(np.abs(values).max()), np.finfo(float).tiny)
     elements.draw(ax, points, values / largest, camera, signed())

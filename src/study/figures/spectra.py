@@ -1,4 +1,4 @@
-"""Singular values of the snapshots, and the error of reconstructed ones, by basis size."""
+"""Figures of singular values of the snapshots, and of reconstruction errors by basis size."""
 
 from pathlib import Path
 
@@ -14,7 +14,7 @@ from study.figures.kit.declaration import figure
 from study.figures.kit.options import Beside, Drawn, Experiment, Methods, NothingToDraw
 
 VALUES = (1e-17, 3.0)
-ERRORS = (1e-7, 1e3)  # errors outside are drawn on the limit
+ERRORS = (1e-7, 1e3)  # limits of the error axis; errors outside are drawn on them
 PUBLISHED = "#B5B5B5"
 PUBLISHED_CODE = "config/reference/published_code"
 REGION = "#F1EFEB"
@@ -23,13 +23,13 @@ Panel = tuple[Axes, Experiment, pd.DataFrame]
 
 
 class Reconstruction(Beside, Methods):
-    """Errors of reconstructed snapshots."""
+    """Options: scenes, methods and scenes of the published code."""
 
 
 def _panels(
     options: Beside, drawn: Drawn, table: pd.DataFrame, limits: tuple[float, float], legend: int
 ) -> tuple[Figure, list[Panel]]:
-    """A panel for each experiment with rows in ``table``; ``legend`` lines are left below."""
+    """Figure with a panel per experiment in ``table`` and space for ``legend`` lines below."""
     pairs = [
         (each, rows)
         for each in drawn.experiments
@@ -45,7 +45,7 @@ def _panels(
 
 
 def _published(path: Path, columns: list[str], options: Beside, each: Experiment) -> pd.DataFrame:
-    """Output of the published code that is drawn beside an experiment, perhaps without rows."""
+    """Rows of the published code's output ``path`` for ``each`` experiment; may be empty."""
     output = read_table(path, ["experiment", "group", *columns], result=False)
     name = options.published.get(each.scene)
     return output[(output.experiment == name) & (output.group == each.group)]
@@ -90,13 +90,13 @@ def singular_values(options: Beside, drawn: Drawn, table: pd.DataFrame, publishe
 
 
 def _draw_values(ax: Axes, rows: pd.DataFrame, colour: str, marker: str) -> None:
-    """Draw values, those of round-off hollow in a shaded region.
+    """Draw singular values; values that are round-off are hollow, in a shaded region.
 
-    It ends between the smallest true value and the largest one that is round-off.
+    The region ends between the smallest value above round-off and the largest at round-off.
     """
     component = rows.component.to_numpy(float)
     above = rows.above_roundoff.astype(bool).to_numpy()
-    # exact zeros have no place on a logarithmic axis; they lie on its lower rim
+    # zeros cannot be drawn on a logarithmic axis and are raised to its lower limit
     shown = np.clip(np.nan_to_num(rows.relative.to_numpy(float)), VALUES[0], None)
     if not above.all():
         limit = np.sqrt(shown[~above].max() * shown[above].min()) if above.any() else VALUES[1]
@@ -130,10 +130,10 @@ def _draw_values(ax: Axes, rows: pd.DataFrame, colour: str, marker: str) -> None
 def reconstruction_error(
     options: Reconstruction, drawn: Drawn, table: pd.DataFrame, published: Path
 ) -> Figure:
-    """Draw a panel per experiment, a line per method and split; errors outside lie on the rim.
+    """Draw a panel per experiment with the error of each method and split over the basis size.
 
-    An experiment without any error (its projections are round-off) has a panel that says so. The
-    published table has errors of the x and y axes and no total.
+    If an experiment has no errors because its projections are round-off, its panel has a note. The
+    published code's table has errors of the x and y axes, but no total error.
     """
     methods = [m for m in drawn.methods if (table.method == m).any()]
     if not methods:
@@ -166,7 +166,7 @@ def reconstruction_error(
 
 
 def _draw_method(ax: Axes, rows: pd.DataFrame, method: str) -> bool:
-    """Draw the errors of a method, if it has any; arrow heads on the upper rim are larger ones."""
+    """Draw the errors of ``method``, with arrows for larger ones; return whether it has any."""
     colour, marker = style.method_styles([method])[method]
     drawn = False
     for split, dashes in style.SPLITS.items():

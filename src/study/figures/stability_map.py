@@ -1,4 +1,4 @@
-"""The stability map: how every reduced run of the study ended."""
+"""Figure of the stability map: the outcome of every reduced run of the study."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,19 +11,19 @@ from study.artifact.reads import TableOf
 from study.figures.kit.declaration import figure
 from study.figures.kit.options import Drawn, Methods, NothingToDraw, Ranks
 
-CELLS = 48  # of one strip; more blocks make another strip
-ROW = 0.145  # inches
+CELLS = 48  # largest width of a strip in cells; further blocks go to another strip
+ROW = 0.145  # height of a row of cells, inches
 GAP = 0.45  # between blocks, in cells
-LEAST = 2.0  # cells, that a title needs
-DENSE = 30  # cells across, from which on labels stand upright and titles take two lines
+LEAST = 2.0  # least width of a title, in cells
+DENSE = 30  # above this number of columns, labels are vertical and titles have two lines
 
 
 @dataclass(frozen=True)
 class Look:
-    """Face colour, mark in the cell and its colour, words of the legend.
+    """Look of an outcome: cell colour, symbol in the cell and its colour, legend text.
 
-    The classes differ in lightness, too, and those of failures carry a mark, so that they can be
-    told apart without colour. A blow-up carries its frame.
+    Outcomes also differ in lightness, and cells of failed runs have a symbol, so that they can be
+    told apart without colour. The symbol of a blow-up is its frame.
     """
 
     face: str
@@ -47,7 +47,7 @@ Cells = dict[tuple[str, str], pd.Series]  # (scene, group) -> row of the table
 
 @dataclass(frozen=True)
 class Block:
-    """Neighbouring columns under one title: labels, and the cells of each."""
+    """Neighbouring columns under one title, with a label and the cells of each column."""
 
     title: str
     labels: Sequence[str]
@@ -56,19 +56,19 @@ class Block:
 
 @dataclass(frozen=True)
 class Strip:
-    """Blocks side by side that share their rows, (scene, group) -> label."""
+    """Blocks side by side with common rows; ``rows`` maps (scene, group) to a label."""
 
     rows: dict[tuple[str, str], str]
     blocks: Sequence[Block]
     xlabel: str
 
     def outcomes(self) -> set[str]:
-        """Outcomes that occur."""
+        """Outcomes of the runs in the strip."""
         cells = [column.get(key) for b in self.blocks for column in b.columns for key in self.rows]
         return {str(cell.outcome) for cell in cells if cell is not None}
 
     def draw(self, ax: Axes) -> None:
-        """Draw on ``ax`` a cell for each row and column; some stay empty."""
+        """Draw a cell on ``ax`` for each row and column that has a run; others stay empty."""
         x, ticks = 0.0, []
         labels = [label for block in self.blocks for label in block.labels]
         dense = len(labels) > DENSE
@@ -108,7 +108,7 @@ def _draw_cell(ax: Axes, x: float, y: float, found: pd.Series) -> None:
 
 
 class Sizes(Methods):
-    """Scenes, methods and basis sizes."""
+    """Options: scenes, methods and basis sizes."""
 
     ranks: Ranks = ()
 
@@ -125,10 +125,10 @@ class Sizes(Methods):
     reads={"table": TableOf("stability")},
 )
 def stability_map(options: Sizes, drawn: Drawn, table: pd.DataFrame) -> Figure:
-    """Draw strips of blocks: a block per method, its columns are sizes; a row per experiment.
+    """Draw strips of blocks: a block per method with a column per size; a row per experiment.
 
-    Runs with unreduced positions come first, then those in position subspaces. Experiments in which
-    nothing ran, because their projections are round-off, are left out.
+    Runs with unreduced positions come first, then runs in position subspaces. Experiments in which
+    no reduction could run, because their projections are round-off, are left out.
     """
     table = options.rows(table)
     table = table[(table.experiment == "rerun") & (table.group.notna())]
@@ -192,7 +192,7 @@ def _cells(rows: pd.DataFrame) -> Cells:
 
 
 def _wrapped(rows: dict[tuple[str, str], str], blocks: list[Block], xlabel: str) -> list[Strip]:
-    """Strips of at most `CELLS` cells."""
+    """Strips with common ``rows``, each with as many ``blocks`` as fit into `CELLS` cells."""
     parts: list[list[Block]] = []
     used = 0
     for block in blocks if rows else ():

@@ -1,4 +1,4 @@
-"""The tables of the study, one module a subject; see `study.tables.kit.declaration`."""
+"""Tables of the study, one module per subject; see `study.tables.kit.declaration`."""
 
 from study.tables.kit.declaration import declared
 

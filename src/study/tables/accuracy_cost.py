@@ -1,6 +1,6 @@
-"""Accuracy and its cost: each method and size as a point (error, time), and requested tolerances.
+"""Tables of error against time: each method and size as a point, and requested tolerances.
 
-Errors of the points have one of two references, and only rows with the same one may be compared:
+The error of a point has one of two references; only rows with the same reference are comparable:
 
 =================  ==================================================================
 method             error against
@@ -9,9 +9,9 @@ fom, fom-anderson  the full-order run whose frames are converged (K -> infinity)
 every other        the scene's own full-order run, which has finitely many iterations
 =================  ==================================================================
 
-Among the others, ``full`` without a position subspace is that own run (error zero by definition),
-and ``fewer-iterations`` is the full-order run stopped earlier: what a reduction has to beat.
-``fom-anderson`` are full-order runs with accelerated iterations.
+Among the other methods, ``full`` without a position subspace is the scene's own full-order run,
+with error zero by definition. ``fewer-iterations`` is the full-order run with fewer iterations,
+which a reduction must beat. ``fom-anderson`` is a full-order run with accelerated iterations.
 """
 
 from collections.abc import Mapping, Sequence
@@ -68,13 +68,13 @@ def accuracy_cost(
     models: list[File],
     iterations: Mapping[str, int],
 ) -> pd.DataFrame:
-    """Points of the reruns whose error within the horizon and time exist, and full-order runs.
+    """Points of reduced runs with a known error within the horizon and time, and full-order runs.
 
-    A point is Pareto-optimal among those of its scene with the same reference.
+    A point is Pareto-optimal among the points of its scene whose errors have the same reference.
 
     Parameters
     ----------
-    iterations : scene -> its own local/global iterations K per frame
+    iterations : scene -> number K of local/global iterations per frame in the scene's settings
     """
     times = timings_in_one_time(timings, frame_times)
     times = times[times.implementation == "compiled"]
@@ -89,7 +89,7 @@ def accuracy_cost(
     full["error_converged"] = [own.get((scene, iterations[scene]), np.nan) for scene in full.scene]
     parts = [full.assign(iterations=full.scene.map(iterations)), points, sweep]
     points = pd.concat([part for part in parts if len(part)], ignore_index=True)
-    # full is also the name of a model whose positions alone are reduced
+    # "full" is also the method name of models that reduce the positions but not the projections
     unreduced = (points.method == "full") & (points.position_basis == "full")
     reduced = points.method.isin(reruns.method) & ~unreduced
     unseen = points[MEDIAN].where(reduced, points.relative_error_within_horizon)
@@ -105,7 +105,7 @@ def accuracy_cost(
 
 
 def _sweep(errors: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
-    """Full-order runs of every K against the converged one, and those stopped early."""
+    """Full-order runs for every K against the converged run, and again as fewer-iterations."""
     full = times[times.method.isna() | times.method.isin([FOM, ANDERSON])]
     cost = full[["scene", "method", "iterations", "ms_per_frame"]]
     cost = cost.fillna({"method": FOM})
@@ -122,12 +122,12 @@ def _sweep(errors: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
 
 
 def reference_of(points: pd.DataFrame) -> pd.Series:
-    """Reference of the error of each row of ``points``: `CONVERGED` or `OWN`."""
+    """Reference of the error in each row of ``points``: `CONVERGED` or `OWN`."""
     return points.method.isin([FOM, ANDERSON]).map({True: CONVERGED, False: OWN})
 
 
 def pareto(error: Sequence[float], cost: Sequence[float]) -> list[bool]:
-    """Whether no other point is as good in ``error`` and ``cost`` and better in one of them."""
+    """Whether, for each point, no other is as good in ``error`` and ``cost`` and better in one."""
     return [
         not any((e <= a) & (c <= b) & ((e < a) | (c < b)) for e, c in zip(error, cost, strict=True))
         for a, b in zip(error, cost, strict=True)
@@ -167,7 +167,7 @@ def pareto(error: Sequence[float], cost: Sequence[float]) -> list[bool]:
     reads={"runs": Every(paths.REQUESTED_TOLERANCES)},
 )
 def requested_tolerances(runs: list[File]) -> pd.DataFrame:
-    """Rows of the ``runs`` of all scenes."""
+    """Rows of all scenes, one per run with a requested tolerance, from the files ``runs``."""
     rows = joined(runs)
     if rows.empty:
         return rows

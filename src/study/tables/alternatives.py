@@ -1,6 +1,6 @@
-"""Projective dynamics, what else there is, and a reduction: errors and times, and who wins.
+"""Errors and times of projective dynamics, of alternative solvers and of a reduction.
 
-Table winners says who reaches an error in the shortest time, and on which meshes a reduction does.
+Table winners gives the fastest method for each error and the meshes on which a reduction is faster.
 """
 
 from collections.abc import Sequence
@@ -23,17 +23,17 @@ SUBSTEPS = integer("substeps", "steps that a frame is divided into")
 ITERATIONS = integer("iterations", "iterations of each substep")
 
 MOTION = text("motion", f"held-out motion, one of: {', '.join(MOTIONS)}")
-# What tells candidates apart, whatever the motion.
+# Columns that identify a candidate (a solver with its settings) in all motions.
 CANDIDATE = ["scene", "factor", "stiffness", *settings.SETTING]
 
-# Rounding decides which iterate of a two-level iteration is refused: its errors have few digits.
+# Rounding decides which iterates a two-level iteration rejects; its errors have few exact digits.
 LOOSE = 0.3
 REFERENCES = ("implicit", "continuous")
 CASE = ["scene", "vertices", "stiffness", "motion"]
 SPEEDUP = ("reduced_speedup", "reduced_speedup_low", "reduced_speedup_high")
 CURVE = ["scene", "stiffness", "reference", "limit"]
 PLAIN = "projective"
-KNOWN = 3.0  # a motion decides about an error only if it is known this many times better
+KNOWN = 3.0  # a motion counts for an error limit of at least this factor times its reference error
 
 
 @table(
@@ -69,9 +69,9 @@ KNOWN = 3.0  # a motion decides about an error only if it is known this many tim
     reads={"parts": Every(paths.ALTERNATIVES), "times": Every(paths.ALTERNATIVE_TIMES)},
 )
 def alternatives(parts: list[File], times: list[File]) -> pd.DataFrame:
-    """Rows of all scenes and meshes, in the order of their ``parts``; held-out motions.
+    """One row per candidate and held-out motion, in the order of the files ``parts``.
 
-    ``times`` are those of every process; their medians count.
+    ``times`` has the frame times measured in each process; the table gives their medians.
     """
     rows = joined(parts)
     if rows.empty:
@@ -89,12 +89,12 @@ def alternatives(parts: list[File], times: list[File]) -> pd.DataFrame:
 def beside(rows: pd.DataFrame, times: pd.DataFrame) -> tuple[pd.DataFrame, list[int]]:
     """``rows`` with a column of ``times`` (ms) for each process, and the names of these columns."""
     wide = times.set_index([*CANDIDATE, "process"]).ms_per_frame.unstack("process")
-    words = {"trained_on": object}  # where nothing is reduced, it would be a number
+    words = {"trained_on": object}  # without any reduction, pandas would read a column of numbers
     both = (table.astype(words) for table in (rows, wide.reset_index()))
     return pd.merge(*both, on=CANDIDATE, how="left"), list(wide.columns)
 
 
-# A time decides which row of alternatives wins, hence all that is said of it.
+# The winning row depends on the measured times, hence all columns about it are marked as timed.
 @table(
     title="Who reaches an error in the shortest time",
     columns=(
@@ -141,10 +141,10 @@ def beside(rows: pd.DataFrame, times: pd.DataFrame) -> tuple[pd.DataFrame, list[
     },
 )
 def winners(rows: pd.DataFrame, times: list[File], limits: Sequence[float]) -> pd.DataFrame:
-    """One row per scene, mesh, stiffness, motion, reference and error; no method where none does.
+    """One row per scene, mesh, stiffness, motion, reference and error limit.
 
-    Errors that are too small to be told from that of the motion in continuous time have no row.
-    Among the methods of the first motion are those that no other motion has.
+    The method is empty where none reaches the limit. Limits below `KNOWN` times the error of the
+    continuous-time reference have no row. Some methods run in the first motion only.
     """
     found = []
     if len(rows):
@@ -168,9 +168,9 @@ def winners(rows: pd.DataFrame, times: list[File], limits: Sequence[float]) -> p
 
 
 def _best(rows: pd.DataFrame, limit: float, processes: list[int]) -> dict[str, object]:
-    """First, second and reduced one to reach ``limit``; what nobody does is left out.
+    """Columns of the fastest, second and reduced method within ``limit``; absent where none is.
 
-    A speed-up is a ratio within each of the ``processes`` that timed both.
+    A speed-up is the median ratio of two times measured in the same one of the ``processes``.
     """
     reaching = rows[rows.error <= limit].sort_values("ms_per_frame", kind="stable")
     inside = reaching.method.isin(REDUCTIONS)
@@ -198,8 +198,8 @@ def _best(rows: pd.DataFrame, limit: float, processes: list[int]) -> dict[str, o
 
 
 def _pays(curve: pd.DataFrame) -> dict[str, object]:
-    """Smallest mesh from which on a reduction pays in every motion, or none, and by how much."""
-    # NaN where one motion is not reached
+    """Mesh sizes from which a reduction is faster in every motion (or None), and its speed-ups."""
+    # NaN where a method misses the error limit in one of the motions
     every = curve.assign(plain=curve.plain_ms / curve.reduced_ms)
     worst = every.groupby("vertices")[["plain", "reduced_speedup"]].agg(
         lambda speedups: speedups.min(skipna=False)
@@ -219,7 +219,7 @@ def _pays(curve: pd.DataFrame) -> dict[str, object]:
 
 
 def _pays_from(sizes: np.ndarray, speedups: np.ndarray) -> int | None:
-    """Smallest mesh from which on all ``speedups`` exceed one."""
+    """Smallest of ``sizes`` from which all ``speedups`` exceed one; None if there is none."""
     losing = np.flatnonzero(~(speedups > 1.0))
     first = int(losing[-1]) + 1 if len(losing) else 0
     return int(sizes[first]) if first < len(sizes) else None

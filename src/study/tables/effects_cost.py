@@ -1,4 +1,4 @@
-"""Cost of the parts of a full-order run: its effects, its local step, and a larger mesh."""
+"""Tables of the cost of a full-order run: by effect, by local step, and by size of the mesh."""
 
 import numpy as np
 import pandas as pd
@@ -13,12 +13,12 @@ from study.tables.kit.parts import in_one_time, joined, timings_in_one_time
 from study.tables.kit.vocabulary import shared
 
 KEYS = ["scene", "effect"]
-NOTHING = "nothing"  # left out: the whole scene
+NOTHING = "nothing"  # value of the column effect for the whole scene, with no effect left out
 PHASE, SEVERAL = "phase", "several"
 IMPLEMENTATIONS = ("interpreted", "numpy", "compiled")
 EXPONENTS = {"ms_per_iteration": "exponent", "local_ms": "local_exponent",
              "global_ms": "global_exponent"}  # fmt: skip
-FEWEST = 3  # meshes, for an exponent
+FEWEST = 3  # least number of meshes for the fit of an exponent
 
 
 @table(
@@ -70,15 +70,15 @@ def effects_cost(
     sensitivity: pd.DataFrame,
     horizon: Horizon,
 ) -> pd.DataFrame:
-    """Effects and phases of each scene, then what was left out together in scenes of many groups.
+    """One row per effect or phase of a scene, then one per set of effects left out together.
 
     Parameters
     ----------
-    parts, left_out : times of effects, and of scenes without some of them; they are brought to
-        those of the table ``frame_times``
+    parts, left_out : times of effects, and of scenes without some of them; they are scaled to the
+        full-order times in ``frame_times`` by `in_one_time`
     contributions : forces and energies by frame
-    sensitivity, horizon : see `horizons`; ``moved`` is empty for the only group of
-        a scene, which cannot be left out
+    sensitivity, horizon : arguments of `horizons`, the end of each scene's comparable frames;
+        ``moved`` is empty for the only group of a scene, which cannot be left out
     """
     costs, removed = joined(parts), joined(left_out)
     if costs.empty:
@@ -107,27 +107,27 @@ def effects_cost(
 
 
 def _absent(rows: pd.DataFrame, others: pd.DataFrame) -> np.ndarray:
-    """Whether each of ``rows`` has a scene and effect that ``others`` have not."""
+    """Boolean array: whether ``others`` lacks the scene and effect of each of ``rows``."""
     keys, known = (pd.MultiIndex.from_frame(each[KEYS]) for each in (rows, others))
     return ~keys.isin(known)
 
 
 def _acting(frames: pd.DataFrame, sensitivity: pd.DataFrame, horizon: Horizon) -> pd.DataFrame:
-    """Force and energy of each effect in ``frames``, and how far the run moves without it."""
+    """Force and energy of each effect in ``frames``, and drift of the run without this effect."""
     made = frames.groupby([*KEYS, "role"], sort=False, as_index=False).agg(
         force=("force", lambda force: float(np.sqrt(np.mean(np.square(force))))),
         acting_frames=("force", lambda force: int((force > 0.0).sum())),
         energy=("energy", lambda of: float(of.max() - of.min() if len(of) > 1 else of.iloc[0])),
     )
     length = frames.groupby("scene").frame.max() + 1
-    # a start has a row in the first frame only
+    # an effect with role "start" has a row in the first frame only; take the RMS over all frames
     starts = made.role == "start"
     made.loc[starts, "force"] /= np.sqrt(made.scene[starts].map(length).to_numpy(float))
     made["force_share"] = made.force / made.groupby("scene").force.transform("sum")
     ends = horizons(sensitivity, horizon.perturbation, horizon.threshold)
 
     def largest(scene: str, label: float | str) -> float | None:
-        """Largest drift before the horizon; None where there was no such run or no such frame."""
+        """Largest drift of run ``label`` before the horizon; None without such a run or frame."""
         drift = floor_of(sensitivity, scene, label)[: ends[scene]]
         return float(drift.max()) if len(drift) else None
 
@@ -150,9 +150,9 @@ def _acting(frames: pd.DataFrame, sensitivity: pd.DataFrame, horizon: Horizon) -
     reads={"timings": Every(paths.TIMINGS), "frame_times": TableOf("frame_times")},
 )
 def local_share(timings: list[File], frame_times: pd.DataFrame) -> pd.DataFrame:
-    """One row per scene and implementation of ``timings``, in the time of ``frame_times``.
+    """One row per scene and implementation, with ``timings`` scaled to the table ``frame_times``.
 
-    Assembly counts as a part of the local step: compiled kernels project and scatter in one pass.
+    Assembly is added to the local step, as compiled kernels project and scatter in one pass.
     """
     times = timings_in_one_time(timings, frame_times)
     full = times[times.method.isna()].copy()
@@ -188,12 +188,12 @@ def local_share(timings: list[File], frame_times: pd.DataFrame) -> pd.DataFrame:
     reads={"parts": Every(paths.SCALING)},
 )
 def scaling(parts: list[File]) -> pd.DataFrame:
-    """All scenes of ``parts``, one row per mesh size and method.
+    """One row per scene, mesh size and method, from the files ``parts`` of all scenes.
 
-    The speed-ups, of an iteration and of its local step, are over the full-order run. Exponents are
-    those of power laws fitted to the logarithms of a curve, all meshes of a scene and method, which
-    has them in all its rows. Any two points lie on a power law: a curve of fewer than three meshes
-    has no exponent, and no quantity that was too small to be measured on so many.
+    Speed-ups of an iteration and of its local step are relative to the full-order run. Exponents
+    belong to power laws, fitted in logarithms over all meshes of a scene and method and repeated in
+    each of these rows. An exponent is empty if fewer than three meshes have a measurable time, as
+    any two points lie on a power law.
     """
     rows = joined(parts)
     if rows.empty:

@@ -1,10 +1,10 @@
-"""Table gain_interventions: lower the gain and leave everything else; does the error fall?
+"""Table gain_interventions: does the error of a run fall if only the gain is lowered?
 
-A correlation of gain and error over methods may stand for anything in which the methods differ. The
-methods compared here share basis and size and differ in what is sampled, or in whether the axes
-share their coefficients (the two by two of table ladder). If the gain were how separate systems do
-their harm, a lower gain would lower the error among runs with coefficients of one kind as well: the
-last steps order any two such runs of a basis by their gain.
+A correlation of gain and error over methods may come from anything in which the methods differ. The
+methods compared here have the same basis and size. They differ in the sampling, or in whether the
+axes share coefficients (four combinations, from table ladder). If separate coefficients did harm
+only by their gain, a lower gain would also lower the error for coefficients of one kind:
+the last two steps compare all such pairs of runs, ordered by gain.
 """
 
 from collections.abc import Iterator, Mapping
@@ -22,15 +22,15 @@ STEPS = {
     "whole elements for single entries": ("deim", "block-deim"),
     "three elements a mode for one": ("block-deim", "gappy"),
 }
-# Steps between the runs of the ladder's two by two; those from rows to elements need more than one
-# row an element.
+# Steps between the four combinations of coefficients and samples in table ladder. Steps from single
+# rows to whole elements are compared only if an element has more than one row.
 SQUARE = {
     "shared coefficients, single rows": ("single rows, separate", "single rows, shared"),
     "shared coefficients, whole elements": ("whole elements, separate", "whole elements, shared"),
     "whole elements, separate coefficients": ("single rows, separate", "whole elements, separate"),
     "whole elements, shared coefficients": ("single rows, shared", "whole elements, shared"),
 }
-# Methods by the kind of their coefficients, ordered by their gain: does the error follow?
+# Methods by kind of coefficients; their runs are compared in pairs, ordered by gain.
 KINDS = {
     "lower gain, shared coefficients": ("deim", "block-deim", "gappy"),
     "lower gain, separate coefficients": ("deim-joint", "published"),
@@ -77,12 +77,11 @@ _CELL = ["scene", "group", "r"]
 def gain_interventions(
     reruns: pd.DataFrame, reconstruction: pd.DataFrame, ladder: pd.DataFrame
 ) -> pd.DataFrame:
-    """One row per step; counted are the runs of `judged_runs`.
+    """One row per step, from the runs that `judged_runs` selects and the table ``ladder``.
 
-    Sizes and groups of one scene are no independent observations, nor are a scene and its twin:
-    intervals draw whole families, the test counts them. Errors below the sensitivity floor count as
-    the floor. A run that ended early has an infinite error; a pair of two such runs says nothing
-    and is left out.
+    Results of one family (a scene and its variant, "twin") are dependent: the bootstrap
+    resamples families and the sign test counts families. Errors below the sensitivity floor are
+    raised to it. A run that ended early has an infinite error; a pair of two such runs is left out.
     """
     runs = judged_runs(reruns, reconstruction)
     rows = []
@@ -97,7 +96,7 @@ def gain_interventions(
 def _steps(
     runs: pd.DataFrame, square: pd.DataFrame
 ) -> Iterator[tuple[str, str, str, pd.DataFrame]]:
-    """Name, methods before and after, and pairs of every step."""
+    """Name of each step, method before, method after, and table of the compared pairs."""
     for name, methods in STEPS.items():
         yield name, *methods, _pairs(runs, *methods)
     for name, (before, after) in SQUARE.items():
@@ -115,7 +114,7 @@ def _steps(
 
 
 def _square(ladder: pd.DataFrame, runs: pd.DataFrame) -> pd.DataFrame:
-    """Runs of the two by two at the places of ``runs``: there the basis suffices."""
+    """Ladder runs of the four combinations, at the scenes, groups and sizes in ``runs``."""
     chosen = ladder[(ladder.direction == "square") & ladder.gain.notna()]
     chosen = chosen.rename(columns={"rung": "method"})
     error = chosen.relative_error_within_horizon.astype(float).fillna(np.inf)
@@ -124,7 +123,7 @@ def _square(ladder: pd.DataFrame, runs: pd.DataFrame) -> pd.DataFrame:
 
 
 def _pairs(runs: pd.DataFrame, before: str, after: str) -> pd.DataFrame:
-    """Scene, ratio of gains and ratio of errors of each pair."""
+    """Scene, gain ratio and error ratio (after over before) of each pair of runs."""
     error = np.maximum(runs.error, runs.sensitivity_floor)
     runs = runs[[*_CELL, "method", "gain"]].assign(error=error)
     one, other = (runs[runs.method == m].drop(columns="method") for m in (before, after))
@@ -140,14 +139,14 @@ def _pairs(runs: pd.DataFrame, before: str, after: str) -> pd.DataFrame:
 
 
 def _summary(pairs: pd.DataFrame) -> Mapping[str, float]:
-    # statistics take a second to load, which planning does not need
+    # imported here because it takes a second, which planning the workflow does not need
     from scipy.stats import binomtest
 
     by_scene = pairs.groupby("scene").error
     by_family = pairs.groupby(families(pairs.scene)).error
     fallen = int((by_family.median() < 1.0).sum())
     values = [own.to_numpy(float) for _, own in by_family]
-    # percentiles of the median over all values, with whole families drawn with replacement
+    # bootstrap of the median over all values, drawing whole families with replacement
     drawn = np.random.default_rng(SEED).integers(len(values), size=(RESAMPLES, len(values)))
     medians = [np.median(np.concatenate([values[i] for i in row])) for row in drawn]
     low, high = np.percentile(medians, [2.5, 97.5], method="inverted_cdf")

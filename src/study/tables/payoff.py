@@ -1,4 +1,4 @@
-"""Gain of reductions over the full order: local steps alone, and accurate runs that are faster."""
+"""Tables of the speed-up of reductions: local steps alone, and accurate runs."""
 
 from collections.abc import Sequence
 
@@ -13,9 +13,9 @@ from study.tables.kit.parts import joined
 from study.tables.kit.reruns import FAILED, trained, with_held_out
 from study.tables.kit.vocabulary import shared
 
-# What the sizes r of one line of the table have in common.
+# Columns that identify a curve, the rows that differ only in size r.
 CURVE = ["scene", "group", "method", "factor"]
-OWN_MESH = "1"  # factor of a scene's own mesh, whose curve is measured with its other timings
+OWN_MESH = "1"  # mesh factor of a scene's configured mesh, which the files ``own`` contain
 _ERROR = "relative_error_within_horizon"
 
 
@@ -37,12 +37,12 @@ _ERROR = "relative_error_within_horizon"
     reads={"own": Every(paths.BREAK_EVEN), "sized": Every(paths.BREAK_EVEN_SIZED)},
 )
 def breakeven(own: list[File], sized: list[File]) -> pd.DataFrame:
-    """One row per size; ``breakeven_r`` belongs to a whole curve, see `CURVE`.
+    """One row per size r of each curve (see `CURVE`), with local-step times and break-even size.
 
-    Scenes have their ``own`` mesh and those of other sizes, ``sized``.
+    Files ``own`` are for the configured mesh of each scene, ``sized`` for other mesh sizes.
 
-    It is empty where the reduction still pays at the largest size, the numerical rank, and the
-    smallest size tried where it never pays.
+    ``breakeven_r`` is one value per curve. It is empty if the reduction is still faster at the
+    largest size (the numerical rank), and the smallest size tried if it is never faster.
     """
     rows = joined([*own, *(file for file in sized if file["factor"] != OWN_MESH)])
     if rows.empty:
@@ -57,9 +57,9 @@ def breakeven(own: list[File], sized: list[File]) -> pd.DataFrame:
 
 
 def break_even(r: Sequence[int], ratio: Sequence[float]) -> int | None:
-    """Smallest size from which the reduced local step costs as much as the full one, for good.
+    """Smallest size from which on the reduced local step costs at least as much as the full one.
 
-    Between the last size below one and the first above it the ratio is interpolated linearly.
+    The ratio is interpolated linearly between the last size with a ratio below one and the next.
     None if the ratio is below one at the largest size; the smallest size if it never is below.
 
     Parameters
@@ -114,10 +114,10 @@ def break_even(r: Sequence[int], ratio: Sequence[float]) -> int | None:
     reads={"reruns": TableOf("reduced_reruns")},
 )
 def payoff(reruns: pd.DataFrame) -> pd.DataFrame:
-    """One row per method, over all scenes and sizes; only what ran and was timed counts.
+    """One row per position basis and method, over all scenes and sizes that ran and were timed.
 
-    Sizes are chosen on the training motion of ``reruns`` and scored on the others, see
-    `with_held_out`.
+    Sizes are chosen by the training motion in the table ``reruns`` and evaluated on the held-out
+    motions, see `with_held_out`.
     """
     runs = trained(reruns)
     runs = with_held_out(runs[runs.speedup.notna() & runs.max_extent.notna()], reruns)

@@ -1,4 +1,4 @@
-"""Singular values of the snapshots, and the reconstruction error of every method and size."""
+"""Tables of the singular values of snapshots and of the reconstruction errors of all methods."""
 
 import pandas as pd
 
@@ -22,11 +22,11 @@ _SMALL = "empty at round-off level"
         number("relative", "over the first one"),
         flag("above_roundoff", "larger than the rounding errors of the projections"),
     ),
-    # of an experiment's bases the one without weights and centring: every study may hold others
+    # the basis without weights and centring; which other bases exist depends on the configuration
     reads={"bases": EachOf(paths.BASIS, "usual_bases")},
 )
 def singular_values(bases: list[File]) -> pd.DataFrame:
-    """Rows of all bases, in order."""
+    """One row per mode of each of the ``bases``, in the order of the files."""
     parts = []
     for file in bases:
         basis = load_basis(file.path)
@@ -62,5 +62,5 @@ def singular_values(bases: list[File]) -> pd.DataFrame:
     reads={"parts": Every(paths.RECONSTRUCTION)},
 )
 def reconstruction_error(parts: list[File]) -> pd.DataFrame:
-    """Rows of all methods, in the order of their ``parts``."""
+    """Rows of the files ``parts`` of all methods, in order."""
     return joined(parts)

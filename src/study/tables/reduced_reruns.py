@@ -1,4 +1,4 @@
-"""Table reduced_reruns: errors of the reruns of all motions, times of those in training."""
+"""Table reduced_reruns: errors of reduced runs of all motions, times in the training motion."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -56,18 +56,18 @@ def reduced_reruns(
     sensitivity: pd.DataFrame,
     horizon: Horizon,
 ) -> pd.DataFrame:
-    """Runs of the training motion with their times, then those of each held-out motion.
+    """Reduced runs of the training motion with their times, then runs of each held-out motion.
 
-    One row per motion, scene, group, method and r, then the runs in position subspaces, in which
-    all groups are reduced and r counts the evaluated elements. Every run is judged by the horizon
-    of its own motion: the error within it uses the frames before it only, and a run that blew up
-    before has none.
+    There is one row per motion, scene, group, method and r, followed by runs in position subspaces,
+    in which all groups are reduced and r is the number of evaluated elements. The horizon is the
+    first frame that perturbed runs make incomparable, per scene and motion. Errors within it use
+    earlier frames only; they are empty for a run that blew up before.
 
     Parameters
     ----------
     runs, rows, rows_heldout : HDF5 files of the runs, and their tables in the same order
-    subspaces, subspace_rows, subspace_rows_heldout : the same in position subspaces
-    sensitivity, horizon : see `horizons`; held-out motions have labels of their own
+    subspaces, subspace_rows, subspace_rows_heldout : such files for runs in position subspaces
+    sensitivity, horizon : arguments of `horizons`; a held-out motion is a label in the table
     """
     judged: list[pd.DataFrame] = []
     for motion in (TRAIN, *MOTIONS):
@@ -87,9 +87,9 @@ def reduced_reruns(
 
 
 def _judged(run: File, row: File, end: int, motion: str) -> pd.DataFrame:
-    """Rows of the runs of a motion, whose positions are reduced where the files know no group."""
+    """Table ``row`` of one motion with errors; a file without a group has reduced positions."""
     table = read_table(row.path)
-    if motion != TRAIN:  # a table of training runs has no column that names one
+    if motion != TRAIN:  # tables of training runs have no column "motion"
         table = table[table.motion == motion]
     with open_hdf5(run.path) as file:
         if "group" in run.labels:
@@ -107,7 +107,7 @@ def _judged(run: File, row: File, end: int, motion: str) -> pd.DataFrame:
 def _errors(
     runs: Sequence[h5py.Group], reference: Series, end: int, units: Mapping[str, Any]
 ) -> dict[str, list[float | None]]:
-    """Errors before the horizon; a run of a size beyond the rank has no frames and no errors."""
+    """Errors before frame ``end`` by name; None for sizes above the rank, which have no frames."""
     known = {unit: float(units[unit]) for unit in ("extent_norm", "time_step")}
     found = [
         errors_within({series: run[series][...] for series in DEVIATIONS}, reference, end, **known)
@@ -119,7 +119,7 @@ def _errors(
 
 
 def _with_times(runs: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
-    """``runs`` with the times of each row; the speed-up is against the compiled full order."""
+    """``runs`` with their times and the speed-up over the compiled full-order run."""
     full = times[times.method.isna() & (times.implementation == "compiled")]
     reference = full.set_index("scene").ms_per_frame
     reduced = times[times.method.notna()].copy()
@@ -132,7 +132,7 @@ def _with_times(runs: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
     local = runs[runs.position_basis == "full"].merge(
         reduced.loc[~inside, keys + measured], on=keys, how="left"
     )
-    # the timing of a subspace model is found by its size k, its r is the element count
+    # timings of subspace models are matched by their size k, as r is their number of elements
     keys = [k for k in KEYS if k != "r"]
     subspace = runs[runs.position_basis != "full"]
     if len(subspace) == 0:

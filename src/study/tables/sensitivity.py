@@ -1,4 +1,4 @@
-"""Changes of results by what should not matter, and by one choice of the method at a time."""
+"""Tables of how results change with perturbations and with single choices of the method."""
 
 from dataclasses import replace
 
@@ -25,7 +25,7 @@ _CELL = ["scene", "group", "method", "r", "varied"]
     reads={"parts": Every(paths.SENSITIVITY)},
 )
 def sensitivity(parts: list[File]) -> pd.DataFrame:
-    """Largest difference of ``parts`` over the seeds, per scene, perturbation and frame."""
+    """Largest difference in ``parts`` over the seeds, per scene, perturbation and frame."""
     keys = ["scene", "perturbation", "frame"]
     rows = joined(parts).groupby(keys, sort=False, as_index=False)
     return rows["relative_difference"].max()
@@ -43,7 +43,7 @@ def sensitivity(parts: list[File]) -> pd.DataFrame:
         integer("seed", "of the start's round-off"),
         *shared("method r"),
         integer("rank", "modes that the snapshots have without a cutoff", compared="value"),
-        # the modes are made of round-off
+        # the gain has no reproducible value because the modes are made of round-off
         replace(*shared("gain"), compared="skipped"),
         *shared("frames finite blowup_frame"),
         number(
@@ -53,7 +53,7 @@ def sensitivity(parts: list[File]) -> pd.DataFrame:
     reads={"parts": Every(paths.NOISE)},
 )
 def noise(parts: list[File]) -> pd.DataFrame:
-    """Rows of all scenes, in the order of their ``parts``."""
+    """Rows of the files ``parts`` of all scenes, in order."""
     return joined(parts)
 
 
@@ -77,10 +77,10 @@ def noise(parts: list[File]) -> pd.DataFrame:
     reads={"parts": Every(paths.REPETITIONS)},
 )
 def repetitions(parts: list[File]) -> pd.DataFrame:
-    """One row per repeated run of ``parts``, over its repetitions.
+    """One row per scene, group, method, r and variation, with statistics over its repetitions.
 
-    The range of n independent draws lies on one side of their distribution's median with the
-    probability 2^(1 - n): five draws enclose it with 15/16, whatever the distribution is.
+    The median of a distribution lies outside the range of n independent draws with probability
+    2^(1 - n): five draws enclose it with probability 15/16, whatever the distribution is.
     """
     rows = joined(parts)
     if rows.empty:
@@ -128,5 +128,5 @@ def repetitions(parts: list[File]) -> pd.DataFrame:
     reads={"parts": Every(paths.LADDER)},
 )
 def ladder(parts: list[File]) -> pd.DataFrame:
-    """Rows of all scenes, in the order of their ``parts``."""
+    """Rows of the files ``parts`` of all scenes, in order."""
     return joined(parts)

@@ -1,4 +1,4 @@
-"""Times over several processes: full-order frames, quoted speed-ups, and large scenes."""
+"""Tables of times over several processes: full-order frames, speed-ups, and large scenes."""
 
 from collections.abc import Iterator
 
@@ -17,8 +17,8 @@ _MODEL = ["scene", "position_basis", "k", "method"]
 _REDUCTION = ["scene", "group", "method", "r"]
 _LABELS = ["scene", "group", "method", "position_basis", "k", "r"]
 _ERROR = "relative_error_within_horizon"
-# The control compares a run with itself; where it differs by more than half, a time says nothing.
-# Fixed on 2026-11-22, before any control had been measured.
+# The control times the full-order run a second time. If both times differ by more than this factor,
+# speed-ups are not shown. Fixed on 2026-11-22, before any control had been measured.
 CONFIRMED = 1.5
 UNCONFIRMED = "not confirmed by its control"
 _ERRORS = {
@@ -48,7 +48,7 @@ _TIMES = ["ms_per_frame", "fom_ms_per_frame", "speedup", "speedup_low", "speedup
     reads={"parts": Every(paths.FRAME_TIMES)},
 )
 def frame_times(parts: list[File]) -> pd.DataFrame:
-    """One row per scene of ``parts``: medians over processes, ratios within a process."""
+    """One row per scene in ``parts``: medians over processes, ratios within a process."""
     rows = joined(parts)
     if rows.empty:
         return rows
@@ -112,7 +112,7 @@ def speedups(
     large: list[File],
     reruns: pd.DataFrame,
 ) -> pd.DataFrame:
-    """One row per quoted reduction; a speed-up is a ratio of two times of one process."""
+    """One row per reduction timed in ``parts``; each speed-up is a ratio within one process."""
     rows = joined(parts)
     if rows.empty or not (rows.role == REDUCED).any():
         return pd.DataFrame()
@@ -136,11 +136,11 @@ def speedups(
 
 
 def timed_reductions(rows: pd.DataFrame, times: pd.DataFrame) -> Iterator[dict]:
-    """Labels, times and ratios of each reduction, over the processes.
+    """Labels, median times and speed-up of each reduction over the processes, as dictionaries.
 
     Parameters
     ----------
-    rows : what the processes measured
+    rows : times measured in each process, with the role of the run (full order or reduced)
     times : table frame_times
     """
     full = rows[rows.role == FULL].set_index(["scene", "process"]).ms_per_frame
@@ -180,7 +180,7 @@ def large_errors(large: pd.DataFrame) -> pd.DataFrame:
 
 
 def _first_known(made: pd.DataFrame, sources: list[pd.DataFrame], column: str) -> pd.DataFrame:
-    """``made`` with a column from the first source that has it, by what tells its rows apart."""
+    """``made`` with ``column`` filled from the first of ``sources`` that has the row's value."""
     found = pd.Series(float("nan"), made.index)
     for source in sources:
         keys = [key for key in _LABELS if key in source.columns]
@@ -215,7 +215,7 @@ def _first_known(made: pd.DataFrame, sources: list[pd.DataFrame], column: str) -
     },
 )
 def online(parts: list[File], measured: list[File], times: pd.DataFrame) -> pd.DataFrame:
-    """Rows of all scenes, ``parts``, in order, with ``measured`` times, in the one of ``times``."""
+    """One row per model of large scenes (files ``parts``), with errors and ``measured`` times."""
     rows = joined(parts)
     if rows.empty:
         return rows

@@ -1,4 +1,4 @@
-"""Limits of trust in each method: over scenes, sizes, time step, stiffness, and in hard cases."""
+"""Tables of where each method fails: over scenes, sizes, time step, stiffness, and hard cases."""
 
 from collections.abc import Mapping
 
@@ -14,10 +14,10 @@ from study.tables.kit.parts import joined
 from study.tables.kit.reruns import KEYS, trained
 from study.tables.kit.vocabulary import shared
 
-# the first is the only one after which numbers of the run count
+# only after the first outcome are further results of a run used
 OUTCOMES = ("accurate", "wrong", "left the scene", "blow-up", "not run", "not judged")
-SETTING = ["experiment", "scene", "h", "stiffness_ratio"]  # what has one full-order run
-# Share of the runs on degenerate meshes whose outcome rounding decides.
+SETTING = ["experiment", "scene", "h", "stiffness_ratio"]  # columns that identify a full-order run
+# Share of the runs on degenerate meshes whose outcome may differ between machines by rounding.
 FRAGILE = 0.005
 
 
@@ -53,14 +53,14 @@ def stability(
     wrong: float,
     departure: float,
 ) -> pd.DataFrame:
-    """Rows of the study's reruns (experiment "rerun"), then of the short runs ("sweep").
+    """Rows of the study's reduced runs (experiment "rerun"), then of short runs ("sweep").
 
-    Method "full" with position basis "full" is the full-order run. The error of a rerun is the one
-    within the horizon, that of a short run is over all of it.
+    Method "full" with position basis "full" is the full-order run. The error of a "rerun" row is
+    taken within the horizon, the error of a "sweep" row over the whole run.
 
     Parameters
     ----------
-    time_steps : scene -> h in seconds
+    time_steps : scene -> time step h in seconds
     """
     runs = pd.concat(
         [_full_order_rows(full_order), _rerun_rows(reruns, subspaces, reduced_reruns)],
@@ -72,7 +72,7 @@ def stability(
 
 
 def outcomes(runs: pd.DataFrame, wrong: float, departure: float) -> list[str]:
-    """One of `OUTCOMES` for each row of ``runs``, by the limits ``wrong`` and ``departure``."""
+    """Outcome of each of ``runs``: ``wrong`` limits the error, ``departure`` relative extent."""
     full = runs[(runs.method == "full") & (runs.position_basis == "full")]
     extents = full.set_index(SETTING).max_extent.rename("full_extent")
     error = runs.relative_error.astype(float)
@@ -87,7 +87,7 @@ def outcomes(runs: pd.DataFrame, wrong: float, departure: float) -> list[str]:
 
 
 def _full_order_rows(files: list[File]) -> pd.DataFrame:
-    """The full-order runs themselves; their energy ratio is one by definition."""
+    """Rows of the full-order runs in ``files``; their energy ratio is 1, their error 0."""
     rows = []
     for run in files:
         with open_hdf5(run.path) as file:
@@ -101,7 +101,7 @@ def _full_order_rows(files: list[File]) -> pd.DataFrame:
 def _rerun_rows(
     reruns: list[File], subspaces: list[File], reduced_reruns: pd.DataFrame
 ) -> pd.DataFrame:
-    """Reruns with their energy ratio and gain, and with the error that reduced_reruns judges by."""
+    """Reduced runs of the training motion, with their error within the horizon as the error."""
     local = joined(reruns).assign(position_basis="full", k=np.nan)
     runs = pd.concat([local, joined(subspaces)], ignore_index=True)
     runs = runs.drop(columns="relative_error")
@@ -133,5 +133,5 @@ def _rerun_rows(
     reads={"parts": Every(paths.HARD_CASES)},
 )
 def hard_cases(parts: list[File]) -> pd.DataFrame:
-    """Rows of ``parts`` in the order of the cases and methods."""
+    """Rows of the files ``parts`` in the order of the cases and methods."""
     return joined(parts)

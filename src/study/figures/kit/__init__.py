@@ -1,1 +1,1 @@
-"""Tools of the figures: their declaration, what they read, and what draws."""
+"""Helpers for figures: their declaration, their options, and the drawing of elements."""

@@ -1,6 +1,6 @@
-"""Declaration of a figure: title, caption, reads, and the function that draws it.
+"""Declaration of a figure: title, caption, inputs, and the function that draws it.
 
-A figure is a function under its declaration in a module of `study.figures`::
+A figure is declared by a decorator on its drawing function in a module of `study.figures`::
 
     @figure(
         title="Rest shapes",
@@ -33,21 +33,21 @@ log = logging.getLogger(__name__)
 
 PACKAGE = "study.figures"
 PNG_DPI = 200
-RASTER_DPI = 300  # of rasterised artists inside a PDF
+RASTER_DPI = 300  # resolution of rasterised parts of a PDF
 ELSEWHERE = "the full study (config/default.yaml) draws it"
 
 
 @dataclass(frozen=True)
 class Declaration(Artifact):
-    """A figure, named as the function that draws it.
+    """Figure of the study, with the name of the function that draws it.
 
-    The function gets what it reads and its ``options``, whose type says what a user may choose in
-    config/figures.yaml, with the defaults. It raises `NothingToDraw` where the configuration holds
-    nothing of what the figure shows, StorageError for a file that is damaged.
+    The function gets its inputs and ``options``, whose type defines the keys and defaults of the
+    figure in config/figures.yaml. It raises `NothingToDraw` if the configuration has no data for
+    it, and StorageError for a damaged file.
 
-    title, caption : in light mark-up (`study.artifact.markup`); ``{key}`` in a caption stands for
+    title, caption : text in light mark-up (`study.artifact.markup`); ``{key}`` in a caption names
         a setting of the configuration
-    number : number in the preprint that is reproduced; None for a figure of this study
+    number : number of the reproduced figure in the preprint; None for a figure of this study
     """
 
     caption: str = ""
@@ -55,39 +55,39 @@ class Declaration(Artifact):
 
     @property
     def options(self) -> type[Options]:
-        """Type of the options."""
+        """Type of the figure's options, from the annotation of its function."""
         chosen: type[Options] = self.function.__annotations__["options"]
         return chosen
 
     @property
     def rule(self) -> str:
-        """Name of the rule that makes it."""
+        """Name of the workflow rule that draws the figure."""
         return f"figure_{self.name}"
 
     def words(self, value: Callable[[str], Any]) -> tuple[str, str]:
-        """Title and caption in mark-up; ``value`` returns the settings that the caption names.
+        """Title and caption in mark-up; ``value`` returns the settings named in the caption.
 
         Raises
         ------
         ConfigurationError
-            A setting does not exist.
+            If a setting does not exist.
         """
         return self.title, filled(self.caption, value)
 
     def perform(
         self, settings: Mapping[str, Any], inputs: Mapping[str, Any], outputs: Mapping[str, str]
     ) -> None:
-        """Draw the figure in a job and write both of its files."""
+        """Draw the figure in a workflow job and write it as PDF and PNG."""
         drawn = self.draw(**self.read(settings, inputs))
         write_figure(drawn, to_plain(self.title), outputs["pdf"], png=outputs["png"])
 
     def draw(self, **read: Any) -> Figure:
-        """Draw the figure from what it reads, or a note where that holds nothing of it.
+        """Draw the figure from its inputs, or a note if they have no data for it.
 
         Raises
         ------
         StorageError
-            A file is missing or damaged.
+            If a file is missing or damaged.
         """
         with style.look():
             try:
@@ -100,14 +100,14 @@ class Declaration(Artifact):
 def figure(
     *, title: str, caption: str, reads: Mapping[str, Read], number: int | None = None
 ) -> Callable[[Callable[..., Figure]], Declaration]:
-    """Declare the function below as a figure; it gets what it reads by name, and its ``options``.
+    """Return a decorator that declares a function, called with ``options`` and inputs, as a figure.
 
-    Where it takes ``drawn``, it also gets the part of the study that the options choose.
+    A function with a parameter ``drawn`` also gets the part of the study selected by the options.
 
     Raises
     ------
     TypeError
-        If the function does not take what it reads.
+        If the function's parameters do not match ``reads``.
     """
 
     def decorate(function: Callable[..., Figure]) -> Declaration:
@@ -124,11 +124,11 @@ def figure(
 def write_figure(
     figure: Figure, title: str, pdf: str | os.PathLike[str], png: str | os.PathLike[str]
 ) -> None:
-    """Write ``figure`` as ``pdf`` (embedded TrueType fonts, no dates) and as its twin ``png``.
+    """Write ``figure`` to the files ``pdf`` (embedded TrueType fonts, no dates) and ``png``.
 
-    The PDF has a ``title``; both are the same bytes every time.
+    Both files have ``title`` in their metadata; repeated calls write the same bytes.
 
-    Either file appears only when complete.
+    A file appears only when it is complete.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
@@ -143,12 +143,12 @@ def write_figure(
 
 @cache
 def declarations() -> dict[str, Declaration]:
-    """Every figure by name: those of the preprint by their number there, then the others by name.
+    """Return figures by name: figures of the preprint by number there, then the others by name.
 
     Raises
     ------
     ConfigurationError
-        Two figures have the same number.
+        If two figures have the same number.
     """
     found = declared_in(PACKAGE, Declaration)
     numbers = [made.number for made in found.values() if made.number is not None]
@@ -160,17 +160,17 @@ def declarations() -> dict[str, Declaration]:
 
 
 def load_choices(path: Path, known: Mapping[str, Collection[str]]) -> dict[str, Options]:
-    """Options of every figure: its defaults, and what ``path`` (config/figures.yaml) chooses.
+    """Options of every figure: its defaults, overridden by the file ``path``.
 
     Parameters
     ----------
-    known : names that options may hold, by their key (scenes, methods)
+    known : option key (scenes, methods) -> names that are allowed in it
 
     Raises
     ------
     ConfigurationError
-        Unknown figure, a key that the figure does not have, a value outside its range, or a name
-        that is not ``known``.
+        If there is an unknown figure or key, a value outside its range, or a name that is not in
+        ``known``.
     """
     content = read_yaml(path)
     content = {} if content is None else content

@@ -1,4 +1,4 @@
-"""Places of the elements of a constraint group on the mesh, to colour them."""
+"""Drawing of the elements of a constraint group on the mesh, coloured by values."""
 
 from dataclasses import dataclass
 
@@ -17,7 +17,7 @@ SIGNED = "RdBu_r"
 
 
 def magnitudes(norm: Normalize | None = None) -> ScalarMappable:
-    """Colours from the page's white to dark, of values from 0 to 1 or as ``norm`` says."""
+    """Colour map from near white to dark for values from 0 to 1, or in the range of ``norm``."""
     import matplotlib as mpl
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import LinearSegmentedColormap, Normalize
@@ -28,7 +28,7 @@ def magnitudes(norm: Normalize | None = None) -> ScalarMappable:
 
 
 def signed() -> ScalarMappable:
-    """Colours of values from -1 to 1."""
+    """Colour map for values from -1 to 1."""
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
 
@@ -37,9 +37,9 @@ def signed() -> ScalarMappable:
 
 @dataclass(frozen=True)
 class ElementMap:
-    """Elements of one group on one mesh.
+    """Elements of one constraint group on one mesh.
 
-    kind : vertex, edge, triangle or tetrahedron
+    kind : mesh entity of an element: vertex, edge, triangle or tetrahedron
     cells : (e, m) vertex indices of each element
     """
 
@@ -52,10 +52,10 @@ class ElementMap:
         return points[self.cells].mean(axis=1)
 
     def face_values(self, values: np.ndarray) -> np.ndarray:
-        """Values (e,) of the elements carried to the surface triangles (T,).
+        """Values of the elements (e,) transferred to the surface triangles (T,).
 
-        A triangle takes its own value, that of the tetrahedron behind it, the mean of its vertices
-        that carry one, or of the means of the edges at its vertices; NaN where there is none.
+        A triangle gets its own value, the value of its tetrahedron, or the mean over vertices: of
+        their values (NaN if none has one), or of the mean values of the edges at each vertex.
         """
         triangles = self.mesh.triangles
         if self.kind == "triangle":
@@ -85,9 +85,9 @@ class ElementMap:
         camera: Camera,
         colours: ScalarMappable,
     ) -> None:
-        """Draw on ``ax``, by ``camera``, the mesh at ``points`` (N, 3) m.
+        """Draw on ``ax``, seen by ``camera``, the mesh with vertices at ``points`` (N, 3) m.
 
-        Its elements have ``values`` (e,), which ``colours`` maps to colours.
+        Each element has a value in ``values`` (e,), which ``colours`` maps to a colour.
         """
         if self.kind == "edge" and not len(self.mesh.tetrahedra):
             draw_surface(
@@ -102,15 +102,15 @@ class ElementMap:
 
 
 def element_map(group: str, mesh: Mesh, elements: int, source: str) -> ElementMap:
-    """Elements of ``group`` on ``mesh``, in the order of the group's rows.
+    """Elements of the constraint ``group`` on ``mesh``, in the order of the group's rows.
 
     Raises
     ------
     StorageError
-        The effect is no constraint group, or ``source`` holds another number of elements than the
-        mesh.
+        If ``group`` is no constraint group, or the mesh has another number of elements than the
+        file ``source`` says.
     ConfigurationError
-        There is no such effect.
+        If no effect has the name ``group``.
     """
     effect = EFFECTS.load(group)
     if not issubclass(effect, ConstraintGroup):
@@ -122,9 +122,9 @@ def element_map(group: str, mesh: Mesh, elements: int, source: str) -> ElementMa
 
 
 def signed_entry(vector: np.ndarray, rows_per_element: int) -> tuple[np.ndarray, str]:
-    """One of the 3 p entries of every element (e,), the one that is largest somewhere; its name.
+    """Values (e,) of the entry that is largest on some element, and the name of this entry.
 
-    vector : a vectorised quantity (3 e p,) with p ``rows_per_element``
+    vector : vector with 3 p entries for each of e elements, with p = ``rows_per_element``
     """
     entries = vector.reshape(-1, 3 * rows_per_element)
     slot = int(np.argmax(np.abs(vector))) % (3 * rows_per_element)

@@ -1,4 +1,4 @@
-"""Options of a figure, and the part of the study that it draws."""
+"""Options of a figure, and the part of the study that these options select."""
 
 from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal
@@ -18,10 +18,10 @@ from study.artifact.paths import File
 Names = tuple[str, ...]
 Ranks = tuple[Annotated[int, Field(ge=0)] | Literal["full"], ...]  # full: the numerical rank
 Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
-Instants = Annotated[tuple[Fraction, ...], Field(min_length=1)]  # 1 is the last frame of a run
+Instants = Annotated[tuple[Fraction, ...], Field(min_length=1)]  # fractions of a run's length
 Columns = Annotated[int, Field(ge=1, le=6)]  # panels side by side
-Count = Annotated[int, Field(ge=1, le=12)]  # of modes or iterations
-AZIMUTH = 30.0  # of every camera, degrees
+Count = Annotated[int, Field(ge=1, le=12)]  # number of modes or iterations
+AZIMUTH = 30.0  # azimuth of every camera, degrees
 
 
 class NothingToDraw(Exception):
@@ -36,17 +36,17 @@ class Options(ConfigModel):
     """
 
     def names(self, key: str) -> Names:
-        """Chosen names under ``key``; empty where the figure has no such choice."""
+        """Chosen names under ``key`` (scenes, methods); empty if the figure has no such option."""
         return getattr(self, key, ())
 
     def words(self) -> str:
-        """Words for what is chosen."""
+        """Text that names the chosen scenes and methods."""
         scenes = ", ".join(self.names("scenes")) or "any scene"
         methods = ", ".join(self.names("methods"))
         return f"{scenes} with {methods}" if methods else scenes
 
     def rows(self, table: pd.DataFrame) -> pd.DataFrame:
-        """Rows of ``table`` of the scenes and methods that are chosen, or of all."""
+        """Rows of ``table`` for the chosen scenes and methods; an empty choice selects all."""
         for key, column in (("scenes", "scene"), ("methods", "method")):
             if names := self.names(key):
                 table = table[table[column].isin(names)]
@@ -71,7 +71,7 @@ class View(Methods):
     elevation: Annotated[float, Field(ge=-90.0, le=90.0)] = 20.0
 
     def camera(self, experiment: "Experiment") -> Camera:
-        """Camera for the scene of an experiment."""
+        """Camera for the scene of ``experiment``."""
         return Camera(AZIMUTH, self.elevation, tuple(up_of(experiment.effects).tolist()))
 
 
@@ -108,28 +108,28 @@ class Experiment(_Plain):
 
     @property
     def modules(self) -> tuple[str, ...]:
-        """Code of the effects: a group says where its elements lie, an obstacle how it looks."""
+        """Modules of the scene's effects, which define element positions and obstacle shapes."""
         return tuple(sorted({EFFECTS[effect.effect] for effect in self.effects}))
 
     @property
     def labels(self) -> dict[str, str]:
-        """Labels of its files."""
+        """Labels that identify the files of the experiment."""
         return {"scene": self.scene, "group": self.group, "mesh": self.mesh}
 
     @property
     def title(self) -> str:
-        """Words for a panel; the group is named only where the scene reduces several."""
+        """Title of a panel; the group is named only if the scene reduces several groups."""
         name = self.scene.replace("_", " ")
         return name if self.only else f"{name}: {self.group.replace('_', ' ')}"
 
     def find(self, files: Sequence[File], **labels: str) -> str | None:
-        """Path of the first of ``files`` that belongs to it, and has further ``labels``."""
+        """Path of the first of ``files`` with the experiment's and further ``labels``, or None."""
         own = self.labels | labels
         found = (f.path for f in files if all(own.get(k, v) == v for k, v in f.labels.items()))
         return next(found, None)
 
     def path(self, files: Sequence[File], **labels: str) -> str:
-        """`find` among ``files`` that hold one for each experiment; LookupError if they do not."""
+        """Path of the first matching file, see `find`; raise LookupError if there is none."""
         path = self.find(files, **labels)
         if path is None:
             raise LookupError(f"no file of {self.labels | labels}")
@@ -144,9 +144,9 @@ class Reduction(_Plain):
 
 
 class Drawn(_Plain):
-    """Part of a study that a figure draws: what its options choose and the study holds.
+    """Part of a study that a figure draws: experiments and methods selected by its options.
 
-    experiments, reductions : in the order asked for; methods by name
+    experiments, reductions : selected experiments, and methods by name, in the requested order
     groups : all constraint groups of the model, whose order decides their colours
     """
 
@@ -156,12 +156,12 @@ class Drawn(_Plain):
 
     @property
     def scenes(self) -> list[str]:
-        """Scenes in which a group is reduced."""
+        """Scenes of the experiments, each once."""
         return list(dict.fromkeys(experiment.scene for experiment in self.experiments))
 
     @property
     def methods(self) -> list[str]:
-        """Names of the methods."""
+        """Names of the selected reduction methods."""
         return list(self.reductions)
 
     @property
@@ -171,25 +171,25 @@ class Drawn(_Plain):
         return {group: looks[place % len(looks)] for place, group in enumerate(self.groups)}
 
     def of(self, scene: str) -> list[Experiment]:
-        """Experiments of a scene."""
+        """Experiments in ``scene``, one per reduced constraint group."""
         return [experiment for experiment in self.experiments if experiment.scene == scene]
 
     def title(self, method: str) -> str:
-        """Title of a method, ready to be drawn; its name where it is not held."""
+        """Title of ``method``, ready to be drawn; its name if the method is not selected."""
         held = self.reductions.get(method)
         return plain_words(held.title if held else method)
 
     def handles(self, looks: Mapping[str, tuple[str, str]], **common: Any) -> list[Line2D]:
-        """Entries of a legend: methods by their titles, with ``looks`` and ``common`` ones."""
+        """Legend entries titled by method, with (colour, marker) ``looks`` and ``common`` style."""
         return [
             style.handle(self.title(method), color=colour, marker=marker, **common)
             for method, (colour, marker) in looks.items()
         ]
 
     def scenes_of(self, table: pd.DataFrame, nothing: str) -> list[str]:
-        """Scenes that have a row in ``table``; without any, `NothingToDraw`.
+        """Scenes that have a row in ``table``; raise `NothingToDraw` if there are none.
 
-        nothing : its message
+        nothing : message of the exception
         """
         scenes = [scene for scene in self.scenes if (table.scene == scene).any()]
         if not scenes:
@@ -197,7 +197,7 @@ class Drawn(_Plain):
         return scenes
 
     def rows(self, table: pd.DataFrame) -> pd.DataFrame:
-        """Rows of ``table`` of the experiments and methods."""
+        """Rows of ``table`` whose experiment and method are selected."""
         pairs = pd.MultiIndex.from_frame(table[["scene", "group"]])
         held = pairs.isin([(each.scene, each.group) for each in self.experiments])
         return table[held & table.method.isin(self.methods)]

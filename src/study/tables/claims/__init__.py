@@ -1,6 +1,6 @@
-"""Verdicts on the preprint's claims, by rules of config/claims.yaml that code evaluates.
+"""Verdicts on the preprint's claims by the rules of config/claims.yaml.
 
-A claim is decided twice, as published and beyond, each time by tests: a metric over chosen rows of
-the tables, compared with a threshold. Tests marked ``decides`` give the verdict, the others stand
-beside it in the reason.
+A claim gets two verdicts: "published" for the preprint's variants and scenes, "beyond" for sound
+variants. A test compares a metric over chosen table rows with a threshold. Tests with ``decides``
+give the verdict; the other tests are only reported in its reason.
 """

@@ -1,7 +1,7 @@
-"""Tables of the claims, by the rules of config/claims.yaml.
+"""Tables about the preprint's claims, by the rules of config/claims.yaml.
 
-claims holds the verdicts, claims_tests every test and what it found, claims_sensitivity which
-verdicts stand when a rule changes.
+Table claims has the verdicts, claims_tests the result of every test, claims_sensitivity the
+verdicts under changed rules.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -36,21 +36,21 @@ from study.tables.claims.verdicts import (
 from study.tables.kit.declaration import flag, integer, number, table, text, timed
 from study.tables.kit.declaration import table as declare
 
-# What the rule of a claim says of it.
+# Fields of a claim's rule that are columns of the table claims.
 WORDS = {"source", "paper", "figure_or_table", "section", "shown", "text", "qualifiers"}
 SAID = {"what", "metric", "decides", "compare", "threshold", "share"}
 FOUND = ("satisfied", "of", "close", "least", "median", "most", "verdict")
 FACTORS = (0.5, 0.8, 1.25, 2.0)  # on thresholds
 SHARES = (0.5, 0.6, 0.75, 0.9, 1.0)
-MARGINS = (1.0, 1.25, 1.5, 2.0, 3.0, 5.0)  # of ratios of times; 1: each of them decides
-SMALL = 10  # largest of the small sizes
+MARGINS = (1.0, 1.25, 1.5, 2.0, 3.0, 5.0)  # margins of tests that compare times; 1 is no margin
+SMALL = 10  # largest size r that counts as small
 SPLITS = ("train", "test", "heldout")
 VARIED = ("threshold", "share", "margin", "sizes", "splits", "scenes")
-# Share of the variations whose verdict a few runs decide.
+# Share of the rows whose verdict may differ between machines because it rests on a few runs.
 FRAGILE = 0.01
 _Rows = list[pd.DataFrame]
 _Keep = Callable[[pd.Series], pd.Series]
-_Variation = tuple[str, str, Sequence[TestRule], _Rows]  # what, how, the tests and their rows
+_Variation = tuple[str, str, Sequence[TestRule], _Rows]  # what varies, how, the tests, their rows
 
 
 @declare(
@@ -91,7 +91,7 @@ _Variation = tuple[str, str, Sequence[TestRule], _Rows]  # what, how, the tests 
     timed_cells=by_rules(lambda rule, row: timed_columns(rule)),
 )
 def claims(rules: Path, added: Added = NONE_ADDED, **tables: pd.DataFrame) -> pd.DataFrame:
-    """One row per claim, in the order of the file ``rules``."""
+    """One row per claim, in the order of the file ``rules``; ``added`` is as in `load_claims`."""
     found = load_claims(rules, added)
     return pd.DataFrame([_row(name, rule, tables) for name, rule in found.items()])
 
@@ -165,7 +165,7 @@ def claims_tests(rules: Path, added: Added = NONE_ADDED, **tables: pd.DataFrame)
 
 
 def _found(test: TestRule, tables: Tables) -> dict[str, Any]:
-    """Margin, counts and the range of the values, which is empty where there are none."""
+    """Margin, counts, verdict and range of the values (None where there are no values)."""
     values = values_of(test, tables)[VALUE].to_numpy(float)
     good, total = int(satisfied(test, values).sum()), len(values)
     spread = (values.min(), np.median(values), values.max()) if total else (None, None, None)
@@ -198,9 +198,9 @@ def claims_sensitivity(
 
 
 def sensitivity_rows(rules: Mapping[str, ClaimRule], tables: Tables) -> pd.DataFrame:
-    """A row for every claim, part and variation of its deciding tests that can be made.
+    """One row per claim, part and variation of the tests that decide the verdict.
 
-    A variation that leaves a test without rows, or no test another, is none.
+    A variation is left out if a test has no rows; a split or filter also if it changes nothing.
     """
     made = []
     for claim, rule in rules.items():
@@ -226,7 +226,7 @@ def _with(test: TestRule, **changes: Any) -> TestRule:
 
 
 def _variations(tests: Sequence[TestRule], rows: _Rows, tables: Tables) -> Iterator[_Variation]:
-    """The tests with other numbers, then on a part of their rows, or on those of another split."""
+    """Variations: tests with other limits, on a subset of their rows, or on another split."""
     for factor in FACTORS:
         changed = [_with(test, threshold=factor * test.threshold) for test in tests]
         yield "threshold", f"x {factor:g}", changed, rows
@@ -252,7 +252,7 @@ def _variations(tests: Sequence[TestRule], rows: _Rows, tables: Tables) -> Itera
 def _kept(
     tests: Sequence[TestRule], rows: _Rows, varied: str, column: str, keeps: Mapping[str, _Keep]
 ) -> Iterator[_Variation]:
-    """The tests on the ``rows`` whose ``column`` a filter keeps, where it drops some."""
+    """Variations that restrict ``rows`` by one of the filters ``keeps`` on ``column``."""
     for name, keep in keeps.items():
         kept = [values[keep(values[column])] if column in values else values for values in rows]
         if sum(map(len, kept)) < sum(map(len, rows)):

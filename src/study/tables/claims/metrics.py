@@ -1,4 +1,4 @@
-"""Metrics of claims: a number for each chosen row of a table, with the row's labels."""
+"""Metrics of claims: functions that give a number and labels for chosen rows of a table."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -25,19 +25,19 @@ _RERUN = ("motion", "frames", "blowup_frame", _ERROR, *_RUN, "position_basis", "
 
 
 def filtered(table: pd.DataFrame, where: Where) -> pd.DataFrame:
-    """Rows of ``table`` whose columns have the values that ``where`` allows."""
+    """Rows of ``table`` whose columns have the values that ``where`` (column -> values) allows."""
     for column, allowed in where.items():
         table = table[table[column].isin(allowed)]
     return table
 
 
 def reruns(table: pd.DataFrame, where: Where) -> pd.DataFrame:
-    """Reruns of the training motion that started: sizes beyond the numerical rank do not.
+    """Reduced runs of the training motion that started (sizes above the numerical rank do not).
 
-    Reruns with reduced positions are among them only if ``where`` selects them, as a method may
-    have the same name with full and with reduced positions. ``r: [full]`` is the largest size tried
-    for each scene, group and method. A run that blew up before its first frame was tried, too:
-    leaving it out would put a smaller size, which survived, in the place of full rank.
+    Runs with reduced positions are included only if ``where`` selects a position basis, because a
+    method may have the same name with full and reduced positions. ``r: [full]`` selects the largest
+    size tried for each scene, group and method. A run that blew up before its first frame counts as
+    tried: without it, a smaller size that survived would be taken for full rank.
     """
     table = trained(table)
     table = table if "position_basis" in where else table[table.position_basis == "full"]
@@ -49,7 +49,7 @@ def reruns(table: pd.DataFrame, where: Where) -> pd.DataFrame:
 
 
 def by_axis(table: pd.DataFrame, where: Where) -> pd.DataFrame:
-    """Rows of ``table`` for each axis, with the error of that axis."""
+    """Rows of ``table`` repeated for each axis, with that axis' error as ``relative_error``."""
     parts = [table.assign(axis=a, relative_error=table[f"relative_error_{a}"]) for a in AXES]
     return filtered(pd.concat(parts, ignore_index=True), where)
 
@@ -57,40 +57,40 @@ def by_axis(table: pd.DataFrame, where: Where) -> pd.DataFrame:
 def held_out(
     choose: Callable[[pd.DataFrame, Where], pd.DataFrame], table: pd.DataFrame, where: Where
 ) -> pd.DataFrame:
-    """Rows that ``choose`` takes of the same runs with their median error over held-out motions.
+    """Rows selected by ``choose``, with the median over held-out motions as their error.
 
-    Runs without a held-out motion that can be judged are left out. Times are the training run's.
+    Runs without a known error on a held-out motion are left out. Times are of the training motion.
     """
     runs = with_held_out(trained(table), table)
     return choose(runs[runs[MEDIAN].notna()].assign(**{_ERROR: runs[MEDIAN]}), where)
 
 
 def labelled(rows: pd.DataFrame, values: pd.Series) -> pd.DataFrame:
-    """Labels of ``rows``, as far as they have them, and one of ``values`` for each."""
+    """Table of the columns of ``rows`` that are in `LABELS`, and ``values`` as column `VALUE`."""
     return rows[[label for label in LABELS if label in rows]].assign(**{VALUE: values})
 
 
 def local_share(rows: pd.DataFrame, accuracy: float) -> pd.DataFrame:
-    """Share of the local step in a frame."""
+    """Share of the local step in the time of a frame, for each row."""
     return labelled(rows, rows.local_share)
 
 
 def decay(rows: pd.DataFrame, accuracy: float) -> pd.DataFrame:
-    """Singular values over the first, of groups of which not all are round-off."""
+    """Singular values over the largest one, for groups with any singular value above round-off."""
     rows = rows[rows.groupby(["scene", "group"]).above_roundoff.transform("any")]
     return labelled(rows, rows.relative)
 
 
 def reconstruction(rows: pd.DataFrame, accuracy: float) -> pd.DataFrame:
-    """Reconstruction error; a singular interpolation counts as infinite."""
+    """Reconstruction error of each row; a singular interpolation has an infinite error."""
     rows = rows[rows.gain.notna()]
     return labelled(rows, rows.relative_error.fillna(np.inf))
 
 
 def axis_reconstruction(rows: pd.DataFrame, accuracy: float) -> pd.DataFrame:
-    """Reconstruction error of each axis, see `reconstruction`.
+    """Reconstruction error of each row and axis, see `reconstruction`.
 
-    An axis whose projections are round-off at every size has no error.
+    An axis is left out if its projections are round-off at every size, where no error is defined.
     """
     rows = rows[rows.gain.notna()]
     curve = [rows[label] for label in (*_RUN, "split", "axis")]
@@ -99,16 +99,16 @@ def axis_reconstruction(rows: pd.DataFrame, accuracy: float) -> pd.DataFrame:
 
 
 def elements_per_entry(rows: pd.DataFrame, accuracy: float) -> pd.DataFrame:
-    """Elements that are evaluated for each mode."""
+    """Number of evaluated elements divided by the number of modes r, for each row."""
     rows = rows[rows.elements_sampled.notna()]
     return labelled(rows, rows.elements_sampled.astype(float) / rows.r)
 
 
 def local_ratio(name: str, rows: pd.DataFrame, accuracy: float) -> pd.DataFrame:
-    """Time of a reduced local step (or part) over the full compiled one's, at the largest size.
+    """Time of a reduced local step, or a part of it, over that of the full compiled local step.
 
-    One value of the column ``name`` per scene, group, method and mesh: whether the dense solve
-    costs more from some size on shows at the largest size that the basis has.
+    The value is column ``name`` at the largest size of each scene, group, method and mesh: if the
+    dense solve becomes too expensive at some size, the largest size shows it.
     """
     rows = rows.dropna(subset=[name]).sort_values("r")
     largest = rows.groupby(CURVE, sort=False).tail(1).sort_index()
@@ -116,18 +116,18 @@ def local_ratio(name: str, rows: pd.DataFrame, accuracy: float) -> pd.DataFrame:
 
 
 def rerun_error(rows: pd.DataFrame, accuracy: float) -> pd.DataFrame:
-    """Error within the horizon; a run that blew up before its horizon counts as infinite."""
+    """Error within the horizon of each run, infinite for a blow-up before the horizon."""
     return labelled(rows, rows[_ERROR].fillna(np.inf))
 
 
 def useful_speedup(rows: pd.DataFrame, accuracy: float) -> pd.DataFrame:
-    """Speed-up over the full-order run; 0 for a run that is not accurate."""
+    """Speed-up over the full-order run; 0 for a run whose error exceeds ``accuracy``."""
     useful = rows.speedup.where(rows[_ERROR] <= accuracy, 0.0)
     return labelled(rows, useful).dropna(subset=[VALUE])
 
 
 def best_useful_speedup(rows: pd.DataFrame, accuracy: float) -> pd.DataFrame:
-    """The largest useful speed-up over sizes and methods, per scene and group."""
+    """Largest value of `useful_speedup` over sizes and methods, per scene and group."""
     runs = useful_speedup(rows, accuracy)
     return runs.groupby(["scene", "group"], sort=False)[VALUE].max().reset_index()
 
@@ -135,8 +135,8 @@ def best_useful_speedup(rows: pd.DataFrame, accuracy: float) -> pd.DataFrame:
 def error_trend(rows: pd.DataFrame, accuracy: float) -> pd.DataFrame:
     """Spearman's rank correlation of error and size, per scene, group and method.
 
-    1 where the error rises with every size, -1 where it falls; blow-ups share the highest rank.
-    Fewer than three sizes have no trend; errors that are all equal have the trend 0.
+    It is 1 if the error rises with every size, -1 if it falls. Blow-ups share the highest rank.
+    Fewer than three sizes give no value; equal errors give 0.
     """
     trends = []
     for labels, run in rows.groupby(_RUN, sort=False):
@@ -148,16 +148,15 @@ def error_trend(rows: pd.DataFrame, accuracy: float) -> pd.DataFrame:
 
 
 def trend_p_value(name: str, rows: pd.DataFrame, accuracy: float) -> pd.DataFrame:
-    """P-value of Page's test (1963) that errors rise with the sizes, over families of scenes.
+    """P-value of Page's test (1963) that errors rise with the size, over families of scenes.
 
-    The errors are those of the column ``name``; of repeated runs they are medians, as one run may
-    rise by chance. The places of the sizes of an experiment (scene, group, method) in ascending
-    order are the treatments, and blow-ups share the highest rank of its errors. A scene, its twin
-    and the methods on both are no independent observations: the mean ranks of a family's
-    experiments are one block. Experiments with the most common number of sizes count; one value, or
-    none with fewer than two blocks of three sizes.
+    Errors are read from column ``name``, for repeated runs a median over repetitions. Treatments
+    are the sizes of an experiment (scene, group, method) in ascending order; blow-ups share the
+    highest rank. A family is a scene with its variant ("twin"); as its experiments are dependent,
+    their mean ranks form one block. Only experiments with the most common number of sizes count.
+    The result has one row, or none with fewer than two blocks or fewer than three sizes.
     """
-    # imported here: at the top it would cost a second of every plan
+    # imported here because it takes a second, which planning the workflow does not need
     from scipy.stats import page_trend_test, rankdata
 
     runs = [run for _, run in rows.sort_values("r").groupby(_RUN, sort=False)]
@@ -180,9 +179,9 @@ def noise_error(rows: pd.DataFrame, accuracy: float) -> pd.DataFrame:
 
 
 def position_basis_ratio(rows: pd.DataFrame, accuracy: float) -> pd.DataFrame:
-    """Error of the snapshot basis over that of the skinning basis at equal k, per scene.
+    """Error with the POD position basis over that with the skinning basis at equal k, per scene.
 
-    Only where at least one of the two is accurate: the better of two failures says nothing.
+    Pairs in which both errors exceed ``accuracy`` are left out: their ratio means nothing.
     """
     kinds = [rows[rows.position_basis == kind] for kind in ("pod", "skinning")]
     pod, skinning = (rows.set_index(["scene", "k"])[_ERROR] for rows in kinds)
@@ -192,19 +191,19 @@ def position_basis_ratio(rows: pd.DataFrame, accuracy: float) -> pd.DataFrame:
 
 
 def over_the_rest(share: np.ndarray) -> np.ndarray:
-    """A share of a time as the ratio of this part to the rest."""
+    """Ratio share / (1 - share) of a part's time to the remaining time."""
     with np.errstate(divide="ignore"):
         return np.divide(share, np.subtract(1.0, share))
 
 
 @dataclass(frozen=True)
 class Metric:
-    """Metric of a test: values from some columns of one table.
+    """Metric of a test, computed from columns of one table.
 
-    of : from chosen rows and the largest error of an accurate run to labels and a `VALUE` for each
-    choose : rows of the table with values that are allowed in columns
-    labels : columns that rows may be chosen by, in addition to those of the table
-    ratio : a value as the ratio of two times, where it is made of times in another way
+    of : function of the chosen rows and ``accuracy``; returns labels and a `VALUE` for each row
+    choose : function of the table and ``where`` (column -> allowed values) that selects the rows
+    labels : columns allowed in ``where`` in addition to the columns of the table
+    ratio : function that converts a value to a ratio of two times, for metrics based on times
     """
 
     of: Callable[[pd.DataFrame, float], pd.DataFrame]
@@ -215,11 +214,11 @@ class Metric:
     ratio: Callable[[np.ndarray], np.ndarray] = np.asarray
 
     def values(self, tables: Tables, where: Where, accuracy: float) -> pd.DataFrame:
-        """Labels and a value for each row that ``where`` allows.
+        """Table of labels and a `VALUE` for each row of the metric's table that ``where`` allows.
 
         Parameters
         ----------
-        accuracy : largest error of an accurate run
+        accuracy : largest error of a run that counts as accurate
         """
         return self.of(self.choose(tables[self.table], where), accuracy)
 

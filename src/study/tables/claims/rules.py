@@ -1,4 +1,4 @@
-"""Rules of config/claims.yaml: each claim of the preprint with the tests that decide it, twice."""
+"""Rules of config/claims.yaml: the claims of the preprint with the tests of two verdicts each."""
 
 import datetime
 import hashlib
@@ -17,12 +17,12 @@ from study.tables import declared
 from study.tables.claims.metrics import METRICS, Value
 
 SETS = "sets"
-_NAMED = "@"  # opens the name of a set in ``where``
+_NAMED = "@"  # prefix of the name of a set of values in ``where``
 Added = Mapping[str, Sequence[Value]]
 NONE_ADDED: Added = MappingProxyType({})
-MARGIN = 1.5  # of tests that compare times and name no other
-PARTS = {"published": "", "beyond": "_beyond"}  # both verdicts, and what ends their columns
-# What the tables of the claims read.
+MARGIN = 1.5  # default margin of tests that compare times
+PARTS = {"published": "", "beyond": "_beyond"}  # verdict -> suffix of its columns
+# Inputs of the tables of the claims: rules file, setting and tables.
 READS: dict[str, Read] = {
     "rules": ProjectFile("config/claims.yaml"),
     "added": Setting("claim_sets"),
@@ -59,14 +59,14 @@ class TestRule(ConfigModel):
 
     @property
     def timed(self) -> bool:
-        """Whether what is compared depends on timing."""
+        """Whether the compared values or the row selection depend on measured times."""
         metric = METRICS[self.metric]
         timing = declared()[metric.table].timing_columns
         return not set(timing).isdisjoint({*metric.columns, *self.where})
 
     @property
     def factor(self) -> float:
-        """The margin, `MARGIN` by default; 1 where nothing depends on timing."""
+        """Margin of the test, `MARGIN` by default; 1 if the test does not depend on timing."""
         if not self.timed:
             return 1.0
         return MARGIN if self.margin is None else self.margin
@@ -139,7 +139,7 @@ class ClaimRule(ConfigModel):
 
     @property
     def fingerprint(self) -> str:
-        """Eight digits that change with every rule, but not with its words."""
+        """Hash of eight hexadecimal digits over the rules without their descriptive texts."""
         tests = [*self.published, *self.beyond]
         plain = [
             test.model_dump(mode="json", exclude={"what", "margin"})
@@ -151,17 +151,17 @@ class ClaimRule(ConfigModel):
 
 
 def load_claims(path: Path, added: Added = NONE_ADDED) -> dict[str, ClaimRule]:
-    """Claims of the file ``path`` by identifier.
+    """Claims of the file ``path`` by identifier, with the sets of values substituted.
 
     Parameters
     ----------
-    added : values that a study adds to named sets of the file, for scenes that the rules were not
-        written for
+    added : name of a set in the file -> values that a study appends to it, for scenes that the
+        rules were not written for
 
     Raises
     ------
     ConfigurationError
-        For any fault of the file, and for a set that it does not have.
+        If the file is invalid, or has no set of a name in ``added``.
     """
     content = read_yaml(path)
     if not isinstance(content, dict) or not {*content} - {SETS}:
@@ -181,7 +181,7 @@ def load_claims(path: Path, added: Added = NONE_ADDED) -> dict[str, ClaimRule]:
 
 
 def _resolved(entry: Any, sets: Mapping[str, list[Value]], place: str) -> Any:
-    """``entry`` with every word ``@name`` of a list replaced by the values of that set."""
+    """``entry`` with each list item ``@name`` replaced by the values of the set ``name``."""
     if isinstance(entry, dict):
         return {key: _resolved(value, sets, place) for key, value in entry.items()}
     if not isinstance(entry, list):

@@ -1,4 +1,4 @@
-"""Verdicts: the tests of a claim, evaluated."""
+"""Verdicts on claims: evaluation of the tests of a claim and combination of their results."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -25,11 +25,11 @@ MEASURED = [f"{name}{suffix}" for suffix in PARTS.values() for name in ("verdict
 class Outcome:
     """Result of one test.
 
-    verdict : one of `VERDICTS`; undecided where there was nothing to compare, dependent on the
-        machine where ratios of times close to the limit decide
-    measured : range of the values
-    sentence : how many rows satisfy the comparison, in words
-    condition : where it depends, how many do so for each value of the column that it names
+    verdict : one of `VERDICTS`; "cannot be decided" if nothing can be compared, "depends on the
+        machine" if ratios of times close to the threshold decide
+    measured : range of the values, in words
+    sentence : number of rows that satisfy the comparison, in words
+    condition : if the verdict depends, that number for each value of the column ``by`` of the test
     """
 
     verdict: str
@@ -44,19 +44,19 @@ def values_of(test: TestRule, tables: Tables) -> pd.DataFrame:
 
 
 def satisfied(test: TestRule, values: np.ndarray) -> np.ndarray:
-    """Whether each of ``values`` satisfies the comparison of ``test``."""
+    """Boolean array: whether each of ``values`` satisfies the comparison of ``test``."""
     return values >= test.threshold if test.compare == ">=" else values <= test.threshold
 
 
 def close(test: TestRule, values: np.ndarray) -> np.ndarray:
-    """Whether each of ``values`` is a ratio of times within the margin of ``test``'s limit."""
+    """Boolean array: whether each value is a ratio of times within the margin of the threshold."""
     ratio = METRICS[test.metric].ratio
     apart = ratio(values) / ratio(np.array(test.threshold))
     return (apart > 1.0 / test.factor) & (apart < test.factor)
 
 
 def answer(share: float, good: int, total: int) -> str:
-    """Verdict of a test that ``good`` of ``total`` rows satisfy where ``share`` must."""
+    """Verdict if ``good`` of ``total`` rows satisfy a test and a fraction ``share`` must agree."""
     if total == 0:
         return UNDECIDED
     if good >= share * total:
@@ -65,7 +65,7 @@ def answer(share: float, good: int, total: int) -> str:
 
 
 def answer_of(test: TestRule, values: np.ndarray) -> str:
-    """Verdict of a test; what values close to the limit would have to decide, the machine does."""
+    """Verdict of ``test``; `MACHINE` if it depends on the values close to the threshold."""
     near = close(test, values)
     sure, total = int((satisfied(test, values) & ~near).sum()), len(values)
     answers = {answer(test.share, sure + more, total) for more in range(int(near.sum()) + 1)}
@@ -100,7 +100,7 @@ def evaluate(test: TestRule, tables: Tables) -> Outcome:
 
 
 def _broken_down(test: TestRule, rows: pd.DataFrame, passed: np.ndarray) -> str:
-    """Number of rows that satisfy the comparison for each value of the column ``by``."""
+    """Text with the number of rows that satisfy the test for each value of its column ``by``."""
     if test.by is None or test.by not in rows:
         return f"{int(passed.sum())} of {len(passed)}"
     counts = pd.Series(passed).groupby(rows[test.by].to_numpy(), sort=False)
@@ -109,7 +109,7 @@ def _broken_down(test: TestRule, rows: pd.DataFrame, passed: np.ndarray) -> str:
 
 
 def _range(values: np.ndarray) -> str:
-    """Smallest to largest, and the median of three and more."""
+    """Text with the smallest and largest value, and the median of three or more values."""
     low, high = _text(values.min()), _text(values.max())
     if low == high:
         return low
@@ -126,7 +126,7 @@ def _text(value: float) -> str:
 
 
 def combined(verdicts: Sequence[str]) -> str:
-    """Verdict of a claim whose parts have ``verdicts``: it holds where all of them hold."""
+    """Verdict of a claim whose tests have ``verdicts``: it holds if all of them hold."""
     for verdict in (UNDECIDED, FAILS, MACHINE, DEPENDS):
         if verdict in verdicts:
             return verdict
@@ -134,7 +134,7 @@ def combined(verdicts: Sequence[str]) -> str:
 
 
 def timed_columns(rule: ClaimRule) -> set[str]:
-    """Columns of the row of a ``rule`` that depend on timing: two runs may differ there."""
+    """Columns in the row of a claim that depend on measured times, by its ``rule``."""
     found: set[str] = set()
     for part, suffix in PARTS.items():
         timed = [test for test in getattr(rule, part) if test.timed]
@@ -147,7 +147,7 @@ def timed_columns(rule: ClaimRule) -> set[str]:
 
 
 def by_rules(timed: Callable[[ClaimRule, Any], set[str]]) -> TimedCells:
-    """Timed columns of a row by the rule of its claim."""
+    """Function for `Table.timed_cells` that calls ``timed`` with each row and its claim's rule."""
 
     def timed_cells(table: pd.DataFrame, **files: Path) -> list[set[str]]:
         rules = load_claims(files["rules"])
@@ -157,7 +157,7 @@ def by_rules(timed: Callable[[ClaimRule, Any], set[str]]) -> TimedCells:
 
 
 def timed_parts(*cells: str) -> TimedCells:
-    """The columns ``cells`` of a row are timed where the verdict of its claim and part is."""
+    """Function that marks ``cells`` as timed columns in rows whose verdict depends on timing."""
     return by_rules(
         lambda rule, row: {*cells} if f"verdict{PARTS[row.part]}" in timed_columns(rule) else set()
     )
@@ -184,7 +184,7 @@ def timed_parts(*cells: str) -> TimedCells:
     timed_cells=timed_parts("verdict", "same", "measured"),
 )
 def replication(claims: pd.DataFrame, rules: Path, recorded: Path) -> pd.DataFrame:
-    """One row per claim and part that the study decides and the record holds."""
+    """One row per claim in both ``claims`` and the file ``recorded``, and part of the claim."""
     loaded = load_claims(rules)
     both = claims.merge(pd.read_csv(recorded), on="claim", suffixes=("", "_replication"))
     unchanged = [

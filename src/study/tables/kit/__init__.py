@@ -1,1 +1,1 @@
-"""Tools of the tables: their declaration, and columns that several of them have."""
+"""Helpers for tables: declaration of a table, shared columns, joining of experiment results."""

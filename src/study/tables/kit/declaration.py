@@ -1,6 +1,6 @@
-"""Declaration of a table: title, columns, reads, and the function that makes it.
+"""Declaration of a table: its title, columns, inputs, and the function that computes it.
 
-A table is a function under its declaration::
+A table is declared by a decorator on the function that computes it::
 
     @table(
         title="What part of a frame the local step takes",
@@ -9,8 +9,8 @@ A table is a function under its declaration::
     )
     def local_share(timings: list[File], wrong: float) -> pd.DataFrame: ...
 
-The function gets what it reads by name: files as a list of `File`, tables as frames, values of the
-configuration as plain data. Whatever it returns is brought to the declared columns and types.
+The function gets its inputs by name: files as a list of `File`, tables as data frames, values of
+the configuration as plain data. The returned frame is reduced to the declared columns and types.
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence
@@ -27,8 +27,8 @@ from study.artifact.artifact import Artifact, declare, declared_in
 from study.artifact.paths import TABLE
 from study.artifact.reads import Read
 
-# Six kinds of what a column may hold, and how far two machines may differ in each, by measurements:
-# docs/decisions/0010-six-kinds.md.
+# Kinds of column content, each with a rule for how far results of two machines may differ, based on
+# measurements: docs/decisions/0010-six-kinds.md.
 Quantity = Literal["exact", "value", "error", "share", "timed", "skipped"]
 QUANTITIES: dict[Quantity, str] = {
     "exact": "names, parameters, sizes, truth values: equal",
@@ -38,9 +38,9 @@ QUANTITIES: dict[Quantity, str] = {
     "timed": "what depends on timing, a compiler or a cache: not judged",
     "skipped": "rounding errors, and words about other columns: not compared",
 }
-# How far one cell may be off, where its column says nothing else.
+# Allowed difference of one number between two machines, unless the column has its own tolerance.
 TOLERANCES: dict[Quantity, float] = {"exact": 1e-8, "value": 1e-4, "error": 0.05, "share": 0.1}
-# The same of numbers of runs over many.
+# The same allowed difference for integers of quantity "share" (numbers of runs).
 TALLY = 2.0
 Kind = Literal["text", "integer", "number", "flag"]
 _DTYPES: dict[Kind, str] = {"integer": "Int64", "number": "float64", "flag": "boolean"}
@@ -48,14 +48,14 @@ _DTYPES: dict[Kind, str] = {"integer": "Int64", "number": "float64", "flag": "bo
 
 @dataclass(frozen=True)
 class Column:
-    """A column; any cell may be empty.
+    """Column of a table; any of its cells may be empty.
 
-    meaning : tells readers what it holds, in a few words
-    unit : empty for text, counts and what has no dimension
-    timed : it depends on timing (or on the memory in use), so that two runs may differ
-    compared : its quantity, where that does not follow from type and name
-    tolerance : its own, where that of its quantity is not the right one; of words and truth values
-        the share of the rows that may be others
+    meaning : description of the content for readers, in a few words
+    unit : empty for text, counts and dimensionless numbers
+    timed : whether values depend on timing (or on memory in use), so that two runs may differ
+    compared : quantity of the column, if it does not follow from kind and name
+    tolerance : allowed difference, if not the default of its quantity; for text and flags the
+        fraction of rows that may differ
     """
 
     kind: Kind
@@ -68,7 +68,7 @@ class Column:
 
     @property
     def quantity(self) -> Quantity:
-        """Kind of difference that two machines may have in it."""
+        """Quantity of the column, which sets how far results of two machines may differ."""
         if self.compared or self.timed:
             return self.compared or "timed"
         if self.kind != "number":
@@ -77,7 +77,7 @@ class Column:
 
     @property
     def within(self) -> float:
-        """Tolerance of a cell; words, truth values and whole numbers are equal."""
+        """Allowed difference of a cell; 0 for text and flags, and for integers except shares."""
         if self.tolerance is not None:
             return self.tolerance
         if self.kind == "integer":
@@ -85,11 +85,11 @@ class Column:
         return TOLERANCES.get(self.quantity, 0.0) if self.kind == "number" else 0.0
 
     def cast(self, values: pd.Series) -> pd.Series:
-        """``values`` with the type of the column; ValueError or TypeError if they do not fit."""
+        """Cast ``values`` to the column type; raise ValueError or TypeError if they do not fit."""
         if self.kind == "text":
             return values
         if self.kind == "flag":
-            # as objects: joined with an empty column, flags are numbers
+            # as objects, because pandas turns flags joined with an empty column into numbers
             others = values[values.notna() & ~values.isin([True, False])]
             if len(others):
                 raise ValueError(f"'{others.iloc[0]}'")
@@ -98,7 +98,7 @@ class Column:
         return values.astype(_DTYPES[self.kind])
 
 
-# Columns of words; of counts, sizes or indices; of True and False; of floating-point numbers.
+# Constructors of columns of strings, of integers, of booleans and of floating-point numbers.
 text = partial(Column, "text")
 integer = partial(Column, "integer")
 flag = partial(Column, "flag")
@@ -106,20 +106,20 @@ number = partial(Column, "number")
 
 
 def timed(column: Column) -> Column:
-    """Mark a column as a timing."""
+    """Copy of ``column`` marked as dependent on timing."""
     return replace(column, timed=True)
 
 
-# Names of the timed columns of each row, from the table and by name the project files it reads.
+# Function of a table and the project files it reads (by name): timed columns of each row.
 TimedCells = Callable[..., Sequence[Collection[str]]]
 
 
 @dataclass(frozen=True)
 class Table(Artifact):
-    """A table of the study; calling it makes it.
+    """Table of the study; calling it with the function's inputs computes the data frame.
 
-    timed_cells : columns of each row that depend on timing, where that differs from row to row
-    only_with_error : the table lists only the runs that have an error before their horizon
+    timed_cells : function that returns the timed columns of each row, if they differ between rows
+    only_with_error : whether the table lists only runs that have an error before their horizon
     """
 
     columns: tuple[Column, ...] = ()
@@ -127,32 +127,32 @@ class Table(Artifact):
     only_with_error: bool = False
 
     def __call__(self, *arguments: Any, **named: Any) -> pd.DataFrame:
-        """Make the table from what it reads, see `checked`."""
+        """Compute the table from its inputs and bring it to the declared columns, see `checked`."""
         return self.checked(self.function(*arguments, **named))
 
     @property
     def rule(self) -> str:
-        """Name of the rule that makes it."""
+        """Name of the workflow rule that computes the table."""
         return f"{self.name}_table"
 
     def perform(
         self, settings: Mapping[str, Any], inputs: Mapping[str, Any], outputs: Mapping[str, str]
     ) -> None:
-        """Make the table in a job and write it."""
+        """Compute the table in a workflow job and write it to ``outputs["table"]``."""
         write_table(self(**self.read(settings, inputs)), Path(outputs["table"]))
 
     @property
     def column_names(self) -> tuple[str, ...]:
-        """Columns in their order."""
+        """Names of the columns in their order."""
         return tuple(column.name for column in self.columns)
 
     @property
     def timing_columns(self) -> tuple[str, ...]:
-        """Columns that may differ between two runs on one machine, in some row at least."""
+        """Names of columns whose values may differ between two runs on one machine."""
         return tuple(column.name for column in self.columns if column.timed)
 
     def checked(self, table: pd.DataFrame) -> pd.DataFrame:
-        """``table`` with exactly the declared columns, in order and with their types.
+        """``table`` with exactly the declared columns, in their order and with their types.
 
         Raises
         ------
@@ -181,7 +181,7 @@ def table(
     timed_cells: TimedCells | None = None,
     only_with_error: bool = False,
 ) -> Callable[[Callable[..., pd.DataFrame]], Table]:
-    """Declare the function below as the one that makes the table of its name.
+    """Return a decorator that declares a function as the computation of the table of its name.
 
     Parameters
     ----------
@@ -190,7 +190,7 @@ def table(
     Raises
     ------
     TypeError
-        If a column is declared twice, or the function does not take what it reads.
+        If a column is declared twice, or the function's parameters do not match ``reads``.
     """
 
     def decorate(function: Callable[..., pd.DataFrame]) -> Table:
@@ -209,5 +209,5 @@ def table(
 
 
 def declared() -> dict[str, Table]:
-    """Return every table of the study by name."""
+    """Return all tables of the study by name."""
     return declared_in("study.tables", Table)

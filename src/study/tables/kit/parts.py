@@ -1,9 +1,9 @@
-"""Rows that experiments have written, file by file, with times that jobs of a scene can share.
+"""Functions that join the tables written by experiments and make their times comparable.
 
-A job times its own full-order run beside its variants, but the machine runs at another speed in
-another job, and so one run would have several times. Ratios within a job stay: the job's
-times are multiplied by the one time of the scene (table frame_times) over the job's own time of its
-full-order run.
+Each job times the full-order run of its scene together with the variants, but machine speed differs
+between jobs. To give the full-order run one time, all times of a job are multiplied by the scene's
+time in the table frame_times over the job's own time of its full-order run. Ratios within a job
+do not change.
 """
 
 from collections.abc import Collection, Iterable, Sequence
@@ -19,7 +19,7 @@ RESAMPLES, SEED, LEVEL = 2000, 1, 0.95
 
 
 def joined(files: Iterable[File]) -> pd.DataFrame:
-    """Rows of all files, in order; without columns if there are no rows."""
+    """Rows of the tables in ``files``, in order; an empty frame without columns if none exist."""
     parts = [part for part in (read_table(file.path) for file in files) if len(part)]
     return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame()
 
@@ -27,9 +27,9 @@ def joined(files: Iterable[File]) -> pd.DataFrame:
 def in_one_time(
     table: pd.DataFrame, own: pd.Series, times: pd.DataFrame, columns: Collection[str]
 ) -> pd.DataFrame:
-    """``table`` with its ``columns`` of times brought to the scenes' one time.
+    """``table`` with its time ``columns`` scaled to the times of the table frame_times.
 
-    Scenes that were not timed in several processes keep the times of their job.
+    Scenes that the table frame_times lacks retain the times measured in their job.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def in_one_time(
 
 
 def timings_in_one_time(timings: Sequence[File], times: pd.DataFrame) -> pd.DataFrame:
-    """Rows of the ``timings`` of all scenes in ``times``, see `in_one_time`."""
+    """Rows of the files ``timings``, scaled to the table ``times`` by `in_one_time`."""
     rows = joined(timings)
     if rows.empty:
         return rows
@@ -54,9 +54,9 @@ def timings_in_one_time(timings: Sequence[File], times: pd.DataFrame) -> pd.Data
 def median_interval(values: Sequence[float] | np.ndarray) -> tuple[float, float, float]:
     """Median, and the 2.5 % and 97.5 % quantiles of medians of resampled values (bootstrap).
 
-    The quantiles of fewer than two values are the value.
+    For a single value, or equal values, both quantiles are that value.
     """
-    # statistics take a second to load, which planning does not need
+    # imported here because it takes a second, which planning the workflow does not need
     from scipy.stats import bootstrap
 
     x = np.asarray(values, float)
@@ -70,11 +70,11 @@ def median_interval(values: Sequence[float] | np.ndarray) -> tuple[float, float,
 
 
 def in_words(median: float, low: float, high: float) -> str:
-    """``median`` and interval from ``low`` to ``high`` as text."""
+    """Text with the ``median`` and the interval from ``low`` to ``high``."""
     return f"{_rounded(median)} ({_rounded(low)} to {_rounded(high)})"
 
 
 def _rounded(value: float) -> str:
-    """``value`` with two significant digits, not in powers of ten."""
+    """Text of ``value`` rounded to two significant digits, without an exponent."""
     place = 1 - int(np.floor(np.log10(abs(value))))
     return f"{round(value, place):.{max(0, place)}f}"

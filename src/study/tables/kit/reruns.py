@@ -1,6 +1,6 @@
-"""Runs of the table reduced_reruns: training and held-out motions, the gain of their reductions.
+"""Selections from the table reduced_reruns by motion, and medians over held-out motions.
 
-Over the held-out motions each run has one number, by a rule fixed in config/claims.yaml.
+Errors over held-out motions are summarised by their median, as fixed in config/claims.yaml.
 """
 
 from collections.abc import Sequence
@@ -10,7 +10,7 @@ import pandas as pd
 
 from study.tables.kit.declaration import integer, number
 
-KEYS = ["scene", "group", "method", "position_basis", "k", "r"]  # what tells runs apart
+KEYS = ["scene", "group", "method", "position_basis", "k", "r"]  # columns that identify a run
 TRAIN = "train"
 MEDIAN, LOW, HIGH, COUNT = "error_heldout", "error_heldout_low", "error_heldout_high", "motions"
 COLUMNS = (
@@ -21,31 +21,31 @@ COLUMNS = (
 )
 _WHOLE = {"k": "Int64", "r": "Int64"}
 EXPERIMENT = ["scene", "group"]
-ORTHOGONAL = "pod"  # the method that evaluates and projects everything
+ORTHOGONAL = "pod"  # orthogonal projection, which evaluates all elements
 FAILED = 0.1  # error within the horizon above which a run counts as failed
 TWIN = "_twin"
 
 
 def families(scenes: pd.Series) -> pd.Series:
-    """Family of each scene: its name, or that of the scene that it is the twin of."""
+    """Family of each scene: its name without the suffix `TWIN` of a scene's variant."""
     return scenes.str.removesuffix(TWIN)
 
 
 def trained(reruns: pd.DataFrame) -> pd.DataFrame:
-    """Runs of the training motion of the table ``reruns``, reduced_reruns."""
+    """Rows of the table reduced_reruns (``reruns``) for the training motion."""
     return reruns[reruns.motion == TRAIN]
 
 
 def over_motions(reruns: pd.DataFrame, keys: Sequence[str] = KEYS) -> pd.DataFrame:
     """Median, least and largest error of each run over its held-out motions, and their number.
 
-    A run that ended before the horizon has an infinite error. A size beyond the rank was not run,
-    and a motion whose horizon is its start judges nothing: both are left out.
+    A run that ended before the horizon has an infinite error. Sizes above the numerical rank, which
+    cannot run, and motions whose horizon is frame 0 are left out.
 
     Parameters
     ----------
     reruns : table reduced_reruns
-    keys : columns that tell runs apart
+    keys : columns that identify a run
     """
     ran = (reruns.frames > 0) | reruns.blowup_frame.notna()
     rows = reruns[(reruns.motion != TRAIN) & ran & (reruns.horizon_frame > 0)]
@@ -62,16 +62,16 @@ def with_held_out(runs: pd.DataFrame, reruns: pd.DataFrame) -> pd.DataFrame:
 
 
 def judged_runs(reruns: pd.DataFrame, reconstruction: pd.DataFrame) -> pd.DataFrame:
-    """Training runs of sampled methods, with unreduced positions, whose basis suffices.
+    """Training-motion runs of sampled methods with unreduced positions and a sufficient basis.
 
-    It suffices where the orthogonal projection on it does not fail. The columns are those of
-    ``reruns``, and
+    A basis suffices where the run with orthogonal projection has an error of at most `FAILED`. The
+    result has the columns of ``reruns`` and
 
-    gain : of the reduction
-    error : of the run within the horizon; inf if it ended before
-    orthogonal_error : the same of the orthogonal projection at the largest size up to r (bases
-        without centring have one mode more)
-    failed : the run ended before the horizon or its error there exceeds `FAILED`
+    gain : gain of the reduction
+    error : error of the run within the horizon; inf if it blew up before
+    orthogonal_error : error of orthogonal projection at its largest size up to r (bases without
+        centring have one mode more)
+    failed : whether the error exceeds `FAILED`
     """
     runs = trained(reruns)
     runs = runs[(runs.position_basis == "full") & runs.max_extent.notna()].copy()

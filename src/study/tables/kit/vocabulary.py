@@ -1,4 +1,4 @@
-"""Columns that several tables share: each name with one meaning."""
+"""Columns that several tables share, so that a column name has the same meaning in each."""
 
 from study.tables.kit.declaration import Column, flag, integer, number, text, timed
 
@@ -51,7 +51,7 @@ _COLUMNS = (
         "missed, -inf if the full order has none, empty if neither has",
         "s",
         compared="share",
-        tolerance=0.02,  # a whole number of frames, of which one is allowed
+        tolerance=0.02,  # s, chosen to allow a difference of one frame
     ),
     integer("horizon_frame", "first frame that cannot be judged: the scene's horizon"),
     number(
@@ -69,5 +69,5 @@ _BY_NAME = {column.name: column for column in _COLUMNS}
 
 
 def shared(names: str) -> list[Column]:
-    """Columns by their ``names`` with blanks between; KeyError for one that no tables share."""
+    """Shared columns for the space-separated ``names``; KeyError for a name that is not shared."""
     return [_BY_NAME[name] for name in names.split()]
