@@ -76,7 +76,7 @@ _LABEL = re.compile(r"\\label\{([^{}]*)\}")
 _EQUATION = re.compile(r"\\begin\{(equation|align)\}")
 _CLAIM = re.compile(r"(\W*)(C\d+)\b(.*)")
 _COLOUR = re.compile(r"color: (ok\w+)")
-PARAGRAPH = 4  # level of a heading that opens a paragraph
+PARAGRAPH = 4  # heading level of LaTeX paragraphs
 
 
 @dataclass

@@ -30,7 +30,7 @@ LABELS = {
 
 @dataclass(frozen=True)
 class Place:
-    """A kind of file; ``pattern`` is relative to the results folder, with labels in braces."""
+    """A kind of file; ``pattern`` is its path in the results folder, with labels in braces."""
 
     pattern: str
 

@@ -71,7 +71,7 @@ def figures_page(root: Path = Path()) -> str:
         number = f" ({numbers[name].words})" if numbers[name].words else ""
         keys = ", ".join(f"`{key}`" for key in figure.options.model_fields)
         read = filter(None, map(_words, figure.reads.values()))
-        caption = re.sub(r"\. (?=[A-Z`])", ".\n", _text(figure.caption))  # a sentence a line
+        caption = re.sub(r"\. (?=[A-Z`])", ".\n", _text(figure.caption))  # one line per sentence
         parts.append(
             f"## `{name}`{number}\n\n**{_text(figure.title)}.**\n{caption}\n\n"
             f"Keys: {keys}.\nReads: {', '.join(dict.fromkeys(read))}.\n"

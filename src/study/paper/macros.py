@@ -47,12 +47,12 @@ def keys_of(source: str) -> list[str]:
 
 
 def macros(source: str, tables: Mapping[str, pd.DataFrame]) -> str:
-    r"""TeX definitions for every \val key of ``source``, with numbers of ``tables``.
+    r"""Return TeX macros for every ``\val`` key of ``source``, with numbers from ``tables``.
 
     Raises
     ------
     PaperError
-        An unknown table or column, or a key that matches several rows without an aggregate.
+        A table or column is unknown, or several rows match a key without an aggregate.
     """
     lines = [
         "% generated from results/tables",

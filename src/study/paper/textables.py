@@ -66,7 +66,7 @@ def _rows(table: pd.DataFrame, **wanted: object) -> pd.DataFrame:
 
 
 def _cell(rows: pd.DataFrame, text: Callable[[pd.Series], str]) -> str:
-    """Return ``text`` of the first of ``rows``, or a dash if there are none."""
+    """Return ``text(row)`` of the first row, or a dash if ``rows`` is empty."""
     return text(rows.iloc[0]) if len(rows) else NONE
 
 

@@ -63,7 +63,7 @@ class CommandLine:
         Raises
         ------
         ConfigurationError
-            A target was taken for a value of ``--config`` or ``--configfile``.
+            A target stands where it is read as a value of ``--config`` or ``--configfile``.
         """
         # imported late: Snakemake's jobs import this module too and need no parser
         from snakemake.cli import get_argument_parser
@@ -160,7 +160,7 @@ def merged(default: Path, configfiles: Iterable[str], settings: Iterable[str]) -
     ConfigurationError
         A file is missing or is not a mapping.
     """
-    # imported late: Snakemake's jobs import this module, too
+    # imported late: Snakemake's jobs import this module and do not need these functions
     from snakemake.cli import parse_config
     from snakemake.settings.types import ConfigSettings
     from snakemake.utils import update_config

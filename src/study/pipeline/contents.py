@@ -99,7 +99,7 @@ SCENES: dict[Place, Callable[[Study], Iterable[str]]] = {
     paths.STABILITY: lambda study: _held(study, study.settings.stability.scenes),
     paths.REQUESTED_TOLERANCES: _requested,
 }
-# Function that returns whether a reduced group of a scene has files of a kind.
+# Functions of study, scene and group: True if the reduced group has files of a kind.
 GROUPS: dict[Place, Callable[[Study, str, str], bool]] = {
     paths.REPETITIONS: lambda study, scene, group: any(
         scene in cell.scenes for cell in study.settings.repetitions.cells

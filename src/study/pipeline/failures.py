@@ -23,7 +23,7 @@ _CRASH = re.compile(
 _FRAME = re.compile(r'^ +File "(?P<file>.*)", line (?P<line>\d+) in (?P<function>.*)$', re.M)
 _IN_RULE = re.compile(r"^\w+ in rule (?P<rule>\w+)\b.*\n(?P<text>.*)", re.MULTILINE)
 _ENDING = re.compile(r"died with <Signals\.(?P<signal>\w+)|exit status (?P<status>\d+)")
-# Message of SLURM in a job's log with the reason for its end; below, that of Snakemake's executor.
+# Messages of SLURM, in a job's log, and of its Snakemake executor about the reason for a job's end.
 _BY_SLURM = re.compile(
     r"\*\*\* JOB \S+ ON \S+ (?P<status>CANCELLED) AT \S+(?: DUE TO (?P<why>[A-Z ]+?))? \*\*\*"
 )
@@ -56,7 +56,7 @@ class Failure:
         return _content(self.log) if path.is_file() and path.stat().st_mtime >= begun else ""
 
     def line(self, begun: float) -> str:
-        """Line with job, cause and, after a crash, code position; the run ``begun`` at (s)."""
+        """Error line: job, cause, crash position; ``begun`` is the start of the run, s."""
         folder = next((p for p in Path(self.output).parents if p.is_dir()), Path())
         errors = _ERROR.findall(_content(self.log))
         # the log of a job that could not start is left over from an older run

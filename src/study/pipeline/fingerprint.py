@@ -163,7 +163,7 @@ def _instructions(code: bytes) -> bytes:
 def _constant(value: object) -> object:
     if isinstance(value, CodeType):
         return _text(value)
-    # the order of a set changes from process to process
+    # the order of a set differs between processes, so that its elements are sorted
     return sorted(map(repr, value)) if isinstance(value, frozenset) else value
 
 

@@ -81,7 +81,7 @@ def _live_bytes(study: Study, name: str) -> float:
     settings, vertices = study.settings, study.vertices[name]
     section = settings.subspace if name in study.scenes else settings.online
     sizes = [k for k in settings.live.sizes if k in section.sizes and "pod" in section.bases]
-    entries = [vertices * (k + 4) for k in sizes]  # four affine columns come with the modes
+    entries = [vertices * (k + 4) for k in sizes]  # modes and four affine columns
     bases = sum(count * (8 if count <= DOUBLES else 4) for count in entries)
     return (vertices * 32 + bases) * 4 / 3  # written in base 64
 

@@ -1,4 +1,4 @@
-"""Rules of the workflow, one for each artifact."""
+"""Rules of the Snakemake workflow, one for each artifact (declared function that makes files)."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field

@@ -242,7 +242,7 @@ class Study:
 
 
 def part_of(value: Any, parts: str, key: str) -> Any:
-    """Value at the dotted path ``parts`` in ``value``; ConfigurationError with ``key`` if none."""
+    """Entry of ``value`` at the path ``parts`` (a.b); ConfigurationError if it does not exist."""
     for part in parts.split("."):
         if not hasattr(value, part):
             known = choices(part, getattr(type(value), "model_fields", ()))

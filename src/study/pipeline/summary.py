@@ -67,7 +67,7 @@ def summary(
     ----------
     command, folders : command line of the run, and the folders of its results
     figures, tables : paths of all figures and tables of the complete study
-    apart : words that mark the verdicts of another than the full study; else empty
+    apart : words that mark verdicts of a study other than the full one; else empty
     """
     wall = time.time() - psutil.Process().create_time()
     lines = [f"configuration: {configuration(command)}"]

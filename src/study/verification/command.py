@@ -1,4 +1,4 @@
-"""Command line of ``./reproduce verify``."""
+"""Command ``./reproduce verify``: arguments, comparison, update of the expected tables."""
 
 import argparse
 import subprocess
@@ -58,7 +58,7 @@ def update(subject: Subject, reason: str) -> Path:
         write_reference(table, frame, folder)
     for old in [*folder.glob("*.csv"), *folder.glob("*.csv.xz")]:
         if old.name.partition(".")[0] not in declared():
-            old.unlink()  # a table that no longer exists
+            old.unlink()  # reference of a table that no longer exists
     here = machine()
     note(folder, words, datetime.now(UTC).date(), f"{here.pdrom} ({here.commit})")
     return folder

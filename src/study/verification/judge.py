@@ -13,7 +13,7 @@ from study.verification.compare import SAMPLES, Comparison, kept, names, names_r
 # Largest number of cells that describe a row in a message.
 NAMED = 6
 # A column of at least `LEAST` numbers must also agree far more closely than the tolerance of one
-# cell: nine of ten cells if it holds at least `TEN` errors, else half of its cells, are closer than
+# cell: nine of ten cells if it has at least `TEN` errors, else half of its cells, are closer than
 # `CLOSE`, or than 1/`OWN` of the column's own tolerance. In a shorter column without own tolerance
 # all cells are closer than `LONE`.
 MOST, HALF, TEN, LEAST = 0.9, 0.5, 10, 3

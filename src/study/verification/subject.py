@@ -48,7 +48,7 @@ class Subject:
 
     @cached_property
     def plan(self) -> Plan:
-        """Plan of the configuration, as Snakemake merges it."""
+        """Plan of the configuration, merged from its files and settings as by Snakemake."""
         command = CommandLine.parse(self.options)
         whole = merged(Path(DEFAULT), command.configfiles, command.settings)
         return load_plan(whole, Path(), command.configfiles, folders=self.folders, quiet=True)

@@ -72,7 +72,7 @@ def hold_pipe(place: Path) -> None:
     """
     place.unlink(missing_ok=True)
     os.mkfifo(place)
-    reader = os.open(place, os.O_RDONLY | os.O_NONBLOCK)  # a writer needs a reader to begin with
+    reader = os.open(place, os.O_RDONLY | os.O_NONBLOCK)  # a FIFO must have a reader to be opened
     os.open(place, os.O_WRONLY)
     os.close(reader)
     os.environ[PIPE] = str(place.absolute())

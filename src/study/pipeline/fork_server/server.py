@@ -29,7 +29,7 @@ NUMBER = b"%20d"
 LARGEST = 1 << 24  # largest size of a request in bytes; environments are smaller on all systems
 # Seconds within which a client must send its request after it has connected.
 PATIENCE = 30.0
-_DIES_WITH_PARENT = 1  # PR_SET_PDEATHSIG of <sys/prctl.h>
+_DIES_WITH_PARENT = 1  # constant PR_SET_PDEATHSIG of <sys/prctl.h>
 
 
 class Request:
