@@ -21,7 +21,7 @@ CLOSE, OWN, LONE = 1e-5, 50, 0.01
 # Limits for cells that rounding decides: (share of runs that may be off, distance that counts as
 # off, columns by which runs are grouped). A tenth may be off by a factor 10, half by a factor 2.
 LOOSE = ((0.1, 1 - 1 / 10, ("scene", "noisy_axes", "method")), (0.5, 1 - 1 / 2, ("scene",)))
-# Number of differing cells allowed in any text or flag column that has a tolerance.
+# Least number of differing cells that a text or flag column with a tolerance may have.
 FEW = 3
 
 
