@@ -1,1 +1,1 @@
-"""The manuscript as a page: its text, and where each of its numbers comes from."""
+"""The manuscript as web pages: its text, with links from each number to its table."""

@@ -1,4 +1,4 @@
-"""The article: paper and supplement as pages, and those of tables, figures and claims."""
+"""The article: web pages of paper and supplement, and of all tables, figures and claims."""
 
 import io
 import json
@@ -28,28 +28,28 @@ from study.paper.source import DOCUMENTS, documents
 from study.tables import declared
 from study.tables.claims.rules import Added, load_claims
 
-# Bytes: a larger picture loses what nobody sees; a larger PDF is left to the command.
+# Bytes: larger pictures are compressed with losses; larger PDFs are not copied to the pages.
 LOSSLESS, COPIED = 150_000, 200_000
-MANY = 4  # keys of options that say what is drawn
+MANY = 4  # least number of option keys for which equal options mean related figures
 
 
 def shown_figure(
     name: str, node: Node, size: tuple[int, int], with_pdf: bool, pages: Mapping[str, str]
 ) -> Node:
-    """A figure with its picture, the caption as its words, its command, data, PDF and kin.
+    """Return the node of a figure with its picture, caption, command, data and related figures.
 
     Parameters
     ----------
-    node : of the figure in the syntax tree
-    size : of the picture, pixels
-    with_pdf : whether its PDF lies beside the page
-    pages : of the figures that stand in the documents, by name
+    node : node of the figure in the syntax tree
+    size : width and height of the picture, pixels
+    with_pdf : whether the pages include a PDF of the figure
+    pages : page of each figure that the documents contain, by the figure's name
     """
     attribute, caption, _ = node["c"]
     picture = attributes("", "", width=str(size[0]), height=str(size[1]), loading="lazy")
     alternative = words(plain(caption[1]).strip())
     image = {"t": "Image", "c": [picture, alternative, [f"figures/{name}.webp", ""]]}
-    # words, since pandoc hides a caption that says what the alternative text does
+    # plain words as alternative text: pandoc hides a caption that equals the alternative text
     made = {"t": "RawInline", "c": ["html", _origin(name, with_pdf, pages)]}
     origin = [{"t": "Plain", "c": [*words("Command: "), made]}]
     told = [caption[0], [*caption[1], boxed("Div", origin, "", "origin")]]
@@ -57,7 +57,7 @@ def shown_figure(
 
 
 def _origin(name: str, with_pdf: bool, pages: Mapping[str, str]) -> str:
-    """HTML of the command of a figure, its data, PDF and kin, and when it was verified."""
+    """HTML with a figure's command, tables, PDF, related figures and last verification."""
     reads = declarations()[name].reads.values()
     tables = [read.name for read in reads if isinstance(read, TableOf)]
     data = ", ".join(f'<a href="tables/{table}.html">{table}</a>' for table in tables)
@@ -76,9 +76,9 @@ def _origin(name: str, with_pdf: bool, pages: Mapping[str, str]) -> str:
 
 
 def _kin(name: str, pages: Mapping[str, str]) -> list[str]:
-    """Names of figures that show the same of other scenes.
+    """Names of related figures in ``pages``, which show other scenes in the same way.
 
-    They share the type of their options, where that has many keys, or their name.
+    Related figures share a type of options with at least `MANY` keys, or the start of the name.
     """
     listed = declarations()
     mine = listed[name].options
@@ -101,7 +101,7 @@ VERIFIED, INDEX = "verified.js", "index.html"
 def write_verified(found: Mapping[str, str], folder: Path) -> None:
     """Write outcomes of ``verify``, by kind and name as in ``table payoff``, into ``folder``.
 
-    A page that is opened from a disk loads nothing but scripts, so that this is one.
+    The file is a script, because a page opened from a disk can load scripts but no data.
     """
     write_text(f"window.pdromVerified={safe_json(dict(found))};\n", folder / VERIFIED)
 
@@ -115,7 +115,7 @@ ASSETS = {
     "style": "article.css",
     "script": "article.js",
 }
-# Pages of the documents by the name of their source.
+# File names of the documents' pages, by the name of the TeX source.
 PAGES = dict(zip(DOCUMENTS, (INDEX, "supplement.html"), strict=True))
 TITLES = dict(zip(DOCUMENTS, ("Paper", "Supplement"), strict=True))
 LINKS = {"tables.html": "Tables", "claims.html": "Claims", "live.html": "A model, running"}
@@ -137,16 +137,16 @@ def write_article(
     outputs: Mapping[str, str],
     **assets: Path,
 ) -> None:
-    """Write every page of the article to its place among ``outputs``.
+    """Write all pages of the article to the paths ``outputs``, by name.
 
     Parameters
     ----------
     source, references : TeX sources of the manuscript and its bibliography
     tables, machine : CSV of the tables and the record of the machine
-    inputs : what the manuscript reads, with `NUMBERS`
+    inputs : inputs of the manuscript, including the file `NUMBERS`
     figures, pictures : PDF and PNG of each figure
-    facts, claims : facts that are no results, and the file of the claims' rules
-    added : values that the study adds to sets of ``claims``, see `load_claims`
+    facts, claims : configuration facts, and the file of the claims' rules
+    added : values that the study adds to the sets of ``claims``, see `load_claims`
     assets : templates, style and script, see `ASSETS`
     """
     made = {file["name"]: file.path for file in inputs}
@@ -193,7 +193,7 @@ def write_article(
 def _write_figures(
     figures: list[File], pictures: list[File], outputs: Mapping[str, str]
 ) -> dict[str, tuple[tuple[int, int], bool]]:
-    """Write pictures as WebP, and small PDF files; size of each, and whether its PDF is here."""
+    """Write WebP pictures and small PDFs; return picture size, and whether the PDF is copied."""
     folder = Path(outputs["main"]).parent / "figures"
     png = {picture["name"]: Path(picture.path) for picture in pictures}
     made = {}
@@ -225,21 +225,21 @@ def _writes() -> dict[str, Place]:
     return {key: ARTICLE.where(name=name) for key, name in names.items()}
 
 
-LIMIT = 300.0  # seconds; a definition that expands to itself never ends
+LIMIT = 300.0  # s, for pandoc, which never ends for a definition that expands to itself
 
 
 def parsed(text: str, files: Mapping[str, str], references: Path) -> Node:
-    r"""Pandoc's syntax tree of a LaTeX source ``text``, with its bibliography.
+    r"""Return pandoc's syntax tree of a LaTeX source ``text``, with its bibliography.
 
     Parameters
     ----------
-    files : what the source reads by ``\input``, by name
-    references : BibTeX
+    files : contents of the files that the source reads by ``\input``, by name
+    references : path of the BibTeX file
 
     Raises
     ------
     PaperError
-        Pandoc is not installed, or refuses the source.
+        Pandoc is not installed, or it rejects the source.
     """
     with tempfile.TemporaryDirectory(prefix="pdrom-pandoc-") as folder:
         for name, content in {**files, "article.tex": text}.items():
@@ -251,9 +251,9 @@ def parsed(text: str, files: Mapping[str, str], references: Path) -> Node:
 
 
 def page(tree: Node, template: Path, variables: Mapping[str, str]) -> str:
-    """HTML of ``tree`` by a ``template`` with ``variables``; PaperError as in `parsed`.
+    """Return the HTML of ``tree`` by ``template`` and ``variables``; errors as in `parsed`.
 
-    Formulas are MathML, a table of contents comes first.
+    Formulas become MathML, and a table of contents comes first.
     """
     words = ["-f", "json", "-t", "html5", "--mathml", "--wrap=none", "--toc", "--toc-depth=2"]
     words += ["--standalone", "--shift-heading-level-by=1", f"--template={template.resolve()}"]

@@ -1,7 +1,7 @@
-r"""The manuscript's source as LaTeX that pandoc reads: numbers are links, tables plain.
+r"""Conversion of the manuscript's source to LaTeX that pandoc reads, with numbers as links.
 
-Whatever the source reads or decides when TeX runs is put in its place here: ``\val``, ``\known``,
-``\row``, ``\ifpart``, captions of figures. A link's address is ``origin:KEY``.
+Commands that TeX would evaluate are replaced here by their results: ``\val``, ``\known``, ``\row``,
+``\ifpart``, captions of figures. The address of a number's link is ``origin:KEY``.
 """
 
 import re
@@ -33,9 +33,9 @@ _NUMBER = re.compile(
     r"(?:[^A-Za-z]|\\(?:ensuremath|cdot|infty|times|ge|le)(?![A-Za-z])|\b(?:to|of)\b)*\d"
     r"(?:[^A-Za-z]|\bloses\b)*"
 )
-_TAIL = re.compile(r"(\(|, )(\d[\d/, ]*)([)}]?)$")  # of "holds (20/20)", of "{blow-up, 34}"
+_TAIL = re.compile(r"(\(|, )(\d[\d/, ]*)([)}]?)$")  # last number, as in "holds (20/20)"
 END = r" \\"
-# Of a preamble, pandoc reads short definitions; those that lay a page out are replaced.
+# Short definitions of the preamble, which pandoc reads; definitions of layout are replaced.
 _SHORT = re.compile(r"(?m)^\\(?:newcommand\{\\(?!longtableof|tablefile)\w+\}.*\}|newtheorem.*)$")
 REPLACED = r"""
 \newcommand{\longtableof}[4]{\begin{table}\caption{#3}\label{#2}\input{#4}\end{table}}
@@ -45,9 +45,9 @@ REPLACED = r"""
 
 
 def prepared(source: str, document: str, origins: Mapping[str, Any], facts: Facts) -> str:
-    """Return the ``source`` of a ``document`` for pandoc, linked by ``origins`` and ``facts``.
+    """Return the ``source`` of a ``document`` for pandoc, with numbers as links to tables.
 
-    ``origins`` are the contents of numbers.json, see `study.paper.build.write_inputs`.
+    ``origins`` is the content of numbers.json, see `study.paper.build.write_inputs`.
     """
     preamble, begin, text = source.partition(r"\begin{document}")
     left_out = rf"\emph{{[{note(facts.part, facts.full_study)}]}}"
@@ -68,7 +68,7 @@ def prepared(source: str, document: str, origins: Mapping[str, Any], facts: Fact
 
 
 def _title(preamble: str) -> str:
-    r"""The lines of the title, with a colon between them."""
+    r"""Return the TeX title as one line, with colons in place of line breaks."""
     start = preamble.index(r"\title{") + len(r"\title{")
     lines = _PART.sub("", preamble[start : closing(preamble, start)]).split(r"\\")
     words = [re.sub(r"^\[[^\]]*\]|\\large|%", "", line).strip() for line in lines]
@@ -76,7 +76,7 @@ def _title(preamble: str) -> str:
 
 
 def _decided(source: str, known: Sequence[str], left_out: str) -> str:
-    r"""``source`` with its ``\known`` and ``\row`` blocks shown, noted or left out."""
+    r"""Return ``source`` with its ``\known`` and ``\row`` blocks shown, noted or dropped."""
     pieces, start = [], 0
     for sentence, decision in zip(sentences(source), known, strict=True):
         opening = (r"\row{" if sentence.is_row else r"\known{") + sentence.text + "}"
@@ -96,7 +96,7 @@ def _figure(found: re.Match[str]) -> str:
 
 
 def _apart(found: re.Match[str]) -> str:
-    """Split mathematics at its numbers: a link cannot stand inside a formula."""
+    """Split a formula at its ``\\val`` numbers, since a link cannot stand inside a formula."""
     if not _VAL.search(found[1]):
         return found[0]
     parts = re.split(r"(\\val\{[^{}]*\})", found[1])
@@ -109,11 +109,11 @@ def _link(key: str, text: str) -> str:
 
 
 def linked_table(text: str, tables: Mapping[str, pd.DataFrame]) -> str:
-    """Return ``text``, a made TeX table, with numbers that link to the rows that they come from.
+    """Return the TeX table ``text`` with its numbers as links to rows of the study's tables.
 
-    They are in the one of ``tables`` that shares most columns with the made table. Where that has
-    as many rows, each has made one; else they agree in the columns that both have, as far as these
-    hold the same (a rounded number, a sum or a title is none of the table's own cells).
+    The links lead to the one of ``tables`` with most columns in common. If both have equally many
+    rows, these correspond in order. Otherwise a link selects rows with equal cells in the common
+    columns, as far as such rows exist (the cell may be a rounded number, a sum or a title).
     """
     text = _HEAD.sub("", text).replace("\\captionrow\n", "").replace("longtable", "tabular")
     lines = text.split("\n")
@@ -131,7 +131,7 @@ def linked_table(text: str, tables: Mapping[str, pd.DataFrame]) -> str:
 
 
 def _agreeing(table: pd.DataFrame, header: Sequence[str], cells: Sequence[str]) -> list[str]:
-    """Filters by which rows of ``table`` agree with a made row."""
+    """Filters ``column=value`` that select the rows of ``table`` with the cells of a TeX row."""
     found = []
     for title, cell in zip(header, cells, strict=True):
         for value in (_plain(cell), _plain(cell).replace(" ", "_")) if title in table else ():
@@ -144,20 +144,20 @@ def _agreeing(table: pd.DataFrame, header: Sequence[str], cells: Sequence[str]) 
 
 
 def _linked_cell(cell: str, key: str) -> str:
-    """A cell whose number, or the one at its end behind words, is a link."""
+    """Make the number in ``cell`` a link: the whole cell, or a number at its end after words."""
     if _NUMBER.fullmatch(cell):
         return _link(key, cell)
     return _TAIL.sub(lambda found: found[1] + _link(key, found[2]) + found[3], cell)
 
 
 def _plain(cell: str) -> str:
-    """Text of a cell without TeX; only the name where the cell begins with one."""
+    """Text of a cell without TeX commands; only the name if the cell begins with one."""
     name = re.match(r"\\texttt\{([^{}]*)\}", cell)
     return (name[1] if name else cell).replace("\\", "")
 
 
 def plain_columns(text: str) -> str:
-    """Return ``text`` with tables whose columns are letters alone; pandoc knows no others."""
+    """Return ``text`` with column definitions of tables reduced to letters, as pandoc needs."""
     pieces, start = [], 0
     for found in _SPEC.finditer(text):
         end = closing(text, found.end() + 1)

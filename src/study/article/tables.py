@@ -1,4 +1,4 @@
-"""Pages of tables and of the claims: rule, tests with what they found, history."""
+"""Web pages of tables, and of the claims with their rules, tests, outcomes and history."""
 
 import base64
 import gzip
@@ -25,7 +25,7 @@ FACTS = {
 
 
 def table_page(name: str, csv: bytes, template: str) -> str:
-    """HTML of table ``name`` (``csv``) by ``template``: its command, tolerance of every column."""
+    """HTML page of table ``name`` from its ``csv``: data, command, tolerance of each column."""
     table = declared().get(name)
     columns = "".join(
         f"<tr data-column='{c.name}'><th scope=row>{c.name}</th>"
@@ -47,14 +47,14 @@ def table_page(name: str, csv: bytes, template: str) -> str:
 
 
 def argument(name: str) -> str:
-    """Argument of ./reproduce that makes table ``name``; facts come with the text's numbers."""
+    """Argument of ./reproduce that makes table ``name``; facts belong to ``paper_inputs``."""
     if name in FACTS:
         return "paper_inputs"
     return TABLE.at(RESULTS, name=name) if name in declarations() else name
 
 
 def list_page(names: list[str], template: str) -> str:
-    """HTML by ``template`` with a line for each table of ``names``."""
+    """HTML page by ``template`` with a link and the title of each table in ``names``."""
     known = declared()
     items = "".join(
         f"<li><a href='tables/{name}.html'><code>{name}</code></a> "
@@ -74,11 +74,11 @@ def claims_page(
     pages: Mapping[str, str],
     template: str,
 ) -> str:
-    """HTML of all ``claims``, rules by name, in ``template``.
+    """HTML page by ``template`` of all ``claims``, given as rules by name.
 
     Parameters
     ----------
-    pages : of the figures by their names
+    pages : page of each figure that the documents contain, by the figure's name
     """
     found, body = verdicts.set_index("claim"), ""
     for name, rule in claims.items():

@@ -1,4 +1,4 @@
-"""Syntax tree of pandoc: its nodes, and the article in it, numbered and linked."""
+"""Pandoc's syntax tree: construction of nodes; numbers and links of the article's parts."""
 
 import re
 from collections import Counter
@@ -10,30 +10,30 @@ from urllib.parse import quote
 from pdrom.core.errors import PaperError
 from study.article.latex import ORIGIN
 
-Node = dict[str, Any]  # and the whole tree
+Node = dict[str, Any]  # a node of the syntax tree, or the whole tree
 
 
 def attributes(identifier: str = "", classes: str = "", **keys: str) -> list[Any]:
-    """Attributes of a node: its ``identifier``, ``classes`` in a string, and further ``keys``."""
+    """Attributes of a node: ``identifier``, space-separated ``classes``, and other ``keys``."""
     return [identifier, classes.split(), [[k.replace("_", "-"), v] for k, v in keys.items()]]
 
 
 def boxed(
     kind: str, content: list[Node], identifier: str = "", classes: str = "", **keys: str
 ) -> Node:
-    """A Span or a Div (``kind``) around ``content``, see `attributes`."""
+    """Node of the ``kind`` Span or Div around ``content``; see `attributes` for the others."""
     return {"t": kind, "c": [attributes(identifier, classes, **keys), content]}
 
 
 def words(text: str) -> list[Node]:
-    """Plain text as inline nodes."""
+    """Return plain text as a list of inline nodes."""
     return [{"t": "Str", "c": text}]
 
 
 def link(inlines: list[Node], address: str, classes: str = "") -> Node:
-    """Make a link around ``inlines`` to an ``address``, of some ``classes``.
+    """Node of a link around ``inlines`` to an ``address``, with ``classes``.
 
-    One of a formula alone has it as its title, too, which screen readers read.
+    A link around a formula also gets the formula as its title, for screen readers.
     """
     formula = all(node["t"] == "Math" for node in inlines)
     title = re.sub(r"\\cdot ?|[{}\\]", lambda m: "·" if "cdot" in m[0] else "", plain(inlines))
@@ -41,7 +41,7 @@ def link(inlines: list[Node], address: str, classes: str = "") -> Node:
 
 
 def plain(node: Any) -> str:
-    """Text of a node without its marks."""
+    """Text of a node or a list of nodes, without formatting."""
     if isinstance(node, list):
         return "".join(map(plain, node))
     if not isinstance(node, dict):
@@ -55,9 +55,9 @@ def plain(node: Any) -> str:
 
 
 def changed(node: Any, visit: Callable[[Node], Any]) -> Any:
-    """Return a tree in which ``visit`` has replaced nodes; it returns None to leave one.
+    """Return a tree with nodes replaced by ``visit``, which returns None to leave a node as it is.
 
-    A replaced node is not looked into. A list of nodes replaces one among others.
+    Replacements are not visited again. A returned list replaces one node by several.
     """
     if isinstance(node, list):
         made: list[Any] = []
@@ -76,12 +76,12 @@ _LABEL = re.compile(r"\\label\{([^{}]*)\}")
 _EQUATION = re.compile(r"\\begin\{(equation|align)\}")
 _CLAIM = re.compile(r"(\W*)(C\d+)\b(.*)")
 _COLOUR = re.compile(r"color: (ok\w+)")
-PARAGRAPH = 4  # level of a heading that opens a paragraph
+PARAGRAPH = 4  # heading level of LaTeX paragraphs
 
 
 @dataclass
 class Labels:
-    """Numbers of labels, and the pages that they are on."""
+    """Numbers and pages of labels, with counters of one document's figures, tables and others."""
 
     prefix: str
     page: str
@@ -89,12 +89,12 @@ class Labels:
     counts: Counter[str] = field(default_factory=Counter)
 
     def next(self, kind: str, label: str = "") -> str:
-        """Number of the next figure, table ... (``kind``); a ``label`` will stand for it."""
+        """Count the next figure, table etc. (``kind``); return and store the ``label``'s number."""
         self.counts[kind] += 1
         return self.note(label, f"{self.prefix}{self.counts[kind]}")
 
     def section(self, level: int, label: str) -> str:
-        """Number of the next section of a ``level``; a ``label`` will stand for it."""
+        """Count the next section of a ``level``; return its number and store it by ``label``."""
         self.counts[f"level{level}"] += 1
         for deeper in range(level + 1, PARAGRAPH):
             self.counts[f"level{deeper}"] = 0
@@ -102,19 +102,19 @@ class Labels:
         return self.note(label, self.prefix + ".".join(parts))
 
     def note(self, label: str, number: str) -> str:
-        """Let a label stand for a number."""
+        """Store ``number`` and page for a non-empty ``label``; return ``number``."""
         if label:
             self.numbers[label] = (number, self.page)
         return number
 
 
 def numbered(tree: Node, labels: Labels, shown: Callable[[str, Node], Node]) -> Node:
-    """Number sections, figures, tables, equations and theorems of ``tree``, and lay them out.
+    """Number sections, figures, tables, equations and theorems of ``tree``; adapt their layout.
 
     Parameters
     ----------
-    labels : gets the number of every label
-    shown : makes of a figure's name and its node, with the number in its caption, what is shown
+    labels : receives the number of every label
+    shown : function of a figure's name and its numbered node that returns the node to show
     """
 
     def visit(node: Node) -> Any:
@@ -133,7 +133,7 @@ def numbered(tree: Node, labels: Labels, shown: Callable[[str, Node], Node]) -> 
             title = {"t": "Header", "c": [1, attributes("references"), words("References")]}
             return [title, node]
         if kind == "Div" and (which := {"theorem", "proposition"} & set(content[0][1])):
-            # pandoc's heading has the name and a number without prefix
+            # pandoc's heading contains the name and a number without the document's prefix
             content[1][0]["c"][0]["c"][-1]["c"] = labels.next(which.pop(), content[0][0])
         if kind == "Math" and content[0]["t"] == "DisplayMath":
             return _equation(node, labels)
@@ -143,10 +143,10 @@ def numbered(tree: Node, labels: Labels, shown: Callable[[str, Node], Node]) -> 
 
 
 def _table(label: str, node: Node, labels: Labels) -> Node:
-    """A table that scrolls, below its caption, which does not."""
+    """Table as a scrollable region, with its number and caption in front."""
 
     def headed(node: Node) -> Node | None:
-        """A formula in a head, with its letters for those who listen."""
+        """Formula in a table head, with its text for screen readers; None for other nodes."""
         return boxed("Span", [node, _heard(plain(node))]) if node["t"] == "Math" else None
 
     content = _captioned(node, f"Table {labels.next('table', label)}.")["c"]
@@ -164,7 +164,7 @@ def _heard(text: str) -> Node:
 
 
 def _captioned(node: Node, opening: str) -> Node:
-    """A figure or a table whose caption opens with its number."""
+    """Figure or table with ``opening``, its number, in front of its caption."""
     attribute, (short, blocks), *others = node["c"]
     words_of_caption = blocks[0]["c"] if blocks else []
     strong = {"t": "Strong", "c": words(opening)}
@@ -173,7 +173,7 @@ def _captioned(node: Node, opening: str) -> Node:
 
 
 def _equation(node: Node, labels: Labels) -> Node:
-    """An equation beside its number; one of several lines has a number for each."""
+    """Display formula with its equation numbers, one per line of an ``align`` environment."""
     kind, tex = node["c"]
     found = _EQUATION.search(tex)
     lines = [] if found is None else [tex] if found[1] == "equation" else tex.split(r"\\")
@@ -187,12 +187,12 @@ def _equation(node: Node, labels: Labels) -> Node:
 
 
 def resolved(tree: Node, labels: Mapping[str, tuple[str, str]], claims: Mapping[str, Any]) -> Node:
-    """Give references their numbers, numbers and claims their links; open paragraphs in bold.
+    """Insert numbers of references, links of numbers and claims, and bold paragraph headings.
 
     Parameters
     ----------
-    labels : number and page of each
-    claims : by name; the text names them
+    labels : number and page of each label
+    claims : claims by the name that the text uses
 
     Raises
     ------
@@ -216,7 +216,7 @@ def resolved(tree: Node, labels: Mapping[str, tuple[str, str]], claims: Mapping[
 
 
 def _run_in(blocks: list[Node]) -> list[Node]:
-    """Headings of paragraphs as the bold words that these begin with."""
+    """Turn headings of paragraphs into bold words at the beginning of the paragraph."""
     made: list[Node] = []
     heading: list[Node] = []
     for block in blocks:
@@ -236,7 +236,7 @@ def _resolved_link(node: Node, labels: Mapping[str, tuple[str, str]]) -> Node | 
     attribute, inlines, (address, _) = node["c"]
     if address.startswith(ORIGIN):
         key = bytes.fromhex(address.removeprefix(ORIGIN)).decode()
-        # the rows that a key names (`study.paper.macros`) on the table's page
+        # the key also selects rows (`study.paper.macros`), which the table's page shows
         table, _, rows = key.partition("|")
         place = re.sub(r'[% "<>#]', lambda sign: quote(sign[0]), rows)
         return link(inlines, f"tables/{table}.html" + (f"#{place}" if place else ""), "val")

@@ -1,1 +1,1 @@
-"""Grammar of artifacts: what the study makes, by a function under a declaration of its reads."""
+"""Artifacts of the study (files made by a declared function): declarations, paths and logs."""

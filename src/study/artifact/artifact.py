@@ -1,6 +1,6 @@
-"""An artifact of the study: what it reads, what it writes, and the function that makes it.
+"""Artifact: a function that makes files of the study, with a declaration of its reads and writes.
 
-A module declares one above its function, which gets what it reads and writes by name::
+A decorator declares an artifact; the function's parameters have the names of reads and writes::
 
     @experiment(
         "POD of {group} in {scene} ({basis})",
@@ -9,8 +9,8 @@ A module declares one above its function, which gets what it reads and writes by
     )
     def pod(snapshots: File, spec: BasisSpec, out: File) -> None: ...
 
-Settings are validated by the annotations of the function, and a job depends on nothing else. The
-labels of a job (scene, group ...) are those of the paths that it writes.
+Settings are validated by the function's annotations, and a job depends on declared reads only. The
+labels of a job (scene, group ...) are the labels in the paths that it writes.
 """
 
 import inspect
@@ -32,13 +32,13 @@ A = TypeVar("A", bound="Artifact")
 
 @dataclass(frozen=True)
 class Artifact:
-    """Product of the study, made by one function.
+    """A function that makes files of the study, with what it reads and writes.
 
-    name : that of the function
-    title : printed by a run, with labels in braces
-    reads : by the names of the function's parameters
+    name : name of the function
+    title : message of a run when the job starts, with labels in braces
+    reads : reads by the names of the function's parameters
     writes : kinds of files by the names of the parameters that receive them
-    alone : it measures times, so that nothing else may run at the same time
+    alone : True if it measures times, so that no other job may run at the same time
     """
 
     name: str
@@ -50,46 +50,46 @@ class Artifact:
 
     @property
     def rule(self) -> str:
-        """Name of the rule that makes it."""
+        """Name of the workflow rule that makes the artifact."""
         return self.name
 
     @property
     def module(self) -> str:
-        """Module that holds it."""
+        """Name of the module that declares the artifact."""
         return self.function.__module__
 
     @property
     def address(self) -> str:
-        """Module and name, see `load`."""
+        """Address ``module:name``, from which `load` imports the artifact."""
         return f"{self.module}:{self.name}"
 
     @property
     def labels(self) -> list[str]:
-        """Names of a job's labels."""
+        """Names of a job's labels, taken from the paths that it writes."""
         return list(dict.fromkeys(name for place in self.writes.values() for name in place.labels))
 
     @property
     def files(self) -> dict[str, FileRead]:
-        """Reads from files, by name."""
+        """Reads that are files, by parameter name."""
         return {name: read for name, read in self.reads.items() if isinstance(read, FileRead)}
 
     @cached_property
     def types(self) -> dict[str, TypeAdapter[Any]]:
-        """Types of the settings, by name."""
+        """Pydantic type adapters of the settings, by parameter name."""
         hints = get_type_hints(self.function, include_extras=True)
         settings = [name for name, read in self.reads.items() if isinstance(read, SettingRead)]
         return {name: TypeAdapter(hints[name]) for name in settings}
 
     def __call__(self, *arguments: Any, **named: Any) -> Any:
-        """Call the function."""
+        """Call the artifact's function with these arguments and return its result."""
         return self.function(*arguments, **named)
 
     def inputs(self, sources: Sources, labels: Labels) -> dict[str, Paths]:
-        """Paths among ``sources`` that a job with these ``labels`` reads, by name."""
+        """Input paths of a job with these ``labels``, by parameter name; ``sources`` finds them."""
         return {name: read.paths(sources, labels) for name, read in self.files.items()}
 
     def settings(self, sources: Sources, labels: Labels) -> dict[str, Any]:
-        """Typed settings of a job by name; ConfigurationError if a key does not exist."""
+        """Typed settings of a job by parameter name; ConfigurationError if a key is unknown."""
         found: dict[str, Any] = {}
         for name, read in self.reads.items():
             if isinstance(read, SettingRead):
@@ -98,38 +98,38 @@ class Artifact:
         return found
 
     def plain(self, settings: Mapping[str, Any]) -> dict[str, Any]:
-        """``settings`` as plain data; a section has the annotated fields only."""
+        """Return typed ``settings`` as plain data, reduced to the fields of the annotated types."""
         return {k: self.types[k].dump_python(v, mode="json") for k, v in settings.items()}
 
     def perform(
         self, settings: Mapping[str, Any], inputs: Mapping[str, Any], outputs: Mapping[str, str]
     ) -> None:
-        """Run a job from plain ``settings`` and paths by name, ``inputs`` and ``outputs``.
+        """Run a job: plain ``settings``, and paths ``inputs`` and ``outputs``, by parameter name.
 
         Raises
         ------
         ValidationError
-            If the settings are not those that the declaration asks for.
+            A setting does not have the type of the function's annotation.
         """
         made = {name: place.file(str(outputs[name])) for name, place in self.writes.items()}
         self.function(**self.read(settings, inputs), **made)
 
     def read(self, settings: Mapping[str, Any], inputs: Mapping[str, Any]) -> dict[str, Any]:
-        """Arguments of the function: content of the files ``inputs``, and typed ``settings``."""
+        """Return the function's arguments: content of the files ``inputs``, typed ``settings``."""
         content = {name: read.content(inputs[name]) for name, read in self.files.items()}
         return content | {k: t.validate_python(settings[k]) for k, t in self.types.items()}
 
 
 class Files(Artifact):
-    """An artifact whose function gets as ``outputs`` the paths that it writes, by name.
+    """An artifact whose function receives all output paths in one argument ``outputs``, by name.
 
-    It looks after its own files: many of them, or in places that may vary.
+    The function writes the files itself, as for many files or files in configurable folders.
     """
 
     def perform(
         self, settings: Mapping[str, Any], inputs: Mapping[str, Any], outputs: Mapping[str, str]
     ) -> None:
-        """Write all of them."""
+        """Run a job: call the function with all ``outputs``, paths by name."""
         self.function(**self.read(settings, inputs), outputs=outputs)
 
 
@@ -143,20 +143,20 @@ def make(
     inputs: Mapping[str, Any],
     outputs: Mapping[str, str],
 ) -> None:
-    """Run a job of the artifact at an address; what it writes says what made it.
+    """Run a job of the artifact at ``address``; its outputs record rule, settings and code.
 
     Parameters
     ----------
-    code : fingerprint of the code that it runs
+    code : fingerprint of the code that the job runs
     inputs, outputs : paths by name
-    rule : name of the workflow's rule, recorded in what is written
+    rule : name of the workflow's rule
     """
     with made_by(rule, {**settings, "labels": dict(labels)}, code):
         load(address).perform(settings, inputs, outputs)
 
 
 def declare(made: A, *parameters: str) -> A:
-    """Return ``made``; TypeError if its function does not take reads and ``parameters``."""
+    """Return ``made``; TypeError if its function's parameters differ from reads and others."""
     try:
         inspect.signature(made.function).bind(**made.reads, **dict.fromkeys(parameters))
     except TypeError as error:
@@ -165,12 +165,12 @@ def declare(made: A, *parameters: str) -> A:
 
 
 def normal(reads: Mapping[str, Read | Place]) -> dict[str, Read]:
-    """``reads``, where a place alone stands for the file of the job."""
+    """Return ``reads`` with every bare `Place` replaced by ``One(place)``, the job's own file."""
     return {k: One(read) if isinstance(read, Place) else read for k, read in reads.items()}
 
 
 def load(address: str) -> Artifact:
-    """Return the artifact of an address ``module:name``; nothing else is imported."""
+    """Import and return the artifact at an address ``module:name``."""
     module, _, name = address.partition(":")
     made: Artifact = getattr(import_module(module), name)
     return made
@@ -178,9 +178,9 @@ def load(address: str) -> Artifact:
 
 @cache
 def declared_in(package: str, kind: type[A]) -> dict[str, A]:
-    """Return the artifacts of a kind that modules of a package declare, by name, sorted.
+    """Return the artifacts of a kind that modules of a package declare, sorted by name.
 
-    Only modules that import something from that of the kind can declare one: no other is imported.
+    Only modules that import from the module of ``kind`` can declare one; others are not imported.
     """
     root, found = Path(import_module(package).__path__[0]), {}
     for path in root.rglob("*.py"):
@@ -195,7 +195,7 @@ def declared_in(package: str, kind: type[A]) -> dict[str, A]:
 
 
 def modules_in(value: Any) -> Iterator[str]:
-    """Yield the modules that models inside ``value`` name, such as the effects of a scene."""
+    """Yield the names of code modules listed by models in ``value``, as by effects of a scene."""
     if isinstance(value, BaseModel):
         yield from getattr(value, "modules", ())
         for name in type(value).model_fields:

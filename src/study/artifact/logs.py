@@ -1,4 +1,4 @@
-"""One log per job, and what the user sees when the job fails."""
+"""Log file of a job, and the message that the user sees when the job fails."""
 
 import errno
 import faulthandler
@@ -22,27 +22,27 @@ FORMAT = "%(asctime)s %(levelname)-7s %(name)s: %(message)s"
 
 
 class _LogFile(logging.FileHandler):
-    """Log file that ends early on a full disk: the job's own outputs report that."""
+    """Log file that ignores a full disk, which the job's own outputs report."""
 
     stream: TextIOWrapper
 
     def handleError(self, record: logging.LogRecord) -> None:
-        """Say nothing: the default prints a traceback for every message."""
+        """Ignore an error of writing: the default prints a traceback for every message."""
 
 
 @contextmanager
 def job_log(path: str) -> Iterator[logging.Logger]:
-    """Send the packages' logs to ``path`` while a job runs, and keep libraries to one thread.
+    """Write the packages' log to ``path`` while a job runs, with libraries limited to one thread.
 
-    Snakemake gives the libraries of a job as many threads as the job claims, and one that measures
-    claims all cores to be alone. More threads would also change the order of sums.
+    Snakemake allows the libraries as many threads as the job claims, and a job that measures times
+    claims all cores. More threads would also change the order of sums.
 
-    A `PdromError` (a user's mistake) ends the job with one line on stderr; any other exception
-    keeps its traceback in the log and one line on stderr that says where to look. Lack of memory or
-    of space on the disk is reported in words. The last line of a job that ends well reports its
-    usage. Where a signal ends it, Python's own lines are the last.
+    A `PdromError` (a user's mistake) ends the job with one line on stderr. Any other exception
+    leaves its traceback in the log and one line on stderr with the log's path; lack of memory or
+    disk space is named. The last line of a successful job's log reports its resources. If a signal
+    ends the job, Python's stack trace comes last.
 
-    Damaged results that the job reads are set aside (`pdrom.core.store.checksum`).
+    Damaged results that the job reads are renamed (`pdrom.core.store.checksum`).
     """
     start = time.monotonic()
     loggers = [logging.getLogger(name) for name in PACKAGES]
@@ -85,7 +85,7 @@ def job_log(path: str) -> Iterator[logging.Logger]:
 def planning_log(quiet: bool) -> Iterator[None]:
     """Show the packages' warnings on stderr, or drop them if ``quiet``.
 
-    Every job plans again in a process of its own: what the main process logged is enough.
+    Every job makes the plan again in its own process; the warnings of the main process suffice.
     """
     handler = logging.NullHandler() if quiet else logging.StreamHandler()
     handler.setLevel(logging.WARNING)

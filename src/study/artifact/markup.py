@@ -1,7 +1,7 @@
-r"""The light mark-up of titles and captions, as TeX, as plain words and as reStructuredText.
+r"""Conversion of the mark-up of titles and captions to TeX, plain text and reStructuredText.
 
-Two marks: ```name``` is a name of the study, and ``$r \le 20$`` is mathematics. ``{key}`` is filled
-in with a setting of the configuration (`filled`).
+The mark-up has two forms: ```name``` is a name of the study, ``$r \le 20$`` is mathematics.
+``{key}`` stands for a setting of the configuration (`filled`).
 """
 
 import re
@@ -22,12 +22,12 @@ _LOWERED = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 
 
 def filled(text: str, value: Callable[[str], float]) -> str:
-    """``text`` with the settings that it names; ``value`` returns one by its key."""
+    """Return ``text`` with each ``{key}`` replaced by the number that ``value`` returns for it."""
     return _KEY.sub(lambda found: number(value(found[1])), text)
 
 
 def number(value: float) -> str:
-    """Number ``value`` in mark-up: powers of ten as such."""
+    """Number ``value`` as mathematics in mark-up, with exponents as powers of ten."""
     mantissa, mark, exponent = f"{value:g}".partition("e")
     if not mark:
         return f"${mantissa}$"
@@ -36,19 +36,19 @@ def number(value: float) -> str:
 
 
 def to_tex(text: str) -> str:
-    """Mark-up ``text`` as TeX; the mathematics is TeX already."""
+    """Convert the mark-up ``text`` to TeX."""
     return _converted(text, escape, lambda name: rf"\texttt{{{escape(name)}}}", lambda m: f"${m}$")
 
 
 def to_plain(text: str) -> str:
-    """Mark-up ``text`` as plain words."""
+    """Convert the mark-up ``text`` to plain words."""
     return _converted(text, str, str, _plain_mathematics)
 
 
 def to_rst(text: str) -> str:
-    """Mark-up as one line of reStructuredText in which every sign of the text is dead.
+    """Convert mark-up to one line of reStructuredText in which no character has a special meaning.
 
-    A backslash takes the meaning of any sign: no directive, role, link or substitution is left.
+    Every punctuation character gets a backslash, so that no directive, role or link can occur.
     """
     words = " ".join(to_plain(text).split())
     return re.sub(r"([^\w\s]|_)", r"\\\1", words)
@@ -64,7 +64,7 @@ def _converted(text: str, words: _Words, name: _Words, mathematics: _Words) -> s
 
 
 def _plain_mathematics(formula: str) -> str:
-    """A formula in plain letters: signs, exponents and indices."""
+    """Convert a formula to plain text with Unicode signs, exponents and indices."""
     text = _SIGN.sub(lambda found: _SIGNS[found[0]], formula)
     text = re.sub(r"\^(?:\{([^{}]*)\}|(.))", lambda f: (f[1] or f[2]).translate(_RAISED), text)
     text = re.sub(r"_(?:\{([^{}]*)\}|(.))", lambda f: (f[1] or f[2]).translate(_LOWERED), text)

@@ -1,7 +1,7 @@
-"""Layout below a results folder, both ways: the one module that knows where results lie.
+"""Layout of a results folder: the only module that defines the paths of results.
 
-A `Place` is a kind of file. It turns labels (scene, group, method ...) into a path, and a path back
-into labels. The results folder itself is chosen by the pipeline, one for each configuration.
+A `Place` is a kind of file. It converts labels (scene, group, method ...) to a path, and a path to
+labels. The pipeline chooses the results folder itself, one for each configuration.
 """
 
 import re
@@ -15,7 +15,7 @@ from pdrom.core.errors import StorageError
 
 RESULTS = "results"
 
-# What a label may be; the workflow restricts its wildcards to the same.
+# Regular expressions of label values, also used for the wildcards of the workflow.
 LABELS = {
     "mesh": r"[A-Za-z0-9_.-]+",
     "scene": r"[a-z][a-z0-9_]*",
@@ -30,20 +30,20 @@ LABELS = {
 
 @dataclass(frozen=True)
 class Place:
-    """A kind of file; ``pattern`` is relative to the results folder, with labels in braces."""
+    """A kind of file; ``pattern`` is its path in the results folder, with labels in braces."""
 
     pattern: str
 
     def at(self, results: str, **labels: str) -> str:
-        """Path of the file with these labels below the folder ``results``."""
+        """Path of the file with these labels in the folder ``results``."""
         return f"{results}/{self.pattern.format(**labels)}"
 
     def rule(self, results: str) -> str:
-        """Path below ``results`` with labels left in braces, as rules of the workflow have it."""
+        """Path pattern in ``results`` with labels in braces, as a Snakemake rule needs it."""
         return f"{results}/{self.pattern}"
 
     def where(self, **labels: str) -> "Place":
-        """Fix some of the labels."""
+        """Return the kind of file with some labels fixed to values."""
         pattern = self.pattern
         for label, value in labels.items():
             pattern = pattern.replace(f"{{{label}}}", value)
@@ -51,18 +51,18 @@ class Place:
 
     @property
     def labels(self) -> list[str]:
-        """Names of the labels of a path."""
+        """Names of the labels in the pattern."""
         return [label for _, label, _, _ in Formatter().parse(self.pattern) if label is not None]
 
     def file(self, path: str) -> "File":
-        """A path of this kind with its labels; StorageError if it is no such path."""
+        """Return ``path`` as a `File` with its labels; StorageError if it is not of this kind."""
         found = self._expression.search(path)
         if found is None:
             raise StorageError(f"{path}: no file of the kind '{self.pattern}'")
         return File(path, found.groupdict())
 
     def files(self, paths: Iterable[str]) -> "list[File]":
-        """`file` of each of ``paths``, in order."""
+        """Return the `File` of each path in ``paths``, in order."""
         return [self.file(path) for path in paths]
 
     @cached_property
@@ -77,7 +77,7 @@ class Place:
 
 @dataclass(frozen=True)
 class File:
-    """A file and what its path says about it."""
+    """A file: its path and the labels in the path, which ``file[label]`` returns."""
 
     path: str
     labels: dict[str, str]
@@ -140,7 +140,7 @@ PLACES = tuple(place for place in vars().copy().values() if isinstance(place, Pl
 
 
 def labels_in(path: str, results: str) -> Iterator[dict[str, str]]:
-    """Labels of a file below ``results``, for each kind of file that it can be."""
+    """Yield the labels of ``path``, a file in ``results``, for each kind of file that fits."""
     for place in PLACES:
         with suppress(StorageError):
             labels = place.file(path).labels

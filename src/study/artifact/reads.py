@@ -1,7 +1,7 @@
-"""Reads of an artifact: files and settings.
+"""Reads of an artifact: declarations of the files and settings that it needs.
 
-A declaration holds no path: it names kinds of files, other tables and keys of the configuration.
-The pipeline finds them (`Sources`); the function of the artifact gets their content by name.
+A read contains no path: it names a kind of file, a table or a key of the configuration. The
+pipeline finds paths and values (`Sources`); the artifact's function gets the content by name.
 """
 
 from collections.abc import Mapping
@@ -17,42 +17,42 @@ Paths = str | list[str]
 
 
 class Sources(Protocol):
-    """Answers of a study about its files and settings, for a job with some labels."""
+    """Interface by which reads find the paths and settings of a study for a job's labels."""
 
     def file(self, place: Place, labels: Labels) -> str:
-        """Return the file of a kind (``place``) that belongs to a job with these ``labels``."""
+        """Return the path of the file of kind ``place`` of a job with these ``labels``."""
         ...
 
     def files(self, place: Place, labels: Labels) -> list[str]:
-        """Return every file of a kind (``place``) that agrees with the ``labels`` of a job."""
+        """Return all paths of the kind ``place`` whose labels agree with ``labels`` of a job."""
         ...
 
     def table(self, name: str) -> str:
-        """Return the file of the table ``name``."""
+        """Return the path of the table ``name``."""
         ...
 
     def value(self, key: str, labels: Labels) -> Any:
-        """Return the value of ``key`` in the configuration, or derived for a job's ``labels``."""
+        """Return the configuration value of ``key``, or a value derived from ``labels``."""
         ...
 
 
 class FileRead:
-    """Something that is read from files."""
+    """Base class of reads from files."""
 
     def paths(self, sources: Sources, labels: Labels) -> Paths:
-        """Return the path, or all paths, among ``sources`` for a job with these ``labels``."""
+        """Return the path, or a list of paths, that ``sources`` finds for these ``labels``."""
         raise NotImplementedError
 
     def content(self, paths: Any) -> Any:
-        """Return what the function of the artifact gets for ``paths``."""
+        """Return the argument of the artifact's function that is read from ``paths``."""
         raise NotImplementedError
 
 
 class SettingRead:
-    """Something that is read from the configuration."""
+    """Base class of reads from the configuration."""
 
     def value(self, sources: Sources, labels: Labels) -> Any:
-        """Return the value from ``sources`` for a job with these ``labels``."""
+        """Return the value that ``sources`` has for a job with these ``labels``."""
         raise NotImplementedError
 
 
@@ -61,7 +61,7 @@ Read = FileRead | SettingRead
 
 @dataclass(frozen=True)
 class One(FileRead):
-    """The file of a kind that belongs to the job; declared by its place alone."""
+    """The file of the kind ``place`` with the job's labels; a bare `Place` declares it, too."""
 
     place: Place
 
@@ -74,7 +74,7 @@ class One(FileRead):
 
 @dataclass(frozen=True)
 class Every(FileRead):
-    """Every file of a kind that the configuration holds and that agrees with the job's labels."""
+    """All files of the kind ``place`` in the configuration whose labels agree with the job's."""
 
     place: Place
 
@@ -87,7 +87,7 @@ class Every(FileRead):
 
 @dataclass(frozen=True)
 class EachOf(Every):
-    """A file for each entry of a setting, which knows its ``labels``, also where some share it."""
+    """One file of the kind ``place`` per entry of the setting ``key``; entries have ``labels``."""
 
     key: str
 
@@ -98,7 +98,7 @@ class EachOf(Every):
 
 @dataclass(frozen=True)
 class TableOf(FileRead):
-    """A table of the study, by name."""
+    """The study's table ``name``, read as a data frame."""
 
     name: str
 
@@ -110,7 +110,7 @@ class TableOf(FileRead):
 
 
 class EditedFiles(FileRead):
-    """Files that people edit: a change of their content counts, not of their dates."""
+    """Base class of reads of hand-edited files; jobs rerun for new content, not for new dates."""
 
     def content(self, paths: Any) -> Any:
         return [Path(path) for path in paths]
@@ -118,7 +118,7 @@ class EditedFiles(FileRead):
 
 @dataclass(frozen=True)
 class ProjectFile(EditedFiles):
-    """A file that people edit, by its path in the project."""
+    """A hand-edited file, given by its path in the project."""
 
     path: str
 
@@ -131,7 +131,7 @@ class ProjectFile(EditedFiles):
 
 @dataclass(frozen=True)
 class ProjectFiles(EditedFiles):
-    """Files that people edit, by their paths in the project."""
+    """Hand-edited files, given by their paths in the project."""
 
     named: tuple[str, ...]
 
@@ -141,7 +141,7 @@ class ProjectFiles(EditedFiles):
 
 @dataclass(frozen=True)
 class SourcesOf(EditedFiles):
-    """Files that people edit and that a setting names by its property ``sources``."""
+    """Hand-edited files, listed by the attribute ``sources`` of the setting ``key``."""
 
     key: str
 
@@ -151,7 +151,7 @@ class SourcesOf(EditedFiles):
 
 @dataclass(frozen=True)
 class Setting(SettingRead):
-    """A value of the configuration, by its key; dots lead into sections."""
+    """The configuration value of ``key``; dots in the key separate section and entry."""
 
     key: str
 
@@ -161,7 +161,7 @@ class Setting(SettingRead):
 
 @dataclass(frozen=True)
 class Settings(SettingRead):
-    """A model of settings that go together; each of its fields is the setting of that name."""
+    """Several settings as one Pydantic ``model``; the name of each field is the setting's key."""
 
     model: type[Any]
 

@@ -1,6 +1,6 @@
-"""Resources of a job, measured in its own process: a line of its log, written and read here.
+"""Time and memory of a job, measured in its own process, as a line of the job's log.
 
-Snakemake's ``benchmark:`` samples every half minute, longer than most jobs run.
+Snakemake's ``benchmark:`` samples only every 30 s, which is longer than most jobs take.
 """
 
 import re
@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 MB = 1e6
-_PEAK = 1.0 if sys.platform == "darwin" else 1024.0  # bytes of one unit of ru_maxrss
+_PEAK = 1.0 if sys.platform == "darwin" else 1024.0  # bytes per unit of ru_maxrss
 _WORDS = re.compile(
     r"used (?P<wall>[0-9.]+) s, (?P<processor>[0-9.]+) s of processor time, "
     r"(?P<memory>[0-9.]+) MB of memory$"
@@ -22,10 +22,10 @@ _WORDS = re.compile(
 class Usage:
     """Time and memory of a job.
 
-    wall : seconds from its beginning to its end
-    processor : seconds of user and system time, of the job and of what it started
-    memory : largest resident memory, MB, of the job or of one process that it started; libraries
-        that jobs share are counted for each of them
+    wall : seconds from its start to its end
+    processor : user and system seconds of the job and of the processes that it started
+    memory : largest resident memory, MB, of the job or of one process that it started; memory of
+        libraries that jobs share is included for each job
     """
 
     wall: float
@@ -40,9 +40,9 @@ class Usage:
 
 
 def usage_since(start: float) -> Usage:
-    """Usage from the monotonic clock's ``start`` on; all but ``wall`` is of the whole process.
+    """Usage since ``start``, s of the monotonic clock; processor time and memory of the process.
 
-    A job that is a fork begins with no processor time of its own.
+    Processor time starts at zero in a forked job.
     """
     used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
     return Usage(
@@ -53,7 +53,7 @@ def usage_since(start: float) -> Usage:
 
 
 def usage_of(log: str | Path) -> Usage | None:
-    """Resources of the job that wrote a log; None where it did not end well, or there is no log."""
+    """Read the usage from the log of a job; None without a log or if the job failed."""
     try:
         lines = Path(log).read_text(encoding="utf-8", errors="replace").splitlines()
     except FileNotFoundError:

@@ -1,1 +1,1 @@
-"""The page on which reduced models run, and what draws runs in a browser."""
+"""Web page on which reduced models run, with the scripts that draw their motion."""

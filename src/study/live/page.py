@@ -1,4 +1,4 @@
-"""The page on which reduced models run: one file, and beside it a file of models for each scene."""
+"""Web page on which reduced models run: one HTML file, and a file of models for each scene."""
 
 import json
 import re
@@ -12,18 +12,18 @@ from study.artifact.artifact import Files, declare
 from study.artifact.paths import LIVE_MODEL, LIVE_PAGE, File
 from study.artifact.reads import Every, ProjectFile
 
-# Folder of the models, from that of the page.
+# Folder of the model files, relative to the page.
 MODELS = Path(LIVE_MODEL.pattern).parent.name
 HEAD = re.compile(r'pdromLive\(\{"format":1,"scene":("\w+"),"title":("(?:[^"\\]|\\.)*"),')
 
 
 def _write(models: list[File], html: Path, outputs: Mapping[str, str], **parts: Path) -> None:
-    """Write the page of its ``parts``; it loads the models of a scene when a reader chooses it.
+    """Write the page from its template and ``parts``; it loads a scene's models when chosen.
 
     Raises
     ------
     StorageError
-        A file of models is damaged, or none.
+        A file of models is damaged or has another format.
     """
     texts = {name.upper(): path.read_text("utf-8") for name, path in parts.items()}
     texts["SCENES"] = safe_json([scene for file in models if (scene := _listed(file))])
@@ -31,7 +31,7 @@ def _write(models: list[File], html: Path, outputs: Mapping[str, str], **parts: 
 
 
 def _listed(file: File) -> dict[str, str] | None:
-    """A scene of the list, None for one of which the study has no models."""
+    """Entry of a scene in the page's list; None if the study has no models of the scene."""
     text = read_text(file.path)
     if '"models":[]' in text:
         return None

@@ -1,1 +1,1 @@
-"""The manuscript: macros and tables from the results, bibliography, TeX."""
+"""The manuscript: TeX macros and tables from the results, bibliography, and its PDFs."""

@@ -1,4 +1,4 @@
-"""Rules of the manuscript: tables -> macros, TeX tables, bibliography -> PDF."""
+"""Artifacts of the manuscript: its inputs (macros, TeX tables, bibliography) and its PDFs."""
 
 import json
 import re
@@ -28,16 +28,16 @@ from study.paper.source import DOCUMENTS, documents
 from study.paper.tex import build_pdfs
 from study.paper.textables import TEX_TABLES, reads, tex_table
 
-PAGES = {"main": 16, "supplement": 30}  # at most, of the paper
+PAGES = {"main": 16, "supplement": 30}  # largest number of pages of each document
 
 
 class Facts(BaseModel):
-    """Facts that the manuscript states and that are no results.
+    """Facts that the manuscript states and that are not results of experiments.
 
     captions : titles and captions of the figures, as TeX, by name
-    part : what the study was read from where it is not the full one, else None
-    full_study : the configuration of the full study
-    pages : at most, by document
+    part : configuration of the results if it is not the full study's, else None
+    full_study : name of the full study's configuration
+    pages : largest number of pages, by document
     tables : facts of the configuration (scenes, methods, study), as rows of tables
     """
 
@@ -58,13 +58,13 @@ def write_inputs(
     facts: Facts,
     outputs: Mapping[str, str],
 ) -> None:
-    r"""Write macros.tex, figures.tex, the TeX tables and the bibliographies.
+    r"""Write macros.tex, figures.tex, TeX tables, bibliographies and the file `NUMBERS`.
 
-    Made from TeX files ``source``, BibTeX ``references``, CSV ``tables``, the record of the
-    ``machine`` and ``facts``.
+    Sources are the TeX files ``source``, BibTeX ``references``, CSV ``tables``, the record of the
+    ``machine`` and ``facts``. ``outputs`` are the paths of the files by name.
 
-    `NUMBERS` says of every ``\val`` key and TeX table where its numbers come from, and which blocks
-    of each document are shown (`decisions`).
+    The file `NUMBERS` gives the origin of the numbers of every ``\val`` key and TeX table, and
+    which blocks of each document are shown (`decisions`).
     """
     texts = documents(source[0].parent)
     whole = "".join(texts.values())
@@ -87,7 +87,7 @@ def write_inputs(
 
 
 def fact_tables(machine: Path, facts: Facts) -> dict[str, pd.DataFrame]:
-    """Tables that are no results: ``facts``, and the record ``machine`` in one row.
+    """Return tables of ``facts``, and the record in the file ``machine`` as a table of one row.
 
     Versions of libraries are columns ``version_NAME``.
     """
@@ -101,7 +101,7 @@ def fact_tables(machine: Path, facts: Facts) -> dict[str, pd.DataFrame]:
     row["kernels"] = ", ".join(sorted({k.architecture for k in record.kernels if k.architecture}))
     if record.units is not None:
         row |= {**record.units.model_dump(), "unit_s": record.units.unit_s}
-    # names of a machine are not ours and may hold any character
+    # names of a machine come from outside and may contain any character
     words = {key: replaced(value) for key, value in row.items() if isinstance(value, str)}
     return {**tables, "machine": pd.DataFrame([{**row, **words}])}
 
@@ -113,10 +113,10 @@ def build(
     facts: Facts,
     outputs: Mapping[str, str],
 ) -> None:
-    """Build the PDFs of the paper and of its supplement from figures and what `write_inputs` wrote.
+    """Build the PDFs of the paper and of its supplement.
 
-    Each links into the other, as long as both lie in one folder. ``source`` and ``outputs`` are TeX
-    and PDF of each, ``figures`` and ``inputs`` files that they read, with ``facts``.
+    The two PDFs link to each other and must lie in one folder. ``source`` are the TeX files,
+    ``figures`` and ``inputs`` (from `write_inputs`) the files that these read.
     """
     results = [Path(file.path) for file in (*figures, *inputs)]
     for path in results:
@@ -130,13 +130,13 @@ _CITE = re.compile(r"\\cite\{([^}]*)\}")
 
 
 def cited_keys(source: str) -> list[str]:
-    """Keys of a TeX source in order of first citation."""
+    """Return the keys that a TeX source cites, in order of first citation."""
     keys = [key.strip() for group in _CITE.findall(source) for key in group.split(",")]
     return list(dict.fromkeys(keys))
 
 
 def bibliography(source: str, references: Path) -> str:
-    """The thebibliography environment (TeX) of the entries that ``source`` cites, in that order.
+    """Return the TeX bibliography of the entries that ``source`` cites, in order of citation.
 
     Raises
     ------
@@ -180,7 +180,7 @@ paper_inputs = Files(
     {Path(name).stem: PAPER_INPUT.where(name=name) for name in FILES},
     write_inputs,
 )
-# its files lie where the configuration says, see `study.pipeline.folders`
+# the output paths depend on the configuration, see `study.pipeline.folders`
 paper = Files(
     "paper",
     "Manuscript",

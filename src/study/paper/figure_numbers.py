@@ -1,4 +1,4 @@
-"""Numbers of the figures in paper, supplement and preprint, and the list of all figures."""
+"""Numbers of the figures in paper, supplement and preprint, and a page that lists all figures."""
 
 import re
 from dataclasses import dataclass
@@ -9,16 +9,16 @@ from study.artifact.reads import Every, ProjectFile, Read, TableOf
 from study.figures.kit.declaration import declarations
 from study.paper.source import documents
 
-SUPPLEMENT = "S"  # before a number of the supplement
+SUPPLEMENT = "S"  # prefix of the figure numbers in the supplement
 _COMMENT = re.compile(r"(?<!\\)%.*")
 _PLACED = re.compile(r"\\figureof\{(\w+)\}")
 
 
 @dataclass(frozen=True)
 class Numbers:
-    """Numbers of a figure, as "3" in the paper or "S7" in its supplement, and in the preprint.
+    """Numbers of a figure: manuscript, "3" for the paper or "S7" for its supplement, and preprint.
 
-    None where it does not stand.
+    A number is None if the document does not contain the figure.
     """
 
     manuscript: str | None
@@ -26,24 +26,24 @@ class Numbers:
 
     @property
     def words(self) -> str:
-        """Both numbers, as in "figure S10 of supplement.pdf, figure 8 of the preprint"."""
+        """Both numbers in words, as in "figure S10 of supplement.pdf, figure 8 of the preprint"."""
         own = self.manuscript or ""
         document = "supplement.pdf" if own.startswith(SUPPLEMENT) else "main.pdf"
         places = {document: self.manuscript, "the preprint": self.preprint}
         return ", ".join(f"figure {n} of {place}" for place, n in places.items() if n is not None)
 
     def label(self, name: str) -> str:
-        """Figure's ``name`` with its numbers behind it, if it has any."""
+        """Return ``name``, the figure's name, followed by its numbers if it has any."""
         return f"{name} ({self.words})" if self.words else name
 
 
 def figure_numbers(root: Path) -> dict[str, Numbers]:
-    """Both numbers of every figure by name, from the manuscript's source below ``root``.
+    """Return the numbers of every figure, by name, from the manuscript's source below ``root``.
 
     Raises
     ------
     PaperError
-        A section of the manuscript has no file.
+        A section file of the manuscript is missing.
     """
     counted: dict[str, str] = {}
     for prefix, source in zip(("", SUPPLEMENT), documents(root / "paper").values(), strict=True):
@@ -64,14 +64,14 @@ The keys given here choose in `config/figures.yaml` what it shows.
 
 
 def figures_page(root: Path = Path()) -> str:
-    """All figures as Markdown, with numbers by the manuscript below ``root``."""
+    """Markdown page of all figures, with the numbers in the manuscript below ``root``."""
     parts = [HEAD]
     numbers = figure_numbers(root)
     for name, figure in declarations().items():
         number = f" ({numbers[name].words})" if numbers[name].words else ""
         keys = ", ".join(f"`{key}`" for key in figure.options.model_fields)
         read = filter(None, map(_words, figure.reads.values()))
-        caption = re.sub(r"\. (?=[A-Z`])", ".\n", _text(figure.caption))  # a sentence a line
+        caption = re.sub(r"\. (?=[A-Z`])", ".\n", _text(figure.caption))  # one line per sentence
         parts.append(
             f"## `{name}`{number}\n\n**{_text(figure.title)}.**\n{caption}\n\n"
             f"Keys: {keys}.\nReads: {', '.join(dict.fromkeys(read))}.\n"
@@ -80,7 +80,7 @@ def figures_page(root: Path = Path()) -> str:
 
 
 def _text(marked: str) -> str:
-    """Mark-up for this page: names in typewriter, settings by their key."""
+    """Convert mark-up to Markdown: names in typewriter, each setting as its key."""
     plain = re.sub(r"\{([a-z_.]+)\}", r"@\1@", marked)
     pieces = re.split(r"(`[^`]*`)", plain)
     words = "".join(p if p.startswith("`") else to_plain(p) for p in pieces)
@@ -88,7 +88,7 @@ def _text(marked: str) -> str:
 
 
 def _words(read: Read) -> str | None:
-    """Words for a table or files that are read; None for settings."""
+    """Return words for a table or files that a figure reads; None for settings."""
     match read:
         case TableOf():
             return f"table `{read.name}`"

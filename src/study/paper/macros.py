@@ -1,17 +1,17 @@
-r"""Numbers of the manuscript, and sentences that are shown where a study holds their numbers.
+r"""Numbers of the manuscript, and sentences that are shown if the study has their numbers.
 
-The source names a number by where it stands in a table::
+The TeX source refers to a number by a key, which is the number's place in a table::
 
     \val{reduced_reruns|scene=bar_release|method=block-deim|r=20|motion=train|speedup}
 
-(table, any number of filters, the column; optionally ``max``, ``min``, ``median``, ``count`` or
-``distinct``, the number of different values, of the rows that match). A filter is column=value
-or column!=value. The keys are found in the source, resolved here, and written as
-one TeX macro each. No number is typed, and none is generated that the text does not use.
+A key consists of the table, any number of filters, the column, and optionally an aggregate of
+the matching rows: ``max``, ``min``, ``median``, ``count`` or ``distinct`` (the number of different
+values). A filter is column=value or column!=value. Each key that the source uses becomes one TeX
+macro, so that no number is typed by hand.
 
-The source wraps them: ``\known{... \val{key} ...}`` is a sentence, ``\row{... & \val{key} \\}`` a
-row of a table. Where one of the keys is not held it is left out, and the first such sentence of a
-paragraph is replaced by a note that says which configuration holds it; a row goes without one.
+A block ``\known{... \val{key} ...}`` is a sentence, ``\row{... & \val{key} \\}`` a table row. If
+the tables have no row for one of its keys, the block is left out. A note about the full study
+replaces the first such sentence of each paragraph.
 """
 
 import re
@@ -30,7 +30,7 @@ _FILTER = re.compile(r"(.*?)(!?=)(.*)")
 Filter = tuple[str, str, str]  # column, sign, value
 MISSING = "n/a"
 _COUNTS = ("count", "distinct")
-# Columns that say what was run; the others say what came out.
+# Columns that identify a run; the other columns are its outcomes.
 _LABELS = ("scene", "group", "method", "position_basis", "variant", "direction", "experiment")
 AGGREGATES: dict[str, Callable[[pd.Series], Any]] = {
     "max": pd.Series.max,
@@ -42,17 +42,17 @@ AGGREGATES: dict[str, Callable[[pd.Series], Any]] = {
 
 
 def keys_of(source: str) -> list[str]:
-    """Keys that a TeX source uses, in order of first use."""
+    """Return the keys of ``\\val`` in a TeX source, in order of first use."""
     return list(dict.fromkeys(_KEY.findall(source)))
 
 
 def macros(source: str, tables: Mapping[str, pd.DataFrame]) -> str:
-    r"""TeX definitions for every \val key of ``source``, with numbers of ``tables``.
+    r"""Return TeX macros for every ``\val`` key of ``source``, with numbers from ``tables``.
 
     Raises
     ------
     PaperError
-        An unknown table or column, or a key that matches several rows without an aggregate.
+        A table or column is unknown, or several rows match a key without an aggregate.
     """
     lines = [
         "% generated from results/tables",
@@ -69,12 +69,12 @@ def macros(source: str, tables: Mapping[str, pd.DataFrame]) -> str:
 
 @dataclass(frozen=True)
 class Number:
-    """A number of the text, and where it stands.
+    """A number in the manuscript's text, and its origin.
 
-    text : as TeX
-    value : before it was rounded, None where there is none
-    rows : those of ``table`` that it is taken of, counted from 0
-    take : the aggregate, None for a single cell
+    text : the number as TeX
+    value : unrounded value, None if there is none
+    rows : row numbers of the values in ``table``, counted from 0
+    take : name of the aggregate, None for a single cell
     """
 
     text: str
@@ -86,12 +86,12 @@ class Number:
 
 
 def number_of(key: str, tables: Mapping[str, pd.DataFrame]) -> Number:
-    """Number of one ``key`` of ``tables``; its text is `MISSING` where there is none.
+    """Return the number of ``key`` in ``tables``; its text is `MISSING` if there is no value.
 
     Raises
     ------
     PaperError
-        An unknown table or column, or several rows without an aggregate.
+        A table or column is unknown, or several rows match without an aggregate.
     """
     table, filters, column, aggregate = _parse(key, tables)
     rows = matching(tables[table], filters)
@@ -111,9 +111,9 @@ def number_of(key: str, tables: Mapping[str, pd.DataFrame]) -> Number:
 
 
 def is_held(key: str, tables: Mapping[str, pd.DataFrame]) -> bool:
-    """Whether ``tables`` of a configuration hold what ``key`` asks for, be its cell empty or not.
+    """Return whether ``tables`` have a row for ``key``, with a value or without.
 
-    A count of none is a number where there are runs to count, whatever became of them.
+    For counts only the filters in the columns `_LABELS` apply, so that a count may be 0.
     """
     table, filters, _, aggregate = _parse(key, tables)
     if aggregate in _COUNTS:
@@ -124,7 +124,7 @@ def is_held(key: str, tables: Mapping[str, pd.DataFrame]) -> bool:
 def _parse(
     key: str, tables: Mapping[str, pd.DataFrame]
 ) -> tuple[str, list[Filter], str, str | None]:
-    """Table, filters, column and aggregate of a key."""
+    """Return table, filters, column and aggregate of a key."""
     name, *parts = key.split("|")
     if name not in tables:
         raise PaperError(f"\\val{{{key}}}: no table '{name}' (allowed: {', '.join(tables)})")
@@ -145,7 +145,7 @@ def _parse(
 
 
 def matching(rows: pd.DataFrame, filters: Sequence[Filter]) -> pd.DataFrame:
-    """Rows of ``rows`` whose cells agree with every filter."""
+    """Return the rows of the table ``rows`` that satisfy every filter."""
     for field, sign, value in filters:
         matches = rows[field].map(lambda cell, value=value: _same(cell, value))
         rows = rows[matches.astype(bool) != (sign == "!=")]
@@ -162,7 +162,7 @@ def _same(cell: Any, value: str) -> bool:
 
 
 def format_number(value: Any) -> str:
-    """Cell ``value`` as TeX: text escaped, integers plain, others with two significant digits."""
+    """Format a cell as TeX: text escaped, integers plain, others with two significant digits."""
     if isinstance(value, str):
         return escape(value)
     if isinstance(value, bool | np.bool_):
@@ -183,14 +183,14 @@ def format_number(value: Any) -> str:
 
 
 _OPENING = re.compile(r"\\(known|row)\{")
-_BRACE = re.compile(r"\\.|[{}]")  # a brace, or an escape, which may be one of a brace
+_BRACE = re.compile(r"\\.|[{}]")  # a brace, or a backslash with the character that it escapes
 _BLANK_LINE = re.compile(r"\n[ \t]*\n")
 SHOWN, NOTED, DROPPED = "shown", "noted", "dropped"
 
 
 @dataclass(frozen=True)
 class Sentence:
-    """Text of a block, the number of its paragraph, and whether it is a row of a table."""
+    """A block: its text, the number of its paragraph, and whether it is a table row."""
 
     text: str
     paragraph: int
@@ -198,12 +198,12 @@ class Sentence:
 
 
 def sentences(source: str) -> list[Sentence]:
-    r"""Every ``\known`` and ``\row`` block of a TeX source, in order.
+    r"""Return all ``\known`` and ``\row`` blocks of a TeX source, in order.
 
     Raises
     ------
     PaperError
-        A block is not closed, or holds another one.
+        A block is not closed, or contains another block.
     """
     found: list[Sentence] = []
     opening = _OPENING.search(source)
@@ -219,7 +219,7 @@ def sentences(source: str) -> list[Sentence]:
 
 
 def decisions(source: str, tables: Mapping[str, pd.DataFrame]) -> list[str]:
-    """Decide for every block of ``source``: shown, noted (left out with a note) or dropped."""
+    """Return for each block of ``source``: shown, noted (replaced by a note) or dropped."""
     made, noted = [], set()
     for sentence in sentences(source):
         if all(is_held(key, tables) for key in keys_of(sentence.text)):
@@ -233,11 +233,11 @@ def decisions(source: str, tables: Mapping[str, pd.DataFrame]) -> list[str]:
 
 
 def provenance(decided: Mapping[str, Sequence[str]], part: str | None, full_study: str) -> str:
-    r"""TeX of ``\known`` and ``\row``, of the note, and of what a manuscript of a part says.
+    r"""Return the TeX definitions of ``\known``, ``\row``, ``\ifpart`` and configuration names.
 
-    What was decided of the blocks of each document stands under its name, which is TeX's
-    ``\jobname``. ``\ifpart`` is true where ``part`` names what the study was read from,
-    ``\configuration``; ``full_study`` is the name of the full one.
+    The decisions on the blocks of each document, in ``decided``, are stored under its name, TeX's
+    ``\jobname``. ``part`` is the configuration of the results, ``\configuration``, or None for the
+    full study, for which ``\ifpart`` is false. ``full_study`` is the full study's configuration.
     """
     lines = [
         r"\newif\ifpart",
@@ -251,7 +251,7 @@ def provenance(decided: Mapping[str, Sequence[str]], part: str | None, full_stud
         r"\let\known@dropped\@gobble",
         r"\newcommand{\known@next}{\csname known@\jobname @\arabic{known}\endcsname}",
         r"\newcommand{\known}[1]{\stepcounter{known}\known@next{#1}}",
-        # a row that is left out must not open a cell
+        # a row that is left out must not start a table cell
         r"\newcommand{\row}[1]{\noalign{\stepcounter{known}}\known@next{#1}}",
     ]
     for document, made in decided.items():
@@ -262,7 +262,7 @@ def provenance(decided: Mapping[str, Sequence[str]], part: str | None, full_stud
 
 
 def note(part: str | None, full_study: str) -> str:
-    """TeX in place of sentences that are left out, see `provenance`."""
+    """Return the TeX note in place of sentences that are left out; arguments as in `provenance`."""
     if part is None:
         return "Sentences are left out here whose numbers this study does not hold."
     full = rf"\texttt{{{escape(full_study)}}}"
@@ -270,7 +270,7 @@ def note(part: str | None, full_study: str) -> str:
 
 
 def closing(source: str, start: int) -> int:
-    """Place in ``source`` of the brace that closes a block which begins at ``start``."""
+    """Position in ``source`` of the brace that closes the block with its content at ``start``."""
     depth = 1
     for brace in _BRACE.finditer(source, start):
         depth += {"{": 1, "}": -1}.get(brace[0], 0)
@@ -280,7 +280,7 @@ def closing(source: str, start: int) -> int:
 
 
 def captions(texts: Mapping[str, str]) -> str:
-    r"""Definitions behind ``\captionof@NAME``, one for each figure; ``texts`` are TeX already."""
+    r"""Return TeX macros ``caption@NAME`` with the captions of all figures, given as TeX."""
     lines = ["% generated from the declarations of the figures", r"\makeatletter"]
     lines += [
         rf"\expandafter\def\csname caption@{name}\endcsname{{{text}}}"

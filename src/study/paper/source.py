@@ -1,4 +1,4 @@
-r"""The manuscript's source: paper and supplement, a file a section; `OWN` is of other scenes."""
+r"""TeX source of the manuscript; `OWN` is the variant for studies of a user's own scenes."""
 
 import re
 from pathlib import Path
@@ -11,16 +11,16 @@ _PART = re.compile(r"\\input\{((?:sections/|supplement/|preamble)[^{}]*\.tex)\}"
 
 
 def whole_source(document: Path) -> str:
-    r"""Text of a document with preamble and sections in place of their ``\input``.
+    r"""Text of a document in which preamble and sections replace their ``\input`` commands.
 
     Raises
     ------
     PaperError
-        A part that has no file.
+        An included file is missing.
     """
 
     def part(match: re.Match[str]) -> str:
-        for folder in document.parents[:2]:  # the preamble of `OWN` is the paper's
+        for folder in document.parents[:2]:  # the preamble for `OWN` lies in its parent folder
             if (path := folder / match[1]).is_file():
                 return path.read_text(encoding="utf-8")
         raise PaperError(f"{document}: no file {document.parent / match[1]}")
@@ -34,13 +34,13 @@ def documents(folder: Path) -> dict[str, str]:
     Raises
     ------
     PaperError
-        A part that has no file.
+        An included file is missing.
     """
     return {name: whole_source(folder / f"{name}.tex") for name in DOCUMENTS}
 
 
 def source_files(root: Path, own: bool = False) -> list[str]:
-    """Files of the source below ``root``, documents and preamble first; or those of `OWN`."""
+    """Paths of the TeX files below ``root``, documents and preamble first; ``own``: see `OWN`."""
     folder = root / "paper"
     files = [(root / OWN if own else folder) / f"{name}.tex" for name in DOCUMENTS]
     files.append(folder / "preamble.tex")

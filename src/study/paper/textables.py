@@ -1,4 +1,4 @@
-"""Tables of the manuscript as TeX; the parameters of each name the study's tables that it reads."""
+"""TeX tables of the manuscript; each function's parameters name the study's tables it reads."""
 
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -16,17 +16,17 @@ from study.tables.kit.reruns import MEDIAN, over_motions, trained
 
 NONE = "--"
 LEFT = r">{\raggedright\arraybackslash}"
-FULL = "full"  # position basis of unreduced positions
+FULL = "full"  # name in the tables for positions without a reduced basis
 
 
 def tabular(header: Sequence[str], rows: Sequence[Sequence[str]], columns: str) -> str:
-    """A tabular of ``rows`` with a ruled ``header``; cells are TeX already, as is ``columns``."""
+    """TeX tabular with a ruled ``header`` and ``rows``; all cells are TeX, as is ``columns``."""
     lines = [rf"\begin{{tabular}}{{{columns}}}", *_head(header), *map(_line, rows)]
     return "\n".join([*lines, r"\hline", r"\end{tabular}"]) + "\n"
 
 
 def longtable(header: Sequence[str], rows: Sequence[Sequence[str]], columns: str) -> str:
-    r"""Table that may break across pages, below ``\captionrow``, which the text defines."""
+    r"""TeX table that may break across pages; the text defines its caption, ``\captionrow``."""
     head = _head(header)
     lines = [rf"\begin{{longtable}}{{{columns}}}", r"\captionrow", *head, r"\endfirsthead"]
     lines += [*head, r"\endhead", *map(_line, rows)]
@@ -42,7 +42,7 @@ def _line(cells: Sequence[str]) -> str:
 
 
 def _name(text: str) -> str:
-    """Name ``text`` of a scene, group or method, in typewriter."""
+    """Format ``text``, the name of a scene, group or method, in typewriter."""
     return rf"\texttt{{{escape(text)}}}"
 
 
@@ -55,7 +55,7 @@ def _whole(value: float) -> str:
 
 
 def _known(value: Any, form: Callable[[Any], str] = format_number) -> str:
-    """Cell of a ``value`` in some ``form``, a dash where there is none."""
+    """Format ``value`` by ``form``, or return a dash if it is missing."""
     return NONE if pd.isna(value) else form(value)
 
 
@@ -66,19 +66,19 @@ def _rows(table: pd.DataFrame, **wanted: object) -> pd.DataFrame:
 
 
 def _cell(rows: pd.DataFrame, text: Callable[[pd.Series], str]) -> str:
-    """Text of the only row, a dash where there is none."""
+    """Return ``text(row)`` of the first row, or a dash if ``rows`` is empty."""
     return text(rows.iloc[0]) if len(rows) else NONE
 
 
 _VERDICT_COLOUR = {"holds": "okgreen", "does not hold": "okred"}
 _PARTS = {"published": "as published", "beyond": "beyond"}
-# Where the manuscript shows what a claim without a figure rests on.
+# TeX labels of the tables that show the basis of a claim without a figure.
 _SHOWN = {"C11": "reruns", "C12": "positions"}
 _SIGNS = {">=": r"$\ge$", "<=": r"$\le$"}
 
 
 def claims(claims_tests: pd.DataFrame, claims: pd.DataFrame) -> str:
-    """Both verdicts on each claim, with how many rows agree in the tests that decide it."""
+    """Both verdicts on each claim, with the number of rows that satisfy each deciding test."""
     tests = claims_tests[claims_tests.decides.astype(bool)]
     rows = []
     for row in claims.itertuples():
@@ -99,7 +99,7 @@ def claims(claims_tests: pd.DataFrame, claims: pd.DataFrame) -> str:
 
 
 def claims_in_full(claims_tests: pd.DataFrame) -> str:
-    """Every test that decides a verdict: its limit, and how many rows satisfy it in which range."""
+    """Tests that decide a verdict: limit, number of rows that satisfy it, range of the values."""
     tests = claims_tests[claims_tests.decides.astype(bool)]
     rows = []
     for (claim, part), found in tests.groupby(["claim", "part"], sort=False):
@@ -112,12 +112,12 @@ def claims_in_full(claims_tests: pd.DataFrame) -> str:
     return tabular(header, rows, "llrrrrr")
 
 
-# Runs of the table of iterations: method and iterations K.
+# Columns of the table of iterations: method and number of local-global iterations K.
 _RUNS = (("fom", 1), ("fom", 5), ("fom", 10), ("fom", 40), ("fom-anderson", 10))
 
 
 def iterations(accuracy_cost: pd.DataFrame) -> str:
-    """Error against the converged run and time per frame of full-order runs."""
+    """Full-order runs: error against the converged run, and time per frame."""
 
     def text(run: pd.Series) -> str:
         error, time = map(format_number, (run.relative_error_within_horizon, run.ms_per_frame))
@@ -137,7 +137,7 @@ _TOLERANCE = "ecsw-1e-02"
 
 
 def positions(reduced_reruns: pd.DataFrame) -> str:
-    """Errors and speed-ups in position subspaces of the largest dimension k."""
+    """Errors and speed-ups of runs in position subspaces of the largest dimension k."""
 
     def error(run: pd.Series) -> str:
         return format_number(run.relative_error_within_horizon)
@@ -174,7 +174,7 @@ _METHODS = ("deim-joint", "block-deim", "gappy")
 
 
 def break_even(breakeven: pd.DataFrame) -> str:
-    """Size r from which a reduced local step takes longer than the full one."""
+    """Smallest size r from which a reduced local step takes longer than the full local step."""
 
     def text(part: pd.DataFrame) -> str:
         crossed = part.breakeven_r.dropna()
@@ -189,11 +189,11 @@ def break_even(breakeven: pd.DataFrame) -> str:
 
 
 def speedups(speedups: pd.DataFrame) -> str:
-    """Each quoted speed-up with its interval, its errors and what it costs."""
+    """Speed-ups that the text cites, with intervals, errors and costs of training."""
     rows = []
     for row in speedups.itertuples():
         size = f"r = {int(row.r)}" if row.position_basis == FULL else f"k = {int(row.k)}"
-        frames = row.frames_to_break_even  # two digits, written out
+        frames = row.frames_to_break_even  # shown with two significant digits
         rows.append(
             [
                 _name(row.scene),
@@ -210,7 +210,7 @@ def speedups(speedups: pd.DataFrame) -> str:
 
 
 def payoff(payoff: pd.DataFrame) -> str:
-    """Numbers of scenes in which each reduction is accurate, pays, and loses."""
+    """Reductions with the numbers of scenes in which each is accurate, pays off, or is slower."""
     rows = []
     for row in payoff.itertuples():
         basis = "" if row.position_basis == FULL else f", {row.position_basis}"
@@ -225,7 +225,7 @@ def payoff(payoff: pd.DataFrame) -> str:
 
 
 def pays(winners: pd.DataFrame) -> str:
-    """Mesh sizes from which a reduction is faster than others, for each error that it reaches."""
+    """Mesh sizes from which a reduction is faster than its opponents, per limit of the error."""
     rows = []
     for _, curve in winners.groupby(CURVE, sort=False):
         row, smallest, largest = curve.iloc[0], curve.vertices.min(), curve.vertices.max()
@@ -249,13 +249,13 @@ def pays(winners: pd.DataFrame) -> str:
 
 
 def scenes(reduced_reruns: pd.DataFrame, scenes: pd.DataFrame) -> str:
-    """Scenes with their groups, sizes and horizons."""
+    """Scenes with their constraint groups, sizes and horizons."""
     horizon = trained(reduced_reruns).groupby("scene").horizon_frame.first()
     rows = []
     for row in scenes.itertuples():
         end = horizon.get(row.scene)
         shown = "run" if end == row.frames and not pd.isna(end) else _known(end, _whole)
-        # numbers such as 1e+06 as powers of ten
+        # numbers such as 1e+06 are written as powers of ten
         powers = re.sub(r"([\d.]+)e\+?(-?)0*(\d+)", r"$\1\\cdot 10^{\2\3}$", _group(row.groups))
         sizes = map(str, (row.vertices, row.elements, row.frames))
         rows.append([_name(row.scene), powers.replace(r"$1\cdot 10", "$10"), *sizes, shown])
@@ -264,7 +264,7 @@ def scenes(reduced_reruns: pd.DataFrame, scenes: pd.DataFrame) -> str:
 
 
 def methods(methods: pd.DataFrame) -> str:
-    """Ingredients of each method, with the number of samples that it takes."""
+    """Parts of each reduction method: centring, rows, selection, number of samples, solver."""
     rows = []
     for row in methods.itertuples():
         least = "one" if row.oversampling == 1 else row.oversampling
@@ -278,7 +278,7 @@ def methods(methods: pd.DataFrame) -> str:
 
 
 def ranks(singular_values: pd.DataFrame) -> str:
-    """Numerical rank and decay of each group's snapshots."""
+    """Numerical rank and singular value decay of the snapshots of each constraint group."""
     rows = []
     for (scene, group), part in singular_values.groupby(["scene", "group"], sort=False):
         real = part[part.above_roundoff]
@@ -291,7 +291,7 @@ def ranks(singular_values: pd.DataFrame) -> str:
 
 
 def reruns(reduced_reruns: pd.DataFrame, methods: pd.DataFrame) -> str:
-    """Error within the horizon of every method at the largest size that the rank allows."""
+    """Error within the horizon of every method at the largest size r that has a run."""
 
     def text(run: pd.Series) -> str:
         if not pd.isna(run.relative_error_within_horizon):
@@ -311,7 +311,7 @@ def reruns(reduced_reruns: pd.DataFrame, methods: pd.DataFrame) -> str:
 
 
 def local_share(local_share: pd.DataFrame) -> str:
-    """Share of the local step in a frame, by implementation."""
+    """Share of the local step in the time of a frame, by implementation."""
     rows = []
     for scene, part in local_share.groupby("scene", sort=False):
         by = part.set_index("implementation")
@@ -329,7 +329,7 @@ _OUTCOMES = ("accurate", "wrong", "left the scene", "blow-up")
 
 
 def stability(stability: pd.DataFrame) -> str:
-    """Counts of runs by method and outcome: the study's reruns, then those at other settings."""
+    """Numbers of runs by method and outcome: standard reruns, then other time steps, stiffness."""
     full_order = (stability.method == "full") & (stability.position_basis == FULL)
     table = stability[(stability.outcome != "not run") & ~full_order]
     rows = []
@@ -357,10 +357,10 @@ TEX_TABLES: dict[str, Callable[..., str]] = {
 
 
 def reads(name: str) -> list[str]:
-    """Names of the study's tables that the TeX table ``name`` is made of."""
+    """Names of the study's tables from which the TeX table ``name`` is made."""
     return list(signature(TEX_TABLES[name]).parameters)
 
 
 def tex_table(name: str, tables: Mapping[str, pd.DataFrame]) -> str:
-    """TeX table ``name``, made of ``tables`` of the study."""
+    """TeX table ``name``, made from the study's ``tables`` by name."""
     return TEX_TABLES[name](*(tables[read] for read in reads(name)))

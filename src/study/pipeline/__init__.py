@@ -1,1 +1,1 @@
-"""Plan of a configuration: its contents, where results lie, and what has to run."""
+"""Planning and running of a study: configuration, workflow rules, jobs and result folders."""

@@ -1,8 +1,8 @@
-"""The command line: configuration, targets, whether jobs will run; the one of the last run.
+"""Parsing and checking of Snakemake's command line, and a record of the last run's configuration.
 
-The configuration files are checked before Snakemake reads them. It would take the last of two equal
-keys without a word, run code that a file asks for (``__use_yte__``), and show a traceback for a
-file that is no text.
+The configuration files are checked before Snakemake reads them. Snakemake itself would silently use
+the last of two equal keys, run code that a file asks for (``__use_yte__``), and show a traceback
+for a file that is not text.
 """
 
 import json
@@ -24,7 +24,7 @@ LOOKS_ONLY = (
     "list_input_changes", "list_params_changes", "list_untracked", "summary", "detailed_summary",
     "archive", "generate_unit_tests",
 )  # fmt: skip
-# Options whose own output is not to be replaced by one line a job.
+# Options that choose Snakemake's own output, which this project's progress lines do not replace.
 OWN_OUTPUT = ("logger", "quiet", "verbose", "printshellcmds", "debug_dag")
 YAML = (".yaml", ".yml", ".json")
 TEMPLATE_KEY = "__use_yte__"
@@ -33,16 +33,16 @@ RECORD = Path(".snakemake/last_run.json")
 
 @dataclass(frozen=True)
 class CommandLine:
-    """Options of Snakemake that this project looks at.
+    """Options of Snakemake's command line that this project evaluates.
 
     configfiles : files of ``--configfile``, in order
     settings : ``key=value`` pairs of ``--config``
     targets : names of files and rules
     report : file of ``--report``, None without one
-    looks_only : no job runs, nothing that a run makes is written
-    plans : the jobs are listed, by ``-n``, and nothing else is looked at
-    own_output, cores : what else decides about the options that `./reproduce` adds
-    executor : Snakemake's executor, of the command line or its profile; None runs jobs here
+    looks_only : True if no job runs and no result is written
+    plans : True for a dry run (``-n``) without any other option of `LOOKS_ONLY`
+    own_output, cores : whether an option of `OWN_OUTPUT`, or a number of cores or jobs, is given
+    executor : Snakemake's executor, from command line or profile; None runs jobs on this machine
     """
 
     arguments: tuple[str, ...]
@@ -63,9 +63,9 @@ class CommandLine:
         Raises
         ------
         ConfigurationError
-            A target was taken for a value of ``--config`` or ``--configfile``.
+            A target stands where it is read as a value of ``--config`` or ``--configfile``.
         """
-        # imported late: Snakemake's jobs import this module, too, and need no parser
+        # imported late: Snakemake's jobs import this module too and need no parser
         from snakemake.cli import get_argument_parser
 
         found = vars(get_argument_parser().parse_args(list(arguments)))
@@ -90,7 +90,7 @@ class CommandLine:
 
     @property
     def configuration(self) -> list[str]:
-        """Options that name the configuration; none for the default one."""
+        """Options that name the configuration; an empty list for the default configuration."""
         files = ["--configfile", *self.configfiles] if self.configfiles else []
         return [*files, *(["--config", *self.settings] if self.settings else [])]
 
@@ -109,17 +109,17 @@ class CommandLine:
                 )
 
     def rewritten(self, more: Sequence[str], made: Mapping[str, Sequence[str]]) -> list[str]:
-        """The arguments with more options, and each target replaced by what is made for it."""
+        """Return the arguments with the options ``more`` and the files ``made`` for each target."""
         targets = dict.fromkeys(file for target in self.targets for file in made[target])
         options = _before_targets(self.arguments)
-        # an option may have the name of a target as its value
+        # an option may have the name of a target as its value, so that all options are searched
         for target in () if "--" in self.arguments else self.targets:
             options.remove(target)
         return [*options, *more, *(["--", *targets] if targets else [])]
 
 
 def _of_profile(arguments: Sequence[str], profiles: Sequence[str]) -> dict[str, Any]:
-    """Cores, jobs and executor, as the command line or a profile sets them."""
+    """Return cores, jobs and executor as set by the command line or by a profile."""
     from snakemake.cli import get_argument_parser
 
     found = vars(get_argument_parser(profiles).parse_args(_before_targets(arguments)))
@@ -127,7 +127,7 @@ def _of_profile(arguments: Sequence[str], profiles: Sequence[str]) -> dict[str, 
 
 
 def _before_targets(arguments: Sequence[str]) -> list[str]:
-    """The arguments before two hyphens, if there are any."""
+    """Return the arguments before the separator ``--``, or all of them without one."""
     return list(arguments)[: [*arguments, "--"].index("--")]
 
 
@@ -136,7 +136,7 @@ def _texts(values: Any) -> tuple[str, ...]:
 
 
 def check_files(paths: Iterable[str | Path]) -> None:
-    """Read all ``paths``; ConfigurationError for one that is no plain mapping of keys."""
+    """Read all ``paths``; raise ConfigurationError if a file is not a mapping of keys."""
     for path in map(Path, paths):
         content = read_yaml(path)
         if not isinstance(content, dict):
@@ -147,7 +147,7 @@ def check_files(paths: Iterable[str | Path]) -> None:
 
 
 def merged(default: Path, configfiles: Iterable[str], settings: Iterable[str]) -> dict[str, Any]:
-    """The whole configuration, as Snakemake merges it.
+    """Return the whole configuration, merged as Snakemake merges it.
 
     Parameters
     ----------
@@ -158,9 +158,9 @@ def merged(default: Path, configfiles: Iterable[str], settings: Iterable[str]) -
     Raises
     ------
     ConfigurationError
-        A file is missing or no mapping.
+        A file is missing or is not a mapping.
     """
-    # imported late: Snakemake's jobs import this module, too
+    # imported late: Snakemake's jobs import this module and do not need these functions
     from snakemake.cli import parse_config
     from snakemake.settings.types import ConfigSettings
     from snakemake.utils import update_config
@@ -175,7 +175,7 @@ def merged(default: Path, configfiles: Iterable[str], settings: Iterable[str]) -
 
 @contextmanager
 def one_line() -> Iterator[None]:
-    """End the process with one line at an error of the user's input."""
+    """Catch a `PdromError`: end the process with a one-line error message."""
     try:
         yield
     except PdromError as error:
@@ -183,15 +183,15 @@ def one_line() -> Iterator[None]:
 
 
 def remember(command: CommandLine) -> None:
-    """Write down the configuration of ``command``, which runs."""
-    # late: it loads NumPy, which the environment is to be settled before
+    """Record the configuration options of ``command``, which is about to run, in `RECORD`."""
+    # imported late: it loads NumPy, and the environment variables must be set before that
     from pdrom.core.store import write_text
 
     write_text(json.dumps(command.configuration) + "\n", RECORD)
 
 
 def recall() -> list[str]:
-    """Options that name the configuration of the last run; none of the default one or of no run."""
+    """Configuration options of the last run; empty for the default configuration or no run."""
     try:
         record = json.loads(RECORD.read_text(encoding="utf-8"))
     except (OSError, ValueError):

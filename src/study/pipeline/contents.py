@@ -1,7 +1,7 @@
-"""Contents of a results folder: which files of each kind a configuration holds.
+"""Contents of a results folder: the files of each kind that a configuration produces.
 
-What the labels of a kind can be follows from the scenes, their groups and the methods of the study.
-A kind that only some of them have is listed here.
+The possible labels of a kind of file follow from the scenes, their constraint groups and the
+methods of the study. Kinds that exist only for some of these are listed in this module.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -19,7 +19,7 @@ Labels = dict[str, str]
 
 
 def labels_of(study: Study, place: Place) -> list[Labels]:
-    """Labels of every file of a kind, ``place``, in the order of ``study``, without repetition."""
+    """Labels of every file of the kind ``place``, in the order of ``study``, without repetition."""
     found = _found(study, place)
     return list({tuple(labels.items()): labels for labels in found}.values())
 
@@ -51,12 +51,12 @@ def _found(study: Study, place: Place) -> Iterator[Labels]:
 
 
 def _held(study: Study, listed: Iterable[str]) -> list[str]:
-    """Scenes of the study that are ``listed``, in its order."""
+    """Scenes of the study that are in ``listed``, in the order of the study."""
     return [scene for scene in study.scenes if scene in {*listed}]
 
 
 def _with_subspaces(study: Study) -> list[str]:
-    """The listed scenes, or all; none where no model is asked for, or none takes an effect."""
+    """Scenes with position subspaces: the configured ones, else all whose effects allow these."""
     section = study.settings.subspace
     if not (section.bases and section.sizes):
         return []
@@ -65,25 +65,25 @@ def _with_subspaces(study: Study) -> list[str]:
 
 
 def _requested(study: Study) -> list[str]:
-    """The listed scenes, or all, the large ones among them."""
+    """Configured scenes of the section `requested_tolerances`, else all, also large scenes."""
     held, listed = [*study.scenes, *study.online], study.settings.requested_tolerances.scenes
     return [scene for scene in held if scene in (listed or held)]
 
 
 def _live(study: Study) -> list[str]:
-    """The listed scenes that the study has models of."""
+    """Configured scenes of the live page for which the study has reduced models."""
     held = {*_with_subspaces(study), *study.online}
     return [scene for scene in study.settings.live.scenes if scene in held]
 
 
-# Names of the files that every study has.
+# Values of the label "name" for kinds of files that every study has.
 NAMES: dict[Place, Callable[[], Iterable[str]]] = {
     paths.TABLE: declared,
     paths.FIGURE: declarations,
     paths.FIGURE_PICTURE: declarations,
     paths.PAPER_INPUT: lambda: FILES,
 }
-# Which of the scenes have files of a kind, with the factors of their mesh size where it has these.
+# Scenes that have files of a kind; a mapping also gives the factors of the mesh size of each scene.
 SCENES: dict[Place, Callable[[Study], Iterable[str]]] = {
     paths.SUBSPACES: _with_subspaces,
     paths.SUBSPACES_TRAIN: _with_subspaces,
@@ -99,7 +99,7 @@ SCENES: dict[Place, Callable[[Study], Iterable[str]]] = {
     paths.STABILITY: lambda study: _held(study, study.settings.stability.scenes),
     paths.REQUESTED_TOLERANCES: _requested,
 }
-# Whether a reduced group of a scene has files of a kind.
+# Functions of study, scene and group: True if the reduced group has files of a kind.
 GROUPS: dict[Place, Callable[[Study, str, str], bool]] = {
     paths.REPETITIONS: lambda study, scene, group: any(
         scene in cell.scenes for cell in study.settings.repetitions.cells

@@ -1,4 +1,4 @@
-"""Report of a failed run: every failed job with its cause, in the last lines."""
+"""Report of a failed run: its last lines name every failed job with the cause of the failure."""
 
 import logging
 import re
@@ -16,19 +16,19 @@ from pdrom.core.errors import INTERRUPTED
 ADVICE = "pdrom: what is finished is kept; the same command goes on from there"
 
 _ERROR = re.compile(r"^[-0-9]+ [0-9:,]+ ERROR +pdrom: (?P<text>.*)$", re.MULTILINE)
-# What Python leaves in a job's log when a signal ends it: the frames of the thread, the last first.
+# Python's message in a job's log after a fatal signal: stack frames of the thread, innermost first.
 _CRASH = re.compile(
     r"^Fatal Python error: .*?^Current thread .*?\n(?P<frames>(?: +File .*\n?)+)", re.M | re.S
 )
 _FRAME = re.compile(r'^ +File "(?P<file>.*)", line (?P<line>\d+) in (?P<function>.*)$', re.M)
 _IN_RULE = re.compile(r"^\w+ in rule (?P<rule>\w+)\b.*\n(?P<text>.*)", re.MULTILINE)
 _ENDING = re.compile(r"died with <Signals\.(?P<signal>\w+)|exit status (?P<status>\d+)")
-# How SLURM says in a job's log, and its executor of a job, why it was ended.
+# Messages of SLURM, in a job's log, and of its Snakemake executor about the reason for a job's end.
 _BY_SLURM = re.compile(
     r"\*\*\* JOB \S+ ON \S+ (?P<status>CANCELLED) AT \S+(?: DUE TO (?P<why>[A-Z ]+?))? \*\*\*"
 )
 _SLURM_STATUS = re.compile(r"SLURM status is: '(?P<status>\w+)'")
-# How Snakemake's log says that the user ended the run.
+# Message of Snakemake's log after the user has interrupted the run.
 _INTERRUPTED = "Terminating processes on user request"
 _CAUSES = {
     "SIGKILL": "killed (SIGKILL): out of memory?",
@@ -38,12 +38,12 @@ _CAUSES = {
 }
 _STATUSES = {126: "its interpreter cannot be executed", 127: "its interpreter was not found"}
 _FULL = ("No space left on device", "Errno 28")
-_FULL_DISK = 1 << 18  # bytes that are left when nothing more can be written
+_FULL_DISK = 1 << 18  # free bytes below which the disk counts as full
 
 
 @dataclass(frozen=True)
 class Failure:
-    """A job that failed: its rule, its log, its first output, and what Snakemake says of it."""
+    """A failed job: its rule, its log, its first output, and Snakemake's message ``said``."""
 
     rule: str
     log: str
@@ -51,15 +51,15 @@ class Failure:
     said: str
 
     def written(self, begun: float) -> str:
-        """Text of its log if that was written since ``begun`` (seconds of the clock)."""
+        """Text of the job's log if it was written since ``begun`` (s, Unix time), else empty."""
         path = Path(self.log)
         return _content(self.log) if path.is_file() and path.stat().st_mtime >= begun else ""
 
     def line(self, begun: float) -> str:
-        """Name of the job, cause, and where it was if it crashed in a run since ``begun``."""
+        """Error line: job, cause, crash position; ``begun`` is the start of the run, s."""
         folder = next((p for p in Path(self.output).parents if p.is_dir()), Path())
         errors = _ERROR.findall(_content(self.log))
-        # the log of a job that did not even start is that of an older run
+        # the log of a job that could not start is left over from an older run
         if errors and cause(self.said, folder) not in _STATUSES.values():
             return f"pdrom: job {self.rule} failed: {errors[-1]}"
         return (
@@ -69,12 +69,12 @@ class Failure:
 
 
 def cause(said: str, folder: Path) -> str:
-    """Reason for the end of a job that wrote no error into its log.
+    """Return the reason for the end of a job that wrote no error into its log.
 
     Parameters
     ----------
-    said : Snakemake's message, with the exit status or the signal
-    folder : where the job wrote
+    said : Snakemake's message, which contains the exit status or the signal
+    folder : folder into which the job wrote; its disk is checked for free space
     """
     if any(words in said for words in _FULL) or shutil.disk_usage(folder).free < _FULL_DISK:
         return "no space left on the disk"
@@ -94,7 +94,7 @@ def cause(said: str, folder: Path) -> str:
 
 
 def crash(written: str, log: str) -> str:
-    """Line of this project that a job was at when it crashed; nothing if its log has none."""
+    """Source line of this project at which a job crashed, as text; empty if it did not crash."""
     found = list(_CRASH.finditer(written))
     if not found:
         return ""
@@ -105,14 +105,14 @@ def crash(written: str, log: str) -> str:
 
 
 def batch(name: str, log: str) -> str:
-    """Line about jobs that a cluster ran as one and ended: the cause, from the log of the whole."""
+    """Error line for a batch of jobs that a cluster ran as one job, with the cause from its log."""
     found = _BY_SLURM.search(_content(log))
     how = (found["why"] or found["status"]).lower() if found else "a job of it failed"
     return f"pdrom: batch {name} failed: {how} (log: {log})"
 
 
 class Failures(logging.Handler):
-    """Listens to Snakemake's log for what fails."""
+    """Log handler that collects failures of jobs and batches, and interruptions, of a run."""
 
     def __init__(self) -> None:
         super().__init__(logging.INFO)
@@ -121,11 +121,11 @@ class Failures(logging.Handler):
         self.batches: list[tuple[str, str]] = []
         self.other: list[str] = []
         self.stopped: str | None = None
-        # last message of each thread: why a job failed is said before which job it was
+        # last error message of each thread: Snakemake logs the cause before it names the failed job
         self._said: dict[int | None, str] = {}
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Keep what belongs to a failure of a ``record``."""
+        """Store the failed job, failed batch, error or interruption that a ``record`` reports."""
         event = getattr(record, "event", None)
         text = record.getMessage()
         if event == LogEvent.GROUP_ERROR:
@@ -134,7 +134,7 @@ class Failures(logging.Handler):
             said = self._said.pop(record.thread, "") or getattr(record, "rule_msg", None) or ""
             log, output = (_first(getattr(record, name, ())) for name in ("log", "output"))
             failure = Failure(record.rule_name, log, output or "its result", said)
-            # of a batch every job is named, also those that never started
+            # Snakemake reports every job of a failed batch, also those that never started
             if not getattr(record, "indent", False) or _ERROR.search(failure.written(self._begun)):
                 self.jobs.append(failure)
         elif event == LogEvent.ERROR:
@@ -147,19 +147,19 @@ class Failures(logging.Handler):
             self.stopped = self.stopped or "interrupted"
 
     def note_sigterm(self) -> None:
-        """The system ends the run."""
+        """Note that the operating system ends the run by SIGTERM."""
         self.stopped = "ended by SIGTERM"
 
     def end(self) -> tuple[str, int]:
-        """Last lines of a failed run, which say what went wrong, and its exit status.
+        """Return the last lines of a failed run, which state the causes, and its exit status.
 
-        Snakemake prints its own account after a job's message, so every failed job is named once
-        more with the error in its log.
+        Snakemake prints further messages after the message about a job, so every failed job is
+        listed again here with the error from its log.
         """
         lines = [batch(name, log) for name, log in self.batches]
         lines += [job.line(self._begun) for job in self.jobs]
         if self.stopped:
-            # jobs that were ended together with the run did not fail themselves
+            # jobs that were ended together with the run are no failures of their own
             lines = [line for line in lines if not line.endswith(tuple(_CAUSES.values()))]
             lines.append(f"pdrom: {self.stopped}")
         text = "\n".join([*dict.fromkeys([*lines, *self.other]), ADVICE]) + "\n"
@@ -171,5 +171,5 @@ def _first(names: Iterable[str]) -> str:
 
 
 def _content(path: str) -> str:
-    """Text of a log; nothing if it could not be written."""
+    """Return the text of a log file; empty if the file does not exist."""
     return Path(path).read_text(encoding="utf-8", errors="replace") if Path(path).is_file() else ""

@@ -1,4 +1,4 @@
-"""Fingerprints of code: what a workflow step runs, comments and docstrings left aside.
+"""Fingerprints (hashes) of the code that a workflow step runs, without comments and docstrings.
 
 Snakemake notices a change of a rule's parameters but not of a module that its script imports. A
 rule therefore carries the fingerprint of the modules it uses as a parameter. Snakemake also reruns
@@ -24,14 +24,14 @@ from pdrom.core.registry import Registry
 PACKAGES = {
     name: Path(package.__path__[0]) for name, package in (("pdrom", pdrom), ("study", study))
 }
-# Left out of fingerprints: these modules say where files lie, which changes no result; Snakemake
-# compares the paths of a job's files itself. So adding a kind of file makes no job run again.
+# Modules left out of fingerprints: they only define file paths, which change no result, and
+# Snakemake compares the paths of a job's files itself. A new kind of file causes no rerun of jobs.
 LAYOUT = {"study.artifact.paths", "study.artifact.reads"}
 SCRIPTS = Path("workflow/scripts")
 _LINE = "__firstlineno__"
 _MODULE = rf"(?:{'|'.join(PACKAGES)})\b[\w.]*"
 # ``from NAME import (NAMES)``, ``from NAME import NAMES`` or ``import NAME``, inside functions too;
-# an example in a docstring would count, which makes a job depend on more than it uses
+# an import in a docstring's example matches as well and only adds an unneeded dependency
 _IMPORT = re.compile(
     rf"^[ ]*(?:from ({_MODULE}) import (?:\(([^)]*)\)|(.*))|import ({_MODULE}))", re.M
 )
@@ -39,11 +39,11 @@ _IMPORT = re.compile(
 
 @cache
 def fingerprint(*places: str) -> str:
-    """SHA-256 over the named modules and everything of the package that they import.
+    """SHA-256 over the given modules and all modules of these packages that they import.
 
-    Imports are found statically, inside functions too. What a registry loads on demand is not
-    followed, nor do its entries for other modules count: the caller lists those that it will ask
-    for, as the registry names them.
+    Imports are found statically, inside functions too. Modules that a registry loads on demand are
+    not followed, and registry entries for other modules are ignored: the caller passes the entries
+    that it uses, written as in the registry.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ def fingerprint(*places: str) -> str:
 
 
 def closure(*places: str) -> list[str]:
-    """Names of the modules that `fingerprint` of ``places`` covers, sorted."""
+    """Sorted names of all modules that `fingerprint` of ``places`` covers."""
     reached: set[str] = set()
     waiting = [place.partition(":")[0] for place in places]
     while waiting:
@@ -88,7 +88,7 @@ def _locate(module: str) -> Path | None:
 
 @cache
 def _read(module: str) -> tuple[tuple[str, ...], str]:
-    """Modules of the package that a module imports, and the hash of its code."""
+    """Names of the project's modules that ``module`` imports, and the hash of its code."""
     path = _locate(module)
     if path is None:
         raise ConfigurationError(f"fingerprint: no module '{module}' in the packages")
@@ -97,7 +97,7 @@ def _read(module: str) -> tuple[tuple[str, ...], str]:
 
 
 def _imports(source: str, module: str) -> tuple[str, ...]:
-    """Modules of the package that a file imports, with the packages above them."""
+    """Modules of these packages that a source text imports, together with their parent packages."""
     found: set[str] = set()
     for name, enclosed, names, plain in _IMPORT.findall(source):
         if plain:
@@ -108,15 +108,15 @@ def _imports(source: str, module: str) -> tuple[str, ...]:
     for parts in [name.split(".") for name in found]:
         found |= {".".join(parts[:i]) for i in range(1, len(parts))}
     known = {name for name in found if _locate(name) is not None}
-    # the packages' own __init__ hold the version only
+    # the __init__ files of the top-level packages contain the version only
     return tuple(sorted(known - {*PACKAGES, module} - LAYOUT))
 
 
 def digest_of_source(source: str, module: str = "") -> str:
     """Hash of source text without comments, layout, docstrings and names of other modules' code.
 
-    The latter are the entries of a registry that lie outside of ``module``. The compiler leaves out
-    what does not count (assertions, too), far faster than a walk over the syntax tree.
+    These names are registry entries that refer to modules other than ``module``. Compilation drops
+    comments, docstrings and assertions, far faster than a walk over the syntax tree.
     """
     program = _without_others(ast.parse(source), module) if Registry.__name__ in source else source
     code = compile(program, "", "exec", dont_inherit=True, optimize=2)
@@ -124,7 +124,7 @@ def digest_of_source(source: str, module: str = "") -> str:
 
 
 def _text(code: CodeType) -> str:
-    """Content of compiled code without its line numbers."""
+    """Return the content of compiled code as text, without its line numbers."""
     if _LINE in code.co_names:
         return repr((code.co_name, _of_class(code), code.co_exceptiontable))
     return repr(
@@ -141,9 +141,9 @@ def _text(code: CodeType) -> str:
 
 
 def _of_class(code: CodeType) -> list[tuple[str, object]]:
-    """Instructions of a class, without the two constants that Python 3.13 adds to it.
+    """Instructions of a class body, without the two constants that Python 3.13 adds to it.
 
-    They are the line of the class, and the attributes that its methods set, in any order.
+    These constants are the line number of the class and the attributes that its methods set.
     """
     steps = [(step.opname, _constant(step.argval)) for step in dis.get_instructions(code)]
     stores = [("STORE_NAME", name) for name in (_LINE, "__static_attributes__")]
@@ -152,7 +152,7 @@ def _of_class(code: CodeType) -> list[tuple[str, object]]:
 
 
 def _instructions(code: bytes) -> bytes:
-    """Instructions of two bytes; one that does nothing stands for a docstring."""
+    """Return two-byte instructions without NOP, the instruction that replaces a docstring."""
     operations, parts, start = code[::2], [], 0
     while (place := operations.find(opmap["NOP"], start)) >= 0:
         parts.append(code[2 * start : 2 * place])
@@ -163,12 +163,12 @@ def _instructions(code: bytes) -> bytes:
 def _constant(value: object) -> object:
     if isinstance(value, CodeType):
         return _text(value)
-    # the order of a set changes from process to process
+    # the order of a set differs between processes, so that its elements are sorted
     return sorted(map(repr, value)) if isinstance(value, frozenset) else value
 
 
 def _without_others(tree: ast.Module, module: str) -> ast.Module:
-    """The tree without entries of registries that are code of other modules."""
+    """Return the syntax tree without registry entries that refer to other modules."""
     for node in ast.walk(tree):
         match node:
             case ast.Call(ast.Name(Registry.__name__), [_, ast.Dict(keys, values) as entries]):
@@ -184,10 +184,10 @@ def _without_others(tree: ast.Module, module: str) -> ast.Module:
 
 
 def digest(root: Path, *names: str) -> str:
-    """Checksum of the files ``names`` below ``root`` that people edit, 16 hexadecimal digits.
+    """Checksum of the hand-edited files ``names`` below ``root``, 16 hexadecimal digits.
 
-    Snakemake compares dates of files, which a copy, an archive or a wrong clock may set back; as a
-    parameter of a rule, the content itself decides.
+    Snakemake compares the dates of files, which a copy, an archive or a wrong clock may set back.
+    With this checksum as a parameter of a rule, the content of the files decides.
     """
     files = [root / name for name in names]
     content = b"".join(hashlib.sha256(f.read_bytes()).digest() for f in files if f.is_file())
@@ -195,17 +195,17 @@ def digest(root: Path, *names: str) -> str:
 
 
 def track_scripts(workflow: Any) -> None:
-    """Give the rules of Snakemake's workflow their scripts as parameters, in place of dates."""
+    """Make a hash of each rule's script a parameter of the rule, in place of the script's date."""
     for rule in workflow.rules:
         if rule.script:
             text = (SCRIPTS / Path(rule.script).name).read_text(encoding="utf-8")
             rule.set_params(script=digest_of_source(text)[:16])
-    # the settings that it is computed from come after the rules were read
+    # Snakemake sets the rerun triggers after it has read the rules, so that a property changes them
     type(workflow).rerun_triggers = property(_triggers)
 
 
 def _triggers(workflow: Any) -> frozenset[Any]:
-    # imported late: a plan is made without Snakemake, too
+    # imported late: a plan can be made without Snakemake
     from snakemake.settings.types import RerunTrigger
 
     return frozenset(workflow.dag_settings.rerun_triggers) - {RerunTrigger.CODE}

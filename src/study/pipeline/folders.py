@@ -1,4 +1,4 @@
-"""Folders of the results: each configuration has one of its own."""
+"""Folders of the results: each configuration has its own folder."""
 
 import re
 from collections.abc import Iterable
@@ -19,24 +19,24 @@ _NAME = re.compile(r"[A-Za-z0-9_-]{1,60}")
 
 @dataclass(frozen=True)
 class Folders:
-    """Folder of the results, and the manuscript that is made from them."""
+    """Path of the results folder, and path of the manuscript's PDF made from these results."""
 
     results: str = RESULTS
     manuscript: str = "paper/main.pdf"
 
     @property
     def documents(self) -> dict[str, str]:
-        """PDFs of the manuscript and of its supplement beside it, by the name of their source."""
+        """PDFs of manuscript and supplement, in one folder, by the name of their TeX source."""
         supplement = Path(self.manuscript).with_name("supplement.pdf").as_posix()
         return dict(zip(DOCUMENTS, (self.manuscript, supplement), strict=True))
 
 
 def folders(configfiles: Iterable[str | Path], settings: Iterable[str]) -> Folders:
-    """Folders of a configuration.
+    """Return the folders of a configuration.
 
-    The default configuration has ``results`` and ``paper``. Every other one has
-    ``results/studies/NAME``, by the key ``study`` of the configuration, else the stem of its last
-    file; `OWN` for settings of the command line alone.
+    The default configuration has the folders ``results`` and ``paper``. Every other one has
+    ``results/studies/NAME``. NAME is the key ``study`` of the configuration, else the stem of its
+    last file, else `OWN` if there are only settings from the command line.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ def folders(configfiles: Iterable[str | Path], settings: Iterable[str]) -> Folde
     Raises
     ------
     ConfigurationError
-        If the name is no plain word.
+        If the name contains other characters than letters, digits, _ and -, or is too long.
     """
     default, pairs = Path(DEFAULT).resolve(), list(settings)
     files = [str(file) for file in configfiles if Path(file).resolve() != default]
@@ -63,7 +63,7 @@ def folders(configfiles: Iterable[str | Path], settings: Iterable[str]) -> Folde
 
 
 def folders_of(workflow: Any) -> Folders:
-    """`folders` of Snakemake's workflow."""
+    """Return the `folders` of the configuration of Snakemake's ``workflow``."""
     settings = [f"{key}={value}" for key, value in workflow.config_settings.config.items()]
     return folders(workflow.overwrite_configfiles, settings)
 

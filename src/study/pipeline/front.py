@@ -1,10 +1,10 @@
-"""``./reproduce ARGS...``: Snakemake with this project's options, names and words.
+"""``./reproduce ARGS...``: Snakemake with the options, target names and messages of this project.
 
-``python -m study.pipeline.front`` does what the console command ``snakemake`` does, after the
-arguments were completed and the configuration files were checked. ``figure`` as the first
-argument names figures by their number in the manuscript or in the preprint; ``verify`` compares
-what was made with what is expected; ``test`` hands the others to pytest, and ``run`` starts a
-program of the environment.
+``python -m study.pipeline.front`` completes the arguments, checks the configuration files, and then
+does what the console command ``snakemake`` does. Some first arguments are special: ``figure``
+selects figures by their number in the manuscript or in the preprint; ``verify`` compares results
+with the expected ones; ``bundle`` writes an archive; ``test`` passes the other arguments to pytest;
+``run`` starts a program of the environment.
 """
 
 import os
@@ -18,13 +18,13 @@ from study.pipeline.commandline import CommandLine, check_files, recall
 from study.pipeline.folders import folders
 from study.pipeline.running import end_at_sigterm
 
-# Snakemake's default scheduler solves an integer program for each choice among the jobs; they are
-# short, so that this takes longer than it saves.
+# Snakemake's default scheduler solves an integer program whenever it chooses jobs; as the jobs are
+# short, this costs more time than it saves.
 OPTIONS = ("--scheduler", "greedy", "--rerun-incomplete")
 
 LINES = ("--logger", "pdrom")
 
-# First arguments that hand the others on, with the modules that get them.
+# First arguments that pass the other arguments to a module, with the name of that module.
 HANDED_ON = {
     "test": "pytest",
     "verify": "study.verification.command",
@@ -33,16 +33,16 @@ HANDED_ON = {
 
 
 def completed(arguments: Sequence[str]) -> list[str]:
-    """Complete the ``arguments`` of the command line for Snakemake.
+    """Return the ``arguments`` of the command line with the options that Snakemake needs.
 
     Raises
     ------
     ConfigurationError
-        A configuration file is missing or no mapping; a target was taken for an option's value;
-        there is no such figure.
+        A configuration file is missing or is not a mapping; a target was taken for the value of an
+        option; a figure does not exist.
     """
     if arguments[:1] == ["figure"]:
-        from study.pipeline.targets import figure_arguments  # it loads the whole package
+        from study.pipeline.targets import figure_arguments  # late: it imports the whole package
 
         arguments = figure_arguments(arguments[1:])
     command = CommandLine.parse(arguments)
@@ -57,11 +57,11 @@ def completed(arguments: Sequence[str]) -> list[str]:
 
 
 def _made(command: CommandLine) -> dict[str, list[str]]:
-    """Files to make for each target of ``command``, which are said where the target is a name."""
+    """Return the files of each target of ``command``; print them if the target is only a name."""
     own = folders(command.configfiles, command.settings)
     if not command.targets:
         return {}
-    from study.pipeline.targets import described, files  # late, as above
+    from study.pipeline.targets import described, files  # late: it imports the whole package
 
     made = {target: files(target, own) for target in command.targets}
     for target, found in made.items():
@@ -75,7 +75,7 @@ def _say(line: str) -> None:
 
 
 def _start(command: Sequence[str]) -> NoReturn:
-    """Become a program of the environment, found as the shell finds it."""
+    """Replace this process by a program, which is searched for on PATH as a shell does."""
     if not command:
         sys.exit(
             "pdrom: run: the name of a program is missing, as in: ./reproduce run pdrom --help"
@@ -87,7 +87,7 @@ def _start(command: Sequence[str]) -> NoReturn:
 
 
 def main() -> None:
-    """Run Snakemake or the tests; end the process with their status."""
+    """Run Snakemake, or the module or program of a special first argument; exit with its status."""
     settle()
     word = sys.argv[1] if sys.argv[1:] else ""
     if word in HANDED_ON:

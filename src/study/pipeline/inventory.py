@@ -1,7 +1,7 @@
-"""results/contents.md: what a finished study holds, for readers of its results.
+"""Text of results/contents.md, an overview of a finished study for readers of its results.
 
-Every claim, figure, table and section of the text with the command that makes it and the minutes
-that this took, then the captions of the figures and the columns of the tables.
+It lists every claim, figure, table and section of the text with the command that makes it and its
+processor minutes, then the captions of the figures and the columns of the tables.
 """
 
 import shlex
@@ -48,7 +48,7 @@ measured by this run.
 
 
 def document(tables: Iterable[Table]) -> str:
-    """Markdown of all tables."""
+    """Return the Markdown that describes all ``tables`` and their columns."""
     tables = list(tables)
     names = [f"- [{table.name}](#{table.name}): {table.title}" for table in tables]
     parts = [TABLES_HEAD, "\n".join(names) + "\n", *map(_section, tables)]
@@ -91,11 +91,11 @@ def _source(read: Read) -> str:
 
 
 class Entry(NamedTuple):
-    """A line of the page.
+    """A line of the overview.
 
-    kind : claim, figure, table, section (numbers of the text) or manuscript
-    files : its files, of the default configuration
-    words : arguments of ./reproduce that make them
+    kind : claim, figure, table, section (source file of the text with numbers) or manuscript
+    files : paths of its files in the default configuration
+    words : arguments of ./reproduce that make these files
     """
 
     kind: str
@@ -105,14 +105,14 @@ class Entry(NamedTuple):
 
 
 def entries() -> Iterator[Entry]:
-    """Claims, figures (the preprint's first), tables, sections, manuscript."""
+    """Yield the entries of claims, figures, tables, sections and manuscript, in this order."""
     for name in load_claims(Path("config/claims.yaml")):
         yield Entry("claim", name, (TABLE.at(RESULTS, name=CLAIMS),), (CLAIMS,))
     for name, figure in declarations().items():
         number = f"{PREPRINT}{figure.number}" if figure.number else name
         yield Entry("figure", name, (FIGURE.at(RESULTS, name=name),), ("figure", number))
     tables = {name: TABLE.at(RESULTS, name=name) for name in declared()}
-    # a name that a figure has, too, stands for both
+    # where a figure has the same name, the name stands for both, so that the table's path is used
     words = {name: path if name in declarations() else name for name, path in tables.items()}
     for name, path in tables.items():
         yield Entry("table", name, (path,), (words[name],))
@@ -126,13 +126,13 @@ def entries() -> Iterator[Entry]:
 
 
 def contents(command: CommandLine, dag: Any, folders: Folders) -> str:
-    """Text of the page of a run that has made everything.
+    """Text of the overview of a run that has made everything.
 
     Parameters
     ----------
-    command : line that started the run
+    command : command line that started the run
     dag : Snakemake's graph of all jobs of the study
-    folders : of the study
+    folders : folders of the study's results
     """
     listed, verdicts = list(entries()), verdicts_in(folders.results)
     lines = []
@@ -149,9 +149,9 @@ def contents(command: CommandLine, dag: Any, folders: Folders) -> str:
 def costs(
     listed: Sequence[Entry], dag: Any, folders: Folders
 ) -> Iterator[tuple[int, float | None]]:
-    """Jobs that each entry needs from nothing, and their processor minutes; None if not measured.
+    """Yield for each entry its number of jobs, with all prerequisites, and their processor minutes.
 
-    They follow from Snakemake's graph ``dag`` and the logs of its jobs.
+    The minutes are None if a job was not measured. ``dag`` is Snakemake's graph of jobs.
     """
     makers = {str(file): job for job in dag.jobs for file in job.output}
     used = {job: usage_of(job.log[0]) for job in makers.values()}

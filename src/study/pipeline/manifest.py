@@ -1,8 +1,8 @@
-"""The manifest of a study: each of its results with its checksum and with what made it.
+"""The manifest of a study: its result files with checksums, code, settings and environments.
 
-It is written at the end of every run that succeeds, from the checksum files, so that no large file
-is read again: an HDF5 file has its BLAKE2b digest, everything else its SHA-256 as well. Equal
-results have an equal manifest.
+It is written at the end of every successful run. It uses the checksum files of the results, so that
+no large file is read again: HDF5 files have their BLAKE2b digest, other files also a SHA-256. Equal
+results have equal manifests.
 """
 
 import hashlib
@@ -31,9 +31,9 @@ class _Record(BaseModel):
 
 
 class Entry(_Record):
-    """A result; ``environment`` is a key of the manifest's environments.
+    """Result file: size, digests, and what made it; ``environment``: key in `environments`.
 
-    sha256 : None for a large file, and for one that was damaged before the manifest was written
+    sha256 : None for an HDF5 file, or a file that was damaged before the manifest was written
     """
 
     bytes: int
@@ -45,7 +45,7 @@ class Entry(_Record):
     environment: str | None = None
 
     def fits(self, path: Path) -> bool:
-        """Whether the file ``path`` has the bytes that the entry records."""
+        """Return whether the content of the file ``path`` agrees with this entry."""
         if self.sha256:
             with open(path, "rb") as handle:
                 return hashlib.file_digest(handle, "sha256").hexdigest() == self.sha256
@@ -55,9 +55,9 @@ class Entry(_Record):
 
 
 class Manifest(_Record):
-    """Results by their paths from the folder that the manifest lies in.
+    """Entries of result files by path, relative to the folder of the manifest.
 
-    options : of the command line, which name the configuration
+    options : command-line options that name the configuration
     environments : versions of the package, of Python and of libraries, by a short key
     """
 
@@ -68,7 +68,7 @@ class Manifest(_Record):
 
 
 def write_manifest(plan: Plan, folders: Folders, options: Iterable[str]) -> None:
-    """Write the manifest of a study whose run has succeeded."""
+    """Write the manifest of a study after a successful run."""
     environments: dict[str, dict[str, str]] = {}
     files = {}
     for path in sorted(study_files(plan, folders)):
@@ -82,7 +82,7 @@ def write_manifest(plan: Plan, folders: Folders, options: Iterable[str]) -> None
 
 
 def read_manifest(results: str) -> Manifest:
-    """The manifest in a folder; StorageError if it is missing, damaged, or of another layout."""
+    """Read a folder's manifest; StorageError if it is missing, damaged or of another format."""
     path = Path(paths.MANIFEST.at(results))
     if check_file(path) is Condition.DAMAGED:
         raise StorageError(f"{path}: damaged, its content and its checksum differ")
@@ -94,20 +94,20 @@ def read_manifest(results: str) -> Manifest:
 
 
 def own_files(plan: Plan) -> set[str]:
-    """Files that a whole run of a study makes by ``plan``."""
+    """Paths of all files that a complete run of the study makes according to ``plan``."""
     return {*plan.made, *plan.measured}
 
 
 def study_files(plan: Plan, folders: Folders) -> Iterator[str]:
-    """Files on the disk that belong to a study: its own, and those that targets have requested."""
+    """Existing files of a study: files of its plan, and files requested by command-line targets."""
     yield from (path for path in own_files(plan) if Path(path).is_file())
     yield from asked_for(_visible(folders.results), plan, folders)
 
 
 def asked_for(found: Iterable[str], plan: Plan, folders: Folders) -> Iterator[str]:
-    """Paths among ``found`` that are not the study's own files, and that a target may name.
+    """Yield the paths of ``found`` outside the plan that a command-line target may have requested.
 
-    They are something of a scene that there is.
+    The scene and the method in such a path exist.
     """
     own = own_files(plan)
     scenes, methods = set(scene_names(plan.root)), {*plan.study.methods, ""}
@@ -120,7 +120,7 @@ def asked_for(found: Iterable[str], plan: Plan, folders: Folders) -> Iterator[st
 
 
 def _visible(results: str) -> Iterator[str]:
-    """Files below a folder of results, without logs and other studies."""
+    """Yield the files below a results folder, except logs, hidden files and other studies."""
     for folder, below, names in os.walk(results):
         if folder == results:
             below[:] = [name for name in below if name not in ("logs", "studies")]

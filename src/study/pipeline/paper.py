@@ -1,4 +1,4 @@
-"""Facts of a study that the manuscript states beside its results."""
+"""Facts about a study that the manuscript states and that are not results of experiments."""
 
 from types import SimpleNamespace
 from typing import Any
@@ -18,12 +18,12 @@ Row = dict[str, Any]
 
 
 def manuscript(study: Study, labels: Labels) -> SimpleNamespace:
-    """The manuscript's ``sources`` below the root of ``study``: both documents, what they read."""
+    """Return a namespace whose ``sources`` lists the TeX files of paper and supplement."""
     return SimpleNamespace(sources=source_files(study.root, study.is_own))
 
 
 def facts(study: Study, labels: Labels) -> Facts:
-    """Facts that the manuscript states beside results of ``study``; one of its own is no part."""
+    """Return configuration facts of ``study``: captions, scenes, methods, settings, page limits."""
     own = study.is_own
     said = [(name, each.words(study.value)) for name, each in declarations().items()]
     return Facts(
@@ -43,7 +43,7 @@ def facts(study: Study, labels: Labels) -> Facts:
 
 
 def check_texts(study: Study) -> None:
-    """ConfigurationError for a text of ``study`` that figures or TeX cannot typeset."""
+    """Raise ConfigurationError for a text of ``study`` that figures or TeX cannot typeset."""
     folder, ladder = study.root / "config", study.settings.ladder
     for name, method in study.methods.items():
         require_typeset(method.title, f"{folder / 'methods.yaml'}: {name}.title")

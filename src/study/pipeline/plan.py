@@ -1,4 +1,4 @@
-"""The plan that the workflow rules ask: file names, parameters and code fingerprints."""
+"""Plan of a study for the workflow rules: file names, parameters and code fingerprints."""
 
 import logging
 import os
@@ -32,7 +32,7 @@ log = logging.getLogger(__name__)
 
 
 def check_subspaces(study: Study) -> None:
-    """Say which scenes go without subspaces; ConfigurationError if one is asked for."""
+    """Warn of scenes without position subspaces; ConfigurationError if the settings need them."""
     outside = {
         name: effects
         for name, config in {**study.scenes, **study.online}.items()
@@ -61,7 +61,7 @@ def check_subspaces(study: Study) -> None:
 
 
 def check_live(study: Study) -> None:
-    """ConfigurationError for a scene that the page with running models cannot hold."""
+    """Raise ConfigurationError for a scene whose models the live page cannot represent or load."""
     for name in (labels["scene"] for labels in labels_of(study, LIVE_MODEL)):
         try:
             require_known(study.scene(name))
@@ -77,11 +77,11 @@ def check_live(study: Study) -> None:
 
 
 def _live_bytes(study: Study, name: str) -> float:
-    """Size of the vertices, masses and bases of a scene in the file of its models."""
+    """Least size in bytes of a scene's model file: its vertices, masses and bases in base 64."""
     settings, vertices = study.settings, study.vertices[name]
     section = settings.subspace if name in study.scenes else settings.online
     sizes = [k for k in settings.live.sizes if k in section.sizes and "pod" in section.bases]
-    entries = [vertices * (k + 4) for k in sizes]  # four affine columns come with the modes
+    entries = [vertices * (k + 4) for k in sizes]  # modes and four affine columns
     bases = sum(count * (8 if count <= DOUBLES else 4) for count in entries)
     return (vertices * 32 + bases) * 4 / 3  # written in base 64
 
@@ -96,17 +96,17 @@ def load_plan(
     folders: Folders = OF_STUDY,
     quiet: bool = False,
 ) -> "Plan":
-    """Plan of ``config``, checked before any job.
+    """Return the plan of ``config``, checked before any job starts.
 
     Parameters
     ----------
-    files : where the configuration came from, for the messages
+    files : configuration files, named in error messages
     quiet : whether warnings are dropped, see `study.artifact.logs.planning_log`
 
     Raises
     ------
     PdromError
-        It is faulty.
+        The configuration is faulty.
     """
     names = [os.path.relpath(path, root) for path in files] or [DEFAULT]
     source = f"configuration ({', '.join(sorted(set(names)))})"
@@ -118,7 +118,7 @@ def load_plan(
 
 
 class Plan(Resolver):
-    """Everything that depends on the configuration and is needed to write the rules."""
+    """Jobs, files and settings of a study that the workflow rules need."""
 
     def __init__(self, study: Study, folders: Folders = OF_STUDY) -> None:
         super().__init__(study, folders.results)
@@ -129,7 +129,7 @@ class Plan(Resolver):
         self.tables = declared()
 
     def check(self) -> None:
-        """Read every file of the configuration, so that a fault shows early."""
+        """Read every file that the configuration names, so that faults show before any job."""
         settings = self.settings
         load_claims(self.root / "config" / "claims.yaml", settings.claim_sets)
         named = {
@@ -150,11 +150,11 @@ class Plan(Resolver):
                 self.job(table)
             except ConfigurationError as error:
                 raise ConfigurationError(f"table {table.name} reads {error}") from error
-        self.fixed  # noqa: B018 : every figure and text is checked
+        self.fixed  # noqa: B018 : resolving all jobs checks every figure and text
 
     @property
     def measured(self) -> list[str]:
-        """Every file that an experiment of the study writes."""
+        """Paths of all files that the study's experiments write."""
         places = [place for made in self.experiments.values() for place in made.writes.values()]
         return [
             place.at(self.results, **labels)
@@ -164,27 +164,27 @@ class Plan(Resolver):
 
     @cached_property
     def fixed(self) -> dict[str, list[Job]]:
-        """Jobs of tables, figures, pages and manuscript by the folder of their logs, in order."""
+        """Jobs of tables, figures, pages and manuscript, by the name of their log folder."""
         return {
             "tables": [self.job(table) for table in self.tables.values()],
             "figures": [self.job(figure) for figure in declarations().values()],
             "article": [self.job(live_page), self.job(article)],
-            # the manuscript lies where the configuration has it
+            # the configuration determines where the manuscript's PDFs lie
             "paper": [self.job(paper_inputs), replace(self.job(paper), outputs=self.documents)],
         }
 
     @property
     def made(self) -> list[str]:
-        """Every file of `fixed`."""
+        """Paths of all files that the jobs of `fixed` write."""
         jobs = [job for jobs in self.fixed.values() for job in jobs]
         return [path for job in jobs for path in job.outputs.values()]
 
     @property
     def table_paths(self) -> list[str]:
-        """File of every table."""
+        """Paths of the CSV files of all tables."""
         return [job.outputs["table"] for job in self.fixed["tables"]]
 
     @property
     def figures(self) -> list[str]:
-        """PDF of every figure."""
+        """Paths of the PDF files of all figures."""
         return [job.outputs["pdf"] for job in self.fixed["figures"]]

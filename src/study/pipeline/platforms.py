@@ -1,7 +1,7 @@
-"""Machines that the locked packages have wheels for, known before anything is downloaded.
+"""Check of whether the locked packages have wheels for this machine, before any download.
 
-``./reproduce`` runs this file by its path with the machine's own Python, before any package is
-there: only the standard library may be imported.
+``./reproduce`` runs this file by its path with the system's Python, before any package is
+installed: only the standard library may be imported.
 """
 
 import platform
@@ -11,9 +11,9 @@ OLDEST, NEWEST = (3, 11), (3, 13)
 
 
 def obstacle(system: str, processor: str, python: tuple[int, int], libc: str) -> str | None:
-    """Reason why the packages cannot be installed, with the remedy; None where they can.
+    """Return the reason why packages cannot be installed, with a remedy; None if they can.
 
-    ``libc`` is "glibc" or "" (musl, or no Linux).
+    ``libc`` is "glibc", or "" for musl and for systems other than Linux.
     """
     if not OLDEST <= python <= NEWEST:
         package = "immutables has no wheel for it" if python > NEWEST else "it is too old"
@@ -39,7 +39,7 @@ def obstacle(system: str, processor: str, python: tuple[int, int], libc: str) ->
 
 
 def main() -> None:
-    """Say why this machine gets no packages, if it gets none."""
+    """End the process with the reason if the packages cannot be installed on this machine."""
     libc = platform.libc_ver()[0] if platform.system() == "Linux" else ""
     found = obstacle(platform.system(), platform.machine(), sys.version_info[:2], libc)
     if found:

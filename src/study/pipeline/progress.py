@@ -1,4 +1,4 @@
-"""Progress of a run: one line a job, with counts and the time that is left."""
+"""Progress of a run: one line per job, with counts and an estimate of the remaining time."""
 
 import logging
 import sys
@@ -10,23 +10,23 @@ from itertools import accumulate
 from snakemake_interface_logger_plugins.common import LogEvent
 
 NOTHING = "Nothing to be done"
-# What Snakemake says of a failed job, which the last lines of the run name with its cause.
+# Part of Snakemake's message about a failed job; the run's last lines report such jobs instead.
 JOB_FAULT = "RuleException"
 CLOSING = "At least one job did not complete successfully"
-# Jobs, and share of the expected work, that must be done before the time that is left is reported.
+# Least number of jobs, and least share of the expected work, done before an estimate is shown.
 ENOUGH_JOBS, ENOUGH = 2, 0.05
-# Share of its expected time that a job is taken to need still, however long it has been running.
+# Least remaining time of an unfinished job, as a share of its expected time.
 REST = 0.1
 
 
 @dataclass
 class Expected:
-    """Job of a run, as expected on the machine where jobs were measured, and as it ran.
+    """Expected and measured time of a job.
 
-    seconds : of the job
-    share : of this machine that it claims, 1 where there is no limit
-    after : seconds of the longest chain of jobs that wait for it
-    start, end : seconds of the clock at which it started and ended, None before
+    seconds : expected duration of the job
+    share : share of this machine's cores that the job claims; 1 on a cluster
+    after : expected seconds of the longest chain of jobs that wait for this job
+    start, end : times in s at which it started and ended; None before
     """
 
     seconds: float
@@ -36,38 +36,38 @@ class Expected:
     end: float | None = None
 
     def ran(self, now: float) -> float:
-        """Seconds that it ran."""
+        """Return the seconds that the job has run until its end or until ``now``."""
         return 0.0 if self.start is None else (now if self.end is None else self.end) - self.start
 
     def rest(self, now: float, slower: float) -> float:
-        """Seconds that it still takes where jobs take ``slower`` times what is expected."""
+        """Return the job's remaining seconds if jobs take ``slower`` times their expected time."""
         expected = self.seconds * slower
         return 0.0 if self.end is not None else max(expected - self.ran(now), REST * expected)
 
 
 class Estimate:
-    """Seconds that a run of ``jobs``, by their numbers, still takes.
+    """Estimate of the remaining seconds of a run of ``jobs``, by job number.
 
-    Finished jobs say how much longer jobs take than expected: the median of these quotients,
-    weighted by work, so that the few which compile kernels do not count. What all jobs together
-    claimed until now says how busy the machine is kept.
+    The slowdown of this machine is the median quotient of measured and expected times of finished
+    jobs, weighted by expected time, so that the few jobs which compile kernels have little effect.
+    The degree of parallel work follows from the time that all jobs have claimed until now.
     """
 
     def __init__(self, jobs: Mapping[int, Expected]) -> None:
         self._jobs = jobs
 
     def start(self, job: int, now: float) -> None:
-        """Note that ``job`` starts at the time ``now``, s."""
+        """Record that ``job`` starts at the time ``now``, s."""
         if job in self._jobs:
             self._jobs[job].start = now
 
     def finish(self, job: int, now: float) -> None:
-        """Note that ``job`` has ended at the time ``now``, s."""
+        """Record that ``job`` has ended at the time ``now``, s."""
         if job in self._jobs:
             self._jobs[job].end = now
 
     def left(self, now: float) -> float | None:
-        """Seconds that are left at the time ``now``, s; None while too little is done."""
+        """Return the remaining seconds at the time ``now``, s; None while too few jobs are done."""
         begun = [job for job in self._jobs.values() if job.start is not None]
         done = [job for job in begun if job.end is not None]
         total = sum(job.seconds for job in self._jobs.values())
@@ -84,7 +84,7 @@ class Estimate:
 
 
 def _median(weighted: Iterable[tuple[float, float]]) -> float:
-    """Median of values with weights."""
+    """Weighted median of (value, weight) pairs."""
     ordered = sorted(weighted)
     half = sum(weight for _, weight in ordered) / 2
     below = accumulate(weight for _, weight in ordered)
@@ -92,17 +92,17 @@ def _median(weighted: Iterable[tuple[float, float]]) -> float:
 
 
 class Progress(logging.Handler):
-    """Writes a line for each job that starts, and what Snakemake warns of."""
+    """Log handler that prints a line for each started or failed job, and Snakemake's warnings."""
 
     def start(self, plans: bool = False) -> None:
-        """Begin with nothing seen; of a dry run, which ``plans``, no job is shown."""
+        """Reset all counts; in a dry run (``plans`` is True) no jobs are printed."""
         self._plans = plans
         self._started = self._total = 0
         self._messages: dict[int, str] = {}
         self._estimate = Estimate({})
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Show what a user wants to see of a record."""
+        """Print the part of a log ``record`` that concerns the user, and update the estimate."""
         event = getattr(record, "event", None)
         if event == LogEvent.RUN_INFO:
             self._total = record.stats["total"]
@@ -136,7 +136,7 @@ class Progress(logging.Handler):
 
 
 def _is_news(record: logging.LogRecord, event: LogEvent | None) -> bool:
-    """Whether a message is shown as it is: warnings, and faults before the first job."""
+    """Return whether a message is printed unchanged: a warning, or an error outside of jobs."""
     text = record.getMessage()
     if event == LogEvent.ERROR:
         return record.exception != JOB_FAULT and CLOSING not in text
@@ -144,7 +144,7 @@ def _is_news(record: logging.LogRecord, event: LogEvent | None) -> bool:
 
 
 def rounded(seconds: float) -> str:
-    """Time of so many ``seconds`` in words, as roughly as it is known."""
+    """Return a duration of ``seconds`` in words, rounded to the accuracy of the estimate."""
     minutes = seconds / 60
     if minutes < 1:
         return "less than a minute"

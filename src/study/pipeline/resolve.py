@@ -1,4 +1,4 @@
-"""Jobs of artifacts: what each reads, writes and depends on, from the declarations and a study."""
+"""Jobs of artifacts: their files, settings and code, from the declarations and a study."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -18,12 +18,12 @@ from study.tables import declared
 
 @dataclass(frozen=True)
 class Job:
-    """An artifact for one set of labels.
+    """A job: an artifact for one set of labels such as scene and group.
 
     inputs, outputs : paths by name
     settings : plain data
-    content : checksum of the files it reads that people edit; their dates may be set back
-    code : fingerprint of the code that it runs
+    content : checksum of the hand-edited files among the inputs, whose dates may be set back
+    code : fingerprint of the code that the job runs
     """
 
     artifact: Artifact
@@ -35,7 +35,7 @@ class Job:
     code: str
 
     def make(self, outputs: Mapping[str, str]) -> None:
-        """Run the job here; ``outputs`` are the files to write, by name."""
+        """Run the job in this process; ``outputs`` are the paths of the files to write, by name."""
         make(
             self.artifact.address,
             self.artifact.rule,
@@ -48,14 +48,14 @@ class Job:
 
     @property
     def files(self) -> list[str]:
-        """Every path that it reads."""
+        """All input paths of the job."""
         return [path for paths in self.inputs.values() for path in listed(paths)]
 
 
 class Resolver:
-    """Files and settings of a study, see `study.artifact.reads.Sources`.
+    """Answers to the reads of artifacts for one study, an implementation of `Sources`.
 
-    results : folder of the results
+    results : path of the results folder
     """
 
     def __init__(self, study: Study, results: str) -> None:
@@ -63,7 +63,7 @@ class Resolver:
         self._jobs: dict[tuple[str, ...], Job] = {}
 
     def job(self, artifact: Artifact, labels: Labels = MappingProxyType({})) -> Job:
-        """The job with these labels; ConfigurationError if it reads what does not exist."""
+        """Return the job with these labels; ConfigurationError if an input or a key is unknown."""
         key = (artifact.rule, *(labels[name] for name in artifact.labels))
         if key not in self._jobs:
             own = {name: labels[name] for name in artifact.labels}
@@ -71,7 +71,7 @@ class Resolver:
         return self._jobs[key]
 
     def _resolved(self, artifact: Artifact, labels: dict[str, str]) -> Job:
-        known = {**labels, "figure": artifact.name}  # a figure's options are found by its name
+        known = {**labels, "figure": artifact.name}  # options of a figure are looked up by its name
         settings = artifact.settings(self, known)
         inputs = artifact.inputs(self, known)
         edited = [k for k, read in artifact.files.items() if isinstance(read, EditedFiles)]
@@ -87,12 +87,12 @@ class Resolver:
             fingerprint(artifact.module, *sorted(set(modules_in(settings)))),
         )
 
-    # What declarations ask for (`Sources`) --------------------------------------------------
+    # Methods of the protocol `Sources`, used by declarations -------------------------------------
 
     def file(self, place: Place, labels: Labels) -> str:
-        """Path of the file ``place`` of a job with ``labels``.
+        """Path of the file of the kind ``place`` that belongs to a job with these ``labels``.
 
-        Mesh and basis follow from its scene and method.
+        A missing label "mesh" follows from the scene, a missing label "basis" from the method.
         """
         found = dict(labels)
         if "mesh" in place.labels and "mesh" not in found:
@@ -102,7 +102,7 @@ class Resolver:
         return place.at(self.results, **{name: found[name] for name in place.labels})
 
     def files(self, place: Place, labels: Labels) -> list[str]:
-        """Paths of a kind, ``place``, whose labels agree with the ``labels`` of a job."""
+        """Paths of all files of the kind ``place`` whose labels agree with ``labels`` of a job."""
         study = self.study.only(labels["scene"]) if "scene" in labels else self.study
         return [
             place.at(self.results, **held)
@@ -111,13 +111,13 @@ class Resolver:
         ]
 
     def table(self, name: str) -> str:
-        """File of the table ``name``; ConfigurationError if there is no such table."""
+        """Path of the table ``name``; ConfigurationError if there is no such table."""
         if name not in declared():
             raise ConfigurationError(f"'{name}': unknown{choices(name, declared())}")
         return TABLE.at(self.results, name=name)
 
     def value(self, key: str, labels: Labels) -> Any:
-        """Value of the configuration by its ``key``, or one derived (`DERIVED`) for ``labels``."""
+        """Configuration value of ``key``, or a value derived from ``labels`` (see `DERIVED`)."""
         head, _, parts = key.partition(".")
         if head not in DERIVED:
             return self.study.value(key)
@@ -126,5 +126,5 @@ class Resolver:
 
 
 def listed(paths: Paths) -> list[str]:
-    """List of one path, or of several, ``paths``."""
+    """Return ``paths``, one path or a list of paths, as a list."""
     return [paths] if isinstance(paths, str) else list(paths)

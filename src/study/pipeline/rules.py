@@ -1,4 +1,4 @@
-"""Rules of the workflow, one for each artifact."""
+"""Rules of the Snakemake workflow, one for each artifact (declared function that makes files)."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -14,15 +14,15 @@ from study.pipeline.resolve import Job
 from study.tables.kit.declaration import Table
 
 UNNUMBERED = "–"
-# What a job depends on beside its files.
+# Attributes of a job that the workflow tracks as parameters, in addition to its files.
 PARAMETERS = ("settings", "content", "code")
 
 
 @dataclass(frozen=True)
 class Rule:
-    """A rule as Snakemake wants it: what depends on a job's labels is a function of wildcards.
+    """A rule of Snakemake; values that depend on a job's labels are functions of the wildcards.
 
-    shown : arguments of Snakemake's ``report`` for its outputs, by their name
+    shown : arguments of Snakemake's function ``report`` for each output to show, by output name
     """
 
     name: str
@@ -38,7 +38,7 @@ class Rule:
 
 
 def rules(plan: Plan, cores: int) -> Iterator[Rule]:
-    """Rule of every artifact of ``plan``; one that measures times claims all ``cores``."""
+    """Yield the rule of each artifact of ``plan``; rules that measure times claim ``cores``."""
     for experiment in plan.experiments.values():
         yield _experiment(plan, experiment, cores)
     numbers = figure_numbers(plan.root)
@@ -62,10 +62,10 @@ def _experiment(plan: Plan, experiment: Experiment, cores: int) -> Rule:
         input={name: paths(name) for name in experiment.files},
         output={name: place.rule(plan.results) for name, place in places},
         log=f"{plan.results}/logs/{experiment.rule}{'/' if labels else ''}{labels}.log",
-        # scenes have no job in common but their meshes, so that each is a batch on a cluster
+        # scenes share no jobs except their meshes, so that a scene's jobs form a batch on a cluster
         group=None if experiment.alone or "scene" not in experiment.labels else "scene",
         threads=cores if experiment.alone else 1,
-        # a job that is to be alone gets a whole node of a cluster
+        # a job that measures times gets a whole node of a cluster
         resources={"slurm_extra": "--exclusive"} if experiment.alone else {},
         params={
             "artifact": experiment.address,
@@ -76,7 +76,7 @@ def _experiment(plan: Plan, experiment: Experiment, cores: int) -> Rule:
 
 
 def _fixed(plan: Plan, job: Job, folder: str, numbers: Mapping[str, Numbers]) -> Rule:
-    """Rule of a single job, without labels; ``numbers`` of the figures."""
+    """Rule of a job without labels; ``numbers``: figure numbers in manuscript and preprint."""
     artifact = job.artifact
     params = {"artifact": artifact.address, **{name: getattr(job, name) for name in PARAMETERS}}
     if isinstance(artifact, Declaration):
@@ -98,13 +98,13 @@ def _fixed(plan: Plan, job: Job, folder: str, numbers: Mapping[str, Numbers]) ->
 
 
 def _presented(job: Job, numbers: Mapping[str, Numbers]) -> tuple[str, dict[str, dict[str, Any]]]:
-    """Message of a job, and what Snakemake's report shows of its outputs."""
+    """Message of a job, and the arguments of ``report`` for each output that the report shows."""
     artifact, paths = job.artifact, job.outputs
     if isinstance(artifact, Table):
         labels = {"table": artifact.name, "title": artifact.title}
         return f"Table {artifact.name}", {"table": {"category": "Tables", "labels": labels}}
     if isinstance(artifact, Declaration):
-        # a PNG is what every browser shows
+        # the report shows the PNG, which every browser can display
         return f"Figure {artifact.name}", {"png": _figure(artifact, numbers[artifact.name])}
     shown = {
         "live_page": {"out": {"category": "Page"}},
@@ -117,7 +117,7 @@ def _presented(job: Job, numbers: Mapping[str, Numbers]) -> tuple[str, dict[str,
 
 
 def _figure(figure: Declaration, numbers: Numbers) -> dict[str, Any]:
-    """Entry of a figure in the report, which is sorted by the first label."""
+    """Arguments of ``report`` for a figure; the report sorts figures by their first label."""
     own = {"paper": numbers.manuscript or UNNUMBERED}
     if numbers.preprint is None:
         category, labels = "Figures of this study", {"name": figure.name, **own}

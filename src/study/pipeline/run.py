@@ -1,4 +1,4 @@
-"""First and last steps of every run, whether ``./reproduce`` or ``snakemake`` started it."""
+"""First and last steps of a run that ``./reproduce`` or ``snakemake`` has started."""
 
 import atexit
 import logging
@@ -38,16 +38,16 @@ RUN_TIMES = Path("config/reference/run_times.csv")
 
 
 def units_of(study: str, root: Path) -> Units:
-    """Units of the machine that timed a ``study``, full or tiny (`RUN_TIMES` below ``root``)."""
+    """Speed of the machine that timed ``study`` ("full" or "tiny"); `RUN_TIMES` has the values."""
     row = read_table(root / RUN_TIMES, result=False).set_index("study").loc[study]
     return Units(**row[list(Units.model_fields)])
 
 
 def expected_seconds(plan: Plan) -> Callable[[str], float]:
-    """Function that returns the expected processor seconds of a job of a plan, given its log.
+    """Function that returns the expected processor seconds of a job, given the path of its log.
 
-    A kind that was not measured takes the median of all. Times are scaled by the units of the
-    machine that the last run of the plan has recorded.
+    Kinds of jobs that were never measured get the median of all kinds. Times are scaled by the
+    speed of the machine that the plan's last run has recorded.
     """
     full = plan.settings.coarsen == Coarsen()
     study, column = ("full", "seconds") if full else ("tiny", "coarse_seconds")
@@ -65,14 +65,14 @@ def expected_seconds(plan: Plan) -> Callable[[str], float]:
 
 
 def tell_expectation(workflow: Any, plan: Plan) -> None:
-    """Log what every job of Snakemake's ``workflow`` is expected to take by ``plan``.
+    """Log the expected seconds of every job of Snakemake's ``workflow`` for `Progress`.
 
-    A job's share of this machine is 1 where it is alone, and where jobs run on a cluster.
+    A job's share of the machine is 1 if it measures times, or if jobs run on a cluster.
     """
     dag, seconds_of = workflow.dag, expected_seconds(plan)
     expected: dict[int, Expected] = {}
     after: dict[Any, float] = {}
-    # from the last jobs to the first, so that what follows a job is known before
+    # jobs are visited from last to first, so that the time after each job is already known
     for job in reversed([job for level in dag.toposorted() for job in level]):
         if not dag.needrun(job) or not job.log:
             continue
@@ -88,14 +88,14 @@ def tell_expectation(workflow: Any, plan: Plan) -> None:
     )
 
 
-# What Snakemake compares by date.
+# Folders whose files Snakemake compares by date.
 DATED = ("results", "paper", "config", "workflow")
-# Executor by which Snakemake runs the jobs of a batch on a node of a cluster.
+# Snakemake's executor that runs the jobs of a batch on a node of a cluster.
 JOBSTEP = "slurm-jobstep"
 
 
 class Run:
-    """The run of this process: it is alone in its folder, and says at its end what came of it."""
+    """The run of this process: locks its folder, starts the jobs' server, reports the outcome."""
 
     def __init__(self, command: CommandLine, failures: Failures) -> None:
         self.command = command
@@ -103,9 +103,9 @@ class Run:
 
     @classmethod
     def begin(cls) -> "Run":
-        """Be the only run in the working directory, or end the process with one line.
+        """Lock the working directory and return the run, or end the process with one line.
 
-        A command that only looks needs no lock, so that it works beside a run.
+        A command that runs no job, such as a dry run, takes no lock and works during another run.
         """
         end_at_sigterm()
         with one_line():
@@ -121,9 +121,9 @@ class Run:
         return cls(command, failures)
 
     def check(self, plan: Plan, folders: Folders, rules: Iterable[Any], cores: int) -> None:
-        """Check targets and report; a dry run says at its end what it would take on ``cores``.
+        """Check targets and report; register the preview of a dry run on ``cores``.
 
-        ``plan``, ``folders`` and Snakemake's ``rules`` are those of the workflow.
+        ``plan``, ``folders`` and Snakemake's ``rules`` belong to the same workflow.
 
         Raises
         ------
@@ -142,15 +142,15 @@ class Run:
             preview(expected_seconds(plan), cores)
 
     def title(self, plan: Plan) -> str:
-        """Configuration of this run, and what tells results of ``plan`` from the full study's."""
+        """Name of this run's configuration, with a note if it is not the full study of ``plan``."""
         named, words = configuration(self.command), plan.study.apart
         return f"{named} ({words})" if words else named
 
     def start(self, workflow: Any, plan: Plan) -> None:
-        """Start the process that jobs are forked from, unless they run on a cluster."""
-        # Jobs start without a limit of their rate. For one, Snakemake starts a timer after every
-        # choice among the jobs, to choose again, and each such choice starts another one: towards
-        # the end of a run they take a third of a core, and the process waits for the last one.
+        """Start the fork server, unless jobs run on a cluster; log the expected times of jobs."""
+        # No limit on the rate of job starts: with a limit, Snakemake starts a timer after each job
+        # choice, which triggers another choice and another timer. At the end of a run these timers
+        # take a third of a core, and the process waits for the last one.
         workflow.scheduler.job_rate_limiter = None
         stop_at_sigterm(self.failures.note_sigterm)
         say_compilation(os.environ.get("NUMBA_CACHE_DIR", ""))
@@ -163,8 +163,8 @@ class Run:
             start_server()
 
     def succeed(self, workflow: Any, plan: Plan, folders: Folders) -> None:
-        """End a run whose jobs all succeeded: it says what came of ``plan`` in ``folders``."""
-        # late: a plan needs nothing of it
+        """End a successful run: write overview and manifest into ``folders``, print the summary."""
+        # imported late: planning does not need this module
         from study.pipeline.inventory import CONTENTS, contents
 
         try:
@@ -177,28 +177,28 @@ class Run:
         say_last(summary(self.command, folders, plan.figures, plan.table_paths, plan.study.apart))
 
     def fail(self) -> None:
-        """End a run that failed or was interrupted: it says why."""
+        """End a failed or interrupted run: print the causes and exit."""
         text, status = self.failures.end()
         say_last(text)
         sys.exit(status)
 
 
 def start_batch(workflow: Any) -> None:
-    """Start the process that jobs of a batch are forked from, if ``workflow`` is on a node.
+    """Start the fork server for the jobs of a batch, if ``workflow`` runs on a cluster's node.
 
-    Snakemake runs there twice. The first one hands the batch to the other (by `JOBSTEP`), which
-    runs its jobs.
+    Snakemake runs twice on a node: the first process hands the batch to a second one (by the
+    executor `JOBSTEP`), which runs the jobs.
     """
     if workflow.remote_exec and JOBSTEP not in sys.argv:
         start_server()
 
 
 def say_compilation(cache: str) -> None:
-    """Announce that the first jobs take longer, where the folder ``cache`` has no step loop yet."""
+    """Announce that kernels are compiled first, if the cache folder has no compiled time step."""
     if not any(Path(cache).glob("dynamics*/*.nbi")):
         sys.stderr.write("pdrom: the first jobs compile kernels (once, some minutes)\n")
 
 
 def say_last(text: str) -> None:
-    """Write ``text`` when the process ends, after what Snakemake has still to say."""
+    """Write ``text`` to standard error at the end of the process, after Snakemake's messages."""
     atexit.register(sys.stderr.write, text)

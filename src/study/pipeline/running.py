@@ -1,12 +1,12 @@
-"""The process of a run: alone in its folder, with dates that Snakemake takes, and with an end.
+"""The process of a run: its lock on the folder, the dates of its files, and its end by SIGTERM.
 
-The lock belongs to the operating system and goes with the process, however that ends, so that it is
-never stale. Snakemake's own lock consists of files, which a killed run leaves behind: whoever holds
-the lock of the operating system may delete them.
+The operating system releases the lock when the process ends, for whatever reason, so that no lock
+is left behind. Snakemake's own lock consists of files, which a killed run leaves behind: a process
+that has the lock of the operating system may delete these files.
 
-Snakemake compares dates and refuses a result that is older than what it was made from, so that no
-run would succeed after the clock was set back until it has passed the dates. At SIGTERM it would
-wait for the jobs that run, for minutes.
+Snakemake compares dates and refuses a result that is older than its inputs. After the clock was set
+back, no run would succeed until the clock has passed the dates of existing files. At SIGTERM,
+Snakemake would wait for running jobs, which takes minutes.
 """
 
 import errno
@@ -29,23 +29,23 @@ from pdrom.core.errors import INTERRUPTED, PdromError
 FOLDER = Path(".snakemake")
 LOCK = FOLDER / "run.lock"
 SNAKEMAKE_LOCKS = FOLDER / "locks"
-# Between two dates in the future that are moved to now.
+# Nanoseconds between successive dates when future dates are replaced by dates just before now.
 STEP_NS = 10_000
-# Seconds after which a job is killed that SIGTERM did not end.
+# Seconds after SIGTERM at which a job that still runs is killed.
 PATIENCE = 5.0
 
 
 class AtWorkError(PdromError):
-    """Another process runs the workflow in this folder."""
+    """Error: another process runs the workflow in this folder, or the lock file is unusable."""
 
 
 def hold() -> int:
-    """Hold the lock of the working directory until the process ends or closes the descriptor.
+    """Lock the working directory until the process ends; return the descriptor of the lock file.
 
     Raises
     ------
     AtWorkError
-        Naming the process that holds it, or the fault of the disk.
+        Another process has the lock, which the message names, or the lock file is unusable.
     """
     try:
         FOLDER.mkdir(exist_ok=True)
@@ -68,7 +68,7 @@ def hold() -> int:
 
 
 def remove_stale_locks() -> None:
-    """Delete what a killed run left of Snakemake's lock, unless somebody is at work."""
+    """Delete Snakemake's lock files of a killed run, unless another process has the lock."""
     if not SNAKEMAKE_LOCKS.is_dir():
         return
     try:
@@ -78,10 +78,10 @@ def remove_stale_locks() -> None:
 
 
 def settle_dates(folders: Iterable[str | Path]) -> int:
-    """Move files in ``folders`` dated in the future to just before now; say and return how many.
+    """Replace future dates of files in ``folders`` by dates just before now; return their number.
 
-    The order is kept: what was newer than something else, and makes it run again, still is. Of a
-    link its own date is moved: what it leads to may lie elsewhere.
+    The order of the dates remains, so that newer files still cause reruns. The date of a symbolic
+    link itself is changed, not the date of its target, which may lie elsewhere.
     """
     now = time.time_ns()
     files = [path for folder in folders for path in Path(folder).rglob("*") if path.is_file()]
@@ -96,7 +96,7 @@ def settle_dates(folders: Iterable[str | Path]) -> int:
 
 
 def end_at_sigterm() -> None:
-    """Let SIGTERM end this process with one line, while no job runs."""
+    """Install a handler that ends this process with one line at SIGTERM, while no job runs."""
 
     def end(number: int, frame: object) -> None:
         _say(b"pdrom: ended by SIGTERM\n")
@@ -106,7 +106,7 @@ def end_at_sigterm() -> None:
 
 
 def stop_at_sigterm(note: Callable[[], None]) -> None:
-    """Let SIGTERM end all jobs, and then the run as Ctrl-C does; ``note`` is called."""
+    """Install a handler for SIGTERM: call ``note``, end all jobs, then the run as by Ctrl-C."""
 
     def stop(number: int, frame: object) -> None:
         _say(b"pdrom: SIGTERM: ending the jobs that run\n")
@@ -119,19 +119,19 @@ def stop_at_sigterm(note: Callable[[], None]) -> None:
 
 
 def _say(line: bytes) -> None:
-    """Write to standard error, unless nobody reads it any more."""
+    """Write ``line`` to standard error; ignore a closed stream."""
     with suppress(OSError):
         os.write(sys.stderr.fileno(), line)
 
 
 def _end_jobs() -> None:
-    """End the processes of jobs until this process ends, also those that just begin."""
+    """End the processes of all jobs, also of new ones, repeatedly until this process ends."""
     begin, own = time.monotonic(), psutil.Process()
     while True:
         late = time.monotonic() - begin > PATIENCE
         for process in own.children(recursive=True):
             with suppress(psutil.Error, ProcessLookupError):
-                # the fork server has a session of its own and ends forks with their clients
+                # the fork server has its own session and ends the forks of clients that are gone
                 if os.getsid(process.pid) == os.getsid(0):
                     process.send_signal(signal.SIGKILL if late else signal.SIGTERM)
         time.sleep(0.5)

@@ -1,6 +1,6 @@
-"""Scenes of config/scenes, changed as a study requests, and built to find every fault early.
+"""Scenes of config/scenes with the changes of a study, built in advance to detect every fault.
 
-A configuration also makes scenes out of others: finer meshes, other weights, other starts.
+A configuration can also derive variants of scenes: finer meshes, other weights, other starts.
 """
 
 from collections.abc import Callable, Iterable, Iterator
@@ -30,7 +30,7 @@ class Coarsen(ConfigModel):
     frames: Fraction = 1.0
 
     def of(self, scene: SceneConfig) -> SceneConfig:
-        """Return the coarsened ``scene``."""
+        """Return ``scene`` with fewer vertices and frames."""
         return scene if self == Coarsen() else scene.coarsened(self.resolution, self.frames)
 
 
@@ -47,7 +47,7 @@ class Replicate(ConfigModel):
     seed: Seed = 0
 
     def of(self, scene: SceneConfig) -> SceneConfig:
-        """Return ``scene`` at another speed, from another start, with other held-out seeds."""
+        """Return ``scene`` at another speed, with another start and other held-out seeds."""
         if self == Replicate():
             return scene
         effects = [effect.with_frames_scaled(self.frames_factor) for effect in scene.effects]
@@ -60,13 +60,13 @@ class Replicate(ConfigModel):
 
 
 class Changes(NamedTuple):
-    """Changes that a study makes to every scene of config/scenes."""
+    """Changes that a study makes to every scene of config/scenes: coarsening and replication."""
 
     coarsen: Coarsen = Coarsen()
     replicate: Replicate = Replicate()
 
     def of(self, scene: SceneConfig) -> SceneConfig:
-        """Return ``scene`` with both changes."""
+        """Return ``scene`` with both changes applied."""
         return self.coarsen.of(self.replicate.of(scene))
 
 
@@ -75,12 +75,12 @@ UNCHANGED = Changes()
 
 
 def scene_names(root: Path) -> list[str]:
-    """Names of all scenes that have a file below ``root``."""
+    """Names of all scenes with a file in config/scenes below ``root``, sorted."""
     return sorted(path.stem for path in (root / "config" / "scenes").glob("*.yaml"))
 
 
 def require_scenes(root: Path, names: Iterable[str], key: str) -> None:
-    """ConfigurationError, which ``key`` opens, if one of ``names`` has no file below ``root``."""
+    """Raise ConfigurationError, with ``key`` in front, if a scene of ``names`` has no file."""
     known = scene_names(root)
     for name in names:
         if name not in known:
@@ -88,28 +88,28 @@ def require_scenes(root: Path, names: Iterable[str], key: str) -> None:
 
 
 def load_bound_scene(root: Path, name: str, changes: Change = UNCHANGED) -> Scene:
-    """Scene ``name`` below ``root`` with ``changes``, built to find every fault early.
+    """Return scene ``name`` of ``root`` with ``changes``, built on its mesh to detect every fault.
 
     Raises
     ------
     ConfigurationError
-        Naming the file and the fault; also for faults of the held-out variant.
+        The scene or its held-out variant is faulty; the message names file and fault.
     """
     return bind(root, read_scene(root, name, changes), str(scene_file(root, name)))
 
 
 def bind(root: Path, scene: SceneConfig, source: str) -> Scene:
-    """Built ``scene``, whose files lie below ``root``; ``source`` opens messages about its faults.
+    """Return ``scene``, built on its mesh from ``root``; ``source`` begins messages about faults.
 
     Raises
     ------
     ConfigurationError
-        Naming the fault; also for those of the held-out variant.
+        The scene or its held-out variant is faulty; the message names the fault.
     """
     try:
         mesh = scene.mesh.build(root)
         bound = Scene.build(scene, mesh)
-        # its groups are those of the scene: what differs is built alone
+        # constraint groups of the held-out variant are equal, so that only other effects are built
         heldout = scene.heldout_variant()
         other = tuple(e for e in heldout.effects if not isinstance(e, GroupConfig))
         Scene.build(heldout.model_copy(update={"effects": other}), mesh)
@@ -121,9 +121,9 @@ def bind(root: Path, scene: SceneConfig, source: str) -> Scene:
 
 
 def read_scene(root: Path, name: str, changes: Change = UNCHANGED) -> SceneConfig:
-    """Configuration of scene ``name`` below ``root``, with ``changes``; ConfigurationError.
+    """Return the configuration of scene ``name`` below ``root``, with ``changes``; builds no mesh.
 
-    Its mesh is not built; a mesh file is named from ``root`` on.
+    The path of a mesh file becomes relative to ``root``. Raises ConfigurationError for a fault.
     """
     require_scenes(root, [name], "scenes")
     path = scene_file(root, name)
@@ -137,12 +137,12 @@ def read_scene(root: Path, name: str, changes: Change = UNCHANGED) -> SceneConfi
 
 
 def scene_file(root: Path, name: str) -> Path:
-    """File of scene ``name`` below ``root``."""
+    """Path of the file of scene ``name`` below ``root``."""
     return root / "config" / "scenes" / f"{name}.yaml"
 
 
 def not_taken(scene: SceneConfig) -> list[str]:
-    """Effects of a scene that a position subspace cannot represent."""
+    """Names of the effects of a scene that a position subspace cannot represent."""
     return [e.effect for e in scene.effects if not EFFECTS.load(e.effect).in_subspace]
 
 
@@ -169,10 +169,10 @@ class Variants(ConfigModel):
         return self
 
     def of(self, read: Callable[[str], SceneConfig]) -> Iterator[SceneConfig]:
-        """Every variant; ``read`` gives the configuration of a scene.
+        """Yield every variant of the scenes; ``read`` returns the configuration of a scene by name.
 
-        The name says what differs: ``strain_oop_m1p5_w0p01_s3`` has 1.5 times the vertices along a
-        side, a hundredth of the weight, and the start of seed 3.
+        The variant's name contains its factors: ``strain_oop_m1p5_w0p01_s3`` has 1.5 times the
+        vertices along a side, 0.01 times the weight, and a random start with seed 3.
         """
         for name in self.scenes:
             scene = read(name)
@@ -194,5 +194,5 @@ class Variants(ConfigModel):
 
 
 def _word(number: float) -> str:
-    """A number as part of a scene's name."""
+    """Number as text for a scene's name: ``p`` for the point, ``m`` for minus, no plus."""
     return f"{number:g}".replace(".", "p").replace("-", "m").replace("+", "")

@@ -1,8 +1,8 @@
-"""Whether NumPy and SciPy calculate correctly on this machine, with the kernels that jobs use.
+"""Check that NumPy and SciPy calculate correctly on this machine, with the kernels that jobs use.
 
-``./reproduce`` runs this before a new environment counts as made. The kernels of a linear algebra
-library can be broken on one processor for some shapes of matrices, and then end the process without
-a word, so that each calculation is named on standard output before it is made.
+``./reproduce`` runs this check before it accepts a new environment. The kernels of a linear algebra
+library can be broken on a processor for some shapes of matrices, and then end the process without a
+message, so that the name of each calculation is printed before it is made.
 """
 
 import faulthandler
@@ -13,15 +13,15 @@ from typing import Any
 
 from pdrom.core.environment import settle
 
-# Rows: one element, those of the hard cases, a group of a scene. Columns: sizes of bases.
+# Rows as in scenes, from one element to a constraint group. Columns are sizes of bases.
 ROWS = (1, 2, 3, 4, 6, 9, 12, 27, 48, 96, 100, 256, 300, 900, 1000, 2700)
 COLUMNS = (1, 2, 3, 4, 6, 8, 12, 16, 20, 25, 32, 50)
-# Difference relative to the largest entry; rounding at these sizes stays far below.
+# Tolerance relative to the largest entry; rounding errors at these sizes are far smaller.
 TOLERANCE = 1e-9
 
 
 def main() -> None:
-    """Make all calculations; the last line on standard output names the one that failed."""
+    """Make all calculations; after a failure the last line on standard output names it."""
     faulthandler.enable()
     settle()
     for what in calculations():
@@ -30,7 +30,7 @@ def main() -> None:
 
 
 def calculations() -> Iterator[str]:
-    """Name each calculation, and make it when the next one is asked for."""
+    """Yield the name of each calculation, and make it when the next name is requested."""
     import numpy as np
     import scipy.linalg
 
@@ -38,7 +38,7 @@ def calculations() -> Iterator[str]:
     names = [f"{library} {version(library)}" for library in ("numpy", "scipy")]
     for rows, columns in [(rows, columns) for rows in ROWS for columns in COLUMNS]:
         x = random.standard_normal((rows, columns))
-        # sums that are formed without a linear algebra library
+        # reference products, formed without a linear algebra library
         gram = np.einsum("ij,ik->jk", x, x)
         where = f"with X of {rows} x {columns}"
         yield f"{names[0]}: X.T @ (2 * X) {where}"
@@ -62,7 +62,7 @@ def calculations() -> Iterator[str]:
 
 
 def compare(found: Any, expected: Any) -> None:
-    """End the process where two arrays differ by more than rounding, or one is not finite."""
+    """Exit if ``found`` and ``expected`` differ by more than `TOLERANCE` or are not finite."""
     import numpy as np
 
     if not np.abs(found - expected).max() <= TOLERANCE * max(np.abs(expected).max(), 1.0):

@@ -1,4 +1,4 @@
-"""The study: which scenes, methods and settings one run of the pipeline covers."""
+"""The study: the scenes, methods and settings that one configuration covers."""
 
 from collections.abc import Iterable
 from copy import copy
@@ -80,7 +80,7 @@ class StudySettings(ConfigModel):
 
     @property
     def changes(self) -> Changes:
-        """Changes of every scene of config/scenes."""
+        """Changes that the study makes to every scene of config/scenes."""
         return Changes(self.coarsen, self.replicate)
 
     @model_validator(mode="after")
@@ -93,7 +93,7 @@ class StudySettings(ConfigModel):
 
     @model_validator(mode="after")
     def _heldout_ranks_are_run(self) -> Self:
-        """Samples exist for the ranks; those of the full rank always do."""
+        """Require that held-out sizes are in ``ranks``; "full" is always allowed."""
         for rank in self.heldout_ranks or ():
             if rank not in (*self.ranks, "full"):
                 allowed = ", ".join(map(str, self.ranks))
@@ -102,14 +102,14 @@ class StudySettings(ConfigModel):
 
 
 class Study:
-    """Settings with the scenes and methods that they name, all checked."""
+    """A study: its checked settings with the scenes and methods that they name."""
 
     def __init__(self, settings: StudySettings, root: Path, configuration: str = DEFAULT) -> None:
-        """Take checked ``settings``; ``configuration`` names what they were read from."""
+        """Build all scenes of ``settings``; ``configuration`` names the files of the settings."""
         self.settings = settings
         self.root = root
         self.configuration = configuration
-        self.titles: dict[str, str] = {}  # for tables and figures
+        self.titles: dict[str, str] = {}  # titles of scenes, for tables and figures
         self.vertices: dict[str, int] = {}
         self.bound: dict[str, Scene] = {
             name: load_bound_scene(root, name, settings.changes) for name in settings.scenes
@@ -129,35 +129,35 @@ class Study:
         source: str = f"configuration ({DEFAULT})",
         configuration: str = DEFAULT,
     ) -> "Study":
-        """Study of a (merged) ``config`` below ``root``; ``source`` opens the messages about it.
+        """Return the study of a merged ``config`` below ``root``.
 
-        ``configuration`` names what it was read from for readers of the manuscript.
+        ``source`` begins error messages; ``configuration`` is the name shown in the manuscript.
 
         Raises
         ------
         ConfigurationError
-            Naming file, key, value and what is allowed, before anything is computed.
+            The message names file, key, value and the allowed values; nothing is computed before.
         """
         settings = validate(StudySettings, config, source)
         return cls(settings, Path(root), configuration)
 
     @cached_property
     def figures(self) -> dict[str, Options]:
-        """Options of every figure, see config/figures.yaml."""
+        """Options of every figure, by its name, from config/figures.yaml."""
         known = {"methods": self.every_method, "scenes": scene_names(self.root)}
         return load_choices(self.root / "config" / "figures.yaml", known)
 
     def value(self, key: str) -> Any:
-        """Value of the configuration by its ``key``; ConfigurationError if there is none."""
+        """Value of the configuration at ``key``; ConfigurationError if the key does not exist."""
         return part_of(self.settings, key, key)
 
     @cached_property
     def every_method(self) -> dict[str, MethodSpec]:
-        """All methods of config/methods.yaml by name."""
+        """Specifications of all methods of config/methods.yaml, by name."""
         return load_methods(self.root / "config" / "methods.yaml")
 
     def scene(self, name: str) -> SceneConfig:
-        """Scene ``name``, held or not; ConfigurationError if it has no file or is faulty."""
+        """Return any scene by ``name``; ConfigurationError if its file is missing or faulty."""
         for held in (self.scenes, self.online, self._others):
             if name in held:
                 return held[name]
@@ -165,17 +165,17 @@ class Study:
         return self._others[name]
 
     def _loaded(self, name: str) -> SceneConfig:
-        """Configuration of a scene that the study does not keep bound to its mesh."""
+        """Checked configuration of a scene whose built form the study does not store."""
         return self._physics(load_bound_scene(self.root, name, self.settings.changes))
 
     def _physics(self, scene: Scene) -> SceneConfig:
-        """The scene under its name instead of its title, so that no job depends on the title."""
+        """Scene configuration with its title replaced by its name: jobs do not depend on titles."""
         config = scene.config
         self.titles[config.name], self.vertices[config.name] = config.title, scene.mesh.vertices
         return config.model_copy(update={"title": config.name})
 
     def only(self, scene: str) -> "Study":
-        """Return a study of one scene, which need not be held."""
+        """Return a copy of the study with ``scene`` alone, which may be outside the study."""
         single = copy(self)
         single.scenes = {scene: self.scene(scene)}
         return single
@@ -187,17 +187,17 @@ class Study:
 
     @property
     def is_full(self) -> bool:
-        """Whether it has the settings of config/default.yaml."""
+        """Whether the settings are those of config/default.yaml."""
         return self.settings == self._full
 
     @property
     def is_own(self) -> bool:
-        """Whether it has none of the scenes of config/default.yaml."""
+        """Whether the study has no scene in common with config/default.yaml."""
         return not {*self.settings.scenes} & {*self._full.scenes}
 
     @property
     def apart(self) -> str:
-        """Words that tell its results from those of the full study; empty for that."""
+        """Words that distinguish results from those of the full study; empty for the full study."""
         if self.is_full:
             return ""
         coarsen = self.settings.coarsen
@@ -207,20 +207,20 @@ class Study:
 
     @property
     def experiments(self) -> list[tuple[str, str]]:
-        """(scene, group) pairs whose group is reduced, in configuration order."""
+        """Pairs (scene, reduced constraint group), in configuration order."""
         return [(name, group) for name, scene in self.scenes.items() for group in scene.reduce]
 
     def mesh_of(self, scene: str) -> str:
-        """Identifier of a scene's mesh."""
+        """Identifier of the mesh of ``scene``."""
         return self.scene(scene).mesh.identifier
 
     @property
     def meshes(self) -> dict[str, MeshConfig]:
-        """Mesh configurations by identifier."""
+        """Mesh configurations of the study's scenes, by identifier."""
         return {scene.mesh.identifier: scene.mesh for scene in self.scenes.values()}
 
     def mesh(self, identifier: str) -> MeshConfig:
-        """Configuration of mesh ``identifier``, which a scene has; it may be outside the study."""
+        """Configuration of the mesh ``identifier`` of any scene in config/scenes or the study."""
         if identifier in self.meshes:
             return self.meshes[identifier]
         changes = self.settings.changes
@@ -228,12 +228,12 @@ class Study:
         return next(mesh for mesh in every if mesh.identifier == identifier)
 
     def basis(self, identifier: str) -> BasisSpec:
-        """Specification of basis ``identifier`` by the first method that has it."""
+        """Specification of the basis ``identifier``, from the first method that uses it."""
         method = next(m for m in self.methods.values() if m.basis_id == identifier)
         return BasisSpec(**{key: getattr(method, key) for key in BasisSpec.model_fields})
 
     def named_methods(self, names: Iterable[str], key: str) -> dict[str, MethodSpec]:
-        """Methods by ``names``; ConfigurationError, which ``key`` opens, for an unknown one."""
+        """Methods by ``names``; ConfigurationError, with ``key`` in front, for an unknown name."""
         known = self.every_method
         for name in names:
             if name not in known:
@@ -242,7 +242,7 @@ class Study:
 
 
 def part_of(value: Any, parts: str, key: str) -> Any:
-    """Part ``a.b`` of a ``value``; ConfigurationError, which names ``key``, if there is none."""
+    """Entry of ``value`` at the path ``parts`` (a.b); ConfigurationError if it does not exist."""
     for part in parts.split("."):
         if not hasattr(value, part):
             known = choices(part, getattr(type(value), "model_fields", ()))

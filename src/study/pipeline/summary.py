@@ -1,4 +1,4 @@
-"""Last lines of a run: of a dry run the jobs and how long all take, else what came of it."""
+"""Last lines of a run: outcome and times; of a dry run, its jobs and their expected time."""
 
 import atexit
 import logging
@@ -19,8 +19,8 @@ from study.pipeline.commandline import CommandLine
 from study.pipeline.folders import Folders
 from study.pipeline.progress import rounded
 
-# Snakemake's reasons, as they begin, and in fewer words. The last one follows from other jobs and
-# is left out if there is another one.
+# Beginnings of Snakemake's reasons for a job, with shorter texts. The last reason only follows from
+# other jobs and is left out if there is another reason.
 FOLLOWS = "Input files updated by another job"
 REASONS = {
     "Forced execution": "forced",
@@ -35,13 +35,13 @@ REASONS = {
 }
 END = "This was a dry-run"
 
-# A run alone keeps about as many processes busy as there are cores, on the mean of five minutes.
+# Load average per core, over five minutes, above which other programs must have been running.
 BUSY = 1.7
-LISTED = 8  # targets, by their names
+LISTED = 8  # largest number of targets that the summary names
 
 
 def processor_seconds() -> float:
-    """Processor time of this process and of all that it has started, until now."""
+    """Processor seconds used until now by this process and its child processes."""
     own = psutil.Process()
     total = 0.0
     for process in (own, *own.children(recursive=True)):
@@ -61,13 +61,13 @@ def summary(
     tables: Sequence[str],
     apart: str = "",
 ) -> str:
-    """Lines about a run that has ended well.
+    """Return the last lines of a successful run.
 
     Parameters
     ----------
-    command, folders : line that started the run, and where its results lie
-    figures, tables : files that the study has when it is complete
-    apart : words that tell its verdicts from those of the full study, if it is another one
+    command, folders : command line of the run, and the folders of its results
+    figures, tables : paths of all figures and tables of the complete study
+    apart : words that mark verdicts of a study other than the full one; else empty
     """
     wall = time.time() - psutil.Process().create_time()
     lines = [f"configuration: {configuration(command)}"]
@@ -96,21 +96,21 @@ def summary(
 
 
 def minutes(seconds: float) -> str:
-    """A time in minutes and seconds."""
+    """Duration of ``seconds`` as text in minutes and seconds."""
     whole = round(seconds)
     return f"{whole // 60} min {whole % 60} s" if whole >= 60 else f"{whole} s"
 
 
 def configuration(command: CommandLine) -> str:
-    """Files and settings of the configuration of ``command``, in one line."""
+    """Names of the configuration files and settings of ``command``, in one line."""
     names = command.configfiles or ("config/default.yaml",)
     return ", ".join([*names, *command.settings])
 
 
 def verdicts_in(results: str) -> dict[str, tuple[str, str]]:
-    """Verdicts of each claim, as published and beyond; none where the table cannot be read."""
+    """Verdicts of each claim, (published, beyond); empty if the table cannot be read."""
     path = paths.TABLE.at(results, name="claims")
-    # a damaged file is only reported here: the job that reads it renames it
+    # a damaged file is not renamed here; the job that reads it sets it aside
     if not Path(path).is_file() or check_file(path) is not Condition.INTACT:
         return {}
     table = read_table(path, ["claim", "verdict", "verdict_beyond"])
@@ -118,12 +118,12 @@ def verdicts_in(results: str) -> dict[str, tuple[str, str]]:
 
 
 class Preview(logging.Handler):
-    """Listens to Snakemake's log for the jobs of a plan.
+    """Log handler that counts the jobs of a dry run, from Snakemake's log.
 
     Parameters
     ----------
-    seconds : expected processor time of a job, given its log
-    cores : how many there are; a job that is alone claims all of them
+    seconds : function that returns the expected processor seconds of a job, given its log
+    cores : number of cores, all of which a job that measures times claims
     """
 
     def __init__(self, seconds: Callable[[str], float], cores: int) -> None:
@@ -135,19 +135,19 @@ class Preview(logging.Handler):
         self._ended = False
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Count the job of a ``record``."""
+        """Add the job of a log ``record`` to the counts, reasons and times."""
         self._ended = self._ended or END in record.getMessage()
         if getattr(record, "event", None) != LogEvent.JOB_INFO:
             return
         self._jobs[record.rule_name] += 1
         self._reasons[record.rule_name] |= shortened(record.reason)
-        if record.log:  # a rule that only names targets has none
+        if record.log:  # rules that only collect targets have no log and take no time
             seconds = self._of_job(str(record.log[0]))
             self._processor += seconds
             self._wall += seconds * min(record.threads, self._cores) / self._cores
 
     def text(self) -> str:
-        """A line for each rule, then jobs and minutes; nothing of a plan without an end."""
+        """One line per rule, then totals of jobs and time; empty if the dry run did not finish."""
         if not self._ended:
             return ""
         width = max(map(len, self._jobs))
@@ -164,14 +164,14 @@ class Preview(logging.Handler):
 
 
 def shortened(reason: str) -> set[str]:
-    """Reasons in ``reason``, a text of Snakemake's, which lists files and settings behind each."""
+    """Short texts of the reasons in Snakemake's message ``reason``, as a set."""
     found = [text for text in REASONS if reason.startswith(text) or f"; {text}" in reason]
     own = [text for text in found if text != FOLLOWS] or found
     return {REASONS[text] for text in own}
 
 
 def preview(seconds: Callable[[str], float], cores: int) -> None:
-    """Report at the end of this process what its dry run has planned."""
+    """Print the jobs of this dry run at the end of the process; arguments as in `Preview`."""
     planned = Preview(seconds, cores)
     logging.getLogger("snakemake.logging").addHandler(planned)
     atexit.register(lambda: sys.stdout.write(planned.text()))

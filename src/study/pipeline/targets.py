@@ -1,4 +1,4 @@
-"""Targets on the command line: figures by number or name, tables and files; help if misspelt."""
+"""Targets of the command line: figures by number or name, tables, files; with suggestions."""
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from itertools import takewhile
@@ -20,22 +20,22 @@ PREPRINT = "preprint:"
 
 
 def figure_arguments(arguments: Sequence[str]) -> list[str]:
-    """Options and targets for Snakemake, from the ``arguments`` that follow the word ``figure``.
+    """Return options and targets for Snakemake, from the ``arguments`` after the word ``figure``.
 
-    A number counts in the paper, one with an S before it in the supplement, ``preprint:NUMBER`` in
-    the preprint; every figure has its name, too. A target reads ``figure NAME`` (one word), which
-    `files` turns into its file.
+    A figure is given by its name, its number in the paper (``3``), in the supplement (``S3``) or in
+    the preprint (``preprint:3``). The returned target is the single string ``figure NAME``, which
+    `files` turns into a path.
 
     Raises
     ------
     ConfigurationError
-        No figure was named, or there is no such one.
+        No figure is given, or a given figure does not exist.
     """
     named = list(takewhile(lambda word: not word.startswith("-"), arguments))
     options = [word for word in arguments[len(named) :] if word != "--"]
     numbers = figure_numbers(Path())
     by_place = {n.manuscript: name for name, n in numbers.items() if n.manuscript}
-    # the paper's numbers, then the supplement's
+    # numbers of the paper first, then numbers of the supplement
     ordered = sorted(by_place, key=lambda n: (SUPPLEMENT in n, int(n.removeprefix(SUPPLEMENT))))
     known = {number: by_place[number] for number in ordered}
     known |= {f"{PREPRINT}{n.preprint}": name for name, n in numbers.items() if n.preprint}
@@ -49,16 +49,16 @@ def figure_arguments(arguments: Sequence[str]) -> list[str]:
 
 
 def described(target: str) -> str:
-    """A target with both numbers, if it is a figure that has one; else the target itself."""
+    """Target as text for the user; a figure is followed by its numbers in the documents."""
     word, _, name = target.partition(" ")
     return f"{WORD} {figure_numbers(Path())[name].label(name)}" if word == WORD else target
 
 
 def files(target: str, folders: Folders) -> list[str]:
-    """Files in ``folders`` to make for a ``target``; itself unless it is a name.
+    """Return the paths in ``folders`` for ``target``, the name of a figure or table or a path.
 
-    A file below ``results`` is the study's own, wherever that has its results; ``figure NAME``
-    stands for that figure alone.
+    A path below ``results`` is moved to the results folder of this study. ``figure NAME`` means
+    the figure only, also if a table has the same name.
     """
     word, _, name = target.partition(" ")
     alone = word == WORD and name in declarations()
@@ -70,7 +70,7 @@ def files(target: str, folders: Folders) -> list[str]:
 
 
 def own_file(path: str, folders: Folders) -> str:
-    """File of a study with these ``folders`` for one of the full study; another stays as it is."""
+    """Translate a path of the full study to the same file in ``folders``; keep other paths."""
     for document, file in Folders().documents.items():
         if path == file:
             return folders.documents[document]
@@ -80,9 +80,9 @@ def own_file(path: str, folders: Folders) -> str:
 
 
 def check_targets(plan: Plan, targets: Iterable[str], rules: Sequence[Any]) -> None:
-    """ConfigurationError with a suggestion for a target that none of Snakemake's rules makes.
+    """Raise ConfigurationError, with a suggestion, for a target that no rule of Snakemake makes.
 
-    ``targets`` are those of the command line.
+    ``targets`` are the arguments of the command line.
     """
     own = {rule.name for rule in rules if not rule.has_wildcards()}
     for target in targets:
@@ -100,7 +100,7 @@ def check_targets(plan: Plan, targets: Iterable[str], rules: Sequence[Any]) -> N
 
 
 def _allowed(study: Study, label: str, before: Mapping[str, str]) -> Collection[str] | None:
-    """Values that a label of a file may have, by the labels ``before`` it; None if any."""
+    """Allowed values of ``label``, given the labels ``before`` it; None if all are allowed."""
     match label:
         case "scene":
             return {*scene_names(study.root), *study.scenes}
@@ -118,7 +118,7 @@ def _allowed(study: Study, label: str, before: Mapping[str, str]) -> Collection[
 
 
 def _unknown(plan: Plan, target: str, rules: Collection[str]) -> str:
-    """End of the message about a target that nothing makes; ``rules`` are those without labels."""
+    """Last part of the message about an unknown target; ``rules`` are names without labels."""
     scenes = {*scene_names(plan.root), *plan.study.scenes}
     if target in scenes:
         example = paths.FULL_ORDER.at(plan.results, scene=target, run="train")

@@ -1,13 +1,13 @@
-"""Measurements that git keeps: costs of jobs, and verdicts on another sample.
+"""Measurements stored in git: costs of jobs, and verdicts on claims for another set of scenes.
 
-``./reproduce run python -m study.pipeline.tracked costs`` writes `config/reference/job_costs.csv`
-again, from the logs of the full and of the tiny study in ``results``. It holds the mean processor
-seconds of a kind of job on the meshes of both studies, with the longest time and the largest memory
-of a job, which the requests of `workflow/profiles/slurm` are to cover. A kind is what a job's log
-is named by below ``logs``: an experiment, or ``tables``, ``figures`` or ``paper``.
+``./reproduce run python -m study.pipeline.tracked costs`` updates `config/reference/job_costs.csv`
+from the logs of the full and of the tiny study in ``results``. The file holds, for each kind of
+job, the mean processor seconds in both studies, and the longest time and largest memory of a job,
+which the requests of `workflow/profiles/slurm` must cover. The kind of a job is the first part of
+its log's path below ``logs``: an experiment, or ``tables``, ``figures`` or ``paper``.
 
-``./reproduce run python -m study.pipeline.tracked replication`` writes the file of the table
-`replication` again, from the table claims of ``config/replication.yaml``.
+``./reproduce run python -m study.pipeline.tracked replication`` updates the file of the table
+`replication` from the table of claims of the study ``config/replication.yaml``.
 """
 
 import sys
@@ -33,27 +33,27 @@ SAMPLE = "config/replication.yaml"
 
 
 def write_tracked(path: Path, content: bytes) -> None:
-    """Write ``content`` to ``path``, which git keeps: whole or not at all, without a checksum."""
+    """Write ``content`` to the git-tracked file ``path``, atomically and without a checksum."""
     with atomic_path(path, with_checksum=False) as temporary:
         temporary.write_bytes(content)
 
 
 def kind_of(log: str, results: str) -> str:
-    """Kind of a job, given its log and the results folder of its study."""
+    """Kind of a job, given the path of its log and the results folder of its study."""
     return Path(log).relative_to(Path(results, "logs")).parts[0].removesuffix(".log")
 
 
 def measured_costs(results: str, coarse: str) -> pd.DataFrame:
-    """A row for each kind of job, with the `COLUMNS`: what the logs of two runs say.
+    """Return a table with a row per kind of job and the `COLUMNS`, from the logs of two studies.
 
     Parameters
     ----------
-    results, coarse : results folders of the full study and of one with coarse meshes
+    results, coarse : results folders of the full study and of a study with coarse meshes
 
     Raises
     ------
     PdromError
-        If no log says what a job used: there was no run.
+        No log reports what a job used, as before the first run.
     """
     full = _used(results).groupby("kind")
     columns = [
@@ -66,12 +66,12 @@ def measured_costs(results: str, coarse: str) -> pd.DataFrame:
 
 
 def recorded_verdicts(claims: Path, rules: Path) -> pd.DataFrame:
-    """The verdicts of the table claims, the fingerprints of their rules, and the day.
+    """Return verdicts and measured values of all claims, fingerprints of their rules, and the date.
 
     Parameters
     ----------
-    claims : the table of another sample
-    rules : the file of the rules
+    claims : path of the table of claims of the other study
+    rules : path of the file of the claims' rules
 
     Raises
     ------
@@ -96,7 +96,7 @@ def _used(results: str) -> pd.DataFrame:
 
 
 def main(words: Sequence[str]) -> None:
-    """Write again what ``words`` name; ConfigurationError if there is no such measurement."""
+    """Update the files for ``words``, "costs" or "replication"; ConfigurationError for others."""
     for word in words or [""]:
         if word == "costs":
             path = COSTS

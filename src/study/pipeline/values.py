@@ -1,9 +1,9 @@
-"""Settings that are derived from the configuration for a job, by the names that artifacts read.
+"""Settings derived from the configuration for a job, by the names that artifacts read (`DERIVED`).
 
-A name that is not listed here is a key of the configuration. A setting of the type of a section's
-base class gets the fields of that class only, so that a job depends on nothing else.
+Names outside `DERIVED` are keys of the configuration. If a setting is annotated with the base class
+of its section, it has the fields of the base class only, so that a job depends on nothing else.
 
-A figure has its own name as a label. Its options choose what it draws of the study.
+The label of a figure's job is the name of the figure. Its options choose what the figure draws.
 """
 
 from collections.abc import Callable
@@ -25,7 +25,7 @@ from study.pipeline import paper
 from study.pipeline.contents import labels_of
 from study.pipeline.study import Study
 
-# The basis of the tables that show one of each group.
+# The preferred basis in tables that show one basis of each constraint group.
 USUAL_BASIS = "none-none-vectorised"
 
 
@@ -35,20 +35,20 @@ def _horizon(study: Study, labels: Labels) -> Horizon:
 
 
 def _heldout_ranks(study: Study, labels: Labels) -> tuple[Rank, ...]:
-    """Sizes that run on the first held-out motion: all, unless the configuration chooses."""
+    """Sizes r that run on the first held-out motion: the configured sizes, else all sizes."""
     chosen = study.settings.heldout_ranks
     return study.settings.ranks if chosen is None else chosen
 
 
 def _stability(study: Study, labels: Labels) -> Stability:
-    """The short runs at the sizes that the study has samples of."""
+    """Settings of short runs, restricted to sizes r for which the study computes samples."""
     section = study.settings.stability
     held = tuple(r for r in section.ranks if r in study.settings.ranks)
     return section.model_copy(update={"ranks": held})
 
 
 def _usual_bases(study: Study, labels: Labels) -> list[File]:
-    """A basis of each reduced group: the usual one where a method has it, else the first."""
+    """Basis file of each reduced group: `USUAL_BASIS` if a method uses it, else the first."""
     chosen: dict[tuple[str, str], Labels] = {}
     for held in labels_of(study, paths.BASIS):
         group = (held["scene"], held["group"])
@@ -58,17 +58,17 @@ def _usual_bases(study: Study, labels: Labels) -> list[File]:
 
 
 def _holds(study: Study, place: paths.Place, labels: Labels) -> bool:
-    """Whether the study itself has the file of a kind that belongs to a job with these labels."""
+    """Return whether the study makes the file of kind ``place`` for these labels of a job."""
     return {name: labels[name] for name in place.labels} in labels_of(study, place)
 
 
 def _of_scene(study: Study, place: paths.Place, labels: Labels) -> tuple[OfScene, ...]:
-    """The scene of a job if the study itself holds its file of a kind."""
+    """Scene of a job as a tuple; empty if the study does not make its file of kind ``place``."""
     return (OfScene(scene=labels["scene"]),) if _holds(study, place, labels) else ()
 
 
 def _joint_rows(study: Study, labels: Labels) -> tuple[JointRows, ...]:
-    """Joint rows of the reduced groups of a scene, as far as the study samples them."""
+    """Reduced groups of a scene with the method `JOINT`; empty if the study lacks either."""
     scene = labels["scene"]
     if JOINT not in study.methods or scene not in study.scenes:
         return ()
@@ -79,7 +79,7 @@ def _joint_rows(study: Study, labels: Labels) -> tuple[JointRows, ...]:
 
 
 def _subspace_cases(study: Study, labels: Labels) -> tuple[SubspaceCase, ...]:
-    """Cases whose models the study holds."""
+    """Configured cases of frame times whose models in position subspaces the study makes."""
     held = {labels["scene"] for labels in labels_of(study, paths.SUBSPACES)}
     models = study.settings.subspace
     return tuple(
@@ -90,7 +90,7 @@ def _subspace_cases(study: Study, labels: Labels) -> tuple[SubspaceCase, ...]:
 
 
 def _projection_cases(study: Study, labels: Labels) -> tuple[ProjectionCase, ...]:
-    """Cases whose samplings the study holds."""
+    """Configured cases of frame times whose samples the study computes."""
     held = labels_of(study, paths.SAMPLING)
     return tuple(
         case
@@ -100,9 +100,9 @@ def _projection_cases(study: Study, labels: Labels) -> tuple[ProjectionCase, ...
 
 
 def scaled_methods(study: Study, labels: Labels) -> dict[str, MethodSpec]:
-    """Methods that ``study`` times on growing meshes, the same for all ``labels``.
+    """Methods timed on meshes of increasing size, by name; ``labels`` are not used.
 
-    They need not be among its own.
+    These methods may be outside of the study's own methods.
     """
     section = study.settings.scaling
     found = study.named_methods([section.method], "scaling.method")
@@ -110,7 +110,7 @@ def scaled_methods(study: Study, labels: Labels) -> dict[str, MethodSpec]:
 
 
 def _repeated(study: Study, labels: Labels) -> tuple[Repeated, ...]:
-    """The cells of a scene, a method after the other; the methods need not be among the study's."""
+    """Repetitions of a scene, one per cell and method; methods may be outside the study."""
     cells = [c for c in study.settings.repetitions.cells if labels["scene"] in c.scenes]
     return tuple(
         Repeated(method=name, spec=spec, sizes=cell.sizes, varied=cell.varied)
@@ -120,20 +120,20 @@ def _repeated(study: Study, labels: Labels) -> tuple[Repeated, ...]:
 
 
 class Run(Experiment):
-    """An experiment with a method."""
+    """A reduced group of a scene together with one reduction method."""
 
     method: str
 
     @property
     def labels(self) -> dict[str, str]:
-        """Labels of its files."""
+        """Labels of the files of this group and method."""
         return {**super().labels, "method": self.method}
 
 
 def _options(study: Study, labels: Labels) -> Options:
-    """Options of a figure with the scenes that the study holds.
+    """Options of a figure, with scenes outside the study removed.
 
-    A list of scenes or methods of which it holds none becomes empty, which means all.
+    A list of scenes or methods without any of the study becomes empty, which means all.
     """
     chosen = study.figures[labels["figure"]]
     update: dict[str, tuple[str, ...]] = {}
@@ -145,7 +145,7 @@ def _options(study: Study, labels: Labels) -> Options:
 
 
 def _experiments(study: Study, labels: Labels) -> tuple[Experiment, ...]:
-    """Reduced groups that a figure's options choose, in the order asked for."""
+    """Reduced groups that a figure's options choose, in the configured order."""
     chosen = _options(study, labels)
     found = []
     for scene in chosen.names("scenes") or tuple(study.scenes):
@@ -165,14 +165,14 @@ def _experiments(study: Study, labels: Labels) -> tuple[Experiment, ...]:
 
 
 def _reductions(study: Study, labels: Labels) -> dict[str, Reduction]:
-    """Methods that a figure's options choose, by name, in the order asked for."""
+    """Methods that a figure's options choose, by name, in the configured order."""
     named = _options(study, labels).names("methods") or tuple(study.methods)
     held = {name: study.methods[name] for name in named if name in study.methods}
     return {name: Reduction(title=spec.title, rows=spec.rows) for name, spec in held.items()}
 
 
 def _runs(study: Study, labels: Labels) -> tuple[Run, ...]:
-    """Every experiment of a figure with every method of it."""
+    """All combinations of a figure's reduced groups and methods."""
     methods = _reductions(study, labels)
     return tuple(
         Run(**experiment.model_dump(), method=method)
@@ -182,7 +182,7 @@ def _runs(study: Study, labels: Labels) -> tuple[Run, ...]:
 
 
 def _drawn_subspaces(study: Study, labels: Labels) -> tuple[Experiment, ...]:
-    """Experiments of a figure in scenes of which the study has models in position subspaces."""
+    """Reduced groups of a figure in scenes for which the study makes position-subspace models."""
     held = {found["scene"] for found in labels_of(study, paths.SUBSPACES)}
     return tuple(each for each in _experiments(study, labels) if each.scene in held)
 
@@ -228,7 +228,7 @@ DERIVED: dict[str, Callable[[Study, Labels], Any]] = {
     "runs": _runs,
     "first_run": lambda study, labels: _runs(study, labels)[:1],
     "drawn_subspaces": _drawn_subspaces,
-    # names of all constraint groups
+    # names of all kinds of constraint groups
     "groups": lambda study, labels: [
         name for name in EFFECTS if EFFECTS[name].startswith(constraints.__name__)
     ],

@@ -1,1 +1,1 @@
-"""``./reproduce verify``: whether the results of the last run are the expected ones."""
+"""``./reproduce verify``: comparison of the last run's results with the expected results."""

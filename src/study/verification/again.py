@@ -1,7 +1,7 @@
-"""Results made again from the files at hand: tables, figures, inputs of the manuscript, manuscript.
+"""Derived results made again from the existing files: tables, figures, manuscript and its inputs.
 
-A file that was replaced together with its checksum and its entry in the manifest is not what its
-inputs give. The results of experiments take too long for that: of them only checksums are compared.
+A file that was replaced together with its checksum and its manifest entry differs from the file
+made again. Results of experiments take too long to repeat; only their checksums are compared.
 """
 
 import filecmp
@@ -16,21 +16,21 @@ from study.artifact.reads import Every
 from study.pipeline.resolve import Job
 from study.tables import declared
 
-# Errors that a job may raise when its tables were edited.
+# Errors that a job may raise if its input tables were edited.
 FAULTS = (PdromError, ArithmeticError, LookupError, TypeError, ValueError)
 
 
 @contextmanager
 def made(job: Job) -> Iterator[dict[str, Path]]:
-    """Files that a job makes now, by the path that each has in the study.
+    """Run a job into a temporary folder; yield the new files by the paths of the study's files.
 
     Raises
     ------
     StorageError
-        It cannot be made from the files at hand.
+        The job fails on the existing input files.
     """
     parents = [os.path.dirname(path) or os.curdir for path in job.outputs.values()]
-    root = os.path.commonpath(parents)  # two pages may have one name in different folders
+    root = os.path.commonpath(parents)  # two pages may have the same name in different folders
     with TemporaryDirectory(prefix="pdrom-again-") as folder:
         inside = {name: os.path.relpath(path, root) for name, path in job.outputs.items()}
         outputs = {name: os.path.join(folder, path) for name, path in inside.items()}
@@ -44,7 +44,7 @@ def made(job: Job) -> Iterator[dict[str, Path]]:
 
 
 def differing(job: Job) -> list[str]:
-    """Outputs of a job that are not what its inputs give; all of them if these give none."""
+    """Paths of a job's outputs that differ from outputs made again; all if the job fails."""
     try:
         with made(job) as files:
             return [old for old, new in files.items() if not filecmp.cmp(old, new, shallow=False)]
@@ -53,6 +53,6 @@ def differing(job: Job) -> list[str]:
 
 
 def is_derived(name: str) -> bool:
-    """Whether the table ``name`` is made from other tables alone."""
+    """Return whether the table ``name`` reads other tables only, no files of experiments."""
     reads = declared()[name].reads.values()
     return not any(isinstance(read, Every) for read in reads)

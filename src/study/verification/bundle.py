@@ -26,7 +26,7 @@ NAME = f"pdrom-{__version__}"
 
 
 def bundle(arguments: Sequence[str]) -> Status:
-    """Write the archive of a finished study; say what is missing or damaged of another one."""
+    """Write the archive of a finished study; otherwise print its missing or damaged files."""
     chosen = parser().parse_args(arguments)
     subject = Subject.of(chosen.configfile, chosen.config)
     status = verify_files(subject)
@@ -34,7 +34,7 @@ def bundle(arguments: Sequence[str]) -> Status:
         return status
     folder = Path(subject.results)
     names = [*read_manifest(subject.results).files, paths.MANIFEST.pattern]
-    small = {n: folder / n for n in names if not n.endswith(".h5")}  # a run makes the others again
+    small = {n: folder / n for n in names if not n.endswith(".h5")}  # a run can remake HDF5 files
     results = {os.path.normpath(f"published/results/{name}"): p for name, p in small.items()}
     target = folder / f"{NAME}.tar.gz"
     write_archive(Path(), results, target)
@@ -43,12 +43,12 @@ def bundle(arguments: Sequence[str]) -> Status:
 
 
 def write_archive(root: Path, results: Mapping[str, Path], target: Path) -> None:
-    """Write the commit of ``root`` and ``results`` by their names to a gzipped tar archive.
+    """Write a gzipped tar archive of the last commit of ``root`` and of ``results``, by name.
 
     Raises
     ------
     ConfigurationError
-        There is no git or no clone, or what git tracks is not as in the last commit.
+        Git is missing, ``root`` is no git clone, or tracked files differ from the last commit.
     """
     date = int(os.environ.get("SOURCE_DATE_EPOCH", "0"))
     if changed := _git(root, "status", "--porcelain", "--untracked-files=no").decode():
@@ -66,7 +66,7 @@ def write_archive(root: Path, results: Mapping[str, Path], target: Path) -> None
 
 
 def parser() -> argparse.ArgumentParser:
-    """Parser of the arguments after the word ``bundle``."""
+    """Return the parser of the arguments after the word ``bundle``."""
     made = argparse.ArgumentParser(prog="./reproduce bundle", description=__doc__)
     made.add_argument("--configfile", nargs="+", default=[], metavar="FILE")
     made.add_argument("--config", nargs="+", default=[], metavar="KEY=VALUE")

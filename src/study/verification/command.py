@@ -1,4 +1,4 @@
-"""Command line of ``./reproduce verify``."""
+"""Command ``./reproduce verify``: arguments, comparison, update of the expected tables."""
 
 import argparse
 import subprocess
@@ -24,14 +24,14 @@ NOTHING = "Nothing to be done"
 
 
 def update(subject: Subject, reason: str) -> Path:
-    """Write the expected tables of ``subject`` again, for a ``reason``; the folder that holds them.
+    """Replace the expected tables of ``subject``, for a ``reason``; return the folder with them.
 
     Raises
     ------
     ConfigurationError
-        No reason is given.
+        The reason is empty.
     StorageError
-        A table is missing, damaged, or older than what it is made from: nothing is written.
+        A table is missing, damaged, or older than its inputs: nothing is written.
     """
     words = " ".join(reason.split())
     if not words:
@@ -58,7 +58,7 @@ def update(subject: Subject, reason: str) -> Path:
         write_reference(table, frame, folder)
     for old in [*folder.glob("*.csv"), *folder.glob("*.csv.xz")]:
         if old.name.partition(".")[0] not in declared():
-            old.unlink()  # a table that no longer exists
+            old.unlink()  # reference of a table that no longer exists
     here = machine()
     note(folder, words, datetime.now(UTC).date(), f"{here.pdrom} ({here.commit})")
     return folder
@@ -69,7 +69,7 @@ PAGE = "verification.md"
 
 
 def parser() -> argparse.ArgumentParser:
-    """Parser of the arguments after the word ``verify``."""
+    """Return the parser of the arguments after the word ``verify``."""
     made = argparse.ArgumentParser(
         prog="./reproduce verify",
         description="Whether the results of the last run are the expected ones.",
@@ -89,12 +89,12 @@ def parser() -> argparse.ArgumentParser:
 
 
 def verify(arguments: Sequence[str]) -> Status:
-    """Do what the ``arguments`` of the command line ask.
+    """Run the command with the ``arguments`` of the command line; return its exit code.
 
     Raises
     ------
     ConfigurationError
-        The configuration is faulty, or nothing is expected of it.
+        The configuration is faulty, or it has no expected tables.
     StorageError
         A file cannot be read or written; --update is refused.
     """
@@ -109,12 +109,12 @@ def verify(arguments: Sequence[str]) -> Status:
 
 
 def verify_tables(subject: Subject) -> Status:
-    """Compare the tables of ``subject`` with the expected ones, write the page of it.
+    """Compare the tables of ``subject`` with the expected tables; print and write the outcomes.
 
     Raises
     ------
     ConfigurationError
-        Nothing is expected of the configuration.
+        The configuration has no expected tables.
     """
     folder = folder_of(subject.results)
     if not folder.is_dir():

@@ -1,6 +1,6 @@
-"""A table against the expected one: which rows belong together, how far each cell may be off.
+"""Comparison of a table with the expected table: pairs of rows, and distances of their cells.
 
-Rounding decides about some rows, by what the expected tables say: chaotic, ill-conditioned.
+Rounding errors decide some rows, such as chaotic or ill-conditioned runs (`Context`).
 """
 
 from collections import Counter
@@ -16,47 +16,47 @@ from study.tables import declared
 from study.tables.kit.declaration import Column, Quantity, Table
 from study.tables.kit.reruns import trained
 
-# Not compared with a reference.
+# Kinds of columns that are not compared with a reference.
 NOT_COMPARED: tuple[Quantity, ...] = ("timed", "skipped")
-# Differences below it count for nothing: rounding errors of sums.
+# Differences up to this size count as rounding errors of sums.
 FLOOR = 1e-12
-# How far a number of samples from a fit, and the numbers of a wrong run, may be off, relative.
+# Relative tolerances of sample numbers that a fit determines, and of the numbers of wrong runs.
 FITTED, OF_WRONG_RUNS = 0.25, 0.3
-# In the names of methods whose number of elements follows from a fit with non-negative weights.
+# Part of the names of methods whose elements are chosen by a non-negative least-squares fit.
 FITTING = "ecsw"
-# Errors of runs on samples with a larger amplification, and errors of approximations and the
-# amplification itself above the second one, have few digits or none on other kernels.
+# Limits of the amplification (gain) of samples. Above the first, errors of reruns have few or no
+# digits in common on different kernels; above the second, also approximation errors and the gain.
 OF_RUNS, DIRECT = 1e2, 1e5
 RUNS, SPECTRA, RECONSTRUCTION = "reduced_reruns", "singular_values", "reconstruction_error"
-# A run with a larger error is wrong, as everywhere in the study.
+# Relative error above which a run is wrong, as everywhere in the study.
 WRONG = 0.1
-# The error that says so, the first that a table has.
+# Columns with the error of a run; the first one that a table has decides if the run is wrong.
 OF_RUN = ("relative_error_within_horizon", "relative_error")
-# Columns that identify the samples of a reduction, and a run.
+# Columns that identify the samples of a reduction; below, columns that identify a run.
 SAMPLES = ("scene", "group", "method", "r")
 RUN = (*SAMPLES, "position_basis", "k")
 
 
 def kept(table: Table) -> dict[str, Column]:
-    """Columns of a ``table`` that are kept in its reference and compared, by name."""
+    """Columns of ``table`` that are stored in its reference and compared, by name."""
     return {c.name: c for c in table.columns if c.quantity not in NOT_COMPARED}
 
 
 def names_row(column: Column) -> bool:
-    """Whether a column says which row it is: a name, a parameter, a size."""
+    """Return whether a column identifies rows: a name, a parameter or a size."""
     return column.quantity == "exact" and not column.timed
 
 
 def names(frame: pd.DataFrame, columns: Sequence[str] = SAMPLES) -> list[tuple]:
-    """Cells in ``columns`` of each row of ``frame`` that name its samples, or its run."""
+    """Cells in ``columns`` of each row of ``frame``, as tuples of text that identify the row."""
     return list(frame[list(columns)].astype(str).itertuples(index=False, name=None))
 
 
 def pairs(table: Table, expected: pd.DataFrame, found: pd.DataFrame) -> list[tuple[int, int]]:
-    """(row of ``expected``, row of ``found``) of all rows of ``table`` that belong together.
+    """Pairs (row of ``expected``, row of ``found``) of matching rows of ``table``, sorted.
 
-    Rows with the same names and numbers of samples belong together; of those that are left, rows
-    with the same names, in their order: a number of samples may differ where a fit leaves it.
+    Rows match first by all identifying columns and integer values such as numbers of samples. The
+    other rows match, in order, by identifying columns only: a fit may change a number of samples.
     """
     named = [c.name for c in table.columns if names_row(c)]
     counts = [c.name for c in table.columns if c.quantity == "value" and c.kind == "integer"]
@@ -74,7 +74,7 @@ def pairs(table: Table, expected: pd.DataFrame, found: pd.DataFrame) -> list[tup
 
 
 def _places(frame: pd.DataFrame, columns: Sequence[str], rows: list[int]) -> dict[tuple, int]:
-    """Each of some rows by its cells and how many rows before it have the same."""
+    """Map the cells of each row, and the count of equal rows before it, to the row's number."""
     seen, places = Counter[tuple](), {}
     cells = [[_key(cell) for cell in frame[name].iloc[rows]] for name in columns]
     for row, key in zip(rows, zip(*cells, strict=True), strict=True):
@@ -84,7 +84,7 @@ def _places(frame: pd.DataFrame, columns: Sequence[str], rows: list[int]) -> dic
 
 
 def _key(cell: object) -> object:
-    """A cell without the digits that references do not have; one word for what is missing."""
+    """Cell rounded to fewer digits than references have; empty text for a missing value."""
     if cell is None or cell is pd.NA or cell != cell:
         return ""
     return f"{cell:.6g}" if isinstance(cell, float) else cell
@@ -92,13 +92,13 @@ def _key(cell: object) -> object:
 
 @dataclass(frozen=True)
 class Context:
-    """Context of rows: facts from other expected tables.
+    """Facts from other expected tables that show which rows rounding errors decide.
 
     chaotic : scenes with frames beyond their horizon, where rounding errors decide
     modes : number of modes above round-off by scene and group
-    gains : amplification by `SAMPLES`
-    ended : `RUN` of runs without an error, of the expected and of the found runs; some tables list
-        the others only
+    gains : amplification of the samples by the columns `SAMPLES`
+    ended : runs without an error, by the columns `RUN`, in the expected and in the found table of
+        runs; some tables list only runs that have an error
     """
 
     chaotic: frozenset[str] = frozenset()
@@ -108,7 +108,7 @@ class Context:
 
     @classmethod
     def of(cls, tables: Mapping[str, pd.DataFrame], found: pd.DataFrame | None = None) -> "Context":
-        """Context from tables by their names, and the table of the runs that was found."""
+        """Context from expected ``tables`` by name, and from the found table of runs."""
         runs, spectra, errors = (
             tables[name] if name in tables else declared()[name].checked(pd.DataFrame())
             for name in (RUNS, SPECTRA, RECONSTRUCTION)
@@ -128,9 +128,9 @@ class Context:
 
 @dataclass
 class Comparison:
-    """Rows of two tables side by side.
+    """Comparison of an expected and a found table, cell by cell.
 
-    e, f : rows of the expected and of the found table that belong together
+    e, f : matching rows of the expected and of the found table, in equal order
     """
 
     table: Table
@@ -143,22 +143,22 @@ class Comparison:
         self.e = self.expected.iloc[[i for i, _ in self.pairs]].reset_index(drop=True)
         self.f = self.found.iloc[[j for _, j in self.pairs]].reset_index(drop=True)
         self._loose: dict[str, dict[str, np.ndarray]] = {}
-        self._timed: Sequence = [()] * len(self.e)  # columns of each row, where these differ
+        self._timed: Sequence = [()] * len(self.e)  # names of timed columns, for each row
         if self.table.timed_cells is not None:
             reads = self.table.reads.items()
             files = {name: Path(r.path) for name, r in reads if isinstance(r, ProjectFile)}
             self._timed = self.table.timed_cells(self.e, **files)
 
     def compared(self, column: Column) -> np.ndarray:
-        """Cells of a column that are compared: those that do not depend on timing."""
+        """Boolean array (rows): True where the column's cell does not depend on timing."""
         return np.array([column.name not in names for names in self._timed], dtype=bool)
 
     def firm(self, column: Column) -> np.ndarray:
-        """Cells of a column that rounding does not decide about."""
+        """Boolean array (rows): True where rounding errors do not decide the column's cell."""
         return ~np.any([np.zeros(len(self.e)), *self.loose(column).values()], axis=0)
 
     def loose(self, column: Column) -> dict[str, np.ndarray]:
-        """Cells of a column that rounding decides about, by the reason."""
+        """Boolean arrays (rows) by reason: True where rounding errors decide the column's cell."""
         if column.name not in self._loose:
             self._loose[column.name] = {} if names_row(column) else self._of_rounding(column)
         return self._loose[column.name]
@@ -176,7 +176,7 @@ class Comparison:
         }
 
     def _of_round_off(self) -> np.ndarray:
-        """Every mode above round-off, or all but one (without the mean), or modes below it."""
+        """Boolean array of rows whose r includes, or nearly includes, all modes above round-off."""
         rows, modes = self.e, self.context.modes
         if "noisy_axes" in rows or not {"scene", "group", "r"} <= set(rows.columns):
             return np.full(len(rows), "noisy_axes" in rows)
@@ -184,7 +184,7 @@ class Comparison:
         return (rows.r >= np.array(most, dtype=float) - 1).fillna(False).to_numpy(dtype=bool)
 
     def _gains(self) -> np.ndarray:
-        """Largest amplification of each row; 0 where none is known."""
+        """Largest amplification (gain) of each row; 0 if unknown."""
         found = [np.zeros(len(self.e))]
         for column in self.table.columns:
             if column.name.startswith("gain") and column.quantity == "value":
@@ -194,10 +194,9 @@ class Comparison:
         return np.fmax.reduce(found)
 
     def wrong(self, column: Column) -> np.ndarray:
-        """Cells of a ``column`` of wrong runs, in which small changes may have grown.
+        """Boolean array of cells of an error ``column`` in wrong runs, where changes grow.
 
-        The run is wrong, where the table says, and so is the cell, if it is an error, by its own
-        value.
+        A run is wrong if its error is above `WRONG`; the cell's own error must be above it, too.
         """
         judged = [name for name in OF_RUN if name in self.e][:1]
         judged += [column.name] if "error" in column.name else []
@@ -207,16 +206,16 @@ class Comparison:
         return (self.e[judged] > WRONG).all(axis=1).to_numpy(dtype=bool)
 
     def fitted(self) -> np.ndarray:
-        """Rows of reductions whose number of samples is the outcome of a fit.
+        """Boolean array of rows of reductions whose number of samples is the outcome of a fit.
 
-        A table that has its tolerance, ``tau``, and names no methods has no others.
+        Tables without the column ``method`` but with the fit's tolerance ``tau`` contain no others.
         """
         if "method" not in self.e:
             return np.full(len(self.e), "tau" in self.e)
         return self.e.method.astype(str).str.contains(FITTING).to_numpy(dtype=bool)
 
     def limits(self, column: Column) -> np.ndarray:
-        """Tolerance of each cell of a column."""
+        """Tolerance of each cell of a column, array (rows)."""
         limit = np.full(len(self.e), column.within)
         if column.quantity == "value" and column.kind == "integer":
             limit[self.fitted()] = FITTED
@@ -224,15 +223,15 @@ class Comparison:
         return limit
 
     def beyond(self, column: Column, wider: float = 0.0) -> np.ndarray:
-        """Cells that are off by more than the tolerance of their column, or than a wider one."""
+        """Boolean array of compared cells that are off by more than tolerance and ``wider``."""
         limit = np.maximum(self.limits(column), wider)
         return (self.apart(column) > limit) & self.compared(column)
 
     def apart(self, column: Column) -> np.ndarray:
-        """Distance of each pair of cells of ``column``.
+        """Distance of each pair of cells of ``column``, array (rows).
 
-        The difference of shares, of other numbers that over the larger of the two; 0 if the cells
-        are equal, inf if only one has a value.
+        The distance of shares is their difference, of other numbers the difference over the larger
+        number. It is 0 for equal cells, inf for unequal texts or if one value is missing.
         """
         e, f = self.e[column.name], self.f[column.name]
         numbers = all(pd.api.types.is_numeric_dtype(cells) for cells in (e, f))
@@ -248,10 +247,10 @@ class Comparison:
         return np.where(same, 0.0, np.where(np.isnan(apart), np.inf, apart))
 
     def unpaired(self) -> tuple[pd.DataFrame, pd.DataFrame]:
-        """Rows of the expected and of the found table without a partner.
+        """Return the rows of the expected table, and of the found table, without a matching row.
 
-        A table that lists only the runs that have an error (`Table.only_with_error`) lacks those
-        that have none on the other side, where they have one on this side.
+        Some tables list only runs that have an error (`Table.only_with_error`). In these, a row is
+        not returned if its run has an error here but none in the other table.
         """
         alone = []
         for side, frame in enumerate((self.expected, self.found)):

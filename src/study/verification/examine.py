@@ -1,4 +1,4 @@
-"""Lines about claims, figures and tables of a results folder."""
+"""Outcomes of the comparison for the claims, figures and tables of a results folder."""
 
 from collections.abc import Mapping, Sequence
 from functools import cache, cached_property
@@ -22,17 +22,17 @@ from study.verification.subject import Subject
 
 RULES = Path("config/claims.yaml")
 CLAIMS = "claims"
-# Columns of the table of claims with a verdict: their tests in the rules, and words.
+# Verdict columns of the table of claims, with the name of their tests in the rules and a label.
 PARTS = {"verdict": ("published", "as published"), "verdict_beyond": ("beyond", "beyond")}
 GOOD = (Outcome.REPRODUCED, Outcome.NOT_COMPARABLE)
 
 
 class Examination:
-    """Examination of what is there, what is expected, and what differs.
+    """Comparison of existing and expected results of a subject; results are cached.
 
-    condition : of a file by its path, None if it is not there
-    read : table by its name, see `found`
-    again : table by its name, made again from those at hand, see `_again`
+    condition : function of a path: `Condition` of the file, None if it is missing
+    read : function of a table's name: table as read from its file, see `found`
+    again : function of a table's name: table made again from other tables, see `_again`
     """
 
     def __init__(self, subject: Subject) -> None:
@@ -41,7 +41,7 @@ class Examination:
         self.read, self.again = cache(self._read), cache(self._again)
 
     def lines(self) -> list[Line]:
-        """Lines of all claims, figures and tables, and of files among these that are none."""
+        """Lines of all claims, figures and tables, and of CSV files that are no declared table."""
         tables = {name: self.table(name) for name in declared()}
         figures = [self._figure(job, tables) for job in self.subject.plan.fixed["figures"]]
         folder = Path(TABLE.at(self.subject.results, name="any")).parent
@@ -53,12 +53,12 @@ class Examination:
         return [*self.claims(), *figures, *tables.values(), *strangers]
 
     def found(self, name: str) -> pd.DataFrame:
-        """Table ``name``, which is there and intact.
+        """Return table ``name`` with all declared columns.
 
         Raises
         ------
         StorageError
-            It cannot be read, or has other columns than those that are declared.
+            It is missing or damaged, or has columns that are not declared.
         """
         return declared()[name].checked(self.read(name))
 
@@ -73,14 +73,14 @@ class Examination:
 
     @cached_property
     def expected(self) -> dict[str, Reference]:
-        """Expected tables that there are, by name."""
+        """Existing references of tables, by name."""
         folder = folder_of(self.subject.results)
         read = {name: read_reference(table, folder) for name, table in declared().items()}
         return {name: reference for name, reference in read.items() if reference is not None}
 
     @cached_property
     def context(self) -> Context:
-        """Context of rows by the expected tables."""
+        """Context of the comparison, from the expected tables and the found table of runs."""
         tables = {name: reference.frame for name, reference in self.expected.items()}
         try:
             return Context.of(tables, self.found(RUNS))
@@ -88,9 +88,9 @@ class Examination:
             return Context.of(tables)
 
     def _again(self, name: str) -> pd.DataFrame | None:
-        """Table ``name``, made from other tables alone, made again from those at hand.
+        """Return the table ``name`` made again from existing tables, if it reads tables only.
 
-        None for other tables, and where one of those is not intact.
+        None for tables that read other files, or if an input is missing or damaged.
         """
         if not is_derived(name):
             return None
@@ -101,7 +101,7 @@ class Examination:
             return read_table(files[job.outputs["table"]])
 
     def table(self, name: str) -> Line:
-        """Line of the table ``name``."""
+        """Line with the outcome of the table ``name``."""
 
         def line(outcome: Outcome, text: str, *details: str) -> Line:
             return Line("table", name, outcome, text, details)
@@ -135,7 +135,7 @@ class Examination:
         return line(Outcome.REPRODUCED, str(judgement))
 
     def claims(self) -> list[Line]:
-        """Lines of the claims."""
+        """Lines with the outcomes of all claims."""
         line = self.table(CLAIMS)
         try:
             found = self.found(CLAIMS).set_index("claim")
@@ -180,7 +180,7 @@ class Examination:
 
 
 def _claim(name: str, expected: pd.DataFrame, found: pd.DataFrame, decided: pd.DataFrame) -> Line:
-    """Line of the claim ``name``, by tables of claims; ``decided`` is what those at hand give."""
+    """Outcome of claim ``name`` by tables of claims; ``decided`` is made from existing tables."""
     if name not in expected.index or name not in found.index:
         text = "the claim is new" if name in found.index else "the claim is gone"
         return Line("claim", name, Outcome.DIFFERS, text)
@@ -207,7 +207,7 @@ def _results(paths: Sequence[str]) -> list[str]:
 
 
 def _first_difference(found: pd.DataFrame, again: pd.DataFrame) -> str | None:
-    """The first cell of a table that is another one when it is made again; None if none is."""
+    """Text about the first difference between ``found`` and ``again``; None if they are equal."""
     if list(found.columns) != list(again.columns) or len(found) != len(again):
         return f"which have {len(again)} rows of {len(again.columns)} columns"
     other = (found != again) & ~(found.isna() & again.isna())

@@ -1,7 +1,7 @@
-"""``./reproduce verify --files``: whether every file is the one that the last run left.
+"""``./reproduce verify --files``: check that every file is unchanged since the last run.
 
-The plan says which files there must be, the manifest which bytes they have; what takes seconds is
-made again from the others and compared (`study.verification.again`).
+The plan lists the files that must exist, the manifest has their checksums. Results that are made in
+seconds are made again from their inputs and compared (`study.verification.again`).
 """
 
 import os
@@ -22,12 +22,12 @@ LOST = "not there"
 OTHER = "not what its inputs give"
 FOREIGN = "no file of this study"
 UNLISTED = "not in the manifest"
-# Faults that have a line of their own.
+# Largest number of faults that are printed one by one.
 SHOWN = 20
 
 
 def verify_files(subject: Subject) -> Status:
-    """Compare the files of ``subject`` with its manifest; say what makes a bad one again."""
+    """Compare the files of ``subject`` with its manifest; print faults and remedies."""
     place = Path(MANIFEST.at(subject.results))
     hint = f"a run that succeeds writes it: {subject.command()}"
     if not place.is_file():
@@ -62,7 +62,7 @@ def verify_files(subject: Subject) -> Status:
 
 
 def _fault(path: str, entry: Entry | None, ours: bool) -> str:
-    """Fault of a file and its entry in the manifest; empty if there is none."""
+    """Fault of the file at ``path`` in words; empty if the file agrees with its entry."""
     if not ours:
         return FOREIGN
     if not Path(path).is_file():

@@ -1,4 +1,4 @@
-"""Whether a compared table holds: what differs, where, and by how much."""
+"""Judgement of a compared table: all differences, with their places and sizes."""
 
 from collections import Counter
 from collections.abc import Iterator
@@ -10,27 +10,27 @@ import pandas as pd
 from study.tables.kit.declaration import Column, Table
 from study.verification.compare import SAMPLES, Comparison, kept, names, names_row
 
-# Columns of a row that say which one it is.
+# Largest number of cells that describe a row in a message.
 NAMED = 6
-# So many cells of a column are far closer than the tolerance of one: nine of ten errors, half of
-# less than `TEN` and of other quantities, from `LEAST` cells on. Closer means this distance, or
-# that part of the tolerance which a column has of its own. Fewer cells are each closer than `LONE`,
-# where the column has no tolerance of its own.
+# A column of at least `LEAST` numbers must also agree far more closely than the tolerance of one
+# cell: nine of ten cells if it has at least `TEN` errors, else half of its cells, are closer than
+# `CLOSE`, or than 1/`OWN` of the column's own tolerance. In a shorter column without own tolerance
+# all cells are closer than `LONE`.
 MOST, HALF, TEN, LEAST = 0.9, 0.5, 10, 3
 CLOSE, OWN, LONE = 1e-5, 50, 0.01
-# Of cells that rounding decides about, a tenth may have another outcome or another order of
-# magnitude, and half may be off by more than a factor of two; and by what they are counted.
+# Limits for cells that rounding decides: (share of runs that may be off, distance that counts as
+# off, columns by which runs are grouped). A tenth may be off by a factor 10, half by a factor 2.
 LOOSE = ((0.1, 1 - 1 / 10, ("scene", "noisy_axes", "method")), (0.5, 1 - 1 / 2, ("scene",)))
-# Cells of a column with a share of its own that may differ in any case.
+# Least number of differing cells that a text or flag column with a tolerance may have.
 FEW = 3
 
 
 @dataclass(frozen=True)
 class Difference:
-    """Something that is not as expected.
+    """A difference between the expected and the found table.
 
     where : row and column in words
-    size : larger is worse; inf where there is no measure
+    size : distance of the cells, larger is worse; inf for a difference without a measure
     """
 
     where: str
@@ -48,11 +48,11 @@ class Difference:
 
 @dataclass(frozen=True)
 class Judgement:
-    """Judgement of a table.
+    """Outcome of the comparison of a table.
 
-    differences : worst first
-    compared : cells that were compared
-    loose : cells that were compared by count, by the reason
+    differences : all differences, largest first
+    compared : number of compared cells
+    loose : number of cells that rounding decides, by the reason; these are compared by counts
     """
 
     differences: tuple[Difference, ...]
@@ -67,7 +67,7 @@ class Judgement:
 
 
 def judge(comparison: Comparison) -> Judgement:
-    """Judgement on the table of a ``comparison``."""
+    """Return the judgement of a ``comparison``: differences of its rows and of all columns."""
     found = [*_rows(comparison)]
     compared, loose = 0, Counter[str]()
     for column in kept(comparison.table).values():
@@ -111,7 +111,7 @@ def _cells(comparison: Comparison, column: Column) -> Iterator[Difference]:
 
 
 def _shifted(comparison: Comparison, column: Column, firm: np.ndarray) -> Iterator[Difference]:
-    """A small shift of all cells is noticed although one may be off by more."""
+    """Yield a difference if most cells of a column are off by little, as by a small shift."""
     there = (comparison.e[column.name].fillna(0) != 0).to_numpy(dtype=bool)
     cells = firm & there & comparison.compared(column)
     own, count = column.tolerance, cells.sum()
@@ -128,9 +128,9 @@ def _shifted(comparison: Comparison, column: Column, firm: np.ndarray) -> Iterat
 
 
 def _loose(comparison: Comparison, column: Column, cells: np.ndarray) -> Iterator[Difference]:
-    """Cells that rounding decides about: most have the same outcome, and the same magnitude.
+    """Yield differences where too many runs have cells off, among cells that rounding decides.
 
-    A number that is there on one side only is another outcome. Cells of one run count once.
+    A value that is missing in one table counts as off. Cells of the same run count once.
     """
     rows = comparison.e[cells]
     run = [*SAMPLES, *({"seed"} & set(rows.columns))]
@@ -152,14 +152,14 @@ def _loose(comparison: Comparison, column: Column, cells: np.ndarray) -> Iterato
 
 
 def in_words(value: object) -> str:
-    """Cell ``value`` as it stands in a message."""
+    """Cell ``value`` as text for a message."""
     if pd.isna(value):
         return "nothing"
     return f"{value:.6g}" if isinstance(value, float) else str(value)[:60]
 
 
 def _row_in_words(table: Table, frame: pd.DataFrame, row: int) -> str:
-    """Name of a ``row`` of ``frame``, a ``table``: its words and sizes."""
+    """Text that identifies a ``row`` of ``frame``: its names, sizes and values, at most `NAMED`."""
     columns = [c.name for c in table.columns if names_row(c) or c.quantity == "value"]
     cells = [(name, frame[name].iloc[row]) for name in columns]
     named = [f"{name} {in_words(value)}" for name, value in cells if not pd.isna(value)]

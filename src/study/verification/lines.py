@@ -1,4 +1,4 @@
-"""One line for each claim, figure and table, and the page that holds them all."""
+"""Line with the outcome of one claim, figure or table, and the page that lists all lines."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -6,12 +6,12 @@ from enum import StrEnum
 
 from study.verification.status import Status
 
-# Differences of one line that the page names.
+# Largest number of differences per line that the page lists.
 ON_PAGE = 20
 
 
 class Outcome(StrEnum):
-    """Outcome of one comparison."""
+    """Outcome of the comparison of one claim, figure or table."""
 
     REPRODUCED = "reproduced"
     DIFFERS = "differs"
@@ -28,8 +28,8 @@ class Line:
     """Outcome of one claim, figure or table.
 
     kind : claim, figure or table
-    text : by how much, where, or why
-    details : everything that differs, worst first
+    text : size and place of the largest difference, or a reason
+    details : all differences as text, largest first
     """
 
     kind: str
@@ -43,7 +43,7 @@ class Line:
 
 
 def status_of(lines: Iterable[Line]) -> Status:
-    """Exit code of ``lines``: something is missing, else something differs, else all holds."""
+    """Exit code of ``lines``: a missing result before a difference, else success."""
     outcomes = {line.outcome for line in lines}
     if Outcome.MISSING in outcomes:
         return Status.MISSING
@@ -51,7 +51,7 @@ def status_of(lines: Iterable[Line]) -> Status:
 
 
 def counted(lines: Sequence[Line]) -> str:
-    """Counts of ``lines`` by kind and outcome."""
+    """Numbers of ``lines`` by kind and outcome, as text."""
     parts = []
     for kind in dict.fromkeys(line.kind for line in lines):
         own = [line.outcome for line in lines if line.kind == kind]
@@ -61,11 +61,11 @@ def counted(lines: Sequence[Line]) -> str:
 
 
 def page(lines: Sequence[Line], about: Sequence[str]) -> str:
-    """Markdown of all lines.
+    """Return the Markdown page of all ``lines``.
 
     Parameters
     ----------
-    about : sentences about what was compared with what
+    about : sentences on top of the page that say what was compared
     """
     parts = ["# Verification", "", *about, "", counted(lines) + ".", ""]
     for kind in dict.fromkeys(line.kind for line in lines):

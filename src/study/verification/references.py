@@ -1,8 +1,8 @@
-"""Expected tables, kept in git below ``results/reference``, in a compact form.
+"""Expected tables in a compact form, stored in git below ``results/reference``.
 
-Columns that are never compared are left out, numbers have the digits that are compared. A table is
-a CSV file, so that a change of it reads well; a large one is packed (``.csv.xz``), so that all of
-them together stay small.
+Columns that are never compared are left out, and numbers are rounded to the compared digits. A
+table is a CSV file, so that its changes are readable; a large table is compressed (``.csv.xz``), so
+that the total size remains small.
 """
 
 import io
@@ -19,7 +19,7 @@ from study.pipeline.tracked import write_tracked
 from study.tables.kit.declaration import Table
 from study.verification.compare import kept
 
-# Digits of numbers; tolerances are a hundred times what these digits leave out, or more.
+# Stored digits of numbers; tolerances are at least a hundred times the rounding error.
 DIGITS = 9
 PACKED_FROM = 50_000
 LOG = "changes.md"
@@ -32,20 +32,20 @@ Written by `./reproduce verify --update --reason "..."`, newest last.
 
 @dataclass(frozen=True)
 class Reference:
-    """An expected table: ``frame`` has all declared columns, ``columns`` names those it holds."""
+    """An expected table: ``frame`` has all declared columns, ``columns`` the stored ones."""
 
     frame: pd.DataFrame
     columns: tuple[str, ...]
 
 
 def folder_of(results: str) -> Path:
-    """Folder of the expected tables of a folder of ``results``."""
+    """Folder of the expected tables that belong to a folder of ``results``."""
     root = Path(RESULTS)
     return root / "reference" / Path(results).relative_to(root) / "tables"
 
 
 def compact(table: Table, frame: pd.DataFrame) -> pd.DataFrame:
-    """Return the part of ``frame``, a ``table``, that is kept."""
+    """Return the columns of ``frame`` that a reference of ``table`` stores, numbers rounded."""
     columns = {name: frame[name] for name in kept(table)}
     for name, column in kept(table).items():
         if column.kind == "number":
@@ -55,7 +55,7 @@ def compact(table: Table, frame: pd.DataFrame) -> pd.DataFrame:
 
 
 def write_reference(table: Table, frame: pd.DataFrame, folder: Path) -> None:
-    """Write the expected form of ``frame``, a ``table``, into ``folder``, packed if it is large."""
+    """Write the reference of ``table``, from its content ``frame``, into ``folder``."""
     plain = compact(table, frame).to_csv(
         index=False, float_format=f"%.{DIGITS}g", lineterminator="\n"
     )
@@ -68,12 +68,12 @@ def write_reference(table: Table, frame: pd.DataFrame, folder: Path) -> None:
 
 
 def read_reference(table: Table, folder: Path) -> Reference | None:
-    """Expected form of a ``table`` in ``folder``; None if there is none.
+    """Return the reference of ``table`` in ``folder``; None if there is none.
 
     Raises
     ------
     StorageError
-        If it cannot be read.
+        The file cannot be read.
     """
     plain, packed = _paths(table.name, folder)
     path = plain if plain.is_file() else packed
@@ -90,7 +90,7 @@ def read_reference(table: Table, folder: Path) -> Reference | None:
 
 
 def note(folder: Path, reason: str, day: date, code: str) -> None:
-    """Add ``day``, hash of the ``code`` and ``reason`` to the log of changes in ``folder``."""
+    """Add the date ``day``, the ``code`` version and the ``reason`` to the log in ``folder``."""
     path = folder / LOG
     text = path.read_text(encoding="utf-8") if path.is_file() else HEAD
     write_tracked(path, f"{text}- {day:%Y-%m-%d}, code {code}: {reason}\n".encode())

@@ -1,4 +1,4 @@
-"""Exit codes of the commands of this package."""
+"""Exit codes of the commands ``verify`` and ``bundle``, and their output."""
 
 import sys
 from collections.abc import Callable
@@ -8,7 +8,7 @@ from pdrom.core.errors import INTERRUPTED, PdromError
 
 
 class Status(IntEnum):
-    """End of a command; argparse ends with 2 for a command that it does not understand."""
+    """Exit code of a command; code 2 is argparse's code for an unknown option."""
 
     HOLDS = 0
     FAULTY = 1
@@ -17,7 +17,7 @@ class Status(IntEnum):
 
 
 def ended(command: Callable[[], int]) -> int:
-    """Exit code of ``command``; faulty input and an interruption are one line."""
+    """Run ``command`` and return its exit code; report errors and interruption in one line."""
     try:
         return command()
     except (PdromError, OSError) as error:
@@ -29,5 +29,5 @@ def ended(command: Callable[[], int]) -> int:
 
 
 def say(line: str) -> None:
-    """Print a ``line``."""
+    """Print ``line`` to standard output."""
     sys.stdout.write(f"{line}\n")

@@ -1,4 +1,4 @@
-"""Subject of verification: the results of one configuration, that of the last run by default."""
+"""Subject of a verification: the results of one configuration, by default of the last run."""
 
 import shlex
 from collections.abc import Sequence
@@ -13,9 +13,9 @@ from study.pipeline.plan import Plan, load_plan
 
 @dataclass(frozen=True)
 class Subject:
-    """Results of a configuration.
+    """Results of a configuration, and the commands that make them.
 
-    options : those of the command line that name the configuration
+    options : command-line options that name the configuration
     """
 
     options: tuple[str, ...]
@@ -23,12 +23,12 @@ class Subject:
 
     @classmethod
     def of(cls, configfiles: Sequence[str], settings: Sequence[str]) -> "Subject":
-        """Subject of the files ``configfiles`` with ``settings``, else of those of the last run.
+        """Subject of the configuration given by files and settings, else that of the last run.
 
         Raises
         ------
         ConfigurationError
-            A configuration file is missing or no mapping.
+            A configuration file is missing or is not a mapping.
         """
         files = ["--configfile", *configfiles] if configfiles else []
         options = [*files, *(["--config", *settings] if settings else [])] or recall()
@@ -38,17 +38,17 @@ class Subject:
 
     @property
     def results(self) -> str:
-        """Folder of the results."""
+        """Path of the results folder."""
         return self.folders.results
 
     def command(self, *targets: str) -> str:
-        """Command that makes some targets of this configuration, or all of it."""
+        """Command that makes the ``targets`` of this configuration; all files without targets."""
         ends = ["--", *targets] if targets and self.options else targets
         return shlex.join(["./reproduce", *self.options, *ends])
 
     @cached_property
     def plan(self) -> Plan:
-        """Plan of the configuration, as Snakemake merges it."""
+        """Plan of the configuration, merged from its files and settings as by Snakemake."""
         command = CommandLine.parse(self.options)
         whole = merged(Path(DEFAULT), command.configfiles, command.settings)
         return load_plan(whole, Path(), command.configfiles, folders=self.folders, quiet=True)

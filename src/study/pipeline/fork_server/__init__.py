@@ -1,4 +1,4 @@
-"""Jobs that start from a process in which the libraries are loaded already.
+"""Start of jobs as forks of a process in which the libraries are already loaded.
 
 A job's interpreter needs about a second to load NumPy, SciPy, pandas and numba, and a study has
 hundreds of jobs. One server process loads them once; each job is a fork of it. The workflow starts
@@ -6,9 +6,9 @@ scripts by `client.py`, which asks the server for a fork, hands over its streams
 folder, and ends as the fork ends. Where no server answers (a platform without safe forks, a server
 that was killed), the client becomes the plain interpreter itself (`alone.py`).
 
-No job outlives its run, whichever process is killed: the server ends the forks of a client or of a
-run that is gone, the system ends those of a server that is gone, the client what they had started,
-and a plain interpreter waits for the end of its run.
+No job outlives its run, whichever process is killed. The server ends the forks of a killed client
+or run, the operating system ends the forks of a killed server, the client ends the processes that
+those forks had started, and a plain interpreter ends itself when its run ends (`alone.py`).
 """
 
 import os
@@ -23,14 +23,14 @@ from pathlib import Path
 from study.pipeline.fork_server.alone import PIPE
 from study.pipeline.fork_server.client import ADDRESS, place_of
 
-# The plain interpreter, in whose place the workflow starts scripts by `interpreter`.
+# Path of the Python interpreter; the workflow uses the command of `interpreter` in its place.
 PYTHON = sys.executable
 
 # Forks of a process that has loaded system frameworks are unsafe on macOS.
 SUPPORTED = sys.platform == "linux"
 
-# Third-party libraries that most jobs or all figures need, modules that every job begins with, and
-# the most frequent experiment.
+# Modules that the server loads in advance: third-party libraries of most jobs or of all figures,
+# modules that every job imports first, and the most frequent experiment.
 LIBRARIES = (
     "h5py",
     "matplotlib.backends.backend_agg",
@@ -53,38 +53,38 @@ LIBRARIES = (
 
 
 def interpreter() -> str:
-    """Words of a shell that run a script by the client, in the place of the plain interpreter."""
+    """Shell command that runs a script by the client, used in place of the plain interpreter."""
     client = Path(__file__).with_name("client.py")
     return f"{shlex.quote(PYTHON)} -I -S {shlex.quote(str(client))}"
 
 
 def hold_pipe(place: Path) -> None:
-    """Open a pipe that closes with this process, which ends the jobs that are no forks.
+    """Open a named pipe that closes with this process, so that jobs that are no forks end with it.
 
     Parameters
     ----------
-    place : file of the pipe, of which jobs learn by the environment; an older one is replaced
+    place : path of the pipe, passed to jobs by an environment variable; an old file is replaced
 
     Raises
     ------
     OSError
-        The file system has no such files.
+        The file system does not support named pipes.
     """
     place.unlink(missing_ok=True)
     os.mkfifo(place)
-    reader = os.open(place, os.O_RDONLY | os.O_NONBLOCK)  # a writer needs a reader to begin with
+    reader = os.open(place, os.O_RDONLY | os.O_NONBLOCK)  # a FIFO must have a reader to be opened
     os.open(place, os.O_WRONLY)
     os.close(reader)
     os.environ[PIPE] = str(place.absolute())
 
 
 def start_server(libraries: Sequence[str] = LIBRARIES) -> None:
-    """Start the server of this process; it ends when this process does.
+    """Start the fork server of this process; the server ends when this process does.
 
-    The address goes into the environment, which jobs inherit. It is a name that Linux keeps beside
-    the file system and forgets with the last process that listens there, so that nothing is left
-    of a run that was killed. Clients that come before the ``libraries`` are loaded wait in the
-    socket's queue.
+    The address goes into an environment variable, which jobs inherit. It is an abstract socket name
+    of Linux, which is no file and disappears with the last process that listens there, so that
+    nothing is left of a killed run. Clients that connect before the ``libraries`` are loaded wait
+    in the socket's queue.
     """
     if not SUPPORTED:
         return

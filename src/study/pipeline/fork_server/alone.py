@@ -1,7 +1,7 @@
-"""Run a script in an interpreter of its own, which ends when the run that wants it has ended.
+"""Run a script in an interpreter of its own, which ends when the run that started it has ended.
 
-A killed run closes its end of a pipe (`study.pipeline.fork_server.hold_pipe`), on every platform.
-This file is run by its path and imports little.
+The run keeps one end of a pipe open (`study.pipeline.fork_server.hold_pipe`). A killed run closes
+it, on every platform. This file is started by its path and imports only the standard library.
 """
 
 import os
@@ -14,7 +14,7 @@ PIPE = "PDROM_RUN_PIPE"
 
 
 def main() -> None:
-    """Run the script that the arguments name as the main module."""
+    """Run the script whose path is the first argument as the main module."""
     if pipe := os.environ.get(PIPE):
         threading.Thread(target=end_with, args=(pipe,), daemon=True).start()
     del sys.argv[0]
@@ -23,9 +23,9 @@ def main() -> None:
 
 
 def end_with(pipe: str) -> None:
-    """End this job with the run, which alone writes to ``pipe`` and never does."""
+    """Kill this job when the run ends, which closes ``pipe``: only the run opens it to write."""
     try:
-        # without O_NONBLOCK a pipe that nobody writes to any more would not be opened
+        # without O_NONBLOCK, open would wait for a writer if the run has already ended
         number = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
         os.set_blocking(number, True)
         os.read(number, 1)

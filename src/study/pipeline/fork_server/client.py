@@ -1,6 +1,6 @@
 """Run a script in a fork of the server, or in a plain interpreter where no server answers.
 
-This file is run by its path, before any package is in reach, and for every job: it imports little.
+This file is started by its path, for every job: it imports a few standard modules only.
 """
 
 import os
@@ -15,10 +15,10 @@ FORWARDED = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 def main() -> int:
-    """Exit code of the job; the process dies of the signal that the job died of."""
+    """Return the exit code of the job; a job that died of a signal ends this process by it, too."""
     name = os.environ.get(ADDRESS)
     script = len(sys.argv) == 2 and not sys.argv[1].startswith("-")
-    # a signal that comes before the job is known waits until it is
+    # signals are blocked until the job's process number is known, so that they can be forwarded
     signal.pthread_sigmask(signal.SIG_BLOCK, FORWARDED)
     connection = connect(name) if name and script else None
     answer = ask(connection) if connection else b""
@@ -32,7 +32,7 @@ def main() -> int:
     signal.pthread_sigmask(signal.SIG_UNBLOCK, FORWARDED)
     status = receive(connection)
     if not status:
-        # the job has ended with the server; what it had started has not
+        # the job has ended with the server, but processes that the job had started still run
         forward(job, signal.SIGKILL)
         sys.stderr.write("pdrom: the process that jobs start from is gone\n")
         return 1
@@ -45,7 +45,7 @@ def main() -> int:
 
 
 def connect(name: str) -> socket.socket | None:
-    """Connection to the server ``name``; None where nobody of the same user listens."""
+    """Connection to the server ``name``; None if no process of the same user listens there."""
     connection = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     try:
         connection.connect(place_of(name))
@@ -55,14 +55,14 @@ def connect(name: str) -> socket.socket | None:
 
 
 def place_of(name: str) -> bytes:
-    """Address of a socket that is a name only, no file (Linux)."""
+    """Address of an abstract socket (Linux), which is a name and has no file."""
     return b"\0" + os.fsencode(name)
 
 
 def of_this_user(connection: socket.socket) -> bool:
-    """Whether the process at the other end of ``connection`` is this user's.
+    """Return whether the process at the other end of ``connection`` belongs to the current user.
 
-    A name has no permissions of its own.
+    An abstract socket name has no access permissions, so that any user could listen there.
     """
     reported = connection.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, struct.calcsize("3i"))
     _process, user, _group = struct.unpack("3i", reported)
@@ -70,7 +70,7 @@ def of_this_user(connection: socket.socket) -> bool:
 
 
 def ask(connection: socket.socket) -> bytes:
-    """Request a fork over ``connection``; its process number, b"" if the server is gone."""
+    """Request a fork over ``connection``; return its process number, b"" if the server is gone."""
     environment = [f"{key}={value}" for key, value in os.environ.items() if key != ADDRESS]
     parts = [os.getcwd(), os.path.abspath(sys.argv[1]), *environment]
     request = "\0".join(parts).encode("utf-8", "surrogateescape")
@@ -83,7 +83,7 @@ def ask(connection: socket.socket) -> bytes:
 
 
 def receive(connection: socket.socket) -> bytes:
-    """Number, a line of twenty characters, from ``connection``; nothing if the server is gone."""
+    """Read a number of twenty characters from ``connection``; return b"" if the server is gone."""
     text = b""
     while len(text) < 20:
         try:
@@ -97,7 +97,7 @@ def receive(connection: socket.socket) -> bytes:
 
 
 def forward(job: int, number: int) -> None:
-    """Hand signal ``number`` on to the process ``job``, which is in a session of its own."""
+    """Send signal ``number`` to the process group ``job``, which has a session of its own."""
     with suppress(ProcessLookupError):
         os.killpg(job, number)
 

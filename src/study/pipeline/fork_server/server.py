@@ -1,9 +1,9 @@
-"""The process that jobs are forked from.
+"""The server process from which jobs are forked.
 
-It has one thread and loads third-party libraries, and the modules that every job begins with: what
-a scene does not list stays unloaded.
-It ends, and its jobs with it, when the process that started it is gone. A client that is killed,
-says nothing or asks for what is no request is dropped, and costs the others nothing.
+It has one thread. It loads third-party libraries and the modules that every job imports first; it
+does not load modules of effects, which only some scenes list.
+It ends, together with its jobs, when the process that started it is gone. A client that is killed,
+sends nothing or sends an invalid request is disconnected; other clients are not affected.
 """
 
 import atexit
@@ -24,21 +24,21 @@ from typing import NoReturn
 
 from study.pipeline.fork_server.client import of_this_user
 
-HEADER = 20  # characters of the line that says how many bytes follow
+HEADER = 20  # characters of the decimal number that gives the size of the request in bytes
 NUMBER = b"%20d"
-LARGEST = 1 << 24  # bytes of a request; systems allow environments less
-# Seconds that a client may take for its request, which it sends as soon as it is connected.
+LARGEST = 1 << 24  # largest size of a request in bytes; environments are smaller on all systems
+# Seconds within which a client must send its request after it has connected.
 PATIENCE = 30.0
-_DIES_WITH_PARENT = 1  # PR_SET_PDEATHSIG of <sys/prctl.h>
+_DIES_WITH_PARENT = 1  # constant PR_SET_PDEATHSIG of <sys/prctl.h>
 
 
 class Request:
-    """Request of a client as received so far: folder, script, environment, and three streams.
+    """A client's request, as far as received: folder, script, environment, three standard streams.
 
     Parameters
     ----------
-    client : connection, which is not waited for
-    until : when its patience ends, seconds of the monotonic clock
+    client : socket of the client, set to non-blocking
+    until : deadline of the request, seconds of the monotonic clock
     """
 
     def __init__(self, client: socket.socket, until: float) -> None:
@@ -49,12 +49,12 @@ class Request:
         self._content = b""
 
     def read(self) -> list[str]:
-        """Folder, script and environment, once there is all of it to read; nothing before.
+        """Return folder, script and environment once the request is complete, else an empty list.
 
         Raises
         ------
         OSError, ValueError
-            The client is gone, or this is no request.
+            The client is gone, or its data are not a valid request.
         """
         more, streams, _, _ = socket.recv_fds(self.client, 1 << 16, 3)
         self.streams += streams
@@ -74,25 +74,25 @@ class Request:
         return found
 
     def close_streams(self) -> None:
-        """Close the server's copies of the streams."""
+        """Close the server's copies of the client's standard streams."""
         for stream in self.streams:
             os.close(stream)
 
 
 def kill(process: int) -> None:
-    """Kill a job with everything that it started."""
+    """Kill the process group of a job, which includes the processes that the job started."""
     with suppress(ProcessLookupError):
         os.killpg(process, signal.SIGKILL)
 
 
 class Server:
-    """Forks a job for each request, until its owner is gone.
+    """Server that forks a job for each request until its owner, the process of the run, is gone.
 
     Parameters
     ----------
-    listener : socket that clients connect to
-    owner : read end of a pipe whose other end only the owner holds
-    patience : seconds that a client may take for its request
+    listener : socket to which clients connect
+    owner : read end of a pipe whose write end only the owner has open
+    patience : seconds within which a client must send its request
     """
 
     def __init__(self, listener: socket.socket, owner: int, patience: float = PATIENCE) -> None:
@@ -100,16 +100,16 @@ class Server:
         self.owner = owner
         self.patience = patience
         self.requests: list[Request] = []
-        # the client that waits for a fork, by the number of that process
+        # clients that wait for the end of their job, by the process number of the job
         self.jobs: dict[int, socket.socket] = {}
-        # a signal wakes the loop up by a byte in this pipe
+        # a signal writes a byte into this pipe, which ends the wait of the loop
         self.wake, self._waker = os.pipe()
         os.set_blocking(self._waker, False)
         self._process = os.getpid()
         self._libc = ctypes.CDLL(None)
 
     def serve(self) -> str | None:
-        """Path of the script to run, in a fork; None in the server, once its owner is gone."""
+        """Serve requests; return the script in a fork, None in the server when its owner ends."""
         signal.set_wakeup_fd(self._waker, warn_on_full_buffer=False)
         signal.signal(signal.SIGCHLD, lambda number, frame: None)
         while True:
@@ -122,8 +122,8 @@ class Server:
                 os.read(self.wake, 4096)
             self._collect()
             for process, client in self.jobs.items():
-                # a client sends nothing after its request, so that something to read means that it
-                # is gone: its job is ended, too
+                # a client sends nothing after its request: readable data mean that its connection
+                # is closed, so that its job is killed
                 if client.fileno() in ready:
                     kill(process)
             for request in [r for r in self.requests if r.client.fileno() in ready]:
@@ -135,11 +135,11 @@ class Server:
                 self._accept()
 
     def _clients(self) -> list[socket.socket]:
-        """Sockets of clients: those of running jobs and of incomplete requests."""
+        """Sockets of all clients, both of running jobs and of incomplete requests."""
         return [*self.jobs.values(), *(request.client for request in self.requests)]
 
     def _wait(self) -> set[int]:
-        """Descriptors with something to read, or none when a client's patience ends."""
+        """Wait for input; return readable descriptors, none when a request's deadline passes."""
         clients = [client.fileno() for client in self._clients()]
         waiting = [self.listener.fileno(), self.owner, self.wake, *clients]
         until = min((request.until for request in self.requests), default=None)
@@ -147,7 +147,7 @@ class Server:
         return set(select.select(waiting, [], [], limit)[0])
 
     def _collect(self) -> None:
-        """Tell the clients of the jobs that have ended their exit status; a client may be gone."""
+        """Send the exit statuses of ended jobs to their clients; ignore clients that are gone."""
         for process in list(self.jobs):
             done, status = os.waitpid(process, os.WNOHANG)
             if done:
@@ -155,7 +155,7 @@ class Server:
                     client.sendall(NUMBER % status)
 
     def _accept(self) -> None:
-        """Begin to listen to a client."""
+        """Accept a new connection, and close it if it is from another user."""
         client, _ = self.listener.accept()
         if of_this_user(client):
             self.requests.append(Request(client, time.monotonic() + self.patience))
@@ -163,13 +163,13 @@ class Server:
             client.close()
 
     def _drop(self, request: Request) -> None:
-        """Close the connection to a client, which then runs its job itself."""
+        """Close the connection to a client, which then runs its job in a plain interpreter."""
         self.requests.remove(request)
         request.close_streams()
         request.client.close()
 
     def _answer(self, request: Request) -> str | None:
-        """Fork a job once its request is complete; the script in the fork, None in the server."""
+        """Fork a job if its request is complete; return the script in the fork, else None."""
         try:
             parts = request.read()
             if not parts:
@@ -181,7 +181,7 @@ class Server:
         if not process:
             self._become_job(parts, request)
             return parts[1]
-        # the server and the fork both ask for the group, so that it exists before either goes on
+        # server and fork both set the process group, so that it exists before either continues
         os.setpgid(process, process)
         self.requests.remove(request)
         request.close_streams()
@@ -193,9 +193,9 @@ class Server:
         return None
 
     def _become_job(self, parts: list[str], request: Request) -> None:
-        """Leave everything of the server behind and take over the client's surroundings."""
+        """Turn a fork into the job: close the server's descriptors, set up the job's streams."""
         os.setpgid(0, 0)
-        # end with the server, however that ends; it may have ended just before
+        # ask to be killed when the server ends; the server may already have ended before this call
         self._libc.prctl(_DIES_WITH_PARENT, signal.SIGKILL)
         if os.getppid() != self._process:
             os._exit(1)
@@ -221,7 +221,7 @@ class Server:
 
 
 def load(libraries: Sequence[str]) -> None:
-    """Import ``libraries``; with numba, register its own functions, which each fork would do."""
+    """Import ``libraries``; register numba's own functions once, which each fork would repeat."""
     for library in libraries:
         importlib.import_module(library)
     if "numba" in libraries:
@@ -231,7 +231,7 @@ def load(libraries: Sequence[str]) -> None:
 
 
 def main() -> None:
-    """Load the libraries, serve; in a fork, run the job's script as a plain interpreter would."""
+    """Load the libraries and serve; in a fork, run the job's script as an interpreter would."""
     listener = socket.socket(fileno=int(sys.argv[1]))
     owner = int(sys.argv[2])
     load(sys.argv[3:])
@@ -243,10 +243,10 @@ def main() -> None:
 
 
 def run(script: str) -> NoReturn:
-    """Run a script as the main module; its exceptions end the process in the usual way.
+    """Run a script as the main module; an exception ends the process as in a plain interpreter.
 
-    After a script that ends well the process is left at once, as `multiprocessing` leaves its
-    forks: to take the libraries apart in memory takes longer than to fork them.
+    After a successful script the process exits by ``os._exit``, as in `multiprocessing`: to free
+    the memory of the libraries would take longer than the fork.
     """
     runpy.run_path(script, run_name="__main__")
     for thread in threading.enumerate():
