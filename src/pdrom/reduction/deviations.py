@@ -81,8 +81,8 @@ class Yardstick:
         Returns
         -------
         ``difference``, ``shape_difference`` and ``step_difference`` (F',) m of positions, shapes
-        and steps; ``energy`` at every `STRIDE`-th frame over the largest of the full order, empty
-        if that has none; ``contact`` (F',), 1 where an obstacle is touched.
+        and steps; ``energy`` of every `STRIDE`-th frame divided by `scale`, empty if the scene has
+        no energy; ``contact`` (F',), 1 where an obstacle is touched.
         """
         steps, shapes, contacts = [], [], []
         with np.errstate(over="ignore", invalid="ignore"):

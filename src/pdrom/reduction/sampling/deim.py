@@ -82,9 +82,9 @@ BLOCK = 16  # columns that LAPACK eliminates at a time
 class GrowingFit:
     """Least-squares fit of each mode by the earlier modes at a growing set of sampled rows.
 
-    Coefficients of a mode in the earlier modes at sampled rows, (S V_k) c = S v_k.
+    The coefficients c of mode v_k solve (S V_k) c = S v_k, where S takes the sampled rows.
 
-    Kept is the triangular factor R (r, r) of the sampled rows of all modes, into which further rows
+    The triangular factor R (r, r) of the sampled rows of all modes is stored, and further rows
     are rotated into it. R[:k, :k] c = R[:k, k] has the same least-squares solutions as the
     sampled equations. Adding s rows costs O(s r^2); factoring all m rows again would cost
     O(m k^2).

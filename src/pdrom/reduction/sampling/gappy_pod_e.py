@@ -97,10 +97,10 @@ class _Growing:
     def _strongest(self) -> int:
         """Return the unsampled element with the largest `eigenvalue_growth`.
 
-        The growth is at most |B u|^2: candidates are those where this is larger than the bound of
-        the element with the largest |B u|^2, which wins ties: if the smallest eigenvalue is double,
-        all bounds are zero. Of these again those whose growth by `_squares`, too large by what
-        rounding may take away, is not below the growth of the best of them.
+        Two upper bounds exclude elements before their growth is computed. |B u|^2 must exceed the
+        growth of the element with the largest |B u|^2, which wins ties (all growths are zero if the
+        smallest eigenvalue is double). `_growth_at_most` must not be below the growth of the
+        element for which it is largest.
         """
         products = (self._rows @ self._weakest).reshape(self.total, -1)
         strength = np.einsum("es,es->e", products, products)
