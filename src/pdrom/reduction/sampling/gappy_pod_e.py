@@ -86,7 +86,7 @@ class _Growing:
         self._decompose()
 
     def _decompose(self) -> None:
-        """Smallest eigenvalue of G, its eigenvector, and the gap to the next (inf if r = 1)."""
+        """Set G's smallest eigenvalue, its eigenvector, and the gap to the next (inf if r = 1)."""
         last = min(1, len(self._gram) - 1)
         values, vectors = linalg.eigh(
             self._gram, subset_by_index=(0, last), check_finite=False, driver="evr"

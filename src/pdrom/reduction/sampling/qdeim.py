@@ -79,7 +79,7 @@ class _Left:
         return len(new)
 
     def _highest(self, count: int) -> tuple[np.ndarray, float]:
-        """Elements with the largest bounds, in order, and the largest of the others (-1: none)."""
+        """The ``count`` elements with the largest bounds, and the next largest bound (-1: none)."""
         bounds = self._weights * (self._squares + self._error)
         bounds[self.picked] = -1.0
         if count == self.total:

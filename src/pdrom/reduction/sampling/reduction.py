@@ -132,7 +132,7 @@ class Reduction:
     """
 
     def __init__(self, basis: Basis, sampling: Sampling, spec: MethodSpec, r: int) -> None:
-        """Take r modes of ``basis``, the entries of ``sampling``, and solve as ``spec`` says."""
+        """Build the operator from r modes of ``basis`` at the ``sampling``, by method ``spec``."""
         self.basis, self.sampling, self.spec, self.r = basis, sampling, spec, r
         self.v = basis.truncated(r)
         axes = [int(a) for a in np.flatnonzero(basis.active_axes)] if spec.per_axis else [None]
