@@ -51,7 +51,7 @@ class _Left:
         self._error = self._rounding(self._squares)
 
     def pick_among(self, count: int, most: int) -> int:
-        """Pick from ``count`` candidates, up to ``most`` in all; return how many were found."""
+        """Add pivots among ``count`` candidates, up to ``most`` in all; return the number added."""
         candidates, rest = self._highest(count)
         left = self._rows.reshape(self.total, self._size, -1)[candidates]
         left = left.reshape(len(candidates) * self._size, -1)

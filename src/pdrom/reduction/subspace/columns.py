@@ -1,4 +1,4 @@
-"""Columns B of a position subspace q = B z, whose coefficients are separate for x, y and z.
+"""Columns B (N, K) of a position subspace q = B z with coordinates z (K, 3); axes share B.
 
 The free vertices get k modes and, always, the affine columns 1, x, y, z of the rest shape: the rest
 shape and every rigid motion are in the space. Vertices that a boundary condition holds at any time
@@ -164,7 +164,7 @@ def skinning_weights(points: np.ndarray, handles: int) -> np.ndarray:
     chosen = farthest_points(points, np.arange(len(points)), handles)
     distance = np.linalg.norm(points[:, None, :] - points[chosen][None], axis=2)
     radius = 3.0 * distance.min(axis=1).max() if handles > 1 else 2.0 * distance.max()
-    # where every vertex is a handle the covering radius is zero, and all distances of a single one
+    # the covering radius is zero if every vertex is a handle; for one vertex all distances are
     radius = max(radius, np.finfo(float).eps * distance.max(), np.finfo(float).tiny)
     scaled = np.minimum(distance / radius, 1.0)
     kernel = (1.0 - scaled) ** 4 * (4.0 * scaled + 1.0)

@@ -245,7 +245,7 @@ log = logging.getLogger(__name__)
 # A unit column depends on the active columns if its orthogonal part is below this.
 DEPENDENT = 1e-7
 
-# Columns join as a block if their correlation exceeds CLOSE times the largest correlation.
+# Columns join as a block: correlations above CLOSE times the largest, at most BLOCK of the active.
 CLOSE = 0.7
 BLOCK = 0.2
 
@@ -331,7 +331,7 @@ class _ActiveSet:
             if joined:
                 self._solve()
             staying = set(self._active).intersection(joined)
-            # a column that depends on the others, or left at once, would be picked for ever
+            # a column that is dependent or leaves at once is banned, or it would be picked again
             if len(block) == 1 and not staying:
                 self._banned[block] = True
             self._alone = not staying and len(block) > 1

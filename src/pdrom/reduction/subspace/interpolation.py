@@ -142,7 +142,7 @@ class SubspaceLocalStep:
         self.group.begin_frame(self._rows @ q)
 
     def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
-        """Add B^T S^T W p at ``y`` (K, 3) to ``rhs`` (K, 3); return the sampled energy."""
+        """Add B^T S^T W p at ``y`` (K, 3) to ``rhs`` (K, 3); return the samples' energy."""
         self._rhs[...] = 0.0
         energy = self.group.accumulate(self._rows @ y, self._rhs)
         rhs += self._transposed @ self._rhs
