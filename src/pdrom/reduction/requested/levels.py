@@ -33,7 +33,7 @@ REDUCED_FRAME, REDUCED_IN_PYTHON = 4e4, 2.3e5
 FILL = 0.35
 # Size of the random shift of a perturbed start, relative to the mesh extent, and its seed.
 MOVED, SEED = 1e-10, 0
-CONVERGED, MOST = 80, 320  # iterations of a reference; twice as many until half agree, up to MOST
+CONVERGED, MOST = 80, 320  # iterations of a reference: first number, doubled up to MOST
 Quantity = Literal["position", "velocity"]
 QUANTITIES: tuple[Quantity, ...] = get_args(Quantity)
 

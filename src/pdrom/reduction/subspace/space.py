@@ -71,7 +71,7 @@ class DenseElimination:
     def response(self, inertia: np.ndarray) -> np.ndarray:
         """Matrix (K', K) that maps s, with fixed coordinates at their targets, to free coordinates.
 
-        This is the solve for ``inertia`` s, (K, K) M/h^2, with the load of the targets.
+        It solves the system for the right-hand side ``inertia`` s; ``inertia`` is M/h^2 (K, K).
         """
         result = self._inverse @ inertia[self.free]
         result[:, self.fixed] -= self._inverse @ self._coupling
@@ -150,7 +150,7 @@ class ReducedSpace(Space):
         return held_targets(self._boundaries, frame, positions)
 
     def held_path(self, frames: range, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Held coordinates in the first ``frames`` from ``positions`` (K, 3), values (n, m, 3)."""
+        """Coordinates (m,) held in the first ``frames`` after ``positions``, values (n, m, 3)."""
         return held_path(self._boundaries, frames, positions)
 
     def elimination(self, fixed: np.ndarray) -> DenseElimination:
@@ -244,12 +244,12 @@ class _ReducedBoundary:
         return self._of(frame)[0]
 
     def path(self, frames: range, current: np.ndarray) -> np.ndarray:
-        """Values (n, m, 3) of these coordinates, which are ``current`` at first, see `Boundary`."""
+        """Values (n, m, 3) of the held coordinates, initially ``current``, see `Boundary`."""
         _, rows, inverse = self._of(frames.start)
         return inverse @ self.boundary.path(frames, rows @ current)
 
     def _of(self, frame: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Coordinates of what is held in ``frame``, the rows of B there, and their inverse."""
+        """Coordinates held in ``frame``, the held vertices' rows of B, and the rows' inverse."""
         vertices = self.boundary.held(frame)
         key = vertices.tobytes()
         if key not in self._parts:
