@@ -189,7 +189,7 @@ class Calibration:
         return max(full, key=lambda each: (each.level.iterations, each.level.window))
 
     def horizon(self, error: float) -> tuple[int, str]:
-        """Frames whose errors are known well enough for a tolerance, and what ends them."""
+        """Number of first frames with errors known to the tolerance ``error``, and its limit."""
         least = error / self.settings.factor
         converged = min(levels.last_within(motion.unconverged, least) for motion in self.motions)
         sharp = min(levels.last_within(motion.sensitivity, least) for motion in self.motions)
@@ -207,7 +207,7 @@ class Calibration:
         return self.settings.factor * float(max(errors[end - 1] for errors in known))
 
     def admissible(self, error: float) -> list[Calibrated]:
-        """Levels whose expected error is within the tolerance; none if no full order is one."""
+        """Levels with an expected error of at most ``error``; none if no full-order level has."""
         good = [each for each in self.levels if self.expected(each, error) <= error]
         return good if any(not each.reduced for each in good) else []
 
@@ -217,7 +217,7 @@ class Calibration:
         return next(full, self.most_accurate)
 
     def second(self, level: Calibrated, error: float) -> Calibrated:
-        """The cheapest other level of the same kind with an error about as large as requested.
+        """Cheapest other level of the same kind, expected error at most ``error`` times the factor.
 
         Return ``level`` itself if there is none.
         """
@@ -229,8 +229,8 @@ class Calibration:
     def attempts(self, error: float) -> list[Calibrated]:
         """Levels to run in turn until one meets the tolerance; only the last if none is admissible.
 
-        The cheapest reduction, where it pays with its second run and its checks; the cheapest full
-        order; the most accurate one.
+        These are the cheapest reduction, if it saves work with its second run and checks, the
+        cheapest full-order level, and the most accurate one.
         """
         full = self.full_order(error)
         most = WORTH * (full.work + self.second(full, error).work)
@@ -287,8 +287,8 @@ class CheckedRun:
     def _estimated(self, level: Calibrated) -> tuple[Trajectory, np.ndarray]:
         """Run ``level`` to its end or the first failed check; return it and estimated errors (F,).
 
-        The error expected is enlarged as the root mean square of the defects is. All are infinite
-        where nothing was expected, a check failed, or the run blew up.
+        The expected error is multiplied by the ratio of defects (root mean square of the run over
+        calibration) if above 1. All are infinite if no error is known, or check or run failed.
         """
         own, frames, full = self._own, self._frames, self._own.full_order(self._error).level
         largest = BLOWUP_EXTENT * self._scene.mesh.extent
