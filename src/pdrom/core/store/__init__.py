@@ -298,7 +298,7 @@ class _Sink:
 
     def readinto(self, buffer: memoryview) -> int:
         count = self._handle.readinto(buffer)
-        buffer[count:] = bytes(len(buffer) - count)  # zeros for what `write` has dropped
+        buffer[count:] = bytes(len(buffer) - count)  # zeros for bytes that `write` discarded
         return len(buffer)
 
     def truncate(self, size: int) -> int:
