@@ -18,7 +18,7 @@ class RoundedLayout(ConstrainedLayoutEngine):
     """Constrained layout that rounds positions to `DIGITS`."""
 
     def execute(self, fig: Figure) -> Any:
-        """Lay out ``fig``."""
+        """Lay out ``fig`` and round the positions of its axes; return the base class's result."""
         grids = super().execute(fig)
         for ax in fig.axes:
             kept = ax.get_in_layout()
