@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 class Status(IntEnum):
-    """Exit codes; 2 is argparse's, for what it does not understand."""
+    """Exit codes; argparse itself uses 2 for invalid arguments."""
 
     DONE = 0
     FAULTY = 1
@@ -24,11 +24,11 @@ class Status(IntEnum):
 class Command:
     """A command of ``pdrom``.
 
-    title : what it does, one line
-    example : a call
-    arguments : keywords of `argparse.ArgumentParser.add_argument` for each of its arguments
-    perform : does it and returns the exit code
-    one_of : arguments of which one call has one at most
+    title : description in one line
+    example : example of a call
+    arguments : keywords of `argparse.ArgumentParser.add_argument` for each argument
+    perform : function that executes the command and returns the exit code
+    one_of : mutually exclusive arguments
     """
 
     title: str
@@ -47,7 +47,7 @@ UNCHECKED = {
 
 
 def files_of(file: str, scene: "Scene") -> list[str]:
-    """Files that a ``scene`` consists of: its own ``file`` and that of its mesh."""
+    """Paths of the files of a ``scene``: its own ``file`` and the mesh file, if any."""
     from pdrom.model.mesh.config import MeshFile
 
     mesh = scene.config.mesh
@@ -55,13 +55,13 @@ def files_of(file: str, scene: "Scene") -> list[str]:
 
 
 def require_output(path: str | Path, reads: Sequence[str]) -> None:
-    """Check a ``path`` to write before anything long is computed for it.
+    """Check, before a long computation, that the output ``path`` can be written.
 
     Raises
     ------
     StorageError
-        The file cannot be written, would replace one that pdrom has not made, or is one of those
-        that the command ``reads``.
+        The file cannot be written, would replace a file from outside pdrom, or is one of the
+        files that the command ``reads``.
     """
     from pdrom.core.errors import StorageError
     from pdrom.core.store import require_own, require_place

@@ -1,6 +1,6 @@
 """``pdrom COMMAND ...``: the parser, messages and exit codes; each command is a module of its own.
 
-A command's module says how it is called (`Command`); what it needs is imported when it runs.
+A command's module declares its arguments (`Command`); other modules are imported when it runs.
 """
 
 import argparse
@@ -102,7 +102,7 @@ def _fail(message: str) -> int:
 
 
 def main() -> None:
-    """Run the command line of this process in the project's environment; end with its code."""
+    """Run the command line in the project's environment; exit with the command's exit code."""
     root = checkout()
     if root and os.access(root / ".cache", os.W_OK):  # compiled kernels are shared with ./reproduce
         os.environ.setdefault("NUMBA_CACHE_DIR", str(root / ".cache" / "numba"))

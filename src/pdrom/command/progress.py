@@ -1,4 +1,4 @@
-"""Progress of a run, and of what precedes it: one line on stderr, rewritten on a terminal."""
+"""Progress of a run and its calibration: one line on stderr, rewritten on a terminal."""
 
 import os
 import sys
@@ -14,7 +14,7 @@ PAUSE = 2.0  # seconds between two lines about levels where there is no terminal
 
 
 class _Line:
-    """Line about a run ``name`` on a ``stream``; the first one says if kernels are compiled."""
+    """Progress line of the run ``name`` on ``stream``; the first announces any compilation."""
 
     def __init__(self, name: str, stream: TextIO | None = None) -> None:
         self._name, self._stream = name, stream or sys.stderr
@@ -45,7 +45,7 @@ class Progress(_Line):
         self._frames, self._ends = frames, [self._began]
 
     def __call__(self, frame: int, report: FrameReport) -> None:
-        """Frame number ``frame``, from 0, is done."""
+        """Show that frame number ``frame``, counted from 0, has been computed."""
         done, now = frame + 1, monotonic()
         self._ends.append(now)
         early = now - self._shown < EVERY if self._terminal else done % max(1, self._frames // 10)
@@ -61,7 +61,7 @@ class Progress(_Line):
 
 
 def line(name: str, done: int, frames: int, ms: float, left: float) -> str:
-    """Line of a run ``name`` of which ``done`` of ``frames`` are done.
+    """Text of the progress line of the run ``name`` after ``done`` of ``frames`` frames.
 
     ``ms`` are the last frame's milliseconds, ``left`` the seconds to its end.
     """

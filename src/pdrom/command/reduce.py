@@ -44,7 +44,7 @@ ARGUMENTS: dict[str, dict[str, Any]] = {
 
 
 def perform(arguments: argparse.Namespace) -> Status:
-    """Run in full order unless that is done, reduce, run again, and say how it went."""
+    """Run the full order unless a run is given, reduce, run the reduction, print the result."""
     if arguments.group is None:
         return _perform_request(arguments)
     from pdrom.api import FullRun, load, load_scene, plot, reduce, run, save
@@ -116,7 +116,7 @@ def _error(reduced: "ReducedRun") -> str:
 
 
 def _perform_request(arguments: argparse.Namespace) -> Status:
-    """Calibrate on the training run, run, and say what was done and what it cost."""
+    """Calibrate on the training run, run within the tolerance, print level, error and cost."""
     from pdrom.api import FullRun, load, load_scene, reduce, save
     from pdrom.command.progress import LevelProgress
     from pdrom.core.errors import ConfigurationError, StorageError
@@ -167,7 +167,7 @@ def _answer(made: "RequestedRun") -> str:
 
 
 def _done(made: "RequestedRun") -> list[str]:
-    """Level, estimate and cost, a line each."""
+    """Lines of text with level, estimated error and cost of the run ``made``."""
     outcome, ms = made.outcome, made.ms[0]
     tried = f", after {', '.join(outcome.failed)}" if outcome.failed else ""
     known = [f"expected at most {outcome.expected:.2g}"]

@@ -1,1 +1,1 @@
-"""Common ground of all rooms: errors, storage, configuration files, registries, logs."""
+"""Shared code of all packages: errors, storage of results, configuration, registries."""

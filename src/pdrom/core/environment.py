@@ -1,13 +1,13 @@
-"""Environment variables of the jobs: none that the user has set may change a result.
+"""Environment variables of the jobs, set so that inherited ones cannot change a result.
 
-Who wants to see how far results depend on such settings names those that are to stay:
+A user who wants to study the influence of a variable names it in ``PDROM_KEEP`` to retain it:
 ``PDROM_KEEP="OPENBLAS_CORETYPE" OPENBLAS_CORETYPE=Nehalem ./reproduce``.
 
-OpenBLAS holds kernels for many processors and takes the newest that fit; they round differently, so
-that it is told which to take. It does not check the variable ``OPENBLAS_CORETYPE``: kernels that
-the processor lacks instructions for would end the process. The project's own kernels are compiled
-on the machine, by default for its very processor; the compiler is told a family of processors
-likewise (docs/decisions/0015-one-target.md). All has to be set before NumPy is loaded.
+OpenBLAS has kernels for many processors, which round differently, and selects the newest that the
+processor supports. ``OPENBLAS_CORETYPE`` fixes the selection; OpenBLAS does not check that the
+processor has the instructions, without which the process would crash. Kernels of this project are
+compiled on the machine; a variable makes their target a family of processors instead of the exact
+one (docs/decisions/0015-one-target.md). The variables must be set before NumPy is loaded.
 """
 
 import os
@@ -15,7 +15,7 @@ import platform
 from collections.abc import Mapping
 from pathlib import Path
 
-# Variables that set up numerical libraries, Python, Matplotlib and TeX.
+# Variables, or their prefixes, that configure numerical libraries, Python, Matplotlib and TeX.
 CLEARED = (
     "OPENBLAS_", "GOTO_", "BLIS_", "MKL_", "VECLIB_", "OMP_", "GOMP_", "KMP_",
     "NPY_", "NUMPY_", "SCIPY_", "NUMBA_", "NUMEXPR_", "PYTHON", "MPL", "MATPLOTLIB",
@@ -23,14 +23,14 @@ CLEARED = (
 )  # fmt: skip
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 KEPT = ("NUMBA_CACHE_DIR", "MPLCONFIGDIR", "PYTHON", "PYTHONPATH", "PYTHONDONTWRITEBYTECODE")
-# Names of further variables to keep, and to leave as they are.
+# Variable that lists the names of variables to leave as the user has set them.
 KEEP = "PDROM_KEEP"
-# Date in the manuscript and the figures, so that equal ones are equal bytes: 1 January 2026.
+# Fixed date in the manuscript and figures, for reproducible files: 1 January 2026.
 DATE = "1767225600"
 CPUINFO = Path("/proc/cpuinfo")
-# every instruction that the kernels named Haswell use beyond those that NumPy itself demands
+# instruction sets that OpenBLAS's Haswell kernels use beyond those that NumPy requires
 HASWELL = {"avx2", "fma"}
-# every instruction set that the compiler draws on for it: Linux's name of each, and the compiler's
+# instruction sets of the compiler's Haswell target: Linux's name of each -> the compiler's name
 COMPILED_HASWELL = {
     "abm": "lzcnt", "avx2": "avx2", "bmi1": "bmi", "bmi2": "bmi2", "f16c": "f16c", "fma": "fma",
     "movbe": "movbe", "popcnt": "popcnt",
@@ -41,14 +41,14 @@ TARGET, FEATURES = "NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES"
 def settled(
     environment: Mapping[str, str], kernels: str | None, target: Mapping[str, str]
 ) -> dict[str, str]:
-    """An environment without inherited settings, and with those of this project.
+    """Return ``environment`` without inherited settings and with this project's settings.
 
-    What the variable ``PDROM_KEEP`` names is neither cleared nor set.
+    Variables named in ``PDROM_KEEP`` are neither cleared nor set.
 
     Parameters
     ----------
-    kernels : OpenBLAS's name of the kernels to use, None leaves the choice to it
-    target : variables that choose what to compile for, see `compiled_for`
+    kernels : OpenBLAS's name of the kernels to use; None leaves the choice to OpenBLAS
+    target : variables that set the compiler's target processor, see `compiled_for`
     """
     asked = environment.get(KEEP, "").split()
     kept = {
@@ -66,13 +66,13 @@ def settled(
     }
     if kernels:
         fixed["OPENBLAS_CORETYPE"] = kernels
-    if TARGET not in asked:  # the features are those of the target
+    if TARGET not in asked:  # the features belong to the target
         fixed |= target
     return kept | {name: value for name, value in fixed.items() if name not in asked}
 
 
 def settle() -> None:
-    """Give this process, and so its jobs, the `settled` environment; before NumPy is loaded."""
+    """Set the `settled` environment in this process and its jobs; call before loading NumPy."""
     system, machine, features = platform.system(), platform.machine(), features_here()
     environment = settled(
         os.environ, core_type(system, machine, features), compiled_for(machine, features)
@@ -83,7 +83,7 @@ def settle() -> None:
 
 
 def core_type(system: str, machine: str, features: set[str]) -> str | None:
-    """Kernels that every processor of a family has; None where there is nothing to choose.
+    """Return OpenBLAS kernels that a whole processor family supports; None without a choice.
 
     Haswell (2013; also AMD's Zen) where the processor has its instructions, otherwise Nehalem,
     whose instructions NumPy demands anyway; on ARM those of the architecture itself. None on other
@@ -102,7 +102,7 @@ def core_type(system: str, machine: str, features: set[str]) -> str | None:
 
 
 def compiled_for(machine: str, features: set[str]) -> dict[str, str]:
-    """Variables that make the compiler's target one that every processor of a family has.
+    """Variables that set a compiler target common to a whole family of processors.
 
     Haswell where an x86-64 processor has what the compiler draws on for it, on ARM what the
     architecture itself has. Empty elsewhere: the compiler then takes the machine's own.
@@ -119,7 +119,7 @@ def compiled_for(machine: str, features: set[str]) -> dict[str, str]:
 
 
 def processor_features(cpuinfo: str) -> set[str]:
-    """Flags that every processor of /proc/cpuinfo has; none where it names none."""
+    """Flags that all processors in the text ``cpuinfo`` of /proc/cpuinfo share; perhaps none."""
     flags = [
         set(line.partition(":")[2].split())
         for line in cpuinfo.splitlines()
@@ -129,7 +129,7 @@ def processor_features(cpuinfo: str) -> set[str]:
 
 
 def features_here() -> set[str]:
-    """`processor_features` of this machine; none where the system does not say."""
+    """`processor_features` of this machine; empty if /proc/cpuinfo cannot be read."""
     try:
         return processor_features(CPUINFO.read_text(encoding="utf-8", errors="replace"))
     except OSError:

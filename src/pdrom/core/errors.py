@@ -1,4 +1,4 @@
-"""Named errors; each carries one line: file or object, key, value, and what is allowed."""
+"""Error classes; a message is one line: file or object, key, value, and allowed values."""
 
 import errno
 import os
@@ -10,19 +10,19 @@ INTERRUPTED = 130  # exit status of a program that ends by Ctrl-C
 
 
 def choices(value: object, allowed: Iterable[object]) -> str:
-    """End of a message about ``value``: what is allowed, and the name that was probably meant."""
+    """End of a message about an invalid ``value``: the ``allowed`` names and the closest one."""
     names = [str(name) for name in allowed]
     return f" (allowed: {', '.join(names)}){suggestion(value, names)}"
 
 
 def suggestion(value: object, allowed: Iterable[str]) -> str:
-    """End of a message about ``value``: the name among ``allowed`` that was probably meant."""
+    """End of a message about an invalid ``value``: the closest of the ``allowed`` names, if any."""
     close = get_close_matches(str(value), list(dict.fromkeys(allowed)), n=1)
     return f", did you mean '{close[0]}'?" if close else ""
 
 
 def reason(error: OSError) -> str:
-    """Words of the operating system for ``error``; HDF5 hides the number in a long text."""
+    """Operating system's message for ``error``, whose number HDF5 puts into a longer text."""
     hidden = re.search(r"errno = (\d+)", str(error))
     number = error.errno or (int(hidden[1]) if hidden else 0)
     return os.strerror(number) if number in errno.errorcode else " ".join(str(error).split())[:200]
@@ -59,7 +59,7 @@ class SceneError(PdromError):
 
 
 class NotReducibleError(SceneError):
-    """An effect of the scene that a position subspace does not take."""
+    """A scene has an effect that cannot be simulated in a position subspace."""
 
 
 class SolverError(PdromError):

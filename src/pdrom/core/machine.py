@@ -1,4 +1,4 @@
-"""The machine that a study ran on: processor, kernels of the linear algebra, libraries, code."""
+"""Record of the machine of a study: processor, linear algebra kernels, libraries, code."""
 
 import os
 import platform
@@ -12,7 +12,7 @@ from pdrom import __version__
 from pdrom.core.provenance import library_versions
 from pdrom.core.yamlfile import ConfigModel
 
-# what loads the linear algebra that the study uses: NumPy and SciPy bring a library each
+# modules whose import loads the linear algebra libraries; NumPy and SciPy have one each
 LINEAR_ALGEBRA = ("numpy.linalg", "scipy.linalg")
 
 
@@ -67,7 +67,7 @@ class Machine(ConfigModel):
 
 
 def machine(units: Units | None = None) -> Machine:
-    """Record of this machine and this process, with ``units`` that were measured."""
+    """Record of this machine and this process, with the measured ``units`` if given."""
     kernels = loaded_kernels()
     return Machine(
         cpu=_cpu_model(),

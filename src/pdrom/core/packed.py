@@ -1,4 +1,4 @@
-"""Arrays for scripts of a page, as text or changes of quantised positions, and on one line."""
+"""Encoding of arrays for scripts of a web page, and one-line descriptions of records."""
 
 import base64
 import zlib
@@ -11,7 +11,7 @@ LEVELS = 65535  # steps of a quantised coordinate from end to end of the run's b
 
 
 def pack_text(values: np.ndarray) -> str:
-    """Bytes of an array ``values`` of any shape and type, compressed, in base 64."""
+    """Compress the bytes of the array ``values`` of any shape and type; return base 64 text."""
     return base64.b64encode(zlib.compress(np.ascontiguousarray(values).tobytes(), 9)).decode()
 
 
@@ -22,7 +22,7 @@ def pack_array(values: np.ndarray, kind: str) -> dict[str, Any]:
 
 
 def pack_positions(positions: np.ndarray) -> dict[str, Any]:
-    """``positions`` (F, N, 3) as steps of a 65535th of their bounding box, and only their changes.
+    """Quantise ``positions`` (F, N, 3) in their bounding box; pack changes between frames.
 
     A coordinate is wrong by half a step at most; changes from frame to frame, modulo 2^16, compress
     better than the positions.
@@ -41,9 +41,9 @@ def pack_positions(positions: np.ndarray) -> dict[str, Any]:
 
 
 def brief(record: Any) -> str:
-    """The dataclass ``record`` as its name and fields; an array is shown by its shape and type.
+    """Text of the dataclass ``record``: name and fields; an array is shown by shape and type.
 
-    A class takes it as its ``__repr__``.
+    Classes use this function as their ``__repr__``.
     """
     shown = []
     for field in fields(record):

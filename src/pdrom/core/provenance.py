@@ -1,9 +1,8 @@
-"""Provenance of a result: what made it, with which settings, code and libraries.
+"""Provenance of a result: the job that made it, its settings, code and libraries.
 
-A job states once what it is (`made_by`). Whatever `pdrom.core.store` writes meanwhile carries that:
-every file in its checksum, HDF5 files inside as well. Nothing in it differs
-between two equal runs: no date, no folder, and no commit, since a commit that changes a word of the
-documentation makes no other result.
+Inside the context `made_by`, every file that `pdrom.core.store` writes records the job in its
+checksum; HDF5 files also record it in attributes. Two equal runs have equal records: these contain
+no date, no folder and no commit, since a commit may change only documentation.
 """
 
 import hashlib
@@ -31,7 +30,7 @@ RECORD = (
 )
 
 
-# What the job at work says of itself, and its configuration as canonical JSON.
+# Name and configuration hash of the running job, and its configuration as canonical JSON.
 _JOB: ContextVar[Mapping[str, str]] = ContextVar("job", default=MappingProxyType({}))
 
 
@@ -68,7 +67,7 @@ def library_versions() -> dict[str, str]:
 
 
 def attributes() -> dict[str, str]:
-    """`provenance` for a file that can also hold the whole configuration (HDF5)."""
+    """`provenance` with the whole configuration of the job, for attributes of HDF5 files."""
     return {
         **_JOB.get(),
         "pdrom_version": __version__,
@@ -79,6 +78,6 @@ def attributes() -> dict[str, str]:
 
 
 def provenance() -> dict[str, str]:
-    """Record of a file that is written now; the part about the job only where there is one."""
+    """Record for a file that is written now; outside a job it has no entries about the job."""
     everything = attributes()
     return {name: everything[name] for name in RECORD if name in everything}

@@ -1,7 +1,7 @@
-"""Names that are loaded on demand.
+"""Registries: names of the configuration whose implementations are imported on demand.
 
-A registry maps a name of the configuration to ``"package.module:attribute"``. Nothing is imported
-before it is needed: what a scene does not list is not even loaded.
+A registry maps a name of the configuration to ``"package.module:attribute"``. A module is imported
+only when its name is used.
 """
 
 from collections.abc import Iterator, Mapping
@@ -12,10 +12,10 @@ from pdrom.core.errors import ConfigurationError, choices
 
 
 class Registry(Mapping[str, str]):
-    """Read-only map from a name to the place of its implementation."""
+    """Read-only map from a name to its implementation, given as "module:attribute"."""
 
     def __init__(self, kind: str, entries: Mapping[str, str]) -> None:
-        """Take ``entries``, "module:Class" by name; ``kind`` names them in messages."""
+        """Store ``entries``, "module:Class" by name; messages call an entry a ``kind``."""
         self.kind = kind
         self._entries = dict(entries)
 

@@ -1,4 +1,4 @@
-"""YAML and names in it, checked against typed models, with messages a user can act on."""
+"""Reading of YAML files and their validation by typed models, with clear error messages."""
 
 import os
 import re
@@ -24,7 +24,7 @@ class ConfigModel(BaseModel):
     @model_validator(mode="before")
     @classmethod
     def _no_truth_value_for_a_number(cls, data: Any) -> Any:
-        """YAML reads yes, on and true as a truth value, which would count as the number 1."""
+        """Refuse truth values for numbers: YAML's yes, on and true would count as 1."""
         for key, value in data.items() if isinstance(data, dict) else ():
             field = cls.model_fields.get(key)
             entries = value if isinstance(value, (list, tuple)) else [value]
@@ -52,7 +52,7 @@ class _PlainLoader(yaml.CSafeLoader):
 
 
 def _require_plain(text: str) -> None:
-    """Refuse aliases, a few of which stand for billions of entries, and deep nesting."""
+    """Refuse deep nesting and aliases, since a few aliases can expand to billions of entries."""
     depth = 0
     events: Iterator[Any] = yaml.parse(text, Loader=yaml.CSafeLoader)
     for event in events:
@@ -77,12 +77,12 @@ def read_yaml(path: Path) -> Any:
             raise ConfigurationError(f"{path}: no such configuration file{meant}")
         if path.stat().st_size > MAX_BYTES:
             raise ConfigurationError(f"{path}: larger than {MAX_BYTES} bytes")
-        # a byte order mark, as some editors write it, is no part of the text
+        # utf-8-sig skips a byte order mark, which some editors write
         text = path.read_text(encoding="utf-8-sig")
         _require_plain(text)
         return yaml.load(text, Loader=_PlainLoader)
     except (yaml.YAMLError, ValueError, TypeError, RecursionError) as error:
-        # ValueError: no UTF-8, or a date that is none; TypeError: a key that cannot be one
+        # ValueError: invalid UTF-8 or an impossible date; TypeError: an unhashable key
         message = " ".join(str(error).replace('in "<unicode string>", ', "in ").split())
         raise ConfigurationError(f"{path}: not valid YAML: {message}") from error
     except OSError as error:
@@ -90,7 +90,7 @@ def read_yaml(path: Path) -> Any:
 
 
 def validate(model: type[M], data: Any, source: str) -> M:
-    """``data`` of a file ``source`` as a ``model``; ConfigurationError names key and value."""
+    """Validate ``data`` of the file ``source`` as a ``model``; ConfigurationError for a fault."""
     if not isinstance(data, dict):
         found = "nothing" if data is None else shown(data, 60)
         raise ConfigurationError(f"{source}: a mapping of keys is required, found {found}")
@@ -101,15 +101,15 @@ def validate(model: type[M], data: Any, source: str) -> M:
 
 
 def describe(error: ValidationError, model: type[BaseModel]) -> str:
-    """First fault of a validation (``error``) by ``model`` as ``key = value: what is allowed``."""
-    # a misspelt key is also a missing one: the first says more
+    """First fault of ``error``, from a validation by ``model``, as ``key = value: allowed``."""
+    # a misspelt key also causes a fault "missing", which is less informative
     faults = sorted(error.errors(), key=lambda fault: fault["type"] == "missing")
     fault = faults[0]
     location = fault["loc"]
     names = [str(part) for part in location if part != "constrained-int"]
     key = " ".join(".".join(names).split()) or model.__name__
     message = fault["msg"].removeprefix("Value error, ")
-    # a tuple of Python is a list of YAML
+    # a tuple in Python is a list in YAML
     message = message.replace("valid tuple", "valid list").replace("Tuple should", "List should")
     if fault["type"] == "extra_forbidden":
         owner = _model_at(model, location[:-1])
@@ -121,16 +121,16 @@ def describe(error: ValidationError, model: type[BaseModel]) -> str:
     if fault["type"] == "union_tag_not_found":
         return f"{key}: key {fault['ctx']['discriminator']} is missing"
     if fault["type"] == "value_error" and isinstance(fault["input"], (dict, list, BaseModel)):
-        # the message names what is wrong inside the whole value
+        # the validator's message itself names the fault within the value
         return f"{key}: {message}" if location and not message.startswith(key) else message
     return f"{key} = {shown(fault['input'], 80)}: {message}"
 
 
 def shown(value: Any, width: int) -> str:
-    """``value`` as it stands in a message, on one line and cut to ``width``."""
+    """Text of ``value`` for a message, on one line and cut to ``width`` characters."""
     try:
         return f"{value!r:.{width}}".replace("\n", " ")
-    except ValueError:  # Python writes no integer of more than 4300 digits
+    except ValueError:  # Python does not print integers of more than 4300 digits
         return f"a {type(value).__name__} of {value.bit_length()} bits"
 
 
@@ -157,7 +157,7 @@ def _inner_model(annotation: Any) -> type[BaseModel] | None:
     return models[0] if len(models) == 1 else None
 
 
-# What file systems and system calls take, in bytes.
+# Longest file name and longest path that systems accept, in bytes.
 MAX_NAME, MAX_PATH = 255, 4095
 _SCENE_NAME = re.compile(r"[a-z][a-z0-9_]{0,63}")
 
@@ -172,7 +172,7 @@ def _scene_name(name: str) -> str:
 
 
 def check_lengths(path: str) -> None:
-    """ValueError for a path, or a name in it, that is longer than systems take."""
+    """Raise ValueError if ``path`` or a name in it is longer than systems accept."""
     if len(os.fsencode(path)) > MAX_PATH:
         raise ValueError(f"a path of at most {MAX_PATH} bytes is required")
     for name in PurePath(path).parts:
@@ -181,12 +181,12 @@ def check_lengths(path: str) -> None:
 
 
 def name_of(stem: str) -> str:
-    """A scene's name from ``stem``, its file's name without the ending, as far as allowed."""
+    """Make a valid scene name from ``stem``, the scene's file name without its ending."""
     return re.sub(r"[^a-z0-9_]+", "_", stem.lower()).lstrip("_0123456789")[:64] or "scene"
 
 
 def named(keys: Any, stem: str) -> Any:
-    """``keys`` of a scene's file with a name and a title, made from the file's name ``stem``."""
+    """Add a missing name and title, made from the file name ``stem``, to a scene's ``keys``."""
     if not isinstance(keys, dict):
         return keys
     name = keys.get("name", name_of(stem))

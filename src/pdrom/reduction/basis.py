@@ -26,8 +26,8 @@ class Basis:
     singular_values : all singular values of the weighted, centred train matrix
     rank : number of singular values above round-off; V has no further columns
     roundoff : absolute size of a singular value that is noise
-    active_axes : whether an axis carries anything above round-off
-    origin : what error messages call the basis: its file
+    active_axes : for each axis, whether its snapshots exceed round-off
+    origin : name of the basis in error messages: the path of its file
     """
 
     V: np.ndarray
@@ -48,7 +48,7 @@ class Basis:
         return len(self.mean) // (3 * self.rows_per_element)
 
     def truncated(self, r: int) -> np.ndarray:
-        """First r modes (3 e p, r); RankError if there are fewer."""
+        """Return the first r modes (3 e p, r); RankError if the basis has fewer modes."""
         if not 1 <= r <= self.rank:
             raise RankError(
                 f"{self.origin}: r = {r}, the snapshots have numerical rank {self.rank} "
@@ -71,7 +71,7 @@ def save_basis(basis: Basis, path: str | os.PathLike[str]) -> None:
 
 
 def load_basis(path: str | os.PathLike[str]) -> Basis:
-    """Read the file ``path`` by `save_basis`; StorageError if it is damaged."""
+    """Read the basis file ``path`` that `save_basis` wrote; StorageError if it is damaged."""
     with open_hdf5(path) as file:
         return Basis(
             **{name: file[name][...] for name in _ARRAYS},
@@ -92,7 +92,7 @@ def compute_basis(
     spec: BasisSpec,
     signs: np.random.Generator | None = None,
 ) -> Basis:
-    """Basis of training snapshots.
+    """Compute the POD basis of training snapshots.
 
     Parameters
     ----------
@@ -100,8 +100,8 @@ def compute_basis(
     row_mass : (e p,) kg, used by mass weighting
     roundoff : Frobenius norm of the rounding errors in ``snapshots``
     rows_per_element : p
-    signs : flips the modes at random before "mean-in-modes" adds the mean to them; there the span
-        depends on these arbitrary signs
+    signs : generator of random signs for the modes, applied before "mean-in-modes" adds the first
+        snapshot to them (with that centring the span depends on the signs); None: no flips
     spec : weighting, centring and layout
 
     Raises
@@ -117,13 +117,13 @@ def compute_basis(
     mean, error, shown = np.zeros(len(matrix)), roundoff, matrix
     if spec.centring == "affine":
         mean, error = matrix.mean(axis=1), max(roundoff, _mean_error(matrix))
-        # a constant axis is in the mean already; "mean-in-modes" puts it back into the modes
+        # the mean contains a constant axis already; "mean-in-modes" adds it to the modes again
         shown = matrix - mean[:, None]
     elif spec.centring == "mean-in-modes":
         mean = matrix[:, 0].copy()
     centred = (matrix - mean[:, None]) * scale[:, None]
     noise = error * float(scale.max())
-    # axes that hold more than round-off, of the data or relative to the largest axis
+    # axes whose norm exceeds the data's round-off and is not round-off of the largest axis
     norms = np.array([np.linalg.norm(shown[axis::3]) for axis in range(3)])
     least = max(error, max(shown.shape) * np.finfo(float).eps * norms.max())
     active = tuple(bool(norm > least) for norm in norms)
@@ -136,7 +136,7 @@ def compute_basis(
         rank = numerical_rank(sigma, centred.shape, noise)
     v = modes[:, : rank if any(active) else 0]
     if spec.centring == "mean-in-modes":
-        # orthonormal axis by axis: no more modes than rows
+        # modes that are orthonormal on each axis cannot outnumber the rows
         v = _mean_in_modes(v[:, : len(row_mass)], centred, mean * scale, active, signs)
         mean = np.zeros_like(mean)
     return Basis(
@@ -157,9 +157,9 @@ def basis_of(
     train: np.ndarray | None = None,
     signs: np.random.Generator | None = None,
 ) -> Basis:
-    """Basis ``spec`` of the training snapshots of ``data``; ``signs`` and errors: `compute_basis`.
+    """Compute the basis ``spec`` of the training snapshots of ``data`` by `compute_basis`.
 
-    ``train`` (n, e p, 3) takes their place.
+    ``train`` (n, e p, 3), if given, replaces these snapshots. ``signs``: see `compute_basis`.
     """
     return compute_basis(
         data.train if train is None else train,
@@ -193,7 +193,7 @@ def _check(
 
 
 def _mean_error(matrix: np.ndarray) -> float:
-    """Bound on what a computed mean leaves in the centred matrix, as a Frobenius norm.
+    """Bound the Frobenius norm of the centred matrix's error due to a rounded mean.
 
     A sum of n terms is wrong by at most n eps/2 times the sum of their magnitudes (Higham 2002,
     section 4.2), the same in every column. Without this bound constant snapshots, whose centred
@@ -204,9 +204,9 @@ def _mean_error(matrix: np.ndarray) -> float:
 
 
 def _per_axis(centred: np.ndarray, noise: float) -> tuple[np.ndarray, np.ndarray, list[int]]:
-    """One basis per axis, stored side by side, and their ranks; zero modes beyond an axis's rank.
+    """Return one POD basis per axis as (modes, singular values, rank of each axis).
 
-    The k-th singular value is the norm of the three axes' k-th ones.
+    Modes beyond an axis's rank are zero; singular value k is the norm of the axes' k-th values.
     """
     n, m = centred.shape
     modes = np.zeros((n, min(n // 3, m)))
@@ -227,10 +227,10 @@ def _mean_in_modes(
     active: tuple[bool, ...],
     signs: np.random.Generator | None,
 ) -> np.ndarray:
-    """The published code's modes: rescaled, first snapshot added to each, QR axis by axis.
+    """Return the published code's modes: rescaled, plus the first snapshot, then QR on each axis.
 
-    As there, an axis that holds fewer independent columns than modes gets the completion that the
-    Householder vectors happen to give: orthonormal, but not from data.
+    As in that code, an axis with fewer independent columns than modes is completed by arbitrary
+    Householder vectors, which are orthonormal but do not come from the data.
     """
     if v.shape[1] == 0:
         return v
@@ -245,7 +245,7 @@ def _mean_in_modes(
 
 
 def pod(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Left singular vectors (n, m) and singular values (m,) of ``matrix`` (n, m), n >= m or not.
+    """Left singular vectors and singular values of ``matrix`` (n, m), min(n, m) of each.
 
     A tall matrix is first reduced by a QR factorisation, A = Q R, and R is decomposed: backward
     stable like the SVD of A itself (Chan 1982), unlike the eigenvalues of A^T A, which lose all
@@ -261,7 +261,7 @@ def pod(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def fix_signs(u: np.ndarray) -> np.ndarray:
-    """Columns of ``u`` (n, m) with their entry of largest magnitude made positive.
+    """Return ``u`` (n, m), each column's sign chosen so that its largest entry is positive.
 
     Magnitudes are compared after rounding to single precision, so that entries which are equal up
     to round-off tie and the first of them decides.
@@ -273,23 +273,23 @@ def fix_signs(u: np.ndarray) -> np.ndarray:
     return u * np.where(signs == 0.0, 1.0, signs)
 
 
-# Largest |Q_1^T Q_1 - I| that counts as good: round-off leaves 1e-14 to 1e-13, a factor L of
-# condition 1e2 about 1e-12.
+# Largest |Q_1^T Q_1 - I| at which `thin_qr` accepts Q_1 as orthonormal. Round-off alone gives
+# 1e-14 to 1e-13, an LU factor L with condition number 1e2 gives about 1e-12.
 DEPARTURE = 1e-12
 
 
 def thin_qr(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Q_1 (n, m), R_2 (m, m) and R (m, m) of A = ``matrix`` (n, m), n > m: A = (Q_1 R_2^-1) R.
+    """Factor A = ``matrix`` (n, m), n > m, as (Q_1 R_2^-1) R; return Q_1, R_2 (m, m), R (m, m).
 
-    Q_1 R_2^-1 has orthonormal columns up to round-off, also where A has no full rank. It is not
-    formed: what comes next multiplies it by something, and that is better done to R_2^-1 first.
+    Q_1 R_2^-1 has orthonormal columns up to round-off, also where A has no full rank. The product
+    is not formed: a caller multiplies it by a small matrix, and R_2^-1 times that costs less.
 
-    Householder's reflections go through A once a column and wait for memory. Here (Terao, Ozaki and
+    Householder reflections read A once per column and wait for memory. Here (Terao, Ozaki and
     Ogita 2020) LU with partial pivoting, A = P L U, leaves a well-conditioned L, and two Cholesky
     factorisations of Gram matrices make it orthonormal: L = Q_1 R_1, Q_1 = Q R_2, R = R_2 R_1 U.
-    That L is well-conditioned is no theorem: where Q_1 is not orthonormal up to `DEPARTURE`,
-    reflections do it. Where it is, the error of R is that of the LU factorisation, some eps cond(L)
-    of each column of A.
+    L need not be well-conditioned: if Q_1 is not orthonormal up to `DEPARTURE`, Householder
+    reflections factor A instead. Otherwise R has the error of the LU factorisation, about
+    eps cond(L) relative to each column of A.
     """
     lower, swaps, _ = linalg.lapack.dgetrf(np.array(matrix, order="F"), overwrite_a=True)
     m = matrix.shape[1]
@@ -315,7 +315,7 @@ def _by_reflections(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndar
 
 
 def numerical_rank(singular_values: np.ndarray, shape: tuple[int, int], roundoff: float) -> int:
-    """Number of ``singular_values`` (n,) of a matrix of that ``shape`` above both round-off levels.
+    """Count the ``singular_values`` (n,) of a matrix of ``shape`` above both round-off levels.
 
     The relative level max(shape) eps sigma_1 is the backward error of the SVD. The absolute level
     ``roundoff`` is the error of the data themselves: where a projection is the difference of

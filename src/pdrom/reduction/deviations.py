@@ -1,7 +1,7 @@
-"""Deviations of a run from the full order in what users look at: by frame, and as errors.
+"""Deviations of a run from the full-order run: norms for each frame, and errors over the run.
 
-Beside the positions these are the velocities, the shape (what the best rigid motion of each frame,
-Kabsch 1976, leaves of the difference), the total energy, and when an obstacle is first touched.
+Compared are positions, velocities, shapes (the difference after the best rigid motion of each
+frame, Kabsch 1976), the total energy, and the frame in which an obstacle is first touched.
 """
 
 from collections.abc import Mapping
@@ -15,13 +15,13 @@ from pdrom.model.metrics import shape_differences, trajectory_error
 from pdrom.model.scene import Scene
 from pdrom.reduction.rerun import Rerun, displacement_norms, step_norms
 
-# Frames that are compared at a time: the memory for it does not grow with the run.
+# Number of frames compared at a time, so that the memory used does not grow with the run.
 BLOCK = 32
-# A vertex that is closer to an obstacle than this part of the extent touches it; in a subspace
-# vertices do not end on its surface.
+# A vertex closer to an obstacle than this fraction of the mesh extent touches it: a subspace
+# does not place vertices exactly on the surface.
 TOUCH = 1e-3
 
-# What is stored of the full order and of a run.
+# Names of the series that are stored for the full-order run, and for each other run.
 REFERENCE = ("displacement", "step", "energy", "contact")
 DEVIATIONS = ("difference", "shape_difference", "step_difference", "energy", "contact")
 ERRORS = (
@@ -32,10 +32,10 @@ Series = Mapping[str, np.ndarray]
 
 
 class Yardstick:
-    """A full-order run, by which other runs of its scene are measured.
+    """A full-order run with which other runs of its scene are compared.
 
-    scene : of the run
-    reference : (F + 1, N, 3) m, its positions, the initial ones first
+    scene : scene of the full-order run
+    reference : (F + 1, N, 3) m, positions of the full-order run, the initial ones first
     """
 
     def __init__(self, scene: Scene, reference: np.ndarray) -> None:
@@ -43,17 +43,17 @@ class Yardstick:
 
     @cached_property
     def displacement(self) -> np.ndarray:
-        """Displacements by frame (F,) m, see `displacement_norms`."""
+        """Displacement norm of each frame, (F,) m, see `displacement_norms`."""
         return displacement_norms(self.reference)
 
     @cached_property
     def scale(self) -> EnergyScale:
-        """Energy by which those of runs are divided."""
+        """Energy scale by which the energies of runs are divided."""
         return EnergyScale.of(self.scene, self.reference)
 
     @cached_property
     def series(self) -> dict[str, np.ndarray]:
-        """Series of the full-order run that `errors_within` asks for.
+        """Per-frame series of the full-order run for the argument ``reference`` of `errors_within`.
 
         ``displacement`` and ``step`` (F,) m, the latter the time step times the velocities;
         ``energy`` and ``contact`` as in `deviations`.
@@ -68,21 +68,21 @@ class Yardstick:
 
     @property
     def units(self) -> dict[str, float]:
-        """Extent norm, m, and time step, s, which `errors_within` needs with the series.
+        """Extent norm, m, and time step, s: keyword arguments of `errors_within`.
 
-        The norm is that of a frame whose vertices are all off by the extent of the mesh.
+        The extent norm is sqrt(N) times the mesh extent: every vertex is off by the extent.
         """
         norm = self.scene.mesh.extent * float(np.sqrt(self.reference.shape[1]))
         return {"extent_norm": norm, "time_step": self.scene.config.time_step}
 
     def deviations(self, outcome: Rerun) -> dict[str, np.ndarray]:
-        """Series of a run, its ``outcome``.
+        """Per-frame deviations of a run with the result ``outcome``.
 
         Returns
         -------
         ``difference``, ``shape_difference`` and ``step_difference`` (F',) m of positions, shapes
-        and steps; ``energy`` at every `STRIDE`-th frame over the largest of the full order, empty
-        if that has none; ``contact`` (F',), 1 where an obstacle is touched.
+        and steps; ``energy`` of every `STRIDE`-th frame divided by `scale`, empty if the scene has
+        no energy; ``contact`` (F',), 1 where an obstacle is touched.
         """
         steps, shapes, contacts = [], [], []
         with np.errstate(over="ignore", invalid="ignore"):
@@ -99,14 +99,14 @@ class Yardstick:
         }
 
     def errors(self, outcome: Rerun) -> dict[str, float | None]:
-        """Errors of a whole run ``outcome`` by the names of their columns, see `errors_within`."""
+        """Errors of the whole run ``outcome`` by column name, see `errors_within`."""
         end = len(self.displacement)
         return errors_within(self.deviations(outcome), self.series, end, **self.units)
 
     def _touched(self, positions: np.ndarray) -> np.ndarray:
-        """Whether a vertex of frames (f, N, 3) m touches an obstacle, (f,) of 0 and 1.
+        """Return for each frame of ``positions`` (f, N, 3) m 1 if it touches an obstacle, else 0.
 
-        Those that touch it at the start do not count.
+        Vertices that touch the obstacle at the start are ignored.
         """
         near = TOUCH * self.scene.mesh.extent
         touched = np.zeros(len(positions), dtype=np.uint8)
@@ -120,9 +120,9 @@ class Yardstick:
 def errors_within(
     run: Series, reference: Series, end: int, extent_norm: float, time_step: float
 ) -> dict[str, float | None]:
-    """Errors over the frames before ``end`` by the names of their columns.
+    """Return the errors over the frames before ``end``, by column name.
 
-    None for a run that ended before, and for a quantity that the full order does not have.
+    An error is None if the run ended earlier or the full-order run lacks the quantity.
 
     Parameters
     ----------
@@ -132,10 +132,10 @@ def errors_within(
     if len(run["difference"]) < end:
         return dict.fromkeys(ERRORS)
     displacement, shape = reference["displacement"], run["shape_difference"]
-    drift, count = None, end // STRIDE + 1  # the first energy is that of the start
+    drift, count = None, end // STRIDE + 1  # the first energy belongs to the start
     if count > 1 and len(reference["energy"]):
         drift = float(np.abs(run["energy"][:count] - reference["energy"][:count]).max())
-    # the first contact: late, never (inf), or one that should not come (-inf)
+    # delay of the first contact; inf: it is missing, -inf: the full-order run has none
     first, wanted = (
         float(np.argmax(touched)) if np.any(touched) else np.inf
         for touched in (run["contact"][:end], reference["contact"][:end])
@@ -158,7 +158,7 @@ def errors_within(
 
 
 def error_within(difference: np.ndarray, displacement: np.ndarray, end: int) -> float | None:
-    """Relative error over the frames before ``end``; None if the run did not get there.
+    """Relative error over the frames before ``end``; None if the run ended earlier.
 
     Parameters
     ----------
@@ -170,7 +170,7 @@ def error_within(difference: np.ndarray, displacement: np.ndarray, end: int) -> 
 
 
 def _blocks(positions: np.ndarray, reference: np.ndarray) -> list[tuple[Any, Any]]:
-    """Views of the same frames of both runs; each begins with the last frame of the one before."""
+    """Split both runs into blocks of the same frames; a block repeats its predecessor's last."""
     starts = range(0, max(len(positions) - 1, 1), BLOCK)
     ends = (min(start + BLOCK + 1, len(positions)) for start in starts)
     return [(positions[s:e], reference[s:e]) for s, e in zip(starts, ends, strict=True)]

@@ -1,6 +1,6 @@
 """A reduction method is a combination of ingredients; the presets are named combinations.
 
-The code of a selection is loaded when a method uses it.
+The module of a sample selection is imported only when a method uses it.
 """
 
 import re
@@ -53,7 +53,7 @@ class BasisSpec(ConfigModel):
 
     @property
     def separate_axes(self) -> bool:
-        """Whether the basis itself is orthonormal axis by axis, not as a whole."""
+        """Whether the modes are orthonormal on each axis instead of as whole vectors."""
         return self.layout == "per-axis" or self.centring == "mean-in-modes"
 
 
@@ -126,25 +126,25 @@ class MethodSpec(BasisSpec):
 
     @property
     def modules(self) -> list[str]:
-        """Places of the code that the method names (for fingerprints), "module:attribute"."""
+        """Selections that the method uses, as "module:attribute", for fingerprints of the code."""
         selects = self.rows in ("scalar", "element") or self.oversampling > 1
         return [SELECTIONS[self.selection]] if selects else []
 
     @property
     def may_oversample(self) -> bool:
-        """Whether there can be more samples than modes, as many as a bound of the gain needs."""
+        """Whether the method may take more samples than modes, to bound the gain."""
         return self.rows in ("scalar", "element") and self.solve != "square"
 
     @property
     def per_axis(self) -> bool:
-        """Whether each axis has coefficients of its own."""
+        """Whether each axis has its own coefficients."""
         if self.coefficients is not None:
             return self.coefficients == "per-axis"
         return self.rows == "joint" or self.separate_axes
 
 
 def load_methods(path: Path) -> dict[str, MethodSpec]:
-    """Methods of the file ``path`` (methods.yaml) by name; ConfigurationError for any fault."""
+    """Read the methods in ``path`` (methods.yaml) by name; ConfigurationError for any fault."""
     content = read_yaml(path)
     if not isinstance(content, dict) or not content:
         raise ConfigurationError(f"{path}: a mapping of method names is required")

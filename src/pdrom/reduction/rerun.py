@@ -12,13 +12,13 @@ from pdrom.model.runs import BoundedRun
 
 @dataclass(frozen=True)
 class Rerun:
-    """Outcome of a reduced run; a run that blows up ends there and is a result like any other.
+    """Result of a reduced run; a run that blows up ends in that frame and is also a result.
 
     positions : (F' + 1, N, 3) m, the initial ones first; only finite frames
     difference : (F',) || Q_red - Q_fom ||_F of each frame, m
-    extent : (F',) longest side of the bounding box over the rest extent
+    extent : (F',) longest side of each frame's bounding box divided by the rest shape's
     blowup_frame : first frame whose extent exceeds the limit or is not finite, else None
-    coordinates : (F' + 1, K, 3) of the step loop; the positions themselves outside a subspace
+    coordinates : (F' + 1, K, 3) unknowns of the step loop; without a subspace, the positions
     """
 
     positions: np.ndarray
@@ -36,16 +36,16 @@ class Rerun:
 
     @property
     def finite(self) -> bool:
-        """Whether it did not blow up."""
+        """Whether the run did not blow up."""
         return self.blowup_frame is None
 
     @property
     def max_extent(self) -> float:
-        """Largest extent of the run."""
+        """Largest entry of ``extent``, 0 for a run without frames."""
         return float(self.extent.max(initial=0.0))
 
     def row(self, displacement: np.ndarray) -> dict[str, Any]:
-        """Outcome of the run and its error; ``displacement`` see `error`."""
+        """Table row with the result of the run and its error; ``displacement`` as in `error`."""
         return {
             "frames": self.frames,
             "finite": self.finite,
@@ -55,11 +55,11 @@ class Rerun:
         }
 
     def error(self, displacement: np.ndarray) -> float | None:
-        """Relative error over the whole run; None if it ended early.
+        """Relative error over the whole run; None if the run ended early.
 
         Parameters
         ----------
-        displacement : (F,) of the full-order run, see `displacement_norms`
+        displacement : (F,) m, `displacement_norms` of the full-order run
         """
         if not self.finite or self.frames < len(displacement):
             return None
@@ -67,7 +67,7 @@ class Rerun:
 
 
 def compare(run: BoundedRun, reference: np.ndarray) -> Rerun:
-    """Do a run and compare it with ``reference``, (F + 1, N, 3) positions of the full-order run."""
+    """Execute ``run`` and compare it with the full-order positions ``reference`` (F + 1, N, 3)."""
     coordinates = [run.state.positions]
     positions = [run.positions(run.state.positions)]
     difference, extents = [], []
@@ -88,19 +88,19 @@ def compare(run: BoundedRun, reference: np.ndarray) -> Rerun:
 
 
 def displacement_norms(reference: np.ndarray) -> np.ndarray:
-    """|| Q_fom - rest ||_F of the frames of ``reference`` (F + 1, N, 3) but the first, (F,) m."""
+    """|| Q_fom - Q_0 ||_F of each frame after the first of ``reference`` (F + 1, N, 3), (F,) m."""
     return np.linalg.norm((reference[1:] - reference[0]).reshape(len(reference) - 1, -1), axis=1)
 
 
 def step_norms(positions: np.ndarray) -> np.ndarray:
     """|| Q^(n + 1) - Q^n ||_F of each frame of ``positions`` (F + 1, N, 3) m, (F,) m.
 
-    These are the velocities of the step loop times h; for the difference of two runs
-    (F + 1, N, 3), the differences of their velocities.
+    A step is the velocity times the time step h. For the difference of the positions of two
+    runs, the result is the norm of the difference of their velocities times h.
     """
     return np.linalg.norm(np.diff(positions, axis=0), axis=(1, 2))
 
 
 def mean_motion(reference: np.ndarray) -> float:
-    """Root mean square, m, of `displacement_norms` of ``reference`` (F + 1, N, 3) over frames."""
+    """Root mean square over frames, m, of `displacement_norms` of ``reference`` (F + 1, N, 3)."""
     return float(np.sqrt(np.mean(displacement_norms(reference) ** 2)))

@@ -1,4 +1,4 @@
-"""Snapshots of projections: which frames train, which test, and the matrices of a group."""
+"""Snapshots of a group's projections: choice of training and test frames, reading and storing."""
 
 import os
 from dataclasses import dataclass
@@ -14,26 +14,26 @@ SPLITS = ("train", "test", "heldout")
 
 
 def training_frames(frames: int, count: int) -> np.ndarray:
-    """``count`` even frames, spread evenly over the run (n,) int64."""
+    """Numbers (count,) int64 of ``count`` even frames, spread evenly over ``frames`` frames."""
     even = np.arange(0, frames, 2)
     return even[np.round(np.linspace(0, len(even) - 1, count)).astype(np.int64)]
 
 
 def test_frames(frames: int) -> np.ndarray:
-    """The odd frames (n,) int64."""
+    """Numbers (n,) int64 of the odd ones among ``frames`` frames."""
     return np.arange(1, frames, 2)
 
 
 def stored_frames(frames: int, count: int) -> np.ndarray:
-    """Frames of the training run (``frames``) needed for ``count`` snapshots, ascending."""
+    """Numbers of the training and test frames of a run of ``frames`` frames, ascending."""
     return np.sort(np.concatenate([training_frames(frames, count), test_frames(frames)]))
 
 
 def row_masses(group: ConstraintGroup, masses: np.ndarray) -> np.ndarray:
     """Lumped mass (e p,) kg of each operator row of ``group``, from vertex ``masses`` (N,) kg.
 
-    Every vertex hands its mass out in equal parts to the elements that touch it, so that the masses
-    of the elements sum to those of the touched vertices; each row of an element carries it.
+    Every vertex divides its mass equally among the elements that touch it, so that the element
+    masses sum to the mass of the touched vertices; each row has the mass of its element.
     """
     element = touched_vertices(group)
     valence = np.asarray(element.sum(axis=0)).ravel()
@@ -50,7 +50,7 @@ def touched_vertices(group: ConstraintGroup) -> sparse.csr_array:
 
 @dataclass(frozen=True)
 class SnapshotSet:
-    """Snapshots (n, e p, 3) of one group, and the size of their round-off.
+    """Training, test and held-out snapshots (n, e p, 3) of one group, and their round-off.
 
     ``roundoff`` is the Frobenius norm of the rounding errors of the train matrix: a singular value
     below it is noise.
@@ -79,7 +79,7 @@ def collect(
     ----------
     training_run, heldout_run : files of the two full-order runs
     masses : (N,) kg
-    train : (n,) frames that train, ascending
+    train : (n,) numbers of the training frames, ascending
 
     Raises
     ------
@@ -129,7 +129,7 @@ def save_snapshots(snapshots: SnapshotSet, path: str | os.PathLike[str]) -> None
 
 
 def load_snapshots(path: str | os.PathLike[str]) -> SnapshotSet:
-    """Read the file ``path`` by `save_snapshots`; StorageError if it is damaged."""
+    """Read the file ``path`` that `save_snapshots` wrote; StorageError if it is damaged."""
     with open_hdf5(path) as file:
         return SnapshotSet(
             **{split: file[split][...] for split in SPLITS},

@@ -1,1 +1,1 @@
-"""A page on which runs are looked at: one file, no network, drawn as `study.live` draws."""
+"""Pictures of runs, and a self-contained HTML page that shows them in a browser."""

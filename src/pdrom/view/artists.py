@@ -1,4 +1,4 @@
-"""Types of matplotlib by which figures are annotated; at run time they stand for nothing.
+"""Matplotlib types for annotations of figures; at run time they are placeholders.
 
 Every plan imports every figure, and only a job that draws one needs the library: modules of figures
 take its types from here, and import what they call inside the function that calls it.

@@ -1,4 +1,4 @@
-"""Orthographic camera, the window of a picture, what is up in it, and obstacles in view."""
+"""Orthographic camera, window of a picture, upward direction, and obstacles in view."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from pdrom.model.effects.base import EffectConfig
 from pdrom.model.effects.forces import Gravity
 from pdrom.model.mesh.types import Mesh
 
-ROOM = 0.2  # margin around a run, over its longest side
+ROOM = 0.2  # margin around a run, relative to its longest side
 Y = np.array([0.0, 1.0, 0.0])
 
 
@@ -34,7 +34,7 @@ class Window(NamedTuple):
         return self.top - self.bottom
 
     def contains(self, flat: np.ndarray) -> np.ndarray:
-        """Mark the picture points ``flat`` (n, 2) that lie inside, (n,) bool."""
+        """Return for each picture point of ``flat`` (n, 2) m whether it lies inside, (n,) bool."""
         x, y = flat.T
         return (x >= self.left) & (x <= self.right) & (y >= self.bottom) & (y <= self.top)
 
@@ -70,24 +70,24 @@ class Camera:
         return points @ self.basis[:2].T
 
     def depth(self, points: np.ndarray) -> np.ndarray:
-        """Distance of ``points`` (n, 3) m towards the eye (n,), m: larger is nearer."""
+        """Coordinate (n,) m of ``points`` (n, 3) m towards the eye; larger is nearer to it."""
         return points @ self.basis[2]
 
 
 def bounds(flat: np.ndarray, margin: float = 0.08) -> Window:
-    """Smallest window of picture points ``flat`` (n, 2), with a relative ``margin`` around."""
+    """Smallest window around picture points ``flat`` (n, 2) m, widened by a relative ``margin``."""
     low, high = flat.min(axis=0), flat.max(axis=0)
     pad = margin * max(float((high - low).max()), 1e-12)
     return Window(low[0] - pad, high[0] + pad, low[1] - pad, high[1] + pad)
 
 
 def window_of(camera: Camera, clouds: Iterable[np.ndarray], margin: float = 0.08) -> Window:
-    """Window by ``camera`` that shows all ``clouds`` (n, 3); ``margin`` as in `bounds`."""
+    """Window in which ``camera`` sees all points of ``clouds`` (n, 3) m; ``margin``: `bounds`."""
     return bounds(np.concatenate([camera.project(cloud) for cloud in clouds]), margin)
 
 
 def up_of(effects: Sequence[EffectConfig]) -> np.ndarray:
-    """Unit vector (3,) against the gravity among ``effects`` of a scene; y where it has none."""
+    """Unit vector (3,) opposite to the gravity in a scene's ``effects``; y without gravity."""
     pull = sum(
         (np.array(e.acceleration) for e in effects if isinstance(e, Gravity.Config)), 0.0 * Y
     )
@@ -96,7 +96,7 @@ def up_of(effects: Sequence[EffectConfig]) -> np.ndarray:
 
 
 def rotation_to(up: np.ndarray) -> np.ndarray:
-    """The smallest rotation (3, 3) that takes y to the unit vector ``up``; half a turn about x."""
+    """Smallest rotation (3, 3) that takes y to the unit vector ``up``; about x if ``up`` is -y."""
     cosine = float(up @ Y)
     if cosine <= -1.0 + 1e-12:
         return np.diag([1.0, -1.0, -1.0])
@@ -105,7 +105,7 @@ def rotation_to(up: np.ndarray) -> np.ndarray:
     if square == 0.0:
         return np.eye(3)
     turn = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    # not divided by 1 + cosine, which loses all digits near half a turn
+    # 1 + cosine as a divisor would lose all digits near half a turn
     return np.eye(3) + turn + turn @ turn * ((1.0 - cosine) / square)
 
 
@@ -131,7 +131,7 @@ def shown_region(
 
 
 def obstacles(positions: np.ndarray, effects: Sequence[EffectConfig]) -> list[Mesh]:
-    """Surfaces of the obstacles near a run, see `shown_region`; the largest, behind, first."""
+    """Surfaces of obstacles in the `shown_region` of a run, largest first (to be drawn behind)."""
     region = shown_region(positions, effects)
     found = [body for effect in effects if (body := effect.body(*region))]
     return sorted(found, key=lambda body: -float(np.ptp(body.points, axis=0).max()))

@@ -1,4 +1,4 @@
-"""A picture of four frames of a scene: the full-order run, and below it each other run."""
+"""Picture of four frames of a scene: a row for the full-order run, below it one per other run."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -18,8 +18,8 @@ from pdrom.view.text import plain_words
 
 INSTANTS = (0.25, 0.5, 0.75, 1.0)  # fractions of the run
 CAMERA = Camera(30.0, 20.0)
-NO_LIMIT = 100.0  # inches: the picture need not fit on a page
-SHOWN = 20  # modes
+NO_LIMIT = 100.0  # inches, largest height of the picture
+SHOWN = 20  # largest number of modes r that a picture shows
 
 
 def write_frames(scene: ViewedScene, png: Path) -> None:
@@ -30,18 +30,18 @@ def write_frames(scene: ViewedScene, png: Path) -> None:
 
 
 def shown(sizes: Sequence[ViewedRun]) -> ViewedRun:
-    """Choose the largest of some sizes (ascending) up to `SHOWN`, else the smallest."""
+    """Choose, from runs by ascending size r, the largest with r <= `SHOWN`, else the smallest."""
     return ([run for run in sizes if run.r <= SHOWN] or sizes[:1])[-1]
 
 
 def shown_runs(scene: ViewedScene) -> list[ViewedRun]:
-    """One run of each group and method of ``scene``, of the size that pictures show."""
+    """One run per group and method of ``scene``, of the size that `shown` chooses."""
     pairs = dict.fromkeys((run.group, run.method) for run in scene.runs)
     return [shown(scene.sizes(*pair)) for pair in pairs]
 
 
 def _upright(scene: ViewedScene) -> tuple[ViewedScene, list[Mesh]]:
-    """Turn ``scene`` so that y is up; also its obstacles, the largest, which are behind, first."""
+    """Return ``scene`` turned so that y is up, and its turned obstacles, the largest first."""
     turn = rotation_to(up_of(scene.effects))
     runs = tuple(replace(run, positions=run.positions @ turn) for run in scene.runs)
     turned = replace(scene, positions=scene.positions @ turn, runs=runs)
@@ -50,7 +50,7 @@ def _upright(scene: ViewedScene) -> tuple[ViewedScene, list[Mesh]]:
 
 
 def _draw(scene: ViewedScene) -> Figure:
-    """One row per run; the grey outline in the rows below is the first run."""
+    """Draw one row per run; the grey outline in reduced rows is the full-order run."""
     scene, bodies = _upright(scene)
     numbers = frame_numbers(INSTANTS, len(scene.positions) - 1)
     full = scene.positions[numbers].astype(float)
@@ -75,7 +75,7 @@ def _draw(scene: ViewedScene) -> Figure:
 
 
 def panel_of(run: ViewedRun, frame: int) -> RunPanel:
-    """Panel of ``run`` at ``frame``, or at its last one with what went wrong."""
+    """Panel of ``run`` at ``frame``; of a run that ended earlier, its last frame and the reason."""
     last = len(run.positions) - 1
     failure = f"blew up at frame {run.blowup_frame}" if run.blowup_frame is not None else "ended"
     positions = run.positions[min(frame, last)].astype(float)
@@ -90,7 +90,7 @@ def _panel(run: ViewedRun, frame: int) -> RunPanel:
 
 
 def _colour(group: str) -> tuple[float, float, float]:
-    """Colour of a constraint group, by its place among all; of all groups the first one."""
+    """Colour of the constraint group by its index in `EFFECTS`; the first for unknown names."""
     groups = [name for name in EFFECTS if issubclass(EFFECTS.load(name), ConstraintGroup)]
     looks, place = style.GROUP_LOOKS, groups.index(group) if group in groups else 0
     return style.surface_colour(looks[place % len(looks)][0])

@@ -1,7 +1,7 @@
 """Constrained layout whose positions are the same in every process.
 
-Its solver sums in the order of addresses in memory, so that positions differ in their last bits
-from one drawing to the next, and now and then a digit of a file with them.
+Matplotlib's layout solver sums in the order of memory addresses, so that positions differ in their
+last bits between drawings, which sometimes changes a digit in the file.
 """
 
 from typing import Any
@@ -18,11 +18,11 @@ class RoundedLayout(ConstrainedLayoutEngine):
     """Constrained layout that rounds positions to `DIGITS`."""
 
     def execute(self, fig: Figure) -> Any:
-        """Lay out ``fig``."""
+        """Lay out ``fig`` and round the positions of its axes; return the base class's result."""
         grids = super().execute(fig)
         for ax in fig.axes:
             kept = ax.get_in_layout()
             place = np.round(ax.get_position(original=True).extents, DIGITS)
             ax.set_position(Bbox.from_extents(*place), which="original")
-            ax.set_in_layout(kept)  # which a position of one's own ends
+            ax.set_in_layout(kept)  # `set_position` has reset it
         return grids

@@ -11,25 +11,25 @@ from pdrom.view.artists import Axes, PolyCollection
 from pdrom.view.camera import Camera, Window
 
 AMBIENT = 0.45
-RASTER_ABOVE = 1000  # faces; more are drawn as pixels, to keep the PDF small
-SHARP = np.cos(np.radians(80.0))  # edges between faces that turn more are drawn as outline
+RASTER_ABOVE = 1000  # number of faces above which they are rasterised, to keep the PDF small
+SHARP = np.cos(np.radians(80.0))  # cosine of the dihedral turn above which an edge is outlined
 # directions towards the lights in the camera's frame, and their strengths
 LIGHTS = (((-0.35, 0.45, 0.82), 0.85), ((0.80, -0.10, 0.59), 0.30))
-BACK = 0.78  # how much of the colour the back of an open surface keeps
+BACK = 0.78  # factor that darkens the back of an open surface
 FLOOR, FLOOR_LINE, SHADOW = "#F4F2EE", "#DEDAD2", "#D3CFC6"
-GHOST = "#4D4D4D"  # an outline to compare with
+GHOST = "#4D4D4D"  # outline of a reference shape
 
 Colour = str | tuple[float, float, float]
 
 
 def face_normals(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Unit normals (T, 3) of ``triangles`` (T, 3) of ``points`` (N, 3); zero without area."""
+    """Unit normals (T, 3) of ``triangles`` (T, 3) of ``points`` (N, 3); zero for no area."""
     a, b, c = (points[triangles[:, i]] for i in range(3))
     return _unit(np.cross(b - a, c - a))
 
 
 def smooth_normals(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Face normals (T, 3) averaged over the neighbourhood of each face; as `face_normals`.
+    """Unit normals (T, 3) of faces, averaged over the neighbouring faces; zero for no area.
 
     ``points`` are (N, 3), ``triangles`` (T, 3).
     """
@@ -43,7 +43,7 @@ def smooth_normals(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 def shade(normals: np.ndarray, camera: Camera) -> np.ndarray:
     """Brightness (T,) of faces with unit ``normals`` (T, 3), in [AMBIENT, 1], two-sided.
 
-    Lights go with the ``camera``.
+    The lights are fixed relative to the ``camera``.
     """
     view = normals @ camera.basis.T
     lit = np.zeros(len(normals))
@@ -72,11 +72,11 @@ def draw_surface(
 ) -> PolyCollection:
     """Draw the shaded surface of ``mesh`` on ``ax``, as ``camera`` sees it.
 
-    That of a volume is closed; an open one is shaded smoothly and shows a darker back.
+    The surface of a volume is closed; an open surface is shaded smoothly, its back darker.
 
     Parameters
     ----------
-    points : (N, 3) m, finite, of the vertices
+    points : (N, 3) m, finite, positions of the vertices
     colour : one colour, or one RGB row per face (T, 3)
     wire : opacity of the wireframe, 0 for none
     contrast : 1 for the full shading, less where colours carry numbers
@@ -108,12 +108,12 @@ def draw_surface(
 
 
 def draw_floor(ax: Axes, points: np.ndarray, mesh: Mesh, camera: Camera, window: Window) -> None:
-    """Draw the floor y = 0 under ``mesh``, with its shadow, where it is in view.
+    """Draw the floor y = 0 with the shadow of ``mesh``, if the floor is in view.
 
     Parameters
     ----------
     ax, camera, window : picture and its view
-    points : (N, 3) m of the vertices
+    points : (N, 3) m, positions of the vertices
     """
     from matplotlib.collections import PolyCollection
 
@@ -164,7 +164,7 @@ def silhouette_edges(points: np.ndarray, triangles: np.ndarray, camera: Camera) 
 
 
 def _edges_between(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Edges (n, 2) and the two triangles (n,) at each; on the boundary the same one twice."""
+    """Edges (n, 2) and their two triangles (n,) each; a boundary edge has the same one twice."""
     pairs = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     owner = np.repeat(np.arange(len(triangles)), 3)
     edges, inverse, count = np.unique(pairs, axis=0, return_inverse=True, return_counts=True)
@@ -174,7 +174,7 @@ def _edges_between(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.nd
 
 
 def draw_outline(ax: Axes, points: np.ndarray, edges: np.ndarray, camera: Camera) -> None:
-    """Draw a thin outline on ``ax``, the ghost of a shape to compare with.
+    """Draw the thin outline of a reference shape on ``ax``.
 
     ``points`` (N, 3) m are joined by ``edges`` (n, 2), as ``camera`` sees them.
     """
@@ -188,7 +188,7 @@ def draw_outline(ax: Axes, points: np.ndarray, edges: np.ndarray, camera: Camera
 def draw_lines(ax: Axes, segments: np.ndarray, camera: Camera, colours: np.ndarray) -> None:
     """Draw coloured ``segments`` (n, 2, 3) m on ``ax`` from far to near, as ``camera`` sees them.
 
-    ``colours`` (n, 4) are theirs, RGBA.
+    ``colours`` (n, 4) are the RGBA colours of the segments.
     """
     from matplotlib.collections import LineCollection
 

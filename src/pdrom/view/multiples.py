@@ -1,4 +1,4 @@
-"""Small multiples: one panel per experiment, equal axes, one legend."""
+"""Figures of many small panels with equal axes and one legend, and helpers for their axes."""
 
 from collections.abc import Iterable
 
@@ -14,7 +14,7 @@ NEAR = 0.05  # of the axis: markers closer than this share a label
 def small_multiples(
     count: int, columns: int, legend_rows: int = 1, height: float = PANEL_HEIGHT
 ) -> tuple[Figure, list[Axes]]:
-    """Figure with ``count`` panels in ``columns`` that share the y axis, none left over.
+    """Create a figure with ``count`` panels in ``columns`` columns that share the y axis.
 
     A row is ``height`` inches high; ``legend_rows`` are left for a legend.
     """
@@ -24,7 +24,7 @@ def small_multiples(
 
 
 def rows_of(count: int, columns: int) -> int:
-    """Number of rows of ``count`` panels in ``columns``."""
+    """Number of rows that ``count`` panels need in ``columns`` columns."""
     return -(-count // min(columns, count))
 
 
@@ -47,7 +47,7 @@ def panels(
 
 
 def label_outer(axes: list[Axes], columns: int, x: str, y: str) -> None:
-    """Label ``axes`` in ``columns``: ``y`` on the left, ``x`` on the lowest panel of each one."""
+    """Write label ``y`` on the leftmost of ``axes`` and ``x`` on the lowest of each column."""
     columns = min(columns, len(axes))
     for i, ax in enumerate(axes):
         if i % columns == 0:
@@ -83,7 +83,7 @@ def time_axis(ax: Axes, times: np.ndarray) -> None:
 
 
 def plain_ticks(axis: Axis, decades: float) -> None:
-    """Plain numbers on a logarithmic axis that spans ``decades``: two at least."""
+    """Put at least two plain numbers on a logarithmic ``axis`` that spans ``decades``."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
     steps = [(0.4, (1, 1.5, 2, 3, 5, 7)), (0.7, (1, 2, 3, 5)), (1.3, (1, 2, 5)), (2.0, (1, 3))]
@@ -104,7 +104,7 @@ def rim_arrows(
     across: tuple[float, float],
     along: tuple[float, float],
 ) -> None:
-    """Draw arrows on the rim of ``ax`` for points outside, ``across`` in x and ``along`` in y.
+    """Draw arrows on the rim of ``ax`` for points outside limits ``across`` x and ``along`` y.
 
     Points are at ``x``, ``y`` and have one ``colour``.
     """
@@ -131,7 +131,7 @@ def clipped(values: np.ndarray, low: float, high: float) -> np.ndarray:
 def label_counts(
     ax: Axes, x: Iterable[float], y: Iterable[float], counts: Iterable[float], prefix: str = ""
 ) -> None:
-    """A number below and left of each marker of a logarithmic x axis; near ones share a label.
+    """Write a number at each marker, below and to its left; near markers share a label.
 
     ``ax`` has markers at ``x``, ``y``; a label is ``prefix`` with its number of ``counts``.
 

@@ -1,6 +1,6 @@
-"""A scene with its runs on a page: scripts and runs as plain data in one file.
+"""HTML page that shows scenes with their runs: scripts and data in one file.
 
-The page holds the surface alone, some frames, positions of 16 bits."""
+It contains surface vertices only, a selection of frames, and positions quantised to 16 bits."""
 
 import json
 import os
@@ -24,11 +24,11 @@ from pdrom.view.camera import rotation_to, shown_region, up_of
 class ViewedRun:
     """A reduced run.
 
-    group, method, title : names of what is reduced and how, and the method in words
+    group, method, title : names of the reduced group and of the method, title of the method
     positions : (F' + 1, N, 3) m, finite, the initial ones first; it may have ended early
     error : (F',) relative error of each frame
     blowup_frame : None for a run that reached its end
-    ms : milliseconds a frame, None where nobody measured
+    ms : milliseconds per frame, None if not measured
     """
 
     group: str
@@ -45,13 +45,13 @@ class ViewedRun:
 class ViewedScene:
     """A scene with its full-order run and the reduced ones.
 
-    time_step : of a frame, s
+    time_step : time step of a frame, s
     positions : (F + 1, N, 3) m of the full order
-    ms : milliseconds a frame of the full order, None where nobody measured
-    floor : (F,) sensitivity floor, empty where it is not known
+    ms : milliseconds per frame of the full order, None if not measured
+    floor : (F,) relative error that perturbations by round-off cause, empty if unknown
     horizon : frame from which on no run can be judged, None if there is none or it is not known
     runs : reduced runs, by group, method and ascending size
-    effects : those of the scene; what has a body is shown
+    effects : effects of the scene; obstacles among them are drawn
     velocities : (F + 1, N, 3) m/s of the full order, None where they were not stored
     first : kind of the run that the others are compared with
     """
@@ -71,7 +71,7 @@ class ViewedScene:
 
     @property
     def groups(self) -> list[str]:
-        """Groups that are reduced."""
+        """Names of the reduced groups."""
         return list(dict.fromkeys(run.group for run in self.runs))
 
     def sizes(self, group: str, method: str) -> list[ViewedRun]:
@@ -111,12 +111,12 @@ def _read(name: str) -> str:
 
 
 def safe_json(value: object) -> str:
-    """JSON of ``value`` in which no text ends the element that holds it, or opens a comment."""
+    """JSON of ``value``, escaped so that no text can end the script element or open a comment."""
     return json.dumps(value, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
 
 
 def filled(template: str, parts: dict[str, str]) -> str:
-    """Return ``template`` with its ``{{NAME}}`` replaced by ``parts``, which are not looked at."""
+    """Replace each ``{{NAME}}`` in ``template`` by its entry of ``parts``, in a single pass."""
     before, *rest = template.split("{{")
     pieces = [before]
     for piece in rest:
@@ -126,11 +126,11 @@ def filled(template: str, parts: dict[str, str]) -> str:
 
 
 EYE = np.array([0.85, 0.55, 1.45])  # direction to the viewer where y points up
-FRAMES = 75  # frames that the page holds of a run, at most
+FRAMES = 75  # largest number of frames of a run on the page
 
 
 def pack_scene(scene: ViewedScene) -> dict[str, Any]:
-    """A scene for the page; vertices that no triangle has are left out."""
+    """Data of ``scene`` for the page, without vertices that belong to no triangle."""
     used, triangles = np.unique(scene.mesh.triangles, return_inverse=True)
     stride = max(1, ceil((len(scene.positions) - 1) / FRAMES))
     full = scene.positions[::stride, used]
@@ -174,5 +174,5 @@ def _pack_run(run: ViewedRun, stride: int, used: np.ndarray) -> dict[str, Any]:
 
 
 def _numbers(values: np.ndarray) -> list[float | None]:
-    """Four digits of each number; null where there is none."""
+    """Round ``values`` to four digits; None for values that are not finite."""
     return [float(f"{v:.4g}") if np.isfinite(v) else None for v in values]

@@ -1,4 +1,4 @@
-"""Panels with a run in them, the mesh at one instant or why there is none, and rows of them."""
+"""Panels that show the mesh of a run in one frame, or a message, and figures of their rows."""
 
 import textwrap
 from collections.abc import Sequence
@@ -15,22 +15,22 @@ from pdrom.view.camera import Camera, Window, bounds, window_of
 from pdrom.view.read import RerunInfo, rerun_positions
 from pdrom.view.style import FAILED
 
-SAME_SCALE = 1.25  # a run that needs more than this multiple of the window is drawn smaller
-SLACK = 1.05  # a picture this much smaller than its neighbours is not pointed out
+SAME_SCALE = 1.25  # limit of the ratio of a run's size to the window; a larger run is drawn smaller
+SLACK = 1.05  # ratio of scales up to which a smaller picture gets no remark
 SHORTEST, TALLEST = 0.35, 1.5  # allowed heights of a panel over its width
 
 
 @dataclass(frozen=True)
 class RunPanel:
-    """One run at one instant.
+    """Picture of one run in one frame.
 
     colour : one for all, or one for each triangle (T, 3), which then carries a number
     positions : (N, 3) m, finite; None if there is nothing to draw
-    failure : what went wrong, drawn in red; None for a run that lived
+    failure : reason of the failure, drawn in red; None for a run without failure
     remark : one line below the picture
     reference : whether this is the run that others are compared with
     flat : (N, 2) m, the positions in the picture plane (see `seen_by`)
-    obstacles : their surfaces; None draws the floor y = 0
+    obstacles : surfaces of the obstacles; None draws the floor y = 0
     """
 
     title: str
@@ -48,7 +48,7 @@ class RunPanel:
         return replace(self, flat=flat)
 
     def zoomed(self, window: Window) -> Window:
-        """``window``, or one of the same shape that holds both it and the run."""
+        """``window``, enlarged with the same aspect ratio if the run does not fit into it."""
         if self.flat is None or window.contains(self.flat).all():
             return window
         corners = [(window.left, window.bottom), (window.right, window.top)]
@@ -92,12 +92,12 @@ def draw_run(
     window: Window,
     ghost: np.ndarray | None = None,
 ) -> None:
-    """Draw a run in ``window``; one that left it is drawn smaller and says so.
+    """Draw a run in ``window``; a run that left it is drawn smaller, with a remark.
 
     Parameters
     ----------
     ax, camera : picture and its view
-    mesh, panel : of the run
+    mesh, panel : mesh and panel of the run
     ghost : (N, 3) m, positions whose outline is drawn for comparison
     """
     ax.set_title(panel.title, pad=3)
@@ -134,7 +134,7 @@ def draw_run(
 
 
 def _cover(ax: Axes, **look: Any) -> None:
-    """Rectangle over the whole panel."""
+    """Draw a rectangle over the whole panel ``ax`` with the properties ``look``."""
     from matplotlib.patches import Rectangle
 
     ax.add_patch(Rectangle((0, 0), 1, 1, transform=ax.transAxes, clip_on=False, **look))
@@ -159,7 +159,7 @@ NOTHING_RAN = "not run: the projections are round-off, there is nothing to reduc
 class Row:
     """Panels of one row; ``ghosts`` (n, N, 3) m are outlined behind the reduced runs.
 
-    camera : that sees all of them
+    camera : camera of all panels of the row
     note : text in place of the reduced runs, for an experiment in which none ran
     """
 
@@ -195,7 +195,7 @@ class Row:
 def run_panel(
     path: str, info: RerunInfo, frame: int, colour: tuple[float, float, float], title: str
 ) -> RunPanel:
-    """Panel of a reduced run at ``frame``; what it says about a run that failed or never began.
+    """Panel of a reduced run at ``frame``, with a message if the run failed or never began.
 
     The run is ``info`` in the file ``path``; ``colour`` and ``title`` are those of the panel.
     """

@@ -1,4 +1,4 @@
-"""Reading what figures draw from the results."""
+"""Readers of result files for figures: positions of runs, bases and samplings."""
 
 from dataclasses import dataclass
 
@@ -57,7 +57,7 @@ class RerunInfo:
 
     @property
     def title(self) -> str:
-        """The size in words."""
+        """Text that states the basis size."""
         return f"r = {self.r} (full rank)" if self.full else f"r = {self.r}"
 
 
@@ -87,7 +87,7 @@ def _info(label: str, group: h5py.Group) -> RerunInfo:
 
 
 def choose_ranks(infos: list[RerunInfo], asked: tuple[int | str, ...]) -> list[RerunInfo]:
-    """Runs among ``infos`` of the sizes ``asked`` for, in this order, none twice, else all."""
+    """Select the runs of ``infos`` with the sizes ``asked``, in this order; all if none match."""
     chosen: dict[str, RerunInfo] = {}
     for rank in asked:
         for info in infos:
@@ -99,7 +99,7 @@ def choose_ranks(infos: list[RerunInfo], asked: tuple[int | str, ...]) -> list[R
 def rerun_positions(path: str, info: RerunInfo, frame: int) -> tuple[int, np.ndarray] | None:
     """Last finite positions (N, 3) m up to entry ``frame``, and their entry; None without any.
 
-    They are those of the run ``info`` in the file ``path``.
+    The run is ``info`` in the file ``path``.
 
     A run that blew up holds fewer entries than the full-order run.
     """

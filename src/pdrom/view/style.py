@@ -1,4 +1,4 @@
-"""One look for all figures: fonts, palette, markers, small helpers."""
+"""Common style of all figures: fonts, colours, markers, legends and axis helpers."""
 
 import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -8,9 +8,9 @@ from typing import Any, Literal
 from pdrom.view.artists import Artist, Axes, Figure, Line2D, Patch
 
 WIDTH = 7.0  # inches, text width of the manuscript
-NOTE = 100  # characters in a line of a figure that only says something
+NOTE = 100  # characters per line in a figure that contains only text
 
-# Okabe and Ito (2008): told apart with every common colour deficiency.
+# Palette of Okabe and Ito (2008), distinguishable with every common colour deficiency.
 BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
 YELLOW, BLUE, VERMILLION, PURPLE = "#F0E442", "#0072B2", "#D55E00", "#CC79A7"
 GREY = "#8C8C8C"
@@ -38,7 +38,7 @@ METHODS: dict[str, tuple[str, str]] = {
 }
 _RESERVE = (("#5A5A5A", "1"), ("#9A6A00", "2"), ("#6B3F00", "3"), ("#2B2B80", "4"))
 
-# Of constraint groups, by their place among all of them.
+# Colours and markers of constraint groups, by their index among all groups.
 GROUP_LOOKS = (
     (GREEN, "^"), (ORANGE, "s"), (BLUE, "o"), (SKY, "D"), (PURPLE, "v"), (VERMILLION, "P"),
     ("#7A5C00", "X"), ("#5A5A5A", "<"), ("#2B2B80", ">"),
@@ -119,7 +119,7 @@ def surface_colour(colour: str) -> tuple[float, float, float]:
 
 
 def words(name: str) -> str:
-    """A name of the configuration as plain words."""
+    """Convert a ``name`` of the configuration to plain words."""
     return name.replace("_", " ")
 
 
@@ -150,7 +150,7 @@ def patch(label: str, **look: Any) -> Patch:
 def handles(looks: Mapping[str, tuple[str, str]], **common: Any) -> list[Line2D]:
     """Entries of a legend by their labels, each with its (colour, marker) of ``looks``.
 
-    What they have in ``common`` are keywords of `handle`.
+    ``common`` are keywords of `handle` for all entries.
     """
     return [handle(label, color=c, marker=m, **common) for label, (c, m) in looks.items()]
 
@@ -166,7 +166,7 @@ def legend(figure: Figure, entries: Sequence[Artist], columns: int) -> None:
 
 
 def label_rows(ax: Axes, labels: Sequence[str]) -> None:
-    """Name rows of ``ax`` at 0, 1, 2, ... from the top by ``labels``."""
+    """Label the rows of ``ax`` at y = 0, 1, 2, ..., from the top, by ``labels``."""
     ax.set_yticks(range(len(labels)), labels)
     ax.set_ylim(len(labels) - 0.4, -0.6)
 

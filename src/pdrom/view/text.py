@@ -44,7 +44,7 @@ def escape(text: str) -> str:
 
 
 def require_typeset(text: str, place: str) -> None:
-    """ConfigurationError, which ``place`` opens, for a text that cannot be typeset."""
+    """Raise ConfigurationError, beginning with ``place``, if ``text`` cannot be typeset."""
     for character in unicodedata.normalize("NFC", text):
         if _typeset(character) is None:
             raise ConfigurationError(
@@ -54,13 +54,13 @@ def require_typeset(text: str, place: str) -> None:
 
 
 def replaced(text: str) -> str:
-    """``text`` with a question mark in place of what cannot be typeset (a machine's name)."""
+    """Return ``text``, a question mark in place of each character that cannot be typeset."""
     characters = unicodedata.normalize("NFC", text)
     return "".join("?" if _typeset(character) is None else character for character in characters)
 
 
 def plain_words(text: str) -> str:
-    """``text`` for a figure, in which a dollar sign would begin mathematics."""
+    """Return ``text`` with dollar signs escaped, which matplotlib would read as mathematics."""
     return unicodedata.normalize("NFC", text).replace("$", r"\$")
 
 
@@ -71,7 +71,7 @@ def characters() -> Iterator[str]:
 
 
 def _typeset(character: str) -> str | None:
-    """TeX of one character; None if it cannot be typeset."""
+    """TeX code of ``character``; None if it cannot be typeset."""
     if character in _SPECIAL:
         return _SPECIAL[character]
     if " " <= character <= "~" or character in _PUNCTUATION or _is_latin(character):
@@ -83,13 +83,13 @@ def _typeset(character: str) -> str | None:
 
 
 def _is_latin(character: str) -> bool:
-    """Whether T1 fonts hold the letter: Latin-1 and Latin Extended-A, and the Romanian ones."""
+    """Whether T1 fonts have the letter: Latin-1, Latin Extended-A, or a Romanian letter."""
     inside = "\u00c0" <= character <= "\u017e" or "\u0218" <= character <= "\u021b"
     return inside and character.isalpha() and character not in _NO_LETTERS
 
 
 def _greek(character: str) -> str | None:
-    """TeX command of a Greek letter without accents, by its Unicode name."""
+    """TeX command of a Greek letter without accents; None for any other ``character``."""
     words = unicodedata.name(character, "").split()
     if len(words) != 4 or words[0] != "GREEK" or words[2] != "LETTER":
         return None

@@ -1,4 +1,4 @@
-"""A scene's runs for ParaView: one file a frame (VTU), and a collection with their times (PVD)."""
+"""Export of a scene's runs to ParaView: a VTU file per frame, and a PVD file with the times."""
 
 from pathlib import Path
 from xml.etree import ElementTree
@@ -14,12 +14,12 @@ NAME = "frame_{:05d}.vtu"
 
 
 def vtk(scene: ViewedScene, collection: Path) -> None:
-    """Write the frames of ``scene`` beside the ``collection``, which is written last.
+    """Write the frames of ``scene`` into the folder of the PVD file ``collection``, then that file.
 
     Raises
     ------
     StorageError
-        A frame cannot be written, or a file that pdrom has not made has such a name.
+        A frame cannot be written, or would replace a file from outside pdrom.
     """
     names = [NAME.format(frame) for frame in range(len(scene.positions))]
     earlier = sorted(collection.parent.glob("frame_*.vtu"))
@@ -43,8 +43,8 @@ def point_data(scene: ViewedScene, frame: int) -> dict[str, np.ndarray]:
     """Data of each vertex of ``scene`` in a ``frame``, (N, 3) float32 each.
 
     Velocity (m/s, where it was stored) and displacement from the start (m) of the full-order run;
-    for each reduced run the vector from the full order to it (m), by which ParaView warps the one
-    into the other, NaN where it had ended.
+    for each reduced run the difference of its positions from the full order (m), by which ParaView
+    can warp the full-order mesh, NaN after the run's end.
     """
     now = scene.positions[frame]
     data = {} if scene.velocities is None else {"velocity": scene.velocities[frame]}
@@ -69,6 +69,6 @@ def _write_collection(path: Path, names: list[str], time_step: float) -> None:
 
 
 def _mark(path: Path) -> None:
-    """Add a comment by which `require_own` knows the XML file ``path``."""
+    """Append the comment by which `require_own` recognises the XML file ``path``."""
     with open(path, "ab") as file:
         file.write(b"\n<!-- " + MARK + b" -->\n")

@@ -49,28 +49,28 @@ __all__ = [
     "require_intact", "require_own", "require_place", "require_self_contained", "write_hdf5",
     "write_table", "write_text",
 ]  # fmt: skip
-# Mark in the first or last bytes of every page, picture and file for ParaView.
+# Text in the first or last MARKED bytes of every page, picture and ParaView file of this package.
 MARK, MARKED = b"made by pdrom, which may replace this file", 65_536
-# Part of the names of temporary files, so that no machine removes those of another one.
+# Hash in names of temporary files, so that a machine does not remove another machine's files.
 _MACHINE = hashlib.blake2b(platform.node().encode(), digest_size=2).hexdigest()
 
 
 @contextmanager
 def atomic_path(path: str | os.PathLike[str], with_checksum: bool = True) -> Iterator[Path]:
-    """Yield a temporary path beside ``path``; checksum and rename it on success, else remove it.
+    """Yield a temporary path next to ``path``; checksum and rename it on success, else remove it.
 
-    What a killed process of this machine left of the same target is removed first.
+    Temporary files that killed processes of this machine left for the same target are removed.
 
     Parameters
     ----------
-    with_checksum : whether a checksum file lies beside it; not so for a file that has its checksum
-        inside, or that goes into a user's own folder
+    with_checksum : whether to write a checksum file next to it; False for a file that contains its
+        checksum or is written to a user's folder
 
     Raises
     ------
     StorageError
-        The folder or the file cannot be written: no permission, no space; or what has the name is
-        no regular file (a folder, a link, a device, a pipe), which a new file would replace.
+        The folder or file cannot be written (no permission, no space), or ``path`` is not a
+        regular file but a folder, link, device or pipe, which a new file would replace.
     """
     target = Path(path)
     _require_file(target)
@@ -101,12 +101,12 @@ def atomic_path(path: str | os.PathLike[str], with_checksum: bool = True) -> Ite
 
 
 def require_place(path: str | os.PathLike[str]) -> None:
-    """Refuse a ``path`` that cannot be written, before a long computation of what goes there.
+    """Check, before a long computation of a result, that ``path`` can be written.
 
     Raises
     ------
     StorageError
-        Something else than a file has the name, or its folder cannot be made or written to.
+        ``path`` is not a regular file, or its folder cannot be created or written to.
     """
     target = Path(path)
     _require_file(target)
@@ -117,12 +117,12 @@ def require_place(path: str | os.PathLike[str]) -> None:
 
 
 def require_own(path: str | os.PathLike[str]) -> None:
-    """Refuse a ``path`` whose file this package has not written: it would be lost.
+    """Check that writing to ``path`` would not replace a file from outside this package.
 
     Raises
     ------
     StorageError
-        There is such a file: no result with a checksum, nor the mark of a page or picture.
+        ``path`` is a file without an intact checksum and without the text `MARK`.
     """
     target = Path(path)
     if not target.is_file():
@@ -203,7 +203,7 @@ def write_text(text: str, path: str | os.PathLike[str], with_checksum: bool = Tr
 
 
 def read_text(path: str | os.PathLike[str]) -> str:
-    """Read the file ``path`` by `write_text`; StorageError if it is missing or damaged."""
+    """Read the file ``path`` that `write_text` wrote; StorageError if missing or damaged."""
     require_intact(path)
     return Path(path).read_text(encoding="utf-8")
 
@@ -275,10 +275,10 @@ def write_hdf5(path: str | os.PathLike[str]) -> Iterator[h5py.File]:
 
 
 class _Sink:
-    """File that HDF5 writes to; it never fails.
+    """File object for HDF5 that never reports a failed write.
 
     HDF5 does not survive an error while it writes: it cannot close the file and crashes when the
-    process ends. So the first error (no space, say) is kept for later and the rest thrown away.
+    process ends. The first error (no space, say) is stored and all later writes are discarded.
     """
 
     def __init__(self, handle: io.FileIO) -> None:
@@ -298,7 +298,7 @@ class _Sink:
 
     def readinto(self, buffer: memoryview) -> int:
         count = self._handle.readinto(buffer)
-        buffer[count:] = bytes(len(buffer) - count)  # zeros for what `write` has dropped
+        buffer[count:] = bytes(len(buffer) - count)  # zeros for bytes that `write` discarded
         return len(buffer)
 
     def truncate(self, size: int) -> int:

@@ -1,4 +1,4 @@
-"""Checksums of results, with what made the result, and the comparison of a file with its own.
+"""Checksums of results, stored with their provenance, and comparison of files with them.
 
 An HDF5 file has its checksum inside, in its first bytes, which HDF5 leaves to its users (the user
 block): a line that names the format, the checksum of all bytes behind the block, and zeros. So a
@@ -47,7 +47,7 @@ def damaged_set_aside() -> Iterator[None]:
 
 
 def sets_aside() -> bool:
-    """Whether a damaged result that is read now is renamed."""
+    """Whether reading a damaged result renames it, see `damaged_set_aside`."""
     return _ASIDE.get()
 
 
@@ -63,7 +63,7 @@ UNCHECKED = "--unchecked (in Python unchecked=True) reads it if it is sound"
 
 @dataclass(frozen=True)
 class Checksum:
-    """Content of a checksum file: digest and name of the result, provenance as JSON or nothing."""
+    """Content of a checksum file: digest and name of the result, provenance as JSON or empty."""
 
     digest: str
     name: str
@@ -79,7 +79,7 @@ class Checksum:
 
     @classmethod
     def parse(cls, content: bytes) -> "Checksum":
-        """Checksum read from these bytes; damaged ones give a checksum that fits no file."""
+        """Parse the bytes ``content``; damaged bytes give a checksum that fits no file."""
         first, _, rest = content.partition(b"\n")
         commented = first.startswith(b"# ")
         words = (rest if commented else content).decode(errors="replace").split()
@@ -105,7 +105,7 @@ def new_checksum(digest: str, name: str) -> Checksum:
 
 
 def is_hdf5(path: Path) -> bool:
-    """Whether the file ``path`` is HDF5, by its name or its beginning, with a block or without."""
+    """Whether ``path`` is an HDF5 file, by its name or first bytes, with a user block or not."""
     with open(path, "rb") as handle:
         head = handle.read(BLOCK + len(_SIGNATURE))
     named = path.suffix in SUFFIXES or head.startswith((_SIGNATURE, _LINE))
@@ -113,7 +113,7 @@ def is_hdf5(path: Path) -> bool:
 
 
 def write_block(path: Path) -> None:
-    """Checksum a complete HDF5 file ``path`` that begins with ``BLOCK`` bytes of no meaning."""
+    """Write the checksum of the HDF5 file ``path`` into its first ``BLOCK`` unused bytes."""
     content = _LINE + new_checksum(digest_of(path, start=BLOCK), BLOCK_NAME).content
     if len(content) > BLOCK:
         raise ValueError(f"{path}: a checksum of {len(content)} bytes, allowed: at most {BLOCK}")
@@ -130,7 +130,7 @@ class Condition(StrEnum):
 
 
 def read_checksum(path: str | os.PathLike[str]) -> Checksum | None:
-    """Checksum of the file ``path``; None where there is none or it is damaged itself."""
+    """Read the checksum of the file ``path``; None if it is missing or itself damaged."""
     path = Path(path)
     content = _checksum_bytes(path) if path.is_file() else None
     if content is None:
@@ -140,13 +140,13 @@ def read_checksum(path: str | os.PathLike[str]) -> Checksum | None:
 
 
 def provenance_of(path: str | os.PathLike[str]) -> dict[str, str]:
-    """Provenance of the file ``path``, kept with its checksum; empty where there is none."""
+    """Provenance of the file ``path`` from its checksum; empty without a valid checksum."""
     checksum = read_checksum(path)
     return json.loads(checksum.provenance) if checksum and checksum.provenance else {}
 
 
 def check_file(path: str | os.PathLike[str]) -> Condition:
-    """Whether the bytes of the result ``path`` of any kind are as written; changes nothing.
+    """Compare the result ``path`` of any kind with its checksum, without changing any file.
 
     Raises
     ------

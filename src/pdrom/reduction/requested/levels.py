@@ -1,11 +1,11 @@
-"""Levels of accuracy: full orders with few or many iterations, reductions; their runs and errors.
+"""Levels of accuracy (full-order and reduced solvers with K iterations), their runs and errors.
 
-The reference of a motion is its implicit step, solved with so many accelerated iterations that half
-of them make no difference to the tolerance. Its error is not zero: it counts as that of half the
-iterations.
+The reference of a motion solves the implicit step with so many accelerated iterations that a run
+with half of them agrees within the tolerance. The error of that run is taken as the error of the
+reference.
 
-What a frame costs is counted, not timed, so that a choice is the same in every run. The constants
-are those of one thread of a processor of 2024; only their ratios matter.
+The cost of a frame is computed from operation counts, not timed, so that the choice of a level is
+reproducible. The constants were measured on one thread of a 2024 processor; only ratios matter.
 """
 
 from collections.abc import Callable, Iterator
@@ -22,23 +22,23 @@ from pdrom.reduction.subspace.model import SubspaceModel
 from pdrom.reduction.subspace.space import projector
 
 WINDOW = 5  # differences of iterates that Anderson's acceleration combines
-# Nanoseconds of the full order: a projection by its rows squared, an entry of the factor, a vertex
-# in accelerated iterations; a frame in compiled code, and what Python adds to one that it does.
+# Full-order cost in ns: per projection and squared number of rows, per entry of the factor, per
+# vertex of an accelerated iteration; per compiled frame, and extra per frame computed in Python.
 PROJECTION, ENTRY, ACCELERATED = 5.0, 0.9, 6.5
 FRAME, IN_PYTHON = 2.3e4, 1.2e5
-# The same of a reduction: a projection, a number of a dense product, the rest of an iteration.
+# Reduced cost in ns: per projection, per entry of a dense product, other work of an iteration.
 SAMPLED, DENSE, ITERATION = 12.5, 0.23, 1.2e3
 REDUCED_FRAME, REDUCED_IN_PYTHON = 4e4, 2.3e5
-# Entries of the factor of a matrix with n entries and N rows: FILL n log2 N.
+# Estimated entries of the Cholesky factor of a matrix with n entries and N rows: FILL n log2 N.
 FILL = 0.35
-# Shift of the second start in every coordinate, over the extent of the mesh.
+# Size of the random shift of a perturbed start, relative to the mesh extent, and its seed.
 MOVED, SEED = 1e-10, 0
-CONVERGED, MOST = 80, 320  # iterations of a reference; twice as many until half agree, up to MOST
+CONVERGED, MOST = 80, 320  # iterations of a reference: first number, doubled up to MOST
 Quantity = Literal["position", "velocity"]
 QUANTITIES: tuple[Quantity, ...] = get_args(Quantity)
 
 OnFrame = Callable[[str], None]
-"""Told the title of a level after each frame that it has done."""
+"""Callback that gets the title of a level after each frame that the level has computed."""
 
 
 def silent(title: str) -> None:
@@ -47,10 +47,10 @@ def silent(title: str) -> None:
 
 @dataclass(frozen=True)
 class Level:
-    """A method for one frame.
+    """A level of accuracy: a full-order or reduced solver with a number of iterations.
 
-    iterations, window : of the step loop; a window of 0 accelerates nothing
-    model : position subspace with sampled elements; None for the full order
+    iterations, window : iterations of a frame, and Anderson window (0: no acceleration)
+    model : position subspace with sampled elements; None for a full-order level
     tau : tolerance of the sampling
     """
 
@@ -61,7 +61,7 @@ class Level:
 
     @property
     def title(self) -> str:
-        """Name for messages and tables."""
+        """Name of the level in messages and tables."""
         count = f"K = {self.iterations}"
         if self.model is None:
             return f"full order, {'Anderson, ' if self.window else ''}{count}"
@@ -69,16 +69,16 @@ class Level:
 
     @property
     def exact(self) -> "Level":
-        """A full order that sees what a frame of this level misses: with twice its iterations."""
+        """More accurate full-order level by which frames of this level are checked."""
         return Level(CONVERGED if self.model is not None else 2 * self.iterations, WINDOW)
 
     def scene(self, scene: Scene) -> Scene:
-        """The scene with the level's iterations."""
+        """Return ``scene`` with the iterations and Anderson window of the level."""
         changes = {"iterations": self.iterations, "anderson_window": self.window}
         return replace(scene, config=scene.config.model_copy(update=changes))
 
     def work(self, scene: Scene) -> float:
-        """Counted nanoseconds of a frame of ``scene``; a reduction resolves contacts in Python."""
+        """Estimated cost of a frame of ``scene``, ns; a reduction resolves contacts in Python."""
         effects = scene.groups, scene.forces, scene.boundaries, scene.contacts
         slow = not WholeFrames.suits(*effects)
         if self.model is None:
@@ -98,18 +98,18 @@ class Level:
 class Trajectory:
     """A run of ``level`` on the motion of ``scene``, frame by frame.
 
-    Only one run of a scene goes on at a time: its boundaries remember where they took hold.
+    Only one run of a scene may be active: its boundaries store the positions where they took hold.
 
     Parameters
     ----------
-    moved : whether it starts a distance of round-off away from the scene's own start
-    on_frame : told of the frames that are done
+    moved : whether the start is perturbed by `MOVED` times the mesh extent
+    on_frame : callback after each frame
 
     Attributes
     ----------
-    ends : positions (N, 3) m of the start, and of the end of every frame that is done
-    defects : of checked frames, m, see `check`
-    seconds : processor time of the frames
+    ends : positions (N, 3) m at the start and at the end of every computed frame
+    defects : defects of the checked frames, m, see `check`
+    seconds : processor time of the frames, s
     """
 
     def __init__(
@@ -131,27 +131,27 @@ class Trajectory:
 
     @property
     def frames(self) -> int:
-        """Frames that are done."""
+        """Number of frames computed so far."""
         return len(self.ends) - 1
 
     @property
     def positions(self) -> np.ndarray:
-        """Positions (F + 1, N, 3) m of all frames that are done, the initial ones first."""
+        """Positions (F + 1, N, 3) m of all computed frames, the initial ones first."""
         return np.stack(self.ends)
 
     def to(self, frame: int) -> "Trajectory":
-        """Do all frames before number ``frame``."""
+        """Compute all frames before number ``frame`` and return the trajectory itself."""
         for after in self._run(self._state, range(self.frames, frame)):
             self._state = after
             self.ends.append(self._of_vertices(after.positions))
         return self
 
     def check(self, exact: "Trajectory") -> float:
-        """Do the next frame, and do it by another run's loop ``exact``, too.
+        """Compute the next frame, and again from the same state by the loop of the run ``exact``.
 
         Returns
         -------
-        The defect: the distance, m, between both ends of the frame, which began at the same state.
+        The defect of the frame: the distance, m, between both results.
         """
         frame = self.frames
         before = State(self.ends[-1], self._of_vertices(self._state.velocities))
@@ -176,14 +176,14 @@ class Trajectory:
 def relative_errors(
     differences: np.ndarray, reference: np.ndarray, quantity: Quantity
 ) -> np.ndarray:
-    """Errors (F',) over the first 1, 2, ... F' frames, relative to the motion in these frames.
+    """Return errors (F',) over the first 1, 2, ... F' frames, relative to their motion.
 
     Velocities are finite differences of positions between frames. An error is infinite where the
-    run is not finite, or where nothing moves and something is wrong.
+    run is not finite, or where the reference does not move but the run differs from it.
 
     Parameters
     ----------
-    differences : (F', N, 3) m, ends of frames minus those of the ``reference`` (F + 1, N, 3) m
+    differences : (F', N, 3) m, positions minus the ``reference`` (F + 1, N, 3) m, without its start
     """
     moved = reference[1 : len(differences) + 1] - reference[0]
     with np.errstate(over="ignore", invalid="ignore"):
@@ -198,24 +198,24 @@ def relative_errors(
 
 
 def last_within(errors: np.ndarray, tolerance: float) -> int:
-    """Most frames over which the ``errors``, see `relative_errors`, are within ``tolerance``."""
+    """Largest number of first frames whose `relative_errors` ``errors`` is within ``tolerance``."""
     within = np.flatnonzero(errors <= tolerance)
     return int(within[-1]) + 1 if len(within) else 0
 
 
 class Motion:
-    """The motion of ``scene`` with its reference, solved to an error of ``tolerance``.
+    """Reference run of ``scene``, solved to an error of ``tolerance``, and its accuracy.
 
     Parameters
     ----------
-    quantity : whose errors are meant
+    quantity : quantity, position or velocity, whose errors are computed
 
     Attributes
     ----------
-    reference : (F + 1, N, 3) m
-    iterations : of the reference
-    unconverged : errors (F,) of half the iterations
-    sensitivity : differences (F,), relative as errors, that a start moved by round-off makes
+    reference : (F + 1, N, 3) m, positions
+    iterations : iterations of each frame of the reference
+    unconverged : errors (F,) of a run with half the iterations
+    sensitivity : relative differences (F,) of a run whose start is perturbed, see `MOVED`
     """
 
     def __init__(

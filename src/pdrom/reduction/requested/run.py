@@ -1,15 +1,15 @@
-"""Runs within a requested tolerance: a level of accuracy is chosen, run, checked, and replaced.
+"""Runs within a requested tolerance by the cheapest sufficient level of accuracy (`Level`).
 
-Every level runs two motions whose converged frames are known: that of the training run, and one
-that is made from it. The cheapest level whose error there, times a factor, is within the tolerance
-runs the scene.
+Calibration runs every level on two motions with known converged frames: the training motion and a
+variation of it. The scene is run by the cheapest level whose error on both, times a safety factor,
+is within the tolerance.
 
-A run adds up the defects of its frames, the distances to what a more accurate level makes of the
-same state, and the motion amplifies them. A run of another motion therefore has the error of the
-calibration, enlarged by as much as the defects of its checked frames are larger, or as it is
-further than in the calibration from a second level's run, whose start is moved by round-off. The
-tolerance counts as met for the frames over which this estimate is within it. A reduction that fails
-is replaced by the full order, and that by the most accurate one. Nothing depends on the clock.
+The defect of a frame is the distance to the result of a more accurate level from the same state. A
+run accumulates defects and amplifies them. The error of the run is estimated as the error in the
+calibration, times the ratio of the defects in checked frames (run / calibration) or the ratio of
+the distances to the run of a second level with a perturbed start, if these exceed 1. The tolerance
+counts as met for the frames over which the estimate is within it. A failed reduction is replaced by
+a full-order level, and a failed one by the most accurate one. No choice depends on timings.
 """
 
 import logging
@@ -34,16 +34,16 @@ log = logging.getLogger(__name__)
 
 Count = Annotated[int, Field(ge=1, le=10_000)]
 
-# The motion that is made from the training motion: slower handles, a kick, stiffer constraints.
+# Variation of the training motion: factors of handle speed and kick, seed, factor of stiffness.
 SLOWER, KICKED, KICK_SEED, STIFFER = 0.9, 0.8, 101, 1.6
-# No error is known where less than this part of a motion's frames can be judged.
+# An error counts as unknown if it can be computed for less than this fraction of the frames.
 JUDGED = 0.1
-PROBED = 6  # frames of a run in calibration whose defects are taken
-CHECKS = 2  # frames of a run that are checked, at least
-# A reduction is taken where it needs less than this part of the full order's work, with all that
-# checks it: counted work is no closer to the time.
+PROBED = 6  # number of frames of a calibration run whose defects are computed
+CHECKS = 2  # least number of checked frames of a run
+# A reduction is run only if its estimated work, with checks, is less than this fraction of the full
+# order's: the estimate is not more accurate than that.
 WORTH = 2.0 / 3.0
-# A run that has grown to this multiple of the mesh has blown up, whatever a check says.
+# A run whose extent exceeds this multiple of the mesh extent counts as blown up.
 BLOWUP_EXTENT = 100.0
 SLOW = "the iterations converge too slowly after it"
 ROUNDOFF = "round-off decides after it"
@@ -114,12 +114,12 @@ class ToleranceSettings(ConfigModel):
 
 @dataclass(frozen=True)
 class Calibrated:
-    """A level with its outcome on the motions.
+    """A level with its cost and its errors on the motions of the calibration.
 
-    work : counted nanoseconds of a frame
-    errors : of each motion, (F,) over the first frames
-    defect : largest defect of a frame, in units of the motion
-    ms : processor time of a frame of the first motion
+    work : estimated cost of a frame, ns
+    errors : for each motion, errors (F,) over the first 1, ..., F frames
+    defect : largest defect of a frame, relative to the displacement of the motion
+    ms : processor time of a frame of the first motion, ms
     """
 
     level: Level
@@ -130,22 +130,22 @@ class Calibrated:
 
     @property
     def reduced(self) -> bool:
-        """Whether it is a reduction."""
+        """Whether the level is a reduced model."""
         return self.level.model is not None
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """Run within a requested tolerance.
+    """Result of a run within a requested tolerance.
 
     positions : (F + 1, N, 3) m, the initial ones first
     frames : number of first frames for which the estimated error is within the tolerance; 0 if the
         request is refused: the most accurate full order has run then
-    limit : what ends these frames; empty if they are all
+    limit : reason why later frames are not within it; empty if all frames are
     expected : error of the chosen level on the motions of the calibration, times the factor
     estimate : estimated error over these frames, times the factor; None if the request is refused
     level : title of the level that made the positions
-    reduced : whether that is a reduction
+    reduced : whether that level is a reduced model
     failed : titles of the levels that were tried before
     checks : numbers of the frames that were checked
     seconds : processor time of all frames that were done, without what precedes the first of them
@@ -173,9 +173,9 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Calibration:
-    """Calibrated ``levels``, in the order of their work, and the ``motions`` with references.
+    """Calibrated ``levels``, ordered by work, and the reference ``motions`` they were run on.
 
-    Its errors are of one quantity; it serves all tolerances down to the one that it was made for.
+    Errors are errors of one quantity. Valid for tolerances not below that of the calibration.
     """
 
     levels: list[Calibrated]
@@ -184,21 +184,21 @@ class Calibration:
 
     @property
     def most_accurate(self) -> Calibrated:
-        """The full order with the most iterations."""
+        """Full-order level with the most iterations."""
         full = (each for each in self.levels if not each.reduced)
         return max(full, key=lambda each: (each.level.iterations, each.level.window))
 
     def horizon(self, error: float) -> tuple[int, str]:
-        """Frames whose errors are known well enough for a tolerance, and what ends them."""
+        """Number of first frames with errors known to the tolerance ``error``, and its limit."""
         least = error / self.settings.factor
         converged = min(levels.last_within(motion.unconverged, least) for motion in self.motions)
         sharp = min(levels.last_within(motion.sensitivity, least) for motion in self.motions)
         return min(converged, sharp), ROUNDOFF if sharp < converged else SLOW
 
     def expected(self, level: Calibrated, error: float) -> float:
-        """Largest error of ``level`` on the motions before the horizon, times the factor.
+        """Largest error of ``level`` on the motions before `horizon`, times the safety factor.
 
-        None is smaller than that of the references. Infinite where too few frames are known.
+        It is at least the error of the references, and infinite if the horizon is too short.
         """
         end, _ = self.horizon(error)
         if end < max(JUDGED * self.motions[0].scene.config.frames, 1):
@@ -207,19 +207,19 @@ class Calibration:
         return self.settings.factor * float(max(errors[end - 1] for errors in known))
 
     def admissible(self, error: float) -> list[Calibrated]:
-        """Levels whose expected error is within the tolerance; none if no full order is one."""
+        """Levels with an expected error of at most ``error``; none if no full-order level has."""
         good = [each for each in self.levels if self.expected(each, error) <= error]
         return good if any(not each.reduced for each in good) else []
 
     def full_order(self, error: float) -> Calibrated:
-        """The cheapest full order that is admissible, else the most accurate one."""
+        """Cheapest admissible full-order level, or the most accurate one if none is admissible."""
         full = (each for each in self.admissible(error) if not each.reduced)
         return next(full, self.most_accurate)
 
     def second(self, level: Calibrated, error: float) -> Calibrated:
-        """The cheapest other level of the same kind with an error about as large as requested.
+        """Cheapest other level of the same kind, expected error at most ``error`` times the factor.
 
-        ``level`` itself if there is none.
+        Return ``level`` itself if there is none.
         """
         most = error * self.settings.factor
         alike = [each for each in self.levels if each.reduced == level.reduced]
@@ -227,10 +227,10 @@ class Calibration:
         return next(others, level)
 
     def attempts(self, error: float) -> list[Calibrated]:
-        """Levels to run until one is within the tolerance; only the last where none is admissible.
+        """Levels to run in turn until one meets the tolerance; only the last if none is admissible.
 
-        The cheapest reduction, where it pays with its second run and its checks; the cheapest full
-        order; the most accurate one.
+        These are the cheapest reduction, if it saves work with its second run and checks, the
+        cheapest full-order level, and the most accurate one.
         """
         full = self.full_order(error)
         most = WORTH * (full.work + self.second(full, error).work)
@@ -242,7 +242,7 @@ class Calibration:
 
 
 class CheckedRun:
-    """A run of ``scene`` within the tolerance ``error``, by levels of a ``calibration``."""
+    """Run of ``scene`` within the tolerance ``error``, by the levels of a ``calibration``."""
 
     def __init__(
         self, calibration: Calibration, scene: Scene, error: float, on_frame: OnFrame = silent
@@ -252,7 +252,7 @@ class CheckedRun:
         self._started: list[Trajectory] = []
 
     def outcome(self) -> Outcome:
-        """Do all frames; each call is a run of its own."""
+        """Run all frames and return the result; each call starts a new run."""
         self._started.clear()
         own, error, frames, failed = self._own, self._error, self._frames, list[str]()
         known, limit = own.horizon(error)
@@ -285,10 +285,10 @@ class CheckedRun:
         return self._started[-1]
 
     def _estimated(self, level: Calibrated) -> tuple[Trajectory, np.ndarray]:
-        """Run of ``level`` up to its end or the first check that fails; its estimated errors (F,).
+        """Run ``level`` to its end or the first failed check; return it and estimated errors (F,).
 
-        The error expected is enlarged as the root mean square of the defects is. All are infinite
-        where nothing was expected, a check failed, or the run blew up.
+        The expected error is multiplied by the ratio of defects (root mean square of the run over
+        calibration) if above 1. All are infinite if no error is known, or check or run failed.
         """
         own, frames, full = self._own, self._frames, self._own.full_order(self._error).level
         largest = BLOWUP_EXTENT * self._scene.mesh.extent
@@ -310,9 +310,9 @@ class CheckedRun:
         return run, np.maximum(estimate, self._amplified(level, run))
 
     def _amplified(self, level: Calibrated, run: Trajectory) -> np.ndarray:
-        """Estimated errors (F,) over the first frames of a ``run`` from that of a second level.
+        """Estimate errors (F,) over the first frames of ``run`` from the run of a second level.
 
-        The error expected is enlarged as the distance of both is over the one expected.
+        The expected error is multiplied by the ratio of the runs' distance to its expected value.
         """
         own, second = self._own, self._own.second(level, self._error)
         other = self._start(second.level, moved=True).to(self._frames)
@@ -325,7 +325,7 @@ class CheckedRun:
 
 
 def check_frames(frames: int, count: int) -> list[int]:
-    """Numbers of ``count`` frames of a run, spread over all ``frames``; `CHECKS` at least."""
+    """Numbers of ``count`` checked frames, at least `CHECKS`, spread over all ``frames``."""
     count = min(max(CHECKS, count), frames)
     return sorted({int(f) for f in (np.arange(count) + 0.5) * frames / count})
 
@@ -333,17 +333,17 @@ def check_frames(frames: int, count: int) -> list[int]:
 def calibrate(
     training: Scene, settings: ToleranceSettings, request: Request, on_frame: OnFrame = silent
 ) -> Calibration:
-    """Run every level of ``settings`` on the ``training`` motion and the one made from it.
+    """Run every level of ``settings`` on the ``training`` motion and on its variation.
 
     Parameters
     ----------
     request : smallest error that will be requested
-    on_frame : told of all frames that are done
+    on_frame : callback after each frame
     """
     scenes, least = (training, varied(training)), request.error / settings.factor
     motions = [Motion(scene, least, request.quantity, on_frame) for scene in scenes]
     most = max(motion.iterations for motion in motions)
-    # the iterations of a reference too, and half of many
+    # full-order levels with the iterations of a reference, and with half of them
     many = [Level(count, levels.WINDOW) for count in {most, max(most // 2, levels.CONVERGED)}]
     plain = [Level(count) for count in settings.plain]
     full = [*many, *plain, *(Level(count, levels.WINDOW) for count in settings.accelerated)]
@@ -359,10 +359,10 @@ def calibrate(
 
 
 def _reduced(training: Scene, motion: Motion, settings: ToleranceSettings) -> Iterator[Level]:
-    """Reductions trained on converged frames; none where the scene does not take a subspace."""
+    """Reduced levels trained on converged frames; none if the scene is not reducible."""
     frames = np.arange(0, training.config.frames, 2)
     few = frames[:: -(-len(frames) // settings.frames)]
-    # iterates of the samples' training run, in the subspace
+    # the elements are trained on iterates of a run in the subspace
     scene = Level(20).scene(training)
     try:
         for k in settings.modes:
@@ -393,7 +393,7 @@ def _calibrated(level: Level, motions: Sequence[Motion], on_frame: OnFrame) -> C
 
 
 def varied(scene: Scene) -> Scene:
-    """The motion that is made from that of ``scene``; none of the study's held-out ones."""
+    """Return ``scene`` with a varied motion that differs from the study's held-out motions."""
     own = scene.config.held_out
     speed, axes = KICKED * (own.kick or KICK), own.kick_axes
     kick = {"effect": "kick", "speed": speed, "seed": KICK_SEED, "axes": axes}
@@ -407,10 +407,10 @@ def varied(scene: Scene) -> Scene:
 
 
 def transferred(trained: Scene, scene: Scene) -> Scene:
-    """The training motion with the material, masses, step, frames and obstacles of ``scene``.
+    """Return ``trained`` with the material, masses, step, frames and obstacles of ``scene``.
 
-    A calibration rests on all of these. Held vertices, their paths and the start are those of
-    the ``trained`` scene.
+    A calibration depends on all of these. Held vertices, their paths and the start remain as in
+    ``trained``.
 
     Raises
     ------

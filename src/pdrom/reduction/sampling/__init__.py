@@ -1,4 +1,4 @@
-"""Sampling of projections: which entries or elements are evaluated, and the interpolation."""
+"""Sampling of projections: selection of entries or elements, and interpolation from them."""
 
 from pdrom.reduction.sampling.reduction import Reduction, Sampling, reductions, select, select_path
 

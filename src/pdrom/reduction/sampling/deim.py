@@ -1,8 +1,8 @@
-"""Selections of samples: their interface, and discrete empirical interpolation, greedy.
+"""Interface of sample selections, and greedy discrete empirical interpolation (DEIM).
 
-DEIM (Chaturantabut and Sorensen 2010, algorithm 1) of single entries, of whole elements (all 3p
-entries of an element are taken at once), and the preprint's variant: one row for x, y and z by the
-joint residual norm.
+DEIM (Chaturantabut and Sorensen 2010, algorithm 1) selects single entries or whole elements (all
+3p entries of an element at once). The preprint's variant selects rows, one for x, y and z, by the
+residual norm over the three axes.
 """
 
 from abc import ABC, abstractmethod
@@ -22,7 +22,7 @@ class Selection(ABC):
 
     @abstractmethod
     def one_a_mode(self, v: np.ndarray, size: int, ranks: Sequence[int]) -> dict[int, np.ndarray]:
-        """Distinct blocks, as many as modes (all, if there are fewer) for every r of ``ranks``.
+        """For every r of ``ranks``, select r distinct blocks (all blocks, if fewer exist).
 
         Parameters
         ----------
@@ -31,7 +31,7 @@ class Selection(ABC):
         """
 
     def extend(self, v: np.ndarray, size: int, chosen: np.ndarray, count: int) -> np.ndarray:
-        """``chosen`` blocks followed by others, ``count`` in all: by GappyPOD+E.
+        """Extend the ``chosen`` blocks to ``count`` blocks by GappyPOD+E.
 
         Parameters
         ----------
@@ -42,7 +42,7 @@ class Selection(ABC):
         return oversample(v, size, chosen, count=count)
 
 
-# Residuals of one size up to a little more than round-off are a tie, see `tie_weights`.
+# Relative difference below which two residuals may count as equal, see `tie_weights`.
 TIE = 1e-6
 
 
@@ -54,8 +54,8 @@ def deim_entries(v: np.ndarray) -> np.ndarray:
     an LU factorisation of diag(w) V with partial pivoting (Sorensen and Embree 2016, section 3),
     which LAPACK does in blocks. Scaling rows scales the residuals and changes nothing else.
 
-    The entries are distinct whatever V holds. Of a mode that depends on the earlier ones nothing
-    but round-off is left, and its entry means nothing.
+    The entries are always distinct. For a mode that depends on the earlier ones, the residual is
+    round-off and its entry is arbitrary.
     """
     n, r = v.shape
     weighted = np.multiply(v, tie_weights(n)[:, None], out=np.empty((n, r), order="F"))
@@ -67,11 +67,11 @@ def deim_entries(v: np.ndarray) -> np.ndarray:
 
 
 def tie_weights(n: int) -> np.ndarray:
-    """Factors (n,) from 1 falling to almost 1 - TIE, by which n magnitudes are multiplied.
+    """Factors (n,), falling from 1 to almost 1 - TIE, that break ties between n magnitudes.
 
-    A motion that is symmetric has residuals that are equal up to round-off, and which of them is
-    largest would depend on the order of the operations. With the factors the first one is taken:
-    one that stands d entries later wins if it is larger by more than TIE d / n of its size.
+    A symmetric motion has residuals that are equal up to round-off, and the largest of them would
+    depend on the order of operations. Multiplied by the factors, the first of them is largest; an
+    entry d places later is selected only if it is larger by more than the fraction TIE d / n.
     """
     return 1.0 - TIE * np.arange(n) / n
 
@@ -80,21 +80,21 @@ BLOCK = 16  # columns that LAPACK eliminates at a time
 
 
 class GrowingFit:
-    """Least squares whose equations and unknowns grow together: each mode fitted by earlier ones.
+    """Least-squares fit of each mode by the earlier modes at a growing set of sampled rows.
 
-    Coefficients of a mode in the earlier modes at sampled rows, (S V_k) c = S v_k.
+    The coefficients c of mode v_k solve (S V_k) c = S v_k, where S takes the sampled rows.
 
-    Kept is the triangular factor R (r, r) of the sampled rows of all modes, into which further rows
-    are rotated: of the first k + 1 columns, R[:k, :k] c = R[:k, k] has the same least-squares
-    solutions as the equations themselves. That takes O(s r^2) for s rows, where a factorisation of
-    all rows takes O(m k^2).
+    The triangular factor R (r, r) of the sampled rows of all modes is stored, and further rows
+    are rotated into it. R[:k, :k] c = R[:k, k] has the same least-squares solutions as the
+    sampled equations. Adding s rows costs O(s r^2); factoring all m rows again would cost
+    O(m k^2).
     """
 
     def __init__(self, modes: int) -> None:
         self._factor = np.zeros((modes, modes), order="F")
 
     def add(self, rows: np.ndarray) -> None:
-        """Sample ``rows`` (s, r) of the modes."""
+        """Add the sampled ``rows`` (s, r) of the modes to the fit."""
         block = min(BLOCK, len(self._factor))
         self._factor = linalg.lapack.dtpqrt(0, block, self._factor, rows, overwrite_a=True)[0]
 
@@ -103,7 +103,7 @@ class GrowingFit:
         return self._factor[:k, :k]
 
     def coefficients(self, k: int) -> np.ndarray:
-        """c (k,) of mode k; of several solutions, up to round-off, the shortest."""
+        """Coefficients c (k,) of mode k; the solution of minimal norm if it is not unique."""
         factor, target = self.triangle(k), self._factor[:k, k]
         if linalg.lapack.dtrcon(factor)[0] > k * np.finfo(float).eps:
             return linalg.solve_triangular(factor, target, check_finite=False)
@@ -111,7 +111,7 @@ class GrowingFit:
 
 
 def block_elements(v: np.ndarray, size: int) -> np.ndarray:
-    """Element indices of the basis ``v`` (size e, r), one per mode (all e if e < r), nested in r.
+    """Greedy element indices for the basis ``v`` (size e, r), min(e, r) of them, nested in r.
 
     Mode k is fitted by the earlier modes on the entries of the elements taken so far (least
     squares, more equations than unknowns); the element with the largest residual norm (times
@@ -134,18 +134,18 @@ def block_elements(v: np.ndarray, size: int) -> np.ndarray:
 def joint_rows(
     v: np.ndarray, active: tuple[bool, ...], repeat: bool, factors: np.ndarray | None = None
 ) -> np.ndarray:
-    """Row indices (r,) of the basis ``v`` (3 rows, r), nested in r.
+    """Greedy row indices (r,) for the basis ``v`` (3 rows, r), nested in r.
 
     For mode k each axis a has its own system (P^T V_a) c_a = P^T v_{k,a}; the row with the largest
-    sum of the squared residuals of the three axes (times `tie_weights`) is taken for all of them. A
+    sum of squared residuals of the three axes (times `tie_weights`) is taken for all axes. A
     singular system is solved in the least-squares sense: the row was chosen for the joint norm and
-    may be useless for one axis. The published code does not exclude rows that it has already
-    (``repeat``); otherwise there are fewer than r rows if the basis has no more. ``factors``
-    (rows,) take the place of `tie_weights`.
+    may be useless for one axis. With ``repeat`` a row may be picked again, as in the published
+    code; without it, the result has at most as many entries as the basis has rows. ``factors``
+    (rows,) replace `tie_weights`.
 
     Parameters
     ----------
-    active : which of the three axes move
+    active : for each of the three axes, whether the basis has modes on it
     """
     rows, r = len(v) // 3, v.shape[1]
     axes = [(np.asfortranarray(v[a::3]), GrowingFit(r)) for a in np.flatnonzero(active)]

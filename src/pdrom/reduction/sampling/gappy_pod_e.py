@@ -11,17 +11,17 @@ from scipy import linalg
 
 from pdrom.core.errors import SamplingError
 
-# Rounding errors of a product of a block with itself, relative to its trace.
+# Bound on the rounding errors of the product B B^T of a block B, relative to its trace.
 ROUNDOFF = 1e-11
 
 
 def oversample(v: np.ndarray, size: int, elements: np.ndarray, count: int) -> np.ndarray:
-    """``elements`` followed by others, ``count`` in all (or as many as there are).
+    """Extend ``elements`` to ``count`` elements (all elements, if fewer exist).
 
     Parameters
     ----------
     v : (size e, r) basis, ``size`` consecutive rows for each of the e elements
-    elements : where to start, distinct; usually one for each mode
+    elements : distinct elements to start from, usually one for each mode
 
     Raises
     ------
@@ -35,11 +35,11 @@ def oversample(v: np.ndarray, size: int, elements: np.ndarray, count: int) -> np
 
 
 def bound_gain(v: np.ndarray, size: int, elements: np.ndarray, bound: float) -> np.ndarray:
-    """``elements`` followed by others until || (P^T V)^+ ||_2 <= ``bound``.
+    """Extend ``elements`` until the gain || (P^T V)^+ ||_2 is at most ``bound``.
 
-    It ends with all elements if even they do not meet the bound, which for orthonormal columns and
-    a bound of at least 1 cannot happen: their gain is 1. Errors are those of
-    `oversample`, and so are ``v`` and ``size``.
+    Return all elements if even these do not meet the bound. With orthonormal columns all elements
+    have the gain 1, so that every bound of at least 1 can be met. ``v``, ``size`` and the errors
+    raised are as in `oversample`.
     """
     growing = _Growing(v, size, elements)
     while len(growing.picked) < growing.total and growing.gain > bound:
@@ -57,7 +57,7 @@ class _Growing:
     def __init__(self, v: np.ndarray, size: int, elements: np.ndarray) -> None:
         self._rows = np.ascontiguousarray(v)
         self._blocks = self._rows.reshape(-1, size, v.shape[1])
-        # a tenth of the numbers of the blocks say all but a few digits of the growth
+        # a tenth of the blocks' size suffices to bound the growth closely, see `_growth_at_most`
         self._squares = self._blocks @ self._blocks.transpose(0, 2, 1)
         self._sizes = np.trace(self._squares, axis1=1, axis2=2)
         self.picked, self.total = [int(e) for e in elements], len(self._blocks)
@@ -74,7 +74,7 @@ class _Growing:
 
     @property
     def gain(self) -> float:
-        """1 / sigma_min; inf where the smallest eigenvalue of G is round-off."""
+        """Gain 1 / sigma_min(P^T V); inf where the smallest eigenvalue of G is round-off."""
         roundoff = len(self._gram) * np.finfo(float).eps * np.trace(self._gram)
         return 1.0 / np.sqrt(self._smallest) if self._smallest > roundoff else np.inf
 
@@ -86,7 +86,7 @@ class _Growing:
         self._decompose()
 
     def _decompose(self) -> None:
-        """Smallest eigenvalue of G, its eigenvector, and the gap to the next (inf if r = 1)."""
+        """Set G's smallest eigenvalue, its eigenvector, and the gap to the next (inf if r = 1)."""
         last = min(1, len(self._gram) - 1)
         values, vectors = linalg.eigh(
             self._gram, subset_by_index=(0, last), check_finite=False, driver="evr"
@@ -95,12 +95,12 @@ class _Growing:
         self._gap = max(float(values[1] - values[0]), 0.0) if last else np.inf
 
     def _strongest(self) -> int:
-        """Element that is not sampled yet with the largest `eigenvalue_growth`.
+        """Return the unsampled element with the largest `eigenvalue_growth`.
 
-        The growth is at most |B u|^2: candidates are those where this is larger than the bound of
-        the element with the largest |B u|^2, which wins ties: if the smallest eigenvalue is double,
-        all bounds are zero. Of these again those whose growth by `_squares`, too large by what
-        rounding may take away, is not below the growth of the best of them.
+        Two upper bounds exclude elements before their growth is computed. |B u|^2 must exceed the
+        growth of the element with the largest |B u|^2, which wins ties (all growths are zero if the
+        smallest eigenvalue is double). `_growth_at_most` must not be below the growth of the
+        element for which it is largest.
         """
         products = (self._rows @ self._weakest).reshape(self.total, -1)
         strength = np.einsum("es,es->e", products, products)
@@ -118,7 +118,7 @@ class _Growing:
         return int(others[np.argmax(growth)]) if growth.max(initial=0.0) > bound else first
 
     def _growth_at_most(self, elements: np.ndarray, products: np.ndarray) -> np.ndarray:
-        """Numbers that `_growth` does not exceed, without the blocks themselves."""
+        """Upper bounds on `_growth` of ``elements``, computed without reading the blocks."""
         products = products[elements]
         squared = np.einsum("es,es->e", products, products)
         stretched = np.einsum("est,et->es", self._squares[elements], products)
@@ -153,8 +153,8 @@ def eigenvalue_growth(
 
     Parameters
     ----------
-    blocks : (m, s, r) the B of m candidates
-    products : (m, s) their b
+    blocks : (m, s, r) matrices B of m candidates
+    products : (m, s) vectors b = B u of the candidates
     weakest : (r,) the unit vector u
     gap : g >= 0
     """
@@ -166,7 +166,7 @@ def eigenvalue_growth(
 
 
 def _smaller_root(squared: np.ndarray, beside: np.ndarray, gap: float) -> np.ndarray:
-    """t of `eigenvalue_growth` for |b|^2 and c, which lowers it, (m,)."""
+    """Root t of `eigenvalue_growth`, (m,), for ``squared`` |b|^2, ``beside`` c and ``gap`` g."""
     if np.isinf(gap):
         return squared
     mean = squared + beside

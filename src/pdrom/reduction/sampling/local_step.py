@@ -1,8 +1,8 @@
 """The reduced local step: S^T W p(y) is replaced by S^T W (mean + V c(y)).
 
 Its compiled part gets the coefficients from sampled entries and reconstructs ("lift"). Coefficients
-come in sets: one that all axes share, or one an axis. A column of the lift adds the coefficients of
-its set to one axis of the right-hand side."""
+come in sets: one set that all axes share, or one set for each axis. A column of the lift adds the
+reconstruction by one set of coefficients to one axis of the right-hand side."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -32,10 +32,10 @@ from pdrom.model.scene import Scene
 from pdrom.reduction.rerun import Rerun, compare
 from pdrom.reduction.sampling.reduction import Reduction
 
-SPLIT_FROM = 1 << 17  # entries of a lift (N, r) from which its rows are in two parts
+SPLIT_FROM = 1 << 17  # size N r of a lift from which its rows are divided between two threads
 
-# Entries of the record: the numbers of modes, sets, columns and sampled numbers, address and record
-# of the sampler; then the places of the arrays of `Lift` in their order, and that of a clock.
+# Entries of the kernel's record of integers: numbers of modes, sets, columns and sampled values,
+# address and record of the sampler; then addresses of the arrays of `Lift` and of the clocks.
 MODES, SETS, COLUMNS, SAMPLED, SAMPLER, SAMPLER_RECORD = range(OWN, OWN + 6)
 STARTS, POSITIONS, PACKED, OPERATORS, SHIFTS, COEFFICIENTS = range(OWN + 6, OWN + 12)
 AXES, OWN_SETS, LIFTED, OFFSET, SECONDS, PROJECTIONS, CLOCK, SIZE = range(OWN + 12, OWN + 20)
@@ -47,14 +47,14 @@ class Lift:
 
     starts : (sets + 1,) where the sampled entries of each set begin
     positions : sampled entries of each set among the numbers of the sampled elements
-    packed : room for those of one set
-    operators : (r, m) of each set, flat, one after the other
-    shifts : (sets, r) what is taken from operator times entries: the part of the mean
-    coefficients : (sets, r) those of the last evaluation
-    axes, own_sets : (c,) axis that a column adds to, set whose coefficients it takes
+    packed : working memory for the sampled entries of one set
+    operators : solution operators (r, m) of all sets, flattened, one after the other
+    shifts : (sets, r) operator times the mean at the entries, subtracted from the coefficients
+    coefficients : (sets, r) coefficients of the last evaluation
+    axes, own_sets : (c,) axis to which a column adds, and the set whose coefficients it uses
     lifted : (c, N, r) S^T W V
-    offset : (4 N,) S^T W mean, padded vectors
-    seconds : (2,) time of the two parts of the lift so far
+    offset : (4 N,) S^T W mean, each vector padded to four numbers
+    seconds : (2,) s, accumulated time of the two halves of the lift
     """
 
     starts: np.ndarray
@@ -70,14 +70,14 @@ class Lift:
     seconds: np.ndarray
 
     def kernel(self, sampler: LocalKernel, sampled: int) -> LocalKernel:
-        """Local kernel that adds the lift; ``sampler`` writes so many ``sampled`` numbers."""
+        """Local kernel that samples by ``sampler``, which writes ``sampled`` numbers, and lifts."""
         columns, vertices, modes = self.lifted.shape
         split = vertices * modes >= SPLIT_FROM
         numbers = (
             modes, len(self.shifts), columns, sampled, sampler.address, sampler.record.ctypes.data
         )  # fmt: skip
         clocks = np.stack([clock(), clock()])
-        # those of the lift have the order of the kernel's record
+        # the arrays of `Lift` are passed in the order in which the kernel's record lists them
         own = vars(self).values()
         arrays = (*own, np.empty(sampled), clocks, sampler.record, *sampler.arrays)
         return LocalKernel(
@@ -93,23 +93,23 @@ class Lift:
 
 @compiled(nogil=True)
 def coefficients(sampled, starts, positions, packed, operators, shifts, result):
-    """Write the coefficients of all sets that belong to the numbers of the sampled elements.
+    """Compute the coefficients of all sets from the projections of the sampled elements.
 
     Parameters
     ----------
     sampled : projections of the sampled elements, one after the other
     starts, positions, packed, operators, shifts : see `Lift`
-    result : (sets, r) that is written
+    result : (sets, r) output
     """
     sets, modes = shifts.shape
     for k in range(sets):
         first, last = starts[k], starts[k + 1]
-        # side by side, so that a product for each mode reads whole vectors
+        # the set's entries are made contiguous for the products with the operator's rows
         for j in range(last - first):
             packed[j] = at(sampled, at(positions, first + j))
         size = last - first
         for i in range(0, modes, 3):
-            # the last one again where there are fewer than three
+            # three modes at a time; the last mode is repeated where fewer than three are left
             a, b, c = i, min(i + 1, modes - 1), min(i + 2, modes - 1)
             result[k, a], result[k, b], result[k, c] = dots(
                 operators,
@@ -189,7 +189,7 @@ def _accumulate(y, rhs_place, record, part):
 
 
 class ReducedLocalStep:
-    """Evaluates sampled elements of a group and lifts their coefficients to the right-hand side.
+    """Local step that evaluates sampled elements and adds their reconstruction to the rhs.
 
     Precomputed: the offset S^T W mean (N, 3), the reconstruction S^T W V for each coefficient
     block, and the solution operators. Online: the projections of the sampled elements, a small
@@ -197,11 +197,11 @@ class ReducedLocalStep:
 
     Attributes
     ----------
-    local_kernel : all of this as compiled code; None for a group without a sampler
+    local_kernel : compiled form of the online part; None for a group without a sampling kernel
     """
 
     def __init__(self, group: ConstraintGroup, reduction: Reduction) -> None:
-        """Precompute what ``reduction`` of ``group`` needs online."""
+        """Precompute the arrays that ``reduction`` of ``group`` needs during a run."""
         self.name = group.name
         self._group = group
         self._elements = np.ascontiguousarray(reduction.elements, dtype=np.int64)
@@ -216,7 +216,7 @@ class ReducedLocalStep:
 
     @property
     def frame_lagged(self) -> bool:
-        """Whether ``begin_frame`` freezes anything."""
+        """Whether the group has data that ``begin_frame`` freezes for a frame."""
         return self._group.frame_lagged
 
     def begin_frame(self, q: np.ndarray) -> None:
@@ -224,7 +224,7 @@ class ReducedLocalStep:
         self._group.begin_frame(q, None if self._everything else self._elements)
 
     def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
-        """Add the reduced S^T W p(y) of ``y`` (N, 3) m to ``rhs`` (N, 3); energy unknown: nan."""
+        """Add the reduced S^T W p(``y``), (N, 3), to ``rhs``; return nan: the energy is unknown."""
         if self._pass is not None:
             return self._pass.accumulate(y, rhs)
         self.solve(self.sample(y))
@@ -236,7 +236,7 @@ class ReducedLocalStep:
         return self._group.project_elements(y, self._elements).ravel()
 
     def solve(self, sampled: np.ndarray) -> None:
-        """Set the coefficients from ``sampled`` (`sample`); the systems are inverted already."""
+        """Set the coefficients from ``sampled``, the result of `sample`."""
         data = self._lift
         coefficients(
             sampled, data.starts, data.positions, data.packed, data.operators, data.shifts,
@@ -256,7 +256,7 @@ class ReducedLocalStep:
 
     @property
     def lift_seconds(self) -> float:
-        """Time of the reconstruction so far."""
+        """Accumulated time of the reconstruction, s."""
         return float(self._lift.seconds.sum())
 
     @lift_seconds.setter
@@ -268,7 +268,7 @@ def _lift(group: ConstraintGroup, reduction: Reduction) -> Lift:
     mean, blocks, r = reduction.basis.mean, reduction.blocks, reduction.r
     operator = group.S.T.multiply(group.row_weights[None, :]).tocsr()
     vertices = operator.shape[0]
-    # from entries of the full vector to those of the sampled elements' vector
+    # map entries of the full projection to entries of the sampled elements' projections
     size = 3 * reduction.basis.rows_per_element
     entries = np.concatenate([np.empty(0, np.int64), *(block.entries for block in blocks)])
     element, inside = np.divmod(entries, size)
@@ -295,7 +295,7 @@ def _lift(group: ConstraintGroup, reduction: Reduction) -> Lift:
 
 
 def replace_group(scene: Scene, group: str, replacement: LocalStep) -> list[LocalStep]:
-    """Local steps of the scene with the one of ``group`` replaced by ``replacement``."""
+    """Local steps of ``scene``, the step of ``group`` replaced by ``replacement``."""
     scene.group(group)
     return [replacement if g.name == group else g for g in scene.groups]
 
@@ -316,7 +316,7 @@ def rerun(
     blowup_extent : the run ends when the extent exceeds this multiple of the rest extent
     offset : (N, 3) m, added to the first positions
     system : factored system of the scene's global step
-    local_steps : those that take the place of the scene's own
+    local_steps : local steps that replace the steps of the scene's groups
     """
     loop = scene.stepper(system, local_steps, track_objective=False)
     start, frames, unit = scene.initial_state(offset), scene.config.frames, scene.mesh.extent
@@ -332,9 +332,9 @@ def rerun_reduced(
     system: GlobalSystem | None = None,
     offset: np.ndarray | None = None,
 ) -> Rerun:
-    """Run a scene with the projections of a ``group`` by ``reduction``, see `rerun`.
+    """Run a scene, evaluating the projections of ``group`` by ``reduction``; see `rerun`.
 
-    ``system`` is the scene's own unless another is given.
+    ``system`` defaults to the scene's own.
     """
     steps = replace_group(scene, group, ReducedLocalStep(scene.group(group), reduction))
     return rerun(scene, system or scene.system, steps, reference, blowup_extent, offset)

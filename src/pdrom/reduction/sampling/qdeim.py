@@ -7,19 +7,19 @@ import numpy as np
 from pdrom.reduction.sampling.deim import Selection, tie_weights
 
 EPS = np.finfo(float).eps
-# Rows of candidates for each mode, and how few pivots among them ask for twice as many.
+# Candidate rows for each mode; if fewer than FEW pivots are found among them, they are doubled.
 ROWS_A_MODE, FEW = 2, 8
 
 
 def qdeim_elements(v: np.ndarray, size: int) -> np.ndarray:
-    """Element indices of the basis ``v`` (size e, r), one per mode (all e if e < r).
+    """Q-DEIM element indices for the basis ``v`` (size e, r), min(e, r) of them.
 
     The columns of V^T are pivots, in groups of ``size`` that belong to one element. The group with
     the largest Frobenius norm (times `tie_weights`) is taken, and the direction in R^r that
-    dominates it is removed from all groups. For ``size`` 1 this is the method of the paper. For
-    larger ones, to remove the whole group would exhaust R^r after about r / size elements; one
-    direction an element gives as many elements as modes, to be compared with the greedy at equal
-    cost. The removed directions are orthonormal and lie in the span of the taken groups, so the
+    dominates it is removed from all groups. For ``size`` 1 this is the method of the paper. With
+    larger sizes, removing the whole group would exhaust R^r after about r / size elements; one
+    direction per element gives as many elements as modes, the same cost as the greedy selection.
+    The removed directions are orthonormal and lie in the span of the taken groups, so that the
     sampled rows of V have full column rank.
 
     Not nested in r. Cost O(n r^2), n = size e.
@@ -34,11 +34,11 @@ def qdeim_elements(v: np.ndarray, size: int) -> np.ndarray:
 
 
 class _Left:
-    """Remainders of all groups, known by bounds on their norms.
+    """Groups of columns after removal of the taken directions, with bounds on their norms.
 
-    Norms only fall. So a pivot among the groups with the largest bounds is the pivot of all while
-    its norm exceeds the bounds of the others, and the others need not be touched until it does not:
-    LAPACK goes through the whole matrix once a pivot, this a few times in all.
+    Norms only decrease. A pivot among the groups with the largest bounds is therefore the pivot of
+    all groups as long as its norm exceeds the bounds of the others, which are updated only when it
+    does not. So the matrix is read a few times in all, where LAPACK reads it once per pivot.
     """
 
     def __init__(self, v: np.ndarray, size: int) -> None:
@@ -51,7 +51,7 @@ class _Left:
         self._error = self._rounding(self._squares)
 
     def pick_among(self, count: int, most: int) -> int:
-        """Pick from ``count`` candidates, up to ``most`` in all; return how many were found."""
+        """Add pivots among ``count`` candidates, up to ``most`` in all; return the number added."""
         candidates, rest = self._highest(count)
         left = self._rows.reshape(self.total, self._size, -1)[candidates]
         left = left.reshape(len(candidates) * self._size, -1)
@@ -65,7 +65,7 @@ class _Left:
                 break
             weights[best] = -1.0
             self.picked.append(int(candidates[best]))
-            # the dominant direction of the group; zero where nothing is left, of dependent modes
+            # the dominant direction of the group; zero where dependent modes leave no remainder
             group = left[self._size * best : self._size * (best + 1)]
             direction = np.linalg.svd(group, full_matrices=False)[2][0] if group.any() else group[0]
             direction = direction - self._directions.T @ (self._directions @ direction)
@@ -79,7 +79,7 @@ class _Left:
         return len(new)
 
     def _highest(self, count: int) -> tuple[np.ndarray, float]:
-        """Elements with the largest bounds, in order, and the largest of the others (-1: none)."""
+        """The ``count`` elements with the largest bounds, and the next largest bound (-1: none)."""
         bounds = self._weights * (self._squares + self._error)
         bounds[self.picked] = -1.0
         if count == self.total:
@@ -89,16 +89,16 @@ class _Left:
         return np.sort(split[self.total - count :]), float(rest)
 
     def _norms(self, rows: np.ndarray) -> np.ndarray:
-        """Squared Frobenius norms of groups."""
+        """Squared Frobenius norm of each group of ``rows``."""
         return np.einsum("nk,nk->n", rows, rows).reshape(-1, self._size).sum(axis=1)
 
     def _rounding(self, squares: np.ndarray) -> np.ndarray:
-        """Bound on the errors of differences of ``squares`` and of those of their directions."""
+        """Bound on the rounding errors of squared norms that are updated by subtraction."""
         return 4.0 * self._rows.shape[1] * EPS * squares
 
 
 class PivotedQR(Selection):
-    """Q-DEIM, not nested in r."""
+    """Q-DEIM; the samples for different numbers r of modes are not nested."""
 
     def one_a_mode(self, v: np.ndarray, size: int, ranks: Sequence[int]) -> dict[int, np.ndarray]:
         return {r: qdeim_elements(v[:, :r], size) for r in ranks}

@@ -39,7 +39,7 @@ def solution_operator(a: np.ndarray, solve: Solve, tikhonov: float) -> np.ndarra
 
 
 def _singular(diagonal: np.ndarray) -> bool:
-    """A factor's diagonal with a zero, or with one that is round-off of the largest."""
+    """Whether the smallest entry of a factor's diagonal is round-off of the largest."""
     return bool(diagonal.min() <= np.finfo(float).eps * diagonal.max())
 
 
@@ -58,7 +58,7 @@ class Sampling:
 
     entries : indices into the vectorised projection (length 3 e p), in order of selection; for
         "joint" rows the x entry of each row stands for the row
-    elements : indices of the elements that must be evaluated for them, unique, in order of need
+    elements : unique indices of the elements of these entries, by their first entry
     """
 
     entries: np.ndarray
@@ -68,13 +68,13 @@ class Sampling:
     def of_entries(
         cls, entries: np.ndarray, rows_per_element: int, elements: int, repeats: bool = False
     ) -> "Sampling":
-        """Sampling of entries; SamplingError for one out of range or, unless allowed, repeated.
+        """Sampling of ``entries``; SamplingError if one is out of range or repeated without leave.
 
         Parameters
         ----------
         entries : (m,) indices of a vectorised projection of all ``elements``
         rows_per_element : p
-        repeats : whether an entry may come twice
+        repeats : whether an entry may occur twice
         """
         entries = np.asarray(entries, dtype=np.int64)
         size = 3 * rows_per_element
@@ -103,7 +103,7 @@ class Block:
 
     entries : sampled entries of the vectorised projection that determine the coefficients
     matrix : (m, r) the basis at these entries
-    operator : (r, m) from sampled values to coefficients
+    operator : (r, m) matrix that maps sampled values to coefficients
     """
 
     axis: int | None
@@ -120,10 +120,10 @@ class Block:
 class Reduction:
     """An interpolation (or projection) operator of a method at basis size r.
 
-    An axis in which the training data are round-off carries nothing: its coefficients are zero and
-    it does not count for the gain. That is kinder to methods with separate systems per axis than
-    their text, which would divide noise by noise. An axis that does carry something but whose
-    system is singular is a failure of the method: gain inf, reconstruction nan.
+    An axis on which the training data are round-off has zero coefficients and does not enter the
+    gain. Methods with a separate system per axis, as published, would divide noise by noise there.
+    A singular system of any other axis is a failure of the method: the gain is inf and the
+    reconstruction nan.
 
     Attributes
     ----------
@@ -132,7 +132,7 @@ class Reduction:
     """
 
     def __init__(self, basis: Basis, sampling: Sampling, spec: MethodSpec, r: int) -> None:
-        """Take r modes of ``basis``, the entries of ``sampling``, and solve as ``spec`` says."""
+        """Build the operator from r modes of ``basis`` at the ``sampling``, by method ``spec``."""
         self.basis, self.sampling, self.spec, self.r = basis, sampling, spec, r
         self.v = basis.truncated(r)
         axes = [int(a) for a in np.flatnonzero(basis.active_axes)] if spec.per_axis else [None]
@@ -140,14 +140,14 @@ class Reduction:
 
     @property
     def elements(self) -> np.ndarray:
-        """Elements to evaluate, in the order that `coefficients` expects."""
+        """Elements to evaluate, in the order of ``sampling.elements``."""
         return self.sampling.elements
 
     def _block(self, axis: int | None) -> Block:
         if self.spec.rows == "all":
             entries = np.arange(len(self.v))[slice(None) if axis is None else slice(axis, None, 3)]
             matrix = self.v[entries]
-            # of orthonormal columns the pseudo-inverse is V^T
+            # the pseudo-inverse of orthonormal columns V is V^T
             gram = matrix.T @ matrix
             orthonormal = np.allclose(gram, np.eye(len(gram)), rtol=0.0, atol=1e-12)
             return Block(axis, entries, matrix, matrix.T if orthonormal else np.linalg.pinv(matrix))
@@ -203,14 +203,14 @@ class Reduction:
 
 
 def select(basis: Basis, spec: MethodSpec, r: int) -> Sampling:
-    """Sampling of ``spec`` for the first r modes of ``basis``."""
+    """Select samples by the method ``spec`` for the first r modes of ``basis``."""
     return select_path(basis, spec, [r])[r]
 
 
 def select_path(basis: Basis, spec: MethodSpec, ranks: Sequence[int]) -> dict[int, Sampling]:
-    """Samplings of ``basis`` by ``spec`` for several ``ranks``, nested where they are greedy.
+    """Select samples of ``basis`` by ``spec`` for each r of ``ranks``, nested where greedy.
 
-    Blocks beyond the modes are not nested in r: they depend on where the first r modes are weak.
+    Samples in excess of the r modes are not nested: they depend on sigma_min of the first r modes.
 
     Raises
     ------
@@ -249,7 +249,7 @@ def select_path(basis: Basis, spec: MethodSpec, ranks: Sequence[int]) -> dict[in
 
 
 def reductions(basis: Basis, spec: MethodSpec, sizes: Sequence[int]) -> dict[int, Reduction]:
-    """Reductions of those of ``sizes`` that ``basis`` has, by ``spec``; see `select_path`."""
+    """Reductions by ``spec`` for each r of ``sizes`` up to the rank of ``basis``, by r."""
     known = [r for r in sizes if r <= basis.rank]
     path = select_path(basis, spec, known)
     return {r: Reduction(basis, path[r], spec, r=r) for r in known}

@@ -13,16 +13,16 @@ from scipy import linalg
 from pdrom.core.errors import SamplingError
 from pdrom.reduction.sampling.deim import GrowingFit, Selection
 
-# Columns of length one depend on each other when what the others leave of one of them is below
-# this. Round-off leaves up to 1e-15 sqrt(r) of a column that is a copy; a column with less than
-# 1e-10 of its own at the samples would amplify their errors by 1e10 and is of no use either.
+# A unit column depends on others if the norm of its part orthogonal to them is below this. For a
+# copied column round-off gives up to 1e-15 sqrt(r); an orthogonal part below 1e-10 at the samples
+# would amplify their errors by 1e10 and be useless as well.
 DEPENDENT = 1e-12
 
 
 def s_opt_path(v: np.ndarray, size: int) -> np.ndarray:
     """Greedy maximisation of the S-measure S(A) = (sqrt(det A^T A) / prod_j |A_j|)^(1/r).
 
-    One element a mode (all e if e < r), nested in r: step k maximises S of the first k modes at k
+    Return min(e, r) elements, nested in r: step k maximises S of the first k modes at k
     elements. The first step, where S is 1 for every element, takes the largest norm of the first
     mode, as classical DEIM does.
 
@@ -34,7 +34,7 @@ def s_opt_path(v: np.ndarray, size: int) -> np.ndarray:
     Raises
     ------
     SamplingError
-        A mode depends on the earlier ones at whatever elements could be taken.
+        A mode depends on the earlier modes at the sampled rows, whichever element is added.
     """
     state = _Sampled(v, size)
     for mode in range(min(v.shape[1], state.total)):
@@ -43,14 +43,14 @@ def s_opt_path(v: np.ndarray, size: int) -> np.ndarray:
 
 
 class SOpt(Selection):
-    """One element a mode, nested in r, and further ones by the same measure."""
+    """S-OPT: one element per mode, nested in r; further elements by the same measure."""
 
     def one_a_mode(self, v: np.ndarray, size: int, ranks: Sequence[int]) -> dict[int, np.ndarray]:
         path = s_opt_path(v, size)
         return {r: path[:r] for r in ranks}
 
     def extend(self, v: np.ndarray, size: int, chosen: np.ndarray, count: int) -> np.ndarray:
-        """``chosen`` followed by those that raise the S-measure of all modes, ``count`` in all.
+        """Extend ``chosen`` to ``count`` elements, each maximising the S-measure of all modes.
 
         Ends with all e elements if there are fewer. Raises SamplingError if the modes depend on
         each other at the elements to start with.
@@ -65,7 +65,7 @@ class SOpt(Selection):
 
 
 class _Sampled:
-    """Sampled elements with what the S-measure of one more needs.
+    """Sampled elements, with the data that give the S-measure after adding any other element.
 
     With G the Gram matrix of the sampled rows and B (s, k) the rows of a candidate,
     det(G + B^T B) = det G det(I + M), M = B G^-1 B^T. Taking an element D updates all M at once
@@ -79,7 +79,7 @@ class _Sampled:
     """
 
     def __init__(self, v: np.ndarray, size: int, elements: Sequence[int] | np.ndarray = ()) -> None:
-        # the measure does not depend on the lengths of the columns, round-off does
+        # scaling the columns to unit length does not change the measure but reduces round-off
         norms = np.linalg.norm(v, axis=0)
         if not norms.all():
             raise SamplingError(f"S-OPT: mode {int(np.argmin(norms)) + 1} is zero")
@@ -95,12 +95,12 @@ class _Sampled:
             self._products = self._blocks @ self._inverse() @ self._blocks.transpose(0, 2, 1)
 
     def best(self) -> int:
-        """Element with the largest S-measure of the modes that are in."""
+        """Element that gives the largest S-measure of the modes that have been added."""
         norms = np.log(self._column_norms(self._modes)).sum(axis=1)
         return self._argmax(self._log_determinants() - norms)
 
     def best_with(self, mode: int) -> int:
-        """Element with the largest S-measure when ``mode`` joins the columns."""
+        """Element that gives the largest S-measure after ``mode`` is added to the columns."""
         if not self.picked:
             return int(np.argmax(self._squares[:, mode]))
         z, q = self._residual()
@@ -114,7 +114,7 @@ class _Sampled:
         return self._argmax(measure)
 
     def add(self, element: int, mode: int | None = None) -> None:
-        """Sample ``element`` and, if given, let ``mode`` join the columns."""
+        """Sample ``element`` and, if given, add ``mode`` to the columns."""
         inverse, columns = self._inverse(), self._blocks[:, :, : self._modes]
         rows = columns[element]
         small = np.eye(len(rows)) + rows @ inverse @ rows.T
@@ -151,11 +151,11 @@ class _Sampled:
         return half @ half.T
 
     def _shifted(self) -> np.ndarray:
-        """I + M of every element."""
+        """Matrix I + M of every element, see the class."""
         return self._products + np.eye(self._products.shape[1])
 
     def _log_determinants(self) -> np.ndarray:
-        """log det(I + M) of all elements; at least 0, below which only round-off leads."""
+        """log det(I + M) of all elements, at least 0 (smaller values are round-off)."""
         return np.maximum(np.linalg.slogdet(self._shifted())[1], 0.0)
 
     def _column_norms(self, modes: int) -> np.ndarray:

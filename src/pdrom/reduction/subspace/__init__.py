@@ -1,1 +1,1 @@
-"""Position subspaces: columns, coordinates, reduced system, element sampling with weights."""
+"""Position subspaces q = B z: columns B, reduced system, and weighted sampling of elements."""

@@ -1,10 +1,10 @@
-"""Columns of a position subspace q = B z, coefficients shared by x, y and z.
+"""Columns B (N, K) of a position subspace q = B z with coordinates z (K, 3); axes share B.
 
 The free vertices get k modes and, always, the affine columns 1, x, y, z of the rest shape: the rest
-shape and every rigid motion are in the space. Vertices that a boundary ever holds get columns of
-their own (affine, and what their released motion needs), atom by atom. While an atom is held its
-coordinates are fixed, so that pins and handles are met exactly (affine lift); when it is released
-they are unknowns like the others. The space never changes during a run.
+shape and every rigid motion are in the space. Vertices that a boundary condition holds at any time
+form atoms, sets that are held and released together. Each atom has its own columns: affine ones
+and POD modes of its released motion. While an atom is held its coordinates are fixed, so that pins
+and handles are met exactly; otherwise they are unknowns. The space is constant during a run.
 """
 
 from collections.abc import Sequence
@@ -17,10 +17,10 @@ from pdrom.model.effects.base import Boundary
 from pdrom.model.mesh.selection import farthest_points
 from pdrom.reduction.basis import fix_signs, pod
 
-# Columns that add less than this (relative) to the span are dropped.
+# A column is dropped if its part orthogonal to the earlier columns is relatively below this.
 DEPENDENT = 1e-9
 
-# An atom's own motion, in addition to its affine one, is represented down to this part of it.
+# Relative truncation of the POD modes of an atom's non-affine motion.
 OWN_MOTION = 1e-3
 
 # Motion below this fraction of the positions is round-off.
@@ -33,8 +33,8 @@ class Columns:
 
     B : (N, K) columns; the free ones are mass-orthonormal
     free : indices of the columns of the free vertices
-    atoms : vertex sets that are held together, and ...
-    atom_columns : ... the columns that each of them has
+    atoms : vertex sets that are held and released together
+    atom_columns : for each atom, the indices of its columns
     modes : number k of modes, not counting the affine columns
     """
 
@@ -46,7 +46,7 @@ class Columns:
 
 
 def affine_columns(points: np.ndarray) -> np.ndarray:
-    """1, x, y, z of the rest shape ``points`` (N, 3) m, (N, 4)."""
+    """Columns 1, x, y, z, (N, 4), of the rest shape ``points`` (N, 3) m."""
     return np.column_stack([np.ones(len(points)), points])
 
 
@@ -69,7 +69,7 @@ def displacement_modes(
     rest = weight * displacements
     rest = rest - affine @ (affine.T @ rest)
     modes, sigma = pod(rest)
-    # a motion that is affine altogether leaves nothing but round-off
+    # the remainder of an entirely affine motion is round-off
     noise = ROUNDOFF * float(np.linalg.norm(weight[:, :, None] * trajectory.transpose(1, 0, 2)))
     useful = int(np.count_nonzero(sigma > max(DEPENDENT * sigma[0], noise)))
     return modes[:, : min(k, useful)] / weight
@@ -82,10 +82,10 @@ def build_columns(
     atoms: Sequence[np.ndarray],
     trajectory: np.ndarray,
 ) -> Columns:
-    """Space of ``modes`` (N, k) on the free vertices and of the atoms' own columns.
+    """Build the space from ``modes`` (N, k) on the free vertices and columns of each atom.
 
-    An atom gets its affine columns and, where its vertices move otherwise in ``trajectory``
-    (n, N, 3), POD modes of that motion down to `OWN_MOTION` of it.
+    An atom has affine columns and, where its motion in ``trajectory`` (n, N, 3) is not affine, POD
+    modes of the remainder, truncated at the relative error `OWN_MOTION`.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ def _atom_columns(
 
 
 def orthonormal(columns: np.ndarray) -> np.ndarray:
-    """Orthonormal columns with the span of ``columns`` (n, k), in order, no dependent ones."""
+    """Orthonormalise ``columns`` (n, k) in their order; dependent columns are dropped."""
     kept: list[np.ndarray] = []
     for column in columns.T:
         norm = np.linalg.norm(column)
@@ -136,7 +136,7 @@ def orthonormal(columns: np.ndarray) -> np.ndarray:
 
 
 def atoms(boundaries: Sequence[Boundary], vertices: int) -> list[np.ndarray]:
-    """Disjoint sets of vertices whose union is everything that is ever held.
+    """Disjoint sets of vertices whose union is all vertices that a boundary ever holds.
 
     Two vertices share an atom if the same units of the boundaries hold them; a unit is then a union
     of atoms, and holding it fixes whole atoms.
@@ -164,7 +164,7 @@ def skinning_weights(points: np.ndarray, handles: int) -> np.ndarray:
     chosen = farthest_points(points, np.arange(len(points)), handles)
     distance = np.linalg.norm(points[:, None, :] - points[chosen][None], axis=2)
     radius = 3.0 * distance.min(axis=1).max() if handles > 1 else 2.0 * distance.max()
-    # where every vertex is a handle the covering radius is zero, and all distances of a single one
+    # the covering radius is zero if every vertex is a handle; for one vertex all distances are
     radius = max(radius, np.finfo(float).eps * distance.max(), np.finfo(float).tiny)
     scaled = np.minimum(distance / radius, 1.0)
     kernel = (1.0 - scaled) ** 4 * (4.0 * scaled + 1.0)
@@ -172,10 +172,10 @@ def skinning_weights(points: np.ndarray, handles: int) -> np.ndarray:
 
 
 def skinning_modes(points: np.ndarray, masses: np.ndarray, k: int) -> np.ndarray:
-    """k mass-orthonormal columns (N, k) of the span of w_h [1, x, y, z], affine part removed.
+    """k mass-orthonormal columns (N, k) in the span of w_h [1, x, y, z], affine part removed.
 
-    The handles are as many as give k columns; of the last handle's columns those with the largest
-    singular values are kept, so that bases of equal size can be compared.
+    w_h are the `skinning_weights` of as many handles as k columns need. Columns in excess of k are
+    dropped by singular value, so that the basis has the same size as others it is compared with.
 
     Parameters
     ----------

@@ -6,7 +6,7 @@ weight the element in the system matrix and in the right-hand side. The reduced 
 again a projective-dynamics problem, with weights xi_e w_e >= 0: whatever the factors and the state,
 its objective cannot rise in an iteration. Their quality decides the accuracy, not the stability.
 
-Training iterates are those of the position subspace with all projections. One iteration there,
+Training iterates come from a run in the position subspace with all projections. One iteration,
 A z' = (M/h^2) s + sum_e B^T S_e^T w_e p_e(B z), can be written as sum_e g_e = (M/h^2)(s - z') with
 g_e = B^T S_e^T w_e (S_e B z' - p_e(B z)). Sampled elements whose factors satisfy
 sum_e xi_e g_e = sum_e g_e map z to the same z', with their own matrix on the left. So the pairs
@@ -15,11 +15,11 @@ iterate by A^-1 r and misses the minimum of the iteration's quadratic objective 
 That is how its size is measured (`Norm` "energy"): in the plain norm the stiff coordinates would
 hide errors of the soft ones, which the run follows.
 
-"response" measures what r does to the run. In each mode of (K, M) the ends of frames obey
+`Norm` "response" measures the effect of r on the run. In each mode of (K, M) the frame ends obey
 x_{n+1} / c^2 - 2 x_n + x_{n-1} = h^2 r_n with c^2 = 1 / (1 + h^2 omega^2). To an r_n that is new
-in every frame this answers with the root mean square h^2 c^2 sqrt((1 + c^2) / (1 + 3 c^2)) /
-(1 - c^2) of its own, which lies between 0.7 and 1 of the static answer 1 / omega^2. A mode without
-stiffness is taken to have the answer of a run of the scene's length.
+in every frame the mode responds with h^2 c^2 sqrt((1 + c^2) / (1 + 3 c^2)) / (1 - c^2) times the
+root mean square of r_n, between 0.7 and 1 of the static response 1 / omega^2. For a mode without
+stiffness, the response over a run of the scene's length is used.
 
 The factors are found by sparse non-negative least squares, stopped early (`nnls_path`).
 """
@@ -48,8 +48,8 @@ Norm = Literal["energy", "response"]
 class TrainingFrame:
     """A frame of the training run.
 
-    start : (K, 3) coordinates at its beginning, which frame-lagged data are frozen at
-    pairs : (n, 2, K, 3) coordinates before and after its iterations
+    start : (K, 3) coordinates at the frame's beginning, where frame-lagged data are evaluated
+    pairs : (n, 2, K, 3) coordinates before and after each iteration
     measure : (K', K) with |measure r| the size of a residual r of the equations in the chosen norm:
         |measure r|^2 = r^T A^-1 r, J, or |M^1/2 x|^2 of the run's response x, kg m^2; held
         coordinates have no equation
@@ -67,14 +67,14 @@ def training_run(
     start: State | None = None,
     norm: Norm = "energy",
 ) -> list[TrainingFrame]:
-    """Run the scene in the subspace with all projections; iterates of ``frames``, ascending.
+    """Run the scene in the subspace with all projections; return iterates of ``frames``.
 
-    Only the training motion is run, and only ``frames`` of it are kept. It begins at ``start``, in
-    coordinates (K, 3), or where the scene does.
+    ``frames`` are ascending. The run begins at ``start``, a state in coordinates (K, 3), or at the
+    scene's initial state if that is None.
 
     Parameters
     ----------
-    norm : in which the sampling's equations are measured
+    norm : norm in which residuals of the training equations are measured
     """
     watched = _Watched(scene.groups[0], columns)
     steps = [watched, *(SubspaceLocalStep(group, columns) for group in scene.groups[1:])]
@@ -91,7 +91,7 @@ def training_run(
         first = state.positions
         state, _ = loop.step(state, frame)
         if frame in wanted:
-            # a contact may have moved the end of the frame: then it is no iterate
+            # after a contact correction the end of the frame is not an iterate
             if len(iterates) == 1:
                 iterates.append(state.positions)
             pairs = np.stack([iterates[:-1], iterates[1:]], axis=1)
@@ -103,7 +103,7 @@ def training_run(
 
 
 class _Watched(SubspaceLocalStep):
-    """A local step that notes where it is evaluated in ``iterates``."""
+    """A local step that appends the coordinates of each evaluation to ``iterates``."""
 
     def __init__(self, group: ConstraintGroup, columns: Columns) -> None:
         super().__init__(group, columns)
@@ -115,7 +115,7 @@ class _Watched(SubspaceLocalStep):
 
 
 def _measure(space: ReducedSpace, fixed: np.ndarray, norm: Norm, frames: int) -> np.ndarray:
-    """Measure (K', K) with the coordinates ``fixed`` held; a run has so many ``frames``."""
+    """`TrainingFrame.measure` (K', K) with coordinates ``fixed`` held, for a run of ``frames``."""
     size = len(space.matrix)
     free = np.setdiff1d(np.arange(size), fixed)
     block, inertia = (m[np.ix_(free, free)] for m in (space.matrix, space.inertia_matrix))
@@ -132,11 +132,11 @@ def _measure(space: ReducedSpace, fixed: np.ndarray, norm: Norm, frames: int) ->
     return measure
 
 
-# Rows that the training equations are hashed to, per coordinate of the subspace: several times the
-# elements that are chosen, or the factors would fit the hashing and not the equations.
+# Rows to which the training equations are hashed, per coordinate of the subspace. They must be
+# several times as many as the chosen elements, or the factors would fit the hashing.
 SKETCH = 60
-# Elements that may be chosen, at first and at most: neighbours are much alike, and the equations
-# of all elements of a large mesh fill the memory.
+# Numbers of candidate elements, initial and largest: the equations of all elements of a large mesh
+# would not fit the memory, and neighbouring elements are similar.
 CANDIDATES, MOST = 5000, 20_000
 SEED = 0
 
@@ -147,10 +147,10 @@ def ecsw_elements(
     training: Sequence[TrainingFrame],
     tolerances: Sequence[float],
 ) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Sampled elements (m,) and their factors xi > 0 (m,) for each tolerance.
+    """Select elements (m,) and their factors xi > 0 (m,) for each tolerance.
 
-    Of a large group a random (seeded) part is eligible, twice as many where these miss a tolerance,
-    up to `MOST`; the sum that they have to meet is always that of all elements.
+    In a large group, candidates are a random (seeded) subset, doubled up to `MOST` while it misses
+    a tolerance; the sum that the samples approximate is always taken over all elements.
 
     Parameters
     ----------
@@ -165,7 +165,7 @@ def ecsw_elements(
         rows, total = training_equations(group, columns, training, eligible)
         solutions = nnls_path(rows, total, tolerances)
         left = [np.linalg.norm(rows[:, support] @ x - total) for support, x in solutions]
-        # every solution keeps to its tolerance, but for round-off
+        # largest residual of each solution, with a margin for round-off
         allowed = (1.0 + 1e-9) * np.linalg.norm(total) * np.array(tolerances)
         if count >= min(group.elements, MOST) or (np.array(left) <= allowed).all():
             return [(eligible[support], factors) for support, factors in solutions]
@@ -178,7 +178,7 @@ def training_equations(
     training: Sequence[TrainingFrame],
     elements: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Training equations of ``elements`` (m, len(elements)) in Fortran order, and all sums (m,).
+    """Return the equations of ``elements`` (m, len(elements)), Fortran order, and sums (m,).
 
     For each pair (z, z') of iterates and each coordinate there is one equation,
     g_e = B^T S_e^T w_e (S_e B z' - p_e(B z)), in the norm of A^-1 (see module `training`),
@@ -242,10 +242,10 @@ def _hash_equations(lifted, differences, buckets, signs, out):
 
 log = logging.getLogger(__name__)
 
-# A column whose part outside the active span is below this fraction of it adds nothing.
+# A unit column depends on the active columns if its orthogonal part is below this.
 DEPENDENT = 1e-7
 
-# Columns that join together: those within CLOSE of the best one, at most this share of the active.
+# Columns join as a block: correlations above CLOSE times the largest, at most BLOCK of the active.
 CLOSE = 0.7
 BLOCK = 0.2
 
@@ -257,7 +257,7 @@ def nnls_path(
 
     The active-set method of Lawson and Hanson: the columns with the largest correlation join, the
     least-squares problem of the active columns is solved, columns that would turn negative leave.
-    The search passes the tolerances from the coarsest to the finest and notes each solution, so
+    The search passes the tolerances from the coarsest to the finest and stores each solution, so
     that the supports stay small. Where many columns are active a few join at a time, which saves
     passes over G; when none of a block stays, the next column comes alone, as in the original
     method, whose end is the minimum. The normal equations of the active columns grow by rows of a
@@ -291,7 +291,7 @@ def nnls_path(
 
 
 class _ActiveSet:
-    """Active columns, their values, and the Cholesky factor of their Gram matrix."""
+    """State of `nnls_path`: active columns, their values, Cholesky factor of their Gram matrix."""
 
     def __init__(self, g: np.ndarray, b: np.ndarray) -> None:
         self._g, self._b, self._size = g, b, float(np.linalg.norm(b))
@@ -307,22 +307,22 @@ class _ActiveSet:
 
     @property
     def _residual(self) -> np.ndarray:
-        """b - G x."""
+        """Residual b - G x, (m,)."""
         return self._b - self._columns[:, : len(self._active)] @ self._values
 
     @property
     def relative_residual(self) -> float:
-        """|| G x - b || / || b ||."""
+        """Relative residual || G x - b || / || b ||."""
         return float(np.linalg.norm(self._residual)) / self._size if self._size else 0.0
 
     def solution(self) -> tuple[np.ndarray, np.ndarray]:
-        """Support, ascending, and values."""
+        """Indices of the active columns, ascending, and their values in x."""
         order = np.argsort(self._active)
         active = np.array(self._active, dtype=np.int64)[order]
         return active, self._values[order] / self._norms[active]
 
     def reach(self, tolerance: float) -> None:
-        """Add columns until the tolerance is met, the support is full, or nothing helps."""
+        """Add columns until the residual meets ``tolerance`` or no further column can be added."""
         while self.relative_residual > tolerance and len(self._active) < self._most:
             block = self._choose()
             if len(block) == 0:
@@ -331,13 +331,13 @@ class _ActiveSet:
             if joined:
                 self._solve()
             staying = set(self._active).intersection(joined)
-            # a column that depends on the others, or left at once, would be picked for ever
+            # a column that is dependent or leaves at once is banned, or it would be picked again
             if len(block) == 1 and not staying:
                 self._banned[block] = True
             self._alone = not staying and len(block) > 1
 
     def _choose(self) -> np.ndarray:
-        """Columns of the largest correlation with the residual, the best one first."""
+        """Columns to add: those most correlated with the residual, the best one first."""
         gradient = (self._residual @ self._g) / self._norms
         gradient[self._active] = -np.inf
         gradient[self._banned] = -np.inf
@@ -353,7 +353,7 @@ class _ActiveSet:
         return first[np.argsort(-gradient[first], kind="stable")]
 
     def _add(self, column: int) -> bool:
-        """Append a column; False (and nothing happens) if it depends on the active ones."""
+        """Append a column and return True; return False if it depends on the active columns."""
         n, new = len(self._active), self._g[:, column] / self._norms[column]
         cross = self._forward(self._columns[:, :n].T @ new)
         rest = float(new @ new - cross @ cross)
@@ -393,7 +393,7 @@ class _ActiveSet:
         return linalg.solve_triangular(self._factor[:n, :n], rhs, lower=True, check_finite=False)
 
     def _keep(self, keep: np.ndarray, x: np.ndarray) -> None:
-        """Keep only the columns of ``keep``, with values ``x``."""
+        """Remove all active columns except those marked in ``keep``; ``x`` are the values."""
         kept = np.flatnonzero(keep)
         size, n = len(self._active), len(kept)
         first = int(np.flatnonzero(~keep)[0])

@@ -1,7 +1,7 @@
-"""A model of a position subspace as plain data, for the engine of the page (`engine.js`).
+"""Export of a subspace model as plain data for the browser's simulation code (`engine.js`).
 
 The engine makes strains and the reduced system from basis, rest shape and samples, by the formulas
-of `pdrom.reduction.subspace`; what is here is exact to the last bit unless it says otherwise.
+of `pdrom.reduction.subspace`. Exported numbers are doubles unless stated otherwise.
 """
 
 from collections.abc import Iterable
@@ -22,13 +22,13 @@ from pdrom.reduction.subspace.interpolation import Interpolation
 from pdrom.reduction.subspace.model import Samples, SubspaceModel
 from pdrom.reduction.subspace.space import PROBES, ReducedSpace, probe_vertices, reduced_state
 
-# Size of a basis above which only the rows that an iteration needs are stored as doubles.
+# Entries of a basis above which only the rows used in an iteration are stored as doubles.
 DOUBLES = 60_000
 MANIFOLDS = ("clamped", "length")
 
 
 def export_scene(scene: Scene) -> dict[str, Any]:
-    """Facts of a scene that all its models share.
+    """Export the data of a scene that all its models share.
 
     Raises
     ------
@@ -69,7 +69,7 @@ def export_scene(scene: Scene) -> dict[str, Any]:
 
 
 def require_known(config: SceneConfig) -> None:
-    """SceneError if the engine of the page cannot run a scene."""
+    """Raise SceneError if the browser's simulation code cannot run a scene."""
     for name in (each.effect for each in config.effects):
         effect = EFFECTS.load(name)
         projected = issubclass(effect, StencilGroup) and effect.manifold in MANIFOLDS
@@ -87,11 +87,11 @@ def require_known(config: SceneConfig) -> None:
 
 
 def export_basis(scene: Scene, columns: Columns, needed: np.ndarray) -> dict[str, Any]:
-    """``columns`` of a subspace of ``scene`` with everything that depends on nothing else.
+    """Export ``columns`` of a subspace of ``scene`` and all data derived from them alone.
 
     Parameters
     ----------
-    needed : vertices (n,) whose rows an iteration uses; those are doubles in any case
+    needed : vertices (n,) whose rows an iteration uses; these rows are always doubles
     """
     space = ReducedSpace(scene, columns, [])
     start = reduced_state(scene, columns)
@@ -115,7 +115,7 @@ def export_basis(scene: Scene, columns: Columns, needed: np.ndarray) -> dict[str
 
 
 def export_model(scene: Scene, model: SubspaceModel) -> dict[str, Any]:
-    """Samples of each group of ``scene`` in a ``model``."""
+    """Export the samples that ``model`` has for each group of ``scene``."""
     return {
         "evaluated": model.elements_evaluated(scene),
         "groups": {

@@ -6,10 +6,10 @@ In the free coordinates z of a position subspace one iteration is
     p = p(d)             projections
     z = c + L^T p        global solve, with c = A^-1 (M/h^2 s - load) and L = W D A^-1
 
-D and L are (m p, K'): two small dense products and the projections, nothing else, no allocation,
-and no array that grows with the mesh. Without frame-lagged groups c is one product, of s with its
-held coordinates at their targets, and a call does many frames: those before the first that meets
-a floor.
+D and L are (m p, K'). An iteration consists of two small dense products and the projections; it
+allocates nothing and no array grows with the mesh. Without frame-lagged groups, c is one product
+of a matrix with s, whose held coordinates are set to their targets, and one compiled call computes
+many frames, up to the first frame that meets a floor.
 
 The matrix of a product lies in blocks of `TALL` rows, column by column, so that a column of a block
 meets a vector in `TALL` products that do not wait for each other. Vectors are three numbers each,
@@ -88,7 +88,7 @@ class _Fused:
         self._waiting = 0
 
     def _of(self, elimination: DenseElimination) -> "_Operators":
-        # eliminations live as long as their space
+        # the id is a valid key: the space never deletes its eliminations
         key = id(elimination)
         if key not in self._operators:
             inertia = self._space.inertia_matrix
@@ -114,7 +114,7 @@ class _Fused:
         return y
 
     def _history(self, free: np.ndarray) -> History | None:
-        """Memory of the acceleration for iterates of the ``free`` coordinates."""
+        """History of the Anderson acceleration for the ``free`` coordinates, reset for a frame."""
         if self._acceleration is None:
             return NO_HISTORY
         self._acceleration.begin_frame(np.empty((len(free), 3)))
@@ -123,9 +123,9 @@ class _Fused:
     def run(
         self, q: np.ndarray, v: np.ndarray, frames: range, h: float, iterations: int, track: bool
     ) -> Blocks | None:
-        """Run as many of ``frames`` as one call can do, see `WholeFrames.run`; nothing is tracked.
+        """Run as many of ``frames`` as one call can do, see `WholeFrames.run`; no objective.
 
-        None in a frame that meets a floor, and for some frames after it: it is likely still there.
+        Return None in a frame that meets a floor and in some frames after it: contact often lasts.
         """
         if self._waiting and frames.start:
             self._waiting -= 1
@@ -174,7 +174,7 @@ class _Sampled:
         """Addresses, elements, first rows, parameters and their starts, S q, projections."""
 
     def refresh(self) -> None:
-        """Take over what the groups froze at the beginning of the frame."""
+        """Copy the parameters that the groups froze at the beginning of the frame."""
         for i in self._lagged:
             start, stop = self._starts[i : i + 2]
             self._parameters[start:stop] = self._groups[i].kernel_parameters().ravel()
@@ -212,7 +212,7 @@ TALL = 8
 
 
 def blocks(matrix: np.ndarray) -> np.ndarray:
-    """A matrix (m, n) as the blocks of `product`, flat; rows of zeros fill up the last one."""
+    """Arrange ``matrix`` (m, n) in the blocks of `product`, flat, padded with rows of zeros."""
     m, n = matrix.shape
     whole = np.zeros((-(-m // TALL) * TALL, n))
     whole[:m] = matrix
@@ -233,7 +233,7 @@ def write(values: np.ndarray, to: np.ndarray) -> None:
 
 @compiled(nogil=True)
 def product(matrix, m, n, start, x, out):
-    """Write ``start`` + M ``x`` into ``out``, `vectors`; ``matrix`` M (m, n) is in `blocks`."""
+    """Set ``out`` = ``start`` + M ``x`` (arrays as `vectors`), M (m, n) arranged by `blocks`."""
     entry = 0
     for row in range(0, 3 * m, 3 * TALL):
         a, b = load(start, row), load(start, row + 3)
@@ -247,7 +247,7 @@ def product(matrix, m, n, start, x, out):
             e, f = add_scaled(e, at(matrix, entry + 4), v), add_scaled(f, at(matrix, entry + 5), v)
             g, h = add_scaled(g, at(matrix, entry + 6), v), add_scaled(h, at(matrix, entry + 7), v)
             entry += TALL
-        # the fourth lane of each is overwritten by the next one
+        # the fourth number stored for each vector is overwritten by the next vector
         store(out, row, a)
         store(out, row + 3, b)
         store(out, row + 6, c)
@@ -264,10 +264,10 @@ def run_iterations(count, size, rows, operators, sampled, history):
 
     Parameters
     ----------
-    rows : of the sampled strain D
+    rows : number of rows of the sampled strain D
     operators : see ``iterated`` of `_Operators`
     sampled : arrays of `_Sampled`
-    history : of the acceleration, see `Anderson`; `NO_HISTORY` without one
+    history : arrays of the acceleration, see `Anderson`; `NO_HISTORY` without acceleration
     """
     strain, lift, offset, constant, z, weights, inertia, start = operators
     addresses, elements, starts, parameters, parameter_starts, d, p = sampled
@@ -327,7 +327,7 @@ def run_frames(
     positions, velocities, acceleration, rate, rates, h, fixed, free, targets, begun, count,
     rows, operators, sampled, history, seconds, watch,
 ):  # fmt: skip
-    """Do a frame for each of ``targets``, with the iterations of `run_iterations`.
+    """Compute one frame for each of ``targets`` by `run_iterations`.
 
     Parameters
     ----------
@@ -335,7 +335,7 @@ def run_frames(
     acceleration, rate, rates : by all forces, see `ReducedSpace.affine`
     h : time step, s
     fixed, free : (m,), (K',) held coordinates and the others
-    targets : (F, m, 3) of the held coordinates
+    targets : (F, m, 3) values of the held coordinates
     begun : see `_Operators`
     count, rows, operators, sampled, history : see `run_iterations`
     seconds : (F, 4) s, times of the phases of each frame, written
@@ -351,7 +351,7 @@ def run_frames(
             for axis in range(3):
                 s[3 * fixed[i] + axis] = held[3 * i + axis] = targets[f, i, axis]
         product(response, len(free), len(before), nothing, s, constant)
-        # targets that stay the same have the product of the frame before
+        # unchanged targets reuse the product of the previous frame
         if f == 0 or (targets[f] != targets[f - 1]).any():
             product(coupling, rows, len(fixed), nothing, held, offset)
         for i in range(len(free)):

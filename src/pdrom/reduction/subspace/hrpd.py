@@ -25,7 +25,7 @@ from pdrom.reduction.snapshots import touched_vertices
 from pdrom.reduction.subspace.columns import DEPENDENT, Columns, orthonormal, skinning_weights
 from pdrom.reduction.subspace.interpolation import Interpolation, element_rows, reduced_strain
 
-# Condition number of the sampled equations from which on their solution is noise.
+# Condition number of the sampled equations above which their solution counts as noise.
 SINGULAR = 1e8
 
 
@@ -41,7 +41,7 @@ class HrpdSpec(ConfigModel):
 
 
 def hrpd(group: ConstraintGroup, columns: Columns, sampled: "SampledSpace | None") -> Interpolation:
-    """Interpolation of ``group`` from a sampled space, for the subspace ``columns``."""
+    """Interpolation of ``group`` in the subspace ``columns``; ``sampled`` None: no projections."""
     strain, stiffness = reduced_strain(group, columns)
     offset = np.zeros((len(stiffness), 3))
     if sampled is None:
@@ -77,7 +77,7 @@ class SampledSpace:
 def sampled_space(
     group: ConstraintGroup, points: np.ndarray, spec: HrpdSpec
 ) -> SampledSpace | None:
-    """Space and samples of ``group`` by ``spec``; None where all columns are noise.
+    """Build space and samples of ``group`` by ``spec``; None if the rest vectors are round-off.
 
     Parameters
     ----------

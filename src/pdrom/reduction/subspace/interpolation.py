@@ -1,8 +1,8 @@
-"""Local steps in the coordinates of a position subspace: of sampled elements, or interpolated.
+"""Local steps in the coordinates of a position subspace, by sampling or by interpolation.
 
 Interpolation: a few elements are evaluated, their values give coefficients c, and the coefficients
-give the right-hand side B^T S^T W (mean + V c). All that has the length of the mesh is multiplied
-out beforehand; the system matrix stays that of the full projections.
+give the right-hand side B^T S^T W (mean + V c). Products over the length of the mesh are formed
+before the run; the system matrix is the same as with all projections.
 """
 
 from dataclasses import dataclass
@@ -19,10 +19,10 @@ class Interpolation:
     """Arrays that one group needs online, in a subspace of K coordinates.
 
     elements : (m,) sampled elements, ascending; none where the projections are constant
-    operator : (r, n) from sampled values to coefficients; n is m p where the axes share one
+    operator : (r, n), maps sampled values to coefficients; n is m p where the axes share one
         operator (coefficients (r, 3)) and 3 m p where they share the coefficients (r, 1)
     modes : (K, r) or (3 K, r), B^T S^T W V
-    offset : (K, 3) what is added whatever the coefficients
+    offset : (K, 3) constant part of the right-hand side
     stiffness : (K, K) B^T S^T W S B of all elements
     gain : || operator ||_2
     """
@@ -52,7 +52,7 @@ class InterpolatedLocalStep:
         self._rows = np.ascontiguousarray(columns.B[vertices])
 
     def begin_frame(self, q: np.ndarray) -> None:
-        """Fix frame-lagged data of the sampled elements at the coordinates q (K, 3)."""
+        """Freeze frame-lagged data of the sampled elements at the coordinates q (K, 3)."""
         if len(self._elements):
             self.group.begin_frame(self._rows @ q)
 
@@ -84,7 +84,7 @@ def interpolation_of(
 ) -> Interpolation:
     """Interpolation in ``columns`` by a ``reduction`` of full-order projections (joint rows, say).
 
-    Coefficients of blocks that serve one axis each stand below each other.
+    Coefficients of blocks that belong to single axes are stacked.
     """
     strain, stiffness = reduced_strain(group, columns)
     weighted = group.row_weights[:, None] * strain
@@ -128,12 +128,12 @@ class SubspaceLocalStep:
 
     @property
     def strain(self) -> np.ndarray:
-        """S B of the sampled elements, (m p, K): all that an iteration needs of the mesh."""
+        """Reduced strain S B of the sampled elements, (m p, K)."""
         return self.group.S @ self._rows
 
     @property
     def matrix(self) -> np.ndarray:
-        """B^T S^T W S B of the sampled elements, (K, K)."""
+        """Stiffness B^T S^T W S B of the sampled elements, (K, K)."""
         strain = self.strain
         return strain.T @ (self.group.row_weights[:, None] * strain)
 
@@ -142,7 +142,7 @@ class SubspaceLocalStep:
         self.group.begin_frame(self._rows @ q)
 
     def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
-        """Add B^T S^T W p at ``y`` (K, 3) to ``rhs`` (K, 3); return the sampled energy."""
+        """Add B^T S^T W p at ``y`` (K, 3) to ``rhs`` (K, 3); return the samples' energy."""
         self._rhs[...] = 0.0
         energy = self.group.accumulate(self._rows @ y, self._rhs)
         rhs += self._transposed @ self._rhs

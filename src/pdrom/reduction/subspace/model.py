@@ -30,19 +30,19 @@ from pdrom.reduction.subspace.interpolation import (
 )
 from pdrom.reduction.subspace.space import ReducedSpace, reduced_state
 
-# Training frames that the element sampling looks at, at most.
+# Largest number of training frames whose iterates train the element sampling.
 FRAMES = 70
 ECSW = "ecsw"
 
 
 def ecsw_name(tolerance: float) -> str:
-    """Name in tables of a model with energy-conserving samples at tolerance tau, ``tolerance``."""
+    """Name in tables of a model whose energy-conserving samples have this ``tolerance`` tau."""
     return f"{ECSW}-{tolerance:.0e}"
 
 
 @dataclass(frozen=True)
 class Samples:
-    """Sampled elements (m,) and their factors (m,)."""
+    """Indices of sampled elements (m,) and their non-negative factors (m,)."""
 
     elements: np.ndarray
     factors: np.ndarray
@@ -50,9 +50,9 @@ class Samples:
 
 @dataclass(frozen=True)
 class SubspaceModel:
-    """Kind of position basis, see `make_columns`, its columns, and what each group samples.
+    """Reduced model: kind of position basis (see `make_columns`), columns, samples by group.
 
-    A group that is not listed takes all elements, with factor one.
+    A group without samples evaluates all elements with factor one.
     """
 
     position_basis: str
@@ -60,16 +60,16 @@ class SubspaceModel:
     samples: Mapping[str, Samples | Interpolation] = field(default_factory=dict)
 
     def elements_evaluated(self, scene: Scene) -> int:
-        """Elements that a local step of ``scene`` evaluates."""
+        """Number of elements that the local steps of ``scene`` evaluate in an iteration."""
         return sum(self.evaluated(group) for group in scene.groups)
 
     def chosen(self, group: ConstraintGroup) -> Samples | Interpolation:
-        """Samples of a group, perhaps all elements, or its interpolation."""
+        """Samples or interpolation of ``group``; all its elements if it has neither."""
         every = Samples(np.arange(group.elements), np.ones(group.elements))
         return self.samples.get(group.name, every)
 
     def evaluated(self, group: ConstraintGroup) -> int:
-        """Elements of a group that a local step evaluates."""
+        """Number of elements of ``group`` that a local step evaluates."""
         return len(self.chosen(group).elements)
 
     def loop(self, scene: Scene) -> tuple[Stepper, State]:
@@ -92,13 +92,13 @@ class SubspaceModel:
 
 
 def make_columns(scene: Scene, training: np.ndarray, kind: str, k: int) -> Columns:
-    """Columns of a position subspace of ``kind`` with k modes (fewer if there are fewer).
+    """Columns of a position subspace of ``kind`` with k modes, or all modes if fewer exist.
 
     Parameters
     ----------
     training : (n, N, 3) positions of the training frames
     kind : "pod", "skinning", or "pod+skinning" with k modes of each
-    scene : its rest shape, masses and holds
+    scene : scene whose rest shape, masses and boundary conditions are used
     """
     points, masses = scene.mesh.points, scene.masses
     parts = []
@@ -118,7 +118,7 @@ def sample_elements(
     start: State | None = None,
     norm: Norm = "energy",
 ) -> list[dict[str, Samples]]:
-    """Energy-conserving samples of every group for each tolerance.
+    """Select energy-conserving samples of every group for each tolerance.
 
     They are trained on iterates of the subspace with all projections, in some of the training
     ``frames`` of a run that begins at ``start`` (coordinates) or where the scene does, and meet the
@@ -138,7 +138,7 @@ def sample_elements(
 def rerun_model(
     scene: Scene, model: SubspaceModel, reference: np.ndarray, blowup_extent: float = np.inf
 ) -> Rerun:
-    """Outcome of a run of ``scene`` with ``model``; a blow-up ends it and is recorded.
+    """Run ``scene`` with ``model`` and compare with ``reference``; a blow-up ends the run.
 
     Parameters
     ----------
@@ -170,7 +170,7 @@ def store_model(
 
 
 def load_models(path: str | os.PathLike[str]) -> list[tuple[dict[str, object], SubspaceModel]]:
-    """Labels (method, position_basis, k) and models of the file ``path``, in order."""
+    """Read the models in the file ``path``, each with labels (method, position_basis, k)."""
     with open_hdf5(path) as file:
         columns = {base: _columns(store) for base, store in file["columns"].items()}
         models = []

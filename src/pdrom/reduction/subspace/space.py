@@ -1,6 +1,6 @@
 """The step loop in the coordinates of a position subspace, q = B z.
 
-Everything that has the length of the mesh is used here once, before the run. During a run the
+Arrays that have the length of the mesh are used only once, before the run. During a run the
 arrays have the length of the subspace, of the held vertices, or (for a scene with contacts) of its
 probe vertices.
 """
@@ -65,13 +65,13 @@ class DenseElimination:
         y[self.free] = self.solved(rhs)
 
     def solved(self, rhs: np.ndarray) -> np.ndarray:
-        """Free coordinates that belong to ``rhs`` (K, 3)."""
+        """Return the free coordinates (K', 3) that solve the system for ``rhs`` (K, 3)."""
         return self._inverse @ (rhs[self.free] - self._load)
 
     def response(self, inertia: np.ndarray) -> np.ndarray:
-        """Free coordinates (K', K) to all of s, the fixed ones of which are at their targets.
+        """Matrix (K', K) that maps s, with fixed coordinates at their targets, to free coordinates.
 
-        This is the solve for ``inertia`` s, (K, K) M/h^2, with the load of the targets.
+        It solves the system for the right-hand side ``inertia`` s; ``inertia`` is M/h^2 (K, K).
         """
         result = self._inverse @ inertia[self.free]
         result[:, self.fixed] -= self._inverse @ self._coupling
@@ -82,12 +82,12 @@ class DenseElimination:
         return rows[:, self.free] @ self._inverse
 
 
-# Vertices at which contacts are looked for, at most.
+# Largest number of vertices at which contacts are detected.
 PROBES = 200
 
 
 class ReducedSpace(Space):
-    """Coordinates z (K, 3) of q = B z.
+    """Forces, boundary conditions, contacts and system matrix in coordinates z (K, 3), q = B z.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ class ReducedSpace(Space):
     ----------
     matrix : (K, K) system matrix A: inertia and stiffness
     inertia_matrix : (K, K) B^T M B / h^2
-    forces : constant coordinates (K, 3) and rate (number or (K, K)) of each force
+    forces : constant (K, 3) and rate (number or (K, K)) of each acceleration constant + rate v
     """
 
     def __init__(self, scene: Scene, columns: Columns, matrices: Sequence[np.ndarray]) -> None:
@@ -110,7 +110,7 @@ class ReducedSpace(Space):
         self.matrix = mass / h**2 + sum(matrices, np.zeros_like(mass))
         self.inertia_matrix = mass / h**2
         self.forces = [_reduce_force(force, columns, scene) for force in scene.forces]
-        # they answer as boundaries do, of coordinates in place of vertices
+        # objects with the interface of `Boundary`, for coordinates instead of vertices
         self._boundaries: Any = [_ReducedBoundary(b, columns) for b in scene.boundaries]
         self._contacts = [_ReducedContact(c, columns, scene) for c in scene.contacts]
         self._cache: dict[bytes, DenseElimination] = {}
@@ -150,11 +150,11 @@ class ReducedSpace(Space):
         return held_targets(self._boundaries, frame, positions)
 
     def held_path(self, frames: range, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Held coordinates in the first ``frames`` from ``positions`` (K, 3), values (n, m, 3)."""
+        """Coordinates (m,) held in the first ``frames`` after ``positions``, values (n, m, 3)."""
         return held_path(self._boundaries, frames, positions)
 
     def elimination(self, fixed: np.ndarray) -> DenseElimination:
-        """Factored system without the ``fixed`` coordinates (m,)."""
+        """System with the ``fixed`` coordinates (m,) eliminated; cached."""
         key = fixed.tobytes()
         if key not in self._cache:
             self._cache[key] = DenseElimination(self.matrix, fixed)
@@ -190,10 +190,10 @@ def projector(columns: Columns, masses: np.ndarray) -> np.ndarray:
 
 
 def _mass_solve(columns: Columns, masses: np.ndarray, rhs: np.ndarray) -> np.ndarray:
-    """(B^T M B)^-1 ``rhs``.
+    """Return (B^T M B)^-1 ``rhs``.
 
-    Equilibrated: columns of held vertices are not mass-orthonormal, so that masses far from 1 kg
-    would make the matrix ill-conditioned by their scale alone.
+    The matrix is scaled to a unit diagonal: columns of held vertices are not mass-orthonormal, and
+    masses far from 1 kg would make it ill-conditioned.
     """
     mass = columns.B.T @ (masses[:, None] * columns.B)
     scale = 1.0 / np.sqrt(np.diag(mass))[:, None]
@@ -210,7 +210,7 @@ def reduced_state(scene: Scene, columns: Columns) -> State:
 
 
 def _reduce_force(force: Force, columns: Columns, scene: Scene) -> tuple[np.ndarray, Any]:
-    """A force as (constant coordinates (K, 3), rate): a = constant + rate v.
+    """Project a force on the subspace: return (constant (K, 3), rate) of a = constant + rate v.
 
     It has to be affine in the velocity, with one rate for all vertices (a number) or one for each
     of them (a matrix (K, K), which is exact as well); another force is refused, not approximated.
@@ -231,7 +231,7 @@ def _reduce_force(force: Force, columns: Columns, scene: Scene) -> tuple[np.ndar
 
 
 class _ReducedBoundary:
-    """Dirichlet condition imposed exactly: atoms of held vertices have coordinates of their own."""
+    """Dirichlet condition imposed exactly: each atom of held vertices has its own coordinates."""
 
     def __init__(self, boundary: Boundary, columns: Columns) -> None:
         self.boundary = boundary
@@ -244,12 +244,12 @@ class _ReducedBoundary:
         return self._of(frame)[0]
 
     def path(self, frames: range, current: np.ndarray) -> np.ndarray:
-        """Values (n, m, 3) of these coordinates, which are ``current`` at first, see `Boundary`."""
+        """Values (n, m, 3) of the held coordinates, initially ``current``, see `Boundary`."""
         _, rows, inverse = self._of(frames.start)
         return inverse @ self.boundary.path(frames, rows @ current)
 
     def _of(self, frame: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Coordinates of what is held in ``frame``, the rows of B there, and their inverse."""
+        """Coordinates held in ``frame``, the held vertices' rows of B, and the rows' inverse."""
         vertices = self.boundary.held(frame)
         key = vertices.tobytes()
         if key not in self._parts:
@@ -263,12 +263,12 @@ class _ReducedBoundary:
 
 
 def probe_vertices(n: int) -> np.ndarray:
-    """Vertices of a mesh of n at which contacts are looked for, ascending."""
+    """Vertices, of n in a mesh, at which contacts are detected, ascending."""
     return np.unique(np.linspace(0, n - 1, min(PROBES, n)).round().astype(np.int64))
 
 
 class _ReducedContact:
-    """A contact, looked for at probe vertices and, where one is hit, resolved at all vertices."""
+    """A contact that is detected at probe vertices and then resolved at all vertices."""
 
     def __init__(self, contact: Contact, columns: Columns, scene: Scene) -> None:
         self._contact, self.height = contact, contact.height
@@ -280,7 +280,7 @@ class _ReducedContact:
     def free_frames(self, path: np.ndarray) -> int:
         """Number of frames of ``path`` (n, K, 3) before the first with a probe in the floor."""
         lowest = (path[:, :, 1] @ self._probes.T).min(axis=1)
-        # a frame that is not finite is left to the plain step
+        # a frame with non-finite coordinates counts as contact: the plain step computes it
         above = lowest >= self.height
         return len(path) if above.all() else int(np.argmin(above))
 
@@ -291,7 +291,7 @@ class _ReducedContact:
         self._contact.apply(corrected, self._probes @ before, held_probes)
         if np.array_equal(probed, corrected):
             return
-        # columns of held vertices are zero elsewhere: their coordinates stay, too
+        # columns of held vertices are zero elsewhere, so that their coordinates do not change
         full = self._columns.B @ y
         self._contact.apply(full, self._columns.B @ before, held)
         y[...] = self._project @ full
