@@ -56,7 +56,7 @@ divide = _lanewise("fdiv", "divide", "a / b, lane by lane.")
 
 @intrinsic
 def scaled(_context, _s, _b):
-    """s b with a number s."""
+    """Product s b of a number s and a row b."""
 
     def generate(_target, builder, _signature, arguments):
         return builder.fmul(spread(builder, arguments[0]), arguments[1])
@@ -66,7 +66,7 @@ def scaled(_context, _s, _b):
 
 @intrinsic
 def add_scaled(_context, _a, _s, _b):
-    """a + s b with a number s."""
+    """Sum a + s b of rows a and b, with a number s."""
 
     def generate(_target, builder, _signature, arguments):
         a, s, b = arguments
@@ -107,7 +107,7 @@ magnitude = _function_of_row("fabs", "Absolute value, lane by lane.")
 
 @intrinsic
 def total(_context, _row):
-    """Sum of the four lanes, from the first to the last."""
+    """Sum of the four components of a row, added from the first to the last."""
 
     def generate(_target, builder, _signature, arguments):
         sums = builder.extract_element(arguments[0], ir.Constant(ir.IntType(32), 0))
@@ -121,7 +121,7 @@ def total(_context, _row):
 
 @intrinsic
 def first_three(_context, _row):
-    """The first three lanes as numbers."""
+    """The first three components of a row as a tuple of numbers."""
     result = types.UniTuple(types.float64, 3)
 
     def generate(context, builder, signature, arguments):
@@ -153,7 +153,7 @@ def _within(builder, row, low, high):
 
 @intrinsic
 def all_within(_context, _row, _low, _high):
-    """Whether all lanes lie in [low, high]; none does that is not a number."""
+    """Whether all components lie in [low, high]; false if one of them is NaN."""
 
     def generate(_target, builder, _signature, arguments):
         inside = builder.bitcast(_within(builder, *arguments), ir.IntType(WIDTH))

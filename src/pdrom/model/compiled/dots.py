@@ -1,7 +1,7 @@
 """Inner products, and sums of vectors, in compiled code.
 
-Those of three rows of a matrix with a vector read the vector once, and the processor fetches three
-rows ahead. The order of the sums does not depend on the processor: sixteen partial sums, then four,
+Products of three matrix rows with a vector read the vector once, and the processor prefetches three
+rows. The order of the sums does not depend on the processor: sixteen partial sums, then four,
 then one by one."""
 
 from pdrom.model.compiled.arithmetic import (
@@ -19,18 +19,18 @@ from pdrom.model.compiled.rows import WIDTH, at, load
 
 @compiled(forceinline=True)
 def _summed(a, b, c):
-    """The sums of the four lanes of three rows as three numbers."""
+    """Return the sums of the components of three SIMD vectors as three numbers."""
     first, second, third, fourth = transposed(a, b, c, c)
     return first_three(add(add(first, third), add(second, fourth)))
 
 
 @compiled(forceinline=True, fastmath={"contract"})
 def dots(matrix, i, j, k, count, vector, starts):
-    """``starts`` (three numbers) plus the products of the rows at i, j, k with ``vector``.
+    """Return ``starts`` (three numbers) plus the inner products of three rows with ``vector``.
 
     Parameters
     ----------
-    matrix : flat; a row is ``count`` numbers from where it begins
+    matrix : flat array; the rows are ``count`` numbers each, from the indices i, j and k on
     """
     x, y, z = starts
     blocks, vectors = count - count % (4 * WIDTH), count - count % WIDTH
@@ -95,6 +95,6 @@ def dot(a, b):
 
 @compiled(nogil=True)
 def add_multiple(a, s, b):
-    """a <- a + s b."""
+    """Add s b to the vector a in place."""
     for k in range(len(a)):
         a[k] += s * b[k]

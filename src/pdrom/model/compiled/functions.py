@@ -1,4 +1,4 @@
-"""Compiling the compiled functions of the model, keeping them, and their clock."""
+"""Compilation of functions with Numba, their cache on disk, and a clock for compiled code."""
 
 import time
 from functools import cache, cached_property
@@ -23,10 +23,10 @@ def _checksum(folders: tuple[str, ...]) -> str:
 
 
 def _mark(function):
-    """Put a checksum of all that it may inline into the name of a function.
+    """Append to the name of a function a checksum of all source files it may inline code from.
 
-    numba's cache looks at the file of a function only, not at those of what it inlines: without it
-    a function would stay as it was when another file is edited.
+    Numba's cache checks only the file of the function itself. Without the checksum, it would return
+    outdated machine code after an edit of a file whose functions are inlined.
     """
     own = function.__module__.removeprefix("pdrom.model.").split(".")[0]
     beside = own if (Path(__file__).parents[1] / own).is_dir() else KERNELS[0]
@@ -34,10 +34,10 @@ def _mark(function):
 
 
 def compiled(function=None, **options):
-    """Compile and keep a ``function``: without division checks, without fast-math by default.
+    """Compile a ``function``, cached on disk, without division checks and, by default, fast-math.
 
-    ``options`` are those of Numba's ``njit``; without a function this is a decorator with them.
-    No function is compiled a second time for callers in C, of which there are none.
+    ``options`` are passed to Numba's ``njit``; without a function, return a decorator.
+    Numba's wrapper for callers in C is left out, as there are no such callers.
     """
     if function is None:
         return lambda wrapped: compiled(wrapped, **options)
@@ -46,9 +46,9 @@ def compiled(function=None, **options):
 
 
 def inner(function=None, **options):
-    """Compile a ``function`` that only other compiled functions call: kept with each of these.
+    """Compile a ``function`` that only compiled functions call; it has no cache of its own.
 
-    Without an entry for callers in Python, which takes longer to compile than a short function.
+    The wrapper for callers in Python is left out: it takes longer to compile than a short function.
     """
     if function is None:
         return lambda wrapped: inner(wrapped, **options)
@@ -57,19 +57,19 @@ def inner(function=None, **options):
 
 
 def template(function):
-    """Compile a function that takes functions, into each function that calls it.
+    """Compile a function that has functions as arguments; it is inlined into each caller.
 
-    It is not kept: numba names a function among the arguments by a number of the process.
+    It is not cached: Numba identifies function arguments by a number that differs per process.
     """
     return njit(error_model="numpy", forceinline=True)(function)
 
 
 class Callback:
-    """A function that other compiled code calls by its address; compiled at the first question.
+    """A function that compiled code calls by its address; compiled when the address is first read.
 
     Attributes
     ----------
-    function, signature : what is compiled
+    function, signature : Python function to compile and its Numba signature
     """
 
     def __init__(self, function, signature):
@@ -87,7 +87,7 @@ class Callback:
 
 
 def caller(result):
-    """An intrinsic of an address and a tuple of integers: calls a `Callback` with ``result``."""
+    """Return an intrinsic (address, integers) that calls a `Callback` of return type ``result``."""
 
     def typed(_context, address, arguments):
         def generate(context, builder, _signature, values):
@@ -106,12 +106,12 @@ _clock_gettime = types.ExternalFunction("clock_gettime", types.int32(types.int32
 
 
 def clock() -> np.ndarray:
-    """Memory that `now` works with."""
+    """Return the buffer of two integers into which `now` reads the time."""
     return np.zeros(2, np.int64)
 
 
 @compiled(nogil=True)
 def now(clock):
-    """Seconds since some moment, by the ``clock``."""
+    """Return the monotonic time in seconds; ``clock`` is a buffer from `clock`."""
     _clock_gettime(_CLOCK, clock.ctypes)
     return clock[0] + 1e-9 * clock[1]

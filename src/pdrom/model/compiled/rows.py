@@ -40,7 +40,7 @@ class _RowModel(models.PrimitiveModel):  # type: ignore[misc]
 
 
 def empty(numbers: int, dtype: type = np.float64) -> np.ndarray:
-    """Array (numbers,) of doubles, or of another ``dtype``, to be written to."""
+    """Uninitialised aligned array (numbers,) of doubles, or of another ``dtype``."""
     kind = np.dtype(dtype)
     memory = np.empty(numbers * kind.itemsize + ROW_BYTES, np.uint8)
     # through a memoryview: views of what is returned have that as their base, not the memory
@@ -49,14 +49,14 @@ def empty(numbers: int, dtype: type = np.float64) -> np.ndarray:
 
 
 def zeros(numbers: int) -> np.ndarray:
-    """Array (numbers,) of zeros."""
+    """Aligned array (numbers,) of zeros."""
     made = empty(numbers)
     made.fill(0.0)
     return made
 
 
 def copied(numbers: np.ndarray) -> np.ndarray:
-    """A copy of the flat array ``numbers``."""
+    """Aligned copy of the flat array ``numbers``."""
     made = empty(len(numbers), numbers.dtype.type)
     made[...] = numbers
     return made
@@ -74,19 +74,19 @@ def write(numbers, to):
 
 
 def vertices(count: int) -> np.ndarray:
-    """Zeros (count, 3), a view of rows of four."""
+    """Zeros (count, 3), as a view of a padded array (count, 4)."""
     return unflat(zeros(WIDTH * count))
 
 
 def as_vertices(values: np.ndarray) -> np.ndarray:
-    """A copy of the values (N, 3) as a view of rows of four."""
+    """Copy of the values (N, 3), as a view of a padded array (N, 4)."""
     copy = vertices(len(values))
     copy[...] = values
     return copy
 
 
 def flat(values: np.ndarray) -> np.ndarray:
-    """Rows of four behind ``values`` (N, 3), as (4 N,): shared if it is a view of them."""
+    """Return ``values`` (N, 3) padded and flat, (4 N,): without a copy if they are such a view."""
     rows = values.base
     if (
         isinstance(rows, np.ndarray)
@@ -108,13 +108,13 @@ def unflat(rows: np.ndarray) -> np.ndarray:
 
 
 def shares(values: np.ndarray, rows: np.ndarray) -> bool:
-    """Whether ``rows`` = `flat` (``values`` (N, 3)) is no copy."""
+    """Whether ``rows``, the result of `flat` for ``values`` (N, 3), shares their memory."""
     return len(values) > 0 and _same_start(values, rows)
 
 
 @compiled
 def _same_start(a, b):
-    """Whether two arrays begin at the same address; NumPy takes longer to compare them."""
+    """Whether two arrays begin at the same address; faster than a comparison with NumPy."""
     return a.ctypes.data == b.ctypes.data
 
 

@@ -49,9 +49,9 @@ RIM = 1e-15
 # that it comes from has cancelled so far that it is made orthogonal once more.
 NEAR_POLE = 1e-4
 
-# numbers of a lane in the packed manifold: weight, magnitude, rest curvature, side times normal
+# Indices in the packed manifold of an element: weight, magnitude, rest curvature, side times normal
 WEIGHT, MAGNITUDE, REST, POLE, MANIFOLD = 0, 1, 2, 5, 8
-# and in the working array: curvature, p, height of its direction above the equator
+# Indices in the working array: curvature, p, height of the curvature's direction above the equator
 H, P, HEIGHT, SIZE = 0, 3, 6, 7
 # Entries of the record: the numbers of elements and of those to project; then the places of the
 # operator in CSR, the manifold, the working arrays, the elements to project and their manifold.
@@ -68,7 +68,7 @@ def put_poles(manifold, elements, side, normals):
 
 @lane_function
 def _curvature(y, e, start, indices, data):
-    """Mean-curvature vector of element e."""
+    """Mean-curvature vector of element e at the positions y, from the operator S in CSR form."""
     h = arithmetic.constant(0.0)
     for k in range(at(start, e), at(start, e + 1)):
         h = arithmetic.add_scaled(h, at(data, k), rows.load(y, WIDTH * at(indices, k)))
@@ -77,7 +77,7 @@ def _curvature(y, e, start, indices, data):
 
 @lane_function
 def _without(a, part, n):
-    """Direction and length of a - part n."""
+    """Return the direction and the length of the vector a - part n."""
     rest = mix(1.0, a, -part, n)
     length = np.sqrt(dot(rest, rest))
     return scaled(1.0 / length, rest), length
@@ -85,7 +85,7 @@ def _without(a, part, n):
 
 @lane_function
 def _half_spheres(work, manifold, block):
-    """Nearest points of the half spheres to the curvature vectors of a block."""
+    """Project the curvature vector of each element of a block onto its half sphere."""
     first, wrong = block * MANIFOLD, 0.0
     for lane in range(LANES):
         h, n = load(work, H, lane), load(manifold, first + POLE, lane)
@@ -109,7 +109,7 @@ def _half_spheres(work, manifold, block):
 
 @lane_function
 def _to_rims(work, manifold, first):
-    """Replace the directions on the wrong side by those of the rim."""
+    """Replace each direction below the equator by the nearest direction on the equator (rim)."""
     for lane in range(LANES):
         n, unit = load(manifold, first + POLE, lane), load(work, P, lane)
         height = work[HEIGHT * LANES + lane]
@@ -123,7 +123,7 @@ def _to_rims(work, manifold, first):
 
 @lane_function
 def _operator(y_place, record):
-    """(y, operator in CSR) of a kernel."""
+    """Return the positions y and the three CSR arrays of S, from their addresses."""
     entries = rows.indices(record, ARRAYS)
     y = rows.doubles(y_place, WIDTH * entries[VERTICES])
     start = rows.integers(entries[START], entries[ELEMENTS] + 1)
@@ -133,7 +133,7 @@ def _operator(y_place, record):
 
 @lane_function
 def _spheres(record, part):
-    """(manifold, working array) of a kernel."""
+    """Return the packed manifold of a kernel and the working array of a ``part``."""
     entries = rows.indices(record, ARRAYS)
     return (
         rows.doubles(entries[SPHERES], entries[FIRST + 2] * MANIFOLD * LANES),
@@ -143,7 +143,7 @@ def _spheres(record, part):
 
 @local_kernel
 def project_vertices(y_place, p_place, record, part):
-    """Projections (m, 3) of some elements; the arguments are those of `local_kernel`.
+    """Write the projections p (m, 3) of the sampled elements of the record; return 0.
 
     Addresses: ``y_place``, ``p_place``, ``record``; ``part`` says which working array is used.
     """
@@ -168,7 +168,7 @@ def project_vertices(y_place, p_place, record, part):
 
 @local_kernel
 def accumulate_vertices(y_place, rhs_place, record, part):
-    """Add S^T W p of a part's blocks to the right-hand side; their energy.
+    """Add S^T W p of the blocks of a ``part`` to the right-hand side; return their energy in J.
 
     ``y_place``, ``rhs_place`` and ``record`` are addresses, see `local_kernel`.
     """
@@ -206,9 +206,9 @@ def accumulate_vertices(y_place, rhs_place, record, part):
 
 @gradient_kernel
 def project_gradients(d_pointer, manifold_pointer, p_pointer, m):
-    """Projections (m, 3) from S q (m, 3) and the packed manifold.
+    """Write the projections p (m, 3) of the curvature vectors S q (m, 3) onto the half spheres.
 
-    They lie at ``p_pointer``, ``d_pointer`` and ``manifold_pointer``, see `gradient_kernel`.
+    ``p_pointer``, ``d_pointer`` and ``manifold_pointer`` are explained at `gradient_kernel`.
     """
     d, p = carray(d_pointer, (m, 3)), carray(p_pointer, (m, 3))
     blocks = (m + LANES - 1) // LANES
@@ -263,7 +263,7 @@ def vertex_fans(triangles: np.ndarray, vertices: int) -> tuple[np.ndarray, np.nd
 
 @lane_function
 def _sides(q, triangle):
-    """Edges of a triangle from its first corner."""
+    """Return the two edge vectors of a triangle that begin at its first corner."""
     a, b, c = triangle[0], triangle[1], triangle[2]
     return (
         (q[b, 0] - q[a, 0], q[b, 1] - q[a, 1], q[b, 2] - q[a, 2]),
@@ -281,7 +281,7 @@ def fan_normals(q, vertices, elements, start, fan, triangles, normals):
     ----------
     q : (N, 3) positions
     vertices : (m,) vertex of each element
-    elements : those whose row of ``normals`` (m, 3) is written
+    elements : indices of the elements whose row of ``normals`` (m, 3) is written
     start, fan : the triangles at vertex v are ``fan[start[v]:start[v + 1]]``
     triangles : (T, 3) vertices
     """

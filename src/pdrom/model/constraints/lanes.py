@@ -1,6 +1,6 @@
 """Elements in blocks of `LANES`, structure of arrays, so that compiled loops over lanes vectorise.
 
-What k numbers an element has lie in a flat array as [block][number][lane]: number i of element e is
+The k numbers of each element lie in a flat array as [block][number][lane]: number i of element e is
 entry ``(e // LANES * k + i) * LANES + e % LANES``. The last block is filled up with copies of the
 last element. A working array of a kernel has the same form with a single block; `row(i)` is where
 its number i begins. Functions of one lane are inlined into the loop over the lanes; they have no
@@ -30,12 +30,12 @@ def kernel(function):
 
 
 def blocks(elements: int) -> int:
-    """Number of blocks of so many elements."""
+    """Number of blocks, of `LANES` elements each, that hold so many ``elements``."""
     return -(-elements // LANES)
 
 
 def pack(numbers: np.ndarray) -> np.ndarray:
-    """Lay out the numbers (e, k) of e elements in blocks, flat."""
+    """Return the k numbers of e elements, (e, k), as a flat array in the layout of the module."""
     e, k = numbers.shape
     padding = np.repeat(numbers[-1:], blocks(e) * LANES - e, axis=0)
     padded = np.concatenate([numbers, padding]).reshape(blocks(e), LANES, k)
@@ -43,7 +43,7 @@ def pack(numbers: np.ndarray) -> np.ndarray:
 
 
 def workspace(numbers: int) -> np.ndarray:
-    """Zeroed working array of one block with so many numbers a lane."""
+    """Zeroed flat working array of one block, with so many ``numbers`` per element."""
     return rows.zeros(numbers * LANES)
 
 
@@ -56,7 +56,7 @@ def workspaces(numbers: int) -> np.ndarray:
 def take(packed, numbers, elements, start, out):
     """Copy one block of ``elements[start:]``, the last one repeated, to ``out``.
 
-    ``packed`` holds so many ``numbers`` an element, see `pack`.
+    ``packed`` is an array from `pack` with so many ``numbers`` per element.
     """
     last = elements.shape[0] - 1
     for lane in range(LANES):
@@ -100,7 +100,7 @@ def save_matrix(work, first, lane, matrix):
 
 @lane_function
 def unmarked(work, mark):
-    """Number of lanes of a block whose number ``mark`` of ``work`` is zero."""
+    """Number of lanes in which the number with index ``mark`` of ``work`` is zero, as a float."""
     left = 0.0
     for lane in range(LANES):
         left += 1.0 if work[mark * LANES + lane] == 0.0 else 0.0
@@ -121,19 +121,19 @@ def cross(a, b):
 
 @lane_function
 def scaled(s, a):
-    """s a."""
+    """Product s a of a number and a vector."""
     return (s * a[0], s * a[1], s * a[2])
 
 
 @lane_function
 def mix(s, a, t, b):
-    """s a + t b."""
+    """Linear combination s a + t b of two vectors."""
     return (s * a[0] + t * b[0], s * a[1] + t * b[1], s * a[2] + t * b[2])
 
 
 @lane_function
 def mix3(r, a, s, b, t, c):
-    """r a + s b + t c."""
+    """Linear combination r a + s b + t c of three vectors."""
     return (
         r * a[0] + s * b[0] + t * c[0],
         r * a[1] + s * b[1] + t * c[1],
@@ -143,13 +143,13 @@ def mix3(r, a, s, b, t, c):
 
 @lane_function
 def choose(condition, a, b):
-    """a where the condition holds, else b."""
+    """Vector a if the condition holds, else vector b."""
     return (a[0] if condition else b[0], a[1] if condition else b[1], a[2] if condition else b[2])
 
 
 @lane_function
 def square_distance(a, b):
-    """|a - b|^2."""
+    """Squared distance of two points a and b."""
     return (a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2
 
 
@@ -161,7 +161,7 @@ def absolute_sum(a):
 
 @lane_function
 def clamp(x, low, high):
-    """x kept within [low, high]."""
+    """Number x, limited to the interval [low, high]."""
     x = low if x < low else x
     return high if x > high else x
 

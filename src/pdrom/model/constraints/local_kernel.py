@@ -17,11 +17,11 @@ from pdrom.model.compiled.functions import Callback, caller, compiled, inner
 # Entries of every record: number of vertices, and the units of part k are those from FIRST + k to
 # FIRST + k + 1. What a kernel has of its own begins at OWN.
 VERTICES, FIRST, OWN = 0, 1, 4
-# Requests to a kernel: one of the two parts, or what both need beforehand.
+# Requests to a kernel: compute one of the two parts, or prepare data that both parts need.
 PARTS, PREPARE = (0, 1), 2
 
 Table = tuple[np.ndarray, np.ndarray, int]
-"""Addresses of kernels and of their records, and the part that is asked for."""
+"""Addresses of kernels, addresses of their records, and the request to all of them."""
 
 _SIGNATURE = types.float64(types.intp, types.intp, types.intp, types.intp)
 
@@ -47,9 +47,9 @@ def call(address, y, rhs, record, part):
 
 @compiled(nogil=True)
 def add_part(table, y, rhs):
-    """Add what a ``table`` of `LocalPass` asks of its kernels to ``rhs``; the energy.
+    """Call all kernels of a ``table``, which add S^T W p(y) to ``rhs``; return their energy in J.
 
-    ``y`` and ``rhs`` are addresses.
+    ``y`` and ``rhs`` are addresses of padded vectors (N, 4).
     """
     addresses, records, part = table
     energy = 0.0
@@ -64,11 +64,11 @@ class LocalKernel:
     Parameters
     ----------
     function : made by `local_kernel`; it is compiled when its address is first needed
-    vertices, units : how many there are
+    vertices, units : number of vertices and number of units (blocks of elements or rows)
     arrays, numbers : entries of the record from `OWN` on: the numbers, then the addresses
     touched : function of a first unit: vertices of this and all later units, for a kernel in two
         parts; without it there is one
-    prepares : whether it wants to be called with `PREPARE`
+    prepares : whether the kernel must be called with `PREPARE` before its parts
 
     Attributes
     ----------
