@@ -32,7 +32,7 @@ from pdrom.model.scene import Scene
 from pdrom.reduction.rerun import Rerun, compare
 from pdrom.reduction.sampling.reduction import Reduction
 
-SPLIT_FROM = 1 << 17  # size N r of a lift from which its rows are divided between two threads
+SPLIT_FROM = 1 << 17  # size N r of a lift from which its rows are divided into two parts
 
 # Entries of the kernel's record of integers: numbers of modes, sets, columns and sampled values,
 # address and record of the sampler; then addresses of the arrays of `Lift` and of the clocks.
