@@ -94,7 +94,7 @@ def test_units_stand_on_the_axes(whole, name, unit):
 
 
 DRAW_ALL = """
-import sys
+import json, sys
 from pathlib import Path
 from study.figures.kit.declaration import declarations
 from study.pipeline.resolve import Resolver
