@@ -125,7 +125,6 @@ STUDY_CASES = [
     more("negative seed", "sensitivity: {seeds: [-1]}\n", "sensitivity.seeds.0 = -1"),
     more("reference that is not run", "sensitivity: {reference: 1.0e-5}\n",
          "reference = 1e-05", "one of the perturbations"),
-    more("held-out rank without samples", "heldout_ranks: [7]\n", "heldout_ranks = 7", "full"),
     more("position basis of unknown kind", "subspace: {bases: [svd]}\n",
          "subspace.bases.0 = 'svd'", "'pod' or 'skinning'"),
     more("position subspace of no scene", "subspace: {scenes: [smal]}\n",

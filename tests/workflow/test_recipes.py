@@ -34,7 +34,6 @@ STUDY = {
     "scenes": ["spring_oop", "cable_sheet"],
     "methods": ["leverage", "block-deim"],
     "ranks": [2],
-    "heldout_ranks": [],
     "coarsen": {"resolution": 0.25, "frames": 0.05},
     "sensitivity": {"perturbations": [1e-10], "seeds": [1]},
 }

@@ -25,7 +25,6 @@ MICRO = {
     "scenes": ["spring_oop", "strain_oop", "bar_release"],
     "methods": ["deim", "block-deim"],
     "ranks": [4, "full"],
-    "heldout_ranks": ["full"],
     "coarsen": {"resolution": 0.25, "frames": 0.05},
     "sensitivity": {"perturbations": [1e-10], "seeds": [1]},
     "subspace": {"scenes": ["strain_oop"], "sizes": [4], "tolerances": [1e-2]},

@@ -1,4 +1,9 @@
-"""Held-out trajectories of a scene: what differs from the training one."""
+"""Held-out trajectories of a scene: three motions that differ from the training motion.
+
+The rule is the same for all scenes. It was fixed by looking at one quantity only: the error of
+playback, which shows the recorded training motion in place of the held-out one. No run of a reduced
+model was looked at.
+"""
 
 from collections.abc import Sequence
 from typing import Annotated, Literal, get_args
@@ -8,66 +13,66 @@ from pydantic import Field
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.model.constraints.base import GroupConfig
 from pdrom.model.effects.base import EffectConfig, Seed, effect_config
+from pdrom.model.mesh.types import Length
 
-HeldOutMotion = Literal["heldout", "kick", "stiffness", "speed", "gravity", "kick_stiffness"]
-WIDE_MOTIONS: tuple[HeldOutMotion, ...] = get_args(HeldOutMotion)
-MOTIONS = WIDE_MOTIONS[:3]  # the study's verdicts rest on these
+HeldOutMotion = Literal["heldout", "kick", "stiffness"]
+MOTIONS: tuple[HeldOutMotion, ...] = get_args(HeldOutMotion)
 FIRST = MOTIONS[0]
-KICK = 0.5  # m/s, where a scene declares none
-FASTER = 0.8  # share of its frames that a handle has left in `speed`
-TILT = 15.0  # degrees, of `gravity`
+FASTER = 0.75  # duration of the handles' motion in `kick`, relative to the training motion
+# Degrees by which gravity is turned, and the axis (the first or the last of those allowed).
+TILTS = {"heldout": (-20.0, 0), "kick": (30.0, 0), "stiffness": (20.0, -1)}
+# Direction in which pins are carried, and the axis.
+CARRIED = {"heldout": (1.0, 0), "stiffness": (-1.0, -1)}
+CARRY_S = 0.5  # duration of that motion, s
 
 
 class HeldOut(ConfigModel):
-    """Other motions of the same scene, by one rule for all scenes.
+    """Held-out motions of a scene; all changes keep to the axes ``kick_axes``.
 
-    ``heldout`` stretches every handle and schedule in time by ``frames_factor`` (another speed),
-    turns the handles' direction round (``reverse``) and adds an initial velocity ``kick`` (m/s,
-    seeded). The others change one thing of the training motion: ``kick`` adds such a velocity with
-    the next seed, ``stiffness`` multiplies the weights of all groups, ``speed`` makes handles and
-    schedules faster (`FASTER`), ``gravity`` turns it (`TILT`) towards the axis of ``kick_axes``
-    that it points along least; ``kick_stiffness`` changes both. Where there is nothing to change,
-    a velocity twice as fast as in ``kick``, with a seed of its own, takes the place.
+    ``heldout`` stretches all schedules in time by ``frames_factor``, moves pinned vertices by
+    ``carry`` (m) and turns gravity. ``kick`` adds a random initial velocity of ``kick`` (m/s, by
+    ``seed``), makes handles faster (`FASTER`) and turns gravity further to the other side.
+    ``stiffness`` multiplies the weights of all groups, moves handles in another direction and pins
+    to another side, turns gravity towards another axis and adds an initial velocity of another
+    seed. Where a scene has no gravity, handles or pins, there is nothing of them to change.
     """
 
     frames_factor: Annotated[float, Field(ge=1e-3, le=1e3)] = 1.25
-    reverse: bool = False
-    kick: Annotated[float, Field(ge=0.0, le=1e3)] = 0.0
+    carry: Length = 0.5
+    kick: Annotated[float, Field(ge=0.0, le=1e3)] = 2.0
     kick_axes: Annotated[tuple[Literal["x", "y", "z"], ...], Field(min_length=1)] = ("x", "y", "z")
     seed: Seed = 1
-    stiffness: Annotated[float, Field(ge=1e-3, le=1e3)] = 2.0
+    stiffness: Annotated[float, Field(ge=1e-3, le=1e3)] = 0.25
 
     def variant(
-        self, effects: Sequence[EffectConfig], motion: HeldOutMotion = FIRST
+        self, effects: Sequence[EffectConfig], motion: HeldOutMotion, time_step: float
     ) -> tuple[EffectConfig, ...]:
-        """Effects of the held-out ``motion``, made from the ``effects`` of the training one."""
+        """Effects of the held-out ``motion``, made from the ``effects`` of the training motion."""
+        own = [self._changed(effect, motion, time_step) for effect in effects]
+        if motion != FIRST and self.kick:
+            seed = (self.seed + MOTIONS.index(motion)) % 2**63
+            kick = {"effect": "kick", "speed": self.kick, "seed": seed, "axes": self.kick_axes}
+            own.append(effect_config(kick, len(own)))
+        return tuple(own)
+
+    def _changed(
+        self, effect: EffectConfig, motion: HeldOutMotion, time_step: float
+    ) -> EffectConfig:
+        axes = ["xyz".index(axis) for axis in self.kick_axes]
+        redirected = effect.redirected(axes)
         if motion == FIRST:
-            own = [effect.with_frames_scaled(self.frames_factor) for effect in effects]
-            if self.reverse:
-                own = [effect.reversed() for effect in own]
-            if self.kick:
-                own.append(self._kick(self.kick, 0, len(own)))
-            return tuple(own)
-        if motion == "kick_stiffness":
-            return self.variant(self.variant(effects, "stiffness"), "kick")
-        place, speed = WIDE_MOTIONS.index(motion), self.kick or KICK
-        if motion == "kick":
-            return (*effects, self._kick(speed, place, len(effects)))
-        changed = tuple(self._changed(effect, motion) for effect in effects)
-        if changed != tuple(effects):
-            return changed
-        return (*effects, self._kick(2.0 * speed, place, len(effects)))
-
-    def _kick(self, speed: float, shift: int, place: int) -> EffectConfig:
-        seed = (self.seed + shift) % 2**63
-        kick = {"effect": "kick", "speed": speed, "seed": seed, "axes": self.kick_axes}
-        return effect_config(kick, place)
-
-    def _changed(self, effect: EffectConfig, motion: HeldOutMotion) -> EffectConfig:
-        if motion == "speed":
-            return effect.with_frames_scaled(FASTER)
-        if motion == "gravity":
-            return effect.tilted(TILT, ["xyz".index(axis) for axis in self.kick_axes])
-        if isinstance(effect, GroupConfig):
-            return effect.model_copy(update={"weight": self.stiffness * effect.weight})
+            effect = effect.with_frames_scaled(self.frames_factor)
+        elif motion == "stiffness":
+            effect = redirected
+            if isinstance(effect, GroupConfig):
+                return effect.model_copy(update={"weight": self.stiffness * effect.weight})
+        elif redirected != effect:  # a handle
+            effect = effect.with_frames_scaled(FASTER)
+        degrees, place = TILTS[motion]
+        effect = effect.tilted(degrees, axes, place)
+        if motion in CARRIED and self.carry:
+            sign, place = CARRIED[motion]
+            offset = [0.0, 0.0, 0.0]
+            offset[axes[place]] = sign * self.carry
+            effect = effect.carried(offset, max(1, round(CARRY_S / time_step)))
         return effect

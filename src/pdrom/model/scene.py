@@ -175,7 +175,8 @@ class SceneConfig(ConfigModel):
 
     def heldout_variant(self, motion: HeldOutMotion = FIRST) -> Self:
         """The scene of the held-out ``motion`` (see `HeldOut`)."""
-        return self.model_copy(update={"effects": self.held_out.variant(self.effects, motion)})
+        effects = self.held_out.variant(self.effects, motion, self.time_step)
+        return self.model_copy(update={"effects": effects})
 
 
 @dataclass(frozen=True, eq=False)
@@ -262,6 +263,8 @@ class Scene:
         for first, second in combinations(self.boundaries, 2):
             shared = np.intersect1d(first.vertices, second.vertices)
             if len(shared) == 0 or not (first.moves or second.moves):
+                continue
+            if _place(first) == _place(second):
                 continue
             for frame in range(self.config.frames):
                 if first.active(frame) and second.active(frame):
@@ -354,6 +357,11 @@ class Scene:
     def space(self, system: GlobalSystem) -> VertexSpace:
         """Vertex positions as the coordinates of the step loop, with its global ``system``."""
         return VertexSpace(system, self.forces, self.boundaries, contacts=self.contacts)
+
+
+def _place(boundary: base.Boundary) -> base.EffectConfig:
+    """Configuration of ``boundary`` without the vertices and the end, which do not move it."""
+    return boundary.config.model_copy(update={"select": None, "until": None})
 
 
 def log_obstructed(scene: Scene) -> None:

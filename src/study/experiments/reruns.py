@@ -11,7 +11,6 @@ import pandas as pd
 from pdrom.core.store import write_hdf5, write_table
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.model.energy import largest
-from pdrom.model.held_out import FIRST
 from pdrom.model.metrics import relative_errors
 from pdrom.model.scene import SceneConfig
 from pdrom.reduction.basis import Basis, load_basis
@@ -62,7 +61,6 @@ class Options(ConfigModel):
     method: MethodSpec
     sweep: Sweep
     ranks: tuple[Rank, ...]
-    heldout_ranks: tuple[Rank, ...]
     blowup_extent: BlowupExtent
     solver: Solver
 
@@ -100,13 +98,10 @@ def reruns(
 ) -> None:
     """Sample the group, then rerun the scene for every r, as trained and as held out.
 
-    One job does all: starting another process takes longer than the sampling. The first held-out
-    motion runs with the ``heldout_ranks``, the others with the full one if it is among them.
+    One job does all: starting another process takes longer than the sampling.
     """
     space, data = load_basis(basis.path), load_snapshots(snapshots.path)
     _sample(space, data, settings, sampling, errors)
-    full = tuple(rank for rank in settings.heldout_ranks if rank == "full")
-    ranks = {TRAIN: settings.ranks, FIRST: settings.heldout_ranks}
     found = {}
     with write_hdf5(runs.path) as file:
         for run in motions:
@@ -116,7 +111,7 @@ def reruns(
             store = file if motion == TRAIN else file.create_group(motion)
             for name, values in yardstick.series.items():
                 store[name] = values
-            sizes = resolve_ranks(ranks.get(motion, full), space.rank)
+            sizes = resolve_ranks(settings.ranks, space.rank)
             made = _runs(yardstick, sampling, space, sizes, settings, store)
             found[motion] = pd.DataFrame(made, columns=COLUMNS)
     write_table(found.pop(TRAIN), out.path)

@@ -42,6 +42,7 @@ from study.artifact.paths import File
 from study.artifact.reads import Every, Setting, SourcesOf
 from study.experiments.kit.declaration import experiment
 from study.experiments.kit.measurement import clocked
+from study.experiments.kit.reruns import run_error
 from study.experiments.kit.scenes import TRAIN, positions_of, scene_of
 from study.experiments.kit.settings import BlowupExtent, Modes, PositionBasis, Tolerance
 
@@ -52,9 +53,11 @@ _RUN = [
     "max_extent", "relative_error",
 ]  # fmt: skip
 COLUMNS = [*_RUN, "energy_ratio"]
-_MADE = [*COLUMNS, "motion", "reduction_s"]
+_MADE = [*COLUMNS, "motion", "playback_error", "reduction_s"]
 SECONDS_COLUMNS = ["scene", "position_basis", "k", "method", "reduction_s"]
-LARGE_COLUMNS = [*_RUN, "motion", "tau", "vertices", "elements", "iterations", "reduction_s"]
+LARGE_COLUMNS = [
+    *_RUN, "motion", "playback_error", "tau", "vertices", "elements", "iterations", "reduction_s",
+]  # fmt: skip
 FULL, HRPD = "full", "hrpd"
 
 Sampled = Mapping[str, Samples | Interpolation]
@@ -214,6 +217,7 @@ def _runs(
     compared : whether the file receives coordinates and deviations of each run, too
     """
     rows: list[dict[str, Any]] = []
+    played = {name: run_error(motions[TRAIN].reference, m.reference) for name, m in motions.items()}
     made = clocked(_subspaces(motions[TRAIN], settings))
     for of_columns, (base, columns, kind, k, models) in made:
         store_columns(file.create_group(f"columns/{base}"), columns)
@@ -231,6 +235,7 @@ def _runs(
                 scene = motion.scene
                 outcome = rerun_model(scene, model, motion.reference, blowup_extent=limit)
                 row = outcome.row(motion.displacement) | labels | {"motion": name}
+                row["playback_error"] = played[name]
                 row |= {"scene": scene.config.name, "r": model.elements_evaluated(scene)}
                 if compared:
                     seen = motion.deviations(outcome)

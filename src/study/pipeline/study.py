@@ -53,7 +53,6 @@ class StudySettings(ConfigModel):
     scenes: Annotated[tuple[SceneName, ...], Field(min_length=1)]
     methods: Annotated[tuple[str, ...], Field(min_length=1)]
     ranks: Annotated[tuple[Rank, ...], Field(min_length=1)] = (6, 10, 20, "full")
-    heldout_ranks: tuple[Rank, ...] | None = None
     sweep: Sweep = Sweep()
     solver: Solver = DEFAULT_SOLVER
     blowup_extent: BlowupExtent = 100.0
@@ -89,15 +88,6 @@ class StudySettings(ConfigModel):
             values = getattr(self, key)
             if len(set(values)) < len(values):
                 raise ValueError(f"{key} = {list(values)}: an entry is given twice")
-        return self
-
-    @model_validator(mode="after")
-    def _heldout_ranks_are_run(self) -> Self:
-        """Require that held-out sizes are in ``ranks``; "full" is always allowed."""
-        for rank in self.heldout_ranks or ():
-            if rank not in (*self.ranks, "full"):
-                allowed = ", ".join(map(str, self.ranks))
-                raise ValueError(f"heldout_ranks = {rank}: allowed are ranks ({allowed}) and full")
         return self
 
 

@@ -16,7 +16,7 @@ from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Labels
 from study.experiments.frame_times import NamedScene, ProjectionCase, SubspaceCase
-from study.experiments.kit.settings import Horizon, Rank
+from study.experiments.kit.settings import Horizon
 from study.experiments.live import JOINT, JointRows, OfScene
 from study.experiments.repetitions import Repeated
 from study.experiments.stability import Stability
@@ -32,12 +32,6 @@ USUAL_BASIS = "none-none-vectorised"
 def _horizon(study: Study, labels: Labels) -> Horizon:
     section = study.settings.sensitivity
     return Horizon(perturbation=section.reference, threshold=section.threshold)
-
-
-def _heldout_ranks(study: Study, labels: Labels) -> tuple[Rank, ...]:
-    """Sizes r that run on the first held-out motion: the configured sizes, else all sizes."""
-    chosen = study.settings.heldout_ranks
-    return study.settings.ranks if chosen is None else chosen
 
 
 def _stability(study: Study, labels: Labels) -> Stability:
@@ -205,7 +199,6 @@ DERIVED: dict[str, Callable[[Study, Labels], Any]] = {
         study.settings.noise if _holds(study, paths.NOISE, labels) else None
     ),
     "horizon": _horizon,
-    "heldout_ranks": _heldout_ranks,
     "stability": _stability,
     "scaled_methods": scaled_methods,
     "noise_methods": lambda study, labels: study.named_methods(

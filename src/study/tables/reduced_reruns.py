@@ -12,10 +12,12 @@ from pdrom.reduction.deviations import DEVIATIONS, ERRORS, REFERENCE, Series, er
 from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, Setting, TableOf
+from study.experiments.kit.reruns import run_error
+from study.experiments.kit.scenes import positions_of
 from study.experiments.kit.settings import Horizon, floor_of, horizons
 from study.tables.kit.declaration import table, text
 from study.tables.kit.parts import timings_in_one_time
-from study.tables.kit.reruns import KEYS, TRAIN
+from study.tables.kit.reruns import KEYS, PLAYBACK, TRAIN
 from study.tables.kit.vocabulary import shared
 
 
@@ -23,7 +25,8 @@ from study.tables.kit.vocabulary import shared
     title="Reduced runs of the training and the held-out motions",
     columns=(
         *shared("scene group method position_basis k r frames finite blowup_frame max_extent"),
-        *shared("relative_error relative_error_within_horizon horizon_frame sensitivity_floor"),
+        *shared("relative_error relative_error_within_horizon playback_error"),
+        *shared("horizon_frame sensitivity_floor"),
         *shared("ms_per_frame local_ms global_ms speedup error_over_extent shape_error"),
         *shared("velocity_error relative_shape_error energy_drift contact_delay"),
         text(
@@ -32,6 +35,7 @@ from study.tables.kit.vocabulary import shared
         ),
     ),
     reads={
+        "full_order": Every(paths.FULL_ORDER),
         "runs": Every(paths.RERUNS),
         "rows": Every(paths.RERUNS_TRAIN),
         "rows_heldout": Every(paths.RERUNS_HELDOUT),
@@ -45,6 +49,7 @@ from study.tables.kit.vocabulary import shared
     },
 )
 def reduced_reruns(
+    full_order: list[File],
     runs: list[File],
     rows: list[File],
     rows_heldout: list[File],
@@ -61,10 +66,12 @@ def reduced_reruns(
     There is one row per motion, scene, group, method and r, followed by runs in position subspaces,
     in which all groups are reduced and r is the number of evaluated elements. The horizon is the
     first frame that perturbed runs make incomparable, per scene and motion. Errors within it use
-    earlier frames only; they are empty for a run that blew up before.
+    earlier frames only; they are empty for a run that blew up before. Rows of the method `PLAYBACK`
+    show the recorded training motion in place of each held-out one.
 
     Parameters
     ----------
+    full_order : runs of all motions
     runs, rows, rows_heldout : HDF5 files of the runs, and their tables in the same order
     subspaces, subspace_rows, subspace_rows_heldout : such files for runs in position subspaces
     sensitivity, horizon : arguments of `horizons`; a held-out motion is a label in the table
@@ -81,9 +88,31 @@ def reduced_reruns(
         floor = {scene: float(drift.max(initial=0.0)) for scene, drift in floors.items()}
         found["horizon_frame"] = found.scene.map(ends)
         found["sensitivity_floor"] = found.scene.map(floor)
+        if motion != TRAIN:
+            played = _played(full_order, ends, motion)
+            distance = played.set_index("scene").playback_error
+            found["playback_error"] = found.scene.map(distance)
+            found = pd.concat([found, played], ignore_index=True)
         judged.append(found)
     judged[0] = _with_times(judged[0], timings_in_one_time(timings, frame_times))
     return pd.concat(judged, ignore_index=True)
+
+
+def _played(full_order: list[File], ends: Mapping[str, int], motion: str) -> pd.DataFrame:
+    """Rows of playback on the held-out ``motion`` of every scene; ``ends`` are the horizons."""
+    runs = {(run["scene"], run["run"]): run for run in full_order}
+    rows = []
+    for scene in dict.fromkeys(run["scene"] for run in full_order):
+        training, other = (positions_of(runs[scene, name]) for name in (TRAIN, motion))
+        end = ends[scene]
+        within = run_error(training[: end + 1], other[: end + 1]) if end else None
+        rows.append({
+            "scene": scene, "group": "all", "method": PLAYBACK, "position_basis": "full",
+            "frames": len(other) - 1, "finite": True, "motion": motion, "horizon_frame": end,
+            "relative_error": run_error(training, other), "playback_error": within,
+            "relative_error_within_horizon": within,
+        })  # fmt: skip
+    return pd.DataFrame(rows)
 
 
 def _judged(run: File, row: File, end: int, motion: str) -> pd.DataFrame:

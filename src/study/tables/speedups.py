@@ -93,7 +93,7 @@ def frame_times(parts: list[File]) -> pd.DataFrame:
         number(
             "error_train", "of the training motion before the horizon, over all of a large scene"
         ),
-        *COLUMNS[:3],
+        *COLUMNS,
     ),
     reads={
         "parts": Every(paths.FRAME_TIMES),
@@ -127,7 +127,7 @@ def speedups(
         extra.append(own[own.motion == TRAIN].reindex(columns=[*_MODEL, "reduction_s"]))
         errors.append(large_errors(own))
     made = _first_known(made, extra, "reduction_s")
-    for column in ("error_train", MEDIAN, LOW, HIGH):
+    for column in ("error_train", *(column.name for column in COLUMNS)):
         made = _first_known(made, errors, column)
     made["training_s"] = 1e-3 * made.full_ms * made.frames
     saved = made.full_ms - made.ms_per_frame
@@ -203,6 +203,7 @@ def _first_known(made: pd.DataFrame, sources: list[pd.DataFrame], column: str) -
         number("relative_error_heldout", "the same in held-out motions: their median"),
         number("relative_error_heldout_low", "the least of them"),
         number("relative_error_heldout_high", "the largest"),
+        *COLUMNS[3:],
         *shared("ms_per_frame"),
         timed(number("ms_per_iteration", "time of an iteration", "ms")),
         timed(number("fom_ms_per_frame", "time of a frame of the full-order run", "ms")),

@@ -61,18 +61,19 @@ class EffectConfig(ConfigModel):
     def check_step(self, time_step: float) -> None:
         """Raise ValueError if the effect is unstable with a step of ``time_step`` s."""
 
-    def reversed(self) -> Self:
-        """The motion in the opposite direction; an effect that does not move stays as it is."""
+    def redirected(self, axes: Sequence[int]) -> Self:
+        """A handle that moves in another direction within ``axes``; other effects do not change."""
         return self
 
-    def tilted(self, degrees: float, axes: Sequence[int]) -> Self:
-        """An acceleration that is the same everywhere, turned; any other effect stays as it is.
+    def tilted(self, degrees: float, axes: Sequence[int], place: int) -> Self:
+        """Gravity turned by ``degrees``; any other effect is unchanged.
 
-        Parameters
-        ----------
-        degrees : by how much
-        axes : of 0, 1, 2; it turns towards the one that it points along least
+        It turns towards ``axes[place]`` (of 0, 1, 2), counted without an axis along gravity.
         """
+        return self
+
+    def carried(self, offset: Sequence[float], over: int) -> "EffectConfig":
+        """Pins that move by ``offset`` (m) in ``over`` frames; other effects are unchanged."""
         return self
 
     def body(self, low: np.ndarray, high: np.ndarray) -> Mesh | None:

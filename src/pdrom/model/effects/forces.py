@@ -20,12 +20,13 @@ class Gravity(Force):
         effect: Literal["gravity"] = "gravity"
         acceleration: Vector = (0.0, -9.81, 0.0)
 
-        def tilted(self, degrees: float, axes: Sequence[int]) -> Self:
+        def tilted(self, degrees: float, axes: Sequence[int], place: int) -> Self:
             own = np.array(self.acceleration)
             size = float(np.linalg.norm(own))
-            axis = min(axes, key=lambda axis: abs(own[axis]))
-            if abs(own[axis]) == size:  # nothing to turn, or no other axis
+            free = [axis for axis in axes if abs(own[axis]) < size]
+            if not free:  # nothing to turn, or no other axis
                 return self
+            axis = free[place]
             side = size * np.eye(3)[axis] - own[axis] / size * own
             side *= size / np.linalg.norm(side)
             angle = np.radians(degrees)

@@ -1,6 +1,7 @@
 """Vertices that are held for a range of frames: still, or moved by a handle."""
 
 from abc import abstractmethod
+from collections.abc import Sequence
 from typing import Annotated, Literal, Self
 
 import numpy as np
@@ -65,6 +66,10 @@ class Pins(Hold):
 
         effect: Literal["pins"] = "pins"
 
+        def carried(self, offset: Sequence[float], over: int) -> EffectConfig:
+            own = {"select": self.select, "start": self.start, "until": self.until}
+            return Translate.Config(**own, offset=tuple(offset), over=over)
+
     moves = False
 
     def _moved(self, anchor: np.ndarray, frame: int) -> np.ndarray:
@@ -90,8 +95,12 @@ class Translate(Hold):
         effect: Literal["translate"] = "translate"
         offset: Vector
 
-        def reversed(self) -> Self:
-            return self.model_copy(update={"offset": tuple(-x for x in self.offset)})
+        def redirected(self, axes: Sequence[int]) -> Self:
+            """Turn the offset by a right angle from the first of ``axes`` to the second."""
+            offset = list(self.offset)
+            first, second = axes[0], axes[min(1, len(axes) - 1)]
+            offset[first], offset[second] = offset[second], -offset[first]
+            return self.model_copy(update={"offset": tuple(offset)})
 
     moves = True
 
@@ -118,7 +127,7 @@ class Rotate(Hold):
         axis: Literal["x", "y", "z"]
         degrees: Annotated[float, Field(ge=-1e6, le=1e6)]
 
-        def reversed(self) -> Self:
+        def redirected(self, axes: Sequence[int]) -> Self:
             return self.model_copy(update={"degrees": -self.degrees})
 
     moves = True

@@ -1,5 +1,6 @@
 """A handle along positions and rotations over time."""
 
+from collections.abc import Sequence
 from typing import Annotated, Literal, Self
 
 import numpy as np
@@ -57,7 +58,7 @@ class Keyframes(Hold):
             scaled = super().with_frames_scaled(factor)
             return scaled.model_copy(update={"keys": tuple(keys)})
 
-        def reversed(self) -> Self:
+        def redirected(self, axes: Sequence[int]) -> Self:
             keys = [
                 key.model_copy(
                     update={name: tuple(-x for x in getattr(key, name)) for name in POSE}

@@ -1,5 +1,6 @@
 """One vertex after the other is pushed back and forth."""
 
+from collections.abc import Sequence
 from typing import Annotated, Literal, Self
 
 import numpy as np
@@ -33,7 +34,7 @@ class Poke(Boundary):
         count: Annotated[int, Field(ge=1, le=1000)] = 8
         avoid: tuple[Selection, ...] = ()
 
-        def reversed(self) -> Self:
+        def redirected(self, axes: Sequence[int]) -> Self:
             return self.model_copy(update={"amplitude": -self.amplitude})
 
     moves = True

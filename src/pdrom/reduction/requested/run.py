@@ -24,7 +24,6 @@ from pdrom.core.errors import ConfigurationError, PdromError, choices
 from pdrom.core.yamlfile import ConfigModel, shown
 from pdrom.model.constraints.base import GroupConfig
 from pdrom.model.effects.base import effect_config
-from pdrom.model.held_out import KICK
 from pdrom.model.scene import Scene
 from pdrom.reduction.requested import levels
 from pdrom.reduction.requested.levels import Level, Motion, OnFrame, Quantity, Trajectory, silent
@@ -35,7 +34,7 @@ log = logging.getLogger(__name__)
 Count = Annotated[int, Field(ge=1, le=10_000)]
 
 # Variation of the training motion: factors of handle speed and kick, seed, factor of stiffness.
-SLOWER, KICKED, KICK_SEED, STIFFER = 0.9, 0.8, 101, 1.6
+SLOWER, KICK_SPEED, KICK_SEED, STIFFER = 0.9, 0.4, 101, 1.6
 # An error counts as unknown if it can be computed for less than this fraction of the frames.
 JUDGED = 0.1
 PROBED = 6  # number of frames of a calibration run whose defects are computed
@@ -394,9 +393,8 @@ def _calibrated(level: Level, motions: Sequence[Motion], on_frame: OnFrame) -> C
 
 def varied(scene: Scene) -> Scene:
     """Return ``scene`` with a varied motion that differs from the study's held-out motions."""
-    own = scene.config.held_out
-    speed, axes = KICKED * (own.kick or KICK), own.kick_axes
-    kick = {"effect": "kick", "speed": speed, "seed": KICK_SEED, "axes": axes}
+    axes = scene.config.held_out.kick_axes
+    kick = {"effect": "kick", "speed": KICK_SPEED, "seed": KICK_SEED, "axes": axes}
     effects = [effect.with_frames_scaled(SLOWER) for effect in scene.config.effects]
     effects = [
         e.model_copy(update={"weight": STIFFER * e.weight}) if isinstance(e, GroupConfig) else e

@@ -17,8 +17,12 @@ COLUMNS = (
     number(MEDIAN, "the same error on held-out motions: their median; inf where a run ended"),
     number(LOW, "the least of them"),
     number(HIGH, "the largest"),
-    integer(COUNT, "held-out motions that were run and can be judged"),
+    integer(COUNT, "held-out motions that were run, can be judged and are far enough"),
+    number("playback_error", "median error of playback on these motions, see reduced_reruns"),
 )
+PLAYBACK = "playback"  # method of the rows that show the recorded training motion
+# A held-out motion is a test only where playback has a larger error than this.
+FAR = 0.3
 _WHOLE = {"k": "Int64", "r": "Int64"}
 EXPERIMENT = ["scene", "group"]
 ORTHOGONAL = "pod"  # orthogonal projection, which evaluates all elements
@@ -40,7 +44,8 @@ def over_motions(reruns: pd.DataFrame, keys: Sequence[str] = KEYS) -> pd.DataFra
     """Median, least and largest error of each run over its held-out motions, and their number.
 
     A run that ended before the horizon has an infinite error. Sizes above the numerical rank, which
-    cannot run, and motions whose horizon is frame 0 are left out.
+    cannot run, and motions whose horizon is frame 0 or that playback nearly meets (`FAR`) are left
+    out.
 
     Parameters
     ----------
@@ -48,17 +53,21 @@ def over_motions(reruns: pd.DataFrame, keys: Sequence[str] = KEYS) -> pd.DataFra
     keys : columns that identify a run
     """
     ran = (reruns.frames > 0) | reruns.blowup_frame.notna()
-    rows = reruns[(reruns.motion != TRAIN) & ran & (reruns.horizon_frame > 0)]
+    tests = (reruns.horizon_frame > 0) & (reruns.playback_error > FAR)
+    rows = reruns[(reruns.motion != TRAIN) & ran & tests]
     rows = rows.astype({key: kind for key, kind in _WHOLE.items() if key in keys})
     error = rows.relative_error_within_horizon.astype(float).fillna(np.inf)
-    runs = error.groupby([rows[key] for key in keys], sort=False, dropna=False)
+    own = [rows[key] for key in keys]
+    runs = error.groupby(own, sort=False, dropna=False)
     made = runs.agg(**{MEDIAN: "median", LOW: "min", HIGH: "max", COUNT: "count"})
-    return made.reset_index()
+    playback = rows.playback_error.groupby(own, sort=False, dropna=False).median()
+    return made.join(playback).reset_index()
 
 
 def with_held_out(runs: pd.DataFrame, reruns: pd.DataFrame) -> pd.DataFrame:
     """``runs`` with the columns of `over_motions` of ``reruns``, empty where it lacks the run."""
-    return runs.astype(_WHOLE).merge(over_motions(reruns), on=KEYS, how="left")
+    own = runs.astype(_WHOLE).drop(columns="playback_error", errors="ignore")
+    return own.merge(over_motions(reruns), on=KEYS, how="left")
 
 
 def judged_runs(reruns: pd.DataFrame, reconstruction: pd.DataFrame) -> pd.DataFrame:

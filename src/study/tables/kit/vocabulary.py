@@ -25,6 +25,10 @@ _COLUMNS = (
     number("relative_error", "error of the positions over all frames"),
     number("relative_error_within_horizon", "error of the positions before the horizon"),
     number(
+        "playback_error",
+        "error of playback before the horizon: of the recorded training motion in place of the run",
+    ),
+    number(
         "error_over_extent",
         "distance of a vertex (root mean square) before the horizon, over the extent",
     ),

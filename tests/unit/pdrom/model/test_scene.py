@@ -79,26 +79,6 @@ def test_coarsening_scales_every_frame_number():
     assert scene.reduce["spring"].train == 25
 
 
-def test_held_out_run_differs_in_speed_direction_and_seed():
-    scene = read_scene(ROOT, "bar_twist")
-    held = scene.heldout_variant()
-    turn = next(e for e in held.effects if e.effect == "rotate")
-    assert (turn.degrees, turn.over) == (-90.0, 125)
-    assert held.frames == scene.frames
-    assert read_scene(ROOT, "bar_release").heldout_variant().effects[-1].effect == "kick"
-
-
-@pytest.mark.parametrize("name", ["bar_twist", "spring_oop"])
-def test_one_rule_gives_every_scene_a_kick_of_its_own_and_twice_the_stiffness(name):
-    scene = read_scene(ROOT, name)
-    *same, kick = scene.heldout_variant("kick").effects
-    assert tuple(same) == scene.effects
-    assert (kick.effect, kick.speed, kick.seed) == ("kick", 0.5, 2)
-    for stiff, own in zip(scene.heldout_variant("stiffness").effects, scene.effects, strict=True):
-        weight = {"weight": 2.0 * own.weight} if own.effect in scene.groups else {}
-        assert stiff == own.model_copy(update=weight)
-
-
 def test_every_scene_file_is_valid():
     for path in sorted((ROOT / "config" / "scenes").glob("*.yaml")):
         assert load_bound_scene(ROOT, path.stem).config.name == path.stem

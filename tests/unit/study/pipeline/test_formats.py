@@ -59,7 +59,6 @@ def files(tmp_path_factory):
             "scenes": [SCENE],
             "methods": [METHOD],
             "ranks": [3, "full"],
-            "heldout_ranks": ["full"],
             "coarsen": {"resolution": 0.3, "frames": 0.1},
         }
         plan = load_plan(config, Path(), folders=Folders(os.fspath(folder)), quiet=True)

@@ -137,7 +137,8 @@ RUN = {"scene": "a", "group": "g", "method": "pod", "position_basis": "full", "k
 
 def rows(*runs: dict) -> pd.DataFrame:
     """Table reduced_reruns, as far as it is read."""
-    usual = {"motion": "kick", "frames": 9, "blowup_frame": None, "horizon_frame": 9}
+    usual = {"motion": "kick", "frames": 9, "blowup_frame": None, "horizon_frame": 9,
+             "playback_error": 0.5}  # fmt: skip
     return pd.DataFrame([RUN | usual | run for run in runs])
 
 
@@ -149,6 +150,8 @@ def test_an_error_is_the_median_over_the_motions_that_can_be_judged():
         {"r": 10, error: None, "frames": 3, "blowup_frame": 3}, {"r": 10, error: 0.5},
         {"r": 10, error: 0.4}, {"r": 10, error: None, "horizon_frame": 0},
         {"r": 20, error: None, "frames": 0},
+        # playback meets the motion: it tests nothing
+        {"r": 6, error: 0.9, "playback_error": 0.3},
         {"r": 6, error: 0.7, "motion": TRAIN}, {"r": 20, error: 0.8, "motion": TRAIN},
     )  # fmt: skip
     found = over_motions(table).set_index("r")
@@ -156,5 +159,6 @@ def test_an_error_is_the_median_over_the_motions_that_can_be_judged():
     assert tuple(found.loc[6, ["error_heldout_low", "error_heldout_high"]]) == (0.1, 0.3)
     assert tuple(found.loc[10, ["error_heldout", "error_heldout_high"]]) == (0.5, np.inf)
     assert found.motions.to_dict() == {6: 3, 10: 3}
+    assert found.playback_error.to_dict() == {6: 0.5, 10: 0.5}
     beside = with_held_out(trained(table)[KEYS], table)
     assert beside.error_heldout.isna().tolist() == [False, True]

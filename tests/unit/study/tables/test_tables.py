@@ -1,6 +1,7 @@
 """Tables of the study from small files, against values worked out by hand."""
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -18,7 +19,7 @@ from study.experiments.kit.settings import Horizon, floor_of
 from study.experiments.requested_tolerances import COLUMNS
 from study.tables.accuracy_cost import accuracy_cost, pareto, reference_of, requested_tolerances
 from study.tables.effects_cost import local_share
-from study.tables.kit.reruns import TRAIN, trained
+from study.tables.kit.reruns import PLAYBACK, TRAIN, trained
 from study.tables.reconstruction_error import singular_values
 from study.tables.reduced_reruns import reduced_reruns
 from study.tables.sensitivity import sensitivity
@@ -99,6 +100,7 @@ STEP = DISPLACEMENT / 2.0  # of the velocities; their differences are thrice tho
 class Files:
     """What the tables of the reruns read: paths of runs, timings and the table sensitivity."""
 
+    full_order: list[str]
     reruns: list[str]
     subspaces: list[str]
     timings: list[File]
@@ -107,6 +109,7 @@ class Files:
     def reduced(self) -> pd.DataFrame:
         """The table reduced_reruns of these files."""
         return reduced_reruns(
+            full_order=paths.FULL_ORDER.files(self.full_order),
             runs=paths.RERUNS.files(self.reruns),
             rows=_tables(paths.RERUNS_TRAIN, self.reruns, ""),
             rows_heldout=_tables(paths.RERUNS_HELDOUT, self.reruns, "_heldout"),
@@ -139,13 +142,20 @@ def store_series(run, difference):
 @pytest.fixture
 def files(tmp_path) -> Files:
     """Reruns of scene a (horizon 2) and b (whole), subspace runs of b, and their timings."""
-    reruns = []
+    reruns, full_order = [], []
     cases = {
         # differences of each run by frame; short ones blew up
         "a": {6: [0.1, 0.2, 9.0, 9.0], 10: [0.5], 20: None},
         "b": {6: [0.1, 0.1, 0.1, 0.1], 10: [0.2, 0.2]},
     }
     for scene, runs in cases.items():
+        for motion in (TRAIN, *MOTIONS):
+            full_order.append(str(tmp_path / "fom" / scene / f"{motion}.h5"))
+            Path(full_order[-1]).parent.mkdir(parents=True, exist_ok=True)
+            with write_hdf5(full_order[-1]) as file:  # held out, it moves twice as far
+                scale = 1.0 if motion == TRAIN else 2.0
+                moved = scale * np.concatenate([[0.0], DISPLACEMENT])
+                file["positions"] = np.tile(moved[:, None, None], (1, 1, 3))
         folder = tmp_path / "reruns" / scene / "spring"
         folder.mkdir(parents=True)
         rows = []
@@ -215,7 +225,7 @@ def files(tmp_path) -> Files:
             time("b", ms=0.5, group="all", method="ecsw-1e-02", position_basis="pod", k=8),
         ),
     ]  # fmt: skip
-    return Files(reruns, subspaces, timings, sensitivity(sensitivity_files(tmp_path)))
+    return Files(full_order, reruns, subspaces, timings, sensitivity(sensitivity_files(tmp_path)))
 
 
 def test_errors_in_units_of_the_extent(files):
@@ -281,7 +291,12 @@ def test_there_need_be_no_subspace(files):
 
 def test_held_out_runs_are_judged_by_their_own_horizon(files):
     table = files.reduced()
-    table = table[table.motion != TRAIN].reset_index(drop=True)
+    played = table[table.method == PLAYBACK].set_index(["motion", "scene"])
+    assert played.relative_error.tolist() == pytest.approx([0.5] * 6)
+    assert played.playback_error["heldout"].to_dict() == pytest.approx({"a": 0.5, "b": 0.5})
+    assert played.playback_error["kick"].isna().all()  # nobody perturbed that motion
+    table = table[(table.motion != TRAIN) & (table.method != PLAYBACK)].reset_index(drop=True)
+    assert table.playback_error.tolist() == pytest.approx([0.5] * 7)
     assert table.horizon_frame.tolist() == [1, 1, 1, 4, 4, 4, 4]
     assert set(table.motion) == {"heldout"}
     assert table.relative_error_within_horizon[0] == pytest.approx(0.1)

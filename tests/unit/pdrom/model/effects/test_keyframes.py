@@ -59,10 +59,10 @@ def test_another_speed_and_direction():
     slow = effect.with_frames_scaled(2.5)
     assert ([key.at for key in slow.keys], slow.start, slow.until) == ([10, 25, 30], 10, 45)
     assert [key.at for key in effect.with_frames_scaled(0.1).keys] == [1, 2, 3]
-    back = effect.reversed()
+    back = effect.redirected([0, 1])
     assert back.keys[1].offset == (-0.1, 0.0, -0.3)
     assert back.keys[1].turn == (0.0, -90.0, 0.0)
-    assert back.reversed() == effect
+    assert back.redirected([0, 1]) == effect
 
 
 @pytest.mark.parametrize(
