@@ -35,7 +35,7 @@ from study.experiments.kit.settings import Modes, PositionBasis, Solver
 FULL, CONTROL, REDUCED = "full", "control", "reduced"
 COLUMNS = [
     "process", "scene", "vertices", "frames", "role", "group", "method", "position_basis", "k", "r",
-    "ms_per_frame",
+    "ms_per_frame", "vertices_ms",
 ]  # fmt: skip
 SECONDS_COLUMNS = ["scene", "group", "method", "r", "reduction_s"]
 
@@ -140,7 +140,8 @@ class TimedScene(Case):
                 own_labels = found["method"], found["position_basis"], found["k"]
                 if wanted is None or own_labels in wanted:
                     sizes = {"group": "all", "r": model.elements_evaluated(scene)}
-                    yield Variant({**reduced, **sizes, **found}, *model.loop(scene), frames)
+                    labels = {**reduced, **sizes, **found}
+                    yield Variant(labels, *model.loop(scene), frames, output=model.output())
 
 
 @experiment(

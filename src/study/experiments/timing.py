@@ -116,11 +116,12 @@ log = logging.getLogger(__name__)
 COLUMNS = [
     "scene", "group", "method", "position_basis", "k", "r", "iterations", "vertices",
     "implementation", "ms_per_frame", "inertia_ms", "local_ms", "assembly_ms", "lift_ms",
-    "global_ms",
+    "global_ms", "vertices_ms",
 ]  # fmt: skip
 ITERATIONS = [
     "scene", "method", "vertices", "elements", "r", "k", "elements_sampled",
-    "factorisation_ms", "memory_mb", "ms_per_iteration", "local_ms", "global_ms", "local_share",
+    "factorisation_ms", "memory_mb", "ms_per_iteration", "local_ms", "global_ms", "vertices_ms",
+    "local_share",
 ]  # fmt: skip
 STATES, SIZED_STATES = 5, 4  # states of a run at which local steps are timed alone
 TrainingFrames = Annotated[int, Field(ge=3, le=1000)]
@@ -212,7 +213,8 @@ def timing(
     for file in subspaces:
         for own, model in load_models(file.path):
             labels = {**common, "iterations": None, "implementation": "compiled", "group": "all"}
-            quick.append(Variant({**labels, **own}, *model.loop(scene), frames))
+            loop, start = model.loop(scene)
+            quick.append(Variant({**labels, **own}, loop, start, frames, output=model.output()))
     log.info("%s: %d runs of %d frames", name, len(quick) + 1, frames)
     results = measure(quick, asked.warmup, asked.repeats) + measure([slow], 0, asked.repeats)
     write_table(pd.DataFrame(results, columns=COLUMNS), out.path)
@@ -341,7 +343,9 @@ def scaling(sources: list[Path], settings: SizedOptions, iterations: File, break
     variants = [
         variant(scene, system, scene.groups, sized.frames, {"method": FOM, **measured}),
         variant(scene, system, steps, sized.frames, {"method": sized.method, **sampled}),
-        Variant({"method": "ecsw", **inside}, *model.loop(scene), sized.frames),
+        Variant(
+            {"method": "ecsw", **inside}, *model.loop(scene), sized.frames, output=model.output()
+        ),
     ]
     times = pd.DataFrame(measure(variants, sized.warmup, sized.repeats)).assign(
         scene=config.name,
@@ -350,6 +354,7 @@ def scaling(sources: list[Path], settings: SizedOptions, iterations: File, break
         ms_per_iteration=lambda own: own.ms_per_frame / config.iterations,
         local_ms=lambda own: (own.local_ms + own.assembly_ms) / config.iterations,
         global_ms=lambda own: own.global_ms / config.iterations,
+        vertices_ms=lambda own: own.vertices_ms / config.iterations,
         local_share=lambda own: own.local_ms / (own.local_ms + own.global_ms),
     )
     write_table(times[ITERATIONS], iterations.path)

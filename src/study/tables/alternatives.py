@@ -58,8 +58,8 @@ KNOWN = 3.0  # a motion counts for an error limit of at least this factor times 
         MOTION,
         integer("frames", "frames that errors are taken over"),
         flag("finite", "no frame blew up", compared="error"),
-        *shared("ms_per_frame"),
-        timed(number("ms_low", "the same in the fastest process", "ms")),
+        *shared("ms_per_frame vertices_ms"),
+        timed(number("ms_low", "the whole in the fastest process", "ms")),
         timed(number("ms_high", "the same in the slowest process", "ms")),
         integer("processes", "processes that timed it, all in the first motion"),
         number("error_implicit", "against the converged step", tolerance=LOOSE),
@@ -87,11 +87,13 @@ def alternatives(parts: list[File], times: list[File]) -> pd.DataFrame:
 
 
 def beside(rows: pd.DataFrame, times: pd.DataFrame) -> tuple[pd.DataFrame, list[int]]:
-    """``rows`` with a column of ``times`` (ms) for each process, and the names of these columns."""
+    """``rows`` with ``times`` (ms): a column for each process, with the names of these columns."""
     wide = times.set_index([*CANDIDATE, "process"]).ms_per_frame.unstack("process")
+    wide["vertices_ms"] = times.groupby(CANDIDATE, dropna=False).vertices_ms.median()
     words = {"trained_on": object}  # without any reduction, pandas would read a column of numbers
-    both = (table.astype(words) for table in (rows, wide.reset_index()))
-    return pd.merge(*both, on=CANDIDATE, how="left"), list(wide.columns)
+    own = rows.drop(columns="vertices_ms", errors="ignore")
+    both = (table.astype(words) for table in (own, wide.reset_index()))
+    return pd.merge(*both, on=CANDIDATE, how="left"), list(wide.columns[:-1])
 
 
 # The winning row depends on the measured times, hence all columns about it are marked as timed.
@@ -114,6 +116,7 @@ def beside(rows: pd.DataFrame, times: pd.DataFrame) -> tuple[pd.DataFrame, list[
         timed(number("plain_ms", "time of one-step projective dynamics, if it reaches it", "ms")),
         timed(number("reduced_error", "smallest error of the reduction")),
         timed(number("reduced_ms", "time of a frame of the reduction, if it reaches it", "ms")),
+        timed(number("reduced_vertices_ms", "of it, the positions of all vertices", "ms")),
         timed(
             number("reduced_speedup", "time of the first over that of the reduction in a process")
         ),
@@ -182,7 +185,7 @@ def _best(rows: pd.DataFrame, limit: float, processes: list[int]) -> dict[str, o
     if len(reduced):
         first = reduced.iloc[0]
         made |= {f"reduced_{key}": first[key] for key in ("method", "trained_on", "iterations")}
-        made["reduced_ms"] = first.ms_per_frame
+        made |= {"reduced_ms": first.ms_per_frame, "reduced_vertices_ms": first.vertices_ms}
     if len(full):
         best = full.iloc[0]
         made |= best[["method", "substeps", "iterations", "error", "ms_per_frame"]].to_dict()

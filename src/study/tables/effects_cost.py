@@ -178,7 +178,7 @@ def local_share(timings: list[File], frame_times: pd.DataFrame) -> pd.DataFrame:
         timed(number("ms_per_iteration", "time of an iteration", "ms")),
         timed(number("local_ms", "time of the local step in an iteration", "ms")),
         timed(number("global_ms", "time of the global solve in an iteration", "ms")),
-        *shared("local_share speedup"),
+        *shared("vertices_ms local_share speedup"),
         timed(number("local_speedup", "the same of the local step alone")),
         integer("meshes", "sizes of the mesh of the curve"),
         timed(number("exponent", "of the time of an iteration in the number of vertices")),

@@ -27,7 +27,8 @@ from study.tables.kit.vocabulary import shared
         *shared("scene group method position_basis k r frames finite blowup_frame max_extent"),
         *shared("relative_error relative_error_within_horizon playback_error"),
         *shared("horizon_frame sensitivity_floor"),
-        *shared("ms_per_frame local_ms global_ms speedup error_over_extent shape_error"),
+        *shared("ms_per_frame vertices_ms local_ms global_ms speedup"),
+        *shared("error_over_extent shape_error"),
         *shared("velocity_error relative_shape_error energy_drift contact_delay"),
         text(
             "motion",
@@ -155,7 +156,7 @@ def _with_times(runs: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
     reduced["position_basis"] = reduced.position_basis.fillna("full")
     reduced["local_ms"] += reduced.assembly_ms + reduced.lift_ms
     reduced["speedup"] = reduced.scene.map(reference) / reduced.ms_per_frame
-    measured = ["ms_per_frame", "local_ms", "global_ms", "speedup"]
+    measured = ["ms_per_frame", "vertices_ms", "local_ms", "global_ms", "speedup"]
     inside = reduced.position_basis != "full"
     keys = [k for k in KEYS if k != "k"]
     local = runs[runs.position_basis == "full"].merge(

@@ -25,7 +25,9 @@ _ERRORS = {
     "error_train": "relative_error_train", MEDIAN: "relative_error_heldout",
     LOW: "relative_error_heldout_low", HIGH: "relative_error_heldout_high",
 }  # fmt: skip
-_TIMES = ["ms_per_frame", "fom_ms_per_frame", "speedup", "speedup_low", "speedup_high"]
+_TIMES = [
+    "ms_per_frame", "vertices_ms", "fom_ms_per_frame", "speedup", "speedup_low", "speedup_high",
+]  # fmt: skip
 
 
 @table(
@@ -82,7 +84,7 @@ def frame_times(parts: list[File]) -> pd.DataFrame:
         *shared("scene vertices group method position_basis k r"),
         integer("processes", "processes that timed it"),
         timed(number("full_ms", "time of a frame of the full-order run", "ms")),
-        *shared("ms_per_frame speedup speedup_low speedup_high"),
+        *shared("ms_per_frame vertices_ms speedup speedup_low speedup_high"),
         timed(text("shown", "the median and its quantiles, where the control confirms the times")),
         timed(flag("loses", "dearer than the full order: the upper quantile is below one")),
         timed(number("training_s", "time of the training run", "s")),
@@ -147,7 +149,8 @@ def timed_reductions(rows: pd.DataFrame, times: pd.DataFrame) -> Iterator[dict]:
     trusted = times.set_index("scene").confirmed
     reduced = rows[rows.role == REDUCED]
     for labels, own in reduced.groupby(_LABELS, sort=False, dropna=False):
-        own = own.set_index(["scene", "process"]).ms_per_frame
+        own = own.set_index(["scene", "process"])
+        vertices_ms, own = float(own.vertices_ms.median()), own.ms_per_frame
         ratio, low, high = median_interval((full.loc[own.index] / own).to_numpy(float))
         scene = labels[0]
         first = rows[rows.scene == scene].iloc[0]
@@ -158,6 +161,7 @@ def timed_reductions(rows: pd.DataFrame, times: pd.DataFrame) -> Iterator[dict]:
             "processes": len(own),
             "full_ms": float(full.loc[own.index].median()),
             "ms_per_frame": float(own.median()),
+            "vertices_ms": vertices_ms,
             "speedup": ratio,
             "speedup_low": low,
             "speedup_high": high,
@@ -204,7 +208,7 @@ def _first_known(made: pd.DataFrame, sources: list[pd.DataFrame], column: str) -
         number("relative_error_heldout_low", "the least of them"),
         number("relative_error_heldout_high", "the largest"),
         *COLUMNS[3:],
-        *shared("ms_per_frame"),
+        *shared("ms_per_frame vertices_ms"),
         timed(number("ms_per_iteration", "time of an iteration", "ms")),
         timed(number("fom_ms_per_frame", "time of a frame of the full-order run", "ms")),
         *shared("speedup speedup_low speedup_high"),

@@ -45,7 +45,9 @@ from study.experiments.kit.measurement import Case, Variant, in_processes
 from study.experiments.kit.reruns import run_error
 from study.experiments.kit.settings import BlowupExtent
 
-TIME_COLUMNS = ["scene", "factor", "stiffness", *SETTING, "process", "ms_per_frame"]
+TIME_COLUMNS = [
+    "scene", "factor", "stiffness", *SETTING, "process", "ms_per_frame", "vertices_ms",
+]  # fmt: skip
 log = logging.getLogger(__name__)
 COLUMNS = [
     "scene", "factor", "vertices", "stiffness", "method", "substeps", "iterations", "trained_on",
@@ -73,6 +75,7 @@ class Candidate:
 
     steps : how many times the loop steps in a frame
     positions : vertex positions of the coordinates of the loop
+    output : the same in single precision, of a loop in a subspace
     """
 
     labels: dict[str, object]
@@ -80,6 +83,7 @@ class Candidate:
     start: State
     steps: int = 1
     positions: Callable[[np.ndarray], np.ndarray] = field(default=lambda y: y)
+    output: Callable[[np.ndarray], np.ndarray] | None = None
 
     def run(self, frames: int, limit: float, extent: float) -> np.ndarray | None:
         """Positions (F + 1, N, 3) at the ends of frames, the initial ones first.
@@ -136,7 +140,9 @@ def candidates(
                 continue
             window = WINDOW if method == ACCELERATED else 0
             other = substepped(scene, substeps, iterations, window)
-            yield Candidate(labels, *own.model.loop(other), substeps, own.model.positions)
+            loop, first = own.model.loop(other)
+            shown = own.model.positions, own.model.output()
+            yield Candidate(labels, loop, first, substeps, *shown)
 
 
 def trained(training: Scene, settings: Comparison) -> Iterator[Trained]:
@@ -203,7 +209,10 @@ class Timed(Case):
         """Loops of all candidates; ``steps`` of one are a frame."""
         for each in candidates(self.scene, self.models, self.settings):
             labels = {**self.labels, **each.labels, "steps": each.steps}
-            yield Variant(labels, each.loop, each.start, each.steps * self.settings.frames)
+            frames = each.steps * self.settings.frames
+            yield Variant(
+                labels, each.loop, each.start, frames, output=each.output, steps=each.steps
+            )
 
 
 class Options(ConfigModel):
@@ -246,7 +255,7 @@ def alternatives(sources: list[Path], settings: Options, out: File, times: File)
         log.info("%s: stiffness %g done", settings.scene.name, stiffness)
     write_table(pd.DataFrame(rows, columns=COLUMNS), out.path)
     measured = pd.DataFrame(in_processes(cases, section))
-    measured["ms_per_frame"] *= measured.steps
+    measured[["ms_per_frame", "vertices_ms"]] *= measured.steps.to_numpy()[:, None]
     write_table(measured.reindex(columns=TIME_COLUMNS), times.path)
 
 

@@ -34,8 +34,10 @@ log = logging.getLogger(__name__)
 # Times of a frame: the whole; prediction at its beginning, contacts and velocities at its end;
 # projections of all groups, and coefficients of reduced ones; product with S^T W, where an
 # implementation does it apart from the projections; from coefficients to the right-hand side; the
-# global step.
-PHASES = ("ms_per_frame", "inertia_ms", "local_ms", "assembly_ms", "lift_ms", "global_ms")
+# global step; the positions of all vertices, where the loop has other coordinates.
+PHASES = (
+    "ms_per_frame", "inertia_ms", "local_ms", "assembly_ms", "lift_ms", "global_ms", "vertices_ms",
+)  # fmt: skip
 _INNER = ("assembly_seconds", "lift_seconds")
 
 
@@ -60,7 +62,8 @@ class Variant:
     """A loop to time: labels for the table, the loop with its first state, and how many frames.
 
     ``share`` is the part of a frame's iterations that the loop does; the times of the phases that
-    repeat with the iterations are divided by it.
+    repeat with the iterations are divided by it. ``output`` makes the positions of all vertices
+    from the coordinates of a loop in a subspace, after every ``steps`` of its steps.
     """
 
     labels: dict[str, Any]
@@ -68,6 +71,8 @@ class Variant:
     start: State
     frames: int
     share: float = 1.0
+    output: Callable[[np.ndarray], np.ndarray] | None = None
+    steps: int = 1
 
 
 def measure(variants: Sequence[Variant], warmup: int, repeats: int) -> list[dict[str, Any]]:
@@ -128,13 +133,18 @@ def _time_once(variant: Variant) -> np.ndarray:
                         setattr(step, name, 0.0)
             state, report = loop.step(state, frame)
             inner = [sum(getattr(s, name, 0.0) for s in loop.local_steps) for name in _INNER]
-            rows.append([*report.seconds, *inner])
+            vertices, before = 0.0, perf_counter()
+            if variant.output is not None and (frame + 1) % variant.steps == 0:
+                variant.output(state.positions)
+                vertices = perf_counter() - before
+            rows.append([*report.seconds, *inner, vertices])
             if not np.isfinite(state.positions).all():
                 break
-    start, local, solve, end, assembly, lift = np.array(rows).T
+    start, local, solve, end, assembly, lift, vertices = np.array(rows).T
     repeated = np.array([local - assembly - lift, assembly, lift, solve]) / variant.share
     inertia = start + end
-    return 1e3 * np.vstack([inertia + repeated.sum(axis=0), inertia, repeated]).T
+    total = inertia + repeated.sum(axis=0) + vertices
+    return 1e3 * np.vstack([total, inertia, repeated, vertices]).T
 
 
 def median_frames(samples: np.ndarray) -> np.ndarray:

@@ -13,8 +13,8 @@ import pandas as pd
 
 from pdrom.core.store import read_table
 from study.artifact.paths import File
+from study.experiments.kit.measurement import PHASES
 
-PHASES = ("ms_per_frame", "inertia_ms", "local_ms", "assembly_ms", "lift_ms", "global_ms")
 RESAMPLES, SEED, LEVEL = 2000, 1, 0.95
 
 

@@ -62,6 +62,7 @@ _COLUMNS = (
         "sensitivity_floor", "largest drift of perturbed runs before the horizon", compared="error"
     ),
     timed(number("ms_per_frame", "time of a frame", "ms")),
+    timed(number("vertices_ms", "of it, the positions of all vertices from coordinates", "ms")),
     timed(number("local_ms", "time of the local step in a frame", "ms")),
     timed(number("global_ms", "time of the global solve in a frame", "ms")),
     timed(number("speedup", "time of the full-order run over that of this one")),

@@ -207,6 +207,7 @@ def files(tmp_path) -> Files:
         return {
             "scene": scene, "implementation": implementation, "ms_per_frame": ms,
             "local_ms": ms / 4, "assembly_ms": ms / 8, "lift_ms": ms / 8, "global_ms": ms / 4,
+            "vertices_ms": ms / 8,
             "vertices": 9, "iterations": 10, **labels,
         }  # fmt: skip
 
@@ -280,6 +281,7 @@ def test_times_go_to_their_runs(files):
     np.testing.assert_allclose(table.speedup, [2.0, 1.6, np.nan, 5.0, np.nan, 10.0, 20.0])
     np.testing.assert_allclose(table.local_ms, np.array(expected) / 2)
     np.testing.assert_allclose(table.global_ms, np.array(expected) / 4)
+    np.testing.assert_allclose(table.vertices_ms, np.array(expected) / 8)
 
 
 def test_there_need_be_no_subspace(files):

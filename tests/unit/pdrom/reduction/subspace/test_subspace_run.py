@@ -20,6 +20,7 @@ from pdrom.reduction.subspace.interpolation import (
     SubspaceLocalStep,
 )
 from pdrom.reduction.subspace.model import (
+    Output,
     Samples,
     SubspaceModel,
     load_models,
@@ -122,6 +123,14 @@ def test_pins_and_handles_are_met_exactly(name, kind, made):
             np.testing.assert_allclose(moved, wanted, atol=1e-12)
             checked += 1
     assert checked >= scene.config.frames
+
+
+@pytest.mark.parametrize(("vertices", "columns"), [(3, 1), (512, 4), (1300, 7)])
+def test_output_in_single_precision_is_the_product(vertices, columns):
+    """Sizes below, at and above those of the panels."""
+    rng = np.random.default_rng(1)
+    B, z = rng.standard_normal((vertices, columns)), rng.standard_normal((columns, 3))
+    np.testing.assert_allclose(Output(B)(z), B @ z, rtol=0.0, atol=1e-5)
 
 
 def test_released_pins_move_again():
