@@ -227,6 +227,7 @@ def online(parts: list[File], measured: list[File], times: pd.DataFrame) -> pd.D
     found = pd.DataFrame(list(timed_reductions(joined(measured), times)))
     found = found.rename(columns={"full_ms": "fom_ms_per_frame"})
     made = rows[rows.motion == TRAIN].rename(columns={"r": "elements_sampled"})
+    made = made.drop(columns="playback_error")  # of the training motion itself
     made = made.merge(large_errors(rows).rename(columns=_ERRORS), on=_MODEL, how="left")
     made = made.merge(found[[*_MODEL, *_TIMES]], on=_MODEL, how="left")
     return made.assign(ms_per_iteration=made.ms_per_frame / made.iterations)
