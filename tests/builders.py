@@ -91,13 +91,3 @@ class Pushing:
 def call_kernel(address, d, parameters, p, m):
     """Call the compiled kernel at ``address`` for ``m`` elements; p is written."""
     call_gradients(address, d.ctypes.data, parameters.ctypes.data, p.ctypes.data, m)
-
-
-def from_python(function):
-    """Let Python call a ``function`` that only compiled code calls."""
-
-    @njit
-    def call(*arguments):
-        return function(*arguments)
-
-    return call

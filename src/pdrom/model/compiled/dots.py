@@ -1,4 +1,4 @@
-"""Inner products, and sums of vectors, in compiled code.
+"""Inner products in compiled code.
 
 Products of three matrix rows with a vector read the vector once, and the processor prefetches three
 rows. The order of the sums does not depend on the processor: sixteen partial sums, then four,
@@ -91,10 +91,3 @@ def dot(a, b):
     for k in range(whole, len(a)):
         result += a[k] * b[k]
     return result
-
-
-@compiled(nogil=True)
-def add_multiple(a, s, b):
-    """Add s b to the vector a in place."""
-    for k in range(len(a)):
-        a[k] += s * b[k]

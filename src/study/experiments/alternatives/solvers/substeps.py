@@ -36,10 +36,6 @@ METHODS = Registry(
         "projective": "study.experiments.alternatives.solvers.projective:SmallSteps",
         "anderson": "study.experiments.alternatives.solvers.projective:Accelerated",
         "chebyshev": "study.experiments.alternatives.solvers.projective:Chebyshev",
-        "l-bfgs": "study.experiments.alternatives.solvers.lbfgs:QuasiNewton",
-        "newton": "study.experiments.alternatives.solvers.newton:Newton",
-        "xpbd": "study.experiments.alternatives.solvers.xpbd:CompliantConstraints",
-        "vertex-descent": "study.experiments.alternatives.solvers.vertex_descent:VertexDescent",
         "explicit": "study.experiments.alternatives.solvers.explicit:Explicit",
     },
 )

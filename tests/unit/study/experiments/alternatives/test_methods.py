@@ -7,10 +7,8 @@ ends at the same step in fewer iterations.
 import numpy as np
 import pytest
 
-from builders import GRAVITY, GROUPS, LEFT, from_python, make_scene
+from builders import GRAVITY, GROUPS, LEFT, make_scene
 from pdrom.core.errors import ConfigurationError, SceneError
-from pdrom.model.compiled.rows import as_vertices, flat
-from pdrom.model.dynamics.frames import inertia_energy
 from pdrom.model.dynamics.stepper import State
 from pdrom.reduction.subspace.model import Samples, SubspaceModel, make_columns
 from study.experiments.alternatives.solvers.explicit import continuous
@@ -23,14 +21,7 @@ SHEET = {"kind": "cloth", "rows": 6, "columns": 5, "plane": "xz"}
 HELD = (GRAVITY, LEFT)
 CLOSED_FORM = ("spring", "strain", "tetrahedron_strain", "deformation_gradient")
 # What minimises the objective of a frame, and iterations that suffice on these meshes.
-IMPLICIT = {
-    "projective": 3000,
-    "anderson": 300,
-    "chebyshev": 1500,
-    "l-bfgs": 200,
-    "newton": 40,
-    "vertex-descent": 300,
-}
+IMPLICIT = {"projective": 3000, "anderson": 300, "chebyshev": 1500}
 
 
 def small(group: str, *effects: dict, weight: float = 1e5, **settings):
@@ -55,28 +46,6 @@ def test_many_iterations_end_at_the_implicit_step(group, method, rng):
     np.testing.assert_allclose(after.velocities, expected.velocities, rtol=0.0, atol=1e-6)
 
 
-@pytest.mark.parametrize("group", CLOSED_FORM)
-def test_compliant_constraints_come_near_the_implicit_step(group):
-    """Their fixed point is the implicit step up to turns of the constraints within a frame."""
-    scene = small(group, *HELD)
-    loops = [ConvergedStepper(scene, scene.system, 1e-12, 4000), alternative("xpbd", scene, 1, 400)]
-    best, own = (followed(loop, scene.initial_state(), 6) for loop in loops)
-    assert np.linalg.norm(own[-1] - best[-1]) < 0.02 * np.linalg.norm(best[-1] - best[0])
-
-
-def test_what_compliant_constraints_miss_vanishes_with_the_step():
-    """The less a constraint turns within a step, the nearer is the implicit step."""
-    misses = []
-    for step in (0.016, 0.004, 0.001):
-        scene = small("spring", *HELD, time_step=step)
-        start = State(1.1 * scene.mesh.points, np.zeros_like(scene.mesh.points))
-        best = ConvergedStepper(scene, scene.system, 1e-13, 4000)
-        expected = followed(best, start, 1)[-1]
-        after = followed(alternative("xpbd", scene, 1, 500), start, 1)[-1]
-        misses.append(np.linalg.norm(after - expected) / np.linalg.norm(expected - start.positions))
-    assert misses[0] > 2.0 * misses[1] > 4.0 * misses[2]
-
-
 @pytest.mark.parametrize("group", GROUPS)
 def test_one_substep_is_the_step_loop(group, rng):
     scene = small(group, *HELD, iterations=4)
@@ -87,23 +56,7 @@ def test_one_substep_is_the_step_loop(group, rng):
     np.testing.assert_allclose(after.velocities, expected.velocities, rtol=0.0, atol=1e-10)
 
 
-@pytest.mark.parametrize("method", ["l-bfgs", "newton", "vertex-descent"])
-def test_objective_falls_with_every_iteration(method, rng):
-    scene = small("strain")
-    start = crumpled(scene, rng, 0.1)
-    system = scene.system
-    s = as_vertices(start.positions)
-    values = []
-    for iterations in range(1, 12):
-        after, _ = alternative(method, scene, 1, iterations).step(start, 0)
-        energy = scene.groups[0].accumulate(after.positions, np.zeros_like(after.positions))
-        y = flat(as_vertices(after.positions))
-        values.append(energy + from_python(inertia_energy)(y, flat(s), system.inertia))
-    assert (np.diff(values) <= 1e-12 * values[0]).all()
-    assert values[-1] < 0.9 * values[0]
-
-
-@pytest.mark.parametrize("method", sorted(set(METHODS) - {"vertex-descent"}))
+@pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("group", ["spring", "strain", "deformation_gradient"])
 def test_a_free_body_gains_the_momentum_of_gravity_only(group, method, rng):
     scene = small(group, GRAVITY, weight=1e4)
@@ -202,18 +155,14 @@ def test_degenerate_inverted_and_stiff_starts_stay_finite(group, method, weight)
 
 
 def test_what_a_method_does_not_take_is_refused_by_name():
-    bending = small("bending")
-    for method in ("xpbd", "newton", "vertex-descent"):
-        with pytest.raises(SceneError, match=f"'bending': method '{method}' takes springs"):
-            alternative(method, bending, 1)
     windy = small("spring", {"effect": "drag", "coefficient": 0.1})
     with pytest.raises(SceneError, match="'drag': method 'explicit' takes no force but gravity"):
         alternative("explicit", windy, 1)
     both = make_scene(*HELD, *({"effect": name, "weight": 1e5} for name in ("spring", "strain")))
     with pytest.raises(SceneError, match="'two-level' takes one group"):
         TwoLevel(both, 1, 1, model_of(hanging("spring"), 2))
-    with pytest.raises(ConfigurationError, match=r"unknown method 'newtn'.*newton"):
-        alternative("newtn", windy, 1)
+    with pytest.raises(ConfigurationError, match=r"unknown method 'andersn'.*anderson"):
+        alternative("andersn", windy, 1)
 
 
 def test_compiled_acceleration_is_that_of_the_step_loop(rng):
