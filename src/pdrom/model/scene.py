@@ -178,6 +178,11 @@ class SceneConfig(ConfigModel):
         effects = self.held_out.variant(self.effects, motion, self.time_step)
         return self.model_copy(update={"effects": effects})
 
+    def training_variant(self, seed: int) -> Self:
+        """The scene of a further training motion (see `HeldOut.further`)."""
+        effects = self.held_out.further(self.effects, seed, self.time_step)
+        return self.model_copy(update={"effects": effects})
+
 
 @dataclass(frozen=True, eq=False)
 class Scene:

@@ -79,7 +79,6 @@ def _study(study: Study) -> Row:
         "left": settings.stability.left,
         "tolerance": settings.iterations.tolerance,
         "continuous_tolerance": settings.alternatives.continuous.tolerance,
-        "compared_frames": settings.alternatives.compared,
         "opponent_frames": settings.alternatives.frames,
     }
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
-from pdrom.model.held_out import MOTIONS
+from pdrom.model.held_out import MOTIONS, PLAYBACK
 from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, Setting, TableOf
@@ -45,14 +45,16 @@ KNOWN = 3.0  # a motion counts for an error limit of at least this factor times 
         STIFFNESS,
         text(
             "method",
-            f"how a frame is solved; {settings.CONVERGED}: to the end; {settings.REDUCED}: "
+            f"how a frame is solved; {settings.CONVERGED}: to the end; {PLAYBACK}: not, "
+            f"the recorded training motion is shown; {settings.REDUCED}: "
             f"reduced, {settings.ACCELERATED}: and accelerated in the subspace",
         ),
         SUBSTEPS,
         ITERATIONS,
         text(
             "trained_on",
-            f"frames that a reduction is trained on: {settings.OWN}, {settings.CONVERGED}",
+            f"frames that a reduction is trained on: {settings.OWN}, {settings.CONVERGED}, "
+            f"{settings.SEVERAL} (converged)",
         ),
         *shared("k elements_sampled"),
         MOTION,
@@ -65,6 +67,7 @@ KNOWN = 3.0  # a motion counts for an error limit of at least this factor times 
         number("error_implicit", "against the converged step", tolerance=LOOSE),
         number("error_continuous", "against continuous time: the total", tolerance=LOOSE),
         number("reference_error", "estimated error of that motion"),
+        number("span_error", "error of the nearest motion in the subspace of a reduction"),
     ),
     reads={"parts": Every(paths.ALTERNATIVES), "times": Every(paths.ALTERNATIVE_TIMES)},
 )

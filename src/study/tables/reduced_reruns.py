@@ -7,7 +7,7 @@ import h5py
 import pandas as pd
 
 from pdrom.core.store import open_hdf5, read_table
-from pdrom.model.held_out import MOTIONS
+from pdrom.model.held_out import MOTIONS, PLAYBACK
 from pdrom.reduction.deviations import DEVIATIONS, ERRORS, REFERENCE, Series, errors_within
 from study.artifact import paths
 from study.artifact.paths import File
@@ -17,7 +17,7 @@ from study.experiments.kit.scenes import positions_of
 from study.experiments.kit.settings import Horizon, floor_of, horizons
 from study.tables.kit.declaration import table, text
 from study.tables.kit.parts import timings_in_one_time
-from study.tables.kit.reruns import KEYS, PLAYBACK, TRAIN
+from study.tables.kit.reruns import KEYS, TRAIN
 from study.tables.kit.vocabulary import shared
 
 

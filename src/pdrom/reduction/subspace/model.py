@@ -169,15 +169,20 @@ def sample_elements(
     tolerances: Sequence[float],
     start: State | None = None,
     norm: Norm = "energy",
+    others: Sequence[Scene] = (),
 ) -> list[dict[str, Samples]]:
     """Select energy-conserving samples of every group for each tolerance.
 
     They are trained on iterates of the subspace with all projections, in some of the training
-    ``frames`` of a run that begins at ``start`` (coordinates) or where the scene does, and meet the
-    tolerances in ``norm`` (see module `ecsw`).
+    ``frames`` of a run that begins at ``start`` (coordinates) or where the scene does, and as many
+    of each of the ``others``, scenes of further training motions. They meet the tolerances in
+    ``norm`` (see module `ecsw`).
     """
-    chosen = frames[np.unique(np.linspace(0, len(frames) - 1, FRAMES).round().astype(int))]
+    count = -(-FRAMES // (1 + len(others)))
+    chosen = frames[np.unique(np.linspace(0, len(frames) - 1, count).round().astype(int))]
     training = training_run(scene, columns, chosen, start, norm)
+    for other in others:
+        training += training_run(other, columns, chosen, norm=norm)
     found = {
         group.name: ecsw_elements(group, columns, training, tolerances) for group in scene.groups
     }

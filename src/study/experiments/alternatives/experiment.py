@@ -19,10 +19,12 @@ from pdrom.core.yamlfile import ConfigModel
 from pdrom.model.constraints.base import GroupConfig
 from pdrom.model.dynamics.stepper import State, Stepper
 from pdrom.model.dynamics.system import GlobalSystem
-from pdrom.model.held_out import FIRST
-from pdrom.model.runs import BoundedRun, trajectory
+from pdrom.model.held_out import FIRST, PLAYBACK
+from pdrom.model.runs import BoundedRun, simulate, trajectory
 from pdrom.model.scene import Scene, SceneConfig
+from pdrom.reduction.subspace.columns import Columns
 from pdrom.reduction.subspace.model import SubspaceModel, make_columns, sample_elements
+from pdrom.reduction.subspace.space import coordinates, projector
 from study.artifact.paths import ALTERNATIVE_TIMES, ALTERNATIVES, File
 from study.artifact.reads import Settings, SourcesOf
 from study.experiments.alternatives.settings import (
@@ -31,6 +33,7 @@ from study.experiments.alternatives.settings import (
     OWN,
     REDUCTIONS,
     SETTING,
+    SEVERAL,
     TRAINED,
     TWO_LEVEL,
     Comparison,
@@ -52,7 +55,7 @@ log = logging.getLogger(__name__)
 COLUMNS = [
     "scene", "factor", "vertices", "stiffness", "method", "substeps", "iterations", "trained_on",
     "k", "elements_sampled", "motion", "frames", "finite", "error_implicit", "error_continuous",
-    "reference_error",
+    "reference_error", "span_error",
 ]  # fmt: skip
 
 
@@ -76,6 +79,7 @@ class Candidate:
     steps : how many times the loop steps in a frame
     positions : vertex positions of the coordinates of the loop
     output : the same in single precision, of a loop in a subspace
+    columns : of that subspace
     """
 
     labels: dict[str, object]
@@ -84,6 +88,14 @@ class Candidate:
     steps: int = 1
     positions: Callable[[np.ndarray], np.ndarray] = field(default=lambda y: y)
     output: Callable[[np.ndarray], np.ndarray] | None = None
+    columns: Columns | None = None
+
+    def state(self, state: State, scene: Scene) -> State:
+        """Coordinates of the loop for a ``state`` of the vertices of ``scene``."""
+        if self.columns is None:
+            return state
+        own = (self.columns, scene.masses)
+        return State(coordinates(*own, state.positions), coordinates(*own, state.velocities))
 
     def run(self, frames: int, limit: float, extent: float) -> np.ndarray | None:
         """Positions (F + 1, N, 3) at the ends of frames, the initial ones first.
@@ -140,17 +152,19 @@ def candidates(
                 continue
             window = WINDOW if method == ACCELERATED else 0
             other = substepped(scene, substeps, iterations, window)
-            loop, first = own.model.loop(other)
-            shown = own.model.positions, own.model.output()
-            yield Candidate(labels, loop, first, substeps, *shown)
+            yield Candidate(
+                labels, *own.model.loop(other), substeps, own.model.positions, own.model.output(),
+                own.model.columns,
+            )  # fmt: skip
 
 
 def trained(training: Scene, settings: Comparison) -> Iterator[Trained]:
     """Position subspaces with sampled elements; columns and samples come from ``training``.
 
-    The columns hold its frames as they are, or converged. The samples are trained on iterates of
-    the training motion in these columns, for every number of substeps that a reduction takes. Of
-    converged frames there is a coarse level, too, with more samples.
+    The columns hold its frames as they are, or converged, or converged frames of further motions,
+    too. The samples are trained on iterates of these motions in these columns, for every number of
+    substeps that a reduction takes. Of converged frames there is a coarse level, too, with more
+    samples.
     """
     vertices, own = training.mesh.vertices, settings.implicit
     taken, coarse = (
@@ -158,21 +172,28 @@ def trained(training: Scene, settings: Comparison) -> Iterator[Trained]:
         for methods in (REDUCTIONS, (TWO_LEVEL,))
     )
     for trained_on in settings.trained_on if taken or coarse else ():
-        run: np.ndarray | None = None
+        further: list[Scene] = []
+        if trained_on == SEVERAL:
+            seeds = range(1, settings.training_motions)
+            variants = map(training.config.training_variant, seeds)
+            further = [Scene.build(variant, training.mesh) for variant in variants]
+        runs: list[np.ndarray | None] = [None]
         if trained_on == OWN:
-            run = trajectory(training, track_objective=False)
+            runs = [trajectory(training, track_objective=False)]
         elif settings.affords(CONVERGED, vertices):
-            run = converged_run(training, own.tolerance, own.limit)
-        if run is None:
+            runs = [converged_run(s, own.tolerance, own.limit) for s in (training, *further)]
+        frames = [run[1:] for run in runs if run is not None]
+        if len(frames) < len(runs):
             continue
         for k in settings.modes:
-            columns = make_columns(training, run[1:], "pod", k=k)
+            columns = make_columns(training, np.concatenate(frames), "pod", k=k)
             for substeps in sorted({*taken, *coarse}):
                 level = trained_on == CONVERGED and substeps in coarse
                 tolerances = [settings.tau, *([settings.coarse_tau] if level else [])]
                 scene = substepped(training, substeps, training.config.iterations)
                 ends = np.arange(substeps - 1, scene.config.frames, substeps)
-                made = sample_elements(scene, columns, ends, tolerances=tolerances)
+                others = [substepped(s, substeps, s.config.iterations) for s in further]
+                made = sample_elements(scene, columns, ends, tolerances, others=others)
                 for tau, samples in dict(zip(tolerances, made, strict=True)).items():
                     model = SubspaceModel("pod", columns, samples)
                     yield Trained(trained_on, substeps, model, coarse=tau != settings.tau)
@@ -207,12 +228,20 @@ class Timed(Case):
 
     def variants(self) -> Iterator[Variant]:
         """Loops of all candidates; ``steps`` of one are a frame."""
-        for each in candidates(self.scene, self.models, self.settings):
+        scene, wanted = self.scene, min(self.settings.frames, self.scene.config.frames)
+        places = np.linspace(0, scene.config.frames - 1, wanted).round().astype(int)
+        # the boundaries remember where they took hold, for the loops that begin later
+        states = [
+            scene.initial_state(),
+            *(end for end, _ in simulate(scene, track_objective=False)),
+        ]
+        for each in candidates(scene, self.models, self.settings):
             labels = {**self.labels, **each.labels, "steps": each.steps}
-            frames = each.steps * self.settings.frames
+            starts = tuple((each.state(states[f], scene), f * each.steps) for f in places)
             yield Variant(
-                labels, each.loop, each.start, frames, output=each.output, steps=each.steps
-            )
+                labels, each.loop, each.start, wanted * each.steps, output=each.output,
+                steps=each.steps, starts=starts,
+            )  # fmt: skip
 
 
 class Options(ConfigModel):
@@ -242,13 +271,13 @@ def alternatives(sources: list[Path], settings: Options, out: File, times: File)
     rows, cases = [], []
     for stiffness in section.factors(settings.scene.name, factor):
         config = sized(settings.scene, factor, stiffness)
-        config = config.model_copy(update={"frames": min(section.compared, config.frames)})
         training = Scene.build(config, config.mesh.build(Path()))
         models = tuple(trained(training, section))
+        recorded = trajectory(training, track_objective=False)
         own = {"scene": config.name, "factor": factor, "stiffness": stiffness}
         for motion in section.motions:
             scene = Scene.build(config.heldout_variant(motion), training.mesh)
-            for row in _rows(scene, models, settings):
+            for row in _rows(scene, recorded, models, settings):
                 rows.append({**own, "motion": motion, **row})
             if motion == FIRST:
                 cases.append(Timed(own, scene, models, section))
@@ -271,11 +300,14 @@ def sized(config: SceneConfig, factor: float, stiffness: float) -> SceneConfig:
     return finer.model_copy(update={"vertex_mass": mass, "effects": effects})
 
 
-def _rows(scene: Scene, models: tuple[Trained, ...], settings: Options) -> Iterator[dict[str, Any]]:
+def _rows(
+    scene: Scene, recorded: np.ndarray, models: tuple[Trained, ...], settings: Options
+) -> Iterator[dict[str, Any]]:
     """Errors of every candidate in the motion of ``scene``, those of the reference first.
 
-    There is none against the implicit step where a frame of it did not converge, or where it would
-    cost too much, and none of a run that blew up.
+    The second row is playback of the ``recorded`` training motion. There is no error against the
+    implicit step where a frame of it did not converge, or where it would cost too much, and none of
+    a run that blew up.
     """
     section, name, vertices = settings.alternatives, scene.config.name, scene.mesh.vertices
     frames, wanted, implicit = scene.config.frames, section.continuous, None
@@ -298,7 +330,17 @@ def _rows(scene: Scene, models: tuple[Trained, ...], settings: Options) -> Itera
 
     common = {"vertices": vertices, "frames": frames, "reference_error": exact.error}
     yield {**common, "method": CONVERGED, "substeps": 1, "finite": True, **errors(implicit)}
+    yield {**common, "method": PLAYBACK, "substeps": 1, "finite": True, **errors(recorded)}
+    spans: dict[int, float | None] = {}
     for candidate in candidates(scene, models, section):
         with np.errstate(over="ignore", invalid="ignore"):
             reached = candidate.run(frames, settings.blowup_extent, scene.mesh.extent)
-        yield {**common, **candidate.labels, "finite": reached is not None, **errors(reached)}
+        row = {**common, **candidate.labels, "finite": reached is not None, **errors(reached)}
+        if implicit is not None and candidate.columns is not None:
+            own = candidate.columns
+            if id(own) not in spans:
+                project = projector(own, scene.masses)
+                nearest = np.stack([own.B @ (project @ q) for q in implicit])
+                spans[id(own)] = run_error(nearest, implicit)
+            row["span_error"] = spans[id(own)]
+        yield row

@@ -13,6 +13,7 @@ from study.experiments.kit.settings import Count, Modes, Sizes, Tolerance
 
 REDUCED, ACCELERATED = REDUCTIONS = "ecsw", "ecsw-anderson"  # the others are full-order ones
 OWN: Final = "own iterations"  # frames that a reduction may be trained on, as may converged ones
+SEVERAL: Final = "several motions"  # converged frames of the training motion and of further ones
 TWO_LEVEL: Final = "two-level"  # full order, with a trained subspace for its coarse level
 TRAINED: Final = (TWO_LEVEL, *REDUCTIONS)
 CONVERGED: Final = "converged"  # the implicit step itself, however long it takes
@@ -21,7 +22,7 @@ CONVERGED: Final = "converged"  # the implicit step itself, however long it take
 SETTING: Final = ["method", "substeps", "iterations", "trained_on", "k"]
 
 Named = TypeVar("Named", dict[str, Any], tuple[str, ...])
-Trained = Literal["own iterations", "converged"]
+Trained = Literal["own iterations", "converged", "several motions"]
 Factors = Annotated[tuple[Annotated[float, Field(gt=0.0, le=1e8)], ...], Field(min_length=1)]
 Work = Annotated[int, Field(ge=1, le=10**12, description="vertices times steps")]
 Steps = Annotated[tuple[Count, Count], Field(description="substeps of a frame, iterations of each")]
@@ -86,17 +87,17 @@ class Comparison(Processes):
     """One scene on one mesh.
 
     ``steps`` has pairs (substeps of a frame, iterations of each) for each method. Errors are taken
-    over ``compared`` frames of each of the held-out ``motions``, for each factor on all weights
+    over all frames of each of the held-out ``motions``, for each factor on all weights
     that ``stiffness`` has for the scene (1 if none, and on other meshes than its own). Each of
-    ``processes`` new ones times ``frames`` of the first motion: a frame takes the same work in all
-    motions. The reduction has each of ``modes`` and samples to ``tau``, trained on
-    the training motion, its frames as they are or converged (``trained_on``); the coarse level of
-    two samples to ``coarse_tau`` and is trained on converged frames. ``work`` bounds the
+    ``processes`` new ones times ``frames`` spread over the first motion: a frame takes the same
+    work in all motions. The reduction has each of ``modes`` and samples to ``tau``, trained on the
+    training motion, its frames as they are or converged, or on converged frames of
+    ``training_motions`` in all (``trained_on``); the coarse level of two samples to ``coarse_tau``
+    and is trained on converged frames. ``work`` bounds the
     vertices times substeps times iterations of a frame of a method: steps beyond are left out
     (converged: the implicit reference, one step of one iteration).
     """
 
-    compared: Count = 20
     stiffness: dict[str, Factors] = Field(default_factory=dict)
     steps: Annotated[
         dict[str, tuple[Steps, ...]], AfterValidator(_known), AfterValidator(_without_converged)
@@ -104,12 +105,13 @@ class Comparison(Processes):
     work: Annotated[dict[str, Work], AfterValidator(_known)] = Field(default_factory=dict)
     modes: Annotated[tuple[Modes, ...], Field(min_length=1)] = (40,)
     tau: Tolerance = 1e-2
-    coarse_tau: Tolerance = 1e-3
-    trained_on: Annotated[tuple[Trained, ...], Field(min_length=1)] = (OWN, CONVERGED)
+    coarse_tau: Tolerance = 5e-3
+    trained_on: Annotated[tuple[Trained, ...], Field(min_length=1)] = (OWN, CONVERGED, SEVERAL)
+    training_motions: Annotated[int, Field(ge=2, le=64)] = 4
     implicit: ImplicitReference = ImplicitReference()
     continuous: ContinuousReference = ContinuousReference()
     motions: Annotated[tuple[HeldOutMotion, ...], AfterValidator(_with_the_first)] = MOTIONS
-    frames: Count = 2
+    frames: Count = 20
 
     def factors(self, scene: str, size: float) -> tuple[float, ...]:
         """Factors on all weights of a scene with ``size`` times the vertices along a side."""

@@ -63,7 +63,9 @@ class Variant:
 
     ``share`` is the part of a frame's iterations that the loop does; the times of the phases that
     repeat with the iterations are divided by it. ``output`` makes the positions of all vertices
-    from the coordinates of a loop in a subspace, after every ``steps`` of its steps.
+    from the coordinates of a loop in a subspace, after every ``steps`` of its steps. ``starts`` are
+    pairs (state, number of the next step) from which as many steps are timed, one after the other,
+    in place of the first ``frames``.
     """
 
     labels: dict[str, Any]
@@ -73,6 +75,7 @@ class Variant:
     share: float = 1.0
     output: Callable[[np.ndarray], np.ndarray] | None = None
     steps: int = 1
+    starts: tuple[tuple[State, int], ...] = ()
 
 
 def measure(variants: Sequence[Variant], warmup: int, repeats: int) -> list[dict[str, Any]]:
@@ -125,8 +128,12 @@ def clocked(made: Iterable[T]) -> Iterator[tuple[float, T]]:
 def _time_once(variant: Variant) -> np.ndarray:
     """Milliseconds of each frame that ran, by phase (`PHASES`)."""
     loop, state, rows = variant.loop, variant.start, []
+    frame = -1
     with np.errstate(over="ignore", invalid="ignore"):
-        for frame in range(variant.frames):
+        for number in range(variant.frames):
+            frame += 1
+            if variant.starts and number % variant.steps == 0:
+                state, frame = variant.starts[number // variant.steps]
             for step in loop.local_steps:
                 for name in _INNER:
                     if hasattr(step, name):
@@ -134,7 +141,7 @@ def _time_once(variant: Variant) -> np.ndarray:
             state, report = loop.step(state, frame)
             inner = [sum(getattr(s, name, 0.0) for s in loop.local_steps) for name in _INNER]
             vertices, before = 0.0, perf_counter()
-            if variant.output is not None and (frame + 1) % variant.steps == 0:
+            if variant.output is not None and (number + 1) % variant.steps == 0:
                 variant.output(state.positions)
                 vertices = perf_counter() - before
             rows.append([*report.seconds, *inner, vertices])

@@ -20,7 +20,6 @@ COLUMNS = (
     integer(COUNT, "held-out motions that were run, can be judged and are far enough"),
     number("playback_error", "median error of playback on these motions, see reduced_reruns"),
 )
-PLAYBACK = "playback"  # method of the rows that show the recorded training motion
 # A held-out motion is a test only where playback has a larger error than this.
 FAR = 0.3
 _WHOLE = {"k": "Int64", "r": "Int64"}

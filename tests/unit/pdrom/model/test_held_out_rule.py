@@ -96,3 +96,15 @@ def test_pins_that_share_vertices_are_carried_together_but_not_apart():
     apart = scene.model_copy(update={"effects": (*scene.effects, late)})
     with pytest.raises(SceneError, match=r"held by 'translate' and by 'translate'"):
         Scene.build(apart.heldout_variant("heldout"), mesh)
+
+
+@pytest.mark.parametrize("name", ["spring_oop", "bar_twist", "bend_fall"])
+def test_further_training_motions_are_none_of_the_held_out_ones(name):
+    scene = read_scene(ROOT, name)
+    made = [scene.training_variant(seed) for seed in range(1, 5)]
+    variants = [scene, *map(scene.heldout_variant, MOTIONS), *made]
+    assert all(a.effects != b.effects for i, a in enumerate(variants) for b in variants[:i])
+    assert made[0] == scene.training_variant(1)
+    mesh = scene.mesh.build(ROOT)
+    for variant in made:
+        Scene.build(variant, mesh)

@@ -36,7 +36,6 @@ def written(tmp_path_factory):
     settings = experiment.Options(
         scene=scene.config,
         alternatives=Comparison(
-            compared=6,
             stiffness={"test": (1.0, 4.0)},
             steps=STEPS,
             modes=(4,),
@@ -64,14 +63,19 @@ def test_rows_of_a_scene(written, table):
     assert made.columns.tolist() == experiment.COLUMNS
     assert read_table(written[1].path).columns.tolist() == experiment.TIME_COLUMNS
     assert len(table) == len(made)
-    # a reduction is trained twice
+    # a reduction is trained three times; the reference and playback have one row
     all_of = sum(map(len, STEPS.values()))
     assert table.motion.value_counts().to_dict() == dict.fromkeys(
-        ("heldout", "stiffness"), 2 * (1 + all_of + 3)
+        ("heldout", "stiffness"), 2 * (2 + all_of + 6)
     )
     reduced = table[table.trained_on.notna()]
-    assert reduced.groupby("trained_on").size().to_dict() == {"converged": 16, "own iterations": 12}
-    timed = table[table.method != "converged"].set_index("method")
+    assert reduced.groupby("trained_on").size().to_dict() == {
+        "converged": 16, "own iterations": 12, "several motions": 12,
+    }  # fmt: skip
+    inside = reduced[reduced.method.str.startswith("ecsw")]
+    assert (inside.span_error > 0.0).all()
+    assert (inside.groupby(["trained_on", "motion"]).span_error.nunique() == 2).all()
+    timed = table[~table.method.isin(["converged", "playback"])].set_index("method")
     assert (timed.ms_per_frame > 0.0).all()
     assert (timed.processes == 2).all()
     stiffer = table[table.motion == "stiffness"].set_index(["method", "iterations"])
@@ -84,7 +88,8 @@ def test_rows_of_a_scene(written, table):
 
 
 def test_errors_of_a_scene(table):
-    table = table[(table.trained_on != "converged") & (table.motion == "heldout")]
+    table = table[~table.trained_on.isin(["converged", "several motions"])]
+    table = table[table.motion == "heldout"]
     case = table[table.stiffness == 1.0].set_index(["method", "substeps", "iterations"])
     # many iterations end at the implicit step, many explicit steps in continuous time
     assert case.error_implicit["anderson", 1, 200] < 1e-4
@@ -96,6 +101,7 @@ def test_errors_of_a_scene(table):
     own_error = pytest.approx(own.error_continuous, rel=1e-2)
     assert case.error_continuous["anderson", 1, 200] == own_error
     assert case.elements_sampled["ecsw", 1, 10] > 0
+    assert case.error_implicit["playback", 1].iloc[0] > 0.3
 
 
 def test_a_finer_mesh_has_the_mass_of_the_scene():

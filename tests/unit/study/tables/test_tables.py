@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from pdrom.core.errors import StorageError
 from pdrom.core.store import write_hdf5, write_table
-from pdrom.model.held_out import MOTIONS
+from pdrom.model.held_out import MOTIONS, PLAYBACK
 from pdrom.reduction.basis import Basis, save_basis
 from study.artifact import paths
 from study.artifact.paths import REQUESTED_TOLERANCES, File, Place
@@ -19,7 +19,7 @@ from study.experiments.kit.settings import Horizon, floor_of
 from study.experiments.requested_tolerances import COLUMNS
 from study.tables.accuracy_cost import accuracy_cost, pareto, reference_of, requested_tolerances
 from study.tables.effects_cost import local_share
-from study.tables.kit.reruns import PLAYBACK, TRAIN, trained
+from study.tables.kit.reruns import TRAIN, trained
 from study.tables.reconstruction_error import singular_values
 from study.tables.reduced_reruns import reduced_reruns
 from study.tables.sensitivity import sensitivity
