@@ -4,6 +4,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from pdrom.model.constraints.base import GroupConfig
+from pdrom.model.held_out import HeldOut
 from pdrom.view.text import require_typeset
 from study.artifact.markup import to_tex
 from study.artifact.reads import Labels
@@ -13,6 +14,7 @@ from study.paper.source import source_files
 from study.pipeline.folders import DEFAULT
 from study.pipeline.study import Study
 from study.tables.claims.rules import load_claims
+from study.tables.kit.reruns import FAR
 
 Row = dict[str, Any]
 
@@ -80,6 +82,9 @@ def _study(study: Study) -> Row:
         "tolerance": settings.iterations.tolerance,
         "continuous_tolerance": settings.alternatives.continuous.tolerance,
         "opponent_frames": settings.alternatives.frames,
+        "far": FAR,
+        "carry": HeldOut().carry,
+        "kick": HeldOut().kick,
     }
 
 

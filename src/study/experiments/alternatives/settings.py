@@ -9,7 +9,7 @@ from pdrom.core.yamlfile import ConfigModel
 from pdrom.model.held_out import FIRST, MOTIONS, HeldOutMotion
 from study.experiments.alternatives.solvers.substeps import METHODS
 from study.experiments.kit.measurement import Processes
-from study.experiments.kit.settings import Count, Modes, Sizes, Tolerance
+from study.experiments.kit.settings import Count, Modes, Repeats, Sizes, Tolerance
 
 REDUCED, ACCELERATED = REDUCTIONS = "ecsw", "ecsw-anderson"  # the others are full-order ones
 OWN: Final = "own iterations"  # frames that a reduction may be trained on, as may converged ones
@@ -112,6 +112,7 @@ class Comparison(Processes):
     continuous: ContinuousReference = ContinuousReference()
     motions: Annotated[tuple[HeldOutMotion, ...], AfterValidator(_with_the_first)] = MOTIONS
     frames: Count = 20
+    repeats: Repeats = 1
 
     def factors(self, scene: str, size: float) -> tuple[float, ...]:
         """Factors on all weights of a scene with ``size`` times the vertices along a side."""
