@@ -1,8 +1,8 @@
 """Error and time of every method on one scene, against two references.
 
-One is the implicit step of the scene, solved to convergence: what more iterations approach. The
-other is the motion in continuous time, which the implicit step itself misses: what a user wants.
-All run the held-out motions; only the reduction has a training motion.
+One reference is the implicit step of the scene, solved to convergence, which more iterations
+approach. The other is the motion in continuous time, which the implicit step itself misses and
+which a user wants. All methods run the held-out motions; only the reduction has a training motion.
 """
 
 import logging
@@ -25,16 +25,8 @@ from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.subspace.model import SubspaceModel, make_columns, sample_elements
 from study.artifact.paths import ALTERNATIVE_TIMES, ALTERNATIVES, File
 from study.artifact.reads import Settings, SourcesOf
-from study.experiments.alternatives.settings import (
-    ACCELERATED,
-    CONVERGED,
-    OWN,
-    REDUCTIONS,
-    SETTING,
-    TRAINED,
-    TWO_LEVEL,
-    Comparison,
-)
+from study.experiments.alternatives import settings as names
+from study.experiments.alternatives.settings import CONVERGED, TWO_LEVEL, Comparison
 from study.experiments.alternatives.solvers.explicit import continuous
 from study.experiments.alternatives.solvers.projective import WINDOW
 from study.experiments.alternatives.solvers.substeps import alternative
@@ -45,7 +37,7 @@ from study.experiments.kit.measurement import Case, Variant, in_processes
 from study.experiments.kit.reruns import run_error
 from study.experiments.kit.settings import BlowupExtent
 
-TIME_COLUMNS = ["scene", "factor", "stiffness", *SETTING, "process", "ms_per_frame"]
+TIME_COLUMNS = ["scene", "factor", "stiffness", *names.SETTING, "process", "ms_per_frame"]
 log = logging.getLogger(__name__)
 COLUMNS = [
     "scene", "factor", "vertices", "stiffness", "method", "substeps", "iterations", "trained_on",
@@ -58,7 +50,7 @@ COLUMNS = [
 class Trained:
     """A reduced ``model`` for frames of so many ``substeps``, and the frames it is trained on.
 
-    It is a ``coarse`` level, or a reduction.
+    coarse : whether it is the coarse level of the two-level method and not a reduction
     """
 
     trained_on: str
@@ -71,8 +63,8 @@ class Trained:
 class Candidate:
     """A method with its settings.
 
-    steps : how many times the loop steps in a frame
-    positions : vertex positions of the coordinates of the loop
+    steps : number of steps of the loop in a frame
+    positions : maps coordinates of the loop to vertex positions
     """
 
     labels: dict[str, object]
@@ -82,9 +74,9 @@ class Candidate:
     positions: Callable[[np.ndarray], np.ndarray] = field(default=lambda y: y)
 
     def run(self, frames: int, limit: float, extent: float) -> np.ndarray | None:
-        """Positions (F + 1, N, 3) at the ends of frames, the initial ones first.
+        """Return positions (F + 1, N, 3) at the ends of frames, the initial ones first.
 
-        None if it is not finite, or larger than ``limit`` times the ``extent`` (m).
+        None if the run is not finite, or grows beyond ``limit`` times the ``extent`` (m).
         """
         run = BoundedRun(
             self.loop.run, self.start, frames * self.steps, limit, extent, self.positions
@@ -97,63 +89,54 @@ class Candidate:
 def candidates(
     scene: Scene, models: Sequence[Trained], settings: Comparison
 ) -> Iterator[Candidate]:
-    """The methods that have steps in ``settings``, with each of these, on the motion of ``scene``.
+    """Every method with each of its pairs in ``settings``, on the motion of ``scene``.
 
-    ``models`` are what `trained` made of another motion.
+    ``models`` are the result of `trained` for another motion.
     """
     systems: dict[int, GlobalSystem] = {}
-    start = scene.initial_state()
-    reduced: list[tuple[str, int, int]] = []
+    start, reduced = scene.initial_state(), []
     for method in settings.steps:
-        pairs = settings.pairs(method, scene.mesh.vertices)
-        if method in TRAINED:
-            reduced += [(method, *pair) for pair in pairs]
-            continue
-        for substeps, iterations in pairs:
+        for substeps, iterations in settings.pairs(method, scene.mesh.vertices):
+            labels: dict[str, object] = {"method": method}
+            labels |= {"substeps": substeps, "iterations": iterations}
+            if method in names.TRAINED:
+                reduced.append((method, substeps, iterations, labels))
+                continue
             if substeps not in systems:
                 step = scene.config.time_step / substeps
                 systems[substeps] = GlobalSystem(scene.masses, step, scene.groups)
-            system = systems[substeps]
-            labels: dict[str, object] = {"method": method}
-            labels |= {"substeps": substeps, "iterations": iterations}
-            loop = alternative(method, scene, substeps, iterations=iterations, system=system)
+            loop = alternative(method, scene, substeps, iterations, systems[substeps])
             yield Candidate(labels, loop, start)
     for own in models:
-        for method, substeps, iterations in reduced:
+        sizes = {"trained_on": own.trained_on, "k": own.model.columns.modes}
+        sizes["elements_sampled"] = own.model.elements_evaluated(scene)
+        for method, substeps, iterations, labels in reduced:
             if substeps != own.substeps or own.coarse != (method == TWO_LEVEL):
                 continue
-            labels = {
-                "method": method,
-                "substeps": substeps,
-                "iterations": iterations,
-                "trained_on": own.trained_on,
-                "k": own.model.columns.modes,
-                "elements_sampled": own.model.elements_evaluated(scene),
-            }
             if own.coarse:
                 level = TwoLevel(scene, substeps, iterations, own.model)
-                yield Candidate(labels, level, start)
+                yield Candidate(labels | sizes, level, start)
                 continue
-            window = WINDOW if method == ACCELERATED else 0
+            window = WINDOW if method == names.ACCELERATED else 0
             other = substepped(scene, substeps, iterations, window)
-            yield Candidate(labels, *own.model.loop(other), substeps, own.model.positions)
+            yield Candidate(labels | sizes, *own.model.loop(other), substeps, own.model.positions)
 
 
 def trained(training: Scene, settings: Comparison) -> Iterator[Trained]:
     """Position subspaces with sampled elements; columns and samples come from ``training``.
 
-    The columns hold its frames as they are, or converged. The samples are trained on iterates of
-    the training motion in these columns, for every number of substeps that a reduction takes. Of
-    converged frames there is a coarse level, too, with more samples.
+    The columns are modes of its frames, with the scene's own iterations or converged. The samples
+    are trained on iterates of the training motion in these columns, for every number of substeps
+    that a reduction takes. Converged frames also give a coarse level, with more samples.
     """
     vertices, own = training.mesh.vertices, settings.implicit
     taken, coarse = (
         sorted({n for m in methods for n, _ in settings.pairs(m, vertices)})
-        for methods in (REDUCTIONS, (TWO_LEVEL,))
+        for methods in (names.REDUCTIONS, (TWO_LEVEL,))
     )
     for trained_on in settings.trained_on if taken or coarse else ():
         run: np.ndarray | None = None
-        if trained_on == OWN:
+        if trained_on == names.OWN:
             run = trajectory(training, track_objective=False)
         elif settings.affords(CONVERGED, vertices):
             run = converged_run(training, own.tolerance, own.limit)
@@ -173,9 +156,9 @@ def trained(training: Scene, settings: Comparison) -> Iterator[Trained]:
 
 
 def substepped(scene: Scene, substeps: int, iterations: int, window: int = 0) -> Scene:
-    """The scene with ``substeps`` frames for one, of ``iterations``; schedules keep their seconds.
+    """The scene with ``substeps`` shorter frames for each frame, of ``iterations`` each.
 
-    ``window`` iterates accelerate the others.
+    Effects keep their times in seconds. ``window`` is that of Anderson acceleration, 0 for none.
     """
     config = scene.config
     changes = {
@@ -192,7 +175,7 @@ def substepped(scene: Scene, substeps: int, iterations: int, window: int = 0) ->
 
 @dataclass(frozen=True)
 class Timed(Case):
-    """A scene in the motion that is timed, its labels, and the reductions of it."""
+    """A scene in the motion that is timed, with the labels of its rows and its reductions."""
 
     labels: dict[str, object]
     scene: Scene
@@ -200,7 +183,7 @@ class Timed(Case):
     settings: Comparison
 
     def variants(self) -> Iterator[Variant]:
-        """Loops of all candidates; ``steps`` of one are a frame."""
+        """Loops of all candidates; the label ``steps`` is the number of steps in a frame."""
         for each in candidates(self.scene, self.models, self.settings):
             labels = {**self.labels, **each.labels, "steps": each.steps}
             yield Variant(labels, each.loop, each.start, each.steps * self.settings.frames)
@@ -263,10 +246,10 @@ def sized(config: SceneConfig, factor: float, stiffness: float) -> SceneConfig:
 
 
 def _rows(scene: Scene, models: tuple[Trained, ...], settings: Options) -> Iterator[dict[str, Any]]:
-    """Errors of every candidate in the motion of ``scene``, those of the reference first.
+    """Errors of the implicit reference, then of every candidate, in the motion of ``scene``.
 
-    There is none against the implicit step where a frame of it did not converge, or where it would
-    cost too much, and none of a run that blew up.
+    An error is missing where the implicit reference did not converge or would cost too much, and
+    for a run that blew up.
     """
     section, name, vertices = settings.alternatives, scene.config.name, scene.mesh.vertices
     frames, wanted, implicit = scene.config.frames, section.continuous, None
