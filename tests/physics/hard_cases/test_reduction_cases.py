@@ -59,7 +59,7 @@ def test_two_runs_give_the_same_bits(name, reduction):
 
 def taken(name: str) -> bool:
     """Whether a position subspace takes all effects of a case."""
-    listed = [EFFECTS.load(effect["effect"]) for effect in CATALOGUE[name].scene.effects]
+    listed = [EFFECTS.load(effect["effect"]) for effect in CATALOGUE[name].effects]
     return all(effect.in_subspace for effect in listed)
 
 

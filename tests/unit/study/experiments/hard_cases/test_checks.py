@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from study.experiments.hard_cases.catalogue import CASES
-from study.experiments.hard_cases.record import CHECKS, Roundoff, faults, full_order, record
+from study.experiments.hard_cases.record import CHECKS, faults, full_order, record
 
 CASE = CASES["inverted_uneven"]
 
@@ -78,5 +78,5 @@ class TooStrong:
 def test_the_allowance_tells_a_wrong_projection_from_rounding(scene, error, rises):
     """At rest the objective is zero: a right-hand side that is wrong by 1e-8 moves it away."""
     loop = scene.stepper(local_steps=[TooStrong(scene.groups[0], 1.0 + error)])
-    found = record(scene, loop, scene.initial_state(), Roundoff(scene, loop))
+    found = record(scene, loop, scene.initial_state())
     assert (found.excess.max() > 0.0) == rises
