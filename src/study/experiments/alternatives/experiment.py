@@ -29,7 +29,7 @@ from study.experiments.alternatives import settings as names
 from study.experiments.alternatives.settings import CONVERGED, TWO_LEVEL, Comparison
 from study.experiments.alternatives.solvers.explicit import continuous
 from study.experiments.alternatives.solvers.projective import WINDOW
-from study.experiments.alternatives.solvers.substeps import alternative
+from study.experiments.alternatives.solvers.substeps import METHODS
 from study.experiments.alternatives.solvers.two_level import TwoLevel
 from study.experiments.kit.converged import converged_run
 from study.experiments.kit.declaration import experiment
@@ -105,7 +105,7 @@ def candidates(
             if substeps not in systems:
                 step = scene.config.time_step / substeps
                 systems[substeps] = GlobalSystem(scene.masses, step, scene.groups)
-            loop = alternative(method, scene, substeps, iterations, systems[substeps])
+            loop = METHODS.load(method)(scene, substeps, iterations, systems[substeps])
             yield Candidate(labels, loop, start)
     for own in models:
         sizes = {"trained_on": own.trained_on, "k": own.model.columns.modes}

@@ -1,13 +1,11 @@
 """The hard cases, by name."""
 
-from collections.abc import Iterable
 from functools import partial
 from typing import Any
 
 import numpy as np
 
 from pdrom.core.project import config_file
-from pdrom.model.effects import EFFECTS
 from pdrom.model.mesh.files import read_mesh_file
 from pdrom.model.mesh.generators import bar, boundary, cloth
 from pdrom.model.mesh.types import Mesh
@@ -432,9 +430,3 @@ CASES: dict[str, HardCase] = {case.name: case for part in PARTS for case in part
 def reducible_cases(slow: bool = False) -> list[str]:
     """Names of the cases that are not refused, either all slow ones or all others."""
     return [name for name, c in CASES.items() if c.slow == slow and c.holds != ("refused",)]
-
-
-def modules_of(names: Iterable[str]) -> list[str]:
-    """Classes of the effects of cases ``names``, as "module:attribute", for the fingerprint."""
-    effects = {effect["effect"] for name in names for effect in CASES[name].effects}
-    return sorted(EFFECTS[effect] for effect in effects)

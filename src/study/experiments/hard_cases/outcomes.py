@@ -16,6 +16,7 @@ from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel, shown
 from pdrom.model.constraints.base import ConstraintGroup
 from pdrom.model.dynamics.stepper import State, Stepper
+from pdrom.model.effects import EFFECTS
 from pdrom.reduction.basis import Basis, compute_basis
 from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.sampling import Reduction, select
@@ -28,7 +29,7 @@ from pdrom.reduction.subspace.space import coordinates
 from study.artifact.paths import HARD_CASES, File
 from study.artifact.reads import ProjectFiles, Setting
 from study.experiments.hard_cases.case import HardCase
-from study.experiments.hard_cases.catalogue import CASES, MESHES, modules_of, reducible_cases
+from study.experiments.hard_cases.catalogue import CASES, MESHES, reducible_cases
 from study.experiments.hard_cases.record import Record, Watched, full_order, momentum, reach, record
 from study.experiments.kit.declaration import experiment
 
@@ -246,8 +247,10 @@ class HardCases(ConfigModel):
 
     @property
     def modules(self) -> list[str]:
-        """Classes of the effects of the cases, as "module:attribute"."""
-        return modules_of(self.cases or reducible_cases())
+        """Classes of the effects of the cases, as "module:attribute", for the fingerprint."""
+        chosen = self.cases or reducible_cases()
+        effects = {effect["effect"] for name in chosen for effect in CASES[name].effects}
+        return sorted(EFFECTS[effect] for effect in effects)
 
 
 @experiment(

@@ -60,7 +60,7 @@ class Alternative(Stepper):
 
     A handle moves at constant speed during a frame, whatever the number of substeps; contacts act
     at the end of the frame, as in the step loop. Groups freeze their data once a frame, at its
-    beginning. Loops with equal substeps may share a factored ``system``.
+    beginning. Loops with equal substeps may share a factored ``system``. `METHODS` has all classes.
 
     Raises
     ------
@@ -185,17 +185,3 @@ def add_projections(tables, y, rhs):
     add_part(preparing, y_place, rhs_place)
     energy = add_part(first, y_place, rhs_place)
     return energy + add_part(second, y_place, rhs_place)
-
-
-def alternative(
-    name: str, scene: Scene, substeps: int, iterations: int = 1, system: GlobalSystem | None = None
-) -> Alternative:
-    """Return the step loop of a scene by the method ``name``; parameters as of `Alternative`.
-
-    Raises
-    ------
-    ConfigurationError, SceneError
-        Unknown name, a group or a force that the method does not take.
-    """
-    made: Alternative = METHODS.load(name)(scene, substeps, iterations, system)
-    return made

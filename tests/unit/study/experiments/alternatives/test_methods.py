@@ -12,7 +12,7 @@ from pdrom.core.errors import ConfigurationError, SceneError
 from pdrom.model.dynamics.stepper import State
 from pdrom.reduction.subspace.model import Samples, SubspaceModel, make_columns
 from study.experiments.alternatives.solvers.explicit import continuous
-from study.experiments.alternatives.solvers.substeps import METHODS, alternative
+from study.experiments.alternatives.solvers.substeps import METHODS
 from study.experiments.alternatives.solvers.two_level import TwoLevel
 from study.experiments.kit.converged import ConvergedStepper, converged_run
 from study.experiments.kit.scenes import followed
@@ -22,6 +22,10 @@ HELD = (GRAVITY, LEFT)
 CLOSED_FORM = ("spring", "strain", "tetrahedron_strain", "deformation_gradient")
 # Methods that minimise the objective of a frame, and iterations that suffice on these meshes.
 IMPLICIT = {"projective": 3000, "anderson": 300, "chebyshev": 1500}
+
+
+def alternative(method: str, *settings):
+    return METHODS.load(method)(*settings)
 
 
 def small(group: str, *effects: dict, weight: float = 1e5, **settings):
@@ -231,7 +235,6 @@ def objective_of(scene, state, y: np.ndarray) -> float:
     h = scene.config.time_step
     s = state.positions + h * state.velocities + h**2 * np.array([0.0, -9.81, 0.0])
     s[scene.mesh.points[:, 0] == scene.mesh.points[:, 0].min()] = 0.0
-    y = y.copy()
     moved = np.where(s == 0.0, 0.0, y - s)
     inertia = 0.5 * float(np.sum(scene.masses[:, None] * moved**2)) / h**2
     return inertia + scene.groups[0].accumulate(y, np.zeros_like(y))
