@@ -1,9 +1,6 @@
-"""Hard cases as test parameters; the slow ones carry the marker."""
+"""Methods, expected outcomes and full-order runs of the hard cases."""
 
-from collections.abc import Iterable
 from functools import cache
-
-import pytest
 
 from pdrom.core.yamlfile import read_yaml
 from pdrom.reduction.method import load_methods
@@ -13,12 +10,6 @@ from study.experiments.hard_cases.outcomes import HardCases, Training
 
 METHODS = load_methods(ROOT / "config" / "methods.yaml")
 EXPECTED = HardCases(**read_yaml(ROOT / "config" / "default.yaml")["hard_cases"]).expected
-
-
-def parameters(names: Iterable[str]) -> list:
-    """Cases as test parameters."""
-    marks = {name: [pytest.mark.slow] if CASES[name].slow else [] for name in names}
-    return [pytest.param(name, marks=marks[name], id=name) for name in names]
 
 
 @cache

@@ -1,4 +1,4 @@
-"""Every reduction in every hard case: it holds, or hard_cases.expected says why."""
+"""Every reduction in every hard case: no failure, or hard_cases.expected has its reason."""
 
 from itertools import cycle
 
@@ -25,8 +25,8 @@ REDUCTIONS = names(METHODS)
 def pairs() -> list:
     """Every case with every reduction.
 
-    The pipeline's experiment `hard_cases` runs the same product and `verify` compares it, so that
-    by default a test runs each case with one reduction, the next case with the next one.
+    The experiment `hard_cases` runs all pairs and `./reproduce verify` compares their table.
+    Therefore only one reduction for each case, another one for the next case, is not slow.
     """
     return [
         pytest.param(
@@ -59,11 +59,11 @@ def test_two_runs_give_the_same_bits(name, reduction):
 
 def taken(name: str) -> bool:
     """Whether a position subspace takes all effects of a case."""
-    listed = [EFFECTS.load(effect["effect"]) for effect in CATALOGUE[name].scene.effects]
+    listed = [EFFECTS.load(effect["effect"]) for effect in CATALOGUE[name].effects]
     return all(effect.in_subspace for effect in listed)
 
 
-# By default every third of the cases whose effects are all taken: `pairs` runs them, too.
+# Two thirds of the cases that a subspace takes are slow tests, since `pairs` runs them as well.
 TAKEN = [name for name in reducible_cases() if taken(name)]
 SELDOM = {name for i, name in enumerate(TAKEN) if i % 3}
 
@@ -73,7 +73,7 @@ SELDOM = {name for i, name in enumerate(TAKEN) if i % 3}
     [pytest.param(n, marks=[pytest.mark.slow] if n in SELDOM else []) for n in reducible_cases()],
 )
 def test_a_subspace_takes_what_the_effects_say(name):
-    """One that does not take an effect says so by name; vertex positions take every effect."""
+    """A subspace that refuses an effect names it; methods in vertex positions take all effects."""
     for reduction in ("pod-full", "pod"):
         found = row(training(name), reduction, METHODS, EXPECTED)
         assert (found["outcome"] == NOT_TAKEN) == (reduction == "pod-full" and not taken(name))

@@ -1,8 +1,8 @@
 """Error and time of every method on one scene, against two references.
 
-One is the implicit step of the scene, solved to convergence: what more iterations approach. The
-other is the motion in continuous time, which the implicit step itself misses: what a user wants.
-All run the held-out motions; only the reduction has a training motion.
+One reference is the implicit step of the scene, solved to convergence, which more iterations
+approach. The other is the motion in continuous time, which the implicit step itself misses and
+which a user wants. All methods run the held-out motions; only the reduction has a training motion.
 """
 
 import logging
@@ -27,20 +27,11 @@ from pdrom.reduction.subspace.model import SubspaceModel, make_columns, sample_e
 from pdrom.reduction.subspace.space import coordinates, projector
 from study.artifact.paths import ALTERNATIVE_TIMES, ALTERNATIVES, File
 from study.artifact.reads import Settings, SourcesOf
-from study.experiments.alternatives.settings import (
-    ACCELERATED,
-    CONVERGED,
-    OWN,
-    REDUCTIONS,
-    SETTING,
-    SEVERAL,
-    TRAINED,
-    TWO_LEVEL,
-    Comparison,
-)
+from study.experiments.alternatives import settings as names
+from study.experiments.alternatives.settings import CONVERGED, TWO_LEVEL, Comparison
 from study.experiments.alternatives.solvers.explicit import continuous
 from study.experiments.alternatives.solvers.projective import WINDOW
-from study.experiments.alternatives.solvers.substeps import alternative
+from study.experiments.alternatives.solvers.substeps import METHODS
 from study.experiments.alternatives.solvers.two_level import TwoLevel
 from study.experiments.kit.converged import converged_run
 from study.experiments.kit.declaration import experiment
@@ -49,7 +40,7 @@ from study.experiments.kit.reruns import run_error
 from study.experiments.kit.settings import BlowupExtent
 
 TIME_COLUMNS = [
-    "scene", "factor", "stiffness", *SETTING, "process", "ms_per_frame", "vertices_ms",
+    "scene", "factor", "stiffness", *names.SETTING, "process", "ms_per_frame", "vertices_ms",
 ]  # fmt: skip
 log = logging.getLogger(__name__)
 COLUMNS = [
@@ -63,7 +54,7 @@ COLUMNS = [
 class Trained:
     """A reduced ``model`` for frames of so many ``substeps``, and the frames it is trained on.
 
-    It is a ``coarse`` level, or a reduction.
+    coarse : whether it is the coarse level of the two-level method and not a reduction
     """
 
     trained_on: str
@@ -76,10 +67,8 @@ class Trained:
 class Candidate:
     """A method with its settings.
 
-    steps : how many times the loop steps in a frame
-    positions : vertex positions of the coordinates of the loop
-    output : the same in single precision, of a loop in a subspace
-    columns : of that subspace
+    steps : number of steps of the loop in a frame
+    positions : maps coordinates of the loop to vertex positions
     """
 
     labels: dict[str, object]
@@ -98,9 +87,9 @@ class Candidate:
         return State(coordinates(*own, state.positions), coordinates(*own, state.velocities))
 
     def run(self, frames: int, limit: float, extent: float) -> np.ndarray | None:
-        """Positions (F + 1, N, 3) at the ends of frames, the initial ones first.
+        """Return positions (F + 1, N, 3) at the ends of frames, the initial ones first.
 
-        None if it is not finite, or larger than ``limit`` times the ``extent`` (m).
+        None if the run is not finite, or grows beyond ``limit`` times the ``extent`` (m).
         """
         run = BoundedRun(
             self.loop.run, self.start, frames * self.steps, limit, extent, self.positions
@@ -113,48 +102,39 @@ class Candidate:
 def candidates(
     scene: Scene, models: Sequence[Trained], settings: Comparison
 ) -> Iterator[Candidate]:
-    """The methods that have steps in ``settings``, with each of these, on the motion of ``scene``.
+    """Every method with each of its pairs in ``settings``, on the motion of ``scene``.
 
-    ``models`` are what `trained` made of another motion.
+    ``models`` are the result of `trained` for another motion.
     """
     systems: dict[int, GlobalSystem] = {}
-    start = scene.initial_state()
-    reduced: list[tuple[str, int, int]] = []
+    start, reduced = scene.initial_state(), []
     for method in settings.steps:
-        pairs = settings.pairs(method, scene.mesh.vertices)
-        if method in TRAINED:
-            reduced += [(method, *pair) for pair in pairs]
-            continue
-        for substeps, iterations in pairs:
+        for substeps, iterations in settings.pairs(method, scene.mesh.vertices):
+            labels: dict[str, object] = {"method": method}
+            labels |= {"substeps": substeps, "iterations": iterations}
+            if method in names.TRAINED:
+                reduced.append((method, substeps, iterations, labels))
+                continue
             if substeps not in systems:
                 step = scene.config.time_step / substeps
                 systems[substeps] = GlobalSystem(scene.masses, step, scene.groups)
-            system = systems[substeps]
-            labels: dict[str, object] = {"method": method}
-            labels |= {"substeps": substeps, "iterations": iterations}
-            loop = alternative(method, scene, substeps, iterations=iterations, system=system)
+            loop = METHODS.load(method)(scene, substeps, iterations, systems[substeps])
             yield Candidate(labels, loop, start)
     for own in models:
-        for method, substeps, iterations in reduced:
+        sizes = {"trained_on": own.trained_on, "k": own.model.columns.modes}
+        sizes["elements_sampled"] = own.model.elements_evaluated(scene)
+        for method, substeps, iterations, labels in reduced:
             if substeps != own.substeps or own.coarse != (method == TWO_LEVEL):
                 continue
-            labels = {
-                "method": method,
-                "substeps": substeps,
-                "iterations": iterations,
-                "trained_on": own.trained_on,
-                "k": own.model.columns.modes,
-                "elements_sampled": own.model.elements_evaluated(scene),
-            }
             if own.coarse:
                 level = TwoLevel(scene, substeps, iterations, own.model)
-                yield Candidate(labels, level, start)
+                yield Candidate(labels | sizes, level, start)
                 continue
-            window = WINDOW if method == ACCELERATED else 0
+            window = WINDOW if method == names.ACCELERATED else 0
             other = substepped(scene, substeps, iterations, window)
             yield Candidate(
-                labels, *own.model.loop(other), substeps, own.model.positions, own.model.output(),
-                own.model.columns,
+                labels | sizes, *own.model.loop(other), substeps, own.model.positions,
+                own.model.output(), own.model.columns,
             )  # fmt: skip
 
 
@@ -169,16 +149,16 @@ def trained(training: Scene, settings: Comparison) -> Iterator[Trained]:
     vertices, own = training.mesh.vertices, settings.implicit
     taken, coarse = (
         sorted({n for m in methods for n, _ in settings.pairs(m, vertices)})
-        for methods in (REDUCTIONS, (TWO_LEVEL,))
+        for methods in (names.REDUCTIONS, (TWO_LEVEL,))
     )
     for trained_on in settings.trained_on if taken or coarse else ():
         further: list[Scene] = []
-        if trained_on == SEVERAL:
+        if trained_on == names.SEVERAL:
             seeds = range(1, settings.training_motions)
             variants = map(training.config.training_variant, seeds)
             further = [Scene.build(variant, training.mesh) for variant in variants]
         runs: list[np.ndarray | None] = [None]
-        if trained_on == OWN:
+        if trained_on == names.OWN:
             runs = [trajectory(training, track_objective=False)]
         elif settings.affords(CONVERGED, vertices):
             runs = [converged_run(s, own.tolerance, own.limit) for s in (training, *further)]
@@ -200,9 +180,9 @@ def trained(training: Scene, settings: Comparison) -> Iterator[Trained]:
 
 
 def substepped(scene: Scene, substeps: int, iterations: int, window: int = 0) -> Scene:
-    """The scene with ``substeps`` frames for one, of ``iterations``; schedules keep their seconds.
+    """The scene with ``substeps`` shorter frames for each frame, of ``iterations`` each.
 
-    ``window`` iterates accelerate the others.
+    Effects keep their times in seconds. ``window`` is that of Anderson acceleration, 0 for none.
     """
     config = scene.config
     changes = {
@@ -219,7 +199,7 @@ def substepped(scene: Scene, substeps: int, iterations: int, window: int = 0) ->
 
 @dataclass(frozen=True)
 class Timed(Case):
-    """A scene in the motion that is timed, its labels, and the reductions of it."""
+    """A scene in the motion that is timed, with the labels of its rows and its reductions."""
 
     labels: dict[str, object]
     scene: Scene

@@ -1,6 +1,6 @@
 """Section ``alternatives``: methods, their steps, and what they are compared with."""
 
-from typing import Annotated, Any, Final, Literal, TypeVar
+from typing import Annotated, Any, Final, Literal
 
 from pydantic import AfterValidator, Field
 
@@ -16,12 +16,11 @@ OWN: Final = "own iterations"  # frames that a reduction may be trained on, as m
 SEVERAL: Final = "several motions"  # converged frames of the training motion and of further ones
 TWO_LEVEL: Final = "two-level"  # full order, with a trained subspace for its coarse level
 TRAINED: Final = (TWO_LEVEL, *REDUCTIONS)
-CONVERGED: Final = "converged"  # the implicit step itself, however long it takes
+CONVERGED: Final = "converged"  # the implicit step solved to convergence
 
-# What tells candidates of a scene apart.
+# These columns together identify a candidate of a scene.
 SETTING: Final = ["method", "substeps", "iterations", "trained_on", "k"]
 
-Named = TypeVar("Named", dict[str, Any], tuple[str, ...])
 Trained = Literal["own iterations", "converged", "several motions"]
 Factors = Annotated[tuple[Annotated[float, Field(gt=0.0, le=1e8)], ...], Field(min_length=1)]
 Work = Annotated[int, Field(ge=1, le=10**12, description="vertices times steps")]
@@ -34,7 +33,7 @@ def _with_the_first(motions: tuple[HeldOutMotion, ...]) -> tuple[HeldOutMotion, 
     return motions
 
 
-def _known(by_method: Named) -> Named:
+def _known(by_method: dict[str, Any]) -> dict[str, Any]:
     allowed = (*METHODS, *TRAINED, CONVERGED)
     for name in by_method:
         if name not in allowed:
@@ -48,7 +47,7 @@ def _without_converged(steps: dict[str, Any]) -> dict[str, Any]:
     return steps
 
 
-# More iterations of one step, and more steps of one iteration; the others are slower.
+# More iterations of one step, and more steps of one iteration. Other settings are slower.
 STEPS: dict[str, tuple[Steps, ...]] = {
     "projective": (
         (1, 1), (1, 2), (1, 3), (1, 4), (1, 5), (1, 10), (1, 20), (1, 40), (1, 80),
@@ -84,18 +83,17 @@ class ImplicitReference(ConfigModel):
 
 
 class Comparison(Processes):
-    """One scene on one mesh.
+    """Comparison of methods on one scene and one mesh.
 
-    ``steps`` has pairs (substeps of a frame, iterations of each) for each method. Errors are taken
-    over all frames of each of the held-out ``motions``, for each factor on all weights
-    that ``stiffness`` has for the scene (1 if none, and on other meshes than its own). Each of
-    ``processes`` new ones times ``frames`` spread over the first motion: a frame takes the same
-    work in all motions. The reduction has each of ``modes`` and samples to ``tau``, trained on the
-    training motion, its frames as they are or converged, or on converged frames of
-    ``training_motions`` in all (``trained_on``); the coarse level of two samples to ``coarse_tau``
-    and is trained on converged frames. ``work`` bounds the
-    vertices times substeps times iterations of a frame of a method: steps beyond are left out
-    (converged: the implicit reference, one step of one iteration).
+    ``steps`` has pairs (substeps of a frame, iterations of each substep) for each method. Errors
+    are taken over ``compared`` frames of each of the held-out ``motions``. On its own mesh a scene
+    runs with each of its factors on all weights in ``stiffness`` (1 if it has none). Each of
+    ``processes`` new processes times ``frames`` of the first motion: a frame takes the same work
+    in all motions. The reduction has each of ``modes`` and samples elements to ``tau``; it is
+    trained on frames of the training motion with the scene's own iterations, or converged
+    (``trained_on``). The coarse level of two-level samples to ``coarse_tau`` and is trained on
+    converged frames. ``work`` bounds vertices x substeps x iterations of a frame of a method;
+    pairs with more are left out (converged: the implicit reference, one step of one iteration).
     """
 
     stiffness: dict[str, Factors] = Field(default_factory=dict)
@@ -119,19 +117,19 @@ class Comparison(Processes):
         return self.stiffness.get(scene, (1.0,)) if size == 1.0 else (1.0,)
 
     def pairs(self, method: str, vertices: int) -> list[tuple[int, int]]:
-        """Substeps and iterations with which a method runs on a mesh of so many ``vertices``."""
+        """Pairs (substeps, iterations) with which ``method`` runs on a mesh of ``vertices``."""
         steps = self.steps.get(method, ())
         return [(n, k) for n, k in steps if self.affords(method, vertices * n * k)]
 
     def affords(self, method: str, work: int) -> bool:
-        """Whether a frame of a method may have ``work``: vertices x substeps x iterations."""
+        """Whether a frame of ``method`` may have ``work``, vertices x substeps x iterations."""
         return work <= self.work.get(method, work)
 
 
 class Alternatives(Comparison):
     """Section ``alternatives``: factors on the vertices along a side for each of ``scenes``.
 
-    The mass of a mesh is that of the scene, whatever the factor. The winners are named for each of
+    The total mass does not depend on the factor. The table of winners has a row for each of
     ``errors``.
     """
 

@@ -1,4 +1,4 @@
-"""A hard case: a scene, what must hold in it, its bounds, and small meshes and starts for it."""
+"""A hard case: a scene, the properties its run must have, and states to start from."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -8,45 +8,40 @@ import numpy as np
 
 from pdrom.core.yamlfile import validate
 from pdrom.model.dynamics.stepper import State
-from pdrom.model.mesh.generators import bar, boundary, cloth
 from pdrom.model.mesh.types import Mesh
 from pdrom.model.scene import Scene, SceneConfig
 
 Start = Callable[[Scene], State]
+Shape = Callable[[], Mesh]
 SEED = 7
 
 
 @dataclass(frozen=True)
-class Recipe:
-    """A scene that is built when it is called: what `build` takes, the mesh by a function."""
-
-    mesh: Callable[[], Mesh]
-    effects: tuple[dict, ...]
-    settings: dict
-
-    def __call__(self) -> Scene:
-        return build(self.mesh(), *self.effects, **self.settings)
-
-
-@dataclass(frozen=True)
 class HardCase:
-    """A scene that is hard for a named reason, and what must hold in it.
+    """A scene that is hard for a named reason, and the properties that its run must have.
 
-    scene : builds the scene; a case that must be refused raises here
-    why : what makes it hard
-    holds : names of the checks that its full-order run must pass (module `checks`)
+    why : what makes the scene hard
+    holds : names of the checks that the full-order run must pass (`record.CHECKS`); a case with
+        "refused" alone raises an error when its scene is built or run
+    mesh, effects, settings : arguments of `build`; the mesh as a function
     start : the state before the first frame
-    bound : largest extent that is no blow-up, over that of start, rest and handles
-    slow : left to the slow tests
+    bound : largest extent that is no blow-up, over the largest extent of start, rest and handles
+    slow : whether only the slow tests run the case
     """
 
     name: str
-    scene: Recipe
     why: str
     holds: tuple[str, ...]
+    mesh: Shape
+    effects: tuple[dict[str, Any], ...]
+    settings: dict[str, Any]
     start: Start = Scene.initial_state
     bound: float = 2.0
     slow: bool = False
+
+    def scene(self) -> Scene:
+        """Build the scene; PdromError if it is refused."""
+        return build(self.mesh(), *self.effects, **self.settings)
 
 
 def build(
@@ -56,56 +51,15 @@ def build(
     masses: Callable[[Mesh], np.ndarray] | None = None,
     **settings: Any,
 ) -> Scene:
-    """Scene of ``effects`` on ``mesh``, with so many ``frames``.
+    """Return a scene of ``effects`` on ``mesh``.
 
-    ``masses`` of a mesh, (N,) kg, replace equal ones; ``settings`` are keys of `SceneConfig`.
+    ``masses`` maps a mesh to masses (N,) kg, equal by default; ``settings`` are keys of
+    `SceneConfig`.
     """
     named = {"name": "hard_case", "title": "hard case"}
     own = {"mesh": {"kind": "file", "path": "generated"}, "frames": frames, **settings}
     config = validate(SceneConfig, {**named, **own, "effects": list(effects)}, "hard case")
     return Scene.build(config, mesh, masses=None if masses is None else masses(mesh))
-
-
-def sheet(wave: float = 0.0) -> Mesh:
-    """A lying sheet of 36 vertices, with ``wave`` as in `cloth`."""
-    return cloth(6, 6, "xz", wave=wave)
-
-
-def small_bar() -> Mesh:
-    """A bar of 45 vertices, 80 tetrahedra."""
-    return bar(5, 3, 3)
-
-
-def one_triangle() -> Mesh:
-    """A single triangle."""
-    return Mesh(np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]), np.array([[0, 1, 2]], np.int32))
-
-
-def one_tetrahedron() -> Mesh:
-    """A single tetrahedron."""
-    points = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
-    tetrahedra = np.array([[0, 1, 2, 3]], np.int32)
-    return Mesh(points, boundary(tetrahedra), tetrahedra)
-
-
-def scaled(mesh: Mesh, *factors: float) -> Mesh:
-    """``mesh`` with its axes scaled by ``factors`` (one, or three)."""
-    return Mesh(mesh.points * np.array(factors), mesh.triangles, mesh.tetrahedra)
-
-
-def shifted(mesh: Mesh, *offset: float) -> Mesh:
-    """``mesh`` moved by ``offset``."""
-    return Mesh(mesh.points + np.array(offset), mesh.triangles, mesh.tetrahedra)
-
-
-def both(first: Mesh, second: Mesh) -> Mesh:
-    """The meshes ``first`` and ``second`` in one, not connected."""
-    n = first.vertices
-    return Mesh(
-        np.concatenate([first.points, second.points]),
-        np.concatenate([first.triangles, second.triangles + n]).astype(np.int32),
-        np.concatenate([first.tetrahedra, second.tetrahedra + n]).astype(np.int32),
-    )
 
 
 def still(positions: np.ndarray) -> State:

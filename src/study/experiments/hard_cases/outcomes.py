@@ -1,4 +1,4 @@
-"""Every reduction, made from a hard case's own run, its outcome, and the outcome expected."""
+"""Every reduction trained on the run of a hard case itself: its outcome and the expected one."""
 
 import logging
 from collections import Counter
@@ -16,6 +16,7 @@ from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel, shown
 from pdrom.model.constraints.base import ConstraintGroup
 from pdrom.model.dynamics.stepper import State, Stepper
+from pdrom.model.effects import EFFECTS
 from pdrom.reduction.basis import Basis, compute_basis
 from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.sampling import Reduction, select
@@ -28,16 +29,8 @@ from pdrom.reduction.subspace.space import coordinates
 from study.artifact.paths import HARD_CASES, File
 from study.artifact.reads import ProjectFiles, Setting
 from study.experiments.hard_cases.case import HardCase
-from study.experiments.hard_cases.catalogue import CASES, MESHES, modules_of, reducible_cases
-from study.experiments.hard_cases.record import (
-    Record,
-    Roundoff,
-    Watched,
-    full_order,
-    momentum,
-    reach,
-    record,
-)
+from study.experiments.hard_cases.catalogue import CASES, MESHES, reducible_cases
+from study.experiments.hard_cases.record import Record, Watched, full_order, momentum, reach, record
 from study.experiments.kit.declaration import experiment
 
 HOLDS, NOTHING, NOT_TAKEN = "holds", "nothing to reduce", "not taken"
@@ -45,9 +38,9 @@ FAILURES = ("refused", "singular", "blow-up", "distorted", "objective rises", "m
 R, K, TOLERANCE = 10, 6, 1e-2
 HRPD = HrpdSpec(dimension=20, samples=60)
 BASES = {"pod": ("full", "ecsw", "hrpd"), "skinning": ("full", "hrpd")}
-# Multiples of the full-order run's scale: a larger extent is a blow-up, or a distorted shape.
+# Extents above these multiples of `Training.extent` are a blow-up, or a distorted shape.
 BLOWUP, DISTORTED = 100.0, 3.0
-# Manifolds that are bounded: no projection onto them exceeds a number known before the run.
+# Bounded manifolds: the norm of any projection has a bound that is known before the run.
 BOUNDED = ("clamped", "length", "half sphere")
 log = logging.getLogger(__name__)
 COLUMNS = [
@@ -86,7 +79,7 @@ class Expectation(ConfigModel):
 
 
 def surprise(outcome: str, case: str, expected: Expectation | None) -> str:
-    """Contradiction of an ``outcome`` of ``case`` to what is ``expected``, "" if there is none."""
+    """Say how the ``outcome`` of ``case`` contradicts the ``expected`` one, "" if it does not."""
     must, may = (expected.fails, expected.may_fail) if expected else ((), ())
     if outcome in FAILURES:
         listed = case in (*must, *may)
@@ -105,7 +98,7 @@ class Training:
         self._roundoff: list[float] = []
         self.run = full_order(case, self.scene, self._observe)
         self._bases: dict[str, Basis] = {}
-        # largest extent of the run, of rest, start and held vertices, m
+        # largest extent in m of the run, the rest shape, the start and the fixed vertices
         self.extent = max(self.run.extent, reach(self.scene, self.run))
 
     def _observe(self, frame: int, y: np.ndarray) -> None:
@@ -128,11 +121,11 @@ class Training:
 
 @dataclass(frozen=True)
 class ReducedRun:
-    """Outcome of a reduced run; ``run`` is None where there is no basis.
+    """A reduced run; ``run`` is None if the basis is empty.
 
     r : basis size, in a subspace the number of evaluated elements
-    k : columns of the position subspace, None for vertices
-    gain : of the interpolation, None where there is none
+    k : number of columns of the position subspace, None in vertex positions
+    gain : gain of the interpolation, None without interpolation
     """
 
     run: Record | None
@@ -162,7 +155,7 @@ class ReducedRun:
 
 
 def names(methods: Mapping[str, MethodSpec]) -> list[str]:
-    """All reductions: the methods, then the position subspaces with what is sampled in them."""
+    """All reductions: the methods, then each position subspace with each way of sampling."""
     return [*methods, *(f"{basis}-{sampling}" for basis in BASES for sampling in BASES[basis])]
 
 
@@ -176,7 +169,7 @@ def reduced_run(
     Raises
     ------
     PdromError
-        Where the reduction itself refuses.
+        The reduction refuses the scene.
     """
     if name not in methods:
         kind, _, sampling = name.partition("-")
@@ -189,13 +182,12 @@ def reduced_run(
     reduction = Reduction(basis, select(basis, spec, r), spec, r=r)
     step = Watched(ReducedLocalStep(group, reduction), group)
     loop = scene.stepper(local_steps=replace_group(scene, group.name, step))
-    start = training.case.start(scene)
-    run = record(scene, loop, start, roundoff=Roundoff(scene, loop), limit=limit)
+    run = record(scene, loop, training.case.start(scene), limit=limit)
     return ReducedRun(run, r, gain=reduction.gain)
 
 
 def _subspace(training: Training, kind: str, sampling: str, limit: float) -> ReducedRun:
-    """Run in a position subspace; samples of "ecsw" come from a run from the case's start."""
+    """Run in a position subspace; ECSW is trained on a run that begins at the case's start."""
     scene = training.scene
     columns = make_columns(scene, training.run.positions[1::2], kind, k=K)
     start = training.case.start(scene)
@@ -212,8 +204,7 @@ def _subspace(training: Training, kind: str, sampling: str, limit: float) -> Red
     untracked, _ = model.loop(scene)
     h, iterations = untracked.time_step, untracked.iterations
     loop = Stepper(untracked.space, h, iterations, local_steps=untracked.local_steps)
-    roundoff = Roundoff(scene, loop, columns)
-    run = record(scene, loop, state, roundoff=roundoff, positions=model.positions, limit=limit)
+    run = record(scene, loop, state, model, limit)
     return ReducedRun(run, model.elements_evaluated(scene), k=columns.B.shape[1])
 
 
@@ -223,7 +214,7 @@ def row(
     methods: Mapping[str, MethodSpec],
     expected: Mapping[str, Expectation],
 ) -> dict[str, Any]:
-    """Row of the reduction ``name``: sizes, what the run did, its outcome, why it failed."""
+    """Row of the reduction ``name``: sizes, figures of the run, outcome, reason of a failure."""
     try:
         reduced = reduced_run(training, name, methods, limit=BLOWUP * training.extent)
     except NotReducibleError as error:
@@ -246,9 +237,9 @@ def row(
 
 
 class HardCases(ConfigModel):
-    """Section ``hard_cases``: the cases, all that are not slow if empty.
+    """Section ``hard_cases``: the cases; if empty, all that are not slow.
 
-    expected : by reduction, where it fails and why; one not named never fails
+    expected : for a reduction, its failures and their reason; others must never fail
     """
 
     cases: tuple[ReducibleCase, ...] = ()
@@ -256,8 +247,10 @@ class HardCases(ConfigModel):
 
     @property
     def modules(self) -> list[str]:
-        """Places of the effects of the cases."""
-        return modules_of(self.cases or reducible_cases())
+        """Classes of the effects of the cases, as "module:attribute", for the fingerprint."""
+        chosen = self.cases or reducible_cases()
+        effects = {effect["effect"] for name in chosen for effect in CASES[name].effects}
+        return sorted(EFFECTS[effect] for effect in effects)
 
 
 @experiment(
@@ -272,9 +265,9 @@ class HardCases(ConfigModel):
 def hard_cases(
     meshes: list[Path], every_method: dict[str, MethodSpec], asked: HardCases, cases: File
 ) -> None:
-    """Put every reduction through the cases; log what contradicts the expectations.
+    """Run the cases with every reduction; log outcomes that contradict the expected ones.
 
-    The cases find the ``meshes`` themselves.
+    ``meshes`` are declared as inputs only: the cases read these files themselves.
     """
     found = []
     for name in asked.cases or reducible_cases():

@@ -1,18 +1,18 @@
-"""One run of a hard case, watched from the outside, and what rounding explains of it.
+"""The record of one run of a hard case, a bound on its rounding errors, and the checks.
 
-In exact arithmetic 1/(2h^2) |M^1/2 (y - s)|^2 + sum_j W_j(y) falls in every iteration. What is
-computed differs in two ways (u = eps, c a small constant for the length of the sums):
+In exact arithmetic 1/(2h^2) |M^1/2 (y - s)|^2 + sum_j W_j(y) falls in every iteration. Computed
+values differ for two reasons (u = eps, c a small constant for the length of the sums):
 
 - evaluation: y - s and S y - p are wrong by c u (|y| + |s|) and c u (|S| |y| + |p|). With R the
   objective of these errors alone, a value E is wrong by at most 2 sqrt(E R) + R (Cauchy-Schwarz);
-- solution: y is no exact minimiser of the quadratic of the global step, and misses its minimum by
-  d^T A d / 2 for an error d. A Cholesky solve leaves a residual |r| <= c u |A| |y| (Higham 2002,
-  theorem 10.4), hence at most |r|^2 / (2 lambda_min(A)). In a subspace the right-hand side is
-  wrong by as much in the vertices, so that r <= c u |B|^T |A| |y|, and the explicit inverse adds
-  d <= c u cond(A) |z|, where the scaling of the columns does not count.
+- solution: the global step misses the minimum of its quadratic by d^T A d / 2 for an error d of y.
+  A Cholesky solve leaves a residual |r| <= c u |A| |y| (Higham 2002, theorem 10.4), so that this
+  is at most |r|^2 / (2 lambda_min(A)). In a subspace the right-hand side has the same error in the
+  vertices, so that r <= c u |B|^T |A| |y|, and the explicit inverse adds d <= c u cond(A) |z|,
+  where A has columns scaled to length one.
 
-lambda_min is bounded by the smallest mass over h^2, as if nothing were held: where masses are
-round-off compared with the weights and pins alone make the system solvable, the bound means little.
+lambda_min is bounded from below by the smallest mass over h^2, without pins: where masses are
+round-off compared with the weights, and only pins make A regular, the bound is very loose.
 """
 
 from collections.abc import Callable, Sequence
@@ -26,14 +26,13 @@ from pdrom.model.dynamics.stepper import FrameReport, LocalStep, State, Stepper
 from pdrom.model.metrics import shape_residuals
 from pdrom.model.runs import BoundedRun, frame_by_frame
 from pdrom.model.scene import Scene
-from pdrom.reduction.subspace.columns import Columns
+from pdrom.reduction.subspace.model import SubspaceModel
 from study.experiments.hard_cases.case import HardCase
 
 EPS = np.finfo(float).eps
 # A row of S or A has about 10 entries, and each value passes through a few further operations.
 OPERATIONS = 32.0
-Positions = Callable[[np.ndarray], np.ndarray]
-# A shape that came back to within this part of its extent is recovered.
+# Largest distance from the rest shape, over the extent, of a shape that counts as recovered.
 RECOVERED = 1e-2
 
 
@@ -41,31 +40,31 @@ RECOVERED = 1e-2
 class Roundoff:
     """Largest rise of the objective of one step loop by rounding alone.
 
-    columns : map B (N, K) from its coordinates to vertices; None: its coordinates are the vertices
+    basis : B (N, K) of the positions B z; None if the coordinates of ``loop`` are the positions
     """
 
     scene: Scene
     loop: Stepper
-    columns: Columns | None = None
+    basis: np.ndarray | None = None
 
     def allowance(self, before: State, after: State, first: float) -> float:
-        """Largest rise in joule that rounding explains, in a frame with first objective ``first``.
+        """Largest rise by rounding, in joule, in a frame with first objective ``first``.
 
-        Coordinates of the frame's beginning, ``before``, and end, ``after``, bound the iterates'.
+        The size of the iterates is estimated by the states ``before`` and ``after`` the frame.
         """
         h = self.loop.time_step
         acceleration = self.loop.space.acceleration(before.positions, before.velocities)
         s = before.positions + h * before.velocities + h**2 * acceleration
         largest = np.max(np.abs([before.positions, s, after.positions]), axis=0)
-        size = largest if self.columns is None else np.abs(self.columns.B) @ largest
+        size = largest if self.basis is None else np.abs(self.basis) @ largest
         size = float(size.max()) + float(np.abs(self.scene.mesh.points).max())
         noise = self._noise(size)
         evaluation = 2.0 * np.sqrt(abs(first) * noise) + noise
-        if self.columns is None:
+        if self.basis is None:
             residual = self._residual(size)
             smallest = float(self.scene.system.inertia.min())
             return evaluation + 1.5 * float(residual @ residual) / smallest
-        return evaluation + self._dense(self.columns, size, largest)
+        return evaluation + self._dense(self.basis, size, largest)
 
     def _noise(self, size: float) -> float:
         """R: the objective of rounding errors where all coordinates are of ``size``."""
@@ -82,13 +81,11 @@ class Roundoff:
         rows = np.asarray(abs(self.scene.system.matrix).sum(axis=1)).ravel()
         return OPERATIONS * EPS * size * rows
 
-    def _dense(self, columns: Columns, size: float, largest: np.ndarray) -> float:
-        b = columns.B
+    def _dense(self, b: np.ndarray, size: float, largest: np.ndarray) -> float:
         matrix = b.T @ (self.scene.masses[:, None] * b) / self.loop.time_step**2
-        steps: Sequence[Any] = self.loop.local_steps  # those of a subspace have a matrix
+        steps: Sequence[Any] = self.loop.local_steps  # in a subspace each has a matrix
         matrix = matrix + sum(step.matrix for step in steps)
-        # coordinates may have different sizes, which does not change the condition: columns are
-        # scaled to length one
+        # columns are scaled to length one: the sizes of the coordinates do not matter
         scale = np.sqrt(np.diag(matrix))
         eigenvalues = np.linalg.eigvalsh(matrix / np.outer(scale, scale))
         smallest, greatest = max(eigenvalues[0], EPS * eigenvalues[-1]), eigenvalues[-1]
@@ -100,13 +97,13 @@ class Roundoff:
 
 @dataclass(frozen=True)
 class Record:
-    """Course of a run, frame by frame; it ends before the first frame that is not finite.
+    """A run, frame by frame; it ends before the first frame that is not finite.
 
     positions, velocities : (F + 1, N, 3) m and m/s, the start first
     rise : (F,) largest rise of the objective from one iteration to the next over the frame's first
         objective, zero if it never rose
-    excess : (F,) largest rise beyond what rounding explains, J; negative or zero if none
-    energy : (F + 1,) kinetic energy and that of the groups, J
+    excess : (F,) that rise minus the largest rise by rounding alone, J
+    energy : (F + 1,) sum of the kinetic energy and the potential energy of the groups, J
     blowup_frame : first frame that is not finite or too large, None if there is none
     """
 
@@ -131,12 +128,12 @@ class Watched:
         self._step, self._group = step, group
 
     def begin_frame(self, q: np.ndarray) -> None:
-        """Freeze the frame's data at ``q`` (N, 3) m of the reduced step and of all elements."""
+        """Freeze the frame's data of the reduced step and of the group at ``q`` (N, 3) m."""
         self._step.begin_frame(q)
         self._group.begin_frame(q)
 
     def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
-        """Add the reduced S^T W p to ``rhs`` (N, 3) at ``y`` (N, 3) m; the full energy, J."""
+        """Add the reduced S^T W p at ``y`` (N, 3) m to ``rhs`` (N, 3); return the full energy J."""
         self._step.accumulate(y, rhs)
         return self._group.accumulate(y, np.zeros_like(y))
 
@@ -145,8 +142,7 @@ def record(
     scene: Scene,
     loop: Stepper,
     state: State,
-    roundoff: Roundoff,
-    positions: Positions = lambda y: y,
+    model: SubspaceModel | None = None,
     limit: float = np.inf,
     observe: Callable[[int, np.ndarray], None] | None = None,
 ) -> Record:
@@ -154,11 +150,12 @@ def record(
 
     Parameters
     ----------
-    roundoff : what rounding explains of a rise of the objective
-    positions : vertex positions (N, 3) of the coordinates of ``loop``
+    model : the position subspace of ``loop``; None if its coordinates are the positions
     limit : extent in metres at which the run ends as a blow-up
-    observe : called with every frame and its last local iterate
+    observe : called with the number and the last local iterate of every frame
     """
+    roundoff = Roundoff(scene, loop, None if model is None else model.columns.B)
+    positions: Callable[[np.ndarray], np.ndarray] = model.positions if model else lambda y: y
     states, rises, excesses = [(positions(state.positions), positions(state.velocities))], [], []
 
     def advance(before: State, frame: int) -> tuple[State, FrameReport]:
@@ -175,10 +172,10 @@ def record(
         if not np.isfinite(v).all():
             run.blowup_frame = frame.number
             break
-        rise = float(np.diff(report.objective).max(initial=0.0))
+        largest = float(np.diff(report.objective).max(initial=0.0))
         first = float(report.objective[0])
-        rises.append(rise / first if first > 0.0 else 0.0)
-        excesses.append(rise - roundoff.allowance(before, after, first))
+        rises.append(largest / first if first > 0.0 else 0.0)
+        excesses.append(largest - roundoff.allowance(before, after, first))
         states.append((frame.positions, v))
         state = after
     energies = []
@@ -190,23 +187,22 @@ def record(
             groups = sum(group.accumulate(q, np.zeros_like(q)) for group in scene.groups)
             energies.append(kinetic + groups)
     q, v = (np.stack(parts) for parts in zip(*states, strict=True))
-    rose, beyond = np.array(rises), np.array(excesses)
-    return Record(q, v, rose, beyond, np.array(energies), run.blowup_frame)
+    rise, excess, total = (np.array(values) for values in (rises, excesses, energies))
+    return Record(q, v, rise, excess, total, run.blowup_frame)
 
 
 def full_order(
     case: HardCase, scene: Scene, observe: Callable[[int, np.ndarray], None] | None = None
 ) -> Record:
-    """Run ``scene``, made by ``case``, from its start; ``observe`` sees every last iterate."""
-    loop = scene.stepper()
-    return record(scene, loop, case.start(scene), roundoff=Roundoff(scene, loop), observe=observe)
+    """Run ``scene`` of ``case`` from its start; ``observe`` as in `record`."""
+    return record(scene, scene.stepper(), case.start(scene), observe=observe)
 
 
 Check = Callable[[HardCase, Scene, Record], str]
 
 
 def finite(case: HardCase, scene: Scene, run: Record) -> str:
-    """Every frame ran and is finite."""
+    """Every frame is there and finite."""
     whole = len(run.positions) == scene.config.frames + 1
     return "" if whole else f"not finite in frame {run.blowup_frame}"
 
@@ -235,10 +231,10 @@ def objective(case: HardCase, scene: Scene, run: Record) -> str:
 
 
 def energy(case: HardCase, scene: Scene, run: Record) -> str:
-    """Kinetic energy plus that of the groups never exceeds its start.
+    """Kinetic plus potential energy never exceeds its value at the start.
 
-    From rest the first frame obeys it for every K, since its objective is this energy; later
-    frames by the damping of the implicit step.
+    From rest the first frame obeys this for every K, since its objective is this energy; later
+    frames obey it by the damping of the implicit step.
     """
     start, largest = run.energy[0], run.energy.max()
     elastic = float(np.abs(run.positions).max()) ** 2 * float(abs(scene.system.matrix).sum())
@@ -248,14 +244,14 @@ def energy(case: HardCase, scene: Scene, run: Record) -> str:
 
 
 def momentum(case: HardCase, scene: Scene, run: Record) -> str:
-    """Linear momentum changes by nothing but gravity."""
+    """Linear momentum changes by gravity only."""
     h, masses = scene.config.time_step, scene.masses
     pull = sum((f.acceleration(run.positions[0], run.velocities[0]) for f in scene.forces), 0.0)
     frames = np.arange(len(run.velocities))[:, None]
     found = np.einsum("n,fna->fa", masses, run.velocities)
     expected = found[0] + frames * h * masses.sum() * np.broadcast_to(pull, 3)
     error = np.abs(found - expected).max()
-    # the columns of S^T W p and of the solve's residual sum to zero up to rounding only
+    # the columns of S^T W p and of the residual of the solve sum to zero up to rounding
     size = float(np.abs(run.positions).max()) + float(np.abs(run.velocities).max()) * h
     noise = EPS * OPERATIONS * size * (masses.sum() / h + h * abs(scene.system.matrix).sum())
     allowed = noise * max(1.0, np.sqrt(len(found)))
@@ -292,9 +288,9 @@ CHECKS: dict[str, Check] = {
 
 
 def faults(case: HardCase) -> list[str]:
-    """List what does not hold in the full-order run of ``case``, empty if all does.
+    """Return the checks that the full-order run of ``case`` fails, each with its reason.
 
-    Of one that must be refused, building the scene or its first frames must raise a named error.
+    For a case that must be refused, building or running the scene must raise a `PdromError`.
     """
     if case.holds == ("refused",):
         try:

@@ -206,6 +206,8 @@ def sensitivity_rows(rules: Mapping[str, ClaimRule], tables: Tables) -> pd.DataF
     for claim, rule in rules.items():
         for part in PARTS:
             tests = [test for test in getattr(rule, part) if test.decides]
+            if not tests:
+                continue
             rows = [values_of(test, tables) for test in tests]
             base = _verdict(tests, rows)
             for varied, variation, changed, kept in _variations(tests, rows, tables):

@@ -13,8 +13,9 @@ from study.tables.claims.metrics import METRICS, VALUE, Tables, filtered
 from study.tables.claims.rules import PARTS, ClaimRule, TestRule, load_claims
 from study.tables.kit.declaration import TimedCells, flag, table, text, timed
 
-VERDICTS = HOLDS, FAILS, DEPENDS, MACHINE, UNDECIDED = (
+VERDICTS = HOLDS, FAILS, DEPENDS, MACHINE, UNDECIDED, UNTESTED = (
     "holds", "does not hold", "depends", "depends on the machine", "cannot be decided",
+    "not tested",
 )  # fmt: skip
 RULES = "config/claims.yaml"
 RECORDED = "config/reference/replication/claims.csv"
@@ -126,7 +127,12 @@ def _text(value: float) -> str:
 
 
 def combined(verdicts: Sequence[str]) -> str:
-    """Verdict of a claim whose tests have ``verdicts``: it holds if all of them hold."""
+    """Verdict of a claim whose tests have ``verdicts``: it holds if all of them hold.
+
+    Without a test that decides it is not tested.
+    """
+    if not verdicts:
+        return UNTESTED
     for verdict in (UNDECIDED, FAILS, MACHINE, DEPENDS):
         if verdict in verdicts:
             return verdict

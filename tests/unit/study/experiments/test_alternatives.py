@@ -1,4 +1,4 @@
-"""Rule alternatives: errors against both references, and the tables of the rows."""
+"""Experiment alternatives: errors against both references, and the tables of its rows."""
 
 import numpy as np
 import pandas as pd
@@ -63,7 +63,7 @@ def test_rows_of_a_scene(written, table):
     assert made.columns.tolist() == experiment.COLUMNS
     assert read_table(written[1].path).columns.tolist() == experiment.TIME_COLUMNS
     assert len(table) == len(made)
-    # a reduction is trained three times; the reference and playback have one row
+    # reductions are trained three times; the reference and playback have one row each
     all_of = sum(map(len, STEPS.values()))
     assert table.motion.value_counts().to_dict() == dict.fromkeys(
         ("heldout", "stiffness"), 2 * (2 + all_of + 6)
@@ -80,7 +80,7 @@ def test_rows_of_a_scene(written, table):
     assert (timed.processes == 2).all()
     stiffer = table[table.motion == "stiffness"].set_index(["method", "iterations"])
     own = table[table.motion == "heldout"].set_index(["method", "iterations"])
-    # one time for a setting, an error for each motion
+    # motions have the same times and different errors
     assert (
         stiffer.ms_per_frame["projective", 5].tolist() == own.ms_per_frame["projective", 5].tolist()
     )
@@ -138,7 +138,7 @@ def test_winners_are_the_cheapest_that_reach_the_error(tmp_path):
         vertices=9, vertices_ms=0.1, motion="heldout", error_continuous=lambda t: t.error_implicit,
         reference_error=1e-2,
     )  # fmt: skip
-    # the ratio in a process counts: both are slower in the second
+    # speed-ups are ratios within a process; in the second one both methods are slower
     ms = rows.dropna(subset="ms_per_frame").drop(columns="error_implicit")
     slow = ms.assign(process=2, ms_per_frame=4.0 * ms.ms_per_frame)
     measured = pd.concat([ms.assign(process=1), slow])[experiment.TIME_COLUMNS]
@@ -209,5 +209,5 @@ def test_the_size_from_which_a_reduction_pays():
     assert (never["from_best"], never["reached"]) == (None, 0)
     always = rows.assign(reduced_speedup=[2.0, 2.0, 2.0])
     assert pays(always)["from_best"] == 100
-    # where one motion is not reached, it does not pay
+    # a reduction that misses the error in one motion does not pay
     assert pays(always, always.assign(reduced_speedup=np.nan))["from_best"] is None

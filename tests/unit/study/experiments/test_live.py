@@ -1,4 +1,4 @@
-"""Models of the page: written by the experiment, run by the page's engine as pdrom runs them."""
+"""Models that the experiment writes for the page run in its engine as they run in pdrom."""
 
 import json
 
@@ -18,7 +18,7 @@ from written_models import write_models
 
 FRAMES = 24
 PULL = [{"effect": "gravity"}, {"effect": "damping", "rate": 0.5}]
-BELOW = 0.02  # a shape at rest lies the floor, m
+BELOW = 0.02  # distance of the floor below the rest shape, m
 WEIGHTS = {"spring": 1e3, "strain": 1e4, "tetrahedron_strain": 1e6, "deformation_gradient": 1e6}
 
 
@@ -65,7 +65,7 @@ def test_a_large_basis_is_short_but_for_what_is_computed_with(tmp_path, monkeypa
 
 
 def test_a_handle_takes_its_vertices_where_the_reader_does(tmp_path):
-    """Offsets are from where it was taken hold of."""
+    """Offsets are relative to the positions of the vertices when the handle was grasped."""
     file, model = write_models(scene_with("spring"), tmp_path)
     script = """
     const run = new engine.Run(data, data.models[0], new engine.Basis(data, data.bases[0]));
@@ -112,7 +112,7 @@ return given.matrices.map((matrix) => {
 @pytest.mark.parametrize(("low", "high"), [(1.0, 1.0), (0.95, 1.1)])
 @pytest.mark.parametrize(("name", "rows"), [("clamp2", 2), ("clamp3", 3)])
 def test_projections_are_the_nearest_matrices(name, rows, low, high):
-    """Also of flat, turned over, tiny and huge ones, where the nearest one is unique."""
+    """Also for flat, inverted, tiny and huge matrices whose nearest matrix is unique."""
     rng = np.random.default_rng(0)
     matrices = rng.standard_normal((60, rows, 3))
     matrices[20:40] = np.eye(3)[:rows] + 0.02 * matrices[20:40]
@@ -124,7 +124,7 @@ def test_projections_are_the_nearest_matrices(name, rows, low, high):
     group = scene_with("strain" if rows == 2 else "tetrahedron_strain").groups[0]
     group.config = group.config.model_copy(update={"minimum": low, "maximum": high})
     expected = group.reference_project(matrices, np.arange(60))
-    # nearly flat ones are as unsure as their second direction
+    # the second direction of nearly collinear rows is ill-conditioned
     allowed = np.where((np.arange(60) >= 40) & (np.arange(60) < 50), 1e-5, 1e-11)
     assert (np.abs(found - expected).max(axis=(1, 2)) < allowed).all()
 

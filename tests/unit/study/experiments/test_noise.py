@@ -1,4 +1,4 @@
-"""Bases of round-off: what a start's round-off reaches, and what becomes of the runs."""
+"""Runs with bases of round-off: the perturbed axes, the modes, and how the runs end."""
 
 import numpy as np
 import pandas as pd
@@ -49,7 +49,7 @@ def test_a_basis_of_noise_keeps_every_axis(rng):
 
 
 def test_the_joint_selection_fails_where_an_axis_carries_nothing(fall, tmp_path):
-    """Its separate system is exactly singular; noise in that axis is harmless."""
+    """Without noise in an axis the system of that axis is singular; with noise it is not."""
     asked = NoiseRuns(sizes=(2, 5, 99), repetitions=2)
     methods = {name: METHODS[name] for name in ("deim-joint", "published")}
     runs = tmp_path / "noise.h5"

@@ -1,4 +1,4 @@
-"""Rule online: the rows of one scene."""
+"""Experiment online: the rows of one scene."""
 
 import numpy as np
 import pandas as pd

@@ -1,4 +1,4 @@
-"""Repetitions of reduced runs: what is resampled, and what stays; the ladder's combinations."""
+"""Repetitions of reduced runs with other starts and training frames; methods of the ladder."""
 
 import numpy as np
 import pytest
@@ -79,7 +79,7 @@ def test_the_error_is_that_of_the_frames_before_the_end(sheet, short):
 
 
 def test_signs_are_drawn_by_a_seed(short):
-    """They change a basis whose modes the mean is added to, and no other."""
+    """Signs change only a basis whose mean is added to its modes."""
     published = MethodSpec(
         title="p", centring="mean-in-modes", rows="joint", solve="tikhonov", repeat_rows=True
     )
@@ -90,7 +90,7 @@ def test_signs_are_drawn_by_a_seed(short):
 
 
 def test_a_run_that_ends_early_is_wrong_without_bound(sheet):
-    """Here one that may extend over half of the sheet only, and ends after a frame."""
+    """The limit is half of the extent of the sheet, so that the run ends after one frame."""
     scene, reference, data = sheet
     narrow = ReducedRuns(scene, "spring", data, reference, END, 0.5).until_the_end()
     (run,) = narrow.repeat(BLOCK, [3], "start", Repetitions(repetitions=1))
@@ -103,7 +103,7 @@ LADDER = LadderSection(**read_yaml(ROOT / "config" / "default.yaml")["ladder"])
 
 @pytest.mark.parametrize("direction", ["up", "down"])
 def test_every_rung_reproduces_what_is_in_its_space(direction, rng):
-    """Each rung's operator is exact on its own affine space, as long as it is no Tikhonov solve."""
+    """Each method of the ladder is exact on its affine space, unless it solves with Tikhonov."""
     snapshots = rng.standard_normal((12, 40, 3))
     for method in getattr(LADDER, direction):
         basis = compute_basis(snapshots, np.ones(40), 0.0, 2, method)
@@ -118,7 +118,7 @@ def test_every_rung_reproduces_what_is_in_its_space(direction, rng):
 
 
 def test_rungs_change_one_ingredient_at_a_time():
-    """Between two rungs of `up` differ at most the fields that one ingredient is made of."""
+    """Two successive methods of `up` differ in the fields of one ingredient only."""
     for lower, upper in zip(LADDER.up[:-1], LADDER.up[1:], strict=True):
         a, b = lower.model_dump(exclude={"title"}), upper.model_dump(exclude={"title"})
         changed = {key for key in a if a[key] != b[key]}

@@ -1,4 +1,4 @@
-"""Sensitivity floor and horizon, and what effects do: forces, energies and runs without them."""
+"""Growth of perturbations, horizons, and the contribution of each effect to a run."""
 
 from functools import partial
 
@@ -27,7 +27,7 @@ from study.experiments.sensitivity import (
 )
 
 SPRING = {"effect": "spring", "weight": 1e5}
-# the sheet is pushed together in its own plane, by its weight: it must buckle, in no preferred way
+# a sheet that is compressed in its own plane buckles, and neither side is preferred
 COMPRESSED = partial(
     make_scene,
     SPRING,
@@ -118,7 +118,7 @@ def test_floor_is_the_largest_over_the_seeds(floors):
 
 @pytest.mark.parametrize("kept", [["1e-10"], ["1e-10", "solver"]])
 def test_horizons_survive_a_file(floors, kept, tmp_path):
-    """Labels are found whether they are read back as text or, without words, as numbers."""
+    """Labels are found as text and, where all labels in the file are numbers, as numbers."""
     write_table(floors[floors.perturbation.isin(kept)], tmp_path / "sensitivity.csv")
     for table in (floors, read_table(tmp_path / "sensitivity.csv")):
         assert horizons(table, 1e-10, 1e-3) == {"a": 2, "b": 4}
@@ -164,7 +164,7 @@ def contributed(*effects, **settings):
 
 
 def test_what_hangs_still_is_carried_by_its_pins():
-    """Two vertices below two pins, which in the end carry their own weight, too."""
+    """Two vertices hang below two pinned ones; the pins carry the weight of all four."""
     mesh = {"kind": "cloth", "rows": 2, "columns": 2}
     damping = {"effect": "damping", "rate": 5.0}
     longer = {"mesh": mesh, "frames": 400, "iterations": 200}

@@ -1,7 +1,7 @@
 """Projective dynamics in substeps: K iterations in each of n steps (Macklin et al. 2019: K = 1).
 
-Plain, with Anderson acceleration (`pdrom.model.dynamics.acceleration`), and with Chebyshev's
-semi-iteration (Wang 2015, alg. 1).
+Three methods: plain, with Anderson acceleration (`pdrom.model.dynamics.acceleration`), and with
+Chebyshev's semi-iteration (Wang 2015, alg. 1).
 """
 
 import numpy as np
@@ -20,21 +20,21 @@ from study.experiments.alternatives.solvers.substeps import (
     end,
 )
 
-WINDOW = 5  # differences of earlier iterates, as in the paper
-# The rate of the plain iteration and their number before the first extrapolation are set by hand,
-# as in the paper: of five rates this one does best on the motions of both sheets on which it is
-# compared, which favours it. A rate measured from the first iterates does worse.
+WINDOW = 5  # number of differences of earlier iterates, as in Peng et al. 2018
+# The estimated rate of the plain iteration, and the number of iterations before extrapolation. Both
+# are set by hand, as in Wang 2015: of five rates this one does best on the motions of both sheets
+# in the comparison, which favours the method. A rate measured from the first iterates does worse.
 RATE = 0.98
 PLAIN = 5
 
 
 class SmallSteps(Alternative):
-    """The local/global iteration for all groups; its matrix is that of the substep."""
+    """The local/global iteration for all groups, with the system matrix of a substep."""
 
     name = "projective"
 
     def _advance(self, part: Substeps) -> None:
-        _plain(*part, self.space.system.inertia, self.potential.tables, self._factor(part))
+        _plain(*part, self.space.system.inertia, self.tables, self._factor(part))
 
 
 @compiled(nogil=True)
@@ -61,7 +61,7 @@ class Accelerated(Alternative):
 
     def _advance(self, part: Substeps) -> None:
         self._history.begin_frame(part.y.reshape(-1, WIDTH))
-        inertia, tables = self.space.system.inertia, self.potential.tables
+        inertia, tables = self.space.system.inertia, self.tables
         _anderson(*part, inertia, tables, self._factor(part), self._history.history)
 
 
@@ -80,19 +80,19 @@ def _anderson(
             objective = add_projections(tables, y, rhs) + inertia_energy(y, s, inertia)
             if not refuse(history, y, objective):
                 sweep(panels, vertices, loads, work, rhs, y)
-                # the last image stays as it is: its objective is known not to rise
+                # the last image is not extrapolated: its objective is known not to rise
                 if k < iterations - 1:
                     combine(history, y)
         end(y, before, step, v)
 
 
 class Chebyshev(Alternative):
-    """Each iterate is moved beyond the plain one, by a weight that grows with the iterations."""
+    """Extrapolates each plain iterate from the iterate before the last, by a growing weight."""
 
     name = "chebyshev"
 
     def _advance(self, part: Substeps) -> None:
-        _chebyshev(*part, self.space.system.inertia, self.potential.tables, self._factor(part))
+        _chebyshev(*part, self.space.system.inertia, self.tables, self._factor(part))
 
 
 @compiled(nogil=True)

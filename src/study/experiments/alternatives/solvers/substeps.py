@@ -1,25 +1,22 @@
-"""A frame in equal substeps, between the same held vertices and contacts as in the step loop.
+"""A frame in equal substeps, with the same fixed vertices and contacts as in the step loop.
 
 The potential energy of all groups, W(y) = sum_j 1/2 sum_e w_e |S_e y - p_e(y)|^2, has the gradient
-S^T W S y - S^T W p(y), because p is the nearest point: what moves p moves along the manifold
-(Bouaziz et al. 2014, sect. 3).
+S^T W S y - S^T W p(y): p is the nearest point of the manifold, so that its derivative is tangential
+and drops out (Bouaziz et al. 2014, sect. 3).
 """
 
 from abc import abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from time import perf_counter
 from typing import ClassVar, NamedTuple
 
 import numpy as np
-from scipy import sparse
 
 from pdrom.core.errors import SceneError
 from pdrom.core.registry import Registry
-from pdrom.model.compiled.arithmetic import add_scaled, constant
 from pdrom.model.compiled.functions import compiled
-from pdrom.model.compiled.rows import WIDTH, as_vertices, at, flat, load, store
-from pdrom.model.constraints.base import ConstraintGroup
-from pdrom.model.constraints.local_kernel import LocalPass, Table, add_part
+from pdrom.model.compiled.rows import WIDTH, as_vertices, flat
+from pdrom.model.constraints.local_kernel import LocalPass, add_part
 from pdrom.model.dynamics.solvers import Factor
 from pdrom.model.dynamics.space import VertexSpace
 from pdrom.model.dynamics.stepper import PHASES, FrameReport, State, Stepper
@@ -27,9 +24,6 @@ from pdrom.model.dynamics.system import Elimination, GlobalSystem
 from pdrom.model.effects.forces import Gravity
 from pdrom.model.scene import Scene
 
-# Arguments of `add_projections`, and of `multiply`.
-Tables = tuple[Table, ...]
-Matrix = tuple[np.ndarray, np.ndarray, np.ndarray]
 METHODS = Registry(
     "method",
     {
@@ -42,13 +36,13 @@ METHODS = Registry(
 
 
 class Substeps(NamedTuple):
-    """Some substeps of a frame, in the order in which the compiled loops take them.
+    """Arguments of the compiled loops over some substeps of a frame, in their order.
 
-    y, v : positions and velocities as padded vectors, flat; changed in place
+    y, v : positions m and velocities m/s as padded vectors, flat; changed in place
     acceleration : (3,) m/s^2
-    time_step : of a substep, s
-    substeps, iterations : how many, and in each of them
-    fixed, targets : held vertices (n,) and where they are (n, 3) at the end, m
+    time_step : length of a substep, s
+    substeps, iterations : number of substeps, and number of iterations in each of them
+    fixed, targets : fixed vertices (n,) and their positions (n, 3) at the end of the substeps, m
     """
 
     y: np.ndarray
@@ -65,14 +59,14 @@ class Alternative(Stepper):
     """A frame of length h in ``substeps`` steps of ``iterations`` each.
 
     A handle moves at constant speed during a frame, whatever the number of substeps; contacts act
-    at its end, as in the step loop. What a group freezes at the beginning of a frame stays. Loops
-    with equal substeps may share a ``system``.
+    at the end of the frame, as in the step loop. Groups freeze their data once a frame, at its
+    beginning. Loops with equal substeps may share a factored ``system``. `METHODS` has all classes.
 
     Raises
     ------
     SceneError
         A force that depends on the motion (it would have to be evaluated in every substep), or a
-        group that the method does not take.
+        group without a compiled local step.
     """
 
     name: ClassVar[str]
@@ -93,11 +87,14 @@ class Alternative(Stepper):
         super().__init__(scene.space(system), step, iterations, scene.groups, False)
         self.substeps = substeps
         self.masses = scene.masses
-        self.potential = Potential(scene.groups, scene.mesh.vertices)
+        kernels = [group.local_kernel for group in scene.groups if group.local_kernel is not None]
+        # the kernels own the memory to which the tables point
+        self._kernels = local = LocalPass(kernels)
+        self.tables = local.first, local.preparing, local.second
         self._prepare(scene)
 
     def _prepare(self, scene: Scene) -> None:
-        """Make what the method keeps from frame to frame; nothing by default."""
+        """Make the data that the method uses in all frames; nothing by default."""
 
     def step(
         self, state: State, frame: int, on_last_iterate: Callable[[np.ndarray], None] | None = None
@@ -111,7 +108,7 @@ class Alternative(Stepper):
             local.begin_frame(q)
         positions, velocities = as_vertices(q), as_vertices(state.velocities)
         y, v = flat(positions), flat(velocities)
-        # what stands still needs no new targets between the substeps
+        # fixed vertices that do not move have the same targets in all substeps
         parts = 1 if np.array_equal(q[fixed], targets) else self.substeps
         for part in range(1, parts + 1):
             now = targets + (1.0 - part / parts) * (q[fixed] - targets)
@@ -121,7 +118,7 @@ class Alternative(Stepper):
                     *(self.iterations, fixed, now),
                 )
             )
-        # contacts set the velocity of what they move by the whole frame
+        # vertices that a contact moves get their mean velocity over the frame
         free = positions.copy()
         self.space.correct(positions, q, frame)
         moved = (positions != free).any(axis=1)
@@ -135,35 +132,28 @@ class Alternative(Stepper):
 
     @abstractmethod
     def _advance(self, part: Substeps) -> None:
-        """Do substeps in place."""
+        """Do the substeps; positions and velocities change in place."""
 
     def _factor(self, part: Substeps) -> Factor:
-        """Factor of the system matrix without the held vertices, as `sweep` takes it."""
+        """Factor of the system matrix without the fixed vertices, as `sweep` takes it."""
         elimination = self.space.eliminate(part.fixed, part.targets)
         assert isinstance(elimination, Elimination)
         assert elimination.factor is not None
         return elimination.factor
 
 
-def inverse_masses(masses: np.ndarray, fixed: np.ndarray) -> np.ndarray:
-    """1 / M of ``masses`` (N,) kg, zero for held vertices ``fixed`` (n,): nothing moves them."""
-    inverse = 1.0 / masses
-    inverse[fixed] = 0.0
-    return inverse
-
-
 @compiled(nogil=True)
 def begin(y, v, acceleration, step, fixed, targets, before, s):
-    """A substep of an implicit method begins at its prediction s = y + step v + step^2 a.
+    """Begin a substep of an implicit method at its prediction s = y + step v + step^2 a.
 
-    ``before`` receives the positions; held vertices of ``s`` and ``y`` go to their targets.
+    ``before`` receives the positions; fixed vertices of ``s`` and ``y`` go to their targets.
 
     Parameters
     ----------
     y, v : padded positions m and velocities m/s, flat
     acceleration : (3,) m/s^2
     step : s
-    fixed, targets : held vertices (n,) and where they are at the end (n, 3) m
+    fixed, targets : fixed vertices (n,) and their positions at the end (n, 3) m
     """
     for i in range(len(y) // WIDTH):
         for axis in range(3):
@@ -179,70 +169,19 @@ def begin(y, v, acceleration, step, fixed, targets, before, s):
 
 @compiled(nogil=True)
 def end(y, before, step, v):
-    """Velocities ``v`` from the positions ``y`` and ``before`` at both ends of a ``step``, s."""
+    """Set velocities ``v`` from the positions ``before`` and ``y`` at both ends of a ``step``."""
     for k in range(len(y)):
         v[k] = (y[k] - before[k]) / step
 
 
-class Potential:
-    """Compiled local steps of groups, and the matrix S^T W S of all of them.
-
-    Attributes
-    ----------
-    tables : first argument of `add_projections`
-    stiffness : S^T W S, first argument of `multiply`
-    """
-
-    def __init__(self, groups: Sequence[ConstraintGroup], vertices: int) -> None:
-        kernels = [group.local_kernel for group in groups if group.local_kernel is not None]
-        self._pass = LocalPass(kernels)  # keeps the arrays that the tables point to
-        local = self._pass
-        self.tables: Tables = local.first, local.preparing, local.second
-        total = sparse.csr_array((vertices, vertices))
-        for group in groups:
-            total = total + group.system_matrix()
-        self.stiffness = rows_of(total)
-
-
-def rows_of(matrix: sparse.csr_array) -> Matrix:
-    """A matrix (N, N) as `multiply` takes it."""
-    ordered = sparse.csr_array(matrix)
-    ordered.sort_indices()
-    return ordered.indptr.astype(np.int32), ordered.indices.astype(np.int32), ordered.data
-
-
 @compiled(nogil=True)
 def add_projections(tables, y, rhs):
-    """Add S^T W p(y) of all groups in ``tables`` to ``rhs``, both padded, flat; the energy W(y)."""
-    kernels, preparing, second = tables
+    """Add S^T W p(y) of all groups to ``rhs``, both padded, flat; return the energy W(y).
+
+    ``tables`` are `first`, `preparing` and `second` of a `LocalPass` of the groups.
+    """
+    first, preparing, second = tables
     y_place, rhs_place = y.ctypes.data, rhs.ctypes.data
     add_part(preparing, y_place, rhs_place)
-    energy = add_part(kernels, y_place, rhs_place)
+    energy = add_part(first, y_place, rhs_place)
     return energy + add_part(second, y_place, rhs_place)
-
-
-@compiled(nogil=True)
-def multiply(matrix, y, out):
-    """Overwrite ``out`` by the matrix times ``y``, both padded vectors, flat."""
-    indptr, indices, data = matrix
-    for i in range(len(indptr) - 1):
-        total = constant(0.0)
-        for k in range(at(indptr, i), at(indptr, i + 1)):
-            total = add_scaled(total, at(data, k), load(y, WIDTH * at(indices, k)))
-        store(out, WIDTH * i, total)
-
-
-def alternative(
-    name: str, scene: Scene, substeps: int, iterations: int = 1, system: GlobalSystem | None = None
-) -> Alternative:
-    """Step loop of a scene by the method ``name``: so many ``substeps`` a frame, see `Alternative`.
-
-    Each of them does ``iterations``; ``system`` is a factored one of equal substeps, to be shared.
-
-    Raises
-    ------
-    ConfigurationError, SceneError
-        Unknown name, a group or a force that the method does not take.
-    """
-    made: Alternative = METHODS.load(name)(scene, substeps, iterations, system)
-    return made

@@ -1,12 +1,12 @@
 """Anderson acceleration with a coarse level: a trained position subspace with sampled elements.
 
-A plain iteration moves slowly what is stiff in the system matrix and soft in the objective. Its
-image G(y) is therefore corrected in the span of columns V with V^T A V = 1: of its step G(y) - y
-the part in the span, g = V^T A (G(y) - y), is replaced by the step z that minimises the objective
-of y + V z there, to which the sampled elements stand in for all of them. This is the full
-approximation scheme (Brandt 1977) with one additive smoothing step: -g is the exact gradient in the
-span, so that z = g = 0 where y solves the frame, whatever was sampled. The whole map is
-accelerated; an iterate that raises the objective is replaced by the last plain image.
+A plain iteration is slow for deformations that are stiff in the system matrix A and soft in the
+objective. Its image G(y) is therefore corrected in the span of columns V with V^T A V = 1: the
+component g = V^T A (G(y) - y) of its step is replaced by the step z that minimises the objective of
+y + V z, in which sampled elements stand for all elements. This is the full approximation scheme
+(Brandt 1977) with one additive smoothing step: -g is the exact gradient in the span, so that
+z = g = 0 where y solves the frame, whatever the samples are. The corrected map is accelerated; an
+iterate that raises the objective is replaced by the last image without correction.
 """
 
 import numpy as np
@@ -16,6 +16,7 @@ from pdrom.core.errors import SceneError
 from pdrom.model.compiled.arithmetic import add, add_scaled, constant
 from pdrom.model.compiled.functions import compiled
 from pdrom.model.compiled.rows import WIDTH, at, load, store, unflat
+from pdrom.model.constraints.local_kernel import LocalPass
 from pdrom.model.dynamics.acceleration import Anderson, combine, forget, refuse
 from pdrom.model.dynamics.frames import inertia_energy, weighted
 from pdrom.model.dynamics.sweeps import sweep
@@ -24,14 +25,13 @@ from pdrom.reduction.subspace.model import Samples, SubspaceModel
 from study.experiments.alternatives.solvers.projective import WINDOW
 from study.experiments.alternatives.solvers.substeps import (
     Alternative,
-    Potential,
     Substeps,
     add_projections,
     begin,
     end,
 )
 
-INNER = 10  # iterations in the span, accelerated as well
+INNER = 10  # iterations in the span, with Anderson acceleration
 
 
 class TwoLevel(Alternative):
@@ -40,7 +40,7 @@ class TwoLevel(Alternative):
     Raises
     ------
     SceneError
-        The scene has several groups, or what `Alternative` refuses.
+        The scene has several groups, or `Alternative` refuses it.
     """
 
     name = "two-level"
@@ -54,7 +54,7 @@ class TwoLevel(Alternative):
             raise SceneError(f"scene '{scene.config.name}': method '{self.name}' takes one group")
         columns, group = self._model.columns, scene.groups[0]
         system = self.space.system
-        # zero at vertices that are ever held, which no correction moves
+        # the correction is zero at vertices that are fixed in any frame
         free = columns.B[:, columns.free]
         image = system.matrix @ free
         factor = linalg.cholesky(free.T @ image, lower=True)
@@ -65,7 +65,8 @@ class TwoLevel(Alternative):
         rows = span[:, self._vertices].T
         inertia = (span * (scene.masses / self.time_step**2)) @ span.T
         inverse = linalg.inv(inertia + rows.T @ (self._group.system_matrix() @ rows))
-        self._sampled = Potential([self._group], len(rows))
+        assert self._group.local_kernel is not None
+        self._sampled = LocalPass([self._group.local_kernel])
         self._matrices = tuple(
             np.ascontiguousarray(m) for m in (span.T, image, rows, inverse @ rows.T, inverse)
         )
@@ -76,9 +77,10 @@ class TwoLevel(Alternative):
         y = unflat(part.y)
         self._history.begin_frame(part.y.reshape(-1, WIDTH))
         self._group.begin_frame(y[self._vertices])
-        coarse = (*self._matrices, self._vertices, self._sampled.tables, self._inner.history)
-        inertia, tables = self.space.system.inertia, self.potential.tables
-        _advance(*part, inertia, tables, self._factor(part), self._history.history, coarse)
+        tables = self._sampled.first, self._sampled.preparing, self._sampled.second
+        coarse = (*self._matrices, self._vertices, tables, self._inner.history)
+        inertia = self.space.system.inertia
+        _advance(*part, inertia, self.tables, self._factor(part), self._history.history, coarse)
 
 
 @compiled(nogil=True)
@@ -96,7 +98,7 @@ def _advance(
         for k in range(iterations):
             rhs[:] = base
             objective = add_projections(tables, y, rhs) + inertia_energy(y, s, inertia)
-            # a corrected image may rise, also the first one
+            # a corrected image may raise the objective, even the first one
             if refuse(history, y, objective, 0):
                 y[:] = plain
                 continue
@@ -110,7 +112,7 @@ def _advance(
 
 @compiled(nogil=True)
 def _correct(coarse, start, image):
-    """Replace the step from ``start`` to ``image`` in the span by that of the sampled objective."""
+    """Replace the step from ``start`` to ``image`` in the span by the sampled minimiser's step."""
     span, duals, rows, steps, inverse, vertices, tables, history = coarse
     size, sampled = WIDTH * span.shape[1], WIDTH * len(vertices)
     step, x, at_start = np.zeros(size), np.empty(sampled), np.zeros(sampled)
@@ -123,7 +125,7 @@ def _correct(coarse, start, image):
     z[:] = first
     forget(history)
     for _ in range(INNER):
-        refuse(history, z, np.nan)  # keeps the iterate: its objective is not known
+        refuse(history, z, np.nan)  # accepts the iterate, since its objective is unknown
         moved[:] = x
         _add_product(rows, z, moved)
         forces[:] = 0.0
@@ -138,11 +140,11 @@ def _correct(coarse, start, image):
 
 @compiled(nogil=True)
 def _add_product(matrix, x, out):
-    """Add ``matrix`` (m, n) times ``x``, n rows of four, to ``out``, m of them, all flat."""
+    """Add ``matrix`` (m, n) times ``x``, n rows of four, to ``out``, m rows of four, all flat."""
     m, n = matrix.shape
     numbers = matrix.reshape(-1)
     for i in range(m):
-        # two sums that do not wait for each other
+        # two independent sums, which the processor overlaps
         even, odd = load(out, WIDTH * i), constant(0.0)
         for k in range(0, n - 1, 2):
             even = add_scaled(even, at(numbers, n * i + k), load(x, WIDTH * k))

@@ -1,7 +1,7 @@
-"""All methods: same implicit step as projective dynamics, momentum, order, hard cases.
+"""All methods: same implicit step as projective dynamics, momentum, order, degenerate states.
 
-Then the motion in continuous time, with the estimate of its own error, and the coarse level, which
-ends at the same step in fewer iterations.
+Also the motion in continuous time with its error estimate, and the two-level method, which reaches
+the same step in fewer iterations.
 """
 
 import numpy as np
@@ -12,7 +12,7 @@ from pdrom.core.errors import ConfigurationError, SceneError
 from pdrom.model.dynamics.stepper import State
 from pdrom.reduction.subspace.model import Samples, SubspaceModel, make_columns
 from study.experiments.alternatives.solvers.explicit import continuous
-from study.experiments.alternatives.solvers.substeps import METHODS, alternative
+from study.experiments.alternatives.solvers.substeps import METHODS
 from study.experiments.alternatives.solvers.two_level import TwoLevel
 from study.experiments.kit.converged import ConvergedStepper, converged_run
 from study.experiments.kit.scenes import followed
@@ -20,8 +20,12 @@ from study.experiments.kit.scenes import followed
 SHEET = {"kind": "cloth", "rows": 6, "columns": 5, "plane": "xz"}
 HELD = (GRAVITY, LEFT)
 CLOSED_FORM = ("spring", "strain", "tetrahedron_strain", "deformation_gradient")
-# What minimises the objective of a frame, and iterations that suffice on these meshes.
+# Methods that minimise the objective of a frame, and iterations that suffice on these meshes.
 IMPLICIT = {"projective": 3000, "anderson": 300, "chebyshev": 1500}
+
+
+def alternative(method: str, *settings):
+    return METHODS.load(method)(*settings)
 
 
 def small(group: str, *effects: dict, weight: float = 1e5, **settings):
@@ -33,27 +37,33 @@ def crumpled(scene, rng, size: float = 0.02) -> State:
     return scene.initial_state(size * rng.standard_normal(scene.mesh.points.shape))
 
 
+def check_first_step(start, loop, reference, position=1e-8, velocity=1e-6):
+    expected, _ = reference.step(start, 0)
+    after, _ = loop.step(start, 0)
+    np.testing.assert_allclose(after.positions, expected.positions, rtol=0.0, atol=position)
+    np.testing.assert_allclose(after.velocities, expected.velocities, rtol=0.0, atol=velocity)
+
+
 @pytest.mark.parametrize("method", IMPLICIT)
 @pytest.mark.parametrize("group", CLOSED_FORM)
 def test_many_iterations_end_at_the_implicit_step(group, method, rng):
     scene = small(group, *HELD)
-    start = crumpled(scene, rng)
     best = ConvergedStepper(scene, scene.system, 1e-12, 4000)
-    expected, _ = best.step(start, 0)
+    check_first_step(crumpled(scene, rng), alternative(method, scene, 1, IMPLICIT[method]), best)
     assert best.converged
-    after, _ = alternative(method, scene, 1, IMPLICIT[method]).step(start, 0)
-    np.testing.assert_allclose(after.positions, expected.positions, rtol=0.0, atol=1e-8)
-    np.testing.assert_allclose(after.velocities, expected.velocities, rtol=0.0, atol=1e-6)
 
 
 @pytest.mark.parametrize("group", GROUPS)
 def test_one_substep_is_the_step_loop(group, rng):
     scene = small(group, *HELD, iterations=4)
-    start = crumpled(scene, rng)
-    expected, _ = scene.stepper().step(start, 0)
-    after, _ = alternative("projective", scene, 1, 4).step(start, 0)
-    np.testing.assert_allclose(after.positions, expected.positions, rtol=0.0, atol=1e-12)
-    np.testing.assert_allclose(after.velocities, expected.velocities, rtol=0.0, atol=1e-10)
+    loop = alternative("projective", scene, 1, 4)
+    check_first_step(crumpled(scene, rng), loop, scene.stepper(), 1e-12, 1e-10)
+
+
+def test_accelerated_substep_is_the_accelerated_step_loop(rng):
+    scene = small("strain", *HELD, iterations=15, anderson_window=5)
+    loop = alternative("anderson", scene, 1, 15)
+    check_first_step(crumpled(scene, rng, 0.1), loop, scene.stepper(), 1e-10, 1e-8)
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -104,7 +114,7 @@ def test_explicit_steps_are_of_second_order():
 
 @pytest.mark.parametrize("method", sorted(set(METHODS) - {"explicit"}))
 def test_substeps_approach_the_motion_in_continuous_time(method):
-    """Every method of first order ends at what fine explicit steps end at."""
+    """Every method of first order converges to the result of fine explicit steps."""
     scene = small("spring", *HELD, weight=1e4)
     exact = last("explicit", scene, 400)
     errors = [np.linalg.norm(last(method, scene, n, 4) - exact) for n in (10, 40, 160)]
@@ -154,23 +164,15 @@ def test_degenerate_inverted_and_stiff_starts_stay_finite(group, method, weight)
     assert np.ptp(after.positions, axis=0).max() < 10.0 * scene.mesh.extent
 
 
-def test_what_a_method_does_not_take_is_refused_by_name():
+def test_forces_groups_and_methods_are_refused_by_name():
     windy = small("spring", {"effect": "drag", "coefficient": 0.1})
     with pytest.raises(SceneError, match="'drag': method 'explicit' takes no force but gravity"):
         alternative("explicit", windy, 1)
     both = make_scene(*HELD, *({"effect": name, "weight": 1e5} for name in ("spring", "strain")))
     with pytest.raises(SceneError, match="'two-level' takes one group"):
-        TwoLevel(both, 1, 1, model_of(hanging("spring"), 2))
+        TwoLevel(both, 1, 1, model_of(small("spring", *HELD, frames=8), 2))
     with pytest.raises(ConfigurationError, match=r"unknown method 'andersn'.*anderson"):
         alternative("andersn", windy, 1)
-
-
-def test_compiled_acceleration_is_that_of_the_step_loop(rng):
-    scene = small("strain", *HELD, iterations=15, anderson_window=5)
-    start = crumpled(scene, rng, 0.1)
-    expected, _ = scene.stepper().step(start, 0)
-    after, _ = alternative("anderson", scene, 1, 15).step(start, 0)
-    np.testing.assert_allclose(after.positions, expected.positions, rtol=0.0, atol=1e-10)
 
 
 def test_estimate_is_the_error():
@@ -185,7 +187,7 @@ def test_estimate_is_the_error():
 
 
 def test_unstable_steps_are_halved():
-    """The first steps leave the floating-point numbers; what is returned is accurate."""
+    """The first runs overflow; the returned run is accurate."""
     found = continuous(small("spring", *HELD, weight=1e9), 4, 1e-3, 2, 10_000)
     assert found.error <= 1e-3
     assert found.substeps > 100
@@ -198,16 +200,8 @@ def test_limit_ends_the_search_and_is_reported():
     assert continuous(small("spring", *HELD, weight=1e14), 4, 1e-3, 2, 8).error > 1e-3
 
 
-SHEET_8 = {"kind": "cloth", "rows": 8, "columns": 7, "plane": "xz"}
-
-
-def hanging(group: str):
-    mesh = SHEET_8 if GROUPS[group]["kind"] == "cloth" else GROUPS[group]
-    return make_scene(*HELD, {"effect": group, "weight": 1e5}, mesh=mesh, frames=8)
-
-
 def model_of(scene, modes: int, elements: np.ndarray | None = None) -> SubspaceModel:
-    """Columns of the scene's own converged run; elements count for as many as are left out."""
+    """Columns of the scene's converged run, and sampled elements with equal factors."""
     group = scene.groups[0]
     chosen = np.arange(group.elements) if elements is None else elements
     factors = np.full(len(chosen), group.elements / len(chosen))
@@ -219,17 +213,14 @@ def model_of(scene, modes: int, elements: np.ndarray | None = None) -> SubspaceM
 @pytest.mark.parametrize("group", ["spring", "strain", "tetrahedron_strain"])
 @pytest.mark.parametrize("every", [1, 7])
 def test_whatever_is_sampled_many_iterations_end_at_the_implicit_step(group, every, rng):
-    scene = hanging(group)
-    start = crumpled(scene, rng)
+    scene = small(group, *HELD, frames=8)
     model = model_of(scene, 3, np.arange(0, scene.groups[0].elements, every))
     best = ConvergedStepper(scene, scene.system, 1e-12, 4000)
-    expected, _ = best.step(start, 0)
-    after, _ = TwoLevel(scene, 1, 400, model).step(start, 0)
-    np.testing.assert_allclose(after.positions, expected.positions, rtol=0.0, atol=1e-8)
+    check_first_step(crumpled(scene, rng), TwoLevel(scene, 1, 400, model), best)
 
 
-def test_few_iterations_do_what_takes_many_without_the_coarse_level():
-    scene = hanging("spring")
+def test_the_coarse_level_saves_iterations():
+    scene = small("spring", *HELD, frames=8)
     model = model_of(scene, 6)
     expected = converged_run(scene, 1e-10, 4000)[-1]
     misses = []
@@ -244,7 +235,6 @@ def objective_of(scene, state, y: np.ndarray) -> float:
     h = scene.config.time_step
     s = state.positions + h * state.velocities + h**2 * np.array([0.0, -9.81, 0.0])
     s[scene.mesh.points[:, 0] == scene.mesh.points[:, 0].min()] = 0.0
-    y = y.copy()
     moved = np.where(s == 0.0, 0.0, y - s)
     inertia = 0.5 * float(np.sum(scene.masses[:, None] * moved**2)) / h**2
     return inertia + scene.groups[0].accumulate(y, np.zeros_like(y))
@@ -252,8 +242,8 @@ def objective_of(scene, state, y: np.ndarray) -> float:
 
 @pytest.mark.parametrize("iterations", [2, 3, 5, 9])
 def test_a_subspace_of_noise_never_raises_the_objective(iterations, rng):
-    """Its corrections lead astray from the first image on: the frame does without them."""
-    scene = hanging("spring")
+    """All of its corrections raise the objective, so that all are rejected."""
+    scene = small("spring", *HELD, frames=8)
     shape = scene.mesh.points.shape
     noise = scene.mesh.points + 0.3 * rng.standard_normal((4, *shape))
     chosen = np.arange(0, scene.groups[0].elements, 9)

@@ -1,4 +1,4 @@
-"""The checks find what they are for: each is shown a run that breaks it, and one that does not."""
+"""Each check of a hard case fails for a run that violates it, and passes for one that does not."""
 
 from dataclasses import replace
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from study.experiments.hard_cases.catalogue import CASES
-from study.experiments.hard_cases.record import CHECKS, Roundoff, faults, full_order, record
+from study.experiments.hard_cases.record import CHECKS, faults, full_order, record
 
 CASE = CASES["inverted_uneven"]
 
@@ -28,7 +28,7 @@ def with_last(array, value):
 
 
 def broken(run, check):
-    """The run with one thing wrong that ``check`` is there for."""
+    """The run with one change that violates ``check``."""
     drift = run.velocities.copy()
     drift[10:, :, 0] += 1e-6 * np.abs(run.velocities).max()
     squeezed = run.positions[-1] * [1.0, 0.9, 1.0]
@@ -52,12 +52,12 @@ def test_a_check_finds_its_fault(check, scene, run):
     assert CHECKS[check](CASE, scene, broken(run, check)) != ""
 
 
-def test_what_is_not_refused_is_a_fault():
+def test_a_case_that_is_not_refused_is_a_fault():
     assert faults(replace(CASE, holds=("refused",))) == ["was not refused"]
 
 
 class TooStrong:
-    """A group that writes a wrong right-hand side: the local step descends no longer."""
+    """A group with a wrong right-hand side, so that the objective may rise."""
 
     name = "wrong"
 
@@ -76,7 +76,7 @@ class TooStrong:
 
 @pytest.mark.parametrize(("error", "rises"), [(0.0, False), (1e-8, True)])
 def test_the_allowance_tells_a_wrong_projection_from_rounding(scene, error, rises):
-    """At rest the objective is zero: a right-hand side that is wrong by 1e-8 moves it away."""
+    """At rest the objective is zero; a relative error of 1e-8 of the right-hand side raises it."""
     loop = scene.stepper(local_steps=[TooStrong(scene.groups[0], 1.0 + error)])
-    found = record(scene, loop, scene.initial_state(), Roundoff(scene, loop))
+    found = record(scene, loop, scene.initial_state())
     assert (found.excess.max() > 0.0) == rises

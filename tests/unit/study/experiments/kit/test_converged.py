@@ -69,7 +69,7 @@ def test_a_frame_ends_where_very_many_iterations_end(group, rng):
     for frame in range(3):
         expected, report = plain.step(state, frame)
         state, _ = best.step(state, frame)
-        # the plain iteration stands still
+        # the plain iteration has converged
         assert report.objective[-2] - report.objective[-1] <= 1e-10 * report.objective[-1]
         np.testing.assert_allclose(state.positions, expected.positions, rtol=0.0, atol=2e-7)
         state = expected

@@ -1,4 +1,4 @@
-"""Cost of effects: every listed one is asked and counted, absent ones are not there at all."""
+"""Costs of effects: each effect of a scene is timed and counted, and no other one."""
 
 import numpy as np
 import pytest
@@ -39,7 +39,7 @@ def test_every_effect_has_a_row_and_the_shares_are_whole():
 
 
 def test_a_stand_in_and_its_kernel_answer_as_the_effect_does(rng):
-    """Also in the compiled loop, which the stand-ins must not leave: they time what a run does."""
+    """Timed effects stay in the compiled loop, so that their times are those of a run."""
     scene = make_scene(*EFFECTS)
     group = scene.group("strain")
     y = scene.mesh.points + 0.01 * rng.standard_normal(scene.mesh.points.shape)
@@ -71,7 +71,7 @@ def test_effects_are_left_out_alone_and_groups_together():
 
 
 def test_a_scene_without_an_effect_does_not_ask_it(monkeypatch):
-    """Not one call of the left-out projections happens, whatever their time would be."""
+    """The projections of an effect that is left out are never called."""
     from pdrom.model.constraints.triangle_strain import TriangleStrain
 
     scene = make_scene(*EFFECTS)

@@ -8,7 +8,7 @@ from study.experiments.kit.measurement import PHASES, Variant, measure, measure_
 
 
 class Clock:
-    """A step loop that takes the seconds it is told, and records its calls."""
+    """A step loop that reports given times and records its calls."""
 
     def __init__(self, name: str, calls: list, seconds, local_steps=(), bad_frame=None) -> None:
         self.name, self.calls, self.seconds = name, calls, iter(seconds)
@@ -73,7 +73,7 @@ def test_the_median_repeat_of_each_frame_counts_with_its_own_phases(
 
 
 class Lifting(Assembling):
-    """A local step that measures its lift, too."""
+    """A local step that measures its lift as well."""
 
     lift_seconds = 55.0
 

@@ -1,4 +1,4 @@
-"""Scenes at another time step and stiffness, and basis sizes: what changes, and what stays."""
+"""Scenes with another time step and stiffness, and the basis sizes of a study."""
 
 import numpy as np
 import pytest
