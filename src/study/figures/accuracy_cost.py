@@ -217,10 +217,7 @@ def handles(found: TradeOffs) -> list[Block]:
         "errors below it cannot be seen. Arrows on the rim are errors outside the axis, crosses "
         "runs that blew up. Below, a scene for each other constraint group."
     ),
-    reads={
-        "table": TableOf("accuracy_cost"),
-        "runs": TableOf("reduced_reruns"),
-    },
+    reads={"table": TableOf("accuracy_cost"), "runs": TableOf("reduced_reruns")},
 )
 def accuracy_cost(
     options: Methods, drawn: Drawn, table: pd.DataFrame, runs: pd.DataFrame

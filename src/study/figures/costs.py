@@ -211,10 +211,7 @@ def break_even(options: BreakEven, drawn: Drawn, table: pd.DataFrame) -> Figure:
         "lie below the floor, at the left edge where nothing changes at all. The only group of a "
         "scene cannot be left out."
     ),
-    reads={
-        "table": TableOf("effects_cost"),
-        "contributions": EachOf(CONTRIBUTIONS, "experiments"),
-    },
+    reads={"table": TableOf("effects_cost"), "contributions": EachOf(CONTRIBUTIONS, "experiments")},
 )
 def effects_contribution(
     options: Scenes, drawn: Drawn, table: pd.DataFrame, contributions: list[File]

@@ -10,7 +10,7 @@ from pdrom.view.text import plain_words
 from study.artifact.reads import TableOf
 from study.figures.kit.declaration import figure
 from study.figures.kit.options import Drawn, Methods, NothingToDraw, Scenes
-from study.tables.kit.reruns import FAILED, judged_runs
+from study.tables.kit.results import FAILED, judged_runs
 
 GAINS = (1.0, 1e5)  # limits of the gain axis; points outside are drawn on them
 ERRORS, LADDER_ERRORS = (1e-5, 1e2), (1e-4, 1e2)

@@ -21,7 +21,7 @@ from study.figures.kit.declaration import figure
 from study.figures.kit.elements import magnitudes
 from study.figures.kit.options import Drawn, Experiment, NothingToDraw, ReducedRuns
 from study.figures.sensitivity_floor import FLOORS, Floors
-from study.tables.kit.reruns import trained
+from study.tables.kit.results import trained
 
 NOISY = {"all": "all axes", "plane": "in the plane", "vertex": "one vertex across"}
 WRONG = 0.1  # relative error above which a run has failed; a run that cannot start has failed, too

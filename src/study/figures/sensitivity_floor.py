@@ -14,7 +14,7 @@ from study.artifact.reads import EachOf, Read, Setting
 from study.experiments.kit.settings import Horizon, floor_of, horizon
 from study.figures.kit.declaration import figure
 from study.figures.kit.options import Columns, Drawn, NothingToDraw, Scenes
-from study.tables.kit.reruns import TWIN
+from study.tables.kit.results import TWIN
 
 # Inputs of a figure that needs sensitivity floors.
 FLOORS: dict[str, Read] = {

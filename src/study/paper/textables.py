@@ -11,8 +11,7 @@ from pdrom.view.text import escape
 from study.figures.kit.declaration import declarations
 from study.paper.macros import format_number
 from study.tables.alternatives import CURVE
-from study.tables.kit.parts import in_words
-from study.tables.kit.reruns import MEDIAN, over_motions, trained
+from study.tables.kit.results import MEDIAN, in_words, over_motions, trained
 
 NONE = "--"
 LEFT = r">{\raggedright\arraybackslash}"

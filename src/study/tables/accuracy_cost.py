@@ -23,10 +23,15 @@ from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, Setting, TableOf
 from study.experiments.kit.settings import ANDERSON, FOM
-from study.tables.kit.declaration import flag, integer, number, table, text, timed
-from study.tables.kit.parts import joined, timings_in_one_time
-from study.tables.kit.reruns import COLUMNS, MEDIAN, trained, with_held_out
-from study.tables.kit.vocabulary import shared
+from study.tables.kit.declaration import flag, integer, number, shared, table, text, timed
+from study.tables.kit.results import (
+    COLUMNS,
+    MEDIAN,
+    joined,
+    timings_in_one_time,
+    trained,
+    with_held_out,
+)
 
 FEWER = "fewer-iterations"
 _MODEL = ["scene", "position_basis", "k", "method"]

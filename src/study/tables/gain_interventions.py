@@ -15,9 +15,8 @@ import pandas as pd
 
 from study.artifact.reads import TableOf
 from study.tables.kit.declaration import integer, number, table, text
-from study.tables.kit.reruns import families, judged_runs
+from study.tables.kit.results import RESAMPLES, SEED, families, judged_runs
 
-RESAMPLES, SEED = 2000, 1
 STEPS = {
     "whole elements for single entries": ("deim", "block-deim"),
     "three elements a mode for one": ("block-deim", "gappy"),

@@ -8,10 +8,8 @@ import pandas as pd
 from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, TableOf
-from study.tables.kit.declaration import integer, number, table, timed
-from study.tables.kit.parts import joined
-from study.tables.kit.reruns import FAILED, trained, with_held_out
-from study.tables.kit.vocabulary import shared
+from study.tables.kit.declaration import integer, number, shared, table, timed
+from study.tables.kit.results import FAILED, joined, trained, with_held_out
 
 # Columns that identify a curve, the rows that differ only in size r.
 CURVE = ["scene", "group", "method", "factor"]

@@ -10,8 +10,8 @@ from scipy.stats import binom
 from pdrom.core.store import write_table
 from study.artifact.paths import File
 from study.experiments.frame_times import COLUMNS
-from study.tables.kit.parts import in_one_time, in_words, median_interval
-from study.tables.sensitivity import repetitions
+from study.tables.errors import repetitions
+from study.tables.kit.results import in_one_time, in_words, median_interval
 from study.tables.speedups import frame_times, speedups
 
 VALUES = st.lists(st.floats(0.1, 10.0), min_size=1, max_size=12)

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from study.tables.kit.reruns import FAILED
+from study.tables.kit.results import FAILED
 from study.tables.payoff import payoff
 
 LABELS = ["scene", "group", "method", "position_basis", "k", "r"]

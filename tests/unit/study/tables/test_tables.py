@@ -18,10 +18,9 @@ from study.experiments.kit.settings import Horizon, floor_of
 from study.experiments.requested_tolerances import COLUMNS
 from study.tables.accuracy_cost import accuracy_cost, pareto, reference_of, requested_tolerances
 from study.tables.effects_cost import local_share
-from study.tables.kit.reruns import TRAIN, trained
-from study.tables.reconstruction_error import singular_values
+from study.tables.errors import sensitivity, singular_values
+from study.tables.kit.results import TRAIN, trained
 from study.tables.reduced_reruns import reduced_reruns
-from study.tables.sensitivity import sensitivity
 
 
 def written(path, *rows) -> File:
