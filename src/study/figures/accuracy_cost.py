@@ -1,7 +1,7 @@
 """Figure of the error of reduced models against their time per frame, by family of models."""
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -140,8 +140,8 @@ def draw_panel(ax: Axes, found: TradeOffs, scene: str, size: float = 3.0) -> Non
         for name, marker in found.members(family).items():
             own = part[part.member == name]
             hollow = own.position_basis == "skinning"
-            _points(ax, own[~hollow], colour, marker, size)
-            _points(ax, own[hollow], colour, marker, size, "none")
+            _points(ax, own[~hollow], size, colour, marker=marker)
+            _points(ax, own[hollow], size, colour, marker=marker, fillstyle="none")
         unbeaten = np.array(pareto(part[ERROR].to_list(), part[TIME].to_list()), dtype=bool)
         front = part[unbeaten].sort_values(TIME)
         heights = clipped(front[ERROR].to_numpy(float), LOW, HIGH)
@@ -160,18 +160,11 @@ def draw_panel(ax: Axes, found: TradeOffs, scene: str, size: float = 3.0) -> Non
         ax.axhline(np.clip(found.own_error[scene], LOW, HIGH), zorder=0, **BLIND)
 
 
-def _points(
-    ax: Axes,
-    rows: pd.DataFrame,
-    colour: str,
-    marker: str,
-    size: float,
-    fill: Literal["full", "none"] = "full",
-) -> None:
+def _points(ax: Axes, rows: pd.DataFrame, size: float, colour: str, **look: Any) -> None:
     error, time = rows[ERROR].to_numpy(float), rows[TIME].to_numpy(float)
     inside = (error >= LOW) & (error <= HIGH)
     common = {"linestyle": "none", "color": colour, "alpha": 0.75, "markeredgewidth": 0.9}
-    ax.plot(time[inside], error[inside], marker=marker, markersize=size, fillstyle=fill, **common)
+    ax.plot(time[inside], error[inside], markersize=size, **common, **look)
     for outside, rim, arrow in ((error < LOW, LOW, BELOW), (error > HIGH, HIGH, ABOVE)):
         if outside.any():
             at = np.full(outside.sum(), rim)

@@ -1,5 +1,7 @@
 """Figures of the cost of a run: phases, effects, larger meshes, reduced local steps."""
 
+from itertools import cycle
+
 import numpy as np
 import pandas as pd
 
@@ -239,13 +241,11 @@ def effects_contribution(
 
 def _looks(drawn: Drawn, rows: pd.DataFrame) -> Looks:
     """Colour and marker of each effect in ``rows``; groups look as in all other figures."""
-    known = drawn.looks
-    others = [effect for effect in dict.fromkeys(rows.effect) if effect not in known]
-    groups = {effect: known[effect] for effect in dict.fromkeys(rows.effect) if effect in known}
-    return groups | {
-        effect: (OTHERS[i % len(OTHERS)], MARKERS[i % len(MARKERS)])
-        for i, effect in enumerate(others)
-    }
+    known, effects = drawn.looks, list(dict.fromkeys(rows.effect))
+    others = [effect for effect in effects if effect not in known]
+    groups = {effect: known[effect] for effect in effects if effect in known}
+    looks = zip(cycle(OTHERS), cycle(MARKERS), strict=False)
+    return groups | dict(zip(others, looks, strict=False))
 
 
 def _draw_forces(ax: Axes, frames: pd.DataFrame, looks: Looks) -> None:

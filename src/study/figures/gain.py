@@ -133,17 +133,16 @@ def ladder(options: Scenes, table: pd.DataFrame) -> Figure:
         raise NothingToDraw("no scene that climbs the ladder")
     climbed = table[table.direction.isin(["up", "down"])]
     rungs = list(dict.fromkeys(zip(climbed.direction, climbed.rung, strict=True)))
-    scenes = list(dict.fromkeys(table.scene))
     figure = style.new_figure(0.2 * len(rungs) + 1.2)
     left, right = figure.subplots(1, 2, sharey=True)
     error = ("relative_error_within_horizon", "error_low", "error_high")
-    _draw_quantity(left, table, rungs, scenes, error, LADDER_ERRORS)
-    _draw_quantity(right, table, rungs, scenes, ("gain", "gain_low", "gain_high"), GAINS)
+    _draw_quantity(left, table, rungs, error, LADDER_ERRORS)
+    _draw_quantity(right, table, rungs, ("gain", "gain_low", "gain_high"), GAINS)
     left.set_xlabel("error of the rerun within the horizon (relative)")
     right.set_xlabel("gain of the interpolation")
     left.set_yticks(range(len(rungs)), [plain_words(rung) for _, rung in rungs])
     left.invert_yaxis()
-    handles = style.scene_handles(scenes)
+    handles = style.scene_handles(list(dict.fromkeys(table.scene)))
     handles.append(style.handle("range: training frames", color=style.GREY, linewidth=0.9))
     handles.append(style.handle("range: signs", color=style.GREY, linewidth=3.0, alpha=0.35))
     style.legend(figure, handles, 4)
@@ -154,13 +153,13 @@ def _draw_quantity(
     ax: Axes,
     table: pd.DataFrame,
     rungs: list[tuple[str, str]],
-    scenes: list[str],
     columns: tuple[str, str, str],
     limits: tuple[float, float],
 ) -> None:
     ax.set_xscale("log")
     ax.set_xlim(limits[0], limits[1] * 1.3)
     style.grid(ax)
+    scenes = list(dict.fromkeys(table.scene))
     for i, scene in enumerate(scenes):
         rows = table[table.scene == scene].set_index(["direction", "rung"])
         found, low, high = (

@@ -29,6 +29,7 @@ DISTANCES = (1e-4, 1.0)  # limits of the colour scale, in extents of the mesh
 FOOTER = 0.55  # height of the colour scale, inches
 TOLERANCE = "ecsw-1e-02"  # method of the position-subspace run in the first figure
 MODES = 20  # largest number of modes k of that subspace
+Files = list[File]
 RUNS: dict[str, Read] = {
     "meshes": EachOf(MESH, "experiments"),
     "full_order": EachOf(TRAIN, "experiments"),
@@ -85,10 +86,6 @@ class Shown:
         )
 
 
-class Teaser(ReducedRuns):
-    """Runs in the first figure."""
-
-
 @dataclass(frozen=True)
 class Runs:
     """Inputs of figures of runs: files of each scene, and ``reruns`` per scene and method."""
@@ -96,10 +93,10 @@ class Runs:
     options: ReducedRuns
     drawn: Drawn
     horizon: Horizon
-    meshes: list[File]
-    full_order: list[File]
-    reruns: list[File]
-    sensitivity: list[File]
+    meshes: Files
+    full_order: Files
+    reruns: Files
+    sensitivity: Files
 
     def __post_init__(self) -> None:
         if not self.drawn.experiments or not self.drawn.methods:
@@ -172,7 +169,7 @@ def obstacles_of(experiment: Experiment, positions: np.ndarray) -> list[Mesh] | 
 @figure(
     title="The bar, reduced", caption=f"Bars with tetrahedral constraints: {COMPARED}", reads=RUNS
 )
-def bar_runs(options: ReducedRuns, drawn: Drawn, horizon: Horizon, **files: list[File]) -> Figure:
+def bar_runs(options: ReducedRuns, drawn: Drawn, horizon: Horizon, **files: Files) -> Figure:
     """Draw full-order and reduced runs in rows, see `Runs.draw`."""
     return Runs(options, drawn, horizon, **files).draw()
 
@@ -183,9 +180,7 @@ def bar_runs(options: ReducedRuns, drawn: Drawn, horizon: Horizon, **files: list
     caption=f"Sheets with edge springs only: {COMPARED}",
     reads=RUNS,
 )
-def spring_runs(
-    options: ReducedRuns, drawn: Drawn, horizon: Horizon, **files: list[File]
-) -> Figure:
+def spring_runs(options: ReducedRuns, drawn: Drawn, horizon: Horizon, **files: Files) -> Figure:
     """Draw full-order and reduced runs in rows, see `Runs.draw`."""
     return Runs(options, drawn, horizon, **files).draw()
 
@@ -196,9 +191,7 @@ def spring_runs(
     caption=f"Sheets with triangle strain only: {COMPARED}",
     reads=RUNS,
 )
-def strain_runs(
-    options: ReducedRuns, drawn: Drawn, horizon: Horizon, **files: list[File]
-) -> Figure:
+def strain_runs(options: ReducedRuns, drawn: Drawn, horizon: Horizon, **files: Files) -> Figure:
     """Draw full-order and reduced runs in rows, see `Runs.draw`."""
     return Runs(options, drawn, horizon, **files).draw()
 
@@ -221,8 +214,8 @@ def bending_runs(
     drawn: Drawn,
     horizon: Horizon,
     noise: pd.DataFrame,
-    noise_runs: list[File],
-    **files: list[File],
+    noise_runs: Files,
+    **files: Files,
 ) -> Figure:
     """Draw reduced runs; if all projections are round-off, runs on bases of round-off, if any."""
     runs, rows = Runs(options, drawn, horizon, **files), []
@@ -285,9 +278,7 @@ def _alike(table: pd.DataFrame) -> dict[tuple[tuple[int, str], ...], list[str]]:
     ),
     reads=RUNS,
 )
-def cloth_all_grid(
-    options: ReducedRuns, drawn: Drawn, horizon: Horizon, **files: list[File]
-) -> Figure:
+def cloth_all_grid(options: ReducedRuns, drawn: Drawn, horizon: Horizon, **files: Files) -> Figure:
     """Draw a row per reduced group, below a row of the full-order run; methods side by side.
 
     Each method has a column per instant, a fraction of the scene's horizon. All pictures have the
@@ -377,12 +368,12 @@ def _colours() -> ScalarMappable:
     },
 )
 def teaser(
-    options: Teaser,
+    options: ReducedRuns,
     drawn: Drawn,
     horizon: Horizon,
-    subspaces: list[File],
+    subspaces: Files,
     errors: pd.DataFrame,
-    **files: list[File],
+    **files: Files,
 ) -> Figure:
     """Draw a row per experiment: the full order, a panel per method, a sampled subspace."""
     runs, errors = Runs(options, drawn, horizon, **files), trained(errors)

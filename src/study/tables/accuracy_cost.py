@@ -23,18 +23,12 @@ from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, Setting, TableOf
 from study.experiments.kit.settings import ANDERSON, FOM
+from study.tables.kit import results
 from study.tables.kit.declaration import flag, integer, number, shared, table, text, timed
-from study.tables.kit.results import (
-    COLUMNS,
-    MEDIAN,
-    joined,
-    timings_in_one_time,
-    trained,
-    with_held_out,
-)
 
 FEWER = "fewer-iterations"
 _MODEL = ["scene", "position_basis", "k", "method"]
+_POINT = ["relative_error_within_horizon", "ms_per_frame"]
 CONVERGED, OWN = "converged", "own iterations"
 
 
@@ -52,7 +46,7 @@ CONVERGED, OWN = "converged", "own iterations"
             "the horizon may have another reference, and in position subspaces",
             tolerance=0.05,
         ),
-        *COLUMNS,
+        *results.COLUMNS,
         timed(flag("pareto_heldout", "the same by the error held out; full order as it is")),
         *shared("velocity_error relative_shape_error energy_drift contact_delay"),
     ),
@@ -81,14 +75,15 @@ def accuracy_cost(
     ----------
     iterations : scene -> number K of local/global iterations per frame in the scene's settings
     """
-    times = timings_in_one_time(timings, frame_times)
+    times = results.timings_in_one_time(timings, frame_times)
     times = times[times.implementation == "compiled"]
     full = times[times.method.isna()].copy()
     full = full.assign(method="full", position_basis="full", relative_error_within_horizon=0.0)
-    sweep = _sweep(joined(sweeps), times)
-    points = trained(reruns).dropna(subset=["relative_error_within_horizon", "ms_per_frame"])
-    points = with_held_out(points.assign(iterations=points.scene.map(iterations)), reruns)
-    known = joined(models).reindex(columns=[*_MODEL, "error_converged"]).astype({"k": "Int64"})
+    sweep = _sweep(results.joined(sweeps), times)
+    points = results.trained(reruns).dropna(subset=_POINT)
+    points = results.with_held_out(points.assign(iterations=points.scene.map(iterations)), reruns)
+    known = results.joined(models).reindex(columns=[*_MODEL, "error_converged"])
+    known = known.astype({"k": "Int64"})
     points = points.merge(known, on=_MODEL, how="left")
     own = sweep[sweep.method == FOM].set_index(["scene", "iterations"]).error_converged
     full["error_converged"] = [own.get((scene, iterations[scene]), np.nan) for scene in full.scene]
@@ -97,7 +92,7 @@ def accuracy_cost(
     # "full" is also the method name of models that reduce the positions but not the projections
     unreduced = (points.method == "full") & (points.position_basis == "full")
     reduced = points.method.isin(reruns.method) & ~unreduced
-    unseen = points[MEDIAN].where(reduced, points.relative_error_within_horizon)
+    unseen = points[results.MEDIAN].where(reduced, points.relative_error_within_horizon)
     errors = {"pareto": points.relative_error_within_horizon, "pareto_heldout": unseen}
     for name, error in errors.items():
         points[name] = False
@@ -123,7 +118,7 @@ def _sweep(errors: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
     fewer = errors[early].assign(method=FEWER, relative_error_within_horizon=errors.error_scene)
     points = pd.concat([every, fewer], ignore_index=True)
     points = points.assign(position_basis="full", k=None, r=None)
-    return points.dropna(subset=["relative_error_within_horizon", "ms_per_frame"])
+    return points.dropna(subset=_POINT)
 
 
 def reference_of(points: pd.DataFrame) -> pd.Series:
@@ -173,7 +168,7 @@ def pareto(error: Sequence[float], cost: Sequence[float]) -> list[bool]:
 )
 def requested_tolerances(runs: list[File]) -> pd.DataFrame:
     """Rows of all scenes, one per run with a requested tolerance, from the files ``runs``."""
-    rows = joined(runs)
+    rows = results.joined(runs)
     if rows.empty:
         return rows
     met = rows.frames > 0
