@@ -200,16 +200,14 @@ def handles(found: TradeOffs) -> list[Block]:
 
 @figure(
     title="What accuracy costs in time",
-    caption=(
-        "Error within the horizon against the time per frame of every reduced model, and of the "
-        "full-order run with fewer iterations $K$; both against the scene's own full-order run, "
-        "whose time is the vertical line. A colour is a family of models, a marker one of its "
-        "members (one for all tolerances; hollow: in a subspace of skinning weights), a line the "
-        "best trade-offs within the family: further down and further left is better. "
-        "The horizontal line is the full-order run's own error, against the converged one: "
-        "errors below it cannot be seen. Arrows on the rim are errors outside the axis, crosses "
-        "runs that blew up. Below, a scene for each other constraint group."
-    ),
+    caption="""Error within the horizon against the time per frame of every reduced model, and of
+    the full-order run with fewer iterations $K$; both against the scene's own full-order run, whose
+    time is the vertical line. A colour is a family of models, a marker one of its members (one for
+    all tolerances; hollow: in a subspace of skinning weights), a line the best trade-offs within
+    the family: further down and further left is better. The horizontal line is the full-order run's
+    own error, against the converged one: errors below it cannot be seen. Arrows on the rim are
+    errors outside the axis, crosses runs that blew up. Below, a scene for each other constraint
+    group.""",
     reads={"table": TableOf("accuracy_cost"), "runs": TableOf("reduced_reruns")},
 )
 def accuracy_cost(

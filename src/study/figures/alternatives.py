@@ -37,15 +37,13 @@ LOOKS = {
 
 @figure(
     title="Alternatives to projective dynamics",
-    caption=(
-        "Error against time per frame on the first held-out motion, the best points of each "
-        "method. Left of each pair the error against the implicit step of 16 ms solved to "
-        "convergence, right the total error, against the motion in continuous time; the dashed "
-        "line is the converged implicit step itself. Filled markers: one step a frame with more "
-        "iterations; hollow ones: the frame divided into substeps. The reduction (ecsw) was "
-        "trained on another motion, on its frames as they are or converged. "
-        "$\\times 100$: the same scene with stiffer weights. Errors outside are drawn on the rim."
-    ),
+    caption="""Error against time per frame on the first held-out motion, the best points of each
+    method. Left of each pair the error against the implicit step of 16 ms solved to convergence,
+    right the total error, against the motion in continuous time; the dashed line is the converged
+    implicit step itself. Filled markers: one step a frame with more iterations; hollow ones: the
+    frame divided into substeps. The reduction (ecsw) was trained on another motion, on its frames
+    as they are or converged. $\\times 100$: the same scene with stiffer weights. Errors outside are
+    drawn on the rim.""",
     reads={"table": TableOf("alternatives")},
 )
 def alternatives(options: Scenes, table: pd.DataFrame) -> Figure:
@@ -99,12 +97,10 @@ def best_points(rows: pd.DataFrame) -> pd.DataFrame:
 
 @figure(
     title="Requested tolerances and errors reached",
-    caption=(
-        "A dot for each scene and held-out motion. Left: the error that a run reached against the "
-        "tolerance that was requested; dots of met tolerances above their line are broken. Right: "
-        "its time over that of a frame with the scene's own iterations, checks and failed levels "
-        "included. What lies outside is drawn on the rim."
-    ),
+    caption="""A dot for each scene and held-out motion. Left: the error that a run reached against
+    the tolerance that was requested; dots of met tolerances above their line are broken. Right: its
+    time over that of a frame with the scene's own iterations, checks and failed levels included.
+    What lies outside is drawn on the rim.""",
     reads={"table": TableOf("requested_tolerances")},
 )
 def requested_tolerances(options: Options, table: pd.DataFrame) -> Figure:

@@ -21,13 +21,11 @@ _KEYS = ["scene", "group", "method", "r"]
 
 @figure(
     title="Error of the run against the gain",
-    caption=(
-        "Left: every run of a sampled method whose basis suffices (the orthogonal projection does "
-        "not fail at the same size), over all scenes and sizes. Dashed: the error from which on a "
-        "run counts as failed. Arrows on the rim lie outside the axes. Crosses: range and median "
-        "over runs, in some scenes, that are trained on as many resampled frames. Right: how many "
-        "of them failed, by decade of the gain."
-    ),
+    caption="""Left: every run of a sampled method whose basis suffices (the orthogonal projection
+    does not fail at the same size), over all scenes and sizes. Dashed: the error from which on a
+    run counts as failed. Arrows on the rim lie outside the axes. Crosses: range and median over
+    runs, in some scenes, that are trained on as many resampled frames. Right: how many of them
+    failed, by decade of the gain.""",
     reads={
         "reruns": TableOf("reduced_reruns"),
         "errors": TableOf("reconstruction_error"),
@@ -109,14 +107,12 @@ def _draw_decades(ax: Axes, runs: pd.DataFrame) -> None:
 
 @figure(
     title="One choice after the other",
-    caption=(
-        "Above the line one ingredient after the other is changed, from the published code to "
-        "whole elements with oversampling; below it each row takes a single ingredient away from "
-        "the complete method or exchanges it. Left the error of the rerun within the horizon, "
-        "right the gain of the interpolation; what blew up or is singular lies on the right rim. "
-        "Bars show the range over runs that are trained on as many resampled frames, on some "
-        "scenes; pale ones that over choices of the arbitrary signs of the singular vectors."
-    ),
+    caption="""Above the line one ingredient after the other is changed, from the published code to
+    whole elements with oversampling; below it each row takes a single ingredient away from the
+    complete method or exchanges it. Left the error of the rerun within the horizon, right the gain
+    of the interpolation; what blew up or is singular lies on the right rim. Bars show the range
+    over runs that are trained on as many resampled frames, on some scenes; pale ones that over
+    choices of the arbitrary signs of the singular vectors.""",
     reads={"table": TableOf("ladder")},
 )
 def ladder(options: Scenes, table: pd.DataFrame) -> Figure:

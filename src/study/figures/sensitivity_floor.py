@@ -75,12 +75,10 @@ class Floored(Scenes):
 
 @figure(
     title="Sensitivity floor and horizon",
-    caption=(
-        "How far full-order runs drift apart whose initial positions differ by "
-        "{sensitivity.reference} of the extent. The horizon, given in the legends, is the first "
-        "frame above the threshold of {sensitivity.threshold}: beyond it a reduced run cannot be "
-        "judged by its error. Dashed lines are twins, scenes that end before."
-    ),
+    caption="""How far full-order runs drift apart whose initial positions differ by
+    {sensitivity.reference} of the extent. The horizon, given in the legends, is the first frame
+    above the threshold of {sensitivity.threshold}: beyond it a reduced run cannot be judged by its
+    error. Dashed lines are twins, scenes that end before.""",
     reads={**FLOORS},
 )
 def sensitivity_floor(

@@ -33,13 +33,11 @@ class Snapshots(View):
 @figure(
     number=1,
     title="Snapshots of the projections and their modes",
-    caption=(
-        "The snapshots of one constraint group, a column each, less their mean, are the product of "
-        "modes, singular values (a diagonal, dark where large) and coefficients; red entries are "
-        "positive, blue ones negative. Below, columns of the first matrix on the moving mesh and "
-        "the first modes on the mesh at rest: an element has the colour of one of its entries, "
-        "whose axis and row are named, relative to the largest."
-    ),
+    caption="""The snapshots of one constraint group, a column each, less their mean, are the
+    product of modes, singular values (a diagonal, dark where large) and coefficients; red entries
+    are positive, blue ones negative. Below, columns of the first matrix on the moving mesh and the
+    first modes on the mesh at rest: an element has the colour of one of its entries, whose axis and
+    row are named, relative to the largest.""",
     reads={
         "meshes": EachOf(MESH, "first_run"),
         "full_order": EachOf(TRAIN, "first_run"),

@@ -103,6 +103,7 @@ def figure(
     """Return a decorator that declares a function, called with ``options`` and inputs, as a figure.
 
     A function with a parameter ``drawn`` also gets the part of the study selected by the options.
+    Line breaks in the caption count as blanks.
 
     Raises
     ------
@@ -115,7 +116,8 @@ def figure(
         writes = {"pdf": FIGURE.where(name=name), "png": FIGURE_PICTURE.where(name=name)}
         drawn = {"drawn": Settings(Drawn)} if "drawn" in function.__annotations__ else {}
         given = {"options": Setting("options"), **drawn, **reads}
-        made = Declaration(name, title, given, writes, function, caption=caption, number=number)
+        words = " ".join(caption.split())
+        made = Declaration(name, title, given, writes, function, caption=words, number=number)
         return declare(made)
 
     return decorate
