@@ -36,10 +36,9 @@ RUNS: dict[str, Read] = {
     "reruns": EachOf(RERUNS, "runs"),
     **FLOORS,
 }
-COMPARED = (
-    "full order against reduced projections, by basis size. The grey outline is the full-order run "
-    "at the same instant; a framed picture is drawn to the smaller scale given below it."
-)
+COMPARED = """full order against reduced projections, by basis size. The grey outline is the
+full-order run at the same instant; a framed picture is drawn to the smaller scale given below it.
+"""
 
 
 @dataclass(frozen=True)

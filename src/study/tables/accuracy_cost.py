@@ -1,13 +1,8 @@
 """Tables of error against time: each method and size as a point, and requested tolerances.
 
-The error of a point has one of two references; only rows with the same reference are comparable:
-
-=================  ==================================================================
-method             error against
-=================  ==================================================================
-fom, fom-anderson  the full-order run whose frames are converged (K -> infinity)
-every other        the scene's own full-order run, which has finitely many iterations
-=================  ==================================================================
+The error of a point has one of two references; only rows with the same reference are comparable.
+The reference of ``fom`` and ``fom-anderson`` is the full-order run whose frames are converged
+(K -> infinity), of every other method the scene's own full-order run with finitely many iterations.
 
 Among the other methods, ``full`` without a position subspace is the scene's own full-order run,
 with error zero by definition. ``fewer-iterations`` is the full-order run with fewer iterations,

@@ -103,6 +103,8 @@ text = partial(Column, "text")
 integer = partial(Column, "integer")
 flag = partial(Column, "flag")
 number = partial(Column, "number")
+# Constructor of columns that count runs or scenes: several may differ between machines.
+count = partial(integer, compared="share")
 
 
 def timed(column: Column) -> Column:
@@ -246,18 +248,13 @@ class Table(Artifact):
 
 
 def table(
-    *,
-    title: str,
-    columns: Sequence[Column],
-    reads: Mapping[str, Read],
-    timed_cells: TimedCells | None = None,
-    only_with_error: bool = False,
+    *, title: str, columns: Sequence[Column], reads: Mapping[str, Read], **more: Any
 ) -> Callable[[Callable[..., pd.DataFrame]], Table]:
     """Return a decorator that declares a function as the computation of the table of its name.
 
     Parameters
     ----------
-    timed_cells, only_with_error : see `Table`
+    more : values of the fields ``timed_cells`` and ``only_with_error`` of `Table`
 
     Raises
     ------
@@ -268,10 +265,7 @@ def table(
     def decorate(function: Callable[..., pd.DataFrame]) -> Table:
         name = function.__name__
         writes = {"table": TABLE.where(name=name)}
-        made = Table(
-            name, title, reads, writes, function, columns=tuple(columns), timed_cells=timed_cells,
-            only_with_error=only_with_error,
-        )  # fmt: skip
+        made = Table(name, title, reads, writes, function, columns=tuple(columns), **more)
         names = made.column_names
         if twice := sorted({column for column in names if names.count(column) > 1}):
             raise TypeError(f"table {name}: column(s) declared twice: {', '.join(twice)}")
