@@ -23,7 +23,7 @@ Panel = tuple[Axes, Experiment, pd.DataFrame]
 
 
 class Reconstruction(Beside, Methods):
-    """Options: scenes, methods and scenes of the published code."""
+    """Options: scenes, methods, panels per row, and experiments of the published code."""
 
 
 def _panels(

@@ -43,7 +43,7 @@ class Declaration(Artifact):
 
     The function gets its inputs and ``options``, whose type defines the keys and defaults of the
     figure in config/figures.yaml. It raises `NothingToDraw` if the configuration has no data for
-    it, and StorageError for a damaged file.
+    the figure, and StorageError for a damaged file.
 
     title, caption : text in light mark-up (`study.artifact.markup`); ``{key}`` in a caption names
         a setting of the configuration
@@ -145,7 +145,7 @@ def write_figure(
 
 @cache
 def declarations() -> dict[str, Declaration]:
-    """Return figures by name: figures of the preprint by number there, then the others by name.
+    """Return figures by name, first those of the preprint in its order, then the others by name.
 
     Raises
     ------

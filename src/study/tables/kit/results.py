@@ -1,9 +1,9 @@
 """Rows of experiment results in comparable times, runs of reduced_reruns, medians over motions.
 
 Each job times the full-order run of its scene together with the variants, but machine speed differs
-between jobs. To give the full-order run one time, all times of a job are multiplied by the scene's
-time in the table frame_times over the job's own time of its full-order run. Ratios within a job
-do not change.
+between jobs. All times of a job are multiplied by the time of the full-order run in the table
+frame_times over its time in the job, so that this run has the same time everywhere. Ratios of times
+within a job do not change.
 
 Errors over held-out motions are summarised by their median, as fixed in config/claims.yaml.
 """
