@@ -17,7 +17,7 @@ from study.figures.stability_map import LOOKS
 from study.pipeline.front import completed
 from study.pipeline.study import StudySettings
 from study.tables import declared
-from study.tables.kit.reruns import trained
+from study.tables.kit.results import trained
 from study.verification.bundle import parser as bundle_parser
 from study.verification.command import parser as verify_parser
 from study.verification.references import folder_of, read_reference

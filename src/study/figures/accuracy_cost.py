@@ -1,7 +1,7 @@
 """Figure of the error of reduced models against their time per frame, by family of models."""
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -140,8 +140,8 @@ def draw_panel(ax: Axes, found: TradeOffs, scene: str, size: float = 3.0) -> Non
         for name, marker in found.members(family).items():
             own = part[part.member == name]
             hollow = own.position_basis == "skinning"
-            _points(ax, own[~hollow], colour, marker, size)
-            _points(ax, own[hollow], colour, marker, size, "none")
+            _points(ax, own[~hollow], size, colour, marker=marker)
+            _points(ax, own[hollow], size, colour, marker=marker, fillstyle="none")
         unbeaten = np.array(pareto(part[ERROR].to_list(), part[TIME].to_list()), dtype=bool)
         front = part[unbeaten].sort_values(TIME)
         heights = clipped(front[ERROR].to_numpy(float), LOW, HIGH)
@@ -160,18 +160,11 @@ def draw_panel(ax: Axes, found: TradeOffs, scene: str, size: float = 3.0) -> Non
         ax.axhline(np.clip(found.own_error[scene], LOW, HIGH), zorder=0, **BLIND)
 
 
-def _points(
-    ax: Axes,
-    rows: pd.DataFrame,
-    colour: str,
-    marker: str,
-    size: float,
-    fill: Literal["full", "none"] = "full",
-) -> None:
+def _points(ax: Axes, rows: pd.DataFrame, size: float, colour: str, **look: Any) -> None:
     error, time = rows[ERROR].to_numpy(float), rows[TIME].to_numpy(float)
     inside = (error >= LOW) & (error <= HIGH)
     common = {"linestyle": "none", "color": colour, "alpha": 0.75, "markeredgewidth": 0.9}
-    ax.plot(time[inside], error[inside], marker=marker, markersize=size, fillstyle=fill, **common)
+    ax.plot(time[inside], error[inside], markersize=size, **common, **look)
     for outside, rim, arrow in ((error < LOW, LOW, BELOW), (error > HIGH, HIGH, ABOVE)):
         if outside.any():
             at = np.full(outside.sum(), rim)
@@ -207,20 +200,15 @@ def handles(found: TradeOffs) -> list[Block]:
 
 @figure(
     title="What accuracy costs in time",
-    caption=(
-        "Error within the horizon against the time per frame of every reduced model, and of the "
-        "full-order run with fewer iterations $K$; both against the scene's own full-order run, "
-        "whose time is the vertical line. A colour is a family of models, a marker one of its "
-        "members (one for all tolerances; hollow: in a subspace of skinning weights), a line the "
-        "best trade-offs within the family: further down and further left is better. "
-        "The horizontal line is the full-order run's own error, against the converged one: "
-        "errors below it cannot be seen. Arrows on the rim are errors outside the axis, crosses "
-        "runs that blew up. Below, a scene for each other constraint group."
-    ),
-    reads={
-        "table": TableOf("accuracy_cost"),
-        "runs": TableOf("reduced_reruns"),
-    },
+    caption="""Error within the horizon against the time per frame of every reduced model, and of
+    the full-order run with fewer iterations $K$; both against the scene's own full-order run, whose
+    time is the vertical line. A colour is a family of models, a marker one of its members (one for
+    all tolerances; hollow: in a subspace of skinning weights), a line the best trade-offs within
+    the family: further down and further left is better. The horizontal line is the full-order run's
+    own error, against the converged one: errors below it cannot be seen. Arrows on the rim are
+    errors outside the axis, crosses runs that blew up. Below, a scene for each other constraint
+    group.""",
+    reads={"table": TableOf("accuracy_cost"), "runs": TableOf("reduced_reruns")},
 )
 def accuracy_cost(
     options: Methods, drawn: Drawn, table: pd.DataFrame, runs: pd.DataFrame

@@ -4,17 +4,8 @@ import numpy as np
 import pandas as pd
 
 from pdrom.model.held_out import FIRST
-from pdrom.view import style
+from pdrom.view import multiples, style
 from pdrom.view.artists import Axes, Figure
-from pdrom.view.multiples import (
-    clipped,
-    label_outer,
-    log_axes,
-    log_axis,
-    panels,
-    rows_of,
-    time_axis,
-)
 from study.artifact.reads import TableOf
 from study.experiments.alternatives.settings import ACCELERATED, CONVERGED, REDUCED, TWO_LEVEL
 from study.figures.kit.declaration import figure
@@ -42,15 +33,13 @@ LOOKS = {
 
 @figure(
     title="Alternatives to projective dynamics",
-    caption=(
-        "Error against time per frame on the first held-out motion, the best points of each "
-        "method. Left of each pair the error against the implicit step of 16 ms solved to "
-        "convergence, right the total error, against the motion in continuous time; the dashed "
-        "line is the converged implicit step itself. Filled markers: one step a frame with more "
-        "iterations; hollow ones: the frame divided into substeps. The reduction (ecsw) was "
-        "trained on another motion, on its frames as they are or converged. "
-        "$\\times 100$: the same scene with stiffer weights. Errors outside are drawn on the rim."
-    ),
+    caption="""Error against time per frame on the first held-out motion, the best points of each
+    method. Left of each pair the error against the implicit step of 16 ms solved to convergence,
+    right the total error, against the motion in continuous time; the dashed line is the converged
+    implicit step itself. Filled markers: one step a frame with more iterations; hollow ones: the
+    frame divided into substeps. The reduction (ecsw) was trained on another motion, on its frames
+    as they are or converged. $\\times 100$: the same scene with stiffer weights. Errors outside are
+    drawn on the rim.""",
     reads={"table": TableOf("alternatives")},
 )
 def alternatives(options: Scenes, table: pd.DataFrame) -> Figure:
@@ -60,11 +49,11 @@ def alternatives(options: Scenes, table: pd.DataFrame) -> Figure:
     if not cases:
         raise NothingToDraw("no alternatives")
     beside = min(PAIRS, len(cases))
-    figure = style.new_figure(1.55 * rows_of(len(cases), beside) + 0.75)
-    axes = panels(figure, 2 * len(cases), 2 * beside, sharey=True)
+    figure = style.new_figure(1.55 * multiples.rows_of(len(cases), beside) + 0.75)
+    axes = multiples.panels(figure, 2 * len(cases), 2 * beside, sharey=True)
     for (labels, case), *pair in zip(cases, axes[::2], axes[1::2], strict=True):
         _draw_case(pair, labels, case)
-    label_outer(axes, 2 * beside, "ms a frame", y="relative error")
+    multiples.label_outer(axes, 2 * beside, "ms a frame", y="relative error")
     drawn = {label: look for m, (label, *look) in LOOKS.items() if (table.method == m).any()}
     style.legend(figure, style.handles(drawn, markersize=4), 4)
     return figure
@@ -75,8 +64,8 @@ def _draw_case(pair: list[Axes], labels: tuple[str, int, float], case: pd.DataFr
     stiff = "" if stiffness == 1.0 else rf" $\times {stiffness:g}$"
     name = f"{style.words(scene)}{stiff}, {vertices:,} vertices"
     for ax, reference in zip(pair, ("implicit", "continuous"), strict=True):
-        log_axis(ax, LOW, HIGH)
-        time_axis(ax, case.ms_per_frame.to_numpy(float))
+        multiples.log_axis(ax, LOW, HIGH)
+        multiples.time_axis(ax, case.ms_per_frame.to_numpy(float))
         kind = "implicit step" if reference == "implicit" else "total error"
         ax.set_title(f"{name}\n{kind}", fontsize=7)
         rows = case.assign(error=case[f"error_{reference}"]).dropna(subset="error")
@@ -85,7 +74,7 @@ def _draw_case(pair: list[Axes], labels: tuple[str, int, float], case: pd.DataFr
             ax.axhline(own.error.iloc[0], color="#555555", linestyle="--", linewidth=0.8)
         for method, (_, colour, marker) in LOOKS.items():
             points = best_points(rows[rows.method == method])
-            errors = clipped(points.error.to_numpy(float), LOW, HIGH)
+            errors = multiples.clipped(points.error.to_numpy(float), LOW, HIGH)
             ax.plot(points.ms_per_frame, errors, color=colour, linewidth=0.9)
             divided = (points.substeps > 1).to_numpy(bool)
             for chosen, face in ((~divided, colour), (divided, "white")):
@@ -104,12 +93,10 @@ def best_points(rows: pd.DataFrame) -> pd.DataFrame:
 
 @figure(
     title="Requested tolerances and errors reached",
-    caption=(
-        "A dot for each scene and held-out motion. Left: the error that a run reached against the "
-        "tolerance that was requested; dots of met tolerances above their line are broken. Right: "
-        "its time over that of a frame with the scene's own iterations, checks and failed levels "
-        "included. What lies outside is drawn on the rim."
-    ),
+    caption="""A dot for each scene and held-out motion. Left: the error that a run reached against
+    the tolerance that was requested; dots of met tolerances above their line are broken. Right: its
+    time over that of a frame with the scene's own iterations, checks and failed levels included.
+    What lies outside is drawn on the rim.""",
     reads={"table": TableOf("requested_tolerances")},
 )
 def requested_tolerances(options: Options, table: pd.DataFrame) -> Figure:
@@ -129,8 +116,8 @@ def requested_tolerances(options: Options, table: pd.DataFrame) -> Figure:
             looks[kind] = (colour, "o")
         dots(left, shift * own.tolerance, own.error, REACHED, colour)
         dots(right, shift * own.tolerance, own.over_own, TIMES, colour)
-    log_axes(left, TOLERANCES, REACHED)
-    log_axes(right, TOLERANCES, TIMES)
+    multiples.log_axes(left, TOLERANCES, REACHED)
+    multiples.log_axes(right, TOLERANCES, TIMES)
     for tolerance in table.tolerance.unique():
         ends = [0.78 * tolerance, 1.28 * tolerance]
         left.plot(ends, [tolerance, tolerance], color="#333333", linewidth=1.2)
@@ -152,6 +139,6 @@ def dots(
     """
     if not values.empty:
         ax.plot(
-            tolerances, clipped(np.asarray(values, float), *limits), "o",
+            tolerances, multiples.clipped(np.asarray(values, float), *limits), "o",
             markersize=3.0, color=colour, alpha=0.7, clip_on=False,
         )  # fmt: skip

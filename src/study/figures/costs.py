@@ -1,5 +1,7 @@
 """Figures of the cost of a run: phases, effects, larger meshes, reduced local steps."""
 
+from itertools import cycle
+
 import numpy as np
 import pandas as pd
 
@@ -50,14 +52,12 @@ class BreakEven(Methods):
 
 @figure(
     title="Where the time of a frame goes",
-    caption=(
-        "Share of the local step and of the global solve in the time of a full-order frame, for "
-        "three implementations of the same local step. The printed number is the share of the "
-        "local step, that is of both shades of orange: the projections and the right-hand side "
-        "that is assembled from them, in one pass where they are compiled. The dashed line is the "
-        "70 % of claim C1; beside the bar stands the time per frame. An interpreted loop confirms "
-        "the claim everywhere, compiled code only where projections are expensive."
-    ),
+    caption="""Share of the local step and of the global solve in the time of a full-order frame,
+    for three implementations of the same local step. The printed number is the share of the local
+    step, that is of both shades of orange: the projections and the right-hand side that is
+    assembled from them, in one pass where they are compiled. The dashed line is the 70 % of claim
+    C1; beside the bar stands the time per frame. An interpreted loop confirms the claim everywhere,
+    compiled code only where projections are expensive.""",
     reads={"table": TableOf("local_share")},
 )
 def local_share(options: Scenes, drawn: Drawn, table: pd.DataFrame) -> Figure:
@@ -103,14 +103,11 @@ def _draw_bars(ax: Axes, rows: pd.DataFrame, scenes: list[str]) -> None:
 
 @figure(
     title="Cost against mesh size",
-    caption=(
-        "Time of one local/global iteration against the number of vertices: the full-order "
-        "run, the same with only the local step reduced, and the hyper-reduced run in a position "
-        "subspace, with the positions of all vertices as a line of its own. Beside "
-        "the ends of curves stands the exponent of a fitted power law, where there are three sizes "
-        "of the mesh or more. Assembly and "
-        "factorisation before the first frame are in the table `scaling`."
-    ),
+    caption="""Time of one local/global iteration against the number of vertices: the full-order
+    run, the same with only the local step reduced, and the hyper-reduced run in a position
+    subspace, with the positions of all vertices as a line of its own. Beside the ends of curves
+    stands the exponent of a fitted power law, where there are three sizes of the mesh or more.
+    Assembly and factorisation before the first frame are in the table `scaling`.""",
     reads={"table": TableOf("scaling")},
 )
 def scaling(options: Scenes, drawn: Drawn, table: pd.DataFrame) -> Figure:
@@ -165,12 +162,10 @@ def _draw_times(ax: Axes, rows: pd.DataFrame) -> None:
 
 @figure(
     title="When a reduced local step stops paying",
-    caption=(
-        "Time of the reduced local step over that of the full one, both compiled and on one "
-        "thread, against the number $r$ of basis vectors; one line per scene and method, timed "
-        "alone on states of the full-order run. Above the dashed line the reduction costs more "
-        "than all projections. Lines end at the numerical rank."
-    ),
+    caption="""Time of the reduced local step over that of the full one, both compiled and on one
+    thread, against the number $r$ of basis vectors; one line per scene and method, timed alone on
+    states of the full-order run. Above the dashed line the reduction costs more than all
+    projections. Lines end at the numerical rank.""",
     reads={"table": TableOf("breakeven")},
 )
 def break_even(options: BreakEven, drawn: Drawn, table: pd.DataFrame) -> Figure:
@@ -204,18 +199,12 @@ def break_even(options: BreakEven, drawn: Drawn, table: pd.DataFrame) -> Figure:
 
 @figure(
     title="What each effect contributes",
-    caption=(
-        "Left: norm of the force of each effect on the free vertices over the frames of a scene "
-        "(of a hold: on the vertices that it holds). Right: how far the run moves "
-        "when an effect is left out, before the horizon; the grey bar ends at the "
-        "sensitivity floor, below which nothing can be told from round-off. Open markers "
-        "lie below the floor, at the left edge where nothing changes at all. The only group of a "
-        "scene cannot be left out."
-    ),
-    reads={
-        "table": TableOf("effects_cost"),
-        "contributions": EachOf(CONTRIBUTIONS, "experiments"),
-    },
+    caption="""Left: norm of the force of each effect on the free vertices over the frames of a
+    scene (of a hold: on the vertices that it holds). Right: how far the run moves when an effect is
+    left out, before the horizon; the grey bar ends at the sensitivity floor, below which nothing
+    can be told from round-off. Open markers lie below the floor, at the left edge where nothing
+    changes at all. The only group of a scene cannot be left out.""",
+    reads={"table": TableOf("effects_cost"), "contributions": EachOf(CONTRIBUTIONS, "experiments")},
 )
 def effects_contribution(
     options: Scenes, drawn: Drawn, table: pd.DataFrame, contributions: list[File]
@@ -243,13 +232,11 @@ def effects_contribution(
 
 def _looks(drawn: Drawn, rows: pd.DataFrame) -> Looks:
     """Colour and marker of each effect in ``rows``; groups look as in all other figures."""
-    known = drawn.looks
-    others = [effect for effect in dict.fromkeys(rows.effect) if effect not in known]
-    groups = {effect: known[effect] for effect in dict.fromkeys(rows.effect) if effect in known}
-    return groups | {
-        effect: (OTHERS[i % len(OTHERS)], MARKERS[i % len(MARKERS)])
-        for i, effect in enumerate(others)
-    }
+    known, effects = drawn.looks, list(dict.fromkeys(rows.effect))
+    others = [effect for effect in effects if effect not in known]
+    groups = {effect: known[effect] for effect in effects if effect in known}
+    looks = zip(cycle(OTHERS), cycle(MARKERS), strict=False)
+    return groups | dict(zip(others, looks, strict=False))
 
 
 def _draw_forces(ax: Axes, frames: pd.DataFrame, looks: Looks) -> None:
@@ -287,12 +274,10 @@ def _draw_moved(ax: Axes, rows: pd.DataFrame, scenes: list[str], looks: Looks) -
 
 @figure(
     title="What each effect costs",
-    caption=(
-        "Left: share of each effect in the time of a full-order frame, which is printed beside "
-        "the bar. Right: the frame of one scene built without some of its effects; the tick is "
-        "the whole less what these effects cost in it. A bar that ends at the tick pays nothing "
-        "for what the scene does not list."
-    ),
+    caption="""Left: share of each effect in the time of a full-order frame, which is printed beside
+    the bar. Right: the frame of one scene built without some of its effects; the tick is the whole
+    less what these effects cost in it. A bar that ends at the tick pays nothing for what the scene
+    does not list.""",
     reads={"table": TableOf("effects_cost")},
 )
 def effects_cost(options: Scenes, drawn: Drawn, table: pd.DataFrame) -> Figure:

@@ -10,7 +10,7 @@ from pdrom.view.text import plain_words
 from study.artifact.reads import TableOf
 from study.figures.kit.declaration import figure
 from study.figures.kit.options import Drawn, Methods, NothingToDraw, Scenes
-from study.tables.kit.reruns import FAILED, judged_runs
+from study.tables.kit.results import FAILED, judged_runs
 
 GAINS = (1.0, 1e5)  # limits of the gain axis; points outside are drawn on them
 ERRORS, LADDER_ERRORS = (1e-5, 1e2), (1e-4, 1e2)
@@ -21,13 +21,11 @@ _KEYS = ["scene", "group", "method", "r"]
 
 @figure(
     title="Error of the run against the gain",
-    caption=(
-        "Left: every run of a sampled method whose basis suffices (the orthogonal projection does "
-        "not fail at the same size), over all scenes and sizes. Dashed: the error from which on a "
-        "run counts as failed. Arrows on the rim lie outside the axes. Crosses: range and median "
-        "over runs, in some scenes, that are trained on as many resampled frames. Right: how many "
-        "of them failed, by decade of the gain."
-    ),
+    caption="""Left: every run of a sampled method whose basis suffices (the orthogonal projection
+    does not fail at the same size), over all scenes and sizes. Dashed: the error from which on a
+    run counts as failed. Arrows on the rim lie outside the axes. Crosses: range and median over
+    runs, in some scenes, that are trained on as many resampled frames. Right: how many of them
+    failed, by decade of the gain.""",
     reads={
         "reruns": TableOf("reduced_reruns"),
         "errors": TableOf("reconstruction_error"),
@@ -109,14 +107,12 @@ def _draw_decades(ax: Axes, runs: pd.DataFrame) -> None:
 
 @figure(
     title="One choice after the other",
-    caption=(
-        "Above the line one ingredient after the other is changed, from the published code to "
-        "whole elements with oversampling; below it each row takes a single ingredient away from "
-        "the complete method or exchanges it. Left the error of the rerun within the horizon, "
-        "right the gain of the interpolation; what blew up or is singular lies on the right rim. "
-        "Bars show the range over runs that are trained on as many resampled frames, on some "
-        "scenes; pale ones that over choices of the arbitrary signs of the singular vectors."
-    ),
+    caption="""Above the line one ingredient after the other is changed, from the published code to
+    whole elements with oversampling; below it each row takes a single ingredient away from the
+    complete method or exchanges it. Left the error of the rerun within the horizon, right the gain
+    of the interpolation; what blew up or is singular lies on the right rim. Bars show the range
+    over runs that are trained on as many resampled frames, on some scenes; pale ones that over
+    choices of the arbitrary signs of the singular vectors.""",
     reads={"table": TableOf("ladder")},
 )
 def ladder(options: Scenes, table: pd.DataFrame) -> Figure:
@@ -133,17 +129,16 @@ def ladder(options: Scenes, table: pd.DataFrame) -> Figure:
         raise NothingToDraw("no scene that climbs the ladder")
     climbed = table[table.direction.isin(["up", "down"])]
     rungs = list(dict.fromkeys(zip(climbed.direction, climbed.rung, strict=True)))
-    scenes = list(dict.fromkeys(table.scene))
     figure = style.new_figure(0.2 * len(rungs) + 1.2)
     left, right = figure.subplots(1, 2, sharey=True)
     error = ("relative_error_within_horizon", "error_low", "error_high")
-    _draw_quantity(left, table, rungs, scenes, error, LADDER_ERRORS)
-    _draw_quantity(right, table, rungs, scenes, ("gain", "gain_low", "gain_high"), GAINS)
+    _draw_quantity(left, table, rungs, error, LADDER_ERRORS)
+    _draw_quantity(right, table, rungs, ("gain", "gain_low", "gain_high"), GAINS)
     left.set_xlabel("error of the rerun within the horizon (relative)")
     right.set_xlabel("gain of the interpolation")
     left.set_yticks(range(len(rungs)), [plain_words(rung) for _, rung in rungs])
     left.invert_yaxis()
-    handles = style.scene_handles(scenes)
+    handles = style.scene_handles(list(dict.fromkeys(table.scene)))
     handles.append(style.handle("range: training frames", color=style.GREY, linewidth=0.9))
     handles.append(style.handle("range: signs", color=style.GREY, linewidth=3.0, alpha=0.35))
     style.legend(figure, handles, 4)
@@ -154,13 +149,13 @@ def _draw_quantity(
     ax: Axes,
     table: pd.DataFrame,
     rungs: list[tuple[str, str]],
-    scenes: list[str],
     columns: tuple[str, str, str],
     limits: tuple[float, float],
 ) -> None:
     ax.set_xscale("log")
     ax.set_xlim(limits[0], limits[1] * 1.3)
     style.grid(ax)
+    scenes = list(dict.fromkeys(table.scene))
     for i, scene in enumerate(scenes):
         rows = table[table.scene == scene].set_index(["direction", "rung"])
         found, low, high = (

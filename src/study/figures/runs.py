@@ -21,7 +21,7 @@ from study.figures.kit.declaration import figure
 from study.figures.kit.elements import magnitudes
 from study.figures.kit.options import Drawn, Experiment, NothingToDraw, ReducedRuns
 from study.figures.sensitivity_floor import FLOORS, Floors
-from study.tables.kit.reruns import trained
+from study.tables.kit.results import trained
 
 NOISY = {"all": "all axes", "plane": "in the plane", "vertex": "one vertex across"}
 WRONG = 0.1  # relative error above which a run has failed; a run that cannot start has failed, too
@@ -29,16 +29,16 @@ DISTANCES = (1e-4, 1.0)  # limits of the colour scale, in extents of the mesh
 FOOTER = 0.55  # height of the colour scale, inches
 TOLERANCE = "ecsw-1e-02"  # method of the position-subspace run in the first figure
 MODES = 20  # largest number of modes k of that subspace
+Files = list[File]
 RUNS: dict[str, Read] = {
     "meshes": EachOf(MESH, "experiments"),
     "full_order": EachOf(TRAIN, "experiments"),
     "reruns": EachOf(RERUNS, "runs"),
     **FLOORS,
 }
-COMPARED = (
-    "full order against reduced projections, by basis size. The grey outline is the full-order run "
-    "at the same instant; a framed picture is drawn to the smaller scale given below it."
-)
+COMPARED = """full order against reduced projections, by basis size. The grey outline is the
+full-order run at the same instant; a framed picture is drawn to the smaller scale given below it.
+"""
 
 
 @dataclass(frozen=True)
@@ -85,10 +85,6 @@ class Shown:
         )
 
 
-class Teaser(ReducedRuns):
-    """Runs in the first figure."""
-
-
 @dataclass(frozen=True)
 class Runs:
     """Inputs of figures of runs: files of each scene, and ``reruns`` per scene and method."""
@@ -96,10 +92,10 @@ class Runs:
     options: ReducedRuns
     drawn: Drawn
     horizon: Horizon
-    meshes: list[File]
-    full_order: list[File]
-    reruns: list[File]
-    sensitivity: list[File]
+    meshes: Files
+    full_order: Files
+    reruns: Files
+    sensitivity: Files
 
     def __post_init__(self) -> None:
         if not self.drawn.experiments or not self.drawn.methods:
@@ -172,7 +168,7 @@ def obstacles_of(experiment: Experiment, positions: np.ndarray) -> list[Mesh] | 
 @figure(
     title="The bar, reduced", caption=f"Bars with tetrahedral constraints: {COMPARED}", reads=RUNS
 )
-def bar_runs(options: ReducedRuns, drawn: Drawn, horizon: Horizon, **files: list[File]) -> Figure:
+def bar_runs(options: ReducedRuns, drawn: Drawn, horizon: Horizon, **files: Files) -> Figure:
     """Draw full-order and reduced runs in rows, see `Runs.draw`."""
     return Runs(options, drawn, horizon, **files).draw()
 
@@ -183,9 +179,7 @@ def bar_runs(options: ReducedRuns, drawn: Drawn, horizon: Horizon, **files: list
     caption=f"Sheets with edge springs only: {COMPARED}",
     reads=RUNS,
 )
-def spring_runs(
-    options: ReducedRuns, drawn: Drawn, horizon: Horizon, **files: list[File]
-) -> Figure:
+def spring_runs(options: ReducedRuns, drawn: Drawn, horizon: Horizon, **files: Files) -> Figure:
     """Draw full-order and reduced runs in rows, see `Runs.draw`."""
     return Runs(options, drawn, horizon, **files).draw()
 
@@ -196,9 +190,7 @@ def spring_runs(
     caption=f"Sheets with triangle strain only: {COMPARED}",
     reads=RUNS,
 )
-def strain_runs(
-    options: ReducedRuns, drawn: Drawn, horizon: Horizon, **files: list[File]
-) -> Figure:
+def strain_runs(options: ReducedRuns, drawn: Drawn, horizon: Horizon, **files: Files) -> Figure:
     """Draw full-order and reduced runs in rows, see `Runs.draw`."""
     return Runs(options, drawn, horizon, **files).draw()
 
@@ -206,14 +198,12 @@ def strain_runs(
 @figure(
     number=5,
     title="Bending only, reduced",
-    caption=(
-        "Sheets with bending constraints only, near the end of the run: full order against "
-        "reduced projections. The projections of a flat sheet are round-off: in the preprint's two "
-        "scenes the basis is one of noise, and what it does depends on which axes the round-off "
-        "of the start reaches (drawn is the first start of which some sizes run and others do "
-        "not, or else the first; all are counted below the pictures and in the figure of "
-        "reductions on bases of round-off). The curved sheet has projections that matter."
-    ),
+    caption="""Sheets with bending constraints only, near the end of the run: full order against
+    reduced projections. The projections of a flat sheet are round-off: in the preprint's two scenes
+    the basis is one of noise, and what it does depends on which axes the round-off of the start
+    reaches (drawn is the first start of which some sizes run and others do not, or else the first;
+    all are counted below the pictures and in the figure of reductions on bases of round-off). The
+    curved sheet has projections that matter.""",
     reads={**RUNS, "noise": TableOf("noise"), "noise_runs": Every(NOISE_RUNS)},
 )
 def bending_runs(
@@ -221,8 +211,8 @@ def bending_runs(
     drawn: Drawn,
     horizon: Horizon,
     noise: pd.DataFrame,
-    noise_runs: list[File],
-    **files: list[File],
+    noise_runs: Files,
+    **files: Files,
 ) -> Figure:
     """Draw reduced runs; if all projections are round-off, runs on bases of round-off, if any."""
     runs, rows = Runs(options, drawn, horizon, **files), []
@@ -275,19 +265,15 @@ def _alike(table: pd.DataFrame) -> dict[tuple[tuple[int, str], ...], list[str]]:
 @figure(
     number=4,
     title="Three constraint groups, one of them reduced",
-    caption=(
-        "The cloth with bending, springs and strain at instants up to the scene's horizon, beyond "
-        "which no difference could be blamed on a reduction: the full-order run, then runs that "
-        "reduce the projections of one group only, by two methods. Triangles are coloured by "
-        "their distance to the full-order run, whose outline is grey; a framed picture is drawn to "
-        "the smaller scale given below it. Springs carry nearly all of the force, so that reducing "
-        "strain changes little whatever the method."
-    ),
+    caption="""The cloth with bending, springs and strain at instants up to the scene's horizon,
+    beyond which no difference could be blamed on a reduction: the full-order run, then runs that
+    reduce the projections of one group only, by two methods. Triangles are coloured by their
+    distance to the full-order run, whose outline is grey; a framed picture is drawn to the smaller
+    scale given below it. Springs carry nearly all of the force, so that reducing strain changes
+    little whatever the method.""",
     reads=RUNS,
 )
-def cloth_all_grid(
-    options: ReducedRuns, drawn: Drawn, horizon: Horizon, **files: list[File]
-) -> Figure:
+def cloth_all_grid(options: ReducedRuns, drawn: Drawn, horizon: Horizon, **files: Files) -> Figure:
     """Draw a row per reduced group, below a row of the full-order run; methods side by side.
 
     Each method has a column per instant, a fraction of the scene's horizon. All pictures have the
@@ -362,14 +348,12 @@ def _colours() -> ScalarMappable:
 
 @figure(
     title="Two scenes under five reductions",
-    caption=(
-        "One instant of the motion that trained all of them. `deim-joint` is the preprint's "
-        "method: joint rows, a system for each axis. `deim` samples single entries, `block-deim` "
-        "whole elements, `gappy` three elements a mode, all with shared coefficients. `ecsw` "
-        "reduces positions and sums sampled elements with non-negative weights. $r$ and $k$ are "
-        "numbers of modes, errors are relative to the motion; the outline is the full order. "
-        "A framed picture is drawn to the smaller scale given below it."
-    ),
+    caption="""One instant of the motion that trained all of them. `deim-joint` is the preprint's
+    method: joint rows, a system for each axis. `deim` samples single entries, `block-deim` whole
+    elements, `gappy` three elements a mode, all with shared coefficients. `ecsw` reduces positions
+    and sums sampled elements with non-negative weights. $r$ and $k$ are numbers of modes, errors
+    are relative to the motion; the outline is the full order. A framed picture is drawn to the
+    smaller scale given below it.""",
     reads={
         **RUNS,
         "subspaces": EachOf(SUBSPACES, "drawn_subspaces"),
@@ -377,12 +361,12 @@ def _colours() -> ScalarMappable:
     },
 )
 def teaser(
-    options: Teaser,
+    options: ReducedRuns,
     drawn: Drawn,
     horizon: Horizon,
-    subspaces: list[File],
+    subspaces: Files,
     errors: pd.DataFrame,
-    **files: list[File],
+    **files: Files,
 ) -> Figure:
     """Draw a row per experiment: the full order, a panel per method, a sampled subspace."""
     runs, errors = Runs(options, drawn, horizon, **files), trained(errors)

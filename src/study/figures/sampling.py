@@ -67,13 +67,11 @@ class Iteration:
 @figure(
     number=2,
     title="The first iterations of DEIM",
-    caption=(
-        "In step $k$ the residual of mode $k$ is taken against the modes before it, interpolated "
-        "at the entries picked so far, and the entry where it is largest in absolute value is "
-        "picked next. An element has the colour of its largest entry, so that the ringed one, "
-        "which holds the picked entry, is the darkest; white dots are elements picked before. Each "
-        "step asks for one number, whose whole element has to be projected for it."
-    ),
+    caption="""In step $k$ the residual of mode $k$ is taken against the modes before it,
+    interpolated at the entries picked so far, and the entry where it is largest in absolute value
+    is picked next. An element has the colour of its largest entry, so that the ringed one, which
+    holds the picked entry, is the darkest; white dots are elements picked before. Each step asks
+    for one number, whose whole element has to be projected for it.""",
     reads={
         "meshes": EachOf(MESH, "first_run"),
         "bases": EachOf(BASIS, "first_run"),
@@ -191,12 +189,10 @@ def _joint_residual(V: np.ndarray, entries: np.ndarray, k: int) -> np.ndarray:
 @figure(
     number=3,
     title="Elements hit by the entries of vectorised DEIM",
-    caption=(
-        "Single entries, picked without regard to elements, scatter over the mesh. Left: the "
-        "elements they belong to, by axis. Middle: how many of its entries each touched element "
-        "contributes. Right: numbers that have to be computed for $r$ interpolation entries, "
-        "because a projection yields all entries of its element at once."
-    ),
+    caption="""Single entries, picked without regard to elements, scatter over the mesh. Left: the
+    elements they belong to, by axis. Middle: how many of its entries each touched element
+    contributes. Right: numbers that have to be computed for $r$ interpolation entries, because a
+    projection yields all entries of its element at once.""",
     reads={
         "meshes": EachOf(MESH, "experiments"),
         "snapshots": EachOf(SNAPSHOTS, "experiments"),

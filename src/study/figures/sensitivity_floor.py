@@ -14,7 +14,7 @@ from study.artifact.reads import EachOf, Read, Setting
 from study.experiments.kit.settings import Horizon, floor_of, horizon
 from study.figures.kit.declaration import figure
 from study.figures.kit.options import Columns, Drawn, NothingToDraw, Scenes
-from study.tables.kit.reruns import TWIN
+from study.tables.kit.results import TWIN
 
 # Inputs of a figure that needs sensitivity floors.
 FLOORS: dict[str, Read] = {
@@ -27,6 +27,9 @@ COLUMNS = ["scene", "perturbation", "frame", "relative_difference"]
 class Floors:
     """Sensitivity floor (drift of perturbed runs by frame) and horizon of each scene.
 
+    The attribute ``of`` maps a scene to its floor: the largest relative difference over all seeds
+    by frame (F,), empty if the scene has no perturbed runs.
+
     Parameters
     ----------
     sensitivity : files with tables of the perturbed runs, one per scene
@@ -34,29 +37,18 @@ class Floors:
     Raises
     ------
     StorageError
-        If the file of a requested scene is damaged or lacks a column.
+        If a file is damaged or lacks a column.
     """
 
     def __init__(self, sensitivity: Sequence[File], horizon: Horizon) -> None:
         self.perturbation, self.threshold = horizon.perturbation, horizon.threshold
-        self._paths = {file["scene"]: file.path for file in sensitivity}
-        self._floors: dict[str, np.ndarray] = {}
-
-    def of(self, scene: str) -> np.ndarray:
-        """Largest relative difference by frame (F,) over all seeds of ``scene``.
-
-        The array is empty if the scene has no perturbed runs.
-        """
-        if scene not in self._floors:
-            table = read_table(self._paths[scene], COLUMNS)
-            self._floors[scene] = floor_of(table, scene, self.perturbation)
-        return self._floors[scene]
+        tables = {file["scene"]: read_table(file.path, COLUMNS) for file in sensitivity}
+        self.of = {s: floor_of(table, s, self.perturbation) for s, table in tables.items()}
 
     def horizon(self, scene: str) -> int | None:
         """First frame at which the floor of ``scene`` exceeds the threshold; None if none does."""
-        floor = self.of(scene)
-        end = horizon(floor, self.threshold)
-        return end if end < len(floor) else None
+        end = horizon(self.of[scene], self.threshold)
+        return end if end < len(self.of[scene]) else None
 
     def instant(self, scene: str, frame: int) -> str:
         """Label of ``frame``, marked past the scene's horizon, where errors cannot be judged."""
@@ -75,13 +67,11 @@ class Floored(Scenes):
 
 @figure(
     title="Sensitivity floor and horizon",
-    caption=(
-        "How far full-order runs drift apart whose initial positions differ by "
-        "{sensitivity.reference} of the extent. The horizon, given in the legends, is the first "
-        "frame above the threshold of {sensitivity.threshold}: beyond it a reduced run cannot be "
-        "judged by its error. Dashed lines are twins, scenes that end before."
-    ),
-    reads={**FLOORS},
+    caption="""How far full-order runs drift apart whose initial positions differ by
+    {sensitivity.reference} of the extent. The horizon, given in the legends, is the first frame
+    above the threshold of {sensitivity.threshold}: beyond it a reduced run cannot be judged by its
+    error. Dashed lines are twins, scenes that end before.""",
+    reads=FLOORS,
 )
 def sensitivity_floor(
     options: Floored, drawn: Drawn, sensitivity: list[File], horizon: Horizon
@@ -94,7 +84,7 @@ def sensitivity_floor(
     floors = Floors(sensitivity, horizon)
     kinds: dict[str, list[str]] = {}
     for scene in drawn.scenes:
-        if len(floors.of(scene)):
+        if len(floors.of[scene]):
             kinds.setdefault(_kind(drawn, scene), []).append(scene)
     if not kinds:
         raise NothingToDraw(f"no run perturbed by {floors.perturbation:g}")
@@ -107,7 +97,7 @@ def sensitivity_floor(
         for scene in scenes:
             family = families.index(scene.removesuffix(TWIN))
             colour = style.CYCLE[family % len(style.CYCLE)]
-            floor, end = floors.of(scene), floors.horizon(scene)
+            floor, end = floors.of[scene], floors.horizon(scene)
             label = f"{style.words(scene)}: {f'beyond {len(floor)}' if end is None else end}"
             line = "--" if scene.endswith(TWIN) else "-"
             shown = clipped(floor, LOW, HIGH)

@@ -33,13 +33,11 @@ class Snapshots(View):
 @figure(
     number=1,
     title="Snapshots of the projections and their modes",
-    caption=(
-        "The snapshots of one constraint group, a column each, less their mean, are the product of "
-        "modes, singular values (a diagonal, dark where large) and coefficients; red entries are "
-        "positive, blue ones negative. Below, columns of the first matrix on the moving mesh and "
-        "the first modes on the mesh at rest: an element has the colour of one of its entries, "
-        "whose axis and row are named, relative to the largest."
-    ),
+    caption="""The snapshots of one constraint group, a column each, less their mean, are the
+    product of modes, singular values (a diagonal, dark where large) and coefficients; red entries
+    are positive, blue ones negative. Below, columns of the first matrix on the moving mesh and the
+    first modes on the mesh at rest: an element has the colour of one of its entries, whose axis and
+    row are named, relative to the largest.""",
     reads={
         "meshes": EachOf(MESH, "first_run"),
         "full_order": EachOf(TRAIN, "first_run"),
@@ -83,13 +81,12 @@ def snapshots_and_modes(
     bottom = total - ABOVE - BLOCKS[0][2] - TITLE - heights[0]
     axes = _row(figure, len(frames), bottom, heights[0], "snapshots\nless mean")
     for ax, k, q, window in zip(axes, taken, positions, moving, strict=True):
-        slot = _draw_column(ax, elements, q, centred[:, k], basis.rows_per_element, camera)
+        slot = _draw_column(ax, elements, q, centred[:, k], camera)
         set_window(ax, window)
         ax.set_title(f"frame {int(snapshots.frames['train'][k])}: {slot}", pad=2)
     axes = _row(figure, count, bottom - TITLE - heights[1], heights[1], "modes")
     for k, ax in enumerate(axes):
-        column, rows = basis.V[:, k], basis.rows_per_element
-        slot = _draw_column(ax, elements, mesh.points, column, rows, camera)
+        slot = _draw_column(ax, elements, mesh.points, basis.V[:, k], camera)
         set_window(ax, resting)
         ratio = basis.singular_values[k] / basis.singular_values[0]
         ax.set_title(f"{k + 1}: {slot}, σ/σ₁ = {ratio:.2g}", pad=2, fontsize=7.5)
@@ -163,15 +160,10 @@ def _row(figure: Figure, count: int, bottom: float, height: float, label: str) -
 
 
 def _draw_column(
-    ax: Axes,
-    elements: ElementMap,
-    points: np.ndarray,
-    column: np.ndarray,
-    rows: int,
-    camera: Camera,
+    ax: Axes, elements: ElementMap, points: np.ndarray, column: np.ndarray, camera: Camera
 ) -> str:
     """Draw one signed entry of each element, over the largest; return the name of the entry."""
-    values, words = signed_entry(column, rows)
+    values, words = signed_entry(column, len(column) // (3 * len(elements.cells)))
     largest = max(float(np.abs(values).max()), np.finfo(float).tiny)
     elements.draw(ax, points, values / largest, camera, signed())
     return words

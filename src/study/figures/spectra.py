@@ -23,7 +23,7 @@ Panel = tuple[Axes, Experiment, pd.DataFrame]
 
 
 class Reconstruction(Beside, Methods):
-    """Options: scenes, methods and scenes of the published code."""
+    """Options: scenes, methods, panels per row, and experiments of the published code."""
 
 
 def _panels(
@@ -54,11 +54,9 @@ def _published(path: Path, columns: list[str], options: Beside, each: Experiment
 @figure(
     number=9,
     title="Decay of the singular values",
-    caption=(
-        "Singular values of the training snapshots, relative to the first. Hollow ones lie below "
-        "the round-off of the projections and are noise. Grey lines are the output of the "
-        "published code for the scene that comes closest."
-    ),
+    caption="""Singular values of the training snapshots, relative to the first. Hollow ones lie
+    below the round-off of the projections and are noise. Grey lines are the output of the published
+    code for the scene that comes closest.""",
     reads={
         "table": TableOf("singular_values"),
         "published": ProjectFile(f"{PUBLISHED_CODE}/singular_values.csv"),
@@ -117,11 +115,9 @@ def _draw_values(ax: Axes, rows: pd.DataFrame, colour: str, marker: str) -> None
 @figure(
     number=8,
     title="Reconstruction error of three scenes of the preprint",
-    caption=(
-        "Relative error of reconstructed projections against the number $r$ of basis vectors, for "
-        "the snapshots used (train), the frames between them (test) and another run (held out). "
-        "Errors above the axis are drawn on its rim with an arrow head."
-    ),
+    caption="""Relative error of reconstructed projections against the number $r$ of basis vectors,
+    for the snapshots used (train), the frames between them (test) and another run (held out).
+    Errors above the axis are drawn on its rim with an arrow head.""",
     reads={
         "table": TableOf("reconstruction_error"),
         "published": ProjectFile(f"{PUBLISHED_CODE}/reconstruction_error.csv"),

@@ -11,8 +11,7 @@ from pdrom.view.text import escape
 from study.figures.kit.declaration import declarations
 from study.paper.macros import format_number
 from study.tables.alternatives import CURVE
-from study.tables.kit.parts import in_words
-from study.tables.kit.reruns import MEDIAN, over_motions, trained
+from study.tables.kit.results import MEDIAN, in_words, over_motions, trained
 
 NONE = "--"
 LEFT = r">{\raggedright\arraybackslash}"
@@ -142,13 +141,14 @@ def positions(reduced_reruns: pd.DataFrame) -> str:
     def error(run: pd.Series) -> str:
         return format_number(run.relative_error_within_horizon)
 
-    def unseen(run: pd.Series) -> str:
+    def unseen(run: pd.Series, column: str = MEDIAN) -> str:
         same = {column: run[column] for column in ("scene", "method", "k", "position_basis")}
         motions = over_motions(_rows(reduced_reruns, group="all", **same))
-        return _cell(motions, lambda found: format_number(found[MEDIAN]))
+        return _cell(motions, lambda found: format_number(found[column]))
 
     columns = {
         "all": ("pod", "full", error),
+        "playback, held out": ("pod", "full", lambda run: unseen(run, "playback_error")),
         "all, held out": ("pod", "full", unseen),
         "sampled": ("pod", _TOLERANCE, error),
         "sampled, held out": ("pod", _TOLERANCE, unseen),

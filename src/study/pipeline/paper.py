@@ -14,7 +14,7 @@ from study.paper.source import source_files
 from study.pipeline.folders import DEFAULT
 from study.pipeline.study import Study
 from study.tables.claims.rules import load_claims
-from study.tables.kit.reruns import FAR
+from study.tables.kit.results import FAR
 
 Row = dict[str, Any]
 
@@ -84,7 +84,6 @@ def _study(study: Study) -> Row:
         "opponent_frames": settings.alternatives.frames,
         "far": FAR,
         "carry": HeldOut().carry,
-        "kick": HeldOut().kick,
     }
 
 

@@ -1,13 +1,8 @@
 """Tables of error against time: each method and size as a point, and requested tolerances.
 
-The error of a point has one of two references; only rows with the same reference are comparable:
-
-=================  ==================================================================
-method             error against
-=================  ==================================================================
-fom, fom-anderson  the full-order run whose frames are converged (K -> infinity)
-every other        the scene's own full-order run, which has finitely many iterations
-=================  ==================================================================
+The error of a point has one of two references; only rows with the same reference are comparable.
+The reference of ``fom`` and ``fom-anderson`` is the full-order run whose frames are converged
+(K -> infinity), of every other method the scene's own full-order run with finitely many iterations.
 
 Among the other methods, ``full`` without a position subspace is the scene's own full-order run,
 with error zero by definition. ``fewer-iterations`` is the full-order run with fewer iterations,
@@ -23,13 +18,12 @@ from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, Setting, TableOf
 from study.experiments.kit.settings import ANDERSON, FOM
-from study.tables.kit.declaration import flag, integer, number, table, text, timed
-from study.tables.kit.parts import joined, timings_in_one_time
-from study.tables.kit.reruns import COLUMNS, MEDIAN, trained, with_held_out
-from study.tables.kit.vocabulary import shared
+from study.tables.kit import results
+from study.tables.kit.declaration import flag, integer, number, shared, table, text, timed
 
 FEWER = "fewer-iterations"
 _MODEL = ["scene", "position_basis", "k", "method"]
+_POINT = ["relative_error_within_horizon", "ms_per_frame"]
 CONVERGED, OWN = "converged", "own iterations"
 
 
@@ -47,7 +41,7 @@ CONVERGED, OWN = "converged", "own iterations"
             "the horizon may have another reference, and in position subspaces",
             tolerance=0.05,
         ),
-        *COLUMNS,
+        *results.COLUMNS,
         timed(flag("pareto_heldout", "the same by the error held out; full order as it is")),
         *shared("velocity_error relative_shape_error energy_drift contact_delay"),
     ),
@@ -76,14 +70,15 @@ def accuracy_cost(
     ----------
     iterations : scene -> number K of local/global iterations per frame in the scene's settings
     """
-    times = timings_in_one_time(timings, frame_times)
+    times = results.timings_in_one_time(timings, frame_times)
     times = times[times.implementation == "compiled"]
     full = times[times.method.isna()].copy()
     full = full.assign(method="full", position_basis="full", relative_error_within_horizon=0.0)
-    sweep = _sweep(joined(sweeps), times)
-    points = trained(reruns).dropna(subset=["relative_error_within_horizon", "ms_per_frame"])
-    points = with_held_out(points.assign(iterations=points.scene.map(iterations)), reruns)
-    known = joined(models).reindex(columns=[*_MODEL, "error_converged"]).astype({"k": "Int64"})
+    sweep = _sweep(results.joined(sweeps), times)
+    points = results.trained(reruns).dropna(subset=_POINT)
+    points = results.with_held_out(points.assign(iterations=points.scene.map(iterations)), reruns)
+    known = results.joined(models).reindex(columns=[*_MODEL, "error_converged"])
+    known = known.astype({"k": "Int64"})
     points = points.merge(known, on=_MODEL, how="left")
     own = sweep[sweep.method == FOM].set_index(["scene", "iterations"]).error_converged
     full["error_converged"] = [own.get((scene, iterations[scene]), np.nan) for scene in full.scene]
@@ -92,7 +87,7 @@ def accuracy_cost(
     # "full" is also the method name of models that reduce the positions but not the projections
     unreduced = (points.method == "full") & (points.position_basis == "full")
     reduced = points.method.isin(reruns.method) & ~unreduced
-    unseen = points[MEDIAN].where(reduced, points.relative_error_within_horizon)
+    unseen = points[results.MEDIAN].where(reduced, points.relative_error_within_horizon)
     errors = {"pareto": points.relative_error_within_horizon, "pareto_heldout": unseen}
     for name, error in errors.items():
         points[name] = False
@@ -118,7 +113,7 @@ def _sweep(errors: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
     fewer = errors[early].assign(method=FEWER, relative_error_within_horizon=errors.error_scene)
     points = pd.concat([every, fewer], ignore_index=True)
     points = points.assign(position_basis="full", k=None, r=None)
-    return points.dropna(subset=["relative_error_within_horizon", "ms_per_frame"])
+    return points.dropna(subset=_POINT)
 
 
 def reference_of(points: pd.DataFrame) -> pd.Series:
@@ -168,7 +163,7 @@ def pareto(error: Sequence[float], cost: Sequence[float]) -> list[bool]:
 )
 def requested_tolerances(runs: list[File]) -> pd.DataFrame:
     """Rows of all scenes, one per run with a requested tolerance, from the files ``runs``."""
-    rows = joined(runs)
+    rows = results.joined(runs)
     if rows.empty:
         return rows
     met = rows.frames > 0

@@ -14,9 +14,8 @@ from study.artifact.paths import File
 from study.artifact.reads import Every, Setting, TableOf
 from study.experiments.alternatives import settings
 from study.experiments.alternatives.settings import REDUCTIONS
-from study.tables.kit.declaration import flag, integer, number, table, text, timed
-from study.tables.kit.parts import joined, median_interval
-from study.tables.kit.vocabulary import shared
+from study.tables.kit.declaration import flag, integer, number, shared, table, text, timed
+from study.tables.kit.results import joined, median_interval
 
 STIFFNESS = number("stiffness", "factor on all weights of the scene", compared="exact")
 SUBSTEPS = integer("substeps", "steps that a frame is divided into")

@@ -8,9 +8,8 @@ from study.artifact.paths import File
 from study.artifact.reads import Every, Setting, TableOf
 from study.experiments.kit.settings import FOM, GLOBAL, REST, RIGHT, Horizon, floor_of, horizons
 from study.experiments.sensitivity import without
-from study.tables.kit.declaration import flag, integer, number, table, text, timed
-from study.tables.kit.parts import in_one_time, joined, timings_in_one_time
-from study.tables.kit.vocabulary import shared
+from study.tables.kit.declaration import flag, integer, number, shared, table, text, timed
+from study.tables.kit.results import in_one_time, joined, timings_in_one_time
 
 KEYS = ["scene", "effect"]
 NOTHING = "nothing"  # value of the column effect for the whole scene, with no effect left out

@@ -8,16 +8,16 @@ the last two steps compare all such pairs of runs, ordered by gain.
 """
 
 from collections.abc import Iterator, Mapping
+from functools import partial
 from itertools import combinations
 
 import numpy as np
 import pandas as pd
 
 from study.artifact.reads import TableOf
-from study.tables.kit.declaration import integer, number, table, text
-from study.tables.kit.reruns import families, judged_runs
+from study.tables.kit.declaration import count, number, table, text
+from study.tables.kit.results import RESAMPLES, SEED, families, judged_runs
 
-RESAMPLES, SEED = 2000, 1
 STEPS = {
     "whole elements for single entries": ("deim", "block-deim"),
     "three elements a mode for one": ("block-deim", "gappy"),
@@ -36,6 +36,8 @@ KINDS = {
     "lower gain, separate coefficients": ("deim-joint", "published"),
 }
 _CELL = ["scene", "group", "r"]
+# Constructor of columns that say something about many runs.
+share = partial(number, compared="share")
 
 
 @table(
@@ -44,29 +46,22 @@ _CELL = ["scene", "group", "r"]
         text("step", f"one of: {', '.join([*STEPS, *SQUARE, *KINDS])}"),
         text("method_before", "method before the step"),
         text("method_after", "method after it, on the same basis"),
-        integer("pairs", "scenes, groups and sizes at which both methods ran", compared="share"),
-        integer("scenes", "scenes among them", compared="share"),
-        number("gain_ratio", "median of the gain after over that before", compared="share"),
-        number(
-            "error_ratio", "median of the error of the run after over that before", compared="share"
-        ),
-        number(
+        count("pairs", "scenes, groups and sizes at which both methods ran"),
+        count("scenes", "scenes among them"),
+        share("gain_ratio", "median of the gain after over that before"),
+        share("error_ratio", "median of the error of the run after over that before"),
+        share(
             "error_ratio_low",
             "2.5 % quantile of this median, families of scenes resampled (bootstrap)",
-            compared="share",
         ),
-        number("error_ratio_high", "97.5 % quantile", compared="share"),
-        number("fallen_share", "pairs whose error falls", compared="share"),
-        integer("scenes_fallen", "scenes whose median error ratio is below one", compared="share"),
-        number(
-            "p_value",
-            "two-sided sign test over all families, for which a tie is no fall",
-            compared="share",
-        ),
-        integer("families", "families among the scenes: a scene and its twin", compared="share"),
-        integer("families_fallen", "those whose median error ratio is below one", compared="share"),
-        number("rank_correlation", "of the two ratios over the pairs (Spearman)", compared="share"),
-        number("unexplained_share", "pairs of which one falls, the other not", compared="share"),
+        share("error_ratio_high", "97.5 % quantile"),
+        share("fallen_share", "pairs whose error falls"),
+        count("scenes_fallen", "scenes whose median error ratio is below one"),
+        share("p_value", "two-sided sign test over all families, for which a tie is no fall"),
+        count("families", "families among the scenes: a scene and its twin"),
+        count("families_fallen", "those whose median error ratio is below one"),
+        share("rank_correlation", "of the two ratios over the pairs (Spearman)"),
+        share("unexplained_share", "pairs of which one falls, the other not"),
     ),
     reads={
         "reruns": TableOf("reduced_reruns"),

@@ -8,10 +8,8 @@ import pandas as pd
 from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, TableOf
-from study.tables.kit.declaration import integer, number, table, timed
-from study.tables.kit.parts import joined
-from study.tables.kit.reruns import FAILED, trained, with_held_out
-from study.tables.kit.vocabulary import shared
+from study.tables.kit.declaration import count, integer, number, shared, table, timed
+from study.tables.kit.results import FAILED, joined, trained, with_held_out
 
 # Columns that identify a curve, the rows that differ only in size r.
 CURVE = ["scene", "group", "method", "factor"]
@@ -82,12 +80,8 @@ def break_even(r: Sequence[int], ratio: Sequence[float]) -> int | None:
     title="Where reductions pay and where they lose to the full order",
     columns=(
         *shared("position_basis method"),
-        integer("scenes", "scenes (and groups) with a timed run", compared="share"),
-        integer(
-            "accurate",
-            "those with a run whose error before the horizon is at most a tenth",
-            compared="share",
-        ),
+        count("scenes", "scenes (and groups) with a timed run"),
+        count("accurate", "those with a run whose error before the horizon is at most a tenth"),
         timed(integer("pays", "those among them with an accurate run faster than the full order")),
         timed(integer("loses", "those whose accurate runs are all slower")),
         timed(number("best_speedup", "median over them of the fastest accurate run's speed-up")),
@@ -103,11 +97,10 @@ def break_even(r: Sequence[int], ratio: Sequence[float]) -> int | None:
         timed(integer("heldout", "runs that had a held-out motion")),
         timed(number("error_heldout_low", "median of the least error of each over its motions")),
         timed(number("error_heldout_high", "median of the largest")),
-        integer(
+        count(
             "accurate_heldout",
             "scenes (and groups) whose most accurate size on the training motion has at most a "
             "tenth held out",
-            compared="share",
         ),
         timed(integer("pays_heldout", "those that pay whose run has at most a tenth held out")),
     ),

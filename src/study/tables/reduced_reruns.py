@@ -15,10 +15,8 @@ from study.artifact.reads import Every, Setting, TableOf
 from study.experiments.kit.reruns import run_error
 from study.experiments.kit.scenes import positions_of
 from study.experiments.kit.settings import Horizon, floor_of, horizons
-from study.tables.kit.declaration import table, text
-from study.tables.kit.parts import timings_in_one_time
-from study.tables.kit.reruns import KEYS, TRAIN
-from study.tables.kit.vocabulary import shared
+from study.tables.kit.declaration import shared, table, text
+from study.tables.kit.results import KEYS, TRAIN, timings_in_one_time
 
 
 @table(

@@ -8,10 +8,8 @@ from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, TableOf
 from study.experiments.frame_times import CONTROL, FULL, REDUCED
-from study.tables.kit.declaration import flag, integer, number, table, text, timed
-from study.tables.kit.parts import in_words, joined, median_interval
-from study.tables.kit.reruns import COLUMNS, HIGH, LOW, MEDIAN, TRAIN, TWIN, over_motions, trained
-from study.tables.kit.vocabulary import shared
+from study.tables.kit import results
+from study.tables.kit.declaration import flag, integer, number, shared, table, text, timed
 
 _MODEL = ["scene", "position_basis", "k", "method"]
 _REDUCTION = ["scene", "group", "method", "r"]
@@ -22,8 +20,8 @@ _ERROR = "relative_error_within_horizon"
 CONFIRMED = 1.5
 UNCONFIRMED = "not confirmed by its control"
 _ERRORS = {
-    "error_train": "relative_error_train", MEDIAN: "relative_error_heldout",
-    LOW: "relative_error_heldout_low", HIGH: "relative_error_heldout_high",
+    "error_train": "relative_error_train", results.MEDIAN: "relative_error_heldout",
+    results.LOW: "relative_error_heldout_low", results.HIGH: "relative_error_heldout_high",
 }  # fmt: skip
 _TIMES = [
     "ms_per_frame", "vertices_ms", "fom_ms_per_frame", "speedup", "speedup_low", "speedup_high",
@@ -51,7 +49,7 @@ _TIMES = [
 )
 def frame_times(parts: list[File]) -> pd.DataFrame:
     """One row per scene in ``parts``: medians over processes, ratios within a process."""
-    rows = joined(parts)
+    rows = results.joined(parts)
     if rows.empty:
         return rows
     full, control = (
@@ -65,12 +63,12 @@ def frame_times(parts: list[File]) -> pd.DataFrame:
             ("ms_per_frame", "low_ms", "high_ms"): full[scene],
             ("control_ratio", "control_low", "control_high"): control[scene] / full[scene],
         }
-        if f"{scene}{TWIN}" in full:
-            twin = full[f"{scene}{TWIN}"] / full[scene]
+        if f"{scene}{results.TWIN}" in full:
+            twin = full[f"{scene}{results.TWIN}"] / full[scene]
             values["twin_ratio", "twin_low", "twin_high"] = twin
         row = {"scene": scene, "vertices": vertices[scene], "processes": len(full)}
         for names, measured in values.items():
-            row |= zip(names, median_interval(measured.to_numpy(float)), strict=True)
+            row |= zip(names, results.median_interval(measured.to_numpy(float)), strict=True)
         low, high = row["control_low"], row["control_high"]
         row["confirmed"] = low >= 1.0 / CONFIRMED and high <= CONFIRMED
         row["control_agrees"] = low <= 1.0 <= high
@@ -95,7 +93,7 @@ def frame_times(parts: list[File]) -> pd.DataFrame:
         number(
             "error_train", "of the training motion before the horizon, over all of a large scene"
         ),
-        *COLUMNS,
+        *results.COLUMNS,
     ),
     reads={
         "parts": Every(paths.FRAME_TIMES),
@@ -115,21 +113,21 @@ def speedups(
     reruns: pd.DataFrame,
 ) -> pd.DataFrame:
     """One row per reduction timed in ``parts``; each speed-up is a ratio within one process."""
-    rows = joined(parts)
+    rows = results.joined(parts)
     if rows.empty or not (rows.role == REDUCED).any():
         return pd.DataFrame()
     made = pd.DataFrame(list(timed_reductions(rows, times)))
     extra = [
-        joined(projections).reindex(columns=[*_REDUCTION, "reduction_s"]),
-        joined(subspaces).reindex(columns=[*_MODEL, "reduction_s"]),
+        results.joined(projections).reindex(columns=[*_REDUCTION, "reduction_s"]),
+        results.joined(subspaces).reindex(columns=[*_MODEL, "reduction_s"]),
     ]
     errors = [_errors(reruns, keys) for keys in (_REDUCTION, _MODEL)]
-    own = joined(large)
+    own = results.joined(large)
     if len(own):
-        extra.append(own[own.motion == TRAIN].reindex(columns=[*_MODEL, "reduction_s"]))
+        extra.append(own[own.motion == results.TRAIN].reindex(columns=[*_MODEL, "reduction_s"]))
         errors.append(large_errors(own))
     made = _first_known(made, extra, "reduction_s")
-    for column in ("error_train", *(column.name for column in COLUMNS)):
+    for column in ("error_train", *(column.name for column in results.COLUMNS)):
         made = _first_known(made, errors, column)
     made["training_s"] = 1e-3 * made.full_ms * made.frames
     saved = made.full_ms - made.ms_per_frame
@@ -151,7 +149,7 @@ def timed_reductions(rows: pd.DataFrame, times: pd.DataFrame) -> Iterator[dict]:
     for labels, own in reduced.groupby(_LABELS, sort=False, dropna=False):
         own = own.set_index(["scene", "process"])
         vertices_ms, own = float(own.vertices_ms.median()), own.ms_per_frame
-        ratio, low, high = median_interval((full.loc[own.index] / own).to_numpy(float))
+        ratio, low, high = results.median_interval((full.loc[own.index] / own).to_numpy(float))
         scene = labels[0]
         first = rows[rows.scene == scene].iloc[0]
         yield {
@@ -165,16 +163,16 @@ def timed_reductions(rows: pd.DataFrame, times: pd.DataFrame) -> Iterator[dict]:
             "speedup": ratio,
             "speedup_low": low,
             "speedup_high": high,
-            "shown": in_words(ratio, low, high) if trusted[scene] else UNCONFIRMED,
+            "shown": results.in_words(ratio, low, high) if trusted[scene] else UNCONFIRMED,
             "loses": high < 1.0,
         }
 
 
 def _errors(reruns: pd.DataFrame, keys: list[str]) -> pd.DataFrame:
     runs = reruns[(reruns.position_basis != "full") == (keys == _MODEL)]
-    train = trained(runs)[[*keys, _ERROR]].rename(columns={_ERROR: "error_train"})
+    train = results.trained(runs)[[*keys, _ERROR]].rename(columns={_ERROR: "error_train"})
     sizes = {key: "Int64" for key in keys if key in ("k", "r")}
-    return train.astype(sizes).merge(over_motions(runs, keys), on=keys, how="outer")
+    return train.astype(sizes).merge(results.over_motions(runs, keys), on=keys, how="outer")
 
 
 def large_errors(large: pd.DataFrame) -> pd.DataFrame:
@@ -207,7 +205,7 @@ def _first_known(made: pd.DataFrame, sources: list[pd.DataFrame], column: str) -
         number("relative_error_heldout", "the same in held-out motions: their median"),
         number("relative_error_heldout_low", "the least of them"),
         number("relative_error_heldout_high", "the largest"),
-        *COLUMNS[3:],
+        *results.COLUMNS[3:],
         *shared("ms_per_frame vertices_ms"),
         timed(number("ms_per_iteration", "time of an iteration", "ms")),
         timed(number("fom_ms_per_frame", "time of a frame of the full-order run", "ms")),
@@ -221,12 +219,12 @@ def _first_known(made: pd.DataFrame, sources: list[pd.DataFrame], column: str) -
 )
 def online(parts: list[File], measured: list[File], times: pd.DataFrame) -> pd.DataFrame:
     """One row per model of large scenes (files ``parts``), with errors and ``measured`` times."""
-    rows = joined(parts)
+    rows = results.joined(parts)
     if rows.empty:
         return rows
-    found = pd.DataFrame(list(timed_reductions(joined(measured), times)))
+    found = pd.DataFrame(list(timed_reductions(results.joined(measured), times)))
     found = found.rename(columns={"full_ms": "fom_ms_per_frame"})
-    made = rows[rows.motion == TRAIN].rename(columns={"r": "elements_sampled"})
+    made = rows[rows.motion == results.TRAIN].rename(columns={"r": "elements_sampled"})
     made = made.drop(columns="playback_error")  # of the training motion itself
     made = made.merge(large_errors(rows).rename(columns=_ERRORS), on=_MODEL, how="left")
     made = made.merge(found[[*_MODEL, *_TIMES]], on=_MODEL, how="left")

@@ -9,10 +9,8 @@ from pdrom.core.store import open_hdf5
 from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, Setting, TableOf
-from study.tables.kit.declaration import flag, number, table, text
-from study.tables.kit.parts import joined
-from study.tables.kit.reruns import KEYS, trained
-from study.tables.kit.vocabulary import shared
+from study.tables.kit.declaration import flag, number, shared, table, text
+from study.tables.kit.results import KEYS, joined, trained
 
 # only after the first outcome are further results of a run used
 OUTCOMES = ("accurate", "wrong", "left the scene", "blow-up", "not run", "not judged")

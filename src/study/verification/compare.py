@@ -14,7 +14,7 @@ import pandas as pd
 from study.artifact.reads import ProjectFile
 from study.tables import declared
 from study.tables.kit.declaration import Column, Quantity, Table
-from study.tables.kit.reruns import trained
+from study.tables.kit.results import trained
 
 # Kinds of columns that are not compared with a reference.
 NOT_COMPARED: tuple[Quantity, ...] = ("timed", "skipped")

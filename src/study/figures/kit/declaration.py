@@ -43,7 +43,7 @@ class Declaration(Artifact):
 
     The function gets its inputs and ``options``, whose type defines the keys and defaults of the
     figure in config/figures.yaml. It raises `NothingToDraw` if the configuration has no data for
-    it, and StorageError for a damaged file.
+    the figure, and StorageError for a damaged file.
 
     title, caption : text in light mark-up (`study.artifact.markup`); ``{key}`` in a caption names
         a setting of the configuration
@@ -103,6 +103,7 @@ def figure(
     """Return a decorator that declares a function, called with ``options`` and inputs, as a figure.
 
     A function with a parameter ``drawn`` also gets the part of the study selected by the options.
+    Line breaks in the caption count as blanks.
 
     Raises
     ------
@@ -115,7 +116,8 @@ def figure(
         writes = {"pdf": FIGURE.where(name=name), "png": FIGURE_PICTURE.where(name=name)}
         drawn = {"drawn": Settings(Drawn)} if "drawn" in function.__annotations__ else {}
         given = {"options": Setting("options"), **drawn, **reads}
-        made = Declaration(name, title, given, writes, function, caption=caption, number=number)
+        words = " ".join(caption.split())
+        made = Declaration(name, title, given, writes, function, caption=words, number=number)
         return declare(made)
 
     return decorate
@@ -143,7 +145,7 @@ def write_figure(
 
 @cache
 def declarations() -> dict[str, Declaration]:
-    """Return figures by name: figures of the preprint by number there, then the others by name.
+    """Return figures by name, first those of the preprint in its order, then the others by name.
 
     Raises
     ------

@@ -25,14 +25,14 @@ AZIMUTH = 30.0  # azimuth of every camera, degrees
 
 
 class NothingToDraw(Exception):
-    """A configuration holds nothing of what a figure shows; the message names what is missing."""
+    """The configuration has no data for a figure; the message names the missing data."""
 
 
 class Options(ConfigModel):
-    """A figure without a choice; the others add keys.
+    """Options of a figure without choices; subclasses add keys.
 
-    Whatever a configuration does not hold is left out of the picture. An empty list of names means
-    all there is, as does a list of which a configuration holds nothing.
+    Chosen names that the configuration lacks are not drawn. An empty list of names, or a list whose
+    names are all absent, selects everything in the configuration.
     """
 
     def names(self, key: str) -> Names:
@@ -54,19 +54,19 @@ class Options(ConfigModel):
 
 
 class Scenes(Options):
-    """Scenes, in the order in which they are drawn."""
+    """Options: scenes, in the order in which they are drawn."""
 
     scenes: Names = ()
 
 
 class Methods(Scenes):
-    """Scenes and reduction methods, in the order in which they are drawn."""
+    """Options: scenes and reduction methods, in the order in which they are drawn."""
 
     methods: Names = ()
 
 
 class View(Methods):
-    """Elevation of the camera, degrees; up is against the gravity of a scene."""
+    """Options: elevation of the camera, degrees; up is opposite to the gravity of a scene."""
 
     elevation: Annotated[float, Field(ge=-90.0, le=90.0)] = 20.0
 
@@ -76,14 +76,14 @@ class View(Methods):
 
 
 class Beside(Scenes):
-    """Scene -> experiment of the published code whose output is drawn beside ours."""
+    """Options: panels per row, and scene -> experiment of the published code drawn with it."""
 
     columns: Columns = 3
     published: dict[str, str] = Field(default_factory=dict)
 
 
 class ReducedRuns(View):
-    """Full-order runs beside reduced ones."""
+    """Options: basis sizes and instants at which full-order and reduced runs are drawn."""
 
     ranks: Ranks = ()
     frames: Instants = (0.1, 0.5, 0.9)
@@ -137,7 +137,7 @@ class Experiment(_Plain):
 
 
 class Reduction(_Plain):
-    """A reduction method: its title, and what it samples (`MethodSpec.rows`)."""
+    """Title of a reduction method, and the rows that it samples (`MethodSpec.rows`)."""
 
     title: str
     rows: str

@@ -5,41 +5,26 @@ verdicts under changed rules.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from study.tables.claims import verdicts
 from study.tables.claims.metrics import VALUE, Tables
-from study.tables.claims.rules import (
-    NONE_ADDED,
-    PARTS,
-    READS,
-    Added,
-    ClaimRule,
-    TestRule,
-    load_claims,
-)
-from study.tables.claims.verdicts import (
-    VERDICTS,
-    answer_of,
-    by_rules,
-    close,
-    combined,
-    evaluate,
-    satisfied,
-    timed_columns,
-    timed_parts,
-    values_of,
-)
-from study.tables.kit.declaration import flag, integer, number, table, text, timed
+from study.tables.claims.rules import PARTS, READS, Added, ClaimRule, TestRule, load_claims
+from study.tables.kit.declaration import Column, flag, number, table, text, timed
 from study.tables.kit.declaration import table as declare
 
 # Fields of a claim's rule that are columns of the table claims.
 WORDS = {"source", "paper", "figure_or_table", "section", "shown", "text", "qualifiers"}
 SAID = {"what", "metric", "decides", "compare", "threshold", "share"}
 FOUND = ("satisfied", "of", "close", "least", "median", "most", "verdict")
+ONE_OF = f"one of: {', '.join(verdicts.VERDICTS)}"
+# Constructor of columns that depend on timing and are not compared.
+skipped = partial(Column, timed=True, compared="skipped")
 FACTORS = (0.5, 0.8, 1.25, 2.0)  # on thresholds
 SHARES = (0.5, 0.6, 0.75, 0.9, 1.0)
 MARGINS = (1.0, 1.25, 1.5, 2.0, 3.0, 5.0)  # margins of tests that compare times; 1 is no margin
@@ -59,38 +44,26 @@ _Variation = tuple[str, str, Sequence[TestRule], _Rows]  # what varies, how, the
         text("claim", "its identifier in config/claims.yaml"),
         text("source", "who claims it"),
         text("paper", "what the preprint says"),
-        timed(
-            text(
-                "measured",
-                "range of what was measured, of the tests that decide",
-                compared="skipped",
-            )
-        ),
-        timed(text("verdict", f"as published, one of: {', '.join(VERDICTS)}", compared="exact")),
-        timed(text("why", "all tests in words", compared="skipped")),
+        skipped("text", "measured", "range of what was measured, of the tests that decide"),
+        timed(text("verdict", f"as published, {ONE_OF}", compared="exact")),
+        skipped("text", "why", "all tests in words"),
         text("figure_or_table", "where to see it"),
         text("section", "section of the preprint"),
         text("shown", "figures of the preprint"),
         text("text", "the claim in our words"),
         text("qualifiers", "what a fair test has to keep"),
-        timed(text("condition", "what the verdict depends on", compared="skipped")),
-        timed(
-            text(
-                "measured_beyond",
-                "the same of sound variants on well-posed scenes",
-                compared="skipped",
-            )
-        ),
+        skipped("text", "condition", "what the verdict depends on"),
+        skipped("text", "measured_beyond", "the same of sound variants on well-posed scenes"),
         timed(text("verdict_beyond", "the verdict there", compared="exact")),
-        timed(text("condition_beyond", "what it depends on", compared="skipped")),
-        timed(text("why_beyond", "all tests there in words", compared="skipped")),
-        timed(text("answer", "both verdicts in words", compared="skipped")),
+        skipped("text", "condition_beyond", "what it depends on"),
+        skipped("text", "why_beyond", "all tests there in words"),
+        skipped("text", "answer", "both verdicts in words"),
         text("history", "when and why the rules became what they are"),
     ),
     reads=READS,
-    timed_cells=by_rules(lambda rule, row: timed_columns(rule)),
+    timed_cells=verdicts.by_rules(lambda rule, row: verdicts.timed_columns(rule)),
 )
-def claims(rules: Path, added: Added = NONE_ADDED, **tables: pd.DataFrame) -> pd.DataFrame:
+def claims(rules: Path, added: Added, **tables: pd.DataFrame) -> pd.DataFrame:
     """One row per claim, in the order of the file ``rules``; ``added`` is as in `load_claims`."""
     found = load_claims(rules, added)
     return pd.DataFrame([_row(name, rule, tables) for name, rule in found.items()])
@@ -113,11 +86,11 @@ def _row(name: str, rule: ClaimRule, tables: Tables) -> dict[str, Any]:
 
 
 def _decided(tests: Sequence[TestRule], tables: Tables) -> dict[str, str]:
-    outcomes = [(test, evaluate(test, tables)) for test in tests]
+    outcomes = [(test, verdicts.evaluate(test, tables)) for test in tests]
     deciding = [o for test, o in outcomes if test.decides]
     return {
         "measured": "; ".join(o.measured for o in deciding),
-        "verdict": combined([o.verdict for o in deciding]),
+        "verdict": verdicts.combined([o.verdict for o in deciding]),
         "condition": "; ".join(o.condition for o in deciding if o.condition),
         "why": "; ".join(o.sentence for _, o in outcomes) + ".",
     }
@@ -140,20 +113,18 @@ def _timed_of_test(rule: ClaimRule, row: Any) -> set[str]:
         number("threshold", "what a value is compared with"),
         number("share", "of the rows that must agree for a clear answer"),
         number("margin", "factor of the threshold within which a ratio of times decides nothing"),
-        timed(integer("satisfied", "rows that satisfy the comparison", compared="skipped")),
-        timed(integer("of", "rows that are compared", compared="skipped")),
-        timed(integer("close", "of them, ratios of times within the margin", compared="skipped")),
-        timed(
-            number("least", "smallest value; infinite for a run that failed", compared="skipped")
-        ),
-        timed(number("median", "their median", compared="skipped")),
-        timed(number("most", "largest value", compared="skipped")),
-        timed(text("verdict", f"of this test, one of: {', '.join(VERDICTS)}", compared="exact")),
+        skipped("integer", "satisfied", "rows that satisfy the comparison"),
+        skipped("integer", "of", "rows that are compared"),
+        skipped("integer", "close", "of them, ratios of times within the margin"),
+        skipped("number", "least", "smallest value; infinite for a run that failed"),
+        skipped("number", "median", "their median"),
+        skipped("number", "most", "largest value"),
+        timed(text("verdict", f"of this test, {ONE_OF}", compared="exact")),
     ),
     reads=READS,
-    timed_cells=by_rules(_timed_of_test),
+    timed_cells=verdicts.by_rules(_timed_of_test),
 )
-def claims_tests(rules: Path, added: Added = NONE_ADDED, **tables: pd.DataFrame) -> pd.DataFrame:
+def claims_tests(rules: Path, added: Added, **tables: pd.DataFrame) -> pd.DataFrame:
     """One row per claim, part and test, in the order of the file ``rules``; see `claims`."""
     rows = [
         {"claim": name, "part": part, **test.model_dump(include=SAID), **_found(test, tables)}
@@ -166,12 +137,12 @@ def claims_tests(rules: Path, added: Added = NONE_ADDED, **tables: pd.DataFrame)
 
 def _found(test: TestRule, tables: Tables) -> dict[str, Any]:
     """Margin, counts, verdict and range of the values (None where there are no values)."""
-    values = values_of(test, tables)[VALUE].to_numpy(float)
-    good, total = int(satisfied(test, values).sum()), len(values)
+    values = verdicts.values_of(test, tables)[VALUE].to_numpy(float)
+    good, total = int(verdicts.satisfied(test, values).sum()), len(values)
     spread = (values.min(), np.median(values), values.max()) if total else (None, None, None)
-    found = (good, total, int(close(test, values).sum()), *spread, answer_of(test, values))
-    margin = test.factor if test.timed else None
-    return {"margin": margin, **dict(zip(FOUND, found, strict=True))}
+    near, answer = int(verdicts.close(test, values).sum()), verdicts.answer_of(test, values)
+    found = zip(FOUND, (good, total, near, *spread, answer), strict=True)
+    return {"margin": test.factor if test.timed else None, **dict(found)}
 
 
 @table(
@@ -181,18 +152,14 @@ def _found(test: TestRule, tables: Tables) -> dict[str, Any]:
         text("part", f"tests that decide: {', '.join(PARTS)}"),
         text("varied", f"what is changed in all of them: {', '.join(VARIED)}"),
         text("variation", "how: factor, share, sizes, split, scene left out"),
-        timed(
-            text("verdict", f"one of: {', '.join(VERDICTS)}", compared="exact", tolerance=FRAGILE)
-        ),
+        timed(text("verdict", ONE_OF, compared="exact", tolerance=FRAGILE)),
         timed(text("verdict_of_rules", "the verdict of the rules as they are", compared="exact")),
         timed(flag("same", "the two agree", compared="exact", tolerance=FRAGILE)),
     ),
     reads=READS,
-    timed_cells=timed_parts("verdict", "verdict_of_rules", "same"),
+    timed_cells=verdicts.timed_parts("verdict", "verdict_of_rules", "same"),
 )
-def claims_sensitivity(
-    rules: Path, added: Added = NONE_ADDED, **tables: pd.DataFrame
-) -> pd.DataFrame:
+def claims_sensitivity(rules: Path, added: Added, **tables: pd.DataFrame) -> pd.DataFrame:
     """One row per claim of the file ``rules``, part and variation; see `claims`."""
     return sensitivity_rows(load_claims(rules, added), tables)
 
@@ -208,7 +175,7 @@ def sensitivity_rows(rules: Mapping[str, ClaimRule], tables: Tables) -> pd.DataF
             tests = [test for test in getattr(rule, part) if test.decides]
             if not tests:
                 continue
-            rows = [values_of(test, tables) for test in tests]
+            rows = [verdicts.values_of(test, tables) for test in tests]
             base = _verdict(tests, rows)
             for varied, variation, changed, kept in _variations(tests, rows, tables):
                 if all(len(values) for values in (*rows, *kept)):
@@ -219,8 +186,8 @@ def sensitivity_rows(rules: Mapping[str, ClaimRule], tables: Tables) -> pd.DataF
 
 
 def _verdict(tests: Sequence[TestRule], rows: _Rows) -> str:
-    found = zip(tests, rows, strict=True)
-    return combined([answer_of(test, values[VALUE].to_numpy(float)) for test, values in found])
+    values = [found[VALUE].to_numpy(float) for found in rows]
+    return verdicts.combined(list(map(verdicts.answer_of, tests, values)))
 
 
 def _with(test: TestRule, **changes: Any) -> TestRule:
@@ -245,7 +212,7 @@ def _variations(tests: Sequence[TestRule], rows: _Rows, tables: Tables) -> Itera
             for test in tests
         ]
         if changed != list(tests):
-            yield "splits", split, changed, [values_of(test, tables) for test in changed]
+            yield "splits", split, changed, [verdicts.values_of(test, tables) for test in changed]
     scenes = dict.fromkeys(s for values in rows if "scene" in values for s in values.scene)
     others = {f"without {s}": lambda values, s=s: values != s for s in scenes}
     yield from _kept(tests, rows, "scenes", "scene", others)

@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 import pandas as pd
 
-from study.tables.kit.reruns import KEYS, MEDIAN, families, trained, with_held_out
+from study.tables.kit.results import KEYS, MEDIAN, families, trained, with_held_out
 from study.tables.payoff import CURVE
 
 Tables = Mapping[str, pd.DataFrame]

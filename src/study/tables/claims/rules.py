@@ -31,17 +31,17 @@ READS: dict[str, Read] = {
 
 
 class TestRule(ConfigModel):
-    """One comparison.
+    """Test of a claim: comparison of a metric with a threshold.
 
-    what : words for the rows that are used in the reason
+    what : description of the compared rows, which the verdict's reason quotes
     metric : name in `METRICS`
     where : column -> allowed values
-    accuracy : error up to which a run counts as accurate, for the metrics that ask
-    margin : factor between a ratio of times and its limit up to which it decides nothing, see
-        `factor`
-    share : fraction of the rows that must agree for a clear answer: the test passes where as many
-        satisfy the comparison, fails where as many do not, and depends otherwise
-    by : column whose values the answer is broken down by where it depends
+    accuracy : largest error of a run that counts as accurate, for metrics that depend on it
+    margin : a ratio of times that differs from the threshold by less than this factor decides
+        nothing, see `factor`
+    share : fraction of the rows that must agree: the test holds if so many satisfy the comparison,
+        does not hold if so many violate it, and depends otherwise
+    by : column for whose values a verdict "depends" counts the rows separately
     """
 
     __test__ = False
@@ -90,8 +90,8 @@ class TestRule(ConfigModel):
 class Change(ConfigModel):
     """Date and reason of a change in the rules of a claim.
 
-    after_data : whether results that the rules decide on were known by then
-    rules : fingerprint of the rules from then on, see `ClaimRule.fingerprint`
+    after_data : whether results that the rules evaluate were known at this date
+    rules : fingerprint of the changed rules, see `ClaimRule.fingerprint`
     """
 
     date: datetime.date
@@ -101,12 +101,12 @@ class Change(ConfigModel):
 
 
 class ClaimRule(ConfigModel):
-    """A claim of the preprint, where it stands, and the tests that decide it.
+    """A claim of the preprint, its place there, and the tests that decide it.
 
     text : the claim in our words
-    paper : what the preprint says, in a few words
+    paper : the statement of the preprint, in a few words
     section, shown : section and figures of the preprint
-    qualifiers : what a fair test has to keep
+    qualifiers : conditions that a fair test has to respect
     published : tests on the preprint's own variants and scenes
     beyond : tests on sound variants and well-posed scenes; where none decides, whether the claim
         carries over is not tested

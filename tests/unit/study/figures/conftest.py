@@ -19,19 +19,7 @@ from pdrom.model.mesh.types import Mesh, save_mesh
 from pdrom.reduction.method import load_methods
 from pdrom.reduction.sampling.deim import block_elements, deim_entries
 from places import CONFIG, ROOT
-from study.artifact.paths import (
-    BASIS,
-    CONTRIBUTIONS,
-    MESH,
-    NOISE_RUNS,
-    RERUNS,
-    SAMPLING,
-    SENSITIVITY,
-    SNAPSHOTS,
-    TABLE,
-    TRAIN,
-    Place,
-)
+from study.artifact import paths
 from study.artifact.reads import TableOf
 from study.figures.kit.declaration import declarations
 from study.pipeline.resolve import Job, Resolver
@@ -63,7 +51,7 @@ class Invented:
         self.study = Study.load(self.settings, ROOT)
         make_results(self)
 
-    def path(self, place: Place, scene: str, group: str = "", method: str = "") -> str:
+    def path(self, place: paths.Place, scene: str, group: str = "", method: str = "") -> str:
         """Path of a file with these labels."""
         labels = {"scene": scene, "group": group, "method": method}
         return Resolver(self.study, str(self.root)).file(place, labels)
@@ -97,16 +85,16 @@ def make_results(results: Invented) -> None:
     rng, effects = np.random.default_rng(7), reference("effects_cost")
     for scene, config in results.study.scenes.items():
         mesh = mesh_of(scene)
-        save_mesh(mesh, results.path(MESH, scene))
+        save_mesh(mesh, results.path(paths.MESH, scene))
         positions = _trajectory(mesh)
-        with write_hdf5(results.path(TRAIN, scene)) as file:
+        with write_hdf5(results.path(paths.TRAIN, scene)) as file:
             file["positions"] = positions
         for group in config.reduce:
             rank = 0 if scene in FLAT else 14
             count = len(EFFECTS.load(group).element_vertices(mesh))
             bases = _write_bases(results, scene, group, count, rank, rng)
             for method, spec in results.study.methods.items():
-                path = results.path(SAMPLING, scene, group, method)
+                path = results.path(paths.SAMPLING, scene, group, method)
                 _write_sampling(path, bases, group, spec.rows)
                 _write_reruns(results, scene, group, method, positions, rank, rng)
         if scene in FLAT:
@@ -128,12 +116,12 @@ def _trajectory(mesh: Mesh) -> np.ndarray:
 def _write_bases(results, scene, group, count, rank, rng) -> np.ndarray:
     rows = EFFECTS.load(group).rows_per_element
     V = np.linalg.qr(rng.standard_normal((3 * rows * count, 14)))[0][:, :rank]
-    for path in {results.path(BASIS, scene, group, method) for method in results.study.methods}:
+    for path in {results.path(paths.BASIS, scene, group, m) for m in results.study.methods}:
         with write_hdf5(path) as file:
             file["V"], file["mean"] = V, np.zeros(len(V))
             file["singular_values"] = 0.5 ** np.arange(14)
             file.attrs.update(rank=rank, roundoff=1e-12, rows_per_element=rows)
-    with write_hdf5(results.path(SNAPSHOTS, scene, group)) as file:
+    with write_hdf5(results.path(paths.SNAPSHOTS, scene, group)) as file:
         for split in ("train", "test", "heldout"):
             file[split] = rng.standard_normal((10, rows * count, 3))
             file[f"{split}_frames"] = np.arange(0, FRAMES, 2) + (split != "train")
@@ -159,7 +147,7 @@ def _write_sampling(path: str, V: np.ndarray, group: str, rows: str) -> None:
 
 
 def _write_reruns(results, scene, group, method, positions, rank, rng) -> None:
-    with write_hdf5(results.path(RERUNS, scene, group, method)) as file:
+    with write_hdf5(results.path(paths.RERUNS, scene, group, method)) as file:
         file["displacement"] = np.ones(FRAMES)
         for r in (6, 10, 14, 20):
             store = file.create_group(f"r{r:04d}")
@@ -201,13 +189,13 @@ def _write_tables(results: Invented) -> None:
             table = table[table.scene.isin(list(results.study.scenes))]
         if "method" in table:
             table = table[~table.method.isin(others)]
-        write_table(table, TABLE.at(str(results.root), name=name))
+        write_table(table, paths.TABLE.at(str(results.root), name=name))
 
 
 def _write_noise_runs(results, scene) -> None:
     """Runs that do not start where round-off stays in the plane, else the sheet at rest."""
     points = mesh_of(scene).points
-    with write_hdf5(results.path(NOISE_RUNS, scene, "bending")) as file:
+    with write_hdf5(results.path(paths.NOISE_RUNS, scene, "bending")) as file:
         for axes, frames in (("all", FRAMES), ("plane", 0), ("vertex", FRAMES)):
             for r in (6, 10):
                 store = file.create_group(f"{axes}/deim-joint/r{r:04d}")
@@ -224,7 +212,7 @@ def _write_contributions(results, scene, effects) -> None:
         for i in range(1 if row.role == "start" else FRAMES)
     ]
     names = "scene effect role frame force energy"
-    write_table(frame(names, *rows), results.path(CONTRIBUTIONS, scene))
+    write_table(frame(names, *rows), results.path(paths.CONTRIBUTIONS, scene))
 
 
 def _write_sensitivity(results, scene) -> None:
@@ -235,7 +223,7 @@ def _write_sensitivity(results, scene) -> None:
         for i in range(FRAMES)
     ]
     names = "scene perturbation frame relative_difference"
-    write_table(frame(names, *rows), results.path(SENSITIVITY, scene))
+    write_table(frame(names, *rows), results.path(paths.SENSITIVITY, scene))
 
 
 @pytest.fixture(scope="session")

@@ -7,26 +7,7 @@ from matplotlib.figure import Figure
 
 from pdrom.reduction.method import load_methods
 from places import ROOT
-from study.figures.accuracy_cost import (
-    ABOVE,
-    BELOW,
-    BLOWN_UP,
-    ENTRIES,
-    ERROR,
-    FAMILIES,
-    HIGH,
-    INTERPOLATED,
-    ITERATIONS,
-    LOW,
-    TIME,
-    WEIGHTED,
-    TradeOffs,
-    draw_panel,
-    handles,
-    label_iterations,
-    look_of,
-    markers,
-)
+from study.figures import accuracy_cost as view
 from study.figures.kit.options import Drawn, Reduction
 
 
@@ -39,26 +20,26 @@ def everything():
 
 
 def test_every_method_of_the_project_has_a_family(everything):
-    families = {name: look_of(name, "full", everything)[0] for name in everything.methods}
-    assert set(families.values()) <= {*FAMILIES} - {ITERATIONS}
-    assert {families[name] for name in ("deim", "deim-joint", "published")} == {ENTRIES}
-    assert look_of("ecsw-1e-02", "pod", everything)[0] == WEIGHTED
-    assert look_of("full", "skinning", everything)[0] == WEIGHTED
-    assert look_of("block-deim", "pod", everything)[0] == INTERPOLATED
-    assert look_of("not drawn", "full", everything)[0] is None
+    families = {name: view.look_of(name, "full", everything)[0] for name in everything.methods}
+    assert set(families.values()) <= {*view.FAMILIES} - {view.ITERATIONS}
+    assert {families[name] for name in ("deim", "deim-joint", "published")} == {view.ENTRIES}
+    assert view.look_of("ecsw-1e-02", "pod", everything)[0] == view.WEIGHTED
+    assert view.look_of("full", "skinning", everything)[0] == view.WEIGHTED
+    assert view.look_of("block-deim", "pod", everything)[0] == view.INTERPOLATED
+    assert view.look_of("not drawn", "full", everything)[0] is None
 
 
 def test_models_that_differ_by_tolerance_or_basis_share_a_marker(everything):
-    ecsw = look_of("ecsw-1e-02", "pod", everything)
-    assert ecsw == look_of("ecsw-1e-03", "skinning", everything)
-    assert look_of("full", "pod", everything) == look_of("full", "skinning", everything)
+    ecsw = view.look_of("ecsw-1e-02", "pod", everything)
+    assert ecsw == view.look_of("ecsw-1e-03", "skinning", everything)
+    assert view.look_of("full", "pod", everything) == view.look_of("full", "skinning", everything)
     names = [("full", "pod"), ("ecsw-1e-02", "pod"), ("deim", "full"), ("deim-joint", "full")]
-    looks = [look_of(*name, everything) for name in names]
-    found = markers([*looks, ecsw])
+    looks = [view.look_of(*name, everything) for name in names]
+    found = view.markers([*looks, ecsw])
     assert list(found) == looks
     assert [found[look] for look in looks] == ["o", "s", "o", "s"]
-    legend = dict(handles(TradeOffs(pd.DataFrame(), pd.DataFrame(), {}, {}, found)))
-    assert [line.get_label() for line in legend[WEIGHTED]] == [
+    legend = dict(view.handles(view.TradeOffs(pd.DataFrame(), pd.DataFrame(), {}, {}, found)))
+    assert [line.get_label() for line in legend[view.WEIGHTED]] == [
         "all projections", "ecsw, by tolerance",
     ]  # fmt: skip
 
@@ -66,11 +47,12 @@ def test_models_that_differ_by_tolerance_or_basis_share_a_marker(everything):
 def invented(errors, times, method="deim", blown_up=(), position_basis="full"):
     """Points of one scene, of one method that samples single entries."""
     names = {"scene": "a", "method": method, "position_basis": position_basis}
-    names |= {"family": ENTRIES, "member": "deim"}
-    points = pd.DataFrame({ERROR: errors, TIME: times, "iterations": range(1, len(errors) + 1)})
-    lost = pd.DataFrame({ERROR: np.nan, TIME: blown_up})
-    marker = {(ENTRIES, "deim"): "o"}
-    return TradeOffs(points.assign(**names), lost.assign(**names), {"a": 2.0}, {}, marker)
+    names |= {"family": view.ENTRIES, "member": "deim"}
+    points = pd.DataFrame({view.ERROR: errors, view.TIME: times})
+    points["iterations"] = points.index + 1
+    lost = pd.DataFrame({view.ERROR: np.nan, view.TIME: blown_up})
+    marker = {(view.ENTRIES, "deim"): "o"}
+    return view.TradeOffs(points.assign(**names), lost.assign(**names), {"a": 2.0}, {}, marker)
 
 
 def drawn(ax, marker):
@@ -81,26 +63,26 @@ def drawn(ax, marker):
 
 def test_points_outside_the_axis_are_arrows_on_its_rim():
     ax = Figure().subplots()
-    draw_panel(ax, invented([1e-9, 0.1, 1e5], [1.0, 2.0, 3.0], blown_up=[4.0]), "a")
-    assert drawn(ax, BELOW) == [(1.0, LOW)]
-    assert drawn(ax, ABOVE) == [(3.0, HIGH)]
+    view.draw_panel(ax, invented([1e-9, 0.1, 1e5], [1.0, 2.0, 3.0], blown_up=[4.0]), "a")
+    assert drawn(ax, view.BELOW) == [(1.0, view.LOW)]
+    assert drawn(ax, view.ABOVE) == [(3.0, view.HIGH)]
     assert drawn(ax, "o") == [(2.0, 0.1)]
-    ((time, height),) = drawn(ax, BLOWN_UP)
+    ((time, height),) = drawn(ax, view.BLOWN_UP)
     assert time == 4.0
-    assert LOW < height < HIGH
+    assert view.LOW < height < view.HIGH
     assert ax.get_xlim()[1] > 4.0
 
 
 @pytest.mark.parametrize(("basis", "fill"), [("pod", "full"), ("skinning", "none")])
 def test_points_in_a_subspace_of_skinning_weights_are_hollow(basis, fill):
     ax = Figure().subplots()
-    draw_panel(ax, invented([0.1], [2.0], position_basis=basis), "a")
+    view.draw_panel(ax, invented([0.1], [2.0], position_basis=basis), "a")
     assert next(line.get_fillstyle() for line in ax.lines if len(line.get_xdata()) == 1) == fill
 
 
 def test_the_front_of_a_family_is_not_beaten():
     ax = Figure().subplots()
-    draw_panel(ax, invented([0.5, 0.7, 0.1, 0.2], [1.0, 2.0, 3.0, 4.0]), "a")
+    view.draw_panel(ax, invented([0.5, 0.7, 0.1, 0.2], [1.0, 2.0, 3.0, 4.0]), "a")
     (front,) = [
         line for line in ax.lines if line.get_drawstyle() == "steps-post" and len(line.get_xdata())
     ]
@@ -110,8 +92,8 @@ def test_the_front_of_a_family_is_not_beaten():
 def test_near_numbers_of_iterations_share_a_label():
     ax = Figure().subplots()
     found = invented([0.3, 0.2, 0.1], [1.0, 1.01, 9.0], method="fewer-iterations")
-    draw_panel(ax, found, "a")
-    label_iterations(ax, found, "a")
+    view.draw_panel(ax, found, "a")
+    view.label_iterations(ax, found, "a")
     assert [text.get_text() for text in ax.texts] == ["K = 1, 2", "K = 3"]
 
 

@@ -10,8 +10,8 @@ from scipy.stats import binom
 from pdrom.core.store import write_table
 from study.artifact.paths import File
 from study.experiments.frame_times import COLUMNS
-from study.tables.kit.parts import in_one_time, in_words, median_interval
-from study.tables.sensitivity import repetitions
+from study.tables.errors import repetitions
+from study.tables.kit.results import in_words, median_interval
 from study.tables.speedups import frame_times, speedups
 
 VALUES = st.lists(st.floats(0.1, 10.0), min_size=1, max_size=12)
@@ -107,14 +107,6 @@ def test_no_process_leaves_empty_tables():
     assert len(frame_times([])) == 0
     empty = speedups([], frame_times([]), [], [], [], pd.DataFrame())
     assert tuple(empty.columns) == speedups.column_names
-
-
-def test_times_of_a_job_are_told_in_the_one_time():
-    job = pd.DataFrame({"scene": ["a", "a", "b"], "ms": [2.0, 1.0, 5.0], "r": [1, 2, 3]})
-    times = pd.DataFrame({"scene": ["a"], "ms_per_frame": [3.0]})
-    told = in_one_time(job, pd.Series({"a": 2.0, "b": 5.0}), times, ["ms"])
-    assert told.ms.tolist() == [3.0, 1.5, 5.0]
-    assert told.r.tolist() == [1, 2, 3]
 
 
 def test_repetitions_are_told_by_median_and_range(tmp_path):

@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 from study.tables.gain_interventions import gain_interventions
-from study.tables.kit.reruns import KEYS, TRAIN, judged_runs, over_motions, trained, with_held_out
+from study.tables.kit.results import KEYS, TRAIN, judged_runs, over_motions, trained, with_held_out
 
 # scene, method, r, error within the horizon (None: ended before), gain, elements, frames
 RUNS = [

@@ -15,14 +15,13 @@ from pdrom.model.held_out import MOTIONS, PLAYBACK
 from pdrom.reduction.basis import Basis, save_basis
 from study.artifact import paths
 from study.artifact.paths import REQUESTED_TOLERANCES, File, Place
-from study.experiments.kit.settings import Horizon, floor_of
+from study.experiments.kit.settings import Horizon
 from study.experiments.requested_tolerances import COLUMNS
 from study.tables.accuracy_cost import accuracy_cost, pareto, reference_of, requested_tolerances
 from study.tables.effects_cost import local_share
-from study.tables.kit.reruns import TRAIN, trained
-from study.tables.reconstruction_error import singular_values
+from study.tables.errors import sensitivity, singular_values
+from study.tables.kit.results import TRAIN, trained
 from study.tables.reduced_reruns import reduced_reruns
-from study.tables.sensitivity import sensitivity
 
 
 def written(path, *rows) -> File:
@@ -80,12 +79,6 @@ def sensitivity_files(tmp_path) -> list[File]:
         ]
         parts.append(written(tmp_path / f"sensitivity_{scene}.csv", *rows))
     return parts
-
-
-def test_floor_is_the_largest_over_the_seeds(tmp_path):
-    table = sensitivity(sensitivity_files(tmp_path))
-    assert floor_of(table, "a", 1e-10).tolist() == [0.0, 2e-9, 5e-3, 1.0]
-    assert floor_of(table, "a", "heldout").tolist() == [1e-12, 1.0, 1.0, 1.0]
 
 
 # Reruns -------------------------------------------------------------------------------------------

@@ -1,13 +1,16 @@
-"""Verdicts under other rules: each variation by hand."""
+"""Every test with the values that it found, and verdicts under other rules, by hand."""
 
 import pandas as pd
+import pytest
 
 from pdrom.core.yamlfile import validate
 from places import ROOT
 from study.tables import declared
-from study.tables.claims.claims import sensitivity_rows
+from study.tables.claims.claims import claims, claims_tests, sensitivity_rows
 from study.tables.claims.rules import PARTS, ClaimRule, TestRule, load_claims
+from study.tables.claims.verdicts import MACHINE, UNDECIDED, combined
 
+PATH = ROOT / "config" / "claims.yaml"
 ERRORS = pd.DataFrame(
     {
         "scene": ["a", "a", "b", "b"],
@@ -62,9 +65,8 @@ def test_margins_vary_where_times_are_compared():
     )
     test = {"what": "w", "metric": "local_share", "compare": ">=", "threshold": 0.35}
     rows = rows_of(test, {"local_share": shares})
-    machine = "depends on the machine"
     assert verdicts(rows, "margin") == {
-        "1": "holds", "1.25": "holds", "1.5": "holds", "2": machine, "3": machine, "5": machine,
+        "1": "holds", "1.25": "holds", "1.5": "holds", "2": MACHINE, "3": MACHINE, "5": MACHINE,
     }  # fmt: skip
     assert set(rows.verdict_of_rules) == {"holds"}
 
@@ -85,4 +87,48 @@ def test_splits_vary_where_a_test_names_one():
 
 def test_a_claim_without_data_has_no_variations():
     empty = {name: table.checked(pd.DataFrame()) for name, table in declared().items()}
-    assert sensitivity_rows(load_claims(ROOT / "config" / "claims.yaml"), empty).empty
+    assert sensitivity_rows(load_claims(PATH), empty).empty
+
+
+# Every test ---------------------------------------------------------------------------------------
+
+SHARES = pd.DataFrame(
+    {"scene": ["a", "b", "c"], "implementation": "compiled", "local_share": [0.2, 0.8, 0.9]}
+)
+
+
+@pytest.fixture(scope="module")
+def tables() -> dict[str, pd.DataFrame]:
+    empty = {name: table.checked(pd.DataFrame()) for name, table in declared().items()}
+    return empty | {"local_share": SHARES}
+
+
+@pytest.fixture(scope="module")
+def outcomes(tables: dict[str, pd.DataFrame]) -> pd.DataFrame:
+    return claims_tests(PATH, {}, **tables)
+
+
+def test_what_a_test_found(outcomes):
+    found = outcomes[(outcomes.claim == "C1") & (outcomes.part == "beyond")]
+    one = found.iloc[0]
+    assert (one.satisfied, one.of, one.close, one.verdict) == (2, 3, 2, MACHINE)
+    assert one.margin == 4.0
+    assert (one.least, one["median"], one.most) == (0.2, 0.8, 0.9)
+
+
+def test_a_test_without_rows_is_undecided(outcomes):
+    nothing = outcomes[outcomes.of == 0]
+    assert (nothing.verdict == UNDECIDED).all()
+    assert nothing[["least", "median", "most"]].isna().all(axis=None)
+
+
+def test_the_tests_that_decide_give_the_verdicts(tables, outcomes):
+    for row in claims(PATH, {}, **tables).itertuples():
+        for part, verdict in (("published", row.verdict), ("beyond", row.verdict_beyond)):
+            mine = outcomes[(outcomes.claim == row.claim) & (outcomes.part == part)]
+            mine = mine[mine.decides]
+            assert combined(list(mine.verdict)) == verdict
+
+
+def test_words_tell_the_tests_of_a_part_apart(outcomes):
+    assert not outcomes.duplicated(["claim", "part", "what"]).any()

@@ -149,16 +149,11 @@ def test_every_table_is_declared_once_and_found_at_its_address():
         assert made.name == name
 
 
-def test_a_time_in_seconds_or_milliseconds_is_timed_unless_it_is_no_clocks():
+def test_every_column_says_what_it_is_and_a_measured_time_is_timed():
     no_clocks = {"h", "contact_delay"}  # set, or seconds of the simulation
     for name, made in declared().items():
-        for column in made.columns:
-            if column.unit in ("s", "ms") and column.name not in no_clocks:
-                assert column.timed, (name, column.name)
-
-
-def test_every_column_says_what_it_is():
-    for made in declared().values():
         assert made.title
         for column in made.columns:
-            assert column.meaning, column.name
+            assert column.meaning, (name, column.name)
+            if column.unit in ("s", "ms") and column.name not in no_clocks:
+                assert column.timed, (name, column.name)

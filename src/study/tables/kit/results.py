@@ -1,15 +1,24 @@
-"""Selections from the table reduced_reruns by motion, and medians over held-out motions.
+"""Rows of experiment results in comparable times, runs of reduced_reruns, medians over motions.
+
+Each job times the full-order run of its scene together with the variants, but machine speed differs
+between jobs. All times of a job are multiplied by the time of the full-order run in the table
+frame_times over its time in the job, so that this run has the same time everywhere. Ratios of times
+within a job do not change.
 
 Errors over held-out motions are summarised by their median, as fixed in config/claims.yaml.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Iterable, Sequence
 
 import numpy as np
 import pandas as pd
 
+from pdrom.core.store import read_table
+from study.artifact.paths import File
+from study.experiments.kit.measurement import PHASES
 from study.tables.kit.declaration import integer, number
 
+RESAMPLES, SEED, LEVEL = 2000, 1, 0.95
 KEYS = ["scene", "group", "method", "position_basis", "k", "r"]  # columns that identify a run
 TRAIN = "train"
 MEDIAN, LOW, HIGH, COUNT = "error_heldout", "error_heldout_low", "error_heldout_high", "motions"
@@ -27,6 +36,68 @@ EXPERIMENT = ["scene", "group"]
 ORTHOGONAL = "pod"  # orthogonal projection, which evaluates all elements
 FAILED = 0.1  # error within the horizon above which a run counts as failed
 TWIN = "_twin"
+
+
+def joined(files: Iterable[File]) -> pd.DataFrame:
+    """Rows of the tables in ``files``, in order; an empty frame without columns if none exist."""
+    parts = [part for part in (read_table(file.path) for file in files) if len(part)]
+    return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame()
+
+
+def in_one_time(
+    table: pd.DataFrame, own: pd.Series, times: pd.DataFrame, columns: Collection[str]
+) -> pd.DataFrame:
+    """``table`` with its time ``columns`` scaled to the times of the table frame_times.
+
+    Scenes that the table frame_times lacks retain the times measured in their job.
+
+    Parameters
+    ----------
+    own : scene -> time of a full-order frame in the job, ms
+    times : table frame_times
+    """
+    one = times.set_index("scene").ms_per_frame.reindex(own.index)
+    factor = table.scene.map((one / own).fillna(1.0)).fillna(1.0)
+    return table.assign(**{name: table[name] * factor for name in columns})
+
+
+def timings_in_one_time(timings: Sequence[File], times: pd.DataFrame) -> pd.DataFrame:
+    """Rows of the files ``timings``, scaled to the table ``times`` by `in_one_time`."""
+    rows = joined(timings)
+    if rows.empty:
+        return rows
+    own = rows[rows.method.isna() & (rows.implementation == "compiled")]
+    own = own.set_index("scene").ms_per_frame
+    return in_one_time(rows, own, times, columns=[name for name in PHASES if name in rows])
+
+
+def median_interval(values: Sequence[float] | np.ndarray) -> tuple[float, float, float]:
+    """Median, and the 2.5 % and 97.5 % quantiles of medians of resampled values (bootstrap).
+
+    For a single value, or equal values, both quantiles are that value.
+    """
+    # imported here because it takes a second, which planning the workflow does not need
+    from scipy.stats import bootstrap
+
+    x = np.asarray(values, float)
+    if len(x) < 2 or np.ptp(x) == 0.0:
+        return (float(np.median(x)),) * 3
+    found = bootstrap(
+        (x,), np.median, n_resamples=RESAMPLES, confidence_level=LEVEL, method="percentile",
+        rng=np.random.default_rng(SEED),
+    ).confidence_interval  # fmt: skip
+    return float(np.median(x)), float(found.low), float(found.high)
+
+
+def in_words(median: float, low: float, high: float) -> str:
+    """Text with the ``median`` and the interval from ``low`` to ``high``."""
+    return f"{_rounded(median)} ({_rounded(low)} to {_rounded(high)})"
+
+
+def _rounded(value: float) -> str:
+    """Text of ``value`` rounded to two significant digits, without an exponent."""
+    place = 1 - int(np.floor(np.log10(abs(value))))
+    return f"{round(value, place):.{max(0, place)}f}"
 
 
 def families(scenes: pd.Series) -> pd.Series:
