@@ -26,10 +26,7 @@ NAME = f"pdrom-{__version__}"
 
 def bundle(arguments: Sequence[str]) -> Status:
     """Write the archive of a finished study; otherwise print its missing or damaged files."""
-    parser = argparse.ArgumentParser(prog="./reproduce bundle", description=__doc__)
-    parser.add_argument("--configfile", nargs="+", default=[], metavar="FILE")
-    parser.add_argument("--config", nargs="+", default=[], metavar="KEY=VALUE")
-    chosen = parser.parse_args(arguments)
+    chosen = parser().parse_args(arguments)
     subject = Subject.of(chosen.configfile, chosen.config)
     status = verify_files(subject)
     if status is not Status.HOLDS:
@@ -65,6 +62,14 @@ def write_archive(root: Path, results: Mapping[str, Path], target: Path) -> None
                 archive.addfile(entry, content)
     with atomic_path(target) as temporary:
         temporary.write_bytes(gzip.compress(made.getvalue(), mtime=date))
+
+
+def parser() -> argparse.ArgumentParser:
+    """Return the parser of the arguments after the word ``bundle``."""
+    made = argparse.ArgumentParser(prog="./reproduce bundle", description=__doc__)
+    made.add_argument("--configfile", nargs="+", default=[], metavar="FILE")
+    made.add_argument("--config", nargs="+", default=[], metavar="KEY=VALUE")
+    return made
 
 
 def _git(root: Path, *words: str) -> bytes:
