@@ -19,8 +19,7 @@ from pdrom.core.store import atomic_path
 from study.artifact import paths
 from study.pipeline.manifest import read_manifest
 from study.verification.files import verify_files
-from study.verification.status import Status, ended, say
-from study.verification.subject import Subject
+from study.verification.subject import Status, Subject, ended, say
 
 NAME = f"pdrom-{__version__}"
 

@@ -17,8 +17,7 @@ from study.verification.examine import Examination
 from study.verification.files import verify_files
 from study.verification.lines import counted, page, status_of
 from study.verification.references import LOG, folder_of, note, write_reference
-from study.verification.status import Status, ended, say
-from study.verification.subject import Subject
+from study.verification.subject import Status, Subject, ended, say
 
 NOTHING = "Nothing to be done"
 

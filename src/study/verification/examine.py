@@ -13,8 +13,8 @@ from study.artifact.paths import TABLE
 from study.pipeline.resolve import Job
 from study.tables import declared
 from study.tables.claims.rules import load_claims
-from study.verification.again import is_derived, made
 from study.verification.compare import RUNS, Comparison, Context, kept, names_row
+from study.verification.files import is_derived, made
 from study.verification.judge import in_words, judge
 from study.verification.lines import Line, Outcome
 from study.verification.references import Reference, folder_of, read_reference

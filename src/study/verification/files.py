@@ -1,21 +1,28 @@
 """``./reproduce verify --files``: check that every file is unchanged since the last run.
 
-The plan lists the files that must exist, the manifest has their checksums. Results that are made in
-seconds are made again from their inputs and compared (`study.verification.again`).
+The plan lists the files that must exist, the manifest has their checksums. Tables, figures and the
+manuscript with its inputs are made again from the existing files and compared: a file that was
+replaced together with its checksum and its manifest entry differs from the file made again. Results
+of experiments take too long to repeat; only their checksums are compared.
 """
 
+import filecmp
 import os
 import shlex
+from collections.abc import Iterator
+from contextlib import contextmanager
 from itertools import chain
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
-from pdrom.core.errors import StorageError
+from pdrom.core.errors import PdromError, StorageError
 from pdrom.core.store import Condition, check_file
 from study.artifact.paths import MANIFEST
+from study.artifact.reads import Every
 from study.pipeline.manifest import Entry, asked_for, own_files, read_manifest
-from study.verification.again import differing
-from study.verification.status import Status, say
-from study.verification.subject import Subject
+from study.pipeline.resolve import Job
+from study.tables import declared
+from study.verification.subject import Status, Subject, say
 
 DAMAGED = "damaged (its checksum differs)"
 LOST = "not there"
@@ -24,6 +31,8 @@ FOREIGN = "no file of this study"
 UNLISTED = "not in the manifest"
 # Largest number of faults that are printed one by one.
 SHOWN = 20
+# Errors that a job may raise if its input tables were edited.
+FAULTS = (PdromError, ArithmeticError, LookupError, TypeError, ValueError)
 
 
 def verify_files(subject: Subject) -> Status:
@@ -71,3 +80,41 @@ def _fault(path: str, entry: Entry | None, ours: bool) -> str:
         return UNLISTED
     intact = entry.fits(Path(path)) and check_file(path) is Condition.INTACT
     return "" if intact else DAMAGED
+
+
+@contextmanager
+def made(job: Job) -> Iterator[dict[str, Path]]:
+    """Run a job into a temporary folder; yield the new files by the paths of the study's files.
+
+    Raises
+    ------
+    StorageError
+        The job fails on the existing input files.
+    """
+    parents = [os.path.dirname(path) or os.curdir for path in job.outputs.values()]
+    root = os.path.commonpath(parents)  # two pages may have the same name in different folders
+    with TemporaryDirectory(prefix="pdrom-again-") as folder:
+        inside = {name: os.path.relpath(path, root) for name, path in job.outputs.items()}
+        outputs = {name: os.path.join(folder, path) for name, path in inside.items()}
+        try:
+            job.make(outputs)
+        except FAULTS as error:
+            fault = " ".join(str(error).split())
+            first = next(iter(job.outputs.values()))
+            raise StorageError(f"{first}: cannot be made again ({fault})") from error
+        yield {path: Path(outputs[name]) for name, path in job.outputs.items()}
+
+
+def differing(job: Job) -> list[str]:
+    """Paths of a job's outputs that differ from outputs made again; all if the job fails."""
+    try:
+        with made(job) as files:
+            return [old for old, new in files.items() if not filecmp.cmp(old, new, shallow=False)]
+    except StorageError:
+        return list(job.outputs.values())
+
+
+def is_derived(name: str) -> bool:
+    """Return whether the table ``name`` reads other tables only, no files of experiments."""
+    reads = declared()[name].reads.values()
+    return not any(isinstance(read, Every) for read in reads)

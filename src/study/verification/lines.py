@@ -4,7 +4,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
-from study.verification.status import Status
+from study.verification.subject import Status
 
 # Largest number of differences per line that the page lists.
 ON_PAGE = 20

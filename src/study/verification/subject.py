@@ -1,11 +1,17 @@
-"""Subject of a verification: the results of one configuration, by default of the last run."""
+"""Results that ``verify`` and ``bundle`` read, and the exit codes and output of both commands.
+
+The results belong to one configuration, by default that of the last run.
+"""
 
 import shlex
-from collections.abc import Sequence
+import sys
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from enum import IntEnum
 from functools import cached_property
 from pathlib import Path
 
+from pdrom.core.errors import INTERRUPTED, PdromError
 from study.pipeline.commandline import CommandLine, check_files, merged, recall
 from study.pipeline.folders import DEFAULT, Folders, folders
 from study.pipeline.plan import Plan, load_plan
@@ -52,3 +58,29 @@ class Subject:
         command = CommandLine.parse(self.options)
         whole = merged(Path(DEFAULT), command.configfiles, command.settings)
         return load_plan(whole, Path(), command.configfiles, folders=self.folders, quiet=True)
+
+
+class Status(IntEnum):
+    """Exit code of a command; code 2 is argparse's code for an unknown option."""
+
+    HOLDS = 0
+    FAULTY = 1
+    DIFFERS = 3
+    MISSING = 4
+
+
+def ended(command: Callable[[], int]) -> int:
+    """Run ``command`` and return its exit code; report errors and interruption in one line."""
+    try:
+        return command()
+    except (PdromError, OSError) as error:
+        sys.stderr.write(f"pdrom: {error}\n")
+        return Status.FAULTY
+    except KeyboardInterrupt:
+        sys.stderr.write("pdrom: interrupted\n")
+        return INTERRUPTED
+
+
+def say(line: str) -> None:
+    """Print ``line`` to standard output."""
+    sys.stdout.write(f"{line}\n")

@@ -12,8 +12,8 @@ from places import ROOT
 from study.artifact.paths import TABLE
 from study.artifact.reads import TableOf
 from study.tables import declared
-from study.verification.again import is_derived, made
 from study.verification.examine import Examination
+from study.verification.files import is_derived, made
 from study.verification.references import folder_of, read_reference, write_reference
 from study.verification.subject import Subject
 

@@ -10,8 +10,7 @@ from pdrom.core.errors import ConfigurationError
 from study.pipeline.folders import Folders
 from study.verification import bundle
 from study.verification.bundle import write_archive
-from study.verification.status import Status
-from study.verification.subject import Subject
+from study.verification.subject import Status, Subject
 
 
 def git(folder, *arguments: str) -> None:

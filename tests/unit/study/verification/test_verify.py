@@ -16,11 +16,11 @@ from study.article.build import INDEX, VERIFIED
 from study.artifact.paths import ARTICLE, TABLE
 from study.figures.kit.declaration import declarations
 from study.tables import declared
-from study.verification.again import made
 from study.verification.command import NOTHING, update, verify, verify_tables
+from study.verification.files import made
 from study.verification.lines import Line, Outcome, status_of
 from study.verification.references import LOG, folder_of
-from study.verification.status import Status
+from study.verification.subject import Status
 
 RESULTS = "results/studies/tiny"
 CLAIMS = ("claims", "claims_tests", "claims_sensitivity")

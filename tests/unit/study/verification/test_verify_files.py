@@ -23,11 +23,9 @@ from study.pipeline.folders import Folders
 from study.pipeline.manifest import read_manifest, write_manifest
 from study.pipeline.resolve import Job
 from study.tables import declared
-from study.verification import again, files
-from study.verification.again import differing
-from study.verification.files import verify_files
-from study.verification.status import Status
-from study.verification.subject import Subject
+from study.verification import files
+from study.verification.files import differing, verify_files
+from study.verification.subject import Status, Subject
 
 NAMES = ("results/tables/a.csv", "results/fom/a/train.h5", "paper/main.pdf", "results/paper/m.tex")
 OPTIONS = ("--configfile", "my study.yaml")
@@ -221,7 +219,7 @@ def test_outputs_of_one_name_stay_apart():
 def test_a_figure_is_drawn_again_to_the_byte(results, subject):
     """Replaced, with new checksums, by a figure that its table does not give, or another's."""
     job = subject.plan.job(declarations()["singular_values"])  # which reads one table
-    with again.made(job) as made:
+    with files.made(job) as made:
         for path, new in made.items():
             with atomic_path(path) as temporary:
                 temporary.write_bytes(new.read_bytes())

@@ -44,7 +44,7 @@ def write_one(path: Path) -> None:
 
 
 def read_one(path: Path) -> None:
-    """Read all of it as a job does."""
+    """Read the whole file with the reader of its kind."""
     if path.suffix == ".h5":
         with open_hdf5(path) as file:
             file.visititems(lambda _, item: item[()] if isinstance(item, h5py.Dataset) else None)
@@ -56,7 +56,7 @@ def read_one(path: Path) -> None:
 
 @pytest.fixture(scope="module", params=["r.h5", "r.csv", "r.tex"])
 def result(request, tmp_path_factory) -> Path:
-    """A small result with its checksum; what a test does to it is undone by `noticed`."""
+    """A small result with its checksum; `noticed` undoes the changes of a test."""
     path = tmp_path_factory.mktemp("result") / request.param
     write_one(path)
     assert check_file(path) == "intact"
@@ -65,7 +65,7 @@ def result(request, tmp_path_factory) -> Path:
 
 
 def hidden(path: Path) -> list[str]:
-    """Names of the files beside a result: none has its checksum inside but HDF5."""
+    """Names of the files beside a result; only HDF5 files contain their own checksum."""
     return [] if path.suffix == ".h5" else [checksum_path(path).name]
 
 
@@ -75,15 +75,15 @@ def checksum_of(path: Path) -> bytes:
 
 
 def places(checksum: bytes) -> list[int]:
-    """Every byte of a checksum, and some of the zeros that fill a block."""
+    """Indices of every byte of a checksum, and of some zeros that fill the block after it."""
     told = len(checksum.rstrip(b"\0"))
     return [*range(told), *range(told, len(checksum), 100)]
 
 
 def noticed(path: Path, content: bytes | None = None, checksum: bytes | None = None) -> bool:
-    """Whether other bytes of the file, or of its checksum, are found.
+    """Replace the file's bytes or its checksum; return True if every reader reports the damage.
 
-    A job sets the file aside, any other reader leaves it where it is. Both are put back.
+    A job renames the damaged file, any other reader leaves it. The old files are restored.
     """
     before = {p: p.read_bytes() for p in path.parent.iterdir()}
     if content is not None:
@@ -229,6 +229,15 @@ def test_what_is_not_there_is_named(tmp_path):
     for check in (check_file, require_intact):
         with pytest.raises(StorageError, match=r"none\.csv: no such file"):
             check(tmp_path / "none.csv")
+
+
+def test_a_wrong_checksum_is_refused_also_by_who_asks_for_none(tmp_path):
+    path = tmp_path / "r.h5"
+    write_one(path)
+    content = path.read_bytes()
+    path.write_bytes(flipped(content, 4 * len(content)))
+    with pytest.raises(StorageError, match="checksum differ"), open_hdf5(path, unchecked=True):
+        pass
 
 
 @pytest.mark.parametrize(
