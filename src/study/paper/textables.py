@@ -167,7 +167,7 @@ def positions(reduced_reruns: pd.DataFrame) -> str:
                 for basis, method, text in columns.values()
             ]
             rows.append([_name(scene), *cells])
-    return tabular(["scene", *columns], rows, "l" + "r" * 8)
+    return tabular(["scene", *columns], rows, "l" + "r" * len(columns))
 
 
 _METHODS = ("deim-joint", "block-deim", "gappy")
