@@ -24,6 +24,7 @@ from pdrom.core.errors import ConfigurationError, PdromError, choices
 from pdrom.core.yamlfile import ConfigModel, shown
 from pdrom.model.constraints.base import GroupConfig
 from pdrom.model.effects.base import effect_config
+from pdrom.model.runs import trajectory
 from pdrom.model.scene import Scene
 from pdrom.reduction.requested import levels
 from pdrom.reduction.requested.levels import Level, Motion, OnFrame, Quantity, Trajectory, silent
@@ -94,7 +95,8 @@ class ToleranceSettings(ConfigModel):
     """Levels that are calibrated, and the factor of the estimates.
 
     modes, tolerances : of the reductions: k, tau
-    frames : of the training motion that the elements are sampled for, at most
+    frames : of the training motions that the elements are sampled for, at most
+    training_motions : training motion and further ones that train the reductions
     plain, accelerated : iterations of the full order, without and with acceleration
     iterations : of the reductions, accelerated
     factor : by which estimated errors are multiplied
@@ -104,6 +106,7 @@ class ToleranceSettings(ConfigModel):
     modes: tuple[Count, ...] = (20, 40)
     tolerances: tuple[Annotated[float, Field(gt=0.0, lt=1.0)], ...] = (5e-2, 1e-2)
     frames: Count = 25
+    training_motions: Count = 4
     iterations: tuple[Count, ...] = (5, 10, 20)
     plain: tuple[Count, ...] = (1, 2, 3, 5)
     accelerated: tuple[Count, ...] = (5, 10, 20, 40)
@@ -358,15 +361,25 @@ def calibrate(
 
 
 def _reduced(training: Scene, motion: Motion, settings: ToleranceSettings) -> Iterator[Level]:
-    """Reduced levels trained on converged frames; none if the scene is not reducible."""
+    """Reduced levels trained on converged frames of ``motion`` and on nearly converged ones of
+    further motions; none if the scene is not reducible.
+    """
     frames = np.arange(0, training.config.frames, 2)
     few = frames[:: -(-len(frames) // settings.frames)]
     # the elements are trained on iterates of a run in the subspace
-    scene = Level(20).scene(training)
+    scene, config = Level(20).scene(training), training.config
     try:
+        seeds = range(1, settings.training_motions)
+        variants = [config.training_variant(seed).effects for seed in seeds]
+        others = [scene.changed(effects=effects) for effects in variants]
+        runs = [motion.reference]
+        runs += [trajectory(Level(20, levels.WINDOW).scene(other)) for other in others]
+        seen = np.concatenate([run[1:][frames] for run in runs])
         for k in settings.modes:
-            columns = make_columns(scene, motion.reference[1:][frames], "pod", k=k)
-            found = sample_elements(scene, columns, few, tolerances=settings.tolerances)
+            columns = make_columns(scene, seen, "pod", k=k)
+            found = sample_elements(
+                scene, columns, few, tolerances=settings.tolerances, others=others
+            )
             for tau, samples in zip(settings.tolerances, found, strict=True):
                 model = SubspaceModel("pod", columns, samples)
                 yield from (
