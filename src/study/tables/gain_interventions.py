@@ -16,7 +16,7 @@ import pandas as pd
 
 from study.artifact.reads import TableOf
 from study.tables.kit.declaration import count, number, table, text
-from study.tables.kit.results import RESAMPLES, SEED, families, judged_runs
+from study.tables.kit.results import FAILED, RESAMPLES, SEED, families, judged_runs
 
 STEPS = {
     "whole elements for single entries": ("deim", "block-deim"),
@@ -36,6 +36,8 @@ KINDS = {
     "lower gain, separate coefficients": ("deim-joint", "published"),
 }
 _CELL = ["scene", "group", "r"]
+VOLUMES = ("deformation_gradient", "tetrahedron_strain", "volume")  # groups of tetrahedra
+MESHES = ALL, SHEETS, BARS = "all", "sheets", "bars"
 # Constructor of columns that say something about many runs.
 share = partial(number, compared="share")
 
@@ -44,10 +46,13 @@ share = partial(number, compared="share")
     title="What the error does when the gain is lowered and the basis stays",
     columns=(
         text("step", f"one of: {', '.join([*STEPS, *SQUARE, *KINDS])}"),
+        text("mesh", f"meshes of the pairs: {', '.join(MESHES)}"),
         text("method_before", "method before the step"),
         text("method_after", "method after it, on the same basis"),
         count("pairs", "scenes, groups and sizes at which both methods ran"),
         count("scenes", "scenes among them"),
+        count("failing", "pairs whose error before exceeds a tenth"),
+        count("rescued", "pairs among these whose error after does not"),
         share("gain_ratio", "median of the gain after over that before"),
         share("error_ratio", "median of the error of the run after over that before"),
         share(
@@ -72,7 +77,7 @@ share = partial(number, compared="share")
 def gain_interventions(
     reruns: pd.DataFrame, reconstruction: pd.DataFrame, ladder: pd.DataFrame
 ) -> pd.DataFrame:
-    """One row per step, from the runs that `judged_runs` selects and the table ``ladder``.
+    """Rows of each step and kind of mesh, from runs by `judged_runs` and the table ``ladder``.
 
     Results of one family (a scene and its variant, "twin") are dependent: the bootstrap
     resamples families and the sign test counts families. Errors below the sensitivity floor are
@@ -81,10 +86,11 @@ def gain_interventions(
     runs = judged_runs(reruns, reconstruction)
     rows = []
     for name, before, after, pairs in _steps(runs, _square(ladder, runs)):
-        if len(pairs):
-            rows.append(
-                {"step": name, "method_before": before, "method_after": after, **_summary(pairs)}
-            )
+        volumes = pairs.group.isin(VOLUMES)
+        for mesh, own in zip(MESHES, (pairs, pairs[~volumes], pairs[volumes]), strict=True):
+            if len(own):
+                labels = {"step": name, "mesh": mesh, "method_before": before}
+                rows.append({**labels, "method_after": after, **_summary(own)})
     return pd.DataFrame(rows)
 
 
@@ -118,18 +124,14 @@ def _square(ladder: pd.DataFrame, runs: pd.DataFrame) -> pd.DataFrame:
 
 
 def _pairs(runs: pd.DataFrame, before: str, after: str) -> pd.DataFrame:
-    """Scene, gain ratio and error ratio (after over before) of each pair of runs."""
+    """Scene, group, errors, and ratios of gain and error (after over before) of pairs of runs."""
     error = np.maximum(runs.error, runs.sensitivity_floor)
     runs = runs[[*_CELL, "method", "gain"]].assign(error=error)
     one, other = (runs[runs.method == m].drop(columns="method") for m in (before, after))
     both = one.merge(other, on=_CELL, suffixes=("_before", "_after"))
     both = both[np.isfinite(both.error_before) | np.isfinite(both.error_after)]
-    return pd.DataFrame(
-        {
-            "scene": both.scene,
-            "gain": both.gain_after / both.gain_before,
-            "error": both.error_after / both.error_before,
-        }
+    return both[["scene", "group", "error_before", "error_after"]].assign(
+        gain=both.gain_after / both.gain_before, error=both.error_after / both.error_before
     )
 
 
@@ -145,10 +147,13 @@ def _summary(pairs: pd.DataFrame) -> Mapping[str, float]:
     drawn = np.random.default_rng(SEED).integers(len(values), size=(RESAMPLES, len(values)))
     medians = [np.median(np.concatenate([values[i] for i in row])) for row in drawn]
     low, high = np.percentile(medians, [2.5, 97.5], method="inverted_cdf")
+    failing = pairs.error_before > FAILED
     known = len(pairs) > 2 and pairs.gain.nunique() > 1 and pairs.error.nunique() > 1
     return {
         "pairs": len(pairs),
         "scenes": by_scene.ngroups,
+        "failing": int(failing.sum()),
+        "rescued": int((failing & (pairs.error_after <= FAILED)).sum()),
         "gain_ratio": float(pairs.gain.median()),
         "error_ratio": float(pairs.error.median()),
         "error_ratio_low": float(low),

@@ -82,7 +82,7 @@ def test_samples_and_coefficients_are_exchanged_at_equal_entries():
     ]
     twins = [t.assign(scene="calm_twin")[t.scene == "calm"] for t in (reruns, reconstruction)]
     both = [pd.concat(two) for two in zip((reruns, reconstruction), twins, strict=True)]
-    table = gain_interventions(*both, square(*runs)).set_index("step")
+    table = gain_interventions(*both, square(*runs)).query("mesh == 'all'").set_index("step")
     shared = table.loc["shared coefficients, single rows"]
     assert (shared.pairs, shared.scenes, shared.families, shared.families_fallen) == (3, 3, 2, 2)
     assert (shared.gain_ratio, shared.error_ratio, shared.p_value) == (0.05, 0.1, 0.5)
@@ -92,11 +92,14 @@ def test_samples_and_coefficients_are_exchanged_at_equal_entries():
 
 
 def test_interventions_compare_runs_on_one_basis():
-    table = gain_interventions(*tables(), square()).set_index("step")
+    table = gain_interventions(*tables(), square())
+    assert set(table.mesh) == {"all", "sheets"}  # no group of tetrahedra ran
+    table = table[table.mesh == "sheets"].set_index("step")
     # block-deim ran in one scene only, where its gain and its error are below those of deim
     step = table.loc["whole elements for single entries"]
     assert (step.pairs, step.scenes, step.scenes_fallen) == (1, 1, 1)
     assert step.gain_ratio == pytest.approx(8.0 / 50.0)
+    assert (step.failing, step.rescued) == (1, 1)  # from half to a hundredth
     assert step.error_ratio == step.error_ratio_low == pytest.approx(0.02)
     assert step.p_value == 1.0
     assert "three elements a mode for one" not in table.index
@@ -120,7 +123,7 @@ def test_scenes_count_once_however_many_sizes_they_have():
                 gains |= {"split": "train", "relative_error": 0.1, "elements_sampled": 9}
                 parts.append((row, gains))
     read = (pd.DataFrame(list(rows)) for rows in zip(*parts, strict=True))
-    step, ordered = gain_interventions(*read, square()).itertuples()
+    step, ordered = gain_interventions(*read, square()).query("mesh == 'all'").itertuples()
     assert (step.pairs, step.scenes, step.scenes_fallen, step.families) == (49, 5, 3, 5)
     assert step.families_fallen == 3
     # the gain falls everywhere, the error not in the two pairs of t and of w and in one of u
