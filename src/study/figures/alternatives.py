@@ -3,16 +3,17 @@
 import numpy as np
 import pandas as pd
 
-from pdrom.model.held_out import FIRST
+from pdrom.model.held_out import FIRST, PLAYBACK
 from pdrom.view import multiples, style
 from pdrom.view.artists import Axes, Figure
 from study.artifact.reads import TableOf
-from study.experiments.alternatives.settings import ACCELERATED, CONVERGED, REDUCED, TWO_LEVEL
+from study.experiments.alternatives.settings import CONVERGED as ACCURATE
+from study.experiments.alternatives.settings import OWN, REDUCTIONS, SEVERAL
 from study.figures.kit.declaration import figure
 from study.figures.kit.options import NothingToDraw, Options, Scenes
 
 LOW, HIGH = 1e-4, 1.0  # limits of the error axis; errors outside are drawn on them
-PAIRS = 2  # number of pairs of panels side by side
+BESIDE = 4  # number of panels side by side
 TOLERANCES, TIMES, REACHED = (5e-3, 2e-1), (1e-2, 1e1), (1e-4, 1e0)
 # Colour of each outcome of a request, and a factor that shifts its dots along the tolerance axis.
 KINDS = {
@@ -20,68 +21,73 @@ KINDS = {
     "full order": (style.VERMILLION, 1.0),
     "refused": (style.GREY, 1.15),
 }
-LOOKS = {
-    "projective": ("projective dynamics", style.BLACK, "o"),
-    "anderson": ("with Anderson acceleration", style.GREY, "s"),
-    "chebyshev": ("with Chebyshev acceleration", style.GREY, "<"),
-    TWO_LEVEL: ("with a coarse level", style.GREY, ">"),
-    "explicit": ("explicit (Verlet)", style.VERMILLION, "X"),
-    REDUCED: ("POD subspace, ecsw", style.GREEN, "*"),
-    ACCELERATED: ("the same, accelerated", style.GREEN, "p"),
+BEST, DOT = ("full order, the best of all methods", style.BLACK), (0.55, 0.55, 0.55)
+# Colour of the reduction by the frames that it is trained on.
+TRAINED = {
+    "reduction, one training motion": ((OWN, ACCURATE), style.GREEN),
+    "reduction, several training motions": ((SEVERAL,), style.BLUE),
 }
+BARE = "the same without the vertices"
 
 
 @figure(
     title="Alternatives to projective dynamics",
-    caption="""Error against time per frame on the first held-out motion, the best points of each
-    method. Left of each pair the error against the implicit step of 16 ms solved to convergence,
-    right the total error, against the motion in continuous time; the dashed line is the converged
-    implicit step itself. Filled markers: one step a frame with more iterations; hollow ones: the
-    frame divided into substeps. The reduction (ecsw) was trained on another motion, on its frames
-    as they are or converged. $\\times 100$: the same scene with stiffer weights. Errors outside are
-    drawn on the rim.""",
+    caption="""Error of whole trajectories against the implicit step solved to convergence, over the
+    time per frame with the positions of all vertices, on the first held-out motion. Black: the best
+    points of all full-order methods, whose settings are the grey dots. Colours: the best points of
+    the reduction (ecsw) trained on frames of one motion or of several; dotted: without the time of
+    the vertices. Dashed: playback of the training recording, which takes no time.
+    $\\times 100$: the same scene with stiffer weights. Errors outside are drawn on the rim.""",
     reads={"table": TableOf("alternatives")},
 )
 def alternatives(options: Scenes, table: pd.DataFrame) -> Figure:
-    """Draw a pair of panels (two references of the error) per scene, mesh and stiffness."""
+    """Draw a panel per scene, mesh and stiffness."""
     table = options.rows(table[table.motion == FIRST])
     cases = list(table.groupby(["scene", "vertices", "stiffness"]))
     if not cases:
         raise NothingToDraw("no alternatives")
-    beside = min(PAIRS, len(cases))
-    figure = style.new_figure(1.55 * multiples.rows_of(len(cases), beside) + 0.75)
-    axes = multiples.panels(figure, 2 * len(cases), 2 * beside, sharey=True)
-    for (labels, case), *pair in zip(cases, axes[::2], axes[1::2], strict=True):
-        _draw_case(pair, labels, case)
-    multiples.label_outer(axes, 2 * beside, "ms a frame", y="relative error")
-    drawn = {label: look for m, (label, *look) in LOOKS.items() if (table.method == m).any()}
-    style.legend(figure, style.handles(drawn, markersize=4), 4)
+    beside = min(BESIDE, len(cases))
+    figure = style.new_figure(1.9 * multiples.rows_of(len(cases), beside) + 0.75)
+    axes = multiples.panels(figure, len(cases), beside, sharey=True)
+    for (labels, case), ax in zip(cases, axes, strict=True):
+        _draw_case(ax, labels, case)
+    multiples.label_outer(axes, beside, "ms a frame", y="relative error")
+    drawn = {label: (colour, "o") for label, (_, colour) in TRAINED.items()}
+    lines = [style.handle(BARE, color=style.GREEN, linestyle=":")]
+    lines.append(style.handle("playback", color="#555555", linestyle="--"))
+    style.legend(figure, [*style.handles({BEST[0]: (BEST[1], "o")} | drawn), *lines], 3)
     return figure
 
 
-def _draw_case(pair: list[Axes], labels: tuple[str, int, float], case: pd.DataFrame) -> None:
+def _draw_case(ax: Axes, labels: tuple[str, int, float], case: pd.DataFrame) -> None:
     scene, vertices, stiffness = labels
     stiff = "" if stiffness == 1.0 else rf" $\times {stiffness:g}$"
-    name = f"{style.words(scene)}{stiff}, {vertices:,} vertices"
-    for ax, reference in zip(pair, ("implicit", "continuous"), strict=True):
-        multiples.log_axis(ax, LOW, HIGH)
-        multiples.time_axis(ax, case.ms_per_frame.to_numpy(float))
-        kind = "implicit step" if reference == "implicit" else "total error"
-        ax.set_title(f"{name}\n{kind}", fontsize=7)
-        rows = case.assign(error=case[f"error_{reference}"]).dropna(subset="error")
-        own = rows[rows.method == CONVERGED]
-        if reference == "continuous" and len(own):
-            ax.axhline(own.error.iloc[0], color="#555555", linestyle="--", linewidth=0.8)
-        for method, (_, colour, marker) in LOOKS.items():
-            points = best_points(rows[rows.method == method])
-            errors = multiples.clipped(points.error.to_numpy(float), LOW, HIGH)
-            ax.plot(points.ms_per_frame, errors, color=colour, linewidth=0.9)
-            divided = (points.substeps > 1).to_numpy(bool)
-            for chosen, face in ((~divided, colour), (divided, "white")):
-                ax.plot(
-                    points.ms_per_frame[chosen], errors[chosen], color=colour, marker=marker,
-                    markerfacecolor=face, linestyle="none", markersize=3.6, markeredgewidth=0.8,
-                )  # fmt: skip
+    ax.set_title(f"{style.words(scene)}{stiff}, {vertices:,} vertices", fontsize=7.5)
+    multiples.log_axis(ax, LOW, HIGH)
+    multiples.time_axis(ax, case.ms_per_frame.to_numpy(float))
+    rows = case.rename(columns={"error_implicit": "error"}).dropna(subset="error")
+    for error in rows.error[rows.method == PLAYBACK]:
+        ax.axhline(error, color="#555555", linestyle="--", linewidth=0.8)
+    rows = rows[rows.ms_per_frame.notna()]
+    inside = rows.method.isin(REDUCTIONS)
+    full = rows[~inside]
+    errors = multiples.clipped(full.error.to_numpy(float), LOW, HIGH)
+    ax.plot(full.ms_per_frame, errors, ".", color=DOT, markersize=3.0)
+    _draw_best(ax, full, BEST[1], "-")
+    for trained_on, colour in TRAINED.values():
+        own = rows[inside & rows.trained_on.isin(trained_on)]
+        _draw_best(ax, own, colour, "-")
+        _draw_best(ax, own.assign(ms_per_frame=own.ms_per_frame - own.vertices_ms), colour, ":")
+
+
+def _draw_best(ax: Axes, rows: pd.DataFrame, colour: str, line: str) -> None:
+    points = best_points(rows)
+    errors = multiples.clipped(points.error.to_numpy(float), LOW, HIGH)
+    marker = "o" if line == "-" else None
+    ax.plot(
+        points.ms_per_frame, errors, line, color=colour, marker=marker, markersize=3.2,
+        linewidth=1.0,
+    )  # fmt: skip
 
 
 def best_points(rows: pd.DataFrame) -> pd.DataFrame:

@@ -229,8 +229,6 @@ def pays(winners: pd.DataFrame) -> str:
     rows = []
     for _, curve in winners.groupby(CURVE, sort=False):
         row, smallest, largest = curve.iloc[0], curve.vertices.min(), curve.vertices.max()
-        if pd.isna(row.speedup):
-            continue
         stiffness = "" if row.stiffness == 1.0 else rf" $\times {row.stiffness:g}$"
         rows.append(
             [
@@ -240,7 +238,9 @@ def pays(winners: pd.DataFrame) -> str:
                 str(smallest) if smallest == largest else f"{smallest} to {largest}",
                 _known(row.from_plain, _whole),
                 _known(row.from_best, _whole),
-                in_words(row.speedup, row.speedup_low, row.speedup_high),
+                NONE
+                if pd.isna(row.speedup)
+                else in_words(row.speedup, row.speedup_low, row.speedup_high),
                 f"{row.reached} of {row.motions}",
             ]
         )
