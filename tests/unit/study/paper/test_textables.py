@@ -130,9 +130,6 @@ def test_every_row_has_a_cell_for_every_column(name):
         ("positions", r"\texttt{b} & 0.12 & 0.75 & 0.50 & 0.38 & -- & 90 & 4 & -- & -- \\"),
         # a reduction that always pays has no size from which it does not
         ("break_even", r"\texttt{bar\_a} & edge spring & 400 & 20 & pays & -- \\"),
-        # errors that a reduction does not reach are left out
-        ("pays", r"\texttt{s\_one} & implicit & 0.10 & 400 to 10000 & 400 & 1600 & "
-                 r"17 (15 to 20) & 2 of 3 \\"),
         # the largest size that ran: without ranks beyond the data, and subspaces
         ("reruns", r"\texttt{bar\_a} & edge spring & 0.25 & \textcolor{okred}{blow-up, 4} \\"),
         # what is above round-off
@@ -143,6 +140,14 @@ def test_every_row_has_a_cell_for_every_column(name):
 )  # fmt: skip
 def test_the_only_row_of_a_table(name, expected):
     assert made(name) == [expected]
+
+
+def test_comparisons_are_listed_won_or_lost():
+    assert made("pays") == [
+        r"\texttt{s\_one} & implicit & 0.10 & 400 to 10000 & 400 & 1600 & "
+        r"17 (15 to 20) & 2 of 3 \\",
+        r"\texttt{s\_two} $\times 100$ & continuous & 0.010 & 400 & -- & -- & -- & 0 of 3 \\",
+    ]
 
 
 def test_speedups_that_lose_say_so():
