@@ -11,6 +11,7 @@ from pydantic import Field
 
 from pdrom.core.store import write_table
 from pdrom.model.held_out import MOTIONS, HeldOutMotion
+from pdrom.model.runs import trajectory
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.requested import levels, run
 from pdrom.reduction.requested.levels import Level, Motion, Quantity, Trajectory
@@ -24,7 +25,7 @@ log = logging.getLogger(__name__)
 COLUMNS = [
     "scene", "motion", "tolerance", "vertices", "frames", "reduced", "error", "velocity_error",
     "expected", "estimate", "level", "failed", "checks", "ms_per_frame", "full_level",
-    "full_error", "full_ms", "own_ms",
+    "full_error", "full_ms", "own_ms", "playback_error",
 ]  # fmt: skip
 REPEATS = 2  # runs of a request, for the time
 
@@ -66,17 +67,22 @@ def requested_tolerances(
     training = Scene.build(config, config.mesh.build(Path()))
     made: list[run.Calibration] = []
     rows: list[dict[str, Any]] = []
+    recorded = trajectory(training, track_objective=False)
     for name in section.motions:
         variant = Scene.build(config.heldout_variant(name), training.mesh, masses=training.masses)
         own = run.transferred(training, variant)
         if not made or made[-1].motions[0].scene.config.effects != own.config.effects:
             made.append(run.calibrate(own, section, run.Request(error=min(section.errors))))
-        rows += ({"motion": name, **row} for row in _rows(variant, made[-1], section))
+        found = _rows(variant, recorded, made[-1], section)
+        rows += ({"motion": name, **row} for row in found)
         log.info("%s: %s done", config.name, name)
     write_table(pd.DataFrame(rows, columns=COLUMNS), out.path)
 
 
-def _rows(scene: Scene, own: run.Calibration, section: RequestedRuns) -> Iterator[dict[str, Any]]:
+def _rows(
+    scene: Scene, recorded: np.ndarray, own: run.Calibration, section: RequestedRuns
+) -> Iterator[dict[str, Any]]:
+    """Rows of the motion of ``scene``; ``recorded`` is the training motion of the study."""
     frames = scene.config.frames
     motion = Motion(scene, min(section.errors) / section.factor, "position")
     judged = motion.unconverged, motion.sensitivity
@@ -107,6 +113,7 @@ def _rows(scene: Scene, own: run.Calibration, section: RequestedRuns) -> Iterato
             "full_error": _error(motion, alone.positions, end, "position"),
             "full_ms": 1e3 * alone.seconds / frames,
             "own_ms": 1e3 * own_run.seconds / frames,
+            "playback_error": _error(motion, recorded, end, "position"),
         }
 
 

@@ -141,6 +141,7 @@ def pareto(error: Sequence[float], cost: Sequence[float]) -> list[bool]:
         flag("reduced", "a reduction made the run", compared="error"),
         number("error", "error over these frames against the converged implicit step"),
         number("velocity_error", "error of the velocities, likewise"),
+        number("playback_error", "error of playback of the training motion, likewise"),
         number("expected", "error in the calibration, times the factor", compared="error"),
         number("estimate", "estimate by checks and a second run, likewise", compared="error"),
         flag("broken", "met, and the error is above the tolerance", compared="error"),
