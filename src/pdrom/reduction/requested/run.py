@@ -22,8 +22,6 @@ from pydantic import Field
 
 from pdrom.core.errors import ConfigurationError, PdromError, choices
 from pdrom.core.yamlfile import ConfigModel, shown
-from pdrom.model.constraints.base import GroupConfig
-from pdrom.model.effects.base import effect_config
 from pdrom.model.runs import trajectory
 from pdrom.model.scene import Scene
 from pdrom.reduction.requested import levels
@@ -34,8 +32,9 @@ log = logging.getLogger(__name__)
 
 Count = Annotated[int, Field(ge=1, le=10_000)]
 
-# Variation of the training motion: factors of handle speed and kick, seed, factor of stiffness.
-SLOWER, KICK_SPEED, KICK_SEED, STIFFER = 0.9, 0.4, 101, 1.6
+# Seed of the further motion (`HeldOut.further`) on which levels are calibrated, too. The motions
+# that train reductions have smaller seeds.
+CALIBRATED = 100
 # An error counts as unknown if it can be computed for less than this fraction of the frames.
 JUDGED = 0.1
 PROBED = 6  # number of frames of a calibration run whose defects are computed
@@ -106,7 +105,7 @@ class ToleranceSettings(ConfigModel):
     modes: tuple[Count, ...] = (20, 40)
     tolerances: tuple[Annotated[float, Field(gt=0.0, lt=1.0)], ...] = (5e-2, 1e-2)
     frames: Count = 25
-    training_motions: Count = 4
+    training_motions: Annotated[int, Field(ge=1, le=64)] = 4
     iterations: tuple[Count, ...] = (5, 10, 20)
     plain: tuple[Count, ...] = (1, 2, 3, 5)
     accelerated: tuple[Count, ...] = (5, 10, 20, 40)
@@ -335,14 +334,15 @@ def check_frames(frames: int, count: int) -> list[int]:
 def calibrate(
     training: Scene, settings: ToleranceSettings, request: Request, on_frame: OnFrame = silent
 ) -> Calibration:
-    """Run every level of ``settings`` on the ``training`` motion and on its variation.
+    """Run every level of ``settings`` on the ``training`` motion and on one far from it.
 
     Parameters
     ----------
     request : smallest error that will be requested
     on_frame : callback after each frame
     """
-    scenes, least = (training, varied(training)), request.error / settings.factor
+    far = training.config.training_variant(CALIBRATED).effects
+    scenes, least = (training, training.changed(effects=far)), request.error / settings.factor
     motions = [Motion(scene, least, request.quantity, on_frame) for scene in scenes]
     most = max(motion.iterations for motion in motions)
     # full-order levels with the iterations of a reference, and with half of them
@@ -402,19 +402,6 @@ def _calibrated(level: Level, motions: Sequence[Motion], on_frame: OnFrame) -> C
     defect = float(np.nan_to_num(max(defects), nan=np.inf))
     log.info("%s: errors %s", level.title, ", ".join(f"{own[-1]:.2e}" for own in errors))
     return Calibrated(level, level.work(motions[0].scene), errors, defect, ms[0])
-
-
-def varied(scene: Scene) -> Scene:
-    """Return ``scene`` with a varied motion that differs from the study's held-out motions."""
-    axes = scene.config.held_out.kick_axes
-    kick = {"effect": "kick", "speed": KICK_SPEED, "seed": KICK_SEED, "axes": axes}
-    effects = [effect.with_frames_scaled(SLOWER) for effect in scene.config.effects]
-    effects = [
-        e.model_copy(update={"weight": STIFFER * e.weight}) if isinstance(e, GroupConfig) else e
-        for e in effects
-    ]
-    effects.append(effect_config(kick, len(effects)))
-    return scene.changed(effects=tuple(effects))
 
 
 def transferred(trained: Scene, scene: Scene) -> Scene:
