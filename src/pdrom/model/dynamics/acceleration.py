@@ -145,7 +145,7 @@ class Anderson:
         return int(self.history[6][REFUSED])
 
     def begin_frame(self, y: np.ndarray) -> None:
-        """Forget the last frame; ``y`` (n, 3) is the first iterate of this one."""
+        """Delete the iterates of the last frame; ``y`` (n, 3) is the first one of a new frame."""
         n, refused = _numbers(y).size, self.refused
         if n != len(self.history[0]):
             self.history = _history(self._window, n)

@@ -1,4 +1,4 @@
-"""Vertices of one body keep their distance."""
+"""Self-collision: vertices of the mesh keep a minimal distance from each other."""
 
 from typing import Annotated, Literal
 
@@ -9,13 +9,13 @@ from pydantic import Field
 from pdrom.model.effects.base import Contact, EffectConfig
 from pdrom.model.mesh.types import MAX_LENGTH, MIN_LENGTH, Mesh
 
-# Searches for close pairs in a frame, and sweeps over the pairs of each search, at most.
+# Largest number of searches for close pairs per frame, and of sweeps over the pairs per search.
 SEARCHES, SWEEPS = 20, 100
-# Pairs are looked for within this multiple of the thickness, so that a sweep meets no others.
+# Radius of the search for pairs over the thickness; sweeps may bring these pairs closer.
 REACH = 1.25
-# A sweep ends when no pair is closer than this part of the thickness.
+# Sweeps end when no pair is closer than this fraction of the thickness.
 ENOUGH = 0.95
-# Vertices of a triangle with edges of length one are no farther than this from its points.
+# Largest distance of a point of an equilateral triangle with unit edges to its nearest vertex.
 COVER = 1.0 / np.sqrt(3.0)
 
 
@@ -49,13 +49,13 @@ class SelfCollision(Contact):
         self._needed = COVER * np.linalg.norm(edges[:, 0] - edges[:, 1], axis=1).max()
 
     def doubt(self, rest: np.ndarray, free: np.ndarray) -> str:
-        """Say which thickness nothing slips through, where the scene's is less.
+        """Return a warning with the thickness that is needed, "" if the scene's is sufficient.
 
-        ``rest`` and ``free`` as in `Contact.doubt`.
+        ``rest`` and ``free`` are as in `Contact.doubt`.
         """
         if self._thickness >= self._needed:
             return ""
-        # rounded up, so that what the message says is enough
+        # round up, so that the thickness in the message is sufficient
         step = 10.0 ** (np.floor(np.log10(self._needed)) - 1.0)
         return (
             f"with thickness {self._thickness:g} a vertex can pass between others; at least "
@@ -91,7 +91,7 @@ class SelfCollision(Contact):
 
 @njit(cache=True)
 def _separate(q, before, pairs, inverse_masses, thickness, enough, sweeps):
-    """Move close ``pairs`` of q apart in place; the closest distance that the first sweep met."""
+    """Move close ``pairs`` of q apart in place; return the least distance in the first sweep."""
     first = thickness
     for sweep in range(sweeps):
         closest = thickness
@@ -107,7 +107,7 @@ def _separate(q, before, pairs, inverse_masses, thickness, enough, sweeps):
             length = np.sqrt(ex * ex + ey * ey + ez * ez)
             gap = thickness - distance
             if length > 0.0 and dx * ex + dy * ey + dz * ez <= 0.0:
-                # it passed through, or its side cannot be determined: back to where it came from
+                # the pair changed sides, or its side is undefined: move it back to its old side
                 along = (dx * ex + dy * ey + dz * ez) / length
                 dx, dy, dz, distance, gap = ex, ey, ez, length, thickness - along
             elif distance == 0.0:
