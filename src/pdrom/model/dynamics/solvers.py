@@ -1,10 +1,10 @@
 """Factorisations of the global system: factor once, solve often.
 
-Panels of a factor are consecutive columns that are swept together. The rows below the columns of a
-panel are the union of those of its columns; a column has zeros where it had none. The wider a
-panel, the fewer numbers are read twice and the fewer times the sweep waits for the column before;
-the more zeros it stores. Which columns go together is decided by dynamic programming over a cost in
-processor cycles.
+Panels (supernodes) are consecutive columns of a factor that substitution ("sweep") treats together.
+A panel stores all rows below its columns in which at least one of its columns has an entry, with
+explicit zeros in the other columns. In a wider panel, fewer numbers are read twice and substitution
+waits less often for the preceding column, but more zeros are stored. Dynamic programming partitions
+the columns such that an estimated number of processor cycles is smallest.
 """
 
 from typing import Any

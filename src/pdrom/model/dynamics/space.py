@@ -17,7 +17,7 @@ class Solve(Protocol):
     """A factored system with the fixed coordinates eliminated."""
 
     def solve(self, rhs: np.ndarray, y: np.ndarray) -> None:
-        """Overwrite the free coordinates of ``y`` (n, 3) by the solution for ``rhs`` (n, 3)."""
+        """Overwrite the coordinates of ``y`` (n, 3) that are not fixed, from ``rhs`` (n, 3)."""
 
 
 class Space(ABC):
@@ -28,7 +28,7 @@ class Space(ABC):
     """
 
     def predict(self, positions: np.ndarray, velocities: np.ndarray, h: float) -> np.ndarray:
-        """Inertial prediction s = q + h v + h^2 a of ``positions`` q and ``velocities`` v."""
+        """Return the prediction s = q + h v + h^2 a of ``positions`` q and ``velocities`` v."""
         return positions + h * velocities + h**2 * self.acceleration(positions, velocities)
 
     def copy(self, s: np.ndarray) -> np.ndarray:

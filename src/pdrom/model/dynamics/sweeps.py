@@ -70,7 +70,7 @@ class _Panel:
         return multiply_add(self.builder, self.builder.fneg(entry), b, a)
 
     def rows_below(self):
-        """Loop over the rows below: (pointer to the row, function of a column: entry of L)."""
+        """Loop over the rows below; yield their pointers, with a function: column -> entry of L."""
         builder = self.builder
         with cgutils.for_range_slice(builder, self._start, self._stop, self._index(1)) as (k, _):
             row = builder.sext(builder.load(builder.gep(self._rows, [k])), _INDEX)

@@ -46,7 +46,7 @@ class Elimination:
         out[...] = y[self.free]
 
     def set_targets(self, targets: np.ndarray) -> None:
-        """Hold the fixed vertices at ``targets`` (n_fixed, 3) in the solves that follow."""
+        """Set the positions ``targets`` (n_fixed, 3) m of fixed vertices in the next solves."""
         if self._solver is not None:
             self._solver.set_targets(targets)
 
@@ -101,7 +101,7 @@ class GlobalSystem:
         return len(self._cache)
 
     def eliminate(self, fixed: np.ndarray) -> Elimination:
-        """The system without the vertices ``fixed`` (ascending), from the cache if known."""
+        """Return the system without the vertices ``fixed`` (ascending), factored or cached."""
         key = np.ascontiguousarray(fixed, dtype=np.int64).tobytes()
         if key not in self._cache:
             self._cache[key] = Elimination(self.matrix, fixed, self._solver)

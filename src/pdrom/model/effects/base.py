@@ -112,8 +112,8 @@ class Force(Effect):
     """Time step h of the run in seconds, set by the scene; some forces are limited by it."""
 
     rate: float | np.ndarray | None = None
-    """Rate c, a number or (N,) 1/s, of an acceleration that is -c v and a part that does not depend
-    on the motion; None for any other."""
+    """Rate c, a number or (N,) 1/s, if the acceleration is -c v plus a term that does not depend on
+    positions or velocities; None for any other force."""
 
     @abstractmethod
     def acceleration(self, positions: np.ndarray, velocities: np.ndarray) -> np.ndarray:
@@ -293,5 +293,5 @@ def held_path(
         known += 1
     paths = [b.path(frames[:known], q) for b, q in zip(active, current, strict=True)]
     if single:
-        return vertices, np.array(paths[0], order="C")  # a view is another type, compiled again
+        return vertices, np.array(paths[0], order="C")  # no view: a new type is compiled anew
     return vertices, np.concatenate([np.empty((known, 0, 3)), *paths], axis=1)[:, first]

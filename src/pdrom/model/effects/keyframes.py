@@ -49,7 +49,7 @@ class Keyframes(Hold):
             return self
 
         def with_frames_scaled(self, factor: float) -> Self:
-            """Return keys at frames times ``factor``, with at least one frame between two keys."""
+            """Return the effect with key frames times ``factor``, at least one frame apart."""
             keys: list[Key] = []
             for key in self.keys:
                 first = keys[-1].at + 1 if keys else 1

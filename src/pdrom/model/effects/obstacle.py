@@ -25,13 +25,13 @@ class ObstacleConfig(EffectConfig):
 
 
 class Obstacle(Contact):
-    """A convex body that does not move; vertices, not edges or triangles, are kept out of it.
+    """A fixed convex body that vertices, but not edges and triangles, cannot enter.
 
-    A vertex whose path of the frame enters the body goes on in the tangent plane at the point of
-    entry, also if the path leaves the body again: no step is too large. A vertex that began the
-    frame inside goes to the nearest point of the surface. Either is moved by some depth d along the
-    normal; its tangential motion along the surface is shortened by mu d, at most to nothing, which
-    is Coulomb's law for the impulses m d / h of the frame. Impacts are inelastic.
+    A vertex whose straight path of a frame enters the body continues in the tangent plane at the
+    entry point, even if the path leaves the body again, so that fast vertices do not pass through.
+    A vertex that is inside at the beginning of a frame goes to the nearest surface point. Both
+    corrections move it by a depth d along the normal and shorten its tangential motion by mu d, to
+    not less than zero: Coulomb's law for the impulse m d / h of the frame. Impacts are inelastic.
     """
 
     def __init__(self, config: ObstacleConfig, mesh: Mesh, masses: np.ndarray) -> None:
@@ -191,7 +191,7 @@ class Box(Obstacle):
         return np.hstack([points - self._lower, self._upper - points])
 
     def normals(self, points: np.ndarray) -> np.ndarray:
-        """Normals (n, 3) of the faces nearest to ``points`` (n, 3) m; of equals the first."""
+        """Return normals (n, 3) of the faces nearest to ``points``, the first if equally near."""
         face = self._to_faces(points).argmin(axis=1)
         return _axis_vectors(face % 3, np.where(face < 3, -1.0, 1.0))
 
@@ -249,7 +249,7 @@ def square(point: np.ndarray, normal: np.ndarray, low: np.ndarray, high: np.ndar
 
 
 def ball(centre: np.ndarray, radius: float) -> Mesh:
-    """A sphere about ``centre`` (3,) m in circles of latitude; corners at ``radius`` m."""
+    """Return a triangulated sphere with vertices at ``radius`` m from ``centre`` (3,) m."""
     around = 2 * RINGS
     polar = np.pi * np.arange(1, RINGS)[:, None] / RINGS
     turn = 2.0 * np.pi * np.arange(around)[None] / around

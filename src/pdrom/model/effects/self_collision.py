@@ -20,16 +20,16 @@ COVER = 1.0 / np.sqrt(3.0)
 
 
 class SelfCollision(Contact):
-    """Pairs of vertices farther apart at rest than the thickness end no frame closer than it.
+    """Contact that separates pairs of vertices closer than the thickness but not so at rest.
 
-    Close pairs (found by a k-d tree) are moved apart along the line between them, each vertex by
-    the share of its inverse mass, which is zero for a held one: otherwise momentum is kept. The
-    sweeps over the pairs, in the order of their vertices, are repeated until every distance is at
-    least `ENOUGH` of the thickness. Where many are crowded together that may take further frames.
+    Close pairs (found by a k-d tree) are moved apart along their connecting line, in proportion to
+    their inverse masses (zero for held vertices); momentum is conserved if none is held. Sweeps
+    over the pairs, in the order of their vertices, are repeated until all distances are at least
+    `ENOUGH` times the thickness; for many pairs in a small region this may take several frames.
 
-    A pair that changed sides during the frame is put back. Vertices stand for the surface:
-    nothing slips between them as long as the thickness is above 0.58 edge lengths and no pair moves
-    farther towards each other than the thickness in a frame.
+    A pair that changed sides during the frame is moved back. Only vertices collide: no vertex can
+    pass between others if the thickness is above 0.58 edge lengths and no pair approaches by more
+    than the thickness in a frame.
     """
 
     class Config(EffectConfig):
@@ -78,7 +78,7 @@ class SelfCollision(Contact):
                 return
 
     def _pairs(self, positions: np.ndarray) -> np.ndarray:
-        """Pairs (n, 2) that are close now and were not at rest, in lexicographic order."""
+        """Return vertex pairs (n, 2) that are close, but not at rest, in lexicographic order."""
         if not np.isfinite(positions).all():
             return np.empty((0, 2), dtype=np.int64)
         from scipy.spatial import cKDTree
