@@ -4,7 +4,7 @@ import numpy as np
 
 
 def squared_norms(p: np.ndarray) -> np.ndarray:
-    """Squared Frobenius norms of p (n, rows, 3): of everything, of x, of y, of z; (4,)."""
+    """Return squared Frobenius norms (4,) of p (n, rows, 3): of all entries, only x, y, z."""
     axes = np.einsum("nra,nra->a", p, p)
     return np.concatenate([[axes.sum()], axes])
 

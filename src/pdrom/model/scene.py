@@ -197,7 +197,7 @@ class Scene:
         return f"Scene('{self.config.name}', {size}: {effects})"
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """A copy, also a pickled one, is built again: compiled kernels cannot be pickled."""
+        """Rebuild the scene when it is copied or unpickled; kernels cannot be pickled."""
         return Scene.build, (self.config, self.mesh, self.masses)
 
     @classmethod
