@@ -151,8 +151,8 @@ def _check_measures(mesh: Mesh, cells: np.ndarray, kind: str, name: str) -> None
     corner = mesh.points[cells]
     edges = corner[:, 1:] - corner[:, :1]
     longest = np.linalg.norm(edges, axis=2).max(axis=1)
-    # of edges of length one: the measure itself, not a Gram determinant, which is its square and
-    # drowns in round-off below 1e-8
+    # scale edges to length one and compute the measure itself, not a Gram determinant, which is its
+    # square and consists of round-off below 1e-8
     edges = edges / longest[:, None, None]
     normal = np.cross(edges[:, 0], edges[:, 1])
     if kind == "triangle":

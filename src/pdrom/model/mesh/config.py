@@ -141,7 +141,7 @@ class MeshFile(MeshModel):
         return value
 
     def below(self, folder: str) -> Self:
-        """Return the mesh with a path relative to the parent of ``folder``, the scene's folder."""
+        """Return the mesh with ``folder``, the folder of its scene, prepended to the path."""
         return self.model_copy(update={"path": f"{folder}/{self.path}"})
 
     def build(self, root: Path) -> Mesh:
@@ -150,8 +150,8 @@ class MeshFile(MeshModel):
         Raises
         ------
         MeshError, DegenerateElementError
-            An unreadable or faulty file, see `read_mesh_file` and `check_mesh`, or a surface with
-            one side only.
+            An unreadable or faulty file, see `read_mesh_file` and `check_mesh`, or a surface which
+            is not orientable.
         """
         mesh = read_mesh_file(self.file(root))
         check_range(mesh.points, self.scale, self.path)
@@ -240,7 +240,7 @@ def given_mesh(points: Any, cells: Any, name: str) -> Mesh:
 
 
 def _array(values: Any, name: str, kind: type[np.generic], widths: tuple[int, ...]) -> np.ndarray:
-    """A copy of ``values`` as an array; whole numbers stay whole."""
+    """Return a copy of ``values`` as an array of type ``kind`` with a row length in ``widths``."""
     required = " or ".join(f"(n, {width})" for width in widths)
     try:
         array = np.array(values)

@@ -1,4 +1,4 @@
-"""Generated meshes of any resolution: cloth (triangles) and bar (tetrahedra)."""
+"""Generated meshes of any resolution: cloth of triangles, bar of tetrahedra (docs/study.md)."""
 
 from typing import Literal
 
