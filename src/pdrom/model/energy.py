@@ -1,4 +1,4 @@
-"""Total energy of a run, from its stored positions, and how it compares with the full order."""
+"""Total energy of a run, from its stored positions, relative to the full-order run."""
 
 from dataclasses import dataclass
 
@@ -6,21 +6,21 @@ import numpy as np
 
 from pdrom.model.scene import Scene
 
-# The potential of the groups is evaluated at every so many frames, and at the last one.
+# Energies are evaluated in every STRIDE-th frame, and in the last one.
 STRIDE = 4
 
 
 def energies(scene: Scene, positions: np.ndarray) -> np.ndarray:
-    """Kinetic energy, potential of all groups and of all forces in joule, at sampled frames (n,).
+    """Return the sum of kinetic energy and potentials of groups and forces, J, at n frames (n,).
 
     Parameters
     ----------
-    positions : (F + 1, N, 3) m of a run of ``scene``, the initial ones first. Velocities are those
-        of the step loop, (q_f - q_{f-1}) / h; the initial state brings its own.
+    positions : (F + 1, N, 3) m of a run of ``scene``, initial positions first. The velocities are
+        (q_f - q_{f-1}) / h as in the step loop; the initial velocities come from the scene.
 
-    Every `STRIDE`-th frame, the first and the last are taken: a fraction 1 / (STRIDE K) of the
-    local steps of the run. The projections are the full ones, whatever the run was made with. The
-    potential of the forces has an arbitrary zero, so that only differences mean anything.
+    The frames are every `STRIDE`-th and the last; this costs a fraction 1 / (STRIDE K) of the local
+    steps of the run. The projections are always the full-order ones, also for reduced runs. The
+    potential of the forces is defined up to a constant, so that only differences are meaningful.
     """
     frames = sorted({*range(0, len(positions), STRIDE), len(positions) - 1})
     with np.errstate(over="ignore", invalid="ignore"):
@@ -29,14 +29,14 @@ def energies(scene: Scene, positions: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class EnergyScale:
-    """Reference for the energy of reduced runs.
+    """Reference for the energy of reduced runs, computed from the full-order run of a scene.
 
-    The potential of the forces is counted from the least one that the full-order run reaches, so
-    that its total energy is never negative.
+    The potential of the forces is measured from its smallest value in the full-order run, so that
+    the total energy of this run is never negative.
 
-    zero : that least potential, J
-    peak : largest total energy of the full-order run, J, counted from there
-    own : energies of that run at the sampled frames, see `relative`
+    zero : this smallest potential, J
+    peak : largest total energy of the full-order run, J, minus ``zero``
+    own : energies of the full-order run at the frames of `energies`, relative as in `relative`
     """
 
     scene: Scene
@@ -46,7 +46,7 @@ class EnergyScale:
 
     @classmethod
     def of(cls, scene: Scene, reference: np.ndarray) -> "EnergyScale":
-        """Scale of a full-order run of ``scene`` with positions ``reference`` (F + 1, N, 3) m."""
+        """Return the scale for the full-order ``reference`` (F + 1, N, 3) m, a run of ``scene``."""
         zero = min(_force_potential(scene, q) for q in reference)
         own = energies(scene, reference) - zero
         peak, rest = float(own.max()), scene.mesh.points
@@ -54,10 +54,10 @@ class EnergyScale:
         return cls(scene, zero, peak, own / peak if peak > roundoff else np.empty(0))
 
     def relative(self, positions: np.ndarray) -> np.ndarray:
-        """Total energies at ``positions`` (F' + 1, N, 3) of a run, over the full order's largest.
+        """Return energies of a run, ``positions`` (F' + 1, N, 3) m, over the full-order peak.
 
-        At the frames of `energies`; inf where one overflows. Empty if the full-order run has no
-        energy above round-off to compare with.
+        They are (n,) at the frames of `energies`; inf where the energy overflows. Empty (0,) if the
+        energy of the full-order run is only round-off.
         """
         if not len(self.own):
             return self.own
@@ -65,17 +65,17 @@ class EnergyScale:
         return np.where(np.isfinite(own), own, np.inf)
 
     def ratio(self, positions: np.ndarray) -> float | None:
-        """Largest total energy at ``positions`` (F' + 1, N, 3) of a run, over the full order's.
+        """Return the largest energy of a run, ``positions`` (F' + 1, N, 3) m, over the peak.
 
-        One for the full-order run itself. Above one, the run has gained energy that neither the
-        initial state nor the handles brought into the full-order run. None if there is nothing to
-        compare with, see `relative`.
+        It is one for the full-order run. Above one, the run has gained energy that did not come
+        from the initial state or the handles of the full-order run. None if `relative` returns an
+        empty array.
         """
         return largest(self.relative(positions))
 
 
 def largest(energy: np.ndarray) -> float | None:
-    """Largest of the values ``energy`` (n,) of `EnergyScale.relative`, None if there are none."""
+    """Return the largest value of ``energy`` (n,), a result of `EnergyScale.relative`, or None."""
     return float(energy.max()) if len(energy) else None
 
 
@@ -88,7 +88,7 @@ def _energy(scene: Scene, positions: np.ndarray, frame: int) -> float:
     kinetic = 0.5 * float(scene.masses @ np.einsum("ij,ij->i", v, v))
     unused, potential = np.zeros_like(q), 0.0
     for group in scene.groups:
-        group.begin_frame(q)  # frame-lagged data are taken at q itself
+        group.begin_frame(q)  # data that are frozen in a frame are computed at q
         potential += group.accumulate(q, unused)
     return kinetic + potential + _force_potential(scene, q)
 

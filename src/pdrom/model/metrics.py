@@ -1,24 +1,24 @@
-"""Errors and norms of the tables."""
+"""Norms and relative errors of projections, and errors of trajectories, for the tables."""
 
 import numpy as np
 
 
 def squared_norms(p: np.ndarray) -> np.ndarray:
-    """Squared Frobenius norms of p (n, rows, 3): of everything, of x, of y, of z; (4,)."""
+    """Return squared Frobenius norms (4,) of p (n, rows, 3): of all entries, only x, y, z."""
     axes = np.einsum("nra,nra->a", p, p)
     return np.concatenate([[axes.sum()], axes])
 
 
 def relative_errors(p: np.ndarray, p_hat: np.ndarray, roundoff: float) -> list[float | None]:
-    """|| p - p^ ||_F / || p ||_F over all frames: total, x, y, z.
+    """Return || p - p_hat ||_F / || p ||_F over all frames: of all entries, only x, y, z.
 
-    None where the reference norm is at round-off level (there is no relative error of noise) or
-    where the reconstruction does not exist.
+    An error is None if || p ||_F is at round-off level (a relative error is then meaningless) or if
+    p_hat is not finite.
 
     Parameters
     ----------
     p, p_hat : (n, rows, 3)
-    roundoff : Frobenius norm of the rounding errors in p
+    roundoff : estimated Frobenius norm of the rounding errors in p
     """
     norm = np.sqrt(squared_norms(p))
     level = max(roundoff, np.finfo(float).eps * norm[0] * np.sqrt(p.size))
@@ -31,9 +31,9 @@ def relative_errors(p: np.ndarray, p_hat: np.ndarray, roundoff: float) -> list[f
 
 
 def shape_residuals(positions: np.ndarray, reference: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Vectors R q + t - q_ref of each frame, which no rigid motion explains, in units of a scale.
+    """Return the differences R q + t - q_ref of each frame after rigid alignment, over a scale.
 
-    R is the best rotation, never a reflection (Kabsch 1976), t joins the centroids.
+    R is the optimal rotation, never a reflection (Kabsch 1976), t aligns the centroids.
 
     Parameters
     ----------
@@ -42,9 +42,9 @@ def shape_residuals(positions: np.ndarray, reference: np.ndarray) -> tuple[np.nd
     Returns
     -------
     residuals, scale
-        (F, N, 3) and (F,) m; apart, because squares in metres may overflow.
+        (F, N, 3) without unit, and (F,) m, because squares in metres may overflow.
     """
-    # the same scale for both: products of a run that has grown out of bounds would overflow
+    # a common scale, as products of positions in an unstable run would overflow
     largest = np.abs(positions).max(initial=0.0, axis=(1, 2), keepdims=True)
     scale = np.maximum(np.maximum(largest, np.abs(reference).max(initial=0.0)), 1.0)
     a, b = positions / scale, reference / scale
@@ -56,7 +56,7 @@ def shape_residuals(positions: np.ndarray, reference: np.ndarray) -> tuple[np.nd
 
 
 def shape_differences(positions: np.ndarray, reference: np.ndarray) -> np.ndarray:
-    """Frobenius norm of the `shape_residuals` of each frame, (F,) m.
+    """Return the Frobenius norm (F,) m of the differences after rigid alignment in each frame.
 
     Parameters
     ----------
@@ -67,13 +67,13 @@ def shape_differences(positions: np.ndarray, reference: np.ndarray) -> np.ndarra
 
 
 def trajectory_error(difference: np.ndarray, displacement: np.ndarray) -> float | None:
-    """|| Q_red - Q_fom ||_F / || Q_fom - rest ||_F from the norms of each frame, m.
+    """Return || Q_red - Q_fom ||_F / || Q_fom - rest ||_F of a run from the norms of its F frames.
 
-    None where the full-order run never leaves its initial state, or no frame is given.
+    Return None if the full-order run never leaves its initial state, or if F = 0.
 
     Parameters
     ----------
-    difference, displacement : (F,) numerators and denominators
+    difference, displacement : (F,) m, norms of Q_red - Q_fom and of Q_fom - rest in each frame
     """
     moved = float(np.linalg.norm(displacement))
     return float(np.linalg.norm(difference)) / moved if moved > 0.0 else None

@@ -1,4 +1,4 @@
-"""Full-order runs, streamed to HDF5 frame by frame, and runs that end where they blow up."""
+"""Full-order runs, written to HDF5 frame by frame, and runs that end when they become unstable."""
 
 import logging
 import os
@@ -21,23 +21,23 @@ log = logging.getLogger(__name__)
 def simulate(
     scene: Scene, perturbation: np.ndarray | None = None, **stepper: Any
 ) -> Iterator[tuple[State, FrameReport]]:
-    """States and reports of all frames of ``scene``, one after the other.
+    """Yield the state and the report after each frame of ``scene``.
 
     Parameters
     ----------
     stepper : options of `Scene.stepper`
-    perturbation : (N, 3) m, added to the first positions
+    perturbation : (N, 3) m, added to the initial positions
     """
     loop = scene.stepper(**stepper)
     yield from loop.run(scene.initial_state(perturbation), range(scene.config.frames))
 
 
 def trajectory(scene: Scene, perturbation: np.ndarray | None = None, **stepper: Any) -> np.ndarray:
-    """Positions (F + 1, N, 3) m of a run of ``scene``, as `simulate`, the initial ones first.
+    """Return positions (F + 1, N, 3) m of a run of ``scene``, the initial positions first.
 
     Parameters
     ----------
-    perturbation : (N, 3) m, added to the first positions
+    perturbation : (N, 3) m, added to the initial positions
     stepper : options of `Scene.stepper`
     """
     positions = [scene.initial_state(perturbation).positions]
@@ -53,14 +53,14 @@ def run(
     with_mesh: bool = False,
     on_frame: Callable[[int, FrameReport], None] = lambda frame, report: None,
 ) -> None:
-    """Run a scene and write positions, velocities, objective, timings and the requested snapshots.
+    """Run a scene; write positions, velocities, objective, timings and the requested snapshots.
 
     Parameters
     ----------
-    snapshot_frames : group -> frames (ascending) whose last local iterate is stored; a group that
-        is not listed stores nothing.
-    with_mesh : stores the mesh, too, for a file that is to be looked at alone
-    on_frame : called after each frame with its number
+    snapshot_frames : group name -> frames (ascending) in which the projections p of the group in
+        the last local step are stored
+    with_mesh : whether the file also contains the mesh, so that it can be used without the scene
+    on_frame : called after each frame with its number and report
     path : HDF5 file that is written
     solver : name of a sparse solver, see `pdrom.model.dynamics.solvers`
     """
@@ -99,7 +99,7 @@ def run(
 
 
 class _SnapshotRecorder:
-    """Stores p of the requested groups and frames; a frame without snapshots costs nothing."""
+    """Writes projections p of the requested groups and frames to datasets of an HDF5 file."""
 
     def __init__(
         self, file: h5py.File, scene: Scene, snapshot_frames: Mapping[str, np.ndarray]
@@ -118,7 +118,7 @@ class _SnapshotRecorder:
             self._targets.append((group, position, data, roundoff))
 
     def observer(self, frame: int) -> Callable[[np.ndarray], None] | None:
-        """Function of the last local iterate, or None if this frame stores nothing."""
+        """Return a function of the last local iterate; None if no snapshot is requested here."""
         wanted = [t for t in self._targets if frame in t[1]]
         if not wanted:
             return None
@@ -133,11 +133,11 @@ class _SnapshotRecorder:
 
 Advance = Callable[[State, int], tuple[State, FrameReport]]
 Run = Callable[[State, range], Iterator[tuple[State, FrameReport]]]
-"""Function of a state and frames that does them one after the other, as `Stepper.run`."""
+"""Function of a state and frames that yields each next state and report, as `Stepper.run`."""
 
 
 def frame_by_frame(advance: Advance) -> Run:
-    """Run that does every frame by a call of ``advance``, and none before it is asked for."""
+    """Return a `Run` that calls ``advance`` for each frame when the iterator is advanced."""
 
     def run(state: State, frames: range) -> Iterator[tuple[State, FrameReport]]:
         for frame in frames:
@@ -149,11 +149,11 @@ def frame_by_frame(advance: Advance) -> Run:
 
 @dataclass(frozen=True)
 class Frame:
-    """End of a frame that stayed finite.
+    """State at the end of a frame in which all positions are finite.
 
-    state : in the coordinates of the step loop
+    state : state in the coordinates of the step loop
     positions : (N, 3) m of the vertices
-    extent : longest side of the bounding box over the run's unit
+    extent : longest side of the bounding box, divided by `BoundedRun.unit`
     """
 
     number: int
@@ -165,12 +165,12 @@ class Frame:
 
 @dataclass
 class BoundedRun:
-    """Frames of a run, in order, up to a blow-up; the frame that grew too large is the last.
+    """Iterator over the frames of a run, up to and including the first that exceeds a limit.
 
-    run : does the frames, perhaps some beyond a blow-up
-    limit : the run ends when its extent, in multiples of ``unit`` (m), exceeds it
-    positions : vertex positions of the coordinates of ``run``
-    blowup_frame : first frame that is not finite or exceeds the limit; None while there is none
+    run : computes the frames, perhaps some more than are yielded
+    limit : the run ends when the extent of the mesh, divided by ``unit`` (m), exceeds this number
+    positions : function from the coordinates of ``run`` to vertex positions (N, 3) m
+    blowup_frame : first frame that is not finite (not yielded) or exceeds the limit; None before
     """
 
     run: Run

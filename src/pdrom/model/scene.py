@@ -1,7 +1,7 @@
-"""A scene: a mesh and a list of effects, typed, checked, and bound to the step loop.
+"""Scenes: a mesh and a list of effects, their typed configuration, and their step loop.
 
-Contradictions of what holds vertices or stops them are refused, doubts are logged. Masses are
-lumped: one for all vertices, or by selection."""
+Effects that prescribe contradictory positions raise an error; doubtful ones cause a logged warning.
+Masses are lumped: one mass for all vertices, or masses of selected vertices."""
 
 import logging
 from collections.abc import Sequence
@@ -30,11 +30,11 @@ from pdrom.model.mesh.types import Mesh, vertex_measures
 
 log = logging.getLogger(__name__)
 
-# Fewer vertices leave a body free to turn about a line.
+# A body that is held at fewer vertices can rotate about a line.
 FEW = 3
-# Targets no deeper in an obstacle than this part of the extent lie on it.
+# Targets inside an obstacle by at most this fraction of the mesh extent count as on its surface.
 SLACK = 1e-9
-# Vertices that a message names.
+# Largest number of vertices that are listed in a message.
 NAMED = 10
 Mass = Annotated[float, Field(ge=1e-150, le=1e150)]
 
@@ -64,9 +64,9 @@ class ReductionPlan(ConfigModel):
 
 
 def with_requested_error(keys: Any) -> Any:
-    """Separate ``reduce.error``, the requested tolerance of the scene, from the groups' plans.
+    """Return ``keys`` with ``reduce.error``, a requested tolerance, moved to ``requested_error``.
 
-    ``keys`` are those of a scene file as read, and come back unchanged where none is requested.
+    ``keys`` are the keys of a scene file; they are returned unchanged if no error is requested.
     """
     plans = keys.get("reduce") if isinstance(keys, dict) else None
     if not isinstance(plans, dict) or "error" not in plans:
@@ -75,7 +75,7 @@ def with_requested_error(keys: Any) -> Any:
     return {**keys, "reduce": groups, "requested_error": plans["error"]}
 
 
-# Positions and velocities of a longer run fill disk and memory: 1600 vertices for 100,000 frames.
+# Limit on disk and memory for positions and velocities: 1600 vertices in 100,000 frames.
 MAX_VERTEX_FRAMES = 160_000_000
 
 
@@ -126,12 +126,12 @@ class SceneConfig(ConfigModel):
         return [e.effect for e in self.effects if isinstance(e, GroupConfig)]
 
     def vertex_masses(self, mesh: Mesh) -> np.ndarray:
-        """Masses (N,) kg: ``vertex_mass``, changed by each entry of ``masses`` in turn.
+        """Return masses (N,) kg: ``vertex_mass``, then changed by each entry of ``masses`` in turn.
 
         Raises
         ------
         SceneError
-            A selection that the mesh does not have.
+            A selection that does not exist on ``mesh``.
         """
         masses = np.full(mesh.vertices, self.vertex_mass)
         for number, entry in enumerate(self.masses):
@@ -148,16 +148,16 @@ class SceneConfig(ConfigModel):
         return masses
 
     def effects_without(self, *names: str) -> tuple[base.EffectConfig, ...]:
-        """Effects of the scene without those called one of ``names``, in their order."""
+        """Return the effects of the scene whose names are not among ``names``, in their order."""
         return tuple(e for e in self.effects if e.effect not in names)
 
     @property
     def modules(self) -> list[str]:
-        """Places of the listed effects (for the code fingerprint), "module:attribute"."""
+        """Import paths "module:attribute" of all effects, for the checksum of the code in use."""
         return sorted({EFFECTS[e.effect] for e in self.effects})
 
     def coarsened(self, resolution: float, frames: float) -> Self:
-        """The scene with shares of its ``resolution`` and ``frames``; schedules shrink alike."""
+        """Return the scene with mesh size, frames and frame numbers scaled by these two factors."""
         count = max(4, round(self.frames * frames))
         even = (count + 1) // 2
         plans = {
@@ -186,7 +186,7 @@ class SceneConfig(ConfigModel):
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A scene bound to its mesh: every listed effect built, sorted by role."""
+    """A scene bound to its mesh: all effects of the configuration as objects, grouped by role."""
 
     config: SceneConfig
     mesh: Mesh
@@ -203,21 +203,21 @@ class Scene:
         return f"Scene('{self.config.name}', {size}: {effects})"
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """A copy, also a pickled one, is built again: compiled kernels cannot be pickled."""
+        """Rebuild the scene when it is copied or unpickled; kernels cannot be pickled."""
         return Scene.build, (self.config, self.mesh, self.masses)
 
     @classmethod
     def build(cls, config: SceneConfig, mesh: Mesh, masses: np.ndarray | None = None) -> "Scene":
-        """Bind ``config`` to ``mesh``.
+        """Return the scene of ``config`` on ``mesh``.
 
         Parameters
         ----------
-        masses : (N,) kg in place of those of ``config``
+        masses : (N,) kg, instead of the masses in ``config``
 
         Raises
         ------
         MeshError, SceneError
-            Faulty mesh, an empty selection, or effects that hold a vertex in different places.
+            Faulty mesh, empty selection, too many frames, or a vertex held by conflicting effects.
         """
         check_mesh(mesh, config.name)
         if config.frames * mesh.vertices > MAX_VERTEX_FRAMES:
@@ -253,18 +253,18 @@ class Scene:
         return scene
 
     def changed(self, **keys: Any) -> "Scene":
-        """The scene with other ``keys`` of its configuration, on the same mesh of the same masses.
+        """Return the scene with other ``keys`` of its configuration, with equal mesh and masses.
 
         Raises
         ------
         MeshError, SceneError
-            As `build`, of effects.
+            Faulty effects, as in `build`.
         """
         config = self.config.model_copy(update=keys)
         return self._bound(config, self.mesh, self.masses)
 
     def _check_holds(self) -> None:
-        """SceneError for a vertex that two hold at once, unless neither of them moves."""
+        """Raise SceneError if two effects, one of them moving, hold a vertex in the same frame."""
         for first, second in combinations(self.boundaries, 2):
             shared = np.intersect1d(first.vertices, second.vertices)
             if len(shared) == 0 or not (first.moves or second.moves):
@@ -279,10 +279,10 @@ class Scene:
                     )
 
     def log_holds(self) -> None:
-        """Log how many vertices each effect holds, and warn of those that end inside an obstacle.
+        """Log how many vertices each effect holds; warn if targets are inside an obstacle.
 
-        A side that holds fewer than `FEW` is a warning, too: on an unstructured mesh a side is
-        often one single vertex.
+        Also warn of a selected side with fewer than `FEW` vertices: on an unstructured mesh a side
+        is often a single vertex.
         """
         for boundary in self.boundaries:
             count, side = len(boundary.vertices), boundary.side
@@ -298,9 +298,9 @@ class Scene:
         log_obstructed(self)
 
     def log_contacts(self) -> None:
-        """Warn of contacts that do not fit the rest shape, see `Contact.doubt`.
+        """Log a warning for each contact that does not fit the rest shape, see `Contact.doubt`.
 
-        Vertices that are held in the first frame do not count.
+        Vertices that are held in the first frame are ignored.
         """
         held = base.held_vertices(self.boundaries, 0)
         free = np.setdiff1d(np.arange(self.mesh.vertices), held)
@@ -310,7 +310,7 @@ class Scene:
                 log.warning("scene '%s', effect '%s': %s", self.config.name, contact.name, doubt)
 
     def group(self, name: str) -> ConstraintGroup:
-        """The constraint group called ``name``; SceneError if the scene does not list it."""
+        """Return the constraint group with this ``name``; SceneError if the scene has none."""
         for group in self.groups:
             if group.name == name:
                 return group
@@ -318,15 +318,15 @@ class Scene:
 
     @cached_property
     def system(self) -> GlobalSystem:
-        """Global system with the default solver, built once."""
+        """Global system with the default solver, computed at the first access."""
         return self.system_with(DEFAULT_SOLVER)
 
     def system_with(self, solver: str) -> GlobalSystem:
-        """Global system solved by the registered ``solver``."""
+        """Return the global system with the ``solver`` of this name, see `solvers.SOLVERS`."""
         return GlobalSystem(self.masses, self.config.time_step, self.groups, solver=solver)
 
     def initial_state(self, perturbation: np.ndarray | None = None) -> State:
-        """State before the first frame; ``perturbation`` (N, 3) m is added to the positions."""
+        """Return the state before the first frame, with ``perturbation`` (N, 3) m of positions."""
         positions = self.mesh.points.copy()
         if perturbation is not None:
             positions += perturbation
@@ -341,9 +341,9 @@ class Scene:
         local_steps: Sequence[LocalStep] | None = None,
         track_objective: bool = True,
     ) -> Stepper:
-        """Step loop of the scene; ``local_steps`` replaces the full projections of all groups.
+        """Return the step loop; ``local_steps`` are used instead of the groups of the scene.
 
-        ``system`` replaces its factored system, ``track_objective`` adds the objective to reports.
+        ``system`` is used instead of `system`; ``track_objective``: reports have the objective.
         """
         return Stepper(
             self.space(system or self.system),
@@ -355,12 +355,12 @@ class Scene:
         )
 
     def acceleration(self) -> Anderson | None:
-        """Acceleration of the iterations, None if the scene has none."""
+        """Return a new Anderson acceleration of the iterations; None if the scene has none."""
         window = self.config.anderson_window
         return Anderson(window) if window else None
 
     def space(self, system: GlobalSystem) -> VertexSpace:
-        """Vertex positions as the coordinates of the step loop, with its global ``system``."""
+        """Return the vertex positions as coordinates of the step loop, with a global ``system``."""
         return VertexSpace(system, self.forces, self.boundaries, contacts=self.contacts)
 
 
@@ -370,14 +370,14 @@ def _place(boundary: base.Boundary) -> base.EffectConfig:
 
 
 def log_obstructed(scene: Scene) -> None:
-    """Warn of held vertices whose targets lie inside an obstacle, where they stay.
+    """Log a warning if targets of held vertices, which contacts cannot move, are in an obstacle.
 
-    Vertices that are taken hold of later are taken to be where obstacles have pushed the mesh
-    at rest.
+    For a hold that begins in a later frame, the vertices are assumed to be at their rest positions
+    after the correction by obstacles.
     """
     obstacles = [contact for contact in scene.contacts if contact.each_alone]
     inside, blocked = np.zeros(scene.mesh.vertices, dtype=bool), dict[str, None]()
-    # boundaries remember where they took hold
+    # boundaries store positions at the beginning of a hold, hence the copy
     boundaries, positions = deepcopy(scene.boundaries), scene.mesh.points.copy()
     slack = SLACK * scene.mesh.extent
     for frame in range(scene.config.frames if obstacles and boundaries else 0):

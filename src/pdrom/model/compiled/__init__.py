@@ -1,1 +1,1 @@
-"""Compiled functions of the model: how they are kept, and vectors of four numbers."""
+"""Compilation and caching of functions with Numba, and vectors (rows) of four numbers."""

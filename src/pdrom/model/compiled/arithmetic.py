@@ -1,7 +1,7 @@
-"""Arithmetic of rows of four numbers: all lanes at once, or whole rows with a number.
+"""SIMD arithmetic of rows of four numbers: row with row, lane by lane, or row with number.
 
-Nothing is reordered and no intermediate result kept, so that a lane gives the same bits in every
-company; a product and a sum are rounded once where the processor can.
+Operations are never reordered, so that the result of a lane does not depend on the other lanes.
+A product and a sum are rounded once (fused) if the processor supports it.
 """
 
 from llvmlite import ir
@@ -13,14 +13,14 @@ from pdrom.model.compiled.rows import INDICES, NUMBERS, ROW, WIDTH
 
 
 def spread(builder, number):
-    """LLVM vector of a ``builder`` with ``number`` in all lanes."""
+    """Return an LLVM vector that ``builder`` makes, with ``number`` in all lanes."""
     undefined = ir.Constant(NUMBERS, ir.Undefined)
     first = builder.insert_element(undefined, number, ir.Constant(ir.IntType(32), 0))
     return builder.shuffle_vector(first, undefined, ir.Constant(INDICES, [0] * WIDTH))
 
 
 def multiply_add(builder, a, b, c):
-    """LLVM vector a b + c of a ``builder``, rounded once where the processor can."""
+    """Return the LLVM vector a b + c that ``builder`` makes, fused if the processor supports it."""
     kind = ir.FunctionType(NUMBERS, [NUMBERS] * 3)
     function = cgutils.get_or_insert_function(builder.module, kind, "llvm.fmuladd.v4f64")
     return builder.call(function, [a, b, c])
@@ -28,7 +28,7 @@ def multiply_add(builder, a, b, c):
 
 @intrinsic
 def constant(_context, _number):
-    """A row with the same number in all lanes."""
+    """Return a row with the same number in all lanes."""
 
     def generate(_target, builder, _signature, arguments):
         return spread(builder, arguments[0])
@@ -77,7 +77,7 @@ def add_scaled(_context, _a, _s, _b):
 
 @intrinsic
 def add_product(_context, _a, _b, _c):
-    """a + b c, lane by lane."""
+    """Sum a + b c of rows a, b and c, lane by lane."""
 
     def generate(_target, builder, _signature, arguments):
         a, b, c = arguments
@@ -121,7 +121,7 @@ def total(_context, _row):
 
 @intrinsic
 def first_three(_context, _row):
-    """The first three components of a row as a tuple of numbers."""
+    """Return the first three components of a row as a tuple of numbers."""
     result = types.UniTuple(types.float64, 3)
 
     def generate(context, builder, signature, arguments):
@@ -134,7 +134,7 @@ def first_three(_context, _row):
 
 @intrinsic
 def of_three(_context, _x, _y, _z):
-    """The row (x, y, z, 0)."""
+    """Return the row (x, y, z, 0)."""
 
     def generate(_target, builder, _signature, arguments):
         row = ir.Constant(NUMBERS, [0.0] * WIDTH)
@@ -153,7 +153,7 @@ def _within(builder, row, low, high):
 
 @intrinsic
 def all_within(_context, _row, _low, _high):
-    """Whether all components lie in [low, high]; false if one of them is NaN."""
+    """Return whether all components lie in [low, high]; false if one of them is NaN."""
 
     def generate(_target, builder, _signature, arguments):
         inside = builder.bitcast(_within(builder, *arguments), ir.IntType(WIDTH))
@@ -164,7 +164,7 @@ def all_within(_context, _row, _low, _high):
 
 @intrinsic
 def choose_within(_context, _row, _low, _high, _a, _b):
-    """a in the lanes where the row lies in [low, high], b in the others."""
+    """Return a row with lane k of a where lane k of ``row`` is in [low, high], else of b."""
 
     def generate(_target, builder, _signature, arguments):
         row, low, high, a, b = arguments
@@ -175,7 +175,7 @@ def choose_within(_context, _row, _low, _high, _a, _b):
 
 @intrinsic
 def transposed(_context, _a, _b, _c, _d):
-    """The four columns of the 4 x 4 matrix with the rows a, b, c, d."""
+    """Return the four columns of the 4 x 4 matrix with the rows a, b, c, d."""
     result = types.UniTuple(ROW, WIDTH)
 
     def shuffle(builder, a, b, order):

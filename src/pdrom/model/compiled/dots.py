@@ -1,8 +1,8 @@
 """Inner products in compiled code.
 
-Products of three matrix rows with a vector read the vector once, and the processor prefetches three
-rows. The order of the sums does not depend on the processor: sixteen partial sums, then four,
-then one by one."""
+Products of three matrix rows with a vector read the vector only once, and the processor prefetches
+three rows. The order of summation does not depend on the processor: sixteen partial sums are added
+to four, these to one, and the remaining terms one by one."""
 
 from pdrom.model.compiled.arithmetic import (
     add,
@@ -30,7 +30,7 @@ def dots(matrix, i, j, k, count, vector, starts):
 
     Parameters
     ----------
-    matrix : flat array; the rows are ``count`` numbers each, from the indices i, j and k on
+    matrix : flat array; the rows have ``count`` numbers each and begin at indices i, j and k
     """
     x, y, z = starts
     blocks, vectors = count - count % (4 * WIDTH), count - count % WIDTH
@@ -81,7 +81,7 @@ def dots(matrix, i, j, k, count, vector, starts):
 
 @compiled(nogil=True)
 def dot(a, b):
-    """Inner product of ``a`` and ``b`` (n,), in eight sums that do not wait for each other."""
+    """Return the inner product of ``a`` and ``b`` (n,), by eight independent partial sums."""
     first = second = constant(0.0)
     whole = len(a) - len(a) % (2 * WIDTH)
     for k in range(0, whole, 2 * WIDTH):

@@ -11,12 +11,12 @@ from numba import cfunc, njit, types
 from numba.extending import intrinsic
 
 _INTEGER = ir.IntType(types.intp.bitwidth)
-KERNELS = ("compiled", "constraints", "dynamics")  # folders whose functions others inline
+KERNELS = ("compiled", "constraints", "dynamics")  # folders with functions that may be inlined
 
 
 @cache
 def _checksum(folders: tuple[str, ...]) -> str:
-    """Checksum of the sources in some folders of the model."""
+    """Return a checksum of the source files in some ``folders`` of the package `pdrom.model`."""
     model = Path(__file__).parents[1]
     sources = sorted(path for folder in folders for path in model.glob(f"{folder}/*.py"))
     return f"{crc32(b''.join(path.read_bytes() for path in sources)):08x}"
@@ -48,7 +48,7 @@ def compiled(function=None, **options):
 def inner(function=None, **options):
     """Compile a ``function`` that only compiled functions call; it has no cache of its own.
 
-    The wrapper for callers in Python is left out: it takes longer to compile than a short function.
+    No wrapper for callers in Python is made: it takes longer to compile than a short function.
     """
     if function is None:
         return lambda wrapped: inner(wrapped, **options)
@@ -65,7 +65,7 @@ def template(function):
 
 
 class Callback:
-    """A function that compiled code calls by its address; compiled when the address is first read.
+    """A function that compiled code calls by address; it is compiled when `address` is first read.
 
     Attributes
     ----------

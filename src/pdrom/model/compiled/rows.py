@@ -1,14 +1,14 @@
-"""Vertices as rows of four numbers, so that compiled code moves one with a single instruction.
+"""Rows of four numbers, one per vertex, which compiled code loads with a single instruction.
 
-The step loop keeps positions and right-hand sides as (N, 4) with a last column of zeros; outside
-they are (N, 3) views of these. Compiled code sees the flat array and holds a row in a register of
-four lanes. A row may also hold one number of four elements
-(`pdrom.model.compiled.arithmetic.transposed` goes from one to the other).
+The step loop stores positions and right-hand sides as (N, 4) arrays with a last column of zeros;
+other code sees (N, 3) views of these "padded" arrays. Compiled code takes the flat array (4 N,) and
+loads a row into a register of four lanes. A row may also hold one number of each of four elements
+(`pdrom.model.compiled.arithmetic.transposed` converts between the two).
 
-Arrays of rows are made here, at multiples of a row's size: NumPy's own begin in the middle of one,
-and every second row then straddles two lines of the cache.
+Arrays of this module begin at multiples of the size of a row. NumPy's arrays may not, and every
+second row would then lie in two cache lines.
 
-Loads and stores check nothing: indices are neither negative nor too large.
+Loads and stores do not check indices, which must be neither negative nor too large.
 """
 
 import numpy as np
@@ -40,23 +40,23 @@ class _RowModel(models.PrimitiveModel):  # type: ignore[misc]
 
 
 def empty(numbers: int, dtype: type = np.float64) -> np.ndarray:
-    """Uninitialised aligned array (numbers,) of doubles, or of another ``dtype``."""
+    """Return an uninitialised array (numbers,) of ``dtype``, aligned to the size of a row."""
     kind = np.dtype(dtype)
     memory = np.empty(numbers * kind.itemsize + ROW_BYTES, np.uint8)
-    # through a memoryview: views of what is returned have that as their base, not the memory
+    # the memoryview makes the returned array, not ``memory``, the base of its views
     start = -memory.ctypes.data % ROW_BYTES
     return np.frombuffer(memory.data, kind, numbers, start)
 
 
 def zeros(numbers: int) -> np.ndarray:
-    """Aligned array (numbers,) of zeros."""
+    """Return an array (numbers,) of zeros, aligned to the size of a row."""
     made = empty(numbers)
     made.fill(0.0)
     return made
 
 
 def copied(numbers: np.ndarray) -> np.ndarray:
-    """Aligned copy of the flat array ``numbers``."""
+    """Return a copy of the flat array ``numbers``, aligned to the size of a row."""
     made = empty(len(numbers), numbers.dtype.type)
     made[...] = numbers
     return made
@@ -66,27 +66,27 @@ def copied(numbers: np.ndarray) -> np.ndarray:
 def write(numbers, to):
     """Copy the flat array ``numbers`` into ``to``, which is at least as long.
 
-    The loops of every frame assign no array to a slice: the message about shapes that could differ
-    takes seconds to compile.
+    The compiled step loop uses this function, as the assignment to a slice takes seconds to compile
+    (because of its error message).
     """
     for i in range(len(numbers)):
         to[i] = numbers[i]
 
 
 def vertices(count: int) -> np.ndarray:
-    """Zeros (count, 3), as a view of a padded array (count, 4)."""
+    """Return zeros (count, 3) as a view of a padded array (count, 4)."""
     return unflat(zeros(WIDTH * count))
 
 
 def as_vertices(values: np.ndarray) -> np.ndarray:
-    """Copy of the values (N, 3), as a view of a padded array (N, 4)."""
+    """Return a copy of the values (N, 3) as a view of a padded array (N, 4)."""
     copy = vertices(len(values))
     copy[...] = values
     return copy
 
 
 def flat(values: np.ndarray) -> np.ndarray:
-    """Return ``values`` (N, 3) padded and flat, (4 N,): without a copy if they are such a view."""
+    """Return ``values`` (N, 3) as a padded flat array (4 N,); no copy if they are a view of one."""
     rows = values.base
     if (
         isinstance(rows, np.ndarray)
@@ -103,18 +103,18 @@ def flat(values: np.ndarray) -> np.ndarray:
 
 
 def unflat(rows: np.ndarray) -> np.ndarray:
-    """Flat ``rows`` (4 N,) of four as a view (N, 3), the opposite of `flat`."""
+    """Return a padded flat array ``rows`` (4 N,) as a view (N, 3), the inverse of `flat`."""
     return rows.reshape(-1, WIDTH)[:, :3]
 
 
 def shares(values: np.ndarray, rows: np.ndarray) -> bool:
-    """Whether ``rows``, the result of `flat` for ``values`` (N, 3), shares their memory."""
+    """Return whether ``rows``, the result of `flat` for ``values`` (N, 3), has the same memory."""
     return len(values) > 0 and _same_start(values, rows)
 
 
 @compiled
 def _same_start(a, b):
-    """Whether two arrays begin at the same address; faster than a comparison with NumPy."""
+    """Return whether two arrays begin at the same address, faster than NumPy does."""
     return a.ctypes.data == b.ctypes.data
 
 
@@ -129,7 +129,7 @@ def _place(context, builder, kind, array, index):
 
 @intrinsic
 def at(_context, array, index):
-    """array[index], an integer widened to the size of an index."""
+    """Return array[index], without a bounds check; integers are converted to the index type."""
     result = types.intp if isinstance(array.dtype, types.Integer) else array.dtype
 
     def generate(context, builder, signature, arguments):
@@ -141,7 +141,7 @@ def at(_context, array, index):
 
 @intrinsic
 def load(_context, array, index):
-    """The row of the flat ``array`` that begins at ``index``."""
+    """Return the row of four numbers of the flat ``array`` that begins at ``index``."""
 
     def generate(context, builder, signature, arguments):
         return builder.load(_place(context, builder, signature.args[0], *arguments), align=8)
@@ -151,7 +151,7 @@ def load(_context, array, index):
 
 @intrinsic
 def store(_context, array, index, _row):
-    """Write a row to the flat ``array`` from ``index`` on."""
+    """Write a row of four numbers to the flat ``array`` from ``index`` on."""
 
     def generate(context, builder, signature, arguments):
         array, index, row = arguments
@@ -171,17 +171,17 @@ def _pointer(_context, _address):
 
 @compiled(inline="always")
 def doubles(address, count):
-    """Array (count,) of the doubles at an address."""
+    """Return an array (count,) over the doubles in memory at an address."""
     return carray(_pointer(address), (count,), np.float64)
 
 
 @compiled(inline="always")
 def integers(address, count):
-    """Array (count,) of the int32 at an address."""
+    """Return an array (count,) over the int32 numbers in memory at an address."""
     return carray(_pointer(address), (count,), np.int32)
 
 
 @compiled(inline="always")
 def indices(address, count):
-    """Array (count,) of the int64 at an address."""
+    """Return an array (count,) over the int64 numbers in memory at an address."""
     return carray(_pointer(address), (count,), np.int64)

@@ -1,1 +1,1 @@
-"""Constraint groups of projective dynamics, one a module (see `pdrom.model.effects`)."""
+"""Constraint groups of projective dynamics and the compiled kernels of their projections."""

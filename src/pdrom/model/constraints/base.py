@@ -1,4 +1,4 @@
-"""The constraint group: operator S, weights W and projection p.
+"""Base classes of constraint groups, with the operator S, the weights W and the projection p.
 
 Energy of a group (Bouaziz et al. 2014, eq. 4): W(q) = 1/2 sum_e w_e || S_e q - p_e(q) ||_F^2.
 """
@@ -19,7 +19,7 @@ from pdrom.model.effects.base import Effect, EffectConfig
 from pdrom.model.mesh.selection import Selection, select_vertices
 from pdrom.model.mesh.types import Mesh
 
-# Kinds of cells that elements lie on, with a function: mesh -> vertices of all such cells.
+# Kind of mesh cell on which constraints are defined -> function: mesh -> vertices of all cells.
 CELLS: dict[str, Callable[[Mesh], np.ndarray]] = {
     "vertex": lambda mesh: np.arange(mesh.vertices)[:, None],
     "edge": lambda mesh: mesh.edges(),
@@ -47,51 +47,51 @@ class GroupConfig(EffectConfig):
 
 
 class ConstraintGroup(Effect):
-    """A set of equal constraints, evaluated in batches.
+    """A set of constraints of one kind, one per mesh element, which are evaluated in batches.
 
     Attributes
     ----------
     name : name of the group in configuration and tables
     elements : number e of elements
-    rows_per_element : rows p of each element's operator
-    S : (e p, N) CSR, the unweighted differential operator
-    weights : (e,) element weights, rest measure included
+    rows_per_element : number p of rows of each element's operator
+    S : (e p, N) CSR, the unweighted differential operator on N vertices
+    weights : (e,) element weights, multiplied by the rest area or volume where the group says so
     """
 
     rows_per_element: int
     split_from: int
-    """Elements from which the group has two parts (`pdrom.model.constraints.parts`); a group that
-    always is one part does not set it."""
+    """Number of elements from which the local step is computed in two parts (see module
+    `local_kernel`); a group that is always computed in one part does not set it."""
     S: sparse.csr_array
     weights: np.ndarray
     gradient_kernel: Any = None
-    """Compiled projection from S q (module `gradient_kernel`), if there is one."""
+    """Compiled function from S q to projections, see `local_kernel.gradient_kernel`; or None."""
     local_kernel: LocalKernel | None = None
-    """Compiled `accumulate`, for loops in compiled code; a group without one writes its own."""
+    """Compiled `accumulate` for compiled loops; a group without one overrides `accumulate`."""
     _pass: LocalPass | None = None
     manifold: ClassVar[str | None] = None
-    """Set that it projects on, if it is one of "clamped" (signed singular values in a range, which
-    are the `kernel_parameters`), "length" or "half sphere": kernels are then compared with its
-    projection in high precision; or "size" (a volume or an area in a range), without a bound."""
+    """Set onto which elements are projected: "clamped" (signed singular values in the range
+    `kernel_parameters`), "length" (of an edge), "half sphere", or "size" (unbounded set with a
+    volume or area in a range). Tests compare the first three with high-precision projections."""
     frame_lagged: bool = False
-    """Whether ``begin_frame`` freezes anything."""
+    """Whether the projection uses data that ``begin_frame`` computes once per frame."""
     cells: ClassVar[str]
-    """Place of an element: a key of `CELLS`."""
+    """Kind of mesh cell on which each element lies, a key of `CELLS`."""
     unit: ClassVar[str] = ""
-    """Unit of a projection; empty where it has none."""
+    """Physical unit of the projections; empty if they are dimensionless."""
 
     @classmethod
     def element_vertices(cls, mesh: Mesh) -> np.ndarray:
-        """Vertices (e, m) of each element on a mesh, in the order of the elements."""
+        """Return the m vertices of each of the e elements on a mesh, (e, m)."""
         return CELLS[cls.cells](mesh)
 
     def element_weights(self, mesh: Mesh) -> float | np.ndarray:
-        """Weight of each element of ``mesh`` without its rest measure, (e,), or one number for all.
+        """Return the weights (e,) of the elements of ``mesh`` per rest measure, or one for all.
 
         Raises
         ------
         SceneError
-            A selection that holds no element of the group.
+            A selection contains no element of the group.
         """
         if not self.config.factors:
             return self.config.weight
@@ -113,32 +113,32 @@ class ConstraintGroup(Effect):
 
     @property
     def row_weights(self) -> np.ndarray:
-        """Diagonal of W, (e p,)."""
+        """Diagonal (e p,) of the weight matrix W."""
         return np.repeat(self.weights, self.rows_per_element)
 
     def begin_frame(self, q: np.ndarray, elements: np.ndarray | None = None) -> None:
-        """Freeze what depends on first positions ``q`` (N, 3) m, for ``elements`` (m,) or all."""
+        """Compute data of a frame from its first ``q`` (N, 3) m, for ``elements`` (m,) or all."""
 
     def kernel_parameters(self) -> np.ndarray:
-        """Numbers that ``gradient_kernel`` needs in addition to S q, in the order that it expects.
+        """Return the numbers that ``gradient_kernel`` needs in addition to S q, in its order.
 
-        Frame-lagged ones are those of the last ``begin_frame``.
+        Numbers that are computed once per frame come from the last call of ``begin_frame``.
         """
         raise NotImplementedError(f"{self.name} has no gradient kernel")
 
     def project(self, y: np.ndarray) -> np.ndarray:
-        """Projections p(y) of all elements at ``y`` (N, 3) m, (e p, 3)."""
+        """Return the projections p(y) (e p, 3) of all elements at ``y`` (N, 3) m."""
         return self.project_elements(y, np.arange(self.elements))
 
     def sampler(self, elements: np.ndarray) -> LocalKernel:
-        """Local kernel that writes the projections of some elements (int64), flat, in their order.
+        """Return a kernel that writes the projections of ``elements`` (m,) int64 to a flat array.
 
-        It is called with the place of the projections in place of that of the right-hand side.
+        Callers pass the address of this array instead of the address of the right-hand side.
         """
         raise NotImplementedError(f"{self.name} has no sampler")
 
     def project_elements(self, y: np.ndarray, elements: np.ndarray) -> np.ndarray:
-        """Projections of ``elements`` at ``y`` (N, 3) m, (len(elements) p, 3), in their order."""
+        """Return projections (m p, 3) of ``elements`` (m,), in their order, at ``y`` (N, 3) m."""
         elements = np.ascontiguousarray(elements, dtype=np.int64)
         return projections(self.sampler(elements), y, self.rows_per_element * len(elements))
 
@@ -152,31 +152,31 @@ class ConstraintGroup(Effect):
 
     @abstractmethod
     def reference_project(self, d: np.ndarray, elements: np.ndarray) -> np.ndarray:
-        """NumPy reference: ``d`` = S_e q -> p_e, both (m, p, 3), of ``elements`` (m,)."""
+        """Return p_e (m, p, 3) of ``elements`` (m,) from ``d`` = S_e q (m, p, 3), by NumPy."""
 
     @abstractmethod
     def restricted(
         self, elements: np.ndarray, factors: np.ndarray
     ) -> tuple["ConstraintGroup", np.ndarray]:
-        """The group of some elements only, on the vertices they need.
+        """Return a group of some elements only, defined on the vertices that these elements use.
 
         Parameters
         ----------
         elements : (m,) element indices
-        factors : (m,) what each element weight is multiplied by
+        factors : (m,) factors by which the element weights are multiplied
 
         Returns
         -------
         group, vertices
-            A group whose positions are those of ``vertices`` (n,), in this order.
+            The smaller group, and the indices (n,) of its vertices in the original mesh.
         """
 
     def system_matrix(self) -> sparse.csr_array:
-        """S^T W S, (N, N) CSR."""
+        """Return the matrix S^T W S, (N, N) CSR."""
         return (self.S.T @ self.S.multiply(self.row_weights[:, None])).tocsr()
 
     def roundoff(self, q: np.ndarray) -> float:
-        """Round-off in S q of ``q`` (N, 3) m: eps times the norm of the cancelling |S| |q|."""
+        """Return an estimate of the round-off in S q at ``q`` (N, 3) m: eps || |S| |q| ||_F."""
         return float(np.finfo(float).eps * np.linalg.norm(abs(self.S) @ np.abs(q)))
 
 
@@ -192,7 +192,7 @@ class StencilGroup(ConstraintGroup):
     stencil: np.ndarray
     operator: np.ndarray
     per_element: tuple[str, ...] = ()
-    """Names of further arrays with one entry per element."""
+    """Names of further attributes that are arrays with one entry per element."""
 
     def restricted(
         self, elements: np.ndarray, factors: np.ndarray
@@ -214,7 +214,7 @@ class StencilGroup(ConstraintGroup):
 
 
 def require_cells(mesh: Mesh, kind: str, effect: str) -> np.ndarray:
-    """The mesh's cells of ``kind``, which ``effect`` needs; SceneError if there are none."""
+    """Return the cells of ``kind`` that an ``effect`` needs; SceneError if a mesh has none."""
     cells = getattr(mesh, kind)
     if kind == "triangles" and len(mesh.tetrahedra):
         raise SceneError(f"effect '{effect}' needs a surface mesh, this mesh is a volume")
@@ -224,8 +224,8 @@ def require_cells(mesh: Mesh, kind: str, effect: str) -> np.ndarray:
 
 
 def directions(a: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Unit vectors and lengths (..., 1) of vectors ``a`` (..., 3); zero where one is zero."""
-    # scaled: neither overflow nor underflow of the squares
+    """Return unit vectors and lengths (..., 1) of vectors ``a`` (..., 3); zero for zero vectors."""
+    # scale the vectors so that their squares neither overflow nor underflow
     largest = np.abs(a).max(axis=-1, keepdims=True)
     part = a / np.where(largest > 0.0, largest, 1.0)
     length = np.linalg.norm(part, axis=-1, keepdims=True)

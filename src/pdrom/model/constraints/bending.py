@@ -43,18 +43,18 @@ from pdrom.model.constraints.local_kernel import (
 )
 from pdrom.model.mesh.types import Mesh, barycentric_areas, boundary_edges
 
-# A rim direction below this has been lost to round-off.
+# A direction to the rim (equator) with a smaller norm consists of round-off.
 RIM = 1e-15
-# A rim direction above this is at right angles to the normal up to 2e-12; below, the difference
-# that it comes from has cancelled so far that it is made orthogonal once more.
+# A rim direction with a larger norm is orthogonal to the normal up to 2e-12. A smaller one has lost
+# digits by cancellation and is orthogonalised again.
 NEAR_POLE = 1e-4
 
-# Indices in the packed manifold of an element: weight, magnitude, rest curvature, side times normal
+# Packed numbers of an element: weight, rest magnitude, rest curvature vector, side times normal
 WEIGHT, MAGNITUDE, REST, POLE, MANIFOLD = 0, 1, 2, 5, 8
-# Indices in the working array: curvature, p, height of the curvature's direction above the equator
+# Offsets in the working array: curvature, projection p, height of its direction above the equator
 H, P, HEIGHT, SIZE = 0, 3, 6, 7
-# Entries of the record: the numbers of elements and of those to project; then the places of the
-# operator in CSR, the manifold, the working arrays, the elements to project and their manifold.
+# Entries of a kernel's record: number of elements, number of elements to project; addresses of the
+# CSR operator, the packed numbers, the working arrays, the elements to project, and their numbers.
 ELEMENTS, COUNT, START, INDICES, DATA, SPHERES, WORK, SAMPLED, TAKEN, ARRAYS = range(OWN, OWN + 10)
 
 
@@ -89,7 +89,7 @@ def _half_spheres(work, manifold, block):
     first, wrong = block * MANIFOLD, 0.0
     for lane in range(LANES):
         h, n = load(work, H, lane), load(manifold, first + POLE, lane)
-        # scaled: neither overflow nor underflow of the squares
+        # scale the vector so that its squares neither overflow nor underflow
         scale = absolute_sum(h)
         unit = scaled(1.0 / (scale + SMALLEST), h)
         unit = scaled(1.0 / np.sqrt(dot(unit, unit)), unit)
@@ -115,7 +115,7 @@ def _to_rims(work, manifold, first):
         height = work[HEIGHT * LANES + lane]
         rim, length = _without(unit, height, n)
         again, left = _without(rim, dot(rim, n), n)
-        # what is mostly normal after a difference of unit vectors was round-off from the start
+        # a difference of unit vectors that is mostly parallel to n consists of round-off
         again = choose(length > RIM and left > 0.5, again, perpendicular(n))
         rim = choose(length > NEAR_POLE, rim, again)
         save(work, P, lane, choose(height < 0.0, rim, unit))
@@ -133,7 +133,7 @@ def _operator(y_place, record):
 
 @lane_function
 def _spheres(record, part):
-    """Return the packed manifold of a kernel and the working array of a ``part``."""
+    """Return the packed numbers of all elements and the working array of a ``part``."""
     entries = rows.indices(record, ARRAYS)
     return (
         rows.doubles(entries[SPHERES], entries[FIRST + 2] * MANIFOLD * LANES),
@@ -145,7 +145,7 @@ def _spheres(record, part):
 def project_vertices(y_place, p_place, record, part):
     """Write the projections p (m, 3) of the sampled elements of the record; return 0.
 
-    Addresses: ``y_place``, ``p_place``, ``record``; ``part`` says which working array is used.
+    ``y_place``, ``p_place``, ``record`` are addresses; ``part`` selects the working array.
     """
     y, start, indices, data = _operator(y_place, record)
     manifold, work = _spheres(record, part)
@@ -225,19 +225,17 @@ def project_gradients(d_pointer, manifold_pointer, p_pointer, m):
 
 
 def interior_vertices(triangles: np.ndarray, vertices: int) -> np.ndarray:
-    """Vertices (n,) of ``triangles`` (T, 3) on no boundary edge, ascending; of all ``vertices``."""
+    """Return the indices (n,) < ``vertices`` on no boundary edge of ``triangles`` (T, 3)."""
     inside = np.ones(vertices, dtype=bool)
     inside[boundary_edges(triangles)] = False
     return np.flatnonzero(inside)
 
 
 def cotangent_laplacian(points: np.ndarray, triangles: np.ndarray) -> sparse.csr_array:
-    """(L q)_v = sum_j (cot a_j + cot b_j)(q_v - q_j), (N, N) CSR (Pinkall and Polthier 1993).
+    """Return the cotangent Laplacian L, (N, N) CSR (Pinkall and Polthier 1993).
 
-    Parameters
-    ----------
-    points : (N, 3) m
-    triangles : (T, 3)
+    (L q)_v = sum_j (cot a_j + cot b_j)(q_v - q_j) with the angles a_j, b_j opposite to edge (v, j).
+    ``points`` are (N, 3) m, ``triangles`` (T, 3).
     """
     n = len(points)
     rows, columns, values = [], [], []
@@ -254,7 +252,7 @@ def cotangent_laplacian(points: np.ndarray, triangles: np.ndarray) -> sparse.csr
 
 
 def vertex_fans(triangles: np.ndarray, vertices: int) -> tuple[np.ndarray, np.ndarray]:
-    """``triangles`` (T, 3) around each of ``vertices``: ``fan[start[v]:start[v + 1]]``."""
+    """Return (start, fan): ``triangles`` at v < ``vertices`` are fan[start[v]:start[v + 1]]."""
     order = np.argsort(triangles.ravel(), kind="stable")
     counts = np.bincount(triangles.ravel(), minlength=vertices)
     start = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
@@ -273,9 +271,9 @@ def _sides(q, triangle):
 
 @kernel
 def fan_normals(q, vertices, elements, start, fan, triangles, normals):
-    """Write the area-weighted unit normals of the vertices of some elements to their rows.
+    """Write the area-weighted unit normals of the vertices of some elements to ``normals``.
 
-    Zero where the fan has no area.
+    The normal is zero where the triangles around a vertex have no area.
 
     Parameters
     ----------
@@ -291,7 +289,7 @@ def fan_normals(q, vertices, elements, start, fan, triangles, normals):
         for k in range(first, last):
             u, v = _sides(q, triangles[fan[k]])
             largest = max(largest, absolute_sum(u), absolute_sum(v))
-        # a power of two: neither overflow nor underflow of the products, and no rounding
+        # scale by a power of two: no rounding, and products neither overflow nor underflow
         power = 2.0 ** min(-math.frexp(largest)[1], 1000)
         nx, ny, nz = 0.0, 0.0, 0.0
         for k in range(first, last):
@@ -305,7 +303,7 @@ def fan_normals(q, vertices, elements, start, fan, triangles, normals):
         normals[i, 0], normals[i, 1], normals[i, 2] = nx, ny, nz
 
 
-# Rest curvature below this (relative to the cancelling terms) is flat: it has no side to keep.
+# A rest curvature below this part of its summands is round-off: the vertex counts as flat.
 FLAT = 1e-9
 
 
@@ -316,10 +314,10 @@ class VertexBending(ConstraintGroup):
     the rest magnitude m and the side s of the rest vector against the vertex normal, the manifold
     is the half sphere { |p| = m, s p.n >= 0 }; n is the normal at the beginning of the frame, so
     that the manifold is fixed during the iterations and the objective cannot rise. On the right
-    side p has the direction of H; on the wrong side it is the nearest point of the rim, which pulls
-    the vertex back: no flip. A flat rest shape has m = 0 up to round-off and needs no side.
-    Where H = 0 the nearest point is the pole; where the fan has no area either there is no pole,
-    and p is the rest vector.
+    side p has the direction of H; on the wrong side p is the nearest point of the rim, which pulls
+    the vertex back so that it does not flip. A flat rest shape has m = 0 up to round-off and s = 0.
+    Where H = 0, p is the pole (m s n); where the triangles around the vertex also have no area,
+    there is no normal, and p is the rest vector.
     """
 
     class Config(GroupConfig):
@@ -366,7 +364,7 @@ class VertexBending(ConstraintGroup):
         return interior_vertices(mesh.triangles, mesh.vertices)[:, None]
 
     def begin_frame(self, q: np.ndarray, elements: np.ndarray | None = None) -> None:
-        """Take the vertex normals of ``q`` (N, 3) m; curved ``elements`` (m,) alone need them."""
+        """Compute vertex normals at ``q`` (N, 3) m, for ``elements`` (m,) with rest curvature."""
         curved = self._curved
         if elements is not None:
             curved = elements[self.side[elements] != 0.0]
@@ -449,7 +447,7 @@ class VertexBending(ConstraintGroup):
 
 
 def _crossing(n: np.ndarray) -> np.ndarray:
-    """A unit vector at right angles to each row of n, always the same one."""
+    """Return a unit vector orthogonal to each row of n, as a deterministic function of n."""
     k = np.argmin(np.abs(n), axis=1)
     i, j = (k + 1) % 3, (k + 2) % 3
     rows = np.arange(len(n))

@@ -1,10 +1,10 @@
-"""Elements in blocks of `LANES`, structure of arrays, so that compiled loops over lanes vectorise.
+"""Elements packed in blocks of `LANES` (structure of arrays), so that compiled loops vectorise.
 
 The k numbers of each element lie in a flat array as [block][number][lane]: number i of element e is
 entry ``(e // LANES * k + i) * LANES + e % LANES``. The last block is filled up with copies of the
-last element. A working array of a kernel has the same form with a single block; `row(i)` is where
-its number i begins. Functions of one lane are inlined into the loop over the lanes; they have no
-branches, only selections. No fast-math: an element gives the same bits in every lane and company.
+last element. A working array of a kernel has the same form with a single block. A lane is the place
+of one element in a block. Functions of one lane are inlined into the loop over the lanes; they have
+no branches, only selections. Without fast-math the result of an element is the same in every lane.
 """
 
 import numpy as np
@@ -15,22 +15,22 @@ from pdrom.model.compiled.rows import at
 
 LANES = 32
 
-# added to a scale: keeps it away from numbers whose reciprocal overflows
+# added to a scale so that its reciprocal does not overflow
 SMALLEST = 1e-300
 
 
 def lane_function(function):
-    """Compile a function of one lane: inlined, without division checks."""
+    """Compile a function of one lane, to be inlined and without checks for division by zero."""
     return inner(function, forceinline=True)
 
 
 def kernel(function):
-    """Compile a ``function`` as a kernel that releases the interpreter lock."""
+    """Compile a ``function`` that Python calls and that releases the interpreter lock."""
     return compiled(function, nogil=True)
 
 
 def blocks(elements: int) -> int:
-    """Number of blocks, of `LANES` elements each, that hold so many ``elements``."""
+    """Return the number of blocks of `LANES` elements that a number of ``elements`` fills."""
     return -(-elements // LANES)
 
 
@@ -43,20 +43,20 @@ def pack(numbers: np.ndarray) -> np.ndarray:
 
 
 def workspace(numbers: int) -> np.ndarray:
-    """Zeroed flat working array of one block, with so many ``numbers`` per element."""
+    """Return a flat working array of zeros for one block with k = ``numbers`` per element."""
     return rows.zeros(numbers * LANES)
 
 
 def workspaces(numbers: int) -> np.ndarray:
-    """A `workspace` for each of the two parts of a local kernel, (2, LANES numbers)."""
+    """Return a `workspace` for each of the two parts of a local kernel, (2, LANES numbers)."""
     return workspace(2 * numbers).reshape(2, -1)
 
 
 @lane_function
 def take(packed, numbers, elements, start, out):
-    """Copy one block of ``elements[start:]``, the last one repeated, to ``out``.
+    """Copy one block of ``elements[start:]``, filled up with copies of the last one, to ``out``.
 
-    ``packed`` is an array from `pack` with so many ``numbers`` per element.
+    ``packed`` is an array from `pack` with k = ``numbers`` per element.
     """
     last = elements.shape[0] - 1
     for lane in range(LANES):
@@ -68,7 +68,7 @@ def take(packed, numbers, elements, start, out):
 
 @lane_function
 def load(work, first, lane):
-    """Vector of the numbers ``first``, ``first + 1``, ``first + 2`` of a ``lane`` of ``work``."""
+    """Return the numbers ``first`` to ``first + 2`` of a ``lane`` of ``work`` as a vector."""
     return (
         at(work, first * LANES + lane),
         at(work, (first + 1) * LANES + lane),
@@ -78,7 +78,7 @@ def load(work, first, lane):
 
 @lane_function
 def save(work, first, lane, vector):
-    """Opposite of `load`: write a ``vector`` to ``work`` from number ``first`` on of a ``lane``."""
+    """Write a ``vector`` to the numbers ``first`` to ``first + 2`` of a ``lane`` of ``work``."""
     work[first * LANES + lane] = vector[0]
     work[(first + 1) * LANES + lane] = vector[1]
     work[(first + 2) * LANES + lane] = vector[2]
@@ -86,13 +86,13 @@ def save(work, first, lane, vector):
 
 @lane_function
 def load_matrix(work, first, lane):
-    """Three vectors of a ``lane`` of ``work``, the first from the number ``first`` on."""
+    """Return the nine numbers from ``first`` on of a ``lane`` of ``work`` as three vectors."""
     return load(work, first, lane), load(work, first + 3, lane), load(work, first + 6, lane)
 
 
 @lane_function
 def save_matrix(work, first, lane, matrix):
-    """Opposite of `load_matrix`: write three vectors to ``work``."""
+    """Write the three vectors of ``matrix`` to ``work``, in the places that `load_matrix` reads."""
     save(work, first, lane, matrix[0])
     save(work, first + 3, lane, matrix[1])
     save(work, first + 6, lane, matrix[2])
@@ -100,7 +100,7 @@ def save_matrix(work, first, lane, matrix):
 
 @lane_function
 def unmarked(work, mark):
-    """Number of lanes in which the number with index ``mark`` of ``work`` is zero, as a float."""
+    """Return how many lanes of ``work`` have the value zero at offset ``mark``, as a float."""
     left = 0.0
     for lane in range(LANES):
         left += 1.0 if work[mark * LANES + lane] == 0.0 else 0.0
@@ -155,7 +155,7 @@ def square_distance(a, b):
 
 @lane_function
 def absolute_sum(a):
-    """Sum of the magnitudes; not finite exactly if a component is not (or the sum overflows)."""
+    """Return |a_0| + |a_1| + |a_2|; not finite if a component is not finite or it overflows."""
     return abs(a[0]) + abs(a[1]) + abs(a[2])
 
 
@@ -168,11 +168,11 @@ def clamp(x, low, high):
 
 @lane_function
 def perpendicular(a):
-    """A unit vector at right angles to the unit vector a, always the same one."""
+    """Return a unit vector orthogonal to the unit vector a, as a deterministic function of a."""
     x, y, z = abs(a[0]), abs(a[1]), abs(a[2])
     first = x <= y and x <= z
     second = not first and y <= z
-    # a x e_k with the axis k along which a is smallest
+    # the cross product a x e_k, where component k of a is the smallest in magnitude
     turned = choose(
         first, (0.0, a[2], -a[1]), choose(second, (-a[2], 0.0, a[0]), (a[1], -a[0], 0.0))
     )

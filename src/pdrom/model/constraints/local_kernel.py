@@ -1,9 +1,9 @@
 """Local steps as compiled functions that the compiled step loop calls by address.
 
-A local kernel reads what it needs from a record of addresses and numbers, so that one loop serves
-every mix of groups and reduced local steps. The units (blocks of elements, rows) of a large step
-are done in two parts, always the same ones: the first adds to the right-hand side itself, the
-second to an array of its own that is added afterwards.
+A local kernel reads its data from a record (an array of addresses and numbers), so that one loop
+serves every mix of groups and reduced local steps. The work units (blocks of elements or rows) of a
+large local step are divided into two fixed parts: the first adds to the right-hand side itself, the
+second to a separate array that is added afterwards.
 """
 
 from collections.abc import Callable, Sequence
@@ -14,23 +14,23 @@ from numba import types
 from pdrom.model.compiled import rows
 from pdrom.model.compiled.functions import Callback, caller, compiled, inner
 
-# Entries of every record: number of vertices, and the units of part k are those from FIRST + k to
-# FIRST + k + 1. What a kernel has of its own begins at OWN.
+# Entries of every record: the number of vertices; at FIRST + k the first unit of part k, at
+# FIRST + k + 1 the end of its units. Entries that depend on the kernel begin at OWN.
 VERTICES, FIRST, OWN = 0, 1, 4
 # Requests to a kernel: compute one of the two parts, or prepare data that both parts need.
 PARTS, PREPARE = (0, 1), 2
 
 Table = tuple[np.ndarray, np.ndarray, int]
-"""Addresses of kernels, addresses of their records, and the request to all of them."""
+"""Addresses of kernels, addresses of their records, and the request that all of them get."""
 
 _SIGNATURE = types.float64(types.intp, types.intp, types.intp, types.intp)
 
 
 def local_kernel(function):
-    """Compile ``function(y, rhs, record, part) -> energy``; all but the part are addresses.
+    """Compile ``function(y, rhs, record, part) -> energy``; y, rhs and record are addresses.
 
-    y, rhs : padded vectors (N, 4); S^T W p(y) of the part's units is added to rhs
-    record : int64 numbers, see `VERTICES`
+    y, rhs : padded vectors (N, 4); S^T W p(y) of the units of the part is added to rhs
+    record : int64 array with the data of the kernel, see `VERTICES`
     part : one of `PARTS`, or `PREPARE`
     """
     return Callback(function, _SIGNATURE)
@@ -63,17 +63,17 @@ class LocalKernel:
 
     Parameters
     ----------
-    function : made by `local_kernel`; it is compiled when its address is first needed
+    function : result of `local_kernel`; it is compiled when its address is first needed
     vertices, units : number of vertices and number of units (blocks of elements or rows)
-    arrays, numbers : entries of the record from `OWN` on: the numbers, then the addresses
-    touched : function of a first unit: vertices of this and all later units, for a kernel in two
-        parts; without it there is one
+    arrays, numbers : the record has from `OWN` on the numbers, then the addresses of the arrays
+    touched : function that returns the vertices of all units from a given unit on; the kernel is
+        then divided into two parts, without it there is one part
     prepares : whether the kernel must be called with `PREPARE` before its parts
 
     Attributes
     ----------
-    record : its numbers; the ``arrays`` that they point to live as long as the kernel
-    touched : range of vertices that the second part adds to; empty if there is one part
+    record : int64 array; the ``arrays`` to which it points live as long as the object
+    touched : range of vertices to which the second part adds; empty if there is one part
     """
 
     def __init__(
@@ -107,18 +107,18 @@ def _call(address, y, out, record):
 
 
 def projections(sampler: LocalKernel, y: np.ndarray, count: int) -> np.ndarray:
-    """Projections (count, 3) that a sampler writes for the positions y (N, 3)."""
+    """Return the projections (count, 3) that a ``sampler`` computes at the positions y (N, 3)."""
     p, places = np.empty((count, 3)), rows.flat(y)
     _call(sampler.address, places.ctypes.data, p.ctypes.data, sampler.record.ctypes.data)
     return p
 
 
 class LocalPass:
-    """All local kernels of a step loop, one after the other.
+    """Calls all local kernels of a step loop, one after the other.
 
     Attributes
     ----------
-    first, second, preparing : first arguments of `add_part`, for the two parts and what both need
+    first, second, preparing : tables for `add_part`: the two parts, and data that both parts need
     """
 
     def __init__(self, kernels: Sequence[LocalKernel]) -> None:
@@ -136,7 +136,7 @@ class LocalPass:
             )
 
     def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
-        """Add S^T W p(y) of ``y`` (N, 3) to ``rhs`` (N, 3), which need not be padded; energy, J."""
+        """Add S^T W p(y) at ``y`` (N, 3) to ``rhs`` (N, 3), padded or not; return the energy, J."""
         right = rows.flat(rhs)
         if rows.shares(rhs, right):
             return self._add(rows.flat(y), right)
@@ -172,15 +172,15 @@ _GRADIENTS = types.void(
 
 
 def gradient_kernel(function):
-    """Compile ``function(d, parameters, p, m)``, a projection of a batch from S q alone.
+    """Compile ``function(d, parameters, p, m)``, which projects m elements from their S q.
 
-    In a position subspace S q comes from a small dense product, not from vertices. The iterations
-    of a subspace call it by its attribute ``address``, so that one compiled loop serves every mix
-    of groups.
+    In a position subspace S q is computed by a small dense product, not from vertices. The compiled
+    loop of a subspace calls the result by its attribute ``address``, so that one loop serves every
+    mix of groups.
 
     d : pointer to (m, rows, 3) values of S q
     parameters : pointer to the numbers of `ConstraintGroup.kernel_parameters`
-    p : pointer to (m, rows, 3), where the projections go
+    p : pointer to (m, rows, 3) numbers, to which the projections are written
     """
     return Callback(function, _GRADIENTS)
 
@@ -189,6 +189,6 @@ def gradient_kernel(function):
 def call_gradients(address, d, parameters, p, m):
     """Call a gradient kernel by its ``address``.
 
-    ``d``, ``parameters`` and ``p``, see `gradient_kernel`, are addresses; ``m`` elements.
+    ``d``, ``parameters``, ``p`` are addresses as in `gradient_kernel`, ``m`` counts elements.
     """
     _call_gradients(address, (d, parameters, p, m))

@@ -1,16 +1,16 @@
-"""The nearest singular values whose product lies in a range: what keeps a volume or an area.
+"""Nearest singular values whose product lies in a range, for volume and area constraints.
 
-Given s_1 >= s_2 >= |s_3|, the nearest t_i > 0 whose product is c obey t_i (t_i - s_i) = m with one
-m for all of them (Lagrange). In the unknown t = t_3 that is m = t (t - s_3), t_1 and t_2 are the
-larger roots of their equations, and
+Given s_1 >= s_2 >= |s_3|, the nearest t_i > 0 with product c satisfy t_i (t_i - s_i) = m with one
+Lagrange multiplier m. With the unknown t = t_3 we have m = t (t - s_3), t_1 and t_2 are the larger
+roots of their equations, and one equation remains (for areas without t_2):
 
     f(t) = t t_1(t) t_2(t) - c = 0
 
-is left, for areas without t_2. A product below c has one solution. A product far above c (more than
-six times as large, for three equal values) has several: the largest t, where all values shrink, and
-the smallest, where the last alone gives way. f is convex towards the largest and concave towards
-the smallest, so that Newton's iteration goes to each from its side without overshooting, and the
-nearer one is taken. Bouaziz et al. 2014, appendix A, iterate on the same equations from s alone.
+If the product of the s_i is below c, there is one solution. If it is far above c (more than six
+times for three equal values), there are several: at the largest t all values shrink, at the
+smallest t mainly the last value shrinks. f is convex near the largest and concave near the smallest
+solution, so that Newton's iteration converges monotonically to each from its outer side, and the
+nearer solution is taken. Bouaziz et al. 2014, appendix A, iterate on these equations from s only.
 
 Values are scaled by the larger of s_1 and c^(1/3), so that neither huge nor tiny ones overflow.
 """
@@ -19,18 +19,18 @@ import numpy as np
 
 from pdrom.model.constraints.lanes import LANES, SMALLEST, lane_function, load, save
 
-# numbers of a lane in the working array: the values, in and out, before what is needed meanwhile
+# offsets in the working array: the values (input and output), then intermediate numbers
 VALUES, SCALE, TARGET, LARGEST, LEAST, MARK, SIZE = 0, 3, 4, 5, 6, 7, 8
 STEPS = 60
-# open lanes still iterate; the others have converged or diverged; _INSIDE: nothing to do
+# state of a lane: still iterating; converged or diverged; product in the range from the start
 _OPEN, _CLOSED, _INSIDE = 1.0, 0.0, 2.0
-# a step below this fraction of t is round-off, and so is what is left of c
+# Newton steps below LAST_STEP t, and residuals of f below ROUNDOFF c, are round-off
 LAST_STEP, ROUNDOFF = 1e-15, 1e-10
 
 
 @lane_function
 def _partner(t, s, last):
-    """The larger root of x (x - s) = t (t - last), and its derivative by t."""
+    """Return the larger root x of x (x - s) = t (t - last), and its derivative by t."""
     square = s * s + 4.0 * t * (t - last)
     root = np.sqrt(square if square > 0.0 else 0.0)
     return 0.5 * (s + root), (2.0 * t - last) / root if root > 0.0 else 1.0
@@ -38,7 +38,7 @@ def _partner(t, s, last):
 
 @lane_function
 def _product(t, values, solid):
-    """The product of the values that belong to t, its derivative, and these values."""
+    """Return the product of t, t_1(t) and t_2(t), its derivative by t, and t_1(t) and t_2(t)."""
     first, first_slope = _partner(t, values[0], values[2])
     second, second_slope = _partner(t, values[1], values[2])
     second = second if solid else 1.0
@@ -49,7 +49,7 @@ def _product(t, values, solid):
 
 @lane_function
 def _start(work, low, high, solid):
-    """Scale the values, set the starting points; return how many lanes need the second start."""
+    """Scale the values and set starting points; return how many lanes need a second one."""
     low_root = low ** (1.0 / 3.0) if solid else np.sqrt(low)
     high_root = high ** (1.0 / 3.0) if solid else np.sqrt(high)
     several = 0.0
@@ -61,10 +61,10 @@ def _start(work, low, high, solid):
         scale = s[0] if s[0] > root else root
         inverse = 1.0 / scale
         target = bound * inverse * inverse * (inverse if solid else 1.0)
-        # smaller numbers are negligible next to values this large
+        # a smaller target would be negligible relative to the scaled values
         target = target if target > SMALLEST else SMALLEST
         first, second = s[0] * inverse, s[1] * inverse if solid else 1.0
-        # t_1 >= s_1, t_2 >= s_2, t_1 >= t_2 >= t where the values grow
+        # bounds on t where the values grow: t_1 >= s_1, t_2 >= s_2, t_1 >= t_2 >= t
         least = target / (first * second)
         largest = root * inverse
         other = np.sqrt(target / first) if solid else least
@@ -83,7 +83,7 @@ def _start(work, low, high, solid):
 
 @lane_function
 def _advance(work, place, side, solid):
-    """A Newton step of the open lanes from above (side 1) or below (-1); how many stay open."""
+    """Do a Newton step from above (side 1) or below (-1); return how many lanes still iterate."""
     left = 0.0
     for lane in range(LANES):
         t, target = work[place * LANES + lane], work[TARGET * LANES + lane]
@@ -103,7 +103,7 @@ def _advance(work, place, side, solid):
 
 @lane_function
 def _distance(t, values, target, solid):
-    """Squared distance to the values that belong to t; infinite where t is no solution."""
+    """Return the squared distance of s to t_1(t), t_2(t), t; infinite where t is no solution."""
     product, _, first, second = _product(t, values, solid)
     m = t * (t - values[2])
     a, b = m / (first + SMALLEST), m / (second + SMALLEST) if solid else 0.0
@@ -113,7 +113,7 @@ def _distance(t, values, target, solid):
 
 @lane_function
 def _finish(work, solid):
-    """Take the nearer of the two solutions."""
+    """Write the nearer of the two solutions, scaled back, to the values in ``work``."""
     for lane in range(LANES):
         values, target = load(work, VALUES, lane), work[TARGET * LANES + lane]
         t, other = work[LARGEST * LANES + lane], work[LEAST * LANES + lane]
@@ -135,13 +135,13 @@ def _finish(work, solid):
 
 @lane_function
 def nearest_block(work, low, high, solid):
-    """Replace the values of a block by the nearest whose product is in [low, high], 0 < low.
+    """Replace the values of a block by the nearest ones with a product in [low, high], 0 < low.
 
     Parameters
     ----------
-    work : `SIZE` numbers a lane; `VALUES` are s_1 >= s_2 >= |s_3|, for areas s_1 >= s_3 >= 0 with 1
-        in the second place, which stays
-    solid : whether there are three values, not two
+    work : `SIZE` numbers per lane; at `VALUES` s_1 >= s_2 >= |s_3|, or for areas s_1, 1, s_3 with
+        s_1 >= s_3 >= 0, where the 1 is not changed
+    solid : whether there are three values (volume) instead of two (area)
 
     Values that are not finite give nan.
     """
@@ -150,7 +150,7 @@ def nearest_block(work, low, high, solid):
         if _advance(work, LARGEST, 1.0, solid) == 0.0:
             break
     if several > 0.0:
-        # open the lanes whose smallest solution is still to be found
+        # iterate again in the lanes that may have a second solution, from below
         for lane in range(LANES):
             mark = work[MARK * LANES + lane]
             again = mark == _CLOSED and work[LEAST * LANES + lane] > 0.0
@@ -162,13 +162,13 @@ def nearest_block(work, low, high, solid):
 
 
 def reference_nearest(values: np.ndarray, low: float, high: float) -> np.ndarray:
-    """NumPy reference: the same for values (e, 2 or 3) in the same order, by bisection.
+    """Return the nearest values (e, 2 or 3) as `nearest_block`, by bisection with NumPy.
 
-    Where several solutions are possible each is bracketed on a grid, and the nearest one taken.
+    Where several solutions are possible, each is bracketed on a grid, and the nearest is returned.
 
     Parameters
     ----------
-    low, high : least and largest product allowed
+    low, high : least and largest allowed product
     """
     product = values.prod(axis=1)
     bound = np.clip(product, low, high)
@@ -183,7 +183,7 @@ def reference_nearest(values: np.ndarray, low: float, high: float) -> np.ndarray
 
 
 def _values_at(t: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """The values (n, 2 or 3) that belong to t (n,)."""
+    """Return the values (n, 2 or 3) that solve Lagrange's conditions with the last value t (n,)."""
     others, last = values[:, :-1], values[:, -1]
     square = np.square(others) + 4.0 * (t * (t - last))[:, None]
     return np.column_stack([0.5 * (others + np.sqrt(np.maximum(square, 0.0))), t])
@@ -192,7 +192,7 @@ def _values_at(t: np.ndarray, values: np.ndarray) -> np.ndarray:
 def _bisected(
     below: np.ndarray, above: np.ndarray, values: np.ndarray, target: np.ndarray
 ) -> np.ndarray:
-    """Values between the ends (n,), where the product is too small and large enough."""
+    """Bisect t between ``below`` (product too small) and ``above`` (n,); return the values."""
     for _ in range(120):
         middle = 0.5 * (below + above)
         small = _values_at(middle, values).prod(axis=1) < target
@@ -205,7 +205,7 @@ def _nearest_of_several(values: np.ndarray, target: float) -> np.ndarray:
     smallest = min(target / values[:-1].prod(), last)
     grid = np.union1d(np.geomspace(smallest, last, 500), np.linspace(smallest, last, 500))
     same = np.tile(values, (len(grid), 1))
-    # the first point is no larger than any solution, up to round-off
+    # the first grid point is no larger than any solution, up to round-off
     small = _values_at(grid, same).prod(axis=1) < target
     small[0] = True
     crossed = np.flatnonzero(small[:-1] & ~small[1:])

@@ -1,14 +1,13 @@
 """Groups on simplices: springs (1 row), triangles (2 rows), tetrahedra (3 rows).
 
 An element with p rows has p + 1 vertices, S q = D^-T [q_1 - q_0, ..., q_p - q_0]^T with the edge
-matrix D of the rest shape (1 for springs). What differs from group to group is the projection of a
-block; gather and scatter are here, for blocks of elements (see `pdrom.model.constraints.lanes`).
+matrix D of the rest shape (1 for springs). The groups differ in the projection of a block; this
+module gathers and scatters blocks of elements (see `pdrom.model.constraints.lanes`).
 
-A block takes the expensive path as soon as one of its elements needs it. Neighbours are in like
-states, so that blocks of neighbours are cheap where little happens; their vertices are also in the
-cache still. Meshers list elements in the order in which they were made, neighbours far apart. What
-a group shows to others (S, weights, projections) keeps the order of the mesh; only the arrays of
-its kernels do not.
+A block takes an expensive branch as soon as one of its elements needs it. Neighbouring elements are
+in similar states and share vertices in the cache, so that blocks of neighbours are cheap. Meshers
+often list neighbours far apart, so that kernels visit the elements in another order. The public
+arrays of a group (S, weights, projections) keep the order of the mesh.
 """
 
 from typing import Any, ClassVar
@@ -24,36 +23,36 @@ from pdrom.model.constraints.base import StencilGroup
 from pdrom.model.constraints.lanes import LANES, blocks, lane_function, load, pack, save, workspaces
 from pdrom.model.constraints.local_kernel import FIRST, OWN, VERTICES, LocalKernel
 
-# numbers of a lane in the working array: edges, S q, p, forces on the corners but 0, energy
+# offsets in the working array: edges, S q, p, forces on all corners except corner 0, energy
 EDGE, F, P, FORCE, ENERGY, SIZE = 0, 9, 18, 27, 36, 37
-# number of a lane in the packed geometry, before the operator and what else a group has
+# offsets in the packed geometry: weight, then the operator or other numbers of the group
 WEIGHT, OPERATOR = 0, 1
-# Entries of the record: the size of a working array and the number of elements to project; then the
-# places of corners, geometry, constants, working arrays, the elements to project and their data.
+# Entries of a kernel's record: size of a working array, number of elements to project; addresses of
+# corners, geometry, constants, working arrays, elements to project, and their corners and geometry.
 WORK_SIZE, COUNT, CORNERS, GEOMETRY, CONSTANTS, WORK, ELEMENTS = range(OWN, OWN + 7)
 TAKEN, TAKEN_GEOMETRY, ARRAYS = range(OWN + 7, OWN + 10)
 
 
 class SimplexGroup(StencilGroup):
-    """A group whose kernels work on packed blocks.
+    """A group of simplices whose kernels work on packed blocks.
 
-    A subclass gives two kernels and, if it has other numbers of an element, `_extra`:
+    A subclass sets two kernels and overrides `_extra` if its elements have other packed numbers:
 
     accumulate_kernel : a `pdrom.model.constraints.local_kernel.local_kernel` whose units are blocks
-    project_kernel : the same form; writes the projections of some elements, see `samples`
+    project_kernel : another local kernel, which writes projections of some elements, see `samples`
     """
 
     accumulate_kernel: Any
     project_kernel: Any
 
     work_size = SIZE
-    """Numbers of a lane in the working array."""
+    """Number of values per lane in the working array."""
     allowed: Any = ()
-    """Further numbers that the kernels need."""
+    """Constants of the kernels, such as the allowed range of singular values."""
     _own_arrays: tuple[np.ndarray, ...] = ()
-    """Further arrays of the kernels."""
+    """Further arrays whose addresses are appended to the record of the kernels."""
     reordered: ClassVar[bool] = True
-    """Whether the kernel may visit the elements in another order than that of the mesh."""
+    """Whether the kernels may visit the elements in an order different from the mesh."""
 
     def _assemble(self, vertices: int) -> None:
         super()._assemble(vertices)
@@ -63,7 +62,7 @@ class SimplexGroup(StencilGroup):
         self._corners = pack(visited)
         numbers = self._visited(np.column_stack([self.weights, *self._extra()]))
         self._geometry = pack(numbers)
-        # the copies that fill up the last block have no force and no energy
+        # the copies that fill up the last block get weight 0, hence no force and no energy
         by_lane = self._geometry.reshape(blocks(e), numbers.shape[1], LANES)
         by_lane[-1:, WEIGHT, e - LANES * (blocks(e) - 1) :] = 0.0
         self._work = workspaces(self.work_size)
@@ -78,7 +77,7 @@ class SimplexGroup(StencilGroup):
         )
 
     def _visited(self, values: np.ndarray) -> np.ndarray:
-        """Values (e, ...) of the elements in the order in which the kernel visits them."""
+        """Return the values (e, ...) of all elements in the order in which kernels visit them."""
         return values if self._order is None else values[self._order]
 
     def sampler(self, elements: np.ndarray) -> LocalKernel:
@@ -96,16 +95,16 @@ class SimplexGroup(StencilGroup):
         return (*data, elements, *self._taken, *self._own_arrays)
 
     def _extra(self) -> list[np.ndarray]:
-        """Numbers of an element after its weight: the operator without the corner 0."""
+        """Return packed numbers after the weight: the operator without the column of corner 0."""
         return [self.operator[:, :, 1:].reshape(self.elements, self.rows_per_element**2)]
 
 
 @lane_function
 def arguments(y, rhs, record, part, corners, numbers):
-    """Unpack the record of a kernel whose elements have so many corners and numbers.
+    """Return (y, rhs, corners, geometry, constants, work, first block, end of the blocks).
 
-    Addresses ``y``, ``rhs``, ``record`` and ``part`` as in `local_kernel`, to
-    (y, rhs, corners, geometry, constants, work, first block, last block)
+    ``y``, ``rhs``, ``record`` and ``part`` are the arguments of a `local_kernel`; ``corners`` and
+    ``numbers`` count the vertices and the packed numbers of an element.
     """
     entries = rows.indices(record, ARRAYS)
     count = WIDTH * entries[VERTICES]
@@ -125,10 +124,10 @@ def arguments(y, rhs, record, part, corners, numbers):
 
 @lane_function
 def samples(record, corners, numbers):
-    """Unpack from ``record`` what a kernel that projects some elements needs besides `arguments`.
+    """Return the elements to project of a ``record``, and memory for their corners and geometry.
 
-    (elements, corners and geometry of a block of them, see `pdrom.model.constraints.lanes.take`),
-    for so many ``corners`` and ``numbers`` an element
+    The memory is for one block, see `pdrom.model.constraints.lanes.take`, with ``corners`` vertices
+    and ``numbers`` packed numbers per element.
     """
     entries = rows.indices(record, ARRAYS)
     return (
@@ -140,7 +139,7 @@ def samples(record, corners, numbers):
 
 @lane_function
 def corner_rows(y, corners, place):
-    """Positions in ``y`` of the vertices ``corners[place:place + 4]``, as rows."""
+    """Return the rows of ``y`` (positions) of the vertices ``corners[place:place + 4]``."""
     return (
         rows.load(y, WIDTH * at(corners, place)),
         rows.load(y, WIDTH * at(corners, place + 1)),
@@ -151,7 +150,7 @@ def corner_rows(y, corners, place):
 
 @lane_function
 def edge_columns(start, end):
-    """x, y and z of four edges, from the rows ``start`` of their first vertices to ``end``."""
+    """Return x, y and z of four edges from the rows ``start`` and ``end`` of their vertices."""
     return transposed(
         subtract(end[0], start[0]),
         subtract(end[1], start[1]),
@@ -162,7 +161,7 @@ def edge_columns(start, end):
 
 @lane_function
 def gather_edges(y, corners, block, edges, work):
-    """Write the ``edges`` from corner 0 in ``y``, of a ``block`` of ``corners``, to ``work``."""
+    """Write the edges from corner 0 to corners 1, ..., ``edges`` of a ``block`` to ``work``."""
     for lane in range(0, LANES, WIDTH):
         base = block * (edges + 1) * LANES + lane
         start = corner_rows(y, corners, base)
@@ -177,7 +176,7 @@ def gather_edges(y, corners, block, edges, work):
 
 @lane_function
 def copy_rows(d, count, start, work, first):
-    """Copy S q, ``d`` (m count, 3), from ``start`` on to ``work[first:]``; the last is repeated."""
+    """Copy S q = ``d`` (m count, 3) of a block from element ``start`` on to offset ``first``."""
     last = d.shape[0] // count - 1
     for lane in range(LANES):
         base = count * min(start + lane, last)
@@ -187,7 +186,7 @@ def copy_rows(d, count, start, work, first):
 
 @lane_function
 def add_to(rhs, corners, place, forces):
-    """Add ``forces`` to ``rhs`` at ``corners[place:place + 4]``, in turn: two may be the same."""
+    """Add four ``forces`` to ``rhs`` at ``corners[place:place + 4]``, where corners may repeat."""
     for lane in range(WIDTH):
         v = WIDTH * at(corners, place + lane)
         rows.store(rhs, v, add(rows.load(rhs, v), forces[lane]))
@@ -195,7 +194,7 @@ def add_to(rhs, corners, place, forces):
 
 @lane_function
 def take_from(rhs, corners, place, forces):
-    """Opposite of `add_to`: take ``forces`` from ``rhs`` at ``corners`` from ``place`` on."""
+    """Subtract four ``forces`` from ``rhs`` at ``corners[place:place + 4]``, as `add_to` adds."""
     for lane in range(WIDTH):
         v = WIDTH * at(corners, place + lane)
         rows.store(rhs, v, subtract(rows.load(rhs, v), forces[lane]))
@@ -203,9 +202,9 @@ def take_from(rhs, corners, place, forces):
 
 @lane_function
 def scatter(work, corners, block, edges, rhs):
-    """Add the forces of a block in ``work`` to ``rhs``, rows of four, flat.
+    """Add the forces of a block in ``work`` to ``rhs``, a flat array of rows of four numbers.
 
-    Forces on the corners 1, ..., ``edges`` are given; corner 0 gets what makes their sum zero.
+    ``work`` has the forces on corners 1, ..., ``edges``; corner 0 gets minus their sum.
     """
     none = constant(0.0)
     for lane in range(0, LANES, WIDTH):
@@ -223,9 +222,9 @@ def scatter(work, corners, block, edges, rhs):
 
 @lane_function
 def store_projections(work, count, start, p):
-    """Copy the projections in ``work`` to those of the elements ``start``, ``start + 1``, ...
+    """Copy the projections of a block in ``work`` to ``p``, from element ``start`` on.
 
-    p : flat, three numbers a row, ``count`` rows an element
+    p : flat array with three numbers per row and ``count`` rows per element
     """
     for lane in range(min(LANES, len(p) // (3 * count) - start)):
         for i in range(count):
@@ -233,16 +232,16 @@ def store_projections(work, count, start, p):
             p[at_p], p[at_p + 1], p[at_p + 2] = load(work, P + 3 * i, lane)
 
 
-# The order of the mesh is kept if its blocks have at most so many times the vertices that others
-# would have. Grids keep theirs.
+# The order of the mesh is used if its blocks have at most KEPT times as many vertices as blocks in
+# the sorted order. This holds for grids.
 KEPT = 1.5
 
 
 def visiting_order(stencil: np.ndarray, vertices: int) -> np.ndarray | None:
-    """Elements (e,) in the order to visit them; None for the order that they have.
+    """Return the elements (e,) in the order to visit them; None for the order of the mesh.
 
-    They are sorted by their vertices, numbered by the reverse Cuthill-McKee algorithm (Cuthill and
-    McKee 1969), which gives neighbours numbers close to each other.
+    Elements are sorted by their vertices, which the reverse Cuthill-McKee algorithm (Cuthill and
+    McKee 1969) numbers such that neighbours have similar numbers.
 
     Parameters
     ----------
@@ -254,7 +253,7 @@ def visiting_order(stencil: np.ndarray, vertices: int) -> np.ndarray | None:
     e, m = stencil.shape
     places = (np.repeat(np.arange(e), m), stencil.ravel())
     incidence = sparse.csr_array((np.ones(e * m), places), shape=(e, vertices))
-    neighbours = sparse.csr_array(incidence.T @ incidence)  # with an element in common
+    neighbours = sparse.csr_array(incidence.T @ incidence)  # vertices that share an element
     rank = np.empty(vertices, dtype=np.int64)
     rank[csgraph.reverse_cuthill_mckee(neighbours, True)] = np.arange(vertices)
     order = np.lexsort(np.sort(rank[stencil], axis=1).T[::-1])
@@ -262,7 +261,7 @@ def visiting_order(stencil: np.ndarray, vertices: int) -> np.ndarray | None:
 
 
 def _corners(stencil: np.ndarray) -> int:
-    """Number of vertices of the blocks, added up."""
+    """Return the sum of the numbers of distinct vertices over all blocks."""
     blocks = np.arange(len(stencil)) // LANES
     pairs = blocks[:, None] * (int(stencil.max()) + 1) + stencil
     return len(np.unique(pairs))

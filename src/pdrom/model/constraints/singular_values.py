@@ -1,14 +1,14 @@
 """Groups on triangles and tetrahedra that project F by its singular values.
 
-S q = F^T of an element is projected on the matrices whose singular values, or whose product of
-them, lie in a range. Groups differ in three compiled functions:
+S q = F^T of an element is projected onto the matrices whose singular values, or the product of all
+singular values, lie in a range. Groups differ in three compiled functions of a block:
 
-gradients(work, geometry, block) : S q of a block from its edges
-nearest(work, low, high) : projections of a block
-forces(work, geometry, block) : weighted forces S^T W p on the corners, and w |S q - p|^2
+gradients(work, geometry, block) : compute S q from the edges
+nearest(work, low, high) : compute the projections p
+forces(work, geometry, block) : compute the forces S^T W p on the corners, and w |S q - p|^2
 
-The passes over elements are here; each group calls them with its functions from kernels of its own,
-because numba keeps no closure and no function of functions on disk, only what calls them.
+The loops over blocks are in this module. Each group calls them, with its functions, in kernels of
+its own: Numba caches these kernels on disk, but no closures and no functions of functions.
 """
 
 from typing import Annotated, Self
@@ -27,13 +27,13 @@ from pdrom.model.mesh.types import Mesh
 
 @template
 def project(y_place, p_place, record, part, rows, gradients, nearest):
-    """Write the projections of some elements of ``rows`` rows, see `local_kernel`.
+    """Write projections of some elements, whose S_e has ``rows`` rows; see `local_kernel`.
 
     Parameters
     ----------
     y_place, p_place, record : addresses
-    part : which working array is used
-    gradients, nearest : functions of a block: S q from edges, p from S q and the allowed range
+    part : 0 or 1, selects the working array
+    gradients, nearest : functions of a block, see the module
     """
     corners, numbers = rows + 1, 1 + rows * rows
     y, _, packed, geometry, allowed, work, _, _ = simplex.arguments(
@@ -54,12 +54,12 @@ def project(y_place, p_place, record, part, rows, gradients, nearest):
 
 @template
 def accumulate(y_place, rhs_place, record, part, rows, gradients, nearest, forces):
-    """Add S^T W p of a part's blocks of elements of ``rows`` rows; their energy.
+    """Add S^T W p of all blocks of a ``part`` to the right-hand side; return their energy in J.
 
     Parameters
     ----------
     y_place, rhs_place, record : addresses
-    gradients, nearest, forces : functions of a block, as in `project`, and the forces from p
+    rows, gradients, nearest, forces : number of rows of S_e; functions of a block, see the module
     """
     y, rhs, corners, geometry, allowed, work, first, last = simplex.arguments(
         y_place, rhs_place, record, part, rows + 1, 1 + rows * rows
@@ -81,13 +81,13 @@ def accumulate(y_place, rhs_place, record, part, rows, gradients, nearest, force
 
 @template
 def project_gradients(d_pointer, range_pointer, p_pointer, m, rows, work_size, nearest):
-    """Write the projections of m elements from S q, with ``work_size`` numbers a lane.
+    """Write the projections of m elements from S q; ``work_size`` is the working array per lane.
 
     Parameters
     ----------
-    d_pointer, p_pointer : S q and projections (rows m, 3)
-    range_pointer : least and greatest singular value
-    nearest : as in `project`
+    d_pointer, p_pointer : pointers to S q and to the projections, both (rows m, 3)
+    range_pointer : pointer to the least and the largest allowed value
+    nearest : function of a block, see the module
     """
     d, p = carray(d_pointer, (rows * m, 3)), carray(p_pointer, (3 * rows * m,))
     allowed = carray(range_pointer, (2,))
@@ -112,7 +112,7 @@ class StrainConfig(GroupConfig):
 
 
 class SingularValueGroup(simplex.SimplexGroup):
-    """A group whose kernels are made of `project`, `accumulate` and `project_gradients`."""
+    """A group on triangles or tetrahedra that projects F by its singular values, see the module."""
 
     manifold = "clamped"
 
@@ -141,5 +141,5 @@ class SingularValueGroup(simplex.SimplexGroup):
         return (u * self._reference_values(sigma)[:, None, :]) @ vt
 
     def _reference_values(self, sigma: np.ndarray) -> np.ndarray:
-        """Singular values (e, p) of the projections; these are signed for tetrahedra."""
+        """Return the singular values (e, p) of the projections, which are signed for tetrahedra."""
         return np.clip(sigma, *self.allowed)

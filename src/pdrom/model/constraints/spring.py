@@ -1,4 +1,4 @@
-"""Edge springs: S q = q_b - q_a, projected on the rest length (Bouaziz et al. 2014, sect. 5.1)."""
+"""Edge springs: S q = q_b - q_a, projected to the rest length (Bouaziz et al. 2014, sect. 5.1)."""
 
 from typing import Literal
 
@@ -26,12 +26,12 @@ from pdrom.model.constraints.lanes import LANES, SMALLEST, lane_function, pack, 
 from pdrom.model.constraints.local_kernel import gradient_kernel, local_kernel
 from pdrom.model.mesh.types import Mesh
 
-# numbers of a lane in the packed geometry: weight, rest length; and in that of the rest edges
+# packed numbers per edge: weight and rest length in the geometry, 3 in the array of rest edges
 LENGTH, GEOMETRY = 1, 2
 REST = 3
-# entries of the record: rest edges, those of a block of elements to project
+# further entries of the record: addresses of all rest edges, and of memory for one block of them
 REST_EDGES, TAKEN_REST = simplex.ARRAYS, simplex.ARRAYS + 1
-# squares of lengths that neither overflow nor lose digits
+# range of squared lengths that neither overflow nor lose digits
 LOW, HIGH = 1e-280, 1e280
 
 
@@ -42,13 +42,13 @@ def _squares(x, y, z):
 
 @lane_function
 def _rest_lengths(x, y, z, length, rest, place):
-    """Four edges with their rest lengths; ``place`` is where their rest edges begin in ``rest``."""
+    """Return four edges, scaled to their rest ``length``; zero edges become ``rest[place:]``."""
     square = _squares(x, y, z)
     factor = divide(length, square_root(square))
     px, py, pz = multiply(factor, x), multiply(factor, y), multiply(factor, z)
     if all_within(square, LOW, HIGH):
         return px, py, pz
-    # scaled: neither overflow nor underflow of the squares; not finite where the edge is not
+    # scale so that squares neither overflow nor underflow; edges that are not finite stay so
     scale = add(add(magnitude(x), magnitude(y)), magnitude(z))
     inverse = divide(constant(1.0), add(scale, constant(SMALLEST)))
     ux, uy, uz = multiply(inverse, x), multiply(inverse, y), multiply(inverse, z)
@@ -65,7 +65,7 @@ def _rest_lengths(x, y, z, length, rest, place):
 
 @lane_function
 def _project_block(work, geometry, geometry_block, rest, rest_block):
-    """Projections of the edges in the working array."""
+    """Write the projections of the edges in ``work`` to ``work``."""
     for lane in range(0, LANES, WIDTH):
         edge, p = simplex.EDGE * LANES + lane, simplex.P * LANES + lane
         px, py, pz = _rest_lengths(
@@ -142,10 +142,10 @@ def _project_gradients(d_pointer, parameters, p_pointer, m):
 
 
 class EdgeSpring(simplex.SimplexGroup):
-    """One constraint per edge of the mesh (of a volume: every edge of its tetrahedra).
+    """One constraint per edge of the mesh; in a volume mesh, per edge of its tetrahedra.
 
-    p keeps the direction of the edge and takes its rest length. An edge of length zero has no
-    direction: it takes the rest edge itself.
+    p has the direction of the edge and its rest length. An edge of length zero has no direction;
+    its p is the rest edge.
     """
 
     class Config(GroupConfig):
@@ -173,7 +173,7 @@ class EdgeSpring(simplex.SimplexGroup):
         self._assemble(mesh.vertices)
 
     def _assemble(self, vertices: int) -> None:
-        # not part of the geometry: only an edge of length zero needs its rest edge
+        # an array apart from the geometry, as only edges of length zero need their rest edge
         self._own_arrays = pack(self.rest), np.empty(REST * LANES)
         super()._assemble(vertices)
 

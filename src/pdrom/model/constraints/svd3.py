@@ -1,4 +1,4 @@
-"""Compiled 3 x 3 projection: signed singular values clamped to a range, for blocks of matrices.
+"""Compiled singular value decomposition of 3 x 3 matrices with signed values, for blocks of them.
 
 One-sided Jacobi (Hestenes 1958; Demmel and Veselic 1992): rotations V make the columns of B = F V
 orthogonal, their norms are the singular values. It works on F, never on F^T F, so that small
@@ -29,24 +29,24 @@ from pdrom.model.constraints.lanes import (
 )
 
 SWEEPS = 12
-# columns whose cosine is below are orthogonal
+# two columns with a smaller cosine count as orthogonal
 ORTHOGONAL = 1e-15
-# after a sweep of smaller rotations than this the cosines are of the size of its square
+# if all tangents of a sweep are smaller, the remaining cosines are of the size of their square
 LAST_TANGENT = 1e-8
-# a second singular value below this fraction of the first has no direction
+# a second singular value below this fraction of the first has no accurate singular vector
 RANK = 1e-15
 
 
-# numbers of a lane after those of every simplex: B, V, the scale, the mark of orthogonal columns,
-# the signed singular values, and the mark of a lane whose projection is found already
+# further offsets in the working array: B, V, scale, DONE (1: columns are orthogonal), the signed
+# singular values, FOUND (1: a cheaper method has already computed the projection)
 B, V, SCALE, DONE, SIGMA, FOUND, SIZE = np.add(simplex.SIZE, [0, 9, 18, 19, 20, 23, 24]).tolist()
 
 
 @lane_function
 def jacobi_rotation(a, b, done):
-    """Cosine, sine, |tangent| of the rotation that makes columns a and b orthogonal.
+    """Return cosine, sine and |tangent| of the rotation that makes columns a and b orthogonal.
 
-    It is none where the lane is ``done``.
+    The rotation is the identity where the lane is ``done``.
     """
     alpha, beta, gamma = dot(a, a), dot(b, b), dot(a, b)
     half = 0.5 * (beta - alpha)
@@ -60,7 +60,7 @@ def jacobi_rotation(a, b, done):
 
 @lane_function
 def _sweep(work):
-    """Rotate all pairs of columns once in the lanes that are not done; number of lanes left."""
+    """Rotate each pair of columns once; return how many lanes are not yet orthogonal."""
     for lane in range(LANES):
         b0, b1, b2 = load_matrix(work, B, lane)
         v0, v1, v2 = load_matrix(work, V, lane)
@@ -83,9 +83,9 @@ def _sweep(work):
 
 @lane_function
 def _larger_first(a, v, b, w):
-    """Swap two columns and their right vectors if the second is longer; one changes sign.
+    """Return columns a, b with right singular vectors v, w as (a, v, b, w), longer column first.
 
-    The sign keeps V a rotation.
+    If they are swapped, one pair changes sign, so that V stays a rotation.
     """
     swap = dot(a, a) < dot(b, b)
     return (
@@ -98,13 +98,13 @@ def _larger_first(a, v, b, w):
 
 @lane_function
 def orthonormal_pair(b0, b1):
-    """Directions and norms of two orthogonal columns ``b0`` and ``b1``, the longer first.
+    """Return directions and norms (u0, u1, s0, s1) of orthogonal columns ``b0``, ``b1``.
 
-    A column that vanishes gets a direction in a fixed way.
+    ``b0`` is the longer column. A zero column gets a fixed direction orthogonal to the other.
     """
     s0 = np.sqrt(dot(b0, b0))
     u0 = choose(s0 > 0.0, scaled(1.0 / s0, b0), (1.0, 0.0, 0.0))
-    # what rounding left of the large column in the small one would tilt its direction
+    # remove the round-off component along the large column, which would tilt the small one
     b1 = mix(1.0, b1, -dot(u0, b1), u0)
     s1 = np.sqrt(dot(b1, b1))
     u1 = choose(s1 > RANK * s0, scaled(1.0 / s1, b1), perpendicular(u0))
@@ -113,11 +113,11 @@ def orthonormal_pair(b0, b1):
 
 @lane_function
 def rotated_pair(f0, f1, sign):
-    """Singular value decomposition of two columns by one rotation, which needs no F^T F.
+    """Decompose two columns into singular values and vectors by one rotation, without F^T F.
 
-    Returns the scale, the rotation's cosine and sine, whether the second column is the longer one,
-    and the directions and norms over the scale, of the longer one first; where they are exchanged,
-    the first column is taken ``sign`` times.
+    Return the scale, cosine and sine of the rotation, whether the second rotated column is longer,
+    and the directions and norms (divided by the scale), longer column first. If they are swapped,
+    the first column is multiplied by ``sign``.
     """
     scale = absolute_sum(f0) + absolute_sum(f1) + SMALLEST
     f0, f1 = scaled(1.0 / scale, f0), scaled(1.0 / scale, f1)
@@ -130,9 +130,9 @@ def rotated_pair(f0, f1, sign):
 
 @lane_function
 def factor_block(work):
-    """Leave U in `B`, V in `V` and the signed singular values of F, largest first, in `SIGMA`.
+    """Write U to `B`, V to `V` and the signed singular values of F, largest first, to `SIGMA`.
 
-    Of a lane that is `FOUND` they mean nothing.
+    The results are meaningless in lanes that are marked `FOUND`.
     """
     for lane in range(LANES):
         f0, f1, f2 = load_matrix(work, simplex.F, lane)
@@ -161,7 +161,7 @@ def factor_block(work):
 
 @lane_function
 def compose_block(work):
-    """Write U diag(sigma) V^T to P from what `factor_block` left; lanes that are `FOUND` stay."""
+    """Write U diag(sigma) V^T of `factor_block` to P, except in lanes that are marked `FOUND`."""
     for lane in range(LANES):
         u, v = load_matrix(work, B, lane), load_matrix(work, V, lane)
         sigma, found = load(work, SIGMA, lane), work[FOUND * LANES + lane] != 0.0

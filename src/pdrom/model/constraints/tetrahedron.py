@@ -1,8 +1,8 @@
-"""Base of the groups on tetrahedra: the operator S q = F^T and the clamping kernels.
+"""Groups on tetrahedra: the operator S q = F^T and kernels that clamp singular values.
 
-X <- (X + X^-T) / 2 converges quadratically to the orthogonal polar factor (Higham 1986). It serves
-matrices far from singular with positive determinant; module `svd3` does the others. A matrix whose
-singular values lie in the range already is its own projection.
+X <- (X + X^-T) / 2 converges quadratically to the orthogonal polar factor (Higham 1986). It is used
+for well-conditioned matrices with positive determinant; module `svd3` projects all others. A matrix
+with all singular values in the range is its own projection.
 """
 
 from typing import Literal
@@ -36,10 +36,10 @@ from pdrom.model.constraints.svd3 import FOUND
 from pdrom.model.mesh.types import Mesh
 
 STEPS = 16
-# det F relative to the cube of the root mean square of the singular values: below it the SVD
-# takes over
+# bound of det F over the cube of the root mean square of the singular values; below it the SVD is
+# used
 WELL_CONDITIONED = 1e-2
-# square of a Newton step: quadratic convergence, a step of 1e-9 leaves an error of 1e-18
+# squared norm of the last Newton step: by quadratic convergence it leaves an error of 1e-18
 LAST_STEP = 1e-18
 
 _OPEN, _FOUND, _UNSUITED = 0.0, 1.0, 2.0
@@ -51,8 +51,8 @@ def _start(work):
         f0, f1, f2 = load_matrix(work, F, lane)
         square = (dot(f0, f0) + dot(f1, f1) + dot(f2, f2)) / 3.0
         inverse = 1.0 / np.sqrt(square)
-        # scaled before the determinant, whose products would overflow; where the mean itself does,
-        # or vanishes, F is not suited
+        # scale before the determinant, whose products could overflow; if the mean square overflows
+        # or vanishes, F does not suit the iteration
         x0, x1, x2 = scaled(inverse, f0), scaled(inverse, f1), scaled(inverse, f2)
         suited = square > SMALLEST and dot(x0, cross(x1, x2)) > WELL_CONDITIONED
         save_matrix(work, P, lane, (x0, x1, x2))
@@ -61,7 +61,7 @@ def _start(work):
 
 @lane_function
 def _advance(work):
-    """One Newton step of the lanes that still iterate; the others keep their bits."""
+    """Do one Newton step in the lanes that still iterate; the other lanes do not change."""
     for lane in range(LANES):
         x0, x1, x2 = load_matrix(work, P, lane)
         c0, c1, c2 = cross(x1, x2), cross(x2, x0), cross(x0, x1)
@@ -77,7 +77,7 @@ def _advance(work):
 
 @lane_function
 def _rotations(work):
-    """Write the nearest rotations of the suited F to P and mark them, and no other, as found."""
+    """Write the nearest rotations of well-conditioned F to P; set FOUND to 1 there, else to 0."""
     _start(work)
     for _ in range(STEPS):
         _advance(work)
@@ -90,10 +90,10 @@ def _rotations(work):
 
 @lane_function
 def _within_range(work, low, high):
-    """Copy F to P, and mark it as found where its singular values surely are in [low, high].
+    """Copy F to P; set FOUND to 1 where the singular values are proven to lie in [low, high].
 
-    Sufficient: |F^T F - I|_F bounds the distance of every squared singular value from 1, and
-    det F > 0.
+    The sufficient condition is det F > 0 and a small |F^T F - I|_F, which bounds the distance of
+    every squared singular value from 1.
     """
     slack = min(1.0 - low * low, high * high - 1.0)
     for lane in range(LANES):
@@ -106,13 +106,13 @@ def _within_range(work, low, high):
         work[FOUND * LANES + lane] = 1.0 if inside else 0.0
 
 
-# numbers of a lane in the packed geometry
+# packed numbers per element: the weight and 9 entries of the operator
 GEOMETRY = 10
 
 
 @lane_function
 def gradients(work, geometry, block):
-    """S q = F^T of a ``block`` of the packed ``geometry`` from its edges, in ``work``."""
+    """Write S q = F^T of a ``block`` to ``work``, from its edges and the packed ``geometry``."""
     start = block * GEOMETRY + OPERATOR
     for lane in range(LANES):
         e0, e1, e2 = load_matrix(work, EDGE, lane)
@@ -123,9 +123,9 @@ def gradients(work, geometry, block):
 
 @lane_function
 def _nearest(work, low, high):
-    """Projections of a block: the cheap cases first, the SVD where a lane is left.
+    """Write the projections of a block: cheap cases first, the SVD if any lane remains.
 
-    A matrix with an entry that is not finite gives nan.
+    A matrix with an entry that is not finite is projected to nan.
     """
     if low == high == 1.0:
         _rotations(work)
@@ -143,9 +143,9 @@ def _nearest(work, low, high):
 
 @lane_function
 def forces(work, geometry, block):
-    """Weighted forces S^T W p on the corners, and w |S q - p|^2, in ``work``.
+    """Write the forces S^T W p on the corners to ``work`` and add w |S q - p|^2 to its energy.
 
-    ``block`` and ``geometry`` as in `gradients`.
+    ``block`` and ``geometry`` are as in `gradients`.
     """
     weight, start = block * GEOMETRY + WEIGHT, block * GEOMETRY + OPERATOR
     for lane in range(LANES):
@@ -197,7 +197,7 @@ class TetrahedronGroup(singular_values.SingularValueGroup):
 
 
 class TetrahedronStrain(TetrahedronGroup):
-    """Clamps to [minimum, maximum] > 0: an inverted tetrahedron is turned right side out."""
+    """Clamping of singular values to [minimum, maximum] > 0; projections have a positive det."""
 
     class Config(singular_values.StrainConfig):
         """Weight w per volume, N/m^2."""
@@ -206,7 +206,7 @@ class TetrahedronStrain(TetrahedronGroup):
 
 
 class DeformationGradient(TetrahedronGroup):
-    """The clamp range [1, 1] leaves U V^T with det +1, the nearest rotation of F."""
+    """Projection of F to the nearest rotation U V^T, det +1: singular values in [1, 1]."""
 
     class Config(GroupConfig):
         """Weight w per volume, N/m^2."""

@@ -1,14 +1,14 @@
 """Triangle strain: singular values of the 3 x 2 deformation gradient clamped to a range.
 
-Bouaziz et al. 2014, sect. 5.1. F maps a rest frame in the triangle's plane (2-D) to space, so that
-the constraint is invariant under rotations, also out of the plane. S q = F^T, two rows an element.
+Bouaziz et al. 2014, sect. 5.1. F maps the 2-D rest frame in the plane of the triangle to space, so
+that the constraint is invariant under rotations in space. S q = F^T has two rows per element.
 
 The singular values of F are the roots of the eigenvalues m +- h of F^T F, and the nearest matrix is
 F (g_1 v_1 v_1^T + g_2 v_2 v_2^T) with g_i = clamp(sigma_i) / sigma_i, where v_1 v_1^T - v_2 v_2^T
-is the traceless part of F^T F over h: no direction is ever computed. It serves matrices that are
-not nearly flat; their smaller singular value comes from the cross product of the columns, which
-does not cancel. The others are rotated by a one-sided Jacobi rotation (module `svd3`). Matrices are
-stored as in S q = F^T: vector k of a matrix is column k of F. See module `lanes` for the layout.
+is the traceless part of F^T F over h, so that no v_i is computed. This closed form is used unless F
+is nearly rank deficient ("flat"); the smaller singular value comes from the cross product of the
+columns, without cancellation. Flat matrices use a one-sided Jacobi rotation (module `svd3`). Vector
+k of a stored matrix is column k of F (S q = F^T). See module `lanes` for the layout.
 """
 
 from typing import Literal
@@ -37,24 +37,24 @@ from pdrom.model.constraints.simplex import EDGE, ENERGY, FORCE, OPERATOR, SIZE,
 from pdrom.model.constraints.svd3 import rotated_pair
 from pdrom.model.mesh.types import Mesh
 
-# sigma_1 sigma_2 over the mean of their squares: below it a matrix is nearly flat
+# bound of sigma_1 sigma_2 over the mean of their squares; below it F is nearly rank deficient
 FLAT = 1e-2
-# means of the squares whose powers in the closed form neither overflow nor lose digits
+# range of the mean square in which the closed form neither overflows nor loses digits
 LOW, HIGH = 1e-60, 1e60
-# added to h in units of m: where sigma_1 = sigma_2 up to round-off there is nothing to tell apart
+# added to h, relative to m: avoids the division by zero where sigma_1 = sigma_2 up to round-off
 EQUAL = 1e-17
 
 
 @lane_function
 def _closed_form(f0, f1, low, high):
-    """Nearest matrix, and whether the closed form suits F: where not, the matrix is meaningless."""
+    """Return the columns of the nearest matrix, and whether the closed form is accurate for F."""
     a, b, off = dot(f0, f0), dot(f1, f1), dot(f0, f1)
     mean, half = 0.5 * (a + b), 0.5 * (a - b)
     h = np.sqrt(half * half + off * off) + EQUAL * mean
     normal = cross(f0, f1)
     product = np.sqrt(dot(normal, normal))
     large = np.sqrt(mean + h)
-    # one division for the three reciprocals
+    # compute three reciprocals with one division
     inverse = 1.0 / (large * product * h)
     of_large, of_product, of_h = (
         inverse * product * h,
@@ -72,25 +72,25 @@ def _closed_form(f0, f1, low, high):
 
 @lane_function
 def _rotated(f0, f1, low, high):
-    """Nearest matrix by one rotation that makes the columns orthogonal."""
+    """Return the columns of the nearest matrix, by a rotation that makes the columns orthogonal."""
     scale, c, s, swapped, pair = rotated_pair(f0, f1, 1.0)
     u0, u1, s0, s1 = pair
-    # not finite where F is not
+    # the term 0 * scale makes the result nan where F is not finite
     u0 = scaled(clamp(scale * s0, low, high) + 0.0 * scale, u0)
     u1 = scaled(clamp(scale * s1, low, high), u1)
     a, b = choose(swapped, u1, u0), choose(swapped, u0, u1)
     return mix(c, a, s, b), mix(c, b, -s, a)
 
 
-# numbers of a lane in the packed geometry
+# packed numbers per element: the weight and 4 entries of the operator
 GEOMETRY = 5
-# where the marks of matrices that the closed form suits begin in the working array
+# offset in the working array of the flag that the closed form is accurate; size of this array
 FOUND, WORK = SIZE, SIZE + 1
 
 
 @lane_function
 def gradients(work, geometry, block):
-    """S q = F^T of a ``block`` of the packed ``geometry`` from its edges, in ``work``."""
+    """Write S q = F^T of a ``block`` to ``work``, from its edges and the packed ``geometry``."""
     first = (block * GEOMETRY + OPERATOR) * LANES
     for lane in range(LANES):
         e0, e1 = load(work, EDGE, lane), load(work, EDGE + 3, lane)
@@ -102,9 +102,9 @@ def gradients(work, geometry, block):
 
 @lane_function
 def forces(work, geometry, block):
-    """Weighted forces S^T W p on the corners, and w |S q - p|^2, in ``work``.
+    """Write the forces S^T W p on the corners to ``work`` and add w |S q - p|^2 to its energy.
 
-    ``block`` and ``geometry`` as in `gradients`.
+    ``block`` and ``geometry`` are as in `gradients`.
     """
     weight = (block * GEOMETRY + WEIGHT) * LANES
     first = (block * GEOMETRY + OPERATOR) * LANES
@@ -122,7 +122,7 @@ def forces(work, geometry, block):
 
 @lane_function
 def _nearest(work, low, high):
-    """Projections of a block. A matrix with an entry that is not finite gives nan."""
+    """Write the projections of a block to ``work``; nan for a matrix that is not finite."""
     for lane in range(LANES):
         p0, p1, suited = _closed_form(load(work, F, lane), load(work, F + 3, lane), low, high)
         save(work, P, lane, p0)
@@ -152,7 +152,7 @@ def _project_gradients(d, allowed, p, m):
 
 
 def rest_frames(points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Inverse rest edge matrices D^-1 (T, 2, 2) in a frame of each triangle, and areas (T,) m^2.
+    """Return inverse rest edge matrices D^-1 (T, 2, 2) in 2-D frames, and the areas (T,) m^2.
 
     Parameters
     ----------
@@ -173,7 +173,7 @@ def rest_frames(points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, 
 
 
 class TriangleStrain(singular_values.SingularValueGroup):
-    """One constraint per triangle, weight w A_t."""
+    """One constraint per triangle on the singular values of F; weight w A_t with the rest area."""
 
     class Config(singular_values.StrainConfig):
         """Weight w per area, N/m (times the clamped strain)."""

@@ -1,8 +1,8 @@
-"""Tetrahedra that keep their volume: det F within a range (Bouaziz et al. 2014, 5.1).
+"""Volume constraints of tetrahedra: det F lies in a range (Bouaziz et al. 2014, 5.1).
 
-Triangles keep their area in the same way, in their plane: the product of F's singular values lies
-within a range. The set of such F is unbounded: an element may become as long and thin as it likes,
-so that the projections have no bound.
+Area constraints of triangles: the product of the two singular values of F lies in a range. Both
+sets of matrices are unbounded, as an element may become arbitrarily long and thin; there is thus no
+bound of the projections.
 """
 
 from typing import Literal
@@ -28,13 +28,13 @@ from pdrom.model.constraints.simplex import SIZE, F, P
 from pdrom.model.constraints.svd3 import FOUND, SIGMA, rotated_pair
 from pdrom.model.constraints.tetrahedron import TetrahedronGroup, forces, gradients
 
-# where the working array of products begins
+# offset of the working array of module `products`, and total size
 VALUES, WORK = svd3.SIZE, svd3.SIZE + products.SIZE
 
 
 @lane_function
 def _nearest(work, low, high):
-    """Projections of a block; a lane whose det F is in the range keeps its F."""
+    """Write the projections of a block to ``work``; F is its own projection if det F is allowed."""
     for lane in range(LANES):
         f0, f1, f2 = load_matrix(work, F, lane)
         volume = dot(f0, cross(f1, f2))
@@ -68,9 +68,9 @@ def _project_gradients(d, allowed, p, m):
 
 
 class TetrahedronVolume(TetrahedronGroup):
-    """One constraint per tetrahedron on det F, its volume over that at rest; weight w V_t.
+    """One constraint per tetrahedron on det F, the volume over the rest volume V_t; weight w V_t.
 
-    An inverted tetrahedron is turned right side out.
+    The projection of an inverted tetrahedron has a positive volume.
     """
 
     class Config(singular_values.StrainConfig):
@@ -88,15 +88,15 @@ class TetrahedronVolume(TetrahedronGroup):
         return products.reference_nearest(sigma, *self.allowed)
 
 
-# numbers of a lane of an area after those of every simplex: the columns of U, the rotation V; then
-# the working array of products begins
+# further offsets in the working array of areas: columns of U, cosine and sine of the rotation V;
+# then the working array of module `products`
 U, COSINE, SINE = SIZE, SIZE + 6, SIZE + 7
 AREA_VALUES, AREA_WORK = SIZE + 8, SIZE + 8 + products.SIZE
 
 
 @lane_function
 def _nearest_area(work, low, high):
-    """Projections of a block."""
+    """Write the projections of a block of triangles to ``work``."""
     values = work[AREA_VALUES * LANES :]
     for lane in range(LANES):
         f0, f1 = load(work, F, lane), load(work, F + 3, lane)
@@ -104,7 +104,7 @@ def _nearest_area(work, low, high):
         u0, u1, s0, s1 = pair
         save(work, U, lane, u0)
         save(work, U + 3, lane, u1)
-        # a quarter turn more puts the longer column first
+        # rotating by another 90 degrees puts the longer column first
         work[COSINE * LANES + lane] = s if swapped else c
         work[SINE * LANES + lane] = -c if swapped else s
         save(values, products.VALUES, lane, (scale * s0, 1.0, scale * s1))
@@ -134,7 +134,7 @@ def _project_area_gradients(d, allowed, p, m):
 
 
 class TriangleArea(triangle_strain.TriangleStrain):
-    """One constraint per triangle on its area over that at rest, weight w A_t."""
+    """One constraint per triangle on its area over the rest area A_t, with the weight w A_t."""
 
     class Config(singular_values.StrainConfig):
         """Weight w per area, N/m; allowed areas [minimum, maximum] over that at rest."""

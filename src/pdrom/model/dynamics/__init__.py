@@ -1,1 +1,1 @@
-"""The step loop of projective dynamics and its global system."""
+"""The step loop of projective dynamics, its global system and the acceleration."""

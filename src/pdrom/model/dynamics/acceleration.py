@@ -1,10 +1,10 @@
 """Anderson acceleration of the local/global iteration (Peng et al. 2018, section 3).
 
-One local and one global step are a map G of the positions; its fixed point solves the frame. In
-place of y <- G(y) the next iterate is the combination of the last few images whose combined
-residual f = G(y) - y is smallest. An iterate whose objective is above the last one is refused and
-replaced by the plain image, which cannot rise: the objective stays monotone, the fixed point the
-same.
+One local and one global step define a map G of the positions; its fixed point solves the frame.
+Instead of y <- G(y), the next iterate is the affine combination of the last few images G(y) with
+the smallest combined residual f = G(y) - y. An iterate with a larger objective than the last one is
+rejected and replaced by the last plain image G(y), whose objective cannot be larger. The objective
+thus decreases monotonically, and the fixed point is the same.
 """
 
 import numpy as np
@@ -13,17 +13,17 @@ from pdrom.model.compiled.dots import dot
 from pdrom.model.compiled.functions import compiled, inner
 from pdrom.model.compiled.rows import flat, write
 
-# Relative Tikhonov term of the small least-squares problem: nearly parallel residual differences
-# (close to convergence) must not blow up the weights.
+# Relative Tikhonov term of the small least-squares problem: keeps the weights bounded if residual
+# differences are nearly parallel (close to convergence).
 REGULARISATION = 1e-14
-# Entries of the history's counts: differences so far (-1: no iterate yet), refused iterates.
+# Indices into the counters of a history: stored differences (-1: no iterate yet), refused iterates.
 DIFFERENCES, REFUSED = 0, 1
 
 
 @inner
 def _weights(gram, projection, count):
-    """Solve the regularised normal equations (count, count) by Cholesky; zero weights if they
-    are not positive definite, so that the plain image is taken."""
+    """Return the weights (count,) that solve the regularised normal equations, by Cholesky; zeros
+    (the plain image) if the matrix ``gram`` is not positive definite."""
     factor, weights = np.zeros((count, count)), np.zeros(count)
     for i in range(count):
         for j in range(i + 1):
@@ -52,17 +52,17 @@ def _weights(gram, projection, count):
 
 @compiled
 def forget(history):
-    """Forget all iterates of ``history``: another frame or substep begins."""
+    """Delete all iterates of ``history`` at the beginning of a frame or substep."""
     history[6][DIFFERENCES] = -1
     history[7][0] = np.inf
 
 
 @compiled
 def refuse(history, y, objective, plain=1):
-    """See `Anderson.refuse` of ``history``; ``y`` (n,) has this ``objective``.
+    """Compiled `Anderson.refuse`, with a ``history``; ``y`` (n,) has this ``objective``.
 
-    The first ``plain`` images after a start or a refusal are not compared: they are images of the
-    local/global iteration, which cannot rise.
+    The first ``plain`` iterates after a start or a rejection are not compared: they are images of
+    the local/global iteration, whose objective cannot rise.
     """
     start, _, image, _, _, _, numbers, last = history
     if numbers[DIFFERENCES] >= plain and objective > last[0]:
@@ -77,7 +77,7 @@ def refuse(history, y, objective, plain=1):
 
 @compiled
 def combine(history, image):
-    """See `Anderson.combine` of ``history``; ``image`` (n,) are all numbers of G(y)."""
+    """Compiled `Anderson.combine`, with a ``history``; ``image`` (n,) is the flat array G(y)."""
     start, residual, last_image, residuals, images, gram, numbers, _ = history
     numbers[DIFFERENCES] += 1
     differences, window = numbers[DIFFERENCES], len(gram)
@@ -103,36 +103,36 @@ def combine(history, image):
 
 
 History = tuple[np.ndarray, ...]
-"""Memory for the iterates of a frame, see `Anderson.history`."""
+"""Arrays with the iterates of a frame, see `_history`."""
 
 
 def _history(window: int, n: int) -> History:
-    """Memory for a frame's iterates of n numbers.
+    """Return the arrays with the iterates, of n numbers each, of a frame.
 
-    The accepted iterate, and the residual and image of the one before (n,); ``window`` differences
-    of residuals and of images (window, n), the Gram matrix of the former; `DIFFERENCES` so far and
-    iterates `REFUSED`; the objective of the accepted iterate (1,).
+    They are: the accepted iterate, residual and image of the last iterate (n,); ``window``
+    differences of residuals and of images (window, n); Gram matrix of the residual differences; the
+    counters `DIFFERENCES` and `REFUSED` (2,); the objective of the accepted iterate (1,).
     """
     vectors = [np.empty(n) for _ in range(3)]
     differences = [np.empty((window, n)) for _ in range(2)]
     return (*vectors, *differences, np.empty((window, window)), np.zeros(2, np.int64), np.empty(1))
 
 
-# Of iterations without acceleration. Compiled loops tell it by its type, so that a process without
-# acceleration compiles nothing of it.
+# The history of iterations without acceleration. Compiled loops distinguish it by its type, so that
+# they do not compile the acceleration if it is not used.
 NO_HISTORY = None
 
 
 class Anderson:
-    """Accelerates the iterations of one step loop.
+    """Anderson acceleration of the iterations of one step loop.
 
     Parameters
     ----------
-    window : how many differences of earlier iterates are combined
+    window : largest number of differences of earlier iterates that are combined
 
     Attributes
     ----------
-    history : what `refuse` and `combine` of compiled loops take
+    history : arrays for the compiled functions `refuse` and `combine`
     """
 
     def __init__(self, window: int) -> None:
@@ -141,11 +141,11 @@ class Anderson:
 
     @property
     def refused(self) -> int:
-        """Number of iterates refused so far."""
+        """Number of rejected iterates since the object was made."""
         return int(self.history[6][REFUSED])
 
     def begin_frame(self, y: np.ndarray) -> None:
-        """Forget the last frame; ``y`` (n, 3) is the first iterate of this one."""
+        """Delete the iterates of the last frame; ``y`` (n, 3) is the first one of a new frame."""
         n, refused = _numbers(y).size, self.refused
         if n != len(self.history[0]):
             self.history = _history(self._window, n)
@@ -153,16 +153,16 @@ class Anderson:
         forget(self.history)
 
     def refuse(self, y: np.ndarray, objective: float) -> bool:
-        """Whether the iterate ``y`` raises the objective (J); it is then replaced by the plain
-        image of the last one and the history is dropped. An unknown objective (nan) never does.
+        """Return whether the iterate ``y`` raises the ``objective`` (J) and is rejected: it is then
+        overwritten by the last plain image G(y), and the history is deleted. Never for nan.
         """
         return refuse(self.history, _numbers(y), objective)
 
     def combine(self, image: np.ndarray) -> None:
-        """Overwrite ``image`` = G(y) of the accepted y by the next iterate."""
+        """Overwrite ``image`` = G(y), with the last accepted iterate y, by the next iterate."""
         combine(self.history, _numbers(image))
 
 
 def _numbers(y: np.ndarray) -> np.ndarray:
-    """All numbers of y as a flat view; rows padded to four come with their zeros."""
+    """Return a flat view of y; for a view of padded rows of four numbers, with the zeros."""
     return y.reshape(-1) if y.flags.c_contiguous else flat(y)

@@ -1,13 +1,13 @@
-"""Frames of all vertices in compiled code: beginning, iterations, end, and many frames a call.
+"""Compiled frames of the full-order step loop: begin, iterate, end, and several frames per call.
 
-Rows of four (x, y, z, 0), flat: the iterate ``y``, the prediction ``s``. ``inertia`` (N,) is M/h^2,
-kg/s^2, ``time_step`` h, s.
+The iterate ``y`` and the prediction ``s`` are flat arrays of rows of four numbers (x, y, z, 0).
+``inertia`` (N,) is M/h^2 in kg/s^2, ``time_step`` is h in s.
 
-The iterations of a frame are one loop for local steps and solvers that are compiled. Whole frames,
-many a call, serve scenes in which Python has nothing to decide between two frames: forces that are
-constant or proportional to the velocity, compiled local steps without frame-lagged data, floors. A
-call ends where another set of vertices is held, or where any are taken hold of: their targets are
-known only then."""
+If local steps and solver are compiled, one compiled loop does the iterations of a frame. One call
+does several whole frames in scenes where Python has nothing to do between two frames: forces are
+constant or proportional to the velocity, local steps are compiled without frame-lagged data, and
+all contacts are floors. Such a call ends before a frame in which the set of held (prescribed)
+vertices changes or a hold begins, because the targets of the vertices are known only then."""
 
 from collections.abc import Sequence
 from typing import Any, TypeGuard
@@ -26,9 +26,9 @@ from pdrom.model.effects.base import Boundary, Contact, Force
 
 @compiled(nogil=True)
 def predict(positions, velocities, acceleration, time_step):
-    """q + h v + h^2 a as rows of four, flat, with h = ``time_step``.
+    """Return q + h v + h^2 a as a flat array of rows of four numbers, with h = ``time_step``.
 
-    ``positions`` q and ``velocities`` v are (N, 3), ``acceleration`` a too, or (1, 3) for all.
+    ``positions`` q and ``velocities`` v are (N, 3), ``acceleration`` a is (N, 3) or (1, 3).
     """
     s, square = np.empty(WIDTH * len(positions)), time_step**2
     for i in range(len(positions)):
@@ -42,7 +42,7 @@ def predict(positions, velocities, acceleration, time_step):
 
 @compiled(nogil=True)
 def weighted(inertia, s):
-    """(M/h^2) s as rows of four, flat as s is; ``inertia`` is M/h^2 (N,)."""
+    """Return (M/h^2) s as a flat array of rows of four numbers, like s; ``inertia`` is M/h^2."""
     result = np.empty(len(s))
     for i in range(len(inertia)):
         for lane in range(WIDTH):
@@ -54,7 +54,7 @@ def weighted(inertia, s):
 def end(y, before, time_step, positions, velocities):
     """Write ``positions`` and ``velocities`` (N, 3) at the end of a frame.
 
-    From ``y``, rows of four, flat, the positions ``before`` (N, 3) and ``time_step``.
+    ``y`` is the last iterate, ``before`` (N, 3) are the positions at the beginning of the frame.
     """
     for i in range(len(before)):
         for axis in range(3):
@@ -64,7 +64,7 @@ def end(y, before, time_step, positions, velocities):
 
 @inner
 def inertia_energy(y, s, inertia):
-    """1/2 |(M/h^2)^1/2 (y - s)|^2 of rows of four, flat; ``inertia`` is M/h^2 (N,)."""
+    """Return 1/2 |(M/h^2)^1/2 (y - s)|^2 in J; ``inertia`` is M/h^2 (N,)."""
     energy = 0.0
     for i in range(len(inertia)):
         square = 0.0
@@ -75,13 +75,13 @@ def inertia_energy(y, s, inertia):
 
 
 class CompiledIterations:
-    """The iterations of a step loop whose local steps all have a local kernel.
+    """Compiled iterations of a step loop in which every local step has a local kernel.
 
     Parameters
     ----------
-    local_steps : objects with ``local_kernel``
+    local_steps : objects with an attribute ``local_kernel``
     inertia : (N,) M / h^2
-    acceleration : begun with each frame by the step loop
+    acceleration : the step loop calls its ``begin_frame`` in each frame
     """
 
     def __init__(
@@ -90,14 +90,14 @@ class CompiledIterations:
         local = self._pass = LocalPass([step.local_kernel for step in local_steps])
         self._inertia = inertia
         self._acceleration = acceleration
-        # what every call hands to compiled code
+        # arguments that are the same in every call of compiled code
         touched = local.touched
         self._tables = (local.first, local.preparing, local.second)
         self._second = (local.other, touched.start, touched.stop)
         self._clock = clock()
 
     def takes(self, elimination: object) -> TypeGuard[Elimination]:
-        """Whether the system of an ``elimination`` is solved by compiled code, too."""
+        """Return whether compiled code can solve the system of an ``elimination``."""
         return isinstance(elimination, Elimination) and elimination.factor is not None
 
     @property
@@ -120,11 +120,11 @@ class CompiledIterations:
 
         Parameters
         ----------
-        objective : (K,) receives the objective at the iterates; empty if it is not tracked
-        y, base : (N, 3) views of rows of four: iterate, (M/h^2) s
+        objective : (K,) receives the objective at the iterates, J; empty if it is not tracked
+        y, base : iterate and (M/h^2) s, (N, 3) views of padded arrays (N, 4)
         s : (N, 3) prediction
-        elimination : the factored system, see `takes`
-        seconds : (4,) times of the local and of the global steps are added to entries 1 and 2
+        elimination : the factored system, for which `takes` is true
+        seconds : (4,) the times of local and global steps are added to entries 1 and 2
         """
         history = NO_HISTORY if self._acceleration is None else self._acceleration.history
         tracked = len(objective) > 0 or history is not None
@@ -147,14 +147,14 @@ def all_iterations(
 
     Parameters
     ----------
-    which : (first, end, iterations), those from ``first`` to before ``end`` of ``iterations``
-    y, s, base, rhs : rows of four, flat: iterate, prediction, (M/h^2) s, working array
+    which : (first, end, K): do the iterations first, ..., end - 1 of the K iterations of a frame
+    y, s, base, rhs : iterate, prediction, (M/h^2) s, working array; flat rows of four numbers
     inertia : (N,) M/h^2, kg/s^2
     tables, second : of the local steps, see `CompiledIterations.compiled_arguments`
-    factor : of the system
-    history : of the acceleration, `NO_HISTORY` without one: its code is then left out
-    objective, seconds : as there
-    watch : see `pdrom.model.compiled.functions`
+    factor : of the global system, see `pdrom.model.dynamics.solvers.Factor`
+    history : of the acceleration; with `NO_HISTORY` its code is not compiled
+    objective, seconds : as in `CompiledIterations.run`
+    watch : a buffer from `pdrom.model.compiled.functions.clock`
     """
     first, end, iterations = which
     local, preparing, kernels = tables
@@ -166,7 +166,7 @@ def all_iterations(
         add_part(preparing, y.ctypes.data, rhs.ctypes.data)
         energy = add_part(local, y.ctypes.data, rhs.ctypes.data)
         if stop > start:
-            # the second parts of all local steps, into an array of their own
+            # the second parts of all local steps add to a separate array
             other[WIDTH * start : WIDTH * stop] = 0.0
             energy += add_part(kernels, y.ctypes.data, other.ctypes.data)
             for i in range(WIDTH * start, WIDTH * stop):
@@ -187,29 +187,29 @@ def all_iterations(
                 objective[k] = objective[k - 1]
         else:
             sweep(panels, vertices, loads, work, rhs, y)
-            # the last image stays as it is: its objective is known not to rise
+            # the last image is not accelerated: its objective cannot be larger
             if history is not None and k < iterations - 1:
                 combine(history, y)
         seconds[2] += now(watch) - between
     return 0.0
 
 
-# Frames of a call at most, so that a run that ends early has done little for nothing.
+# Largest number of frames per call, so that little work is wasted if the caller ends the run early.
 BLOCK = 16
 
 Blocks = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
-"""Positions and velocities (n, N, 3) after each of n frames, objective (n, K), seconds (n, 4)."""
+"""Positions, velocities (n, N, 3) at the end of n frames; objectives (n, K), seconds (n, 4)."""
 
 
 class WholeFrames:
-    """Frames of a step loop in a `pdrom.model.dynamics.space.VertexSpace`.
+    """Several whole frames per compiled call, for a `pdrom.model.dynamics.space.VertexSpace`.
 
     Parameters
     ----------
-    space : gives ``held_path`` and ``system``
+    space : its ``held_path`` and ``system`` are used
     loop : the compiled iterations
-    forces : with a ``rate``
-    contacts : with a ``height``
+    forces : each with a ``rate`` (not None)
+    contacts : each with a ``height`` (not None)
     """
 
     def __init__(
@@ -229,7 +229,7 @@ class WholeFrames:
         ).reshape(-1, vertices, 3)
         rates = [np.broadcast_to(np.asarray(f.rate, float), vertices) for f in forces]
         self._rates = np.array(rates).reshape(-1, vertices)
-        # one row for all vertices where all forces are uniform
+        # a single row for all vertices if all forces are uniform
         alike = not self._rates.any() and bool((self._constants == self._constants[:, :1]).all())
         self._acceleration = np.zeros((1 if alike else vertices, 3))
         self._floors = np.array([contact.height for contact in contacts], dtype=float)
@@ -243,9 +243,9 @@ class WholeFrames:
         boundaries: Sequence[Boundary],
         contacts: Sequence[Contact],
     ) -> bool:
-        """Whether compiled code can do all local ``steps`` and effects of these roles.
+        """Return whether compiled code can do all local ``steps`` and effects of a scene.
 
-        Stand-ins that watch one of the ``forces``, ``boundaries`` or ``contacts`` cannot be.
+        It cannot do ``forces``, ``boundaries`` or ``contacts`` that are wrapped in other objects.
         """
         return (
             all(isinstance(force, Force) and force.rate is not None for force in forces)
@@ -257,14 +257,14 @@ class WholeFrames:
     def run(
         self, q: np.ndarray, v: np.ndarray, frames: range, h: float, iterations: int, track: bool
     ) -> Blocks | None:
-        """Run as many of ``frames`` as one call can do; None where another solver is in use.
+        """Run as many of ``frames`` as one call can do; return None if the solver is not compiled.
 
         Parameters
         ----------
         q, v : (N, 3) positions, m, and velocities, m/s, at the beginning
         h : time step, s
-        iterations : of a frame
-        track : whether the objectives are wanted
+        iterations : number of iterations per frame
+        track : whether the objective is computed
         """
         fixed, targets = self._space.held_path(frames[:BLOCK], q)
         system = self._space.system.eliminate(fixed)
@@ -289,12 +289,12 @@ class WholeFrames:
 
 @inner
 def _accelerate(constants, rates, velocities, result):
-    """Sum of all forces' accelerations, (N, 3), or (1, 3) where they are constant."""
+    """Write the sum of all accelerations to ``result``, (N, 3), or (1, 3) if it is uniform."""
     for i in range(len(result)):
         for axis in range(3):
             total = 0.0
             for k in range(len(constants)):
-                # no product with a rate of zero: a velocity that is not finite stays where it is
+                # no product with a zero rate, which would make nan of a velocity that is not finite
                 own = -rates[k, i] * velocities[i, axis] if rates[k, i] else constants[k, i, axis]
                 total += own
             result[i, axis] = total
@@ -302,7 +302,7 @@ def _accelerate(constants, rates, velocities, result):
 
 @inner
 def _correct(y, floors, fixed, targets):
-    """Lift free vertices onto the floors."""
+    """Lift vertices below a floor onto it, then set the ``fixed`` vertices to their targets."""
     for height in floors:
         for i in range(1, len(y), WIDTH):
             if y[i] < height:

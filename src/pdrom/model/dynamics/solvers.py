@@ -1,10 +1,10 @@
 """Factorisations of the global system: factor once, solve often.
 
-Panels of a factor are consecutive columns that are swept together. The rows below the columns of a
-panel are the union of those of its columns; a column has zeros where it had none. The wider a
-panel, the fewer numbers are read twice and the fewer times the sweep waits for the column before;
-the more zeros it stores. Which columns go together is decided by dynamic programming over a cost in
-processor cycles.
+Panels (supernodes) are consecutive columns of a factor that substitution ("sweep") treats together.
+A panel stores all rows below its columns in which at least one of its columns has an entry, with
+explicit zeros in the other columns. In a wider panel, fewer numbers are read twice and substitution
+waits less often for the preceding column, but more zeros are stored. Dynamic programming partitions
+the columns such that an estimated number of processor cycles is smallest.
 """
 
 from typing import Any
@@ -20,27 +20,26 @@ from pdrom.model.compiled.functions import compiled
 from pdrom.model.compiled.rows import WIDTH
 from pdrom.model.dynamics.sweeps import SWEEP, WIDTHS, load, sweep
 
-# Cycles of a panel (a branch that is guessed wrong, the chain of its own columns) and of each row
-# below, for each column and for the row itself; fitted to sheets and bars of 400 to 10,000
-# vertices.
+# Processor cycles of a panel (a mispredicted branch, its dependent columns), of each row below it,
+# and of each entry in such a row; fitted to sheets and bars of 400 to 10,000 vertices.
 PANEL, ROW, ENTRY = 20.0, 1.0, 0.5
 
 
 def panels(lower: sparse.csc_array, diagonal: np.ndarray) -> tuple[Any, ...]:
-    """L D L^T = A by panels, from L = ``lower`` (n, n) and D = ``diagonal`` (n,).
+    """Store L D L^T = A by panels, from L = ``lower`` (n, n) and D = ``diagonal`` (n,).
 
     L is unit lower triangular with ascending row indices.
 
     Returns
     -------
-    The first argument of `pdrom.model.dynamics.sweeps.sweep`: the arrays, and the function's
-    address.
+    The first argument of `pdrom.model.dynamics.sweeps.sweep`: these arrays for P panels, and the
+    address of a compiled function.
 
     first : (P + 1,) first column of each panel
-    row_start, value_start : (P + 1,) where its rows and numbers begin
+    row_start, value_start : (P + 1,) first index of each panel in ``rows`` and in ``values``
     rows : rows below each panel, times `pdrom.model.compiled.rows.WIDTH`
-    values : of each panel with w columns 1 / D (w), the triangle of L row by row without its
-        diagonal, then the rows below (m, w)
+    values : for each panel with w columns and m rows below: 1 / D (w), the strict lower triangle of
+        L row by row, then the rows below (m, w)
     """
     n = lower.shape[0]
     below = np.zeros((max(WIDTHS) + 1, n), np.int64)
@@ -67,10 +66,10 @@ def panels(lower: sparse.csc_array, diagonal: np.ndarray) -> tuple[Any, ...]:
 
 @compiled
 def _count_rows_below(indptr, indices, seen, below):
-    """below[w, j]: rows below the panel of the w columns that end with column j.
+    """Write to below[w, j] the number of rows below the panel of the w columns up to column j.
 
-    ``seen`` (n,) is working memory of -1. Arrays are made by Python here: each kind of allocation
-    takes a tenth of a second to compile.
+    ``seen`` (n,) is working memory, filled with -1. The caller makes all arrays in Python, because
+    each allocation in compiled code takes a tenth of a second to compile.
     """
     for j in range(len(seen)):
         count = 0
@@ -86,9 +85,9 @@ def _count_rows_below(indptr, indices, seen, below):
 
 @compiled
 def _choose(below, widths, cost, chosen):
-    """Write the width of the last panel of the cheapest partition of the columns before each one.
+    """Write to chosen[k] the width of the last panel in the cheapest partition of k columns.
 
-    ``cost`` (n + 1,) is working memory of inf.
+    ``cost`` (n + 1,) is working memory, filled with inf.
     """
     cost[0] = 0.0
     for end in range(1, len(cost)):
@@ -102,7 +101,7 @@ def _choose(below, widths, cost, chosen):
 
 @compiled
 def _fill(indptr, indices, data, inverse, first, row_start, value_start, rows, values, place):
-    """Write the rows and numbers of all panels; ``place`` (n,) is working memory of -1."""
+    """Write ``rows`` and ``values`` of all panels; ``place`` (n,) is working memory of -1."""
     for panel in range(len(first) - 1):
         a, b = first[panel], first[panel + 1]
         width, start = b - a, row_start[panel]
@@ -111,7 +110,7 @@ def _fill(indptr, indices, data, inverse, first, row_start, value_start, rows, v
             row = indices[k]
             if row >= b and place[row] < 0:
                 place[row] = 0
-                # columns are sorted: few rows are not at the end (a compiled sort takes a second)
+                # insertion sort: most rows belong at the end (compiling a sort takes a second)
                 new = start + count
                 while new > start and rows[new - 1] > row:
                     rows[new] = rows[new - 1]
@@ -152,25 +151,25 @@ NOTHING_FREE: Factor = (
     np.zeros(0),
     np.zeros(0),
 )
-# First arguments of `pdrom.model.dynamics.sweeps.load`, where no unknown has a held neighbour.
+# First arguments of `pdrom.model.dynamics.sweeps.load` if no unknown is coupled to a held vertex.
 NO_COUPLING = (np.zeros(0, np.int64), np.zeros(1, np.int32), np.zeros(0, np.int32), np.zeros(0))
 
 
 class SuperLUSolver:
-    """A factored symmetric positive definite matrix: SciPy's SuperLU and its own substitution.
+    """A symmetric positive definite matrix, factored and solved by SuperLU of SciPy.
 
     Parameters
     ----------
     matrix : (n, n)
-    vertices : (n,) rows of the arrays (N, 3) that its unknowns are
-    coupling : (n, m) to m held vertices, whose part is taken from the right-hand side; None: m = 0
+    vertices : (n,) vertex of each unknown, a row of the arrays (N, 3)
+    coupling : (n, m) matrix entries between the unknowns and m held vertices; None if m = 0
     """
 
     ordering = "MMD_AT_PLUS_A"
     factor: Factor | None = None
-    """For a compiled loop; None if the solver is not compiled."""
+    """Arguments of `sweep` in a compiled loop; None if the solver is not compiled."""
     coupling = NO_COUPLING
-    """To the held vertices, for a compiled loop."""
+    """Arguments of `load` in a compiled loop, the coupling to the held vertices."""
 
     def __init__(
         self,
@@ -183,11 +182,11 @@ class SuperLUSolver:
         self._take(factored(matrix, self.ordering))
 
     def _take(self, factor: SuperLU) -> None:
-        """Keep the factor in the form that `solve` needs."""
+        """Store the ``factor`` in the form that `solve` needs."""
         self._factor = factor
 
     def set_targets(self, targets: np.ndarray) -> None:
-        """Hold the held vertices at ``targets`` (m, 3) in the solves that follow."""
+        """Set the positions ``targets`` (m, 3) m of the held vertices for all following solves."""
         if self._held is not None:
             self._load = self._held @ targets
 
@@ -197,15 +196,15 @@ class SuperLUSolver:
 
 
 class ColumnOrderedSolver(SuperLUSolver):
-    """SuperLU with another order of summation, to see what the order changes."""
+    """SuperLU with another column ordering, to measure the effect of the order of summation."""
 
     ordering = "COLAMD"
 
 
 class SupernodalSolver(SuperLUSolver):
-    """SuperLU's factor in panels, swept by compiled code with x, y and z in one pass.
+    """SuperLU's factor stored by panels, with compiled substitution of x, y and z in one pass.
 
-    factor : the first arguments of `sweep`
+    factor : first arguments of `sweep`
     """
 
     factor: Factor
@@ -219,7 +218,7 @@ class SupernodalSolver(SuperLUSolver):
         self.factor = panels(lower, factor.U.diagonal()), order, loads, work
         if self._held is not None:
             own = sparse.csr_array(self._held[unknowns])
-            # few unknowns have a held neighbour
+            # only the few unknowns that are coupled to held vertices
             beside = np.flatnonzero(np.diff(own.indptr))
             self.coupling = beside, own.indptr, own.indices, own.data
 
@@ -235,7 +234,7 @@ class SupernodalSolver(SuperLUSolver):
 
 
 def factored(matrix: sparse.csr_array, ordering: str) -> SuperLU:
-    """SuperLU of a matrix (n, n) without pivoting; ``ordering`` as SuperLU's ``permc_spec``.
+    """Factor a matrix (n, n) by SuperLU without pivoting; ``ordering`` is its ``permc_spec``.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The coordinates that the step loop works in: vertex positions, or those of a subspace."""
+"""Coordinates of the step loop: vertex positions, or coordinates in a position subspace."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
@@ -17,7 +17,7 @@ class Solve(Protocol):
     """A factored system with the fixed coordinates eliminated."""
 
     def solve(self, rhs: np.ndarray, y: np.ndarray) -> None:
-        """Overwrite the free coordinates of ``y`` (n, 3) by the solution for ``rhs`` (n, 3)."""
+        """Overwrite the coordinates of ``y`` (n, 3) that are not fixed, from ``rhs`` (n, 3)."""
 
 
 class Space(ABC):
@@ -28,59 +28,59 @@ class Space(ABC):
     """
 
     def predict(self, positions: np.ndarray, velocities: np.ndarray, h: float) -> np.ndarray:
-        """Inertial prediction s = q + h v + h^2 a of ``positions`` q and ``velocities`` v."""
+        """Return the prediction s = q + h v + h^2 a of ``positions`` q and ``velocities`` v."""
         return positions + h * velocities + h**2 * self.acceleration(positions, velocities)
 
     def copy(self, s: np.ndarray) -> np.ndarray:
-        """Copy ``s`` (n, 3), which `predict` or `inertia` returned, to iterate on."""
+        """Return a copy of ``s`` (n, 3), which is a result of `predict` or `inertia`."""
         return s.copy()
 
     def end(self, y: np.ndarray, before: np.ndarray, h: float) -> tuple[np.ndarray, np.ndarray]:
-        """Coordinates and velocities from ``y`` at the end of a frame that began at ``before``."""
+        """Return coordinates and velocities at the end of a frame from ``y`` and ``before``."""
         return y, (y - before) / h
 
     def compiled(
         self, local_steps: Sequence[Any], acceleration: Anderson | None = None
     ) -> tuple[CompiledIterations | None, WholeFrames | None]:
-        """Compiled iterations with ``local_steps`` and ``acceleration``, and whole frames of these.
+        """Return compiled iterations with ``local_steps`` and ``acceleration``, and whole frames.
 
-        Each is None if there are none.
+        Each of the two is None if it is not available in these coordinates.
         """
         return None, None
 
     @abstractmethod
     def acceleration(self, positions: np.ndarray, velocities: np.ndarray) -> np.ndarray:
-        """Acceleration by all forces, broadcastable to (n, 3), m/s^2.
+        """Return the acceleration by all forces, broadcastable to (n, 3), m/s^2.
 
         ``positions`` (m) and ``velocities`` (m/s) are those at the beginning of the frame.
         """
 
     @abstractmethod
     def fixed(self, frame: int, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Coordinates held in ``frame``, ascending (m,), and their values (m, 3).
+        """Return the fixed coordinates of ``frame``, ascending (m,), and their values (m, 3).
 
-        ``positions`` (n, 3) are those at its beginning.
+        ``positions`` (n, 3) are the coordinates at the beginning of the frame.
         """
 
     @abstractmethod
     def eliminate(self, fixed: np.ndarray, targets: np.ndarray) -> Solve:
-        """The factored system without the ``fixed`` coordinates, which take their ``targets``."""
+        """Return the factored system in which ``fixed`` coordinates have the values ``targets``."""
 
     @abstractmethod
     def inertia(self, s: np.ndarray) -> np.ndarray:
-        """(M / h^2) s."""
+        """Return (M / h^2) s."""
 
     @abstractmethod
     def inertia_energy(self, difference: np.ndarray) -> float:
-        """1/(2 h^2) |M^1/2 difference|^2 in joule."""
+        """Return 1/(2 h^2) |M^1/2 difference|^2 in joule; ``difference`` (n, 3) is y - s."""
 
     @abstractmethod
     def correct(self, y: np.ndarray, before: np.ndarray, frame: int) -> None:
-        """Correct ``y`` by the contacts at the end of ``frame``, which began at ``before``."""
+        """Apply all contacts to ``y`` at the end of ``frame``; ``before`` are its first values."""
 
 
 class VertexSpace(Space):
-    """All vertex positions. Roles that a scene does not fill are empty and cost nothing."""
+    """The positions of all vertices as coordinates, with the effects of a scene in three roles."""
 
     def __init__(
         self,
@@ -102,9 +102,9 @@ class VertexSpace(Space):
         return base.held_targets(self._boundaries, frame, positions)
 
     def held_path(self, frames: range, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Coordinates that are held in the first ``frames``, and their values (n, m, 3).
+        """Return the vertices (m,) held in the first n ``frames``, and their targets (n, m, 3) m.
 
-        ``positions`` (N, 3) are those at the beginning of the first one.
+        ``positions`` (N, 3) m are those at the beginning of the first frame; see `base.held_path`.
         """
         return base.held_path(self._boundaries, frames, positions)
 
@@ -132,7 +132,7 @@ class VertexSpace(Space):
             return None, None
         loop = CompiledIterations(local_steps, self.system.inertia, acceleration)
         effects = self._forces, self._boundaries, self._contacts
-        # a subclass may do any part of a frame in its own way
+        # a subclass may override any part of a frame
         if type(self) is not VertexSpace or not WholeFrames.suits(local_steps, *effects):
             return loop, None
         return loop, WholeFrames(self, loop, self._forces, self._contacts, acceleration)

@@ -2,7 +2,7 @@
 
 One frame (Bouaziz et al. 2014, alg. 1): y <- s = q + h v + h^2 a, then K times a local step
 p_j = p_j(y) and a global step (M/h^2 + sum S^T W S) y = (M/h^2) s + sum S^T W p; finally
-v = (y - q) / h and q = y. What replaces the projections of a group is a `LocalStep`.
+v = (y - q) / h and q = y. A `LocalStep` computes or approximates the local step of one group.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -19,19 +19,19 @@ PHASES = ("inertia", "local", "global", "finish")
 
 
 class LocalStep(Protocol):
-    """Contribution of one group to the right-hand side. A constraint group is one itself.
+    """Contribution of one group to the right-hand side. A constraint group is a local step itself.
 
-    With a position subspace y and rhs are coordinates (k, 3) in place of vertex positions (N, 3).
-    A step with a ``local_kernel`` is part of compiled iterations.
+    In a position subspace y and rhs are coordinates (k, 3) instead of vertex positions (N, 3).
+    Compiled iterations need an attribute ``local_kernel`` in every local step.
     """
 
     name: str
 
     def begin_frame(self, q: np.ndarray) -> None:
-        """Called once a frame with its first positions ``q`` (N, 3)."""
+        """Prepare a frame whose first positions are ``q`` (N, 3) m; called once per frame."""
 
     def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
-        """Add S^T W p(y) of ``y`` (N, 3) to ``rhs`` (N, 3); return the energy W(y), J, or nan."""
+        """Add S^T W p(y) to ``rhs`` (N, 3); return the energy W(y) in J, nan if it is unknown."""
 
 
 @dataclass(frozen=True)
@@ -44,11 +44,11 @@ class State:
 
 @dataclass(frozen=True)
 class FrameReport:
-    """Objective and times of a frame.
+    """Objective and computation times of a frame.
 
     objective : (K,) value of 1/(2 h^2) |M^1/2 (y - s)|^2 + sum_j W_j(y) at the K local iterates
-        (at a refused one the value of the last accepted), nan where a local step does not know its
-        energy; empty if it was not tracked
+        (for a rejected iterate the value of the last accepted one), nan if a local step does not
+        know its energy; empty if it was not tracked
     seconds : (4,) time of each of `PHASES`
     """
 
@@ -74,14 +74,14 @@ class Stepper:
         self.local_steps = list(local_steps)
         self._acceleration = acceleration
         self._track = track_objective
-        # a subclass may have whole frames of its own, with the method `run` of `WholeFrames`
+        # a subclass may set another object that has the method `run` of `WholeFrames`
         self._whole: Any
         self._compiled, self._whole = space.compiled(self.local_steps, acceleration)
 
     def step(
         self, state: State, frame: int, on_last_iterate: Callable[[np.ndarray], None] | None = None
     ) -> tuple[State, FrameReport]:
-        """Do ``frame`` (0-based) from ``state``; ``on_last_iterate`` sees the last iterate y."""
+        """Do ``frame`` (0-based) from ``state``; call ``on_last_iterate`` with the last local y."""
         if on_last_iterate is None:
             for done in self._at_once(state, range(frame, frame + 1)):
                 return done
@@ -96,12 +96,12 @@ class Stepper:
         return after, FrameReport(objective, seconds)
 
     def run(self, state: State, frames: range) -> Iterator[tuple[State, FrameReport]]:
-        """Do ``frames`` from ``state``, as `step` without an observer; many in one compiled call.
+        """Yield the state and report after each of ``frames``, several of them per compiled call.
 
-        What a caller does between two of them changes nothing in those that follow.
+        Changes that the caller makes between two frames do not affect the following frames.
         """
         while frames:
-            # a subclass may have steps of its own
+            # a subclass may override `step`
             own = type(self).step is not Stepper.step
             done = () if own else self._at_once(state, frames)
             for after in done or (self.step(state, frames.start),):
@@ -109,7 +109,7 @@ class Stepper:
                 yield after
 
     def _at_once(self, state: State, frames: range) -> Sequence[tuple[State, FrameReport]]:
-        """Do as many of the first frames as one compiled call can; return them, perhaps none."""
+        """Do as many of the first frames as one compiled call can; return their results or ()."""
         if self._whole is None:
             return ()
         q, v, h = state.positions, state.velocities, self.time_step
@@ -117,7 +117,7 @@ class Stepper:
         done = self._whole.run(q, v, frames, h, self.iterations, self._track)
         if done is None:
             return ()
-        # the interpreter's time of the call is shared by the beginnings of its frames
+        # the time outside compiled code is divided equally among the frames, as phase 0
         beside = perf_counter() - started - float(done[3].sum())
         done[3][:, 0] += max(beside, 0.0) / len(done[3])
         return [
@@ -126,7 +126,7 @@ class Stepper:
         ]
 
     def _begin(self, state: State, frame: int) -> tuple[np.ndarray, Solve, np.ndarray]:
-        """Inertial prediction s with held coordinates at their targets, the system, (M/h^2) s."""
+        """Return the prediction s with ``fixed`` coordinates at targets, the system, (M/h^2) s."""
         space, h = self.space, self.time_step
         s = space.predict(state.positions, state.velocities, h)
         fixed, targets = space.fixed(frame, state.positions)
@@ -145,9 +145,9 @@ class Stepper:
         seconds: np.ndarray,
         on_last_iterate: Callable[[np.ndarray], None] | None,
     ) -> tuple[np.ndarray, np.ndarray]:
-        """All iterations of a frame, started at s: the last y and the objective at the iterates.
+        """Do all iterations of a frame from y = s; return the last y and the objective (K,).
 
-        Their times are added to ``seconds``.
+        Their computation times are added to ``seconds``.
         """
         y = self.space.copy(s)
         objective = np.full(self.iterations if self._track else 0, np.nan)
@@ -178,7 +178,7 @@ class Stepper:
         objective: np.ndarray,
         seconds: np.ndarray,
     ) -> None:
-        """Iteration k with local steps of any kind, in place."""
+        """Do iteration k with any local steps: update y, ``objective`` and ``seconds`` in place."""
         space, acceleration = self.space, self._acceleration
         before = perf_counter()
         rhs = space.copy(base)
@@ -196,12 +196,12 @@ class Stepper:
             objective[k : k + 1] = objective[k - 1 : k]
         else:
             elimination.solve(rhs, y)
-            # the last image stays as it is: its objective is known not to rise
+            # the last image is not accelerated: its objective cannot be larger
             if k < self.iterations - 1:
                 acceleration.combine(y)
         seconds[2] += perf_counter() - before
 
     def _finish(self, state: State, y: np.ndarray, frame: int) -> State:
-        """State after the frame: contacts, then the velocities."""
+        """Return the state after the frame: apply contacts, then compute the velocities."""
         self.space.correct(y, state.positions, frame)
         return State(*self.space.end(y, state.positions, self.time_step))

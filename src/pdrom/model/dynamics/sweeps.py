@@ -1,8 +1,8 @@
-"""Forward and backward substitution with panels, three right-hand sides at once.
+"""Forward and backward substitution by panels, for three right-hand sides (x, y, z) at once.
 
 A row of the right-hand side is a register of four lanes (`pdrom.model.compiled.rows`), so that an
-entry of the factor is read once for x, y and z. The instructions of a panel are written out for its
-width: its columns stay in registers while the rows below go by.
+entry of the factor is read once for x, y and z. The instructions of each panel width are unrolled,
+so that the panel's columns stay in registers during the loop over the rows below.
 """
 
 from llvmlite import ir
@@ -16,14 +16,14 @@ from pdrom.model.compiled.rows import NUMBERS, WIDTH, at, doubles, indices, inte
 from pdrom.model.compiled.rows import load as load_row
 
 _INDEX = ir.IntType(64)
-# Columns that a panel may have.
+# Allowed numbers of columns of a panel.
 WIDTHS = (1, 2, 3, 4, 6, 8)
 
 
 class _Panel:
-    """Writes the instructions of a panel of ``width`` columns.
+    """Generator of the LLVM instructions of a panel of ``width`` columns.
 
-    values : of the panel, see `pdrom.model.dynamics.solvers.panels`
+    ``arguments`` are those of `_panel_intrinsic`, as LLVM values.
     """
 
     def __init__(self, context, builder, signature, arguments, width):
@@ -44,19 +44,19 @@ class _Panel:
         return spread(self.builder, self.builder.load(self.builder.gep(pointer, [offset])))
 
     def inverse(self, column):
-        """1 / D of a column."""
+        """Return 1 / D of a column, in all lanes."""
         return self._spread(self._own, self._index(column))
 
     def triangle(self, row, column):
-        """Entry of L inside the panel."""
+        """Return an entry of L in the triangle of the panel, in all lanes."""
         return self._spread(self._own, self._index(self.width + row * (row - 1) // 2 + column))
 
     def pointer(self, offset):
-        """Address of a row of the right-hand side."""
+        """Return the address of the row of the right-hand side at an ``offset`` in numbers."""
         return self.builder.bitcast(self.builder.gep(self._x, [offset]), NUMBERS.as_pointer())
 
     def column(self, k):
-        """Address of the row of the panel's own column."""
+        """Return the address of the row of the right-hand side for column k of the panel."""
         return self.pointer(self.builder.add(self._first, self._index(WIDTH * k)))
 
     def load(self, pointer):
@@ -66,11 +66,11 @@ class _Panel:
         self.builder.store(row, pointer, align=8)
 
     def less(self, a, entry, b):
-        """a - entry b."""
+        """Return a - entry b, lane by lane."""
         return multiply_add(self.builder, self.builder.fneg(entry), b, a)
 
     def rows_below(self):
-        """Loop over the rows below: (pointer to the row, function of a column: entry of L)."""
+        """Loop over the rows below; yield their pointers, with a function: column -> entry of L."""
         builder = self.builder
         with cgutils.for_range_slice(builder, self._start, self._stop, self._index(1)) as (k, _):
             row = builder.sext(builder.load(builder.gep(self._rows, [k])), _INDEX)
@@ -80,7 +80,7 @@ class _Panel:
 
 
 def _panel_intrinsic(write):
-    """An intrinsic ``(width, x, first, rows, start, stop, values, value_start)``."""
+    """Return an intrinsic (width, x, first, rows, start, stop, values, value_start)."""
 
     def typed(_context, width, x, first, rows, start, stop, values, value_start):
         def generate(context, builder, signature, arguments):
@@ -103,7 +103,7 @@ def _panel_intrinsic(write):
 
 
 def _write_forward(panel):
-    """x <- L^-1 x: the panel's columns, then what they take from the rows below."""
+    """Generate x <- L^-1 x: solve for the panel's columns, then update the rows below."""
     columns: list[ir.Value] = []
     for row in range(panel.width):
         value = panel.load(panel.column(row))
@@ -113,7 +113,7 @@ def _write_forward(panel):
             panel.store(value, panel.column(row))
         columns.append(value)
     for pointer, entry in panel.rows_below():
-        # two sums: half the wait for the next panel
+        # two partial sums halve the chain of dependent additions
         sums = [panel.load(pointer), None]
         for k, column in enumerate(columns):
             if sums[k % 2] is None:
@@ -125,7 +125,7 @@ def _write_forward(panel):
 
 
 def _write_backward(panel):
-    """x <- L^-T D^-1 x: what the rows below take from the panel's columns, then these."""
+    """Generate x <- L^-T D^-1 x: subtract the rows below, then solve for the panel's columns."""
     builder = panel.builder
     slots = []
     for k in range(panel.width):
@@ -150,10 +150,10 @@ _backward = _panel_intrinsic(_write_backward)
 
 @compiled(nogil=True)
 def load(beside, indptr, indices, data, targets, loads):
-    """Write coupling times targets to the rows ``beside`` of ``loads``; the others stay zero.
+    """Write the product coupling times ``targets`` to ``loads``, only in the rows ``beside``.
 
-    The coupling is a CSR matrix (``indptr``, ``indices``, ``data``), ``targets`` are (m, 3),
-    ``loads`` rows of four, flat.
+    The coupling is a CSR matrix (``indptr``, ``indices``, ``data``), ``targets`` are (m, 3) m,
+    ``loads`` is a flat array of rows of four numbers, whose other rows are zero.
     """
     for i in beside:
         for axis in range(3):
@@ -166,7 +166,7 @@ def load(beside, indptr, indices, data, targets, loads):
 def _sweep(
     count, first, row_start, value_start, rows, values, size, vertices, loads, x, rhs, y
 ):  # fmt: skip
-    """Do `sweep` with ``count`` panels of ``size`` unknowns; the others are addresses."""
+    """Do `sweep` with ``count`` panels and ``size`` unknowns; other arguments are addresses."""
     first, vertices = integers(first, count + 1), integers(vertices, size)
     row_start, value_start = indices(row_start, count + 1), indices(value_start, count + 1)
     rows, values = integers(rows, row_start[count]), doubles(values, value_start[count])
@@ -187,22 +187,22 @@ def _sweep(
         store(y, WIDTH * at(vertices, i), load_row(x, WIDTH * i))
 
 
-# Called by its address: as a part of each loop it would be compiled with each of them.
+# Called by its address, so that it is not compiled again with each loop that calls it.
 SWEEP = Callback(_sweep, types.void(*(types.intp,) * 12))
 _call = caller(types.void)
 
 
 @compiled(nogil=True)
 def sweep(panels, vertices, loads, x, rhs, y):
-    """Overwrite some rows of ``y`` by A^-1 (rhs - load).
+    """Overwrite the rows ``vertices`` of ``y`` by A^-1 (rhs - loads).
 
     Parameters
     ----------
     panels : see `pdrom.model.dynamics.solvers.panels`
     vertices : (n,) row of ``rhs`` and ``y`` of each unknown, in the order of the factor
-    loads : (4 n,) rows that are taken from the right-hand side, in that order
+    loads : (4 n,) rows that are subtracted from the right-hand side, in the order of the factor
     x : (4 n,) working array
-    rhs, y : rows of four, flat
+    rhs, y : flat arrays of rows of four numbers
     """
     first, row_start, value_start, rows, values, address = panels
     if len(vertices) == 0:

@@ -1,4 +1,4 @@
-"""The global system (M / h^2 + sum_j S_j^T W_j S_j) y = rhs with exactly eliminated vertices."""
+"""The global system (M / h^2 + sum_j S_j^T W_j S_j) y = rhs, with held vertices eliminated."""
 
 from collections.abc import Callable, Sequence
 
@@ -12,16 +12,16 @@ from pdrom.model.dynamics import solvers
 
 DEFAULT_SOLVER = "supernodal"
 
-# A solve that keeps fewer digits than this would move a body that nothing pushes.
+# Largest allowed error of a solve; a larger one would move a body on which no force acts.
 ACCURACY = 1e-6
 
 
 class Elimination:
-    """The system with a fixed set of vertices taken out; one factorisation serves x, y and z.
+    """The system without the vertices ``fixed``; one factorisation is used for x, y and z.
 
     Attributes
     ----------
-    factor : arguments of `pdrom.model.dynamics.sweeps.sweep`; None if another solver is in use
+    factor : arguments of `pdrom.model.dynamics.sweeps.sweep`; None if the solver is not compiled
     coupling : first arguments of `pdrom.model.dynamics.sweeps.load`
     """
 
@@ -46,22 +46,22 @@ class Elimination:
         out[...] = y[self.free]
 
     def set_targets(self, targets: np.ndarray) -> None:
-        """Hold the fixed vertices at ``targets`` (n_fixed, 3) in the solves that follow."""
+        """Set the positions ``targets`` (n_fixed, 3) m of fixed vertices in the next solves."""
         if self._solver is not None:
             self._solver.set_targets(targets)
 
     def solve(self, rhs: np.ndarray, y: np.ndarray) -> None:
-        """Overwrite the free rows of ``y`` (N, 3) with the solution for ``rhs`` (N, 3)."""
+        """Overwrite the rows of ``y`` (N, 3) that are not fixed by the solution for ``rhs``."""
         if self._solver is not None:
             self._solver.solve(rhs, y)
 
 
 def require_accurate(matrix, solve: Callable[[np.ndarray, np.ndarray], object]) -> None:
-    """Raise SolverError if the factored ``matrix`` (n, n) does not return a known solution.
+    """Raise SolverError if ``solve`` does not reproduce a known solution for a ``matrix`` (n, n).
 
     ``solve`` takes a right-hand side (n, 3) and the array that receives the solution.
-    The known solution is a translation: all springs and elements cancel in it and nothing but
-    inertia (and pins) is left, which rounding in the matrix loses first.
+    The known solution is a translation, for which the terms of all elements cancel. Only inertia
+    (and pins) remain, which are lost first by rounding errors in the matrix.
     """
     if matrix.shape[0] == 0:
         return
@@ -77,7 +77,7 @@ def require_accurate(matrix, solve: Callable[[np.ndarray, np.ndarray], object]) 
 
 
 class GlobalSystem:
-    """Matrix of the global step; eliminations are factored once per set of fixed vertices."""
+    """Matrix of the global step, which is factored once for each set of fixed vertices."""
 
     def __init__(
         self,
@@ -97,11 +97,11 @@ class GlobalSystem:
 
     @property
     def factorisations(self) -> int:
-        """Number of factorisations so far."""
+        """Number of factorisations that have been computed."""
         return len(self._cache)
 
     def eliminate(self, fixed: np.ndarray) -> Elimination:
-        """The system without the vertices ``fixed`` (ascending), from the cache if known."""
+        """Return the system without the vertices ``fixed`` (ascending), factored or cached."""
         key = np.ascontiguousarray(fixed, dtype=np.int64).tobytes()
         if key not in self._cache:
             self._cache[key] = Elimination(self.matrix, fixed, self._solver)

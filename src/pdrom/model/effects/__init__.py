@@ -1,4 +1,4 @@
-"""Effects of a scene, loaded by name and only when a scene lists them."""
+"""Registry of effects by their names; a module is imported only when a scene lists its effect."""
 
 from pdrom.core.registry import Registry
 

@@ -1,15 +1,15 @@
-"""Roles of effects, the base classes of each role, and a scene's list of effects.
+"""Base classes of effects, one for each role, and the configuration of a scene's effects.
 
 A scene is a mesh and a list of effects. Each effect is one class with one typed configuration,
-registered under the name that the configuration uses. It plays exactly one role, and the step loop
-calls in each role only the effects that the scene lists:
+registered under the name that the configuration uses. An effect has exactly one role, in which the
+step loop calls it:
 
 =============  ===================================================  =========================
-role           what it gives the step loop                          examples
+role           result that the step loop uses                       examples
 =============  ===================================================  =========================
 `Start`        initial velocity                                     kick
 `Force`        acceleration of the frame                            gravity, wind
-`Boundary`     which vertices are held, and where                   pins, translate, poke
+`Boundary`     held (prescribed) vertices and their positions       pins, translate, poke
 `Contact`      correction of the end-of-frame positions             floor, sphere
 constraint     local projection and its operator                    spring, strain (in
 group                                                               `pdrom.model.constraints`)
@@ -28,12 +28,12 @@ from pdrom.core.yamlfile import ConfigModel, describe, shown
 from pdrom.model.effects import EFFECTS
 from pdrom.model.mesh.types import Length, Mesh
 
-# A vertex no deeper than this part of the extent touches an obstacle and is not inside.
+# A vertex inside an obstacle by at most this fraction of the mesh extent counts as touching it.
 TOUCHING = 1e-6
 
 
 class ScaledWithFrames:
-    """Marks a configuration field that counts frames and follows a change of the frame count."""
+    """Marker of configuration fields that are scaled if the frame count of a scene changes."""
 
 
 FrameNumber = Annotated[int, Field(ge=0, le=1_000_000), ScaledWithFrames()]
@@ -47,11 +47,11 @@ class EffectConfig(ConfigModel):
     effect: str
 
     def with_frames_scaled(self, factor: float) -> Self:
-        """Same effect with every frame number multiplied by ``factor`` (a duration stays >= 1)."""
+        """Return the effect with all frame numbers times ``factor``; nonzero ones stay >= 1."""
         changes: dict[str, Any] = {}
         for name, field in type(self).model_fields.items():
             value = getattr(self, name)
-            # also the markers inside ``FrameNumber | None``
+            # a field of type ``FrameNumber | None`` has the marker inside the union
             inside = getattr(field.annotation, "__args__", ())
             nested = [m for part in inside for m in getattr(part, "__metadata__", ())]
             if value and any(isinstance(m, ScaledWithFrames) for m in (*field.metadata, *nested)):
@@ -77,7 +77,7 @@ class EffectConfig(ConfigModel):
         return self
 
     def body(self, low: np.ndarray, high: np.ndarray) -> Mesh | None:
-        """Surface that pictures of the region from ``low`` to ``high`` (3,) m show."""
+        """Return the surface to draw in the region from ``low`` to ``high`` (3,) m, or None."""
         return None
 
 
@@ -87,7 +87,7 @@ class Effect(ABC):
     Config: type[EffectConfig]
 
     in_subspace: ClassVar[bool] = True
-    """Whether a position subspace takes the effect; one that it does not take is refused there."""
+    """Whether the effect is supported in a position subspace (an error is raised otherwise)."""
 
     def __init__(self, config: EffectConfig, mesh: Mesh, masses: np.ndarray) -> None:
         """Bind ``config`` to a mesh whose vertices have ``masses`` (N,) kg."""
@@ -96,7 +96,7 @@ class Effect(ABC):
 
 
 class Start(Effect):
-    """Sets the state before the first frame."""
+    """Effect on the state before the first frame."""
 
     @abstractmethod
     def velocity(self) -> np.ndarray:
@@ -104,64 +104,64 @@ class Start(Effect):
 
 
 class Force(Effect):
-    """Accelerates the vertices.
+    """Effect that accelerates the vertices.
 
-    A position subspace takes forces that are affine in the velocity, with a rate for each vertex.
+    A position subspace supports forces that are affine in the velocity, with a rate per vertex.
     """
 
     time_step: float
-    """Step h of the run in seconds, which the scene sets: no force may overshoot in a frame."""
+    """Time step h of the run in seconds, set by the scene; some forces are limited by it."""
 
     rate: float | np.ndarray | None = None
-    """Rate c, a number or (N,) 1/s, of an acceleration that is -c v and a part that does not depend
-    on the motion; None for any other."""
+    """Rate c, a number or (N,) 1/s, if the acceleration is -c v plus a term that does not depend on
+    positions or velocities; None for any other force."""
 
     @abstractmethod
     def acceleration(self, positions: np.ndarray, velocities: np.ndarray) -> np.ndarray:
-        """Acceleration, (3,) or (N, 3) m/s^2, at ``positions`` m and ``velocities`` m/s (N, 3)."""
+        """Return (3,) or (N, 3) m/s^2 at ``positions`` (N, 3) m and ``velocities`` (N, 3) m/s."""
 
     def potential(self, positions: np.ndarray, masses: np.ndarray) -> float:
-        """Potential energy, J, at ``positions`` (N, 3) m of ``masses`` (N,) kg, up to a constant.
+        """Return the potential energy, J, at ``positions`` (N, 3) m of ``masses`` (N,) kg.
 
-        A force that has no potential (damping) adds none.
+        It is defined up to a constant, and zero for a force without potential (damping).
         """
         return 0.0
 
 
 class Boundary(Effect):
-    """Prescribes positions. Held vertices are eliminated from the system, not penalised."""
+    """Effect that prescribes positions of ("holds") vertices, by elimination, not by a penalty."""
 
     vertices: np.ndarray
-    """All vertices that the effect may ever hold, ascending (n,) int64."""
+    """All vertices that the effect holds in any frame, ascending (n,) int64."""
 
     side: str | None = None
-    """Side of the rest shape that chose the vertices; None if they were listed or computed."""
+    """Side of the rest shape if the vertices were selected as a side of it; else None."""
 
     moves: bool
-    """Whether the targets move while held."""
+    """Whether the targets change from frame to frame."""
 
     @abstractmethod
     def active(self, frame: int) -> bool:
-        """Whether anything is held in ``frame`` (0-based: the step from state f to f + 1)."""
+        """Return whether vertices are held in ``frame`` f (0-based: step from state f to f + 1)."""
 
     @abstractmethod
     def held(self, frame: int) -> np.ndarray:
-        """Vertices that are held in an active ``frame``, (n,) int64."""
+        """Return the vertices (n,) int64 that are held in ``frame``, in which `active` is true."""
 
     @abstractmethod
     def targets(self, frame: int, current: np.ndarray) -> np.ndarray:
-        """Positions (n, 3) m of the held vertices at the end of ``frame``.
+        """Return the positions (n, 3) m of the held vertices at the end of ``frame``.
 
-        ``current`` (n, 3) are their positions at its beginning; the effect remembers where they
-        were when it took hold of them.
+        ``current`` (n, 3) m are their positions at its beginning. The effect stores them in the
+        first frame of a hold.
         """
 
     def takes_hold(self, frame: int) -> bool:
-        """Whether the targets of ``frame`` depend on the positions at its beginning."""
+        """Return whether a hold begins in ``frame``: targets depend on the positions before it."""
         return True
 
     def path(self, frames: range, current: np.ndarray) -> np.ndarray:
-        """`targets` (f, n, 3) of ``frames``; only the first may take hold of ``current`` (n, 3)."""
+        """Return targets (f, n, 3) m of f ``frames``; a hold may begin in the first one only."""
         first = self.targets(frames.start, current)
         if not self.moves:
             return np.broadcast_to(first, (len(frames), *first.shape))
@@ -169,26 +169,26 @@ class Boundary(Effect):
 
     @abstractmethod
     def units(self) -> list[np.ndarray]:
-        """Sets of vertices that are always held together."""
+        """Return the sets of vertices that are always held at the same time."""
 
 
 class Contact(Effect):
-    """Corrects positions at the end of a frame. Held vertices have infinite mass: none moves."""
+    """Effect that corrects positions at the end of a frame, except those of held vertices."""
 
     each_alone: ClassVar[bool] = True
-    """Whether a vertex is corrected by itself, whatever the others do."""
+    """Whether the correction of a vertex does not depend on other vertices."""
 
     height: float | None = None
-    """y in metres of a contact that does nothing but lift vertices to it."""
+    """Height y in metres if the contact only lifts lower vertices to this height; else None."""
 
     def gaps(self, points: np.ndarray) -> np.ndarray:
-        """Distances (n,) m of ``points`` (n, 3) m to the obstacle; inf if there is none."""
+        """Return distances (n,) m of ``points`` (n, 3) m to the obstacle; inf without obstacle."""
         return np.full(len(points), np.inf)
 
     def apply(self, positions: np.ndarray, before: np.ndarray, held: np.ndarray) -> None:
-        """`correct` all vertices but those ``held`` (n,), in place.
+        """Correct all vertices except the ``held`` ones (n,), in place.
 
-        A contact that shares a correction between vertices overrides this.
+        A contact that divides a correction between several vertices overrides this method.
 
         Parameters
         ----------
@@ -200,15 +200,15 @@ class Contact(Effect):
 
     @abstractmethod
     def correct(self, positions: np.ndarray, before: np.ndarray) -> None:
-        """Change positions (N, 3) m in place; ``before`` (N, 3) are those at the frame's beginning.
+        """Change ``positions`` (N, 3) m in place; ``before`` (N, 3) m are those before the frame.
 
-        What a scene lists later has the last word.
+        Contacts are applied in the order of the scene's effects.
         """
 
     def doubt(self, rest: np.ndarray, free: np.ndarray) -> str:
-        """Say what is odd about ``rest`` (N, 3) m with its ``free`` vertices (n,); "" if nothing.
+        """Return a warning about positions ``rest`` (N, 3) m of ``free`` vertices (n,), or "".
 
-        By default: vertices that the first frame moves, whatever the forces.
+        By default the warning is about vertices that the contact moves in the first frame.
         """
         moved = rest.copy()
         self.correct(moved, rest)
@@ -223,7 +223,7 @@ class Contact(Effect):
 
 
 def effect_config(entry: Any, index: int) -> EffectConfig:
-    """Typed configuration of ``entry``, number ``index`` of ``effects``; ValueError for a fault."""
+    """Return the typed configuration of ``entry``, effects[``index``]; ValueError for a fault."""
     if isinstance(entry, EffectConfig):
         return entry
     if not isinstance(entry, dict) or not isinstance(entry.get("effect"), str):
@@ -249,7 +249,7 @@ EffectConfigs = Annotated[tuple[SerializeAsAny[EffectConfig], ...], BeforeValida
 
 
 def held_vertices(boundaries: Sequence[Boundary], frame: int) -> np.ndarray:
-    """Vertices that any of the ``boundaries`` holds in ``frame``, ascending (n,) int64."""
+    """Return the vertices that any of ``boundaries`` holds in ``frame``, ascending (n,) int64."""
     held = [b.held(frame) for b in boundaries if b.active(frame)]
     return np.unique(np.concatenate(held)) if held else np.empty(0, dtype=np.int64)
 
@@ -257,9 +257,9 @@ def held_vertices(boundaries: Sequence[Boundary], frame: int) -> np.ndarray:
 def held_targets(
     boundaries: Sequence[Boundary], frame: int, positions: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The vertices that are held in ``frame``, as `held_vertices`, and their targets (n, 3) m.
+    """Return the vertices (n,) that ``boundaries`` hold in ``frame`` and their targets (n, 3) m.
 
-    ``positions`` (N, 3) m are those at the frame's beginning; ``boundaries`` are the scene's.
+    ``positions`` (N, 3) m are those at the beginning of the frame.
     """
     vertices, path = held_path(boundaries, range(frame, frame + 1), positions)
     return vertices, path[0]
@@ -268,10 +268,10 @@ def held_targets(
 def held_path(
     boundaries: Sequence[Boundary], frames: range, positions: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """`held_targets` of the first of ``frames``, and of those whose targets are known by then.
+    """Return the held vertices (m,) and their targets (n, m, 3) m in the first n >= 1 ``frames``.
 
-    Targets are (n, m, 3) m for n >= 1 frames: up to the first in which others are held, or in which
-    any are taken hold of.
+    The n frames end before the first one in which other vertices are held or a hold begins, as its
+    targets are not yet known.
 
     Parameters
     ----------
@@ -294,5 +294,5 @@ def held_path(
         known += 1
     paths = [b.path(frames[:known], q) for b, q in zip(active, current, strict=True)]
     if single:
-        return vertices, np.array(paths[0], order="C")  # a view is another type, compiled again
+        return vertices, np.array(paths[0], order="C")  # no view: a new type is compiled anew
     return vertices, np.concatenate([np.empty((known, 0, 3)), *paths], axis=1)[:, first]

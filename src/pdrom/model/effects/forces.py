@@ -12,7 +12,7 @@ from pdrom.model.mesh.types import Mesh, barycentric_areas
 
 
 class Gravity(Force):
-    """An equal acceleration for every vertex."""
+    """A uniform acceleration of all vertices."""
 
     class Config(EffectConfig):
         """``acceleration`` in m/s^2."""
@@ -47,7 +47,7 @@ class Gravity(Force):
 
 
 class Damping(Force):
-    """Acceleration -c v, explicit in the velocity of the frame's beginning."""
+    """Acceleration -c v with the velocity v at the beginning of the frame (explicit)."""
 
     class Config(EffectConfig):
         """``rate`` c in 1/s; the explicit treatment needs c h < 2, another step is refused."""
@@ -71,10 +71,10 @@ class Damping(Force):
 
 
 class Drag(Force):
-    """Force -c A_v v on each vertex, A_v a third of the area of its triangles at rest.
+    """Force -c A_v v on each vertex, where A_v is a third of the rest area of its triangles.
 
-    Taken over a frame as the exact decay of a free vertex, v exp(-c A_v h / m_v), so that no
-    coefficient and no step turns a velocity round. Inside a volume A_v is zero.
+    Over a frame a free vertex has the exact decay v exp(-c A_v h / m_v), so that the velocity never
+    changes its sign. Vertices inside a volume have A_v = 0.
     """
 
     class Config(EffectConfig):
@@ -90,7 +90,7 @@ class Drag(Force):
 
     @cached_property
     def rate(self) -> np.ndarray:  # type: ignore[override]
-        """Velocity lost in a frame over its first value and the step, (N,) 1/s."""
+        """Relative loss of velocity in a frame, divided by the time step, (N,) 1/s."""
         return -np.expm1(-self._rates * self.time_step) / self.time_step
 
     def acceleration(self, positions: np.ndarray, velocities: np.ndarray) -> np.ndarray:
@@ -98,17 +98,17 @@ class Drag(Force):
 
 
 class Wind(Force):
-    """Force 1/2 rho C A |w_n| w_n n on each triangle, a third of it on each corner.
+    """Force 1/2 rho C A |w_n| w_n n on each triangle, divided equally among its corners.
 
-    n is the triangle's normal and A its area, both at the beginning of the frame, and w_n the
-    component along n of the wind relative to the triangle's mean velocity; a triangle edge-on to
-    the wind feels nothing.
+    n is the triangle's normal and A its area, both at the beginning of the frame. w_n is the normal
+    component of the wind velocity minus the triangle's mean velocity; a triangle parallel to the
+    wind has no force.
 
     An explicit step would overshoot in strong wind. The force is divided by 1 + h kappa |w_n|, with
-    kappa the largest of rho C A_v / (2 m_v) at the corners and A_v a third of the area around a
-    vertex: exact for a free flat sheet, and otherwise the map of the velocities is the identity
-    less a symmetric positive matrix smaller than one (in the inner product of the masses), so that
-    the energy of the motion relative to the wind never grows, whatever wind, step and masses are.
+    kappa the largest value of rho C A_v / (2 m_v) at the corners and A_v a third of the area around
+    a vertex. This is exact for a free flat sheet. Otherwise velocities relative to the wind are
+    multiplied by the identity minus a symmetric positive matrix smaller than one (in the inner
+    product of the masses), so that their energy never grows, for any wind, step and masses.
     """
 
     class Config(EffectConfig):
@@ -142,6 +142,6 @@ class Wind(Force):
         )
 
     def _at_vertices(self, values: np.ndarray) -> np.ndarray:
-        """Sum over the triangles around each vertex, (N,)."""
+        """Return the sums (N,) of triangle ``values`` over the triangles around each vertex."""
         corners = np.repeat(values, 3)
         return np.bincount(self._triangles.ravel(), corners, minlength=len(self._masses))

@@ -1,4 +1,4 @@
-"""Vertices that are held for a range of frames: still, or moved by a handle."""
+"""Boundary effects that hold vertices for a range of frames, at rest or along a motion (handle)."""
 
 from abc import abstractmethod
 from collections.abc import Sequence
@@ -27,7 +27,7 @@ class HoldConfig(EffectConfig):
 
 
 class Hold(Boundary):
-    """Base of pins and handles: remembers the positions at which it took hold."""
+    """Base class of pins and handles, which stores the positions at the beginning of the hold."""
 
     def __init__(self, config: HoldConfig, mesh: Mesh, masses: np.ndarray) -> None:
         super().__init__(config, mesh, masses)
@@ -55,11 +55,11 @@ class Hold(Boundary):
 
     @abstractmethod
     def _moved(self, anchor: np.ndarray, frame: int) -> np.ndarray:
-        """Positions (n, 3) at the end of ``frame`` of vertices that were taken at ``anchor``."""
+        """Return targets (n, 3) m of ``frame``; ``anchor`` are the positions before the hold."""
 
 
 class Pins(Hold):
-    """Vertices held where they were when the pin took hold."""
+    """Vertices that are fixed at their positions at the beginning of the hold."""
 
     class Config(HoldConfig):
         """See `HoldConfig`."""
@@ -82,12 +82,12 @@ class HandleConfig(HoldConfig):
     over: Annotated[FrameNumber, Field(ge=1)]
 
     def progress(self, frame: int) -> float:
-        """Fraction of the motion done at the end of ``frame``, in [0, 1]."""
+        """Return the fraction in [0, 1] of the motion that is done at the end of ``frame``."""
         return min(1.0, (frame + 1 - self.start) / self.over)
 
 
 class Translate(Hold):
-    """Vertices moved at constant speed by an offset."""
+    """Held vertices that move by an offset at constant speed."""
 
     class Config(HandleConfig):
         """``offset`` in metres."""
@@ -118,7 +118,7 @@ AXES = {"x": 0, "y": 1, "z": 2}
 
 
 class Rotate(Hold):
-    """Vertices turned at constant angular speed about an axis through the rest shape's centre."""
+    """Held vertices that rotate at constant speed about an axis through the rest shape's centre."""
 
     class Config(HandleConfig):
         """``degrees`` counted right-handed about ``axis``."""

@@ -1,4 +1,4 @@
-"""A handle along positions and rotations over time."""
+"""A handle: held vertices that follow given offsets and rotations over time."""
 
 from collections.abc import Sequence
 from typing import Annotated, Literal, Self
@@ -28,11 +28,11 @@ class Key(ConfigModel):
 
 
 class Keyframes(Hold):
-    """Vertices that move as a rigid body from key to key, and hold still after the last one.
+    """Held vertices that move as a rigid body from key to key, and rest after the last key.
 
     Offsets and rotation vectors are interpolated: ``linear``, with a kink at each key, or
-    ``smooth``, by monotone cubics without overshoot (Fritsch and Butland 1984). Angles beyond half
-    a turn are kept, since rotation vectors are interpolated, not rotations.
+    ``smooth``, by monotone cubics without overshoot (Fritsch and Butland 1984). Angles above 180
+    degrees are possible, since rotation vectors are interpolated, not rotations.
     """
 
     class Config(HoldConfig):
@@ -50,7 +50,7 @@ class Keyframes(Hold):
             return self
 
         def with_frames_scaled(self, factor: float) -> Self:
-            """Scale the frames of the keys by ``factor``; they stay apart by one frame at least."""
+            """Return the effect with key frames times ``factor``, at least one frame apart."""
             keys: list[Key] = []
             for key in self.keys:
                 first = keys[-1].at + 1 if keys else 1

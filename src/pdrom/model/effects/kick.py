@@ -1,4 +1,4 @@
-"""A smooth random initial velocity, for held-out trajectories."""
+"""A smooth random initial velocity, used for test trajectories that are not trained on."""
 
 from typing import Annotated, Literal
 
@@ -10,10 +10,10 @@ from pdrom.model.mesh.types import Mesh
 
 
 class Kick(Start):
-    """Random combination of the fields 1, x, y, z, xy, yz, zx (scaled coordinates), seeded.
+    """Initial velocity: seeded random combination of 1, x, y, z, xy, yz, zx (scaled coordinates).
 
-    Low-degree polynomials excite what a slow motion of the whole body does and leave the
-    element-scale noise out.
+    Low-degree polynomials excite slow motions of the whole body, without noise at the scale of
+    elements.
     """
 
     class Config(EffectConfig):

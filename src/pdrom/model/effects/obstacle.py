@@ -1,4 +1,4 @@
-"""Plane, sphere and box: vertices stop at a convex body, with Coulomb friction; and a floor."""
+"""Contacts of vertices with a plane, sphere or box, with Coulomb friction, and with a floor."""
 
 from abc import abstractmethod
 from typing import Annotated, Literal, Self
@@ -10,12 +10,12 @@ from pdrom.model.effects.base import Contact, EffectConfig, Vector
 from pdrom.model.mesh.selection import require_direction, require_ordered
 from pdrom.model.mesh.types import Length, Mesh, PositiveLength
 
-# A vertex that began a frame no deeper than this part of the extent began it outside.
+# A vertex at a depth of at most this fraction of the mesh extent counts as outside.
 SLACK = 1e-9
 
 Entries = tuple[np.ndarray, np.ndarray, np.ndarray]
-"""Hits (n,) bool, points (n, 3) m, outward unit normals (n, 3) of paths into a body; the latter two
-mean nothing for a path that does not enter."""
+"""For n paths: whether each enters a body (n,), entry points (n, 3) m and outward unit normals
+(n, 3) there; points and normals are meaningless for a path that does not enter."""
 
 
 class ObstacleConfig(EffectConfig):
@@ -25,13 +25,13 @@ class ObstacleConfig(EffectConfig):
 
 
 class Obstacle(Contact):
-    """A convex body that does not move; vertices, not edges or triangles, are kept out of it.
+    """A fixed convex body that vertices, but not edges and triangles, cannot enter.
 
-    A vertex whose path of the frame enters the body goes on in the tangent plane at the point of
-    entry, also if the path leaves the body again: no step is too large. A vertex that began the
-    frame inside goes to the nearest point of the surface. Either is moved by some depth d along the
-    normal; its tangential motion along the surface is shortened by mu d, at most to nothing, which
-    is Coulomb's law for the impulses m d / h of the frame. Impacts are inelastic.
+    A vertex whose straight path of a frame enters the body continues in the tangent plane at the
+    entry point, even if the path leaves the body again, so that fast vertices do not pass through.
+    A vertex that is inside at the beginning of a frame goes to the nearest surface point. Both
+    corrections move it by a depth d along the normal and shorten its tangential motion by mu d, to
+    not less than zero: Coulomb's law for the impulse m d / h of the frame. Impacts are inelastic.
     """
 
     def __init__(self, config: ObstacleConfig, mesh: Mesh, masses: np.ndarray) -> None:
@@ -61,7 +61,7 @@ class Obstacle(Contact):
             positions[inside] = lifted - along + self._braked(along, depth)
 
     def _braked(self, along: np.ndarray, depth: np.ndarray) -> np.ndarray:
-        """Tangential motion (n, 3) after friction."""
+        """Return the tangential motion ``along`` (n, 3) m after friction at ``depth`` (n,) m."""
         mu = self.config.friction
         if mu == 0.0:
             return along
@@ -72,19 +72,19 @@ class Obstacle(Contact):
 
     @abstractmethod
     def depths(self, points: np.ndarray) -> np.ndarray:
-        """Distance (n,) of ``points`` (n, 3) m inside to the surface; not positive outside."""
+        """Return distances (n,) m to the surface of ``points`` (n, 3) m inside; <= 0 outside."""
 
     @abstractmethod
     def normals(self, points: np.ndarray) -> np.ndarray:
-        """Outward unit normals (n, 3) at the surface points nearest to ``points`` (n, 3) inside."""
+        """Return outward unit normals (n, 3) at the surface points nearest to inner ``points``."""
 
     @abstractmethod
     def entries(self, start: np.ndarray, end: np.ndarray) -> Entries:
-        """Entry into the body of straight paths from ``start`` outside to ``end`` (n, 3)."""
+        """Return where paths from ``start`` (n, 3) m, outside, to ``end`` (n, 3) m enter."""
 
 
 class Plane(Obstacle):
-    """Vertices stay on the side of a plane that its normal points to; see `Obstacle`."""
+    """The half space behind a plane, which vertices cannot enter; see `Obstacle`."""
 
     class Config(ObstacleConfig):
         """``point`` on the plane in metres, ``normal`` of any length."""
@@ -122,7 +122,7 @@ UP = np.array([0.0, 1.0, 0.0])
 
 
 class Sphere(Obstacle):
-    """Vertices stay out of a ball; see `Obstacle`."""
+    """A ball, which vertices cannot enter; see `Obstacle`."""
 
     class Config(ObstacleConfig):
         """``centre`` and ``radius`` in metres."""
@@ -142,20 +142,20 @@ class Sphere(Obstacle):
         return self.config.radius - np.linalg.norm(points - self._centre, axis=1)
 
     def normals(self, points: np.ndarray) -> np.ndarray:
-        """Normals (n, 3) at ``points`` (n, 3) m, at the centre itself upwards."""
+        """Return outward unit normals (n, 3) at ``points`` (n, 3) m; at the centre: upwards."""
         arm = points - self._centre
         length = np.linalg.norm(arm, axis=1)[:, None]
         return np.where(length > 0.0, arm / np.where(length > 0.0, length, 1.0), UP)
 
     def entries(self, start: np.ndarray, end: np.ndarray) -> Entries:
-        """Smaller root t of |start + t (end - start) - centre| = radius, if in [0, 1]."""
+        """Return entries at the smaller root t in [0, 1] of |start + t (end - start) - c| = r."""
         arm, path = start - self._centre, end - start
         square = np.einsum("ij,ij->i", path, path)
         inwards = -np.einsum("ij,ij->i", arm, path)
         outside = np.einsum("ij,ij->i", arm, arm) - self.config.radius**2
         root = inwards**2 - square * outside
         meets = (inwards > 0.0) & (root >= 0.0)
-        # not the difference of inwards and the root, which cancel near the surface
+        # this form of the root avoids the cancellation of inwards - sqrt(root) near the surface
         divisor = np.where(meets, inwards + np.sqrt(np.where(meets, root, 0.0)), 1.0)
         fraction = np.clip(np.where(meets, outside / divisor, 0.0), 0.0, None)
         points = start + fraction[:, None] * path
@@ -163,7 +163,7 @@ class Sphere(Obstacle):
 
 
 class Box(Obstacle):
-    """Vertices stay out of a box; see `Obstacle`. It may be as thin as a plate."""
+    """A box, possibly as thin as a plate, which vertices cannot enter; see `Obstacle`."""
 
     class Config(ObstacleConfig):
         """Corners ``lower`` and ``upper`` in metres."""
@@ -187,23 +187,23 @@ class Box(Obstacle):
         return self._to_faces(points).min(axis=1)
 
     def _to_faces(self, points: np.ndarray) -> np.ndarray:
-        """Distance (n, 6) to the lower and the upper faces, x, y, z; negative beyond them."""
+        """Return distances (n, 6) m to lower x, y, z and upper x, y, z faces; negative outside."""
         return np.hstack([points - self._lower, self._upper - points])
 
     def normals(self, points: np.ndarray) -> np.ndarray:
-        """Normals (n, 3) of the faces nearest to ``points`` (n, 3) m; of equals the first."""
+        """Return normals (n, 3) of the faces nearest to ``points``, the first if equally near."""
         face = self._to_faces(points).argmin(axis=1)
         return _axis_vectors(face % 3, np.where(face < 3, -1.0, 1.0))
 
     def entries(self, start: np.ndarray, end: np.ndarray) -> Entries:
-        """Entries of straight paths from ``start`` to ``end`` (n, 3), see `Entries`.
+        """Return the `Entries` of straight paths from ``start`` to ``end`` (n, 3) m.
 
-        A path enters where it has crossed the nearer faces of all three axes.
+        A path enters the box at the last of its crossings with the nearer faces of the three axes.
         """
         path, rows = end - start, np.arange(len(start))
         near_face = np.where(path > 0.0, self._lower, self._upper)
         far_face = np.where(path > 0.0, self._upper, self._lower)
-        # a path that hardly moves along an axis, or not at all: between the faces from -inf to inf
+        # a path that does not move along an axis is between its faces for all t or for none
         with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
             near, far = (near_face - start) / path, (far_face - start) / path
             within = (start >= self._lower) & (start <= self._upper)
@@ -211,7 +211,7 @@ class Box(Obstacle):
             far = np.where(path != 0.0, far, np.inf)
             axis = near.argmax(axis=1)
             fraction, moved = near[rows, axis], path[rows, axis]
-            # a little inside the face still is on it
+            # a start that is inside the face by round-off counts as on the face
             on_face = fraction * np.abs(moved) >= -self._slack
         hits = (moved != 0.0) & on_face & (fraction <= 1.0) & (far.min(axis=1) >= fraction)
         points = start + np.clip(np.where(hits, fraction, 0.0), 0.0, None)[:, None] * path
@@ -220,22 +220,22 @@ class Box(Obstacle):
 
 
 def _axis_vectors(axes: np.ndarray, signs: np.ndarray) -> np.ndarray:
-    """Vectors (n, 3) along the axes (n,) 0, 1 or 2."""
+    """Return unit vectors (n, 3) along the ``axes`` (n,), 0, 1 or 2, times ``signs`` (n,)."""
     return np.eye(3)[axes] * signs[:, None]
 
 
-RINGS = 24  # steps of a ball from pole to pole; twice as many corners around
+RINGS = 24  # intervals of a drawn sphere from pole to pole; it has twice as many around
 
 
 def square(point: np.ndarray, normal: np.ndarray, low: np.ndarray, high: np.ndarray) -> Mesh:
-    """The part of a plane that is seen from the region between ``low`` and ``high`` (3,) m.
+    """Return a square in a plane, to draw the plane near the box from ``low`` to ``high`` (3,) m.
 
-    A square about the middle of the region, seen along the normal, that covers it from every side.
+    Its centre is the centre of the box projected onto the plane, its side the box diagonal.
 
     Parameters
     ----------
-    point : (3,) m, on the plane
-    normal : (3,)
+    point : (3,) m, any point of the plane
+    normal : (3,), of any length
     """
     normal = normal / np.linalg.norm(normal)
     middle, reach = 0.5 * (low + high), np.linalg.norm(high - low)
@@ -249,7 +249,7 @@ def square(point: np.ndarray, normal: np.ndarray, low: np.ndarray, high: np.ndar
 
 
 def ball(centre: np.ndarray, radius: float) -> Mesh:
-    """A sphere about ``centre`` (3,) m in circles of latitude; corners at ``radius`` m."""
+    """Return a triangulated sphere with vertices at ``radius`` m from ``centre`` (3,) m."""
     around = 2 * RINGS
     polar = np.pi * np.arange(1, RINGS)[:, None] / RINGS
     turn = 2.0 * np.pi * np.arange(around)[None] / around
@@ -268,7 +268,7 @@ def ball(centre: np.ndarray, radius: float) -> Mesh:
 
 
 def cuboid(lower: np.ndarray, upper: np.ndarray) -> Mesh:
-    """A box along the axes between the corners ``lower`` and ``upper`` (3,) m."""
+    """Return the surface of an axis-parallel box with corners ``lower`` and ``upper`` (3,) m."""
     upwards = np.array([[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
     faces = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
     triangles = [[f[0], *pair] for f in faces for pair in (f[1:3], f[2:4])]
@@ -276,10 +276,10 @@ def cuboid(lower: np.ndarray, upper: np.ndarray) -> Mesh:
 
 
 class Floor(Contact):
-    """Lifts vertices that ended a frame below the floor back onto it.
+    """A contact that lifts vertices below a horizontal floor onto it at the end of a frame.
 
-    The velocity is taken from the corrected positions, so that the impact is inelastic. Acting
-    after the iterations, the floor leaves the objective of the local/global loop alone.
+    Velocities are computed from the corrected positions, so that impacts are inelastic. As the
+    floor acts after the iterations, it does not change the objective of the local/global loop.
     """
 
     class Config(EffectConfig):

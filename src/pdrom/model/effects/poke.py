@@ -1,4 +1,4 @@
-"""One vertex after the other is pushed back and forth."""
+"""A boundary effect that moves single vertices back and forth, one after the other."""
 
 from collections.abc import Sequence
 from typing import Annotated, Literal, Self
@@ -12,15 +12,15 @@ from pdrom.model.effects.hold import AXES
 from pdrom.model.mesh.selection import Selection, farthest_points, select_vertices
 from pdrom.model.mesh.types import Length, Mesh
 
-# displacement over amplitude at equally spaced times: 0 -> -z -> +z -> -z -> 0
+# displacement divided by amplitude, at equally spaced times: 0 -> -z -> +z -> -z -> 0
 KNOTS = (0.0, -1.0, 1.0, -1.0, 0.0)
 
 
 class Poke(Boundary):
-    """Moves a vertex 0 -> -z -> +z -> -z -> 0, lets go, and goes on to the next.
+    """Moves a vertex 0 -> -z -> +z -> -z -> 0, releases it, and continues with the next vertex.
 
-    The vertices follow farthest-point sampling from the centre, without those of ``avoid``. The
-    preprint gives no speeds: amplitude, frames and order are this study's choice.
+    Vertices are chosen by farthest-point sampling from the centre, except those in ``avoid``. The
+    reproduced preprint gives no speeds; amplitude, frames and order are chosen by this study.
     """
 
     class Config(EffectConfig):

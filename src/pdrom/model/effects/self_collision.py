@@ -1,4 +1,4 @@
-"""Vertices of one body keep their distance."""
+"""Self-collision: vertices of the mesh keep a minimal distance from each other."""
 
 from typing import Annotated, Literal
 
@@ -9,27 +9,27 @@ from pydantic import Field
 from pdrom.model.effects.base import Contact, EffectConfig
 from pdrom.model.mesh.types import MAX_LENGTH, MIN_LENGTH, Mesh
 
-# Searches for close pairs in a frame, and sweeps over the pairs of each search, at most.
+# Largest number of searches for close pairs per frame, and of sweeps over the pairs per search.
 SEARCHES, SWEEPS = 20, 100
-# Pairs are looked for within this multiple of the thickness, so that a sweep meets no others.
+# Radius of the search for pairs over the thickness; sweeps may bring these pairs closer.
 REACH = 1.25
-# A sweep ends when no pair is closer than this part of the thickness.
+# Sweeps end when no pair is closer than this fraction of the thickness.
 ENOUGH = 0.95
-# Vertices of a triangle with edges of length one are no farther than this from its points.
+# Largest distance of a point of an equilateral triangle with unit edges to its nearest vertex.
 COVER = 1.0 / np.sqrt(3.0)
 
 
 class SelfCollision(Contact):
-    """Pairs of vertices farther apart at rest than the thickness end no frame closer than it.
+    """Contact that separates pairs of vertices closer than the thickness but not so at rest.
 
-    Close pairs (found by a k-d tree) are moved apart along the line between them, each vertex by
-    the share of its inverse mass, which is zero for a held one: otherwise momentum is kept. The
-    sweeps over the pairs, in the order of their vertices, are repeated until every distance is at
-    least `ENOUGH` of the thickness. Where many are crowded together that may take further frames.
+    Close pairs (found by a k-d tree) are moved apart along their connecting line, in proportion to
+    their inverse masses (zero for held vertices); momentum is conserved if none is held. Sweeps
+    over the pairs, in the order of their vertices, are repeated until all distances are at least
+    `ENOUGH` times the thickness; for many pairs in a small region this may take several frames.
 
-    A pair that changed sides during the frame is put back. Vertices stand for the surface:
-    nothing slips between them as long as the thickness is above 0.58 edge lengths and no pair moves
-    farther towards each other than the thickness in a frame.
+    A pair that changed sides during the frame is moved back. Only vertices collide: no vertex can
+    pass between others if the thickness is above 0.58 edge lengths and no pair approaches by more
+    than the thickness in a frame.
     """
 
     class Config(EffectConfig):
@@ -49,13 +49,13 @@ class SelfCollision(Contact):
         self._needed = COVER * np.linalg.norm(edges[:, 0] - edges[:, 1], axis=1).max()
 
     def doubt(self, rest: np.ndarray, free: np.ndarray) -> str:
-        """Say which thickness nothing slips through, where the scene's is less.
+        """Return a warning with the thickness that is needed, "" if the scene's is sufficient.
 
-        ``rest`` and ``free`` as in `Contact.doubt`.
+        ``rest`` and ``free`` are as in `Contact.doubt`.
         """
         if self._thickness >= self._needed:
             return ""
-        # rounded up, so that what the message says is enough
+        # round up, so that the thickness in the message is sufficient
         step = 10.0 ** (np.floor(np.log10(self._needed)) - 1.0)
         return (
             f"with thickness {self._thickness:g} a vertex can pass between others; at least "
@@ -78,7 +78,7 @@ class SelfCollision(Contact):
                 return
 
     def _pairs(self, positions: np.ndarray) -> np.ndarray:
-        """Pairs (n, 2) that are close now and were not at rest, in lexicographic order."""
+        """Return vertex pairs (n, 2) that are close, but not at rest, in lexicographic order."""
         if not np.isfinite(positions).all():
             return np.empty((0, 2), dtype=np.int64)
         from scipy.spatial import cKDTree
@@ -91,7 +91,7 @@ class SelfCollision(Contact):
 
 @njit(cache=True)
 def _separate(q, before, pairs, inverse_masses, thickness, enough, sweeps):
-    """Move close ``pairs`` of q apart in place; the closest distance that the first sweep met."""
+    """Move close ``pairs`` of q apart in place; return the least distance in the first sweep."""
     first = thickness
     for sweep in range(sweeps):
         closest = thickness
@@ -107,7 +107,7 @@ def _separate(q, before, pairs, inverse_masses, thickness, enough, sweeps):
             length = np.sqrt(ex * ex + ey * ey + ez * ez)
             gap = thickness - distance
             if length > 0.0 and dx * ex + dy * ey + dz * ez <= 0.0:
-                # it passed through, or its side cannot be determined: back to where it came from
+                # the pair changed sides, or its side is undefined: move it back to its old side
                 along = (dx * ex + dy * ey + dz * ez) / length
                 dx, dy, dz, distance, gap = ex, ey, ez, length, thickness - along
             elif distance == 0.0:

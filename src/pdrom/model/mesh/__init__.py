@@ -1,1 +1,1 @@
-"""Meshes: generators, files, checks, vertex selections."""
+"""Meshes: generators, files, configuration, checks, and selections of vertices."""

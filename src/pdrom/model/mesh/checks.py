@@ -1,4 +1,4 @@
-"""Conditions on a mesh, checked before anything is computed on it."""
+"""Checks of a mesh before any computation, and a consistent orientation of its cells."""
 
 import numpy as np
 from scipy import sparse
@@ -9,21 +9,20 @@ from pdrom.core.store import require_finite
 from pdrom.model.mesh.generators import boundary, orient
 from pdrom.model.mesh.types import MAX_LENGTH, MIN_LENGTH, Mesh
 
-# An element is degenerate when its measure is below this fraction of its longest edge's power.
+# An element is degenerate if its measure is below this times the power 2 or 3 of its longest edge.
 RELATIVE_MEASURE = 1e-12
 
 
 def check_mesh(mesh: Mesh, name: str) -> Mesh:
-    """Return ``mesh`` or raise the first fault found; ``name`` opens the message.
+    """Return ``mesh``, or raise an error at its first fault; ``name`` begins the message.
 
     Raises
     ------
     MeshError
-        No cells, indices out of range, NaN or Inf, unreferenced or repeated vertices, an element
-        that names a vertex twice or is given twice, an edge of more than two triangles or a face
-        of more than two tetrahedra.
+        No cells, indices out of range, NaN or Inf, unreferenced or repeated vertices, a repeated
+        element, an edge of more than two triangles or a face of more than two tetrahedra.
     DegenerateElementError
-        A triangle of zero area or a tetrahedron of zero volume at rest.
+        An element with a repeated vertex, or with zero area or volume at rest.
     """
     cells = mesh.tetrahedra if len(mesh.tetrahedra) else mesh.triangles
     kind = "tetrahedron" if len(mesh.tetrahedra) else "triangle"
@@ -38,29 +37,29 @@ def check_mesh(mesh: Mesh, name: str) -> Mesh:
 
 
 def mesh_of(points: np.ndarray, cells: np.ndarray, name: str) -> Mesh:
-    """Mesh of points (N, 3) m and of triangles (T, 3) or tetrahedra (E, 4), which are oriented.
+    """Return a mesh of points (N, 3) m and triangles (T, 3), or tetrahedra (E, 4), then oriented.
 
     Raises
     ------
     MeshError, DegenerateElementError
-        See `check_indices`; ``name`` opens the message.
+        See `check_indices`; ``name`` begins the message.
     """
     if cells.shape[1] == 3:
         check_indices(cells, len(points), "triangle", name=name)
         return Mesh(points, cells.astype(np.int32))
     check_indices(cells, len(points), "tetrahedron", name=name)
-    # formats differ in how they number the corners
+    # formats number the corners of a tetrahedron differently
     tetrahedra = orient(points, cells)
     return Mesh(points, boundary(tetrahedra), tetrahedra)
 
 
 def check_indices(cells: np.ndarray, vertices: int, kind: str, name: str) -> None:
-    """MeshError for an index out of range, DegenerateElementError for one given twice.
+    """Raise MeshError for an index out of range, DegenerateElementError for a repeated one.
 
     Parameters
     ----------
-    cells : (E, corners), with ``vertices`` the number of vertices
-    kind, name : of the cells and of the mesh, for messages
+    cells : (E, corners) vertex indices, allowed from 0 to ``vertices`` - 1
+    kind, name : kind of the cells and name of the mesh, for messages
     """
     outside = np.flatnonzero(((cells < 0) | (cells >= vertices)).any(axis=1))
     if len(outside):
@@ -77,14 +76,14 @@ def check_indices(cells: np.ndarray, vertices: int, kind: str, name: str) -> Non
 
 
 def check_range(points: np.ndarray, scale: float, name: str) -> None:
-    """MeshError for a vertex or an extent that is out of range when multiplied by ``scale``.
+    """Raise MeshError if coordinates or the extent, times ``scale``, are out of range.
 
-    Beyond the range squares of lengths overflow, or lose every digit.
+    Out of the range squares of lengths would overflow or lose all digits.
 
     Parameters
     ----------
-    points : (N, 3) m
-    name : of the mesh, for messages
+    points : (N, 3), in metres after the multiplication by ``scale``
+    name : name of the mesh, for messages
     """
     limit = MAX_LENGTH / scale
     outside = np.flatnonzero(~(np.abs(points) <= limit).all(axis=1))
@@ -102,7 +101,7 @@ def check_range(points: np.ndarray, scale: float, name: str) -> None:
 
 
 def _check_neighbours(cells: np.ndarray, kind: str, name: str) -> None:
-    """No cell is given twice, and no edge of triangles or face of tetrahedra joins three."""
+    """Raise MeshError for a repeated cell, or an edge or face that more than two cells share."""
     twice = _largest_group(np.sort(cells, axis=1))
     if len(twice) > 1:
         first, again = twice[:2]
@@ -123,7 +122,7 @@ def _check_neighbours(cells: np.ndarray, kind: str, name: str) -> None:
 
 
 def _largest_group(rows: np.ndarray) -> np.ndarray:
-    """Indices, ascending, of the row that occurs most often (the smallest one of them)."""
+    """Return the indices, ascending, of the most frequent row, the smallest one of several."""
     order = np.lexsort(rows.T[::-1])
     ordered = rows[order]
     new = (ordered[1:] != ordered[:-1]).any(axis=1)
@@ -152,8 +151,8 @@ def _check_measures(mesh: Mesh, cells: np.ndarray, kind: str, name: str) -> None
     corner = mesh.points[cells]
     edges = corner[:, 1:] - corner[:, :1]
     longest = np.linalg.norm(edges, axis=2).max(axis=1)
-    # of edges of length one: the measure itself, not a Gram determinant, which is its square and
-    # drowns in round-off below 1e-8
+    # scale edges to length one and compute the measure itself, not a Gram determinant, which is its
+    # square and consists of round-off below 1e-8
     edges = edges / longest[:, None, None]
     normal = np.cross(edges[:, 0], edges[:, 1])
     if kind == "triangle":
@@ -169,16 +168,16 @@ def _check_measures(mesh: Mesh, cells: np.ndarray, kind: str, name: str) -> None
 
 
 def turned_alike(mesh: Mesh, name: str) -> tuple[Mesh, np.ndarray]:
-    """Turn triangles over so that neighbours see a side from the same side; which ones (n,).
+    """Return the surface with consistently oriented triangles, and the reversed triangles (n,).
 
-    In each connected part of the surface ``mesh`` the fewer ones are turned. Two copies of every
-    triangle, as it is and turned over, are joined with those of a neighbour that agree with them: a
-    part of the surface has two sides if this graph falls into two.
+    In each connected part of ``mesh`` the smaller number of triangles is reversed. A graph has two
+    nodes per triangle, as given and reversed, and edges to the nodes of neighbours with consistent
+    orientation. A part is orientable if its nodes form two connected components.
 
     Raises
     ------
     MeshError
-        A part has one side only, as Möbius' strip; ``name`` opens the message.
+        A part is not orientable, such as a Möbius strip; ``name`` begins the message.
     """
     triangles, t = mesh.triangles, len(mesh.triangles)
     edges = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
@@ -186,7 +185,7 @@ def turned_alike(mesh: Mesh, name: str) -> tuple[Mesh, np.ndarray]:
     ends = np.sort(edges, axis=1)[order]
     second = 1 + np.flatnonzero((ends[1:] == ends[:-1]).all(axis=1))
     a, b = order[second - 1] // 3, order[second] // 3
-    # neighbours that are turned alike run through their edge in opposite directions
+    # consistently oriented neighbours have opposite directions of their common edge
     opposite = edges[order[second - 1], 0] == edges[order[second], 0]
     pairs = np.concatenate(
         [np.column_stack([a, b + t * opposite]), np.column_stack([a + t, b + t * ~opposite])]

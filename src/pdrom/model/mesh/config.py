@@ -1,4 +1,4 @@
-"""Typed configuration of a mesh: a generator with its parameters, a file, or given arrays."""
+"""Typed configuration of meshes from a generator with parameters, from a file, or from arrays."""
 
 import hashlib
 import json
@@ -26,30 +26,30 @@ class MeshModel(ConfigModel):
 
     @property
     def label(self) -> str:
-        """Readable name of the mesh in messages and file names."""
+        """Readable name of the mesh for messages and file names."""
         raise NotImplementedError(f"{type(self).__name__} has no label")
 
     @property
     def identifier(self) -> str:
-        """File name of the mesh: readable, and different for different parameters."""
+        """File name of the mesh: its label and a checksum of all parameters."""
         canonical = json.dumps(self.model_dump(mode="json"), sort_keys=True)
         return f"{self.label}_{hashlib.sha256(canonical.encode()).hexdigest()[:8]}"
 
     @property
     def sources(self) -> list[str]:
-        """Files of the project that the mesh is read from; none for one that is generated."""
+        """Paths of the files from which the mesh is read; empty for a generated mesh."""
         return []
 
     def coarsened(self, factor: float) -> Self:
-        """The mesh itself, whatever ``factor``: a file, or given arrays, have one resolution."""
+        """Return the mesh for any ``factor``, as files and given arrays have one resolution."""
         return self
 
     def build(self, root: Path) -> Mesh:
-        """Generate the mesh, or read it below ``root``."""
+        """Return the mesh, generated or read from a file in the folder ``root``."""
         raise NotImplementedError(f"{type(self).__name__} has no mesh")
 
 
-_DIGITS = 32  # of a digest
+_DIGITS = 32  # length of a hexadecimal digest
 Count = Annotated[int, Field(ge=2, le=2000)]
 
 
@@ -58,7 +58,7 @@ class GeneratedMesh(MeshModel):
 
     sides: ClassVar[tuple[str, ...]]
     least: ClassVar[int]
-    """Vertices that a side keeps when the mesh is made coarser."""
+    """Smallest number of vertices along a side of a coarsened mesh."""
 
     @model_validator(mode="after")
     def _not_too_large(self) -> Self:
@@ -70,7 +70,7 @@ class GeneratedMesh(MeshModel):
         return self
 
     def coarsened(self, factor: float) -> Self:
-        """Same shape with ``factor`` times the vertices along each side, at least `least`."""
+        """Return the shape with ``factor`` times the vertices along each side, at least `least`."""
         sizes = {name: max(self.least, round(getattr(self, name) * factor)) for name in self.sides}
         return self.model_copy(update=sizes)
 
@@ -141,17 +141,17 @@ class MeshFile(MeshModel):
         return value
 
     def below(self, folder: str) -> Self:
-        """The mesh of a scene that lies in ``folder``, named from where that begins."""
+        """Return the mesh with ``folder``, the folder of its scene, prepended to the path."""
         return self.model_copy(update={"path": f"{folder}/{self.path}"})
 
     def build(self, root: Path) -> Mesh:
-        """Read the mesh file below ``root``, all triangles turned the same way round.
+        """Return the mesh of the file in the folder ``root``, with consistently oriented triangles.
 
         Raises
         ------
         MeshError, DegenerateElementError
-            An unreadable or faulty file, see `read_mesh_file` and `check_mesh`, or a surface with
-            one side only.
+            An unreadable or faulty file, see `read_mesh_file` and `check_mesh`, or a surface which
+            is not orientable.
         """
         mesh = read_mesh_file(self.file(root))
         check_range(mesh.points, self.scale, self.path)
@@ -173,7 +173,7 @@ class MeshFile(MeshModel):
         return [self.path]
 
     def file(self, root: Path) -> Path:
-        """The mesh file below ``root``; MeshError if a link leads out of it."""
+        """Return the path of the file in ``root``; MeshError if a link leads out of ``root``."""
         path = root / self.path
         try:
             inside = path.resolve().is_relative_to(root.resolve())
@@ -199,7 +199,7 @@ class GivenMesh(MeshModel):
 
     @classmethod
     def of(cls, mesh: Mesh) -> Self:
-        """The configuration of a mesh."""
+        """Return the configuration of a ``mesh`` that was given as arrays."""
         digest = hashlib.blake2b(digest_size=_DIGITS // 2)
         for array in (mesh.points, mesh.triangles, mesh.tetrahedra):
             digest.update(f"{array.shape}".encode())
@@ -207,7 +207,7 @@ class GivenMesh(MeshModel):
         return cls(kind="given", blake2b=digest.hexdigest())
 
     def build(self, root: Path) -> Mesh:
-        """MeshError, whatever ``root``: there are no arrays in a configuration."""
+        """Raise MeshError for any ``root``, as the configuration does not contain the arrays."""
         raise MeshError("mesh.kind = 'given': its arrays come from Python (pdrom.api.build_scene)")
 
     @property
@@ -216,19 +216,19 @@ class GivenMesh(MeshModel):
 
 
 def given_mesh(points: Any, cells: Any, name: str) -> Mesh:
-    """Mesh of points (N, 3) m and of triangles (T, 3) or tetrahedra (E, 4); ``name`` opens errors.
+    """Return the mesh of points (N, 3) m and cells; error messages begin with ``name``.
 
-    Triangles that face the other way than their neighbours, and corners of tetrahedra, are put
-    into order. What else a mesh has to satisfy is checked when a scene is built.
+    Triangles are oriented consistently, tetrahedra with positive volume. All other conditions on a
+    mesh are checked when a scene is built.
 
     Parameters
     ----------
-    cells : (T, 3) or (E, 4), counted from 0
+    cells : triangles (T, 3) or tetrahedra (E, 4), vertex indices from 0
 
     Raises
     ------
     MeshError
-        Arrays of another shape or kind, an index out of range, a surface with one side only.
+        Arrays of wrong shape or type, an index out of range, a surface that is not orientable.
     """
     points = _array(points, f"{name}: points", np.float64, (3,))
     cells = _array(cells, f"{name}: cells", np.int64, (3, 4))
@@ -240,7 +240,7 @@ def given_mesh(points: Any, cells: Any, name: str) -> Mesh:
 
 
 def _array(values: Any, name: str, kind: type[np.generic], widths: tuple[int, ...]) -> np.ndarray:
-    """A copy of ``values`` as an array; whole numbers stay whole."""
+    """Return a copy of ``values`` as an array of type ``kind`` with a row length in ``widths``."""
     required = " or ".join(f"(n, {width})" for width in widths)
     try:
         array = np.array(values)

@@ -1,4 +1,4 @@
-"""Mesh files, read by meshio in a process of its own with limits of time and memory."""
+"""Mesh files, which meshio reads in a separate process with limits on time and memory."""
 
 import hashlib
 import io
@@ -19,7 +19,7 @@ from pdrom.model.mesh import reader
 from pdrom.model.mesh.checks import mesh_of
 from pdrom.model.mesh.types import Mesh
 
-# A cloth of this size needs about 1 GB while its operators are built.
+# The operators of a cloth with this number of vertices need about 1 GB to compute.
 MAX_VERTICES = 1_000_000
 VARIABLE = "PDROM_MESH_LIMITS"
 MAX_FACTOR = 1000.0
@@ -27,15 +27,15 @@ MAX_FACTOR = 1000.0
 
 @dataclass(frozen=True)
 class MeshLimits:
-    """Limits on one mesh file; `mesh_limits` returns those in force.
+    """Limits for reading one mesh file; `mesh_limits` returns the limits in force.
 
     file_bytes : size of the file
-    seconds : processor time to read it
-    deadline : seconds after which a reader is ended that waits instead of computing; also the limit
-        of time where a process has none. Far above ``seconds``, so that a busy machine does not
-        decide which meshes are read.
-    memory : bytes of address space of the process that reads it
-    vertices, cells : size of the mesh inside
+    seconds : processor time of the process that reads the file
+    deadline : elapsed seconds after which this process is ended, for processes that wait and for
+        platforms without limits of processor time. Much larger than ``seconds``, so that the result
+        does not depend on the load of the machine.
+    memory : bytes of address space of this process
+    vertices, cells : largest numbers in the mesh
     """
 
     file_bytes: int = 500_000_000
@@ -47,12 +47,12 @@ class MeshLimits:
 
 
 def mesh_limits() -> MeshLimits:
-    """The limits, multiplied by the environment variable PDROM_MESH_LIMITS if it is set.
+    """Return the limits, multiplied by the environment variable PDROM_MESH_LIMITS if it is set.
 
     Raises
     ------
     ConfigurationError
-        The variable is no number from 1 to 1000.
+        The variable is not a number from 1 to 1000.
     """
     text = os.environ.get(VARIABLE, "1")
     try:
@@ -68,11 +68,11 @@ def mesh_limits() -> MeshLimits:
     return MeshLimits(**{f.name: int(factor * getattr(plain, f.name)) for f in fields(plain)})
 
 
-# Extension -> readers, of which the file's beginning chooses one. Each opens the mesh file and no
-# other: what a run depends on is this one file, which is hashed and lies in the project. Not among
-# them are formats that keep data in further files (.xdmf, .pvd, .ele and .node, dolfin's .xml),
-# include others (.inp) or link to others (all that are HDF5 or netCDF inside: .med, .h5m, .hmf,
-# .cgns, .e). Of Kratos's .mdpa meshio takes quadrilaterals for tetrahedra.
+# File extension -> readers, one of which is chosen by the first byte of the file. Each reader opens
+# only the mesh file, so that the hash of this file covers all inputs. Formats are excluded if they
+# store data in further files (.xdmf, .pvd, .ele and .node, dolfin's .xml), include files (.inp), or
+# can link to files (HDF5 and netCDF: .med, .h5m, .hmf, .cgns, .e). Kratos's .mdpa is excluded
+# because meshio reads its quadrilaterals as tetrahedra.
 FORMATS = {
     ".avs": ("avsucd",),
     ".bdf": ("nastran",),
@@ -97,13 +97,13 @@ FORMATS = {
     ".vtu": ("vtu",),
     ".wkt": ("wkt",),
 }
-# The workflow replaces `sys.executable` by words for a shell.
+# A copy, because the workflow changes `sys.executable` to a shell command.
 PYTHON = sys.executable
 ADVICE = f"{VARIABLE}=2 in the environment doubles the limits"
 
 
 def read_mesh_file(path: Path) -> Mesh:
-    """Read triangles or tetrahedra from the file ``path`` of one of `FORMATS`.
+    """Return the mesh of triangles or tetrahedra in the file ``path``, in one of `FORMATS`.
 
     Raises
     ------
@@ -137,12 +137,12 @@ def read_mesh_file(path: Path) -> Mesh:
 
 @lru_cache(maxsize=8)
 def _arrays(path: Path, digest: str, limits: MeshLimits) -> tuple[np.ndarray, np.ndarray]:
-    """Points and cells of a file, read once as long as its content (``digest``) is the same."""
+    """Return points and cells of a file, cached for the same path, ``digest`` and ``limits``."""
     numbers = (limits.seconds, limits.memory, limits.vertices, limits.cells)
-    # -P: the modules beside the script must not hide those of the standard library
+    # -P: modules in the folder of the script must not shadow the standard library
     command = [PYTHON, "-P", "-X", "utf8", "-W", "ignore", reader.__file__, str(path)]
     command += [",".join(FORMATS[path.suffix.lower()]), *map(str, numbers)]
-    # every thread of the linear algebra, which is not used here, would reserve memory
+    # each thread of the linear algebra libraries, unused here, would reserve memory
     single = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
     try:
         ended = subprocess.run(
@@ -165,7 +165,7 @@ def _arrays(path: Path, digest: str, limits: MeshLimits) -> tuple[np.ndarray, np
 
 
 def _fault(ended: subprocess.CompletedProcess[bytes], limits: MeshLimits) -> str:
-    """Reason why a reader ended without a mesh."""
+    """Return a message that says why a reading process ``ended`` without a mesh."""
     status = ended.returncode
     if status == reader.REFUSED:
         return ended.stdout.decode(errors="replace")

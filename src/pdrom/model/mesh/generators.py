@@ -1,4 +1,4 @@
-"""Cloth and bar of the study (docs/study.md: 20 x 20 sheet, 40 x 5 x 5 bar), at any resolution."""
+"""Generated meshes of any resolution: cloth of triangles, bar of tetrahedra (docs/study.md)."""
 
 from typing import Literal
 
@@ -17,7 +17,7 @@ def cloth(
     lift: float = 2.0,
     wave: float = 0.0,
 ) -> Mesh:
-    """Rectangular sheet of ``rows`` x ``columns`` vertices with square cells, two triangles a cell.
+    """Return a sheet of ``rows`` x ``columns`` vertices; square cells with two triangles each.
 
     Vertex (i, j) has index ``i * columns + j``. Each cell is split into [ll, ur, ul] and
     [ll, lr, ur] with ul = ll + 1, lr = ll + columns, ur = lr + 1. The sheet is centred, its longer
@@ -25,9 +25,9 @@ def cloth(
 
     Parameters
     ----------
-    plane : "xy" (upright) or "xz" (horizontal).
-    wave : amplitude in metres of the curved rest shape ``wave * sin(6 u) cos(5 v)`` out of the
-        plane, with u and v the sheet's coordinates over its extent.
+    plane : "xy" (upright) or "xz" (horizontal)
+    wave : amplitude in metres of the displacement ``wave * sin(6 u) cos(5 v)`` normal to the plane,
+        where u and v are the coordinates in the sheet divided by ``extent``
     """
     spacing = extent / (max(rows, columns) - 1)
     u = (np.arange(rows) - 0.5 * (rows - 1)) * spacing
@@ -47,20 +47,20 @@ def cloth(
     return Mesh(points, pairs.reshape(-1, 3).astype(np.int32))
 
 
-# Corners of a cell are numbered by the bits of (di, dj, dk); the inner tetrahedron comes first.
+# Five tetrahedra of a cell, the inner one first; bits of a corner number are its (di, dj, dk).
 _EVEN = ((0, 3, 5, 6), (1, 0, 3, 5), (2, 0, 6, 3), (4, 0, 5, 6), (7, 3, 6, 5))
 _ODD = ((1, 2, 4, 7), (0, 1, 2, 4), (3, 1, 7, 2), (5, 1, 4, 7), (6, 2, 7, 4))
 
 
 def bar(nx: int, ny: int, nz: int, extent: float = 1.0, lift: float = 2.0) -> Mesh:
-    """Bar of nx x ny x nz vertices with cubic cells, five tetrahedra a cell, alternating parity.
+    """Return a bar of nx x ny x nz vertices with cubic cells of five tetrahedra each.
 
-    Vertex (i, j, k) has index ``(i * ny + j) * nz + k``. Neighbouring cells mirror each other so
-    that their face diagonals meet. Centred, longest side ``extent`` metres, lifted along y.
+    Vertex (i, j, k) has index ``(i * ny + j) * nz + k``. Neighbouring cells are mirror images, so
+    that face diagonals match. The bar is centred, its longest side is ``extent`` metres.
 
     Parameters
     ----------
-    lift : m along y
+    lift : translation along y, m
     """
     counts = np.array([nx, ny, nz])
     spacing = extent / (counts.max() - 1)
@@ -79,7 +79,7 @@ def bar(nx: int, ny: int, nz: int, extent: float = 1.0, lift: float = 2.0) -> Me
 
 
 def orient(points: np.ndarray, tetrahedra: np.ndarray) -> np.ndarray:
-    """``tetrahedra`` (E, 4) of ``points`` (N, 3) m, turned to a positive volume; int32."""
+    """Return ``tetrahedra`` (E, 4) on ``points`` (N, 3) m with positive volumes, int32."""
     a, b, c, d = (points[tetrahedra[:, i]] for i in range(4))
     negative = np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a) < 0.0
     oriented = tetrahedra.astype(np.int32)
@@ -88,11 +88,11 @@ def orient(points: np.ndarray, tetrahedra: np.ndarray) -> np.ndarray:
 
 
 def boundary(tetrahedra: np.ndarray) -> np.ndarray:
-    """Faces (T, 3) int32 that belong to one of ``tetrahedra`` (E, 4), oriented outwards."""
+    """Return the faces (T, 3) int32 of only one of ``tetrahedra`` (E, 4), oriented outwards."""
     faces = tetrahedra[:, [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]]].reshape(-1, 3)
     ordered = np.sort(faces, axis=1).astype(np.int64)
     size = int(faces.max()) + 1
-    # one number a face, of 64 bits for up to a million vertices: sorting rows is much slower
+    # one integer per face, 64 bits for up to a million vertices: faster to sort than rows
     keys = (ordered[:, 0] * size + ordered[:, 1]) * size + ordered[:, 2]
     _, first, count = np.unique(keys, return_index=True, return_counts=True)
     return faces[np.sort(first[count == 1])].astype(np.int32)

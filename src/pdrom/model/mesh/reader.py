@@ -1,18 +1,18 @@
-"""Reads one mesh file in a process of its own, which `pdrom.model.mesh.files` starts.
+"""Script that reads one mesh file in a separate process, started by `pdrom.model.mesh.files`.
 
-Readers trust their input: cut files make them loop without end, and a few megabytes of compressed
-zeros unpack to gigabytes. The limits that hold here end only this process. It is a script that
+meshio does not validate its input: truncated files cause endless loops, and a few megabytes of
+compressed zeros unpack to gigabytes. Limits on time and memory end only this process. The script
 imports nothing else of the package, so that it starts in a fraction of a second.
 
-meshio trusts its input. Where it would read another mesh than the file holds, the file is refused
-here; where it takes the end of a file for the end of its mesh, the end is looked at first. The
-format .obj is read here (Advanced Visualizer manual, appendix B1, Alias/Wavefront).
+Files from which meshio would read a wrong mesh are rejected by checks before and after its call.
+Where meshio accepts a truncated file as a complete one, the end of the file is checked first. This
+module reads .obj files itself (Advanced Visualizer manual, appendix B1, Alias/Wavefront).
 
 usage: reader.py FILE FORMATS SECONDS MEMORY VERTICES CELLS
 
-``FORMATS`` are names of readers, joined by commas; how the file begins chooses between them. What
-comes out is points (N, 3) float64 and cells (E, 3 or 4) int64 as two arrays of NumPy's format .npy,
-or, with the exit status `REFUSED`, a sentence that states what is wrong.
+``FORMATS`` are names of readers, joined by commas, one of which is chosen by the first byte of the
+file. Standard output is points (N, 3) float64 and cells (E, 3 or 4) int64 as two arrays in NumPy's
+format .npy, or, with the exit status `REFUSED`, a sentence that states the fault.
 """
 
 import builtins
@@ -30,12 +30,12 @@ import numpy as np
 
 REFUSED = 3
 NO_MEMORY = 4
-# How a file begins whose extension leaves two formats.
+# First byte of a file, by format, where two formats have the same extension.
 OPENINGS = {"ansys": b"(", "gmsh": b"$"}
 
 
 def main(path: str, formats: str, *numbers: str) -> int:
-    """Read the file ``path`` and write its arrays; the exit status.
+    """Write the arrays of the file ``path`` to standard output; return the exit status.
 
     ``formats`` are meshio's names, separated by commas; ``numbers`` are the limits: seconds, bytes,
     vertices, cells.
@@ -45,16 +45,16 @@ def main(path: str, formats: str, *numbers: str) -> int:
     _limit("RLIMIT_AS", memory)
     _limit("RLIMIT_CORE", 0)
     try:
-        # readers warn, and report some faults by printing and leaving the process
+        # some readers print warnings and faults, and end the process
         with redirect_stdout(io.StringIO()) as said, redirect_stderr(said):
             arrays = read(path, formats.split(","), vertices, cells)
-        # NumPy asks a real file for its position, which a pipe has not
+        # np.save would ask a file object for its position, which a pipe does not have
         pipe = SimpleNamespace(write=sys.stdout.buffer.write)
         for array in arrays:
             np.save(pipe, array, allow_pickle=False)
         sys.stdout.flush()
     except MemoryError:
-        os._exit(NO_MEMORY)  # an orderly end would need memory
+        os._exit(NO_MEMORY)  # a normal exit would need memory
     except ValueError as error:
         sys.stdout.buffer.write(str(error).encode())
         return REFUSED
@@ -62,7 +62,7 @@ def main(path: str, formats: str, *numbers: str) -> int:
 
 
 def _limit(name: str, value: int) -> None:
-    """Lower a limit of this process, where the platform has it."""
+    """Lower the resource limit ``name`` of this process to ``value`` if the platform has it."""
     try:
         import resource
 
@@ -75,24 +75,24 @@ def _limit(name: str, value: int) -> None:
 
 
 def read(path: str, formats: list[str], max_vertices: int, max_cells: int) -> tuple:
-    """Points (N, 3) float64 and cells (E, 3 or 4) int64 of the file ``path``.
+    """Return points (N, 3) float64 and cells (E, 3 or 4) int64 of the file ``path``.
 
     Parameters
     ----------
-    formats : names that meshio has for the format, the likeliest first
-    max_vertices, max_cells : more are refused
+    formats : meshio's names of possible formats, the most likely one first
+    max_vertices, max_cells : largest allowed numbers
 
     Raises
     ------
     ValueError
-        Says what is wrong with the file.
+        The file is not a readable mesh; the message states why.
     """
     with open(path, "rb") as file:
         begins = file.read(64).lstrip()[:1]
     name = next((name for name in formats if OPENINGS.get(name) == begins), formats[0])
     try:
         points, cells = read_obj(Path(path)) if name == "obj" else _by_meshio(path, name)
-        # of a damaged file they may be no arrays, which the conversion refuses
+        # a damaged file may give other objects than arrays, which the conversion rejects
         _check_size("vertices", len(np.atleast_1d(points)), max_vertices)
         _check_size("cells", len(cells), max_cells)
         points = np.ascontiguousarray(points, dtype=np.float64)
@@ -116,14 +116,14 @@ def read(path: str, formats: list[str], max_vertices: int, max_cells: int) -> tu
 
 
 def _by_meshio(path: str, name: str) -> tuple:
-    """Points and cells that meshio's reader finds, where they are those of the file."""
+    """Return points and cells from meshio's reader ``name``, after checks that they are correct."""
     import meshio
     from meshio.gmsh import _gmsh40
     from meshio.gmsh import main as gmsh
     from meshio.ugrid import _ugrid
 
-    _ugrid.file_types["ascii"]["float_type"] = "f8"  # meshio rounds what is text to single
-    gmsh._readers["4"] = _gmsh40  # as Gmsh calls 4.0; meshio takes it for 4.1
+    _ugrid.file_types["ascii"]["float_type"] = "f8"  # meshio would round numbers in text to float32
+    gmsh._readers["4"] = _gmsh40  # Gmsh writes version "4" for 4.0, which meshio reads as 4.1
     content = Path(path).read_bytes()
     check_before(name, content)
     with ends_noticed():
@@ -142,7 +142,7 @@ def _by_meshio(path: str, name: str) -> tuple:
 
 
 def _last_line(path: str) -> str:
-    """A hint where a text may have been cut within a line."""
+    """Return a hint for the message if the text file does not end with an end of line, else ""."""
     end = Path(path).read_bytes()[-80:]
     cut = end and b"\0" not in end and not end.endswith((b"\n", b"\r"))
     return "; cut off? The last line has no end" if cut else ""
@@ -153,28 +153,28 @@ def _check_size(what: str, found: int, allowed: int) -> None:
         raise RefusedError(f"holds {found} {what}, allowed: at most {allowed}")
 
 
-# Kinds of cells that are wanted, and how many corners they have.
+# Accepted kinds of cells -> number of corners.
 CORNERS = {"triangle": 3, "tetra": 4}
 _LAST_NUMBER = re.compile(rb"(?:^|\s)([-+]?[\d.]+(?:[eE][-+]?\d*)?)\Z")
 
 
 class UnreadableError(ValueError):
-    """A file that is no mesh of its format, or one that would be read wrong."""
+    """A file that is not a valid mesh file of its format, or that would be read incorrectly."""
 
 
 class RefusedError(ValueError):
-    """A mesh that is read, and is not what is wanted."""
+    """A readable mesh that is too large or has other cells than `CORNERS` allows."""
 
 
 class CutError(UnreadableError):
-    """A file that ends before its mesh does."""
+    """A file that is truncated, before the end of its mesh."""
 
     def __init__(self, why: str) -> None:
         super().__init__(f"cut off: {why}")
 
 
 def only_kind(kinds: Iterable[str]) -> str:
-    """The one kind of cells of a mesh among ``kinds``; `RefusedError` for none or another."""
+    """Return the only one of ``kinds`` of cells; `RefusedError` if none, several or not allowed."""
     found = list(dict.fromkeys(kinds))
     if len(found) != 1 or found[0] not in CORNERS:
         raise RefusedError(
@@ -184,10 +184,10 @@ def only_kind(kinds: Iterable[str]) -> str:
 
 
 def check_last_number(content: bytes, vertices: int) -> None:
-    """`CutError` if the text ``content`` ends in what may be the beginning of a longer number.
+    """Raise `CutError` if the text ``content`` ends with a number that may be truncated.
 
-    Only the end of the line distinguishes ``12`` from the first digits of ``123``. An index that
-    could not be longer, as there are not so many ``vertices``, is taken.
+    Without an end of line, ``12`` may be the first digits of ``123``. An index that cannot have
+    more digits, because there are not so many ``vertices``, is accepted.
     """
     last = _LAST_NUMBER.search(content[-64:])
     if last is None:
@@ -201,7 +201,7 @@ def check_last_number(content: bytes, vertices: int) -> None:
 
 
 def reason(error: BaseException) -> str:
-    """Message of an error, on one short line."""
+    """Return the message of an ``error`` as one line of at most about 200 characters."""
     text = " ".join(str(error).split())[:200]
     if isinstance(error, UnreadableError):
         return text
@@ -210,21 +210,21 @@ def reason(error: BaseException) -> str:
     return f"{type(error).__name__}: {text}"
 
 
-# Bytes that are read at once by who reads piece by piece; reads behind the end before it is a loop.
+# Reads of less than PIECE bytes past the end of a file are counted; more than PATIENCE mean a loop.
 PIECE, PATIENCE = 4096, 100
-# What a whole file holds, of formats that mark their end; others state how much they hold.
+# Format -> pattern that only a complete file matches; other formats state their numbers of items.
 ENDS = {
     "ansys": rb"\)\s*\Z",
     "gmsh": rb"^\$End\w+\s*\Z",
-    "medit": rb"\A\x01\0\0\0|^\s*End\s*\Z",  # a binary one ends with a number
+    "medit": rb"\A\x01\0\0\0|^\s*End\s*\Z",  # a binary file has no end mark
     "nastran": rb"^ENDDATA",
-    "netgen": rb"^\s*endmesh\s*$",  # the geometry may follow
+    "netgen": rb"^\s*endmesh\s*$",  # a section with the geometry may follow
     "permas": rb"^\s*\$FIN",
     "stl": rb"^\s*endsolid[^\n]*\s*\Z",
     "vtu": rb"</VTKFile>\s*\Z",
     "wkt": rb"\)\s*\Z",
 }
-# Lines that meshio passes over, and what they would change.
+# Format -> pattern of lines that meshio ignores although they change the mesh, and a message.
 PASSED_OVER = {
     "nastran": (
         rb"^[ \t]*(GRDSET|INCLUDE|(?:CTRI|CTETRA)\w*\*)",
@@ -242,21 +242,21 @@ PASSED_OVER = {
 
 
 def check_before(name: str, content: bytes) -> None:
-    """Refuse a file with this ``content`` that meshio's reader ``name`` would read wrong.
+    """Raise an error for ``content`` that meshio's reader ``name`` would read incorrectly.
 
     Raises
     ------
     CutError
-        The mark is missing that ends a file of this format.
+        The end mark of this format is missing.
     UnreadableError
-        A line that the reader passes over though it changes the mesh, or vertices that are
-        numbered in another order than they are listed, where the reader takes no notice.
+        A line that the reader ignores although it changes the mesh, or vertices that are listed in
+        an order different from their numbers, if the reader ignores the numbers.
     """
     binary = name == "stl" and 84 + 50 * int.from_bytes(content[80:84], "little") == len(content)
     if name in ENDS and not binary and not re.search(ENDS[name], content, re.M):
         raise CutError("the file does not end as this format does")
     if name == "wkt" and content.count(b"(") != content.count(b")"):
-        raise CutError("brackets that are not closed")  # the reader would try for hours
+        raise CutError("brackets that are not closed")  # the reader would take hours
     if name in PASSED_OVER:
         pattern, why = PASSED_OVER[name]
         found = re.search(pattern, content, re.M | re.S | re.I)
@@ -267,14 +267,14 @@ def check_before(name: str, content: bytes) -> None:
 
 
 def check_after(name: str, content: bytes, mesh: Any) -> None:
-    """Refuse, or repair, the ``mesh`` that meshio's reader ``name`` has read from ``content``.
+    """Raise an error if ``mesh``, from meshio's reader ``name``, may differ from ``content``.
 
     Raises
     ------
     CutError
-        The last number may be the beginning of a longer one.
+        Fewer elements than announced, or a last number that may be truncated.
     UnreadableError
-        Vertices in a coordinate system of their own, or with equal numbers.
+        Vertices in a coordinate system other than the basic one.
     """
     if name == "nastran" and np.any(mesh.point_data.get("nastran:ref", 0)):
         raise UnreadableError("GRID with a coordinate system (CP): only the basic one is read")
@@ -284,7 +284,7 @@ def check_after(name: str, content: bytes, mesh: Any) -> None:
         counts = re.findall(rb"^[ \t]*(?:NELEM|MARKER_ELEMS)[ \t]*=[ \t]*(\d+)", content, re.M)
         announced = {sum(map(int, counts))}
     elif name == "vtk":
-        offsets = content.startswith(b"# vtk DataFile Version 5")  # one more than there are cells
+        offsets = content.startswith(b"# vtk DataFile Version 5")  # it counts one offset too many
         counts = re.findall(rb"^(CELLS|CELL_TYPES)[ \t]+(\d+)", content, re.M)
         announced = {int(count) - (offsets and word == b"CELLS") for word, count in counts}
     if announced - {there}:
@@ -294,7 +294,7 @@ def check_after(name: str, content: bytes, mesh: Any) -> None:
 
 
 def _check_order(content: bytes) -> None:
-    """Refuse a .su2 file whose vertices are numbered out of order: meshio ignores the numbers."""
+    """Raise UnreadableError for .su2 vertices not numbered in order: meshio ignores numbers."""
     dimension = re.search(rb"^[ \t]*NDIME[ \t]*=[ \t]*(\d+)", content, re.M)
     points = re.search(rb"^[ \t]*NPOIN[ \t]*=[ \t]*(\d+)[^\n]*\n", content, re.M)
     if dimension is None or points is None:
@@ -307,9 +307,9 @@ def _check_order(content: bytes) -> None:
 
 
 def without_faces(cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Drop the triangles of ``cells`` (by kind) if all of them are faces of its tetrahedra.
+    """Return ``cells`` (by kind) without the triangles if all are faces of its tetrahedra.
 
-    Meshers write the boundary of a volume, which says no more than the tetrahedra do.
+    Meshers write the boundary of a volume mesh, which follows from the tetrahedra.
     """
     if cells.keys() != {"triangle", "tetra"}:
         return cells
@@ -318,7 +318,7 @@ def without_faces(cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
 
     def number(triangles: np.ndarray) -> np.ndarray:
         a, b, c = np.sort(triangles.astype(np.int64), axis=1).T
-        return (a * size + b) * size + c  # a million vertices leave it in 64 bits
+        return (a * size + b) * size + c  # fits in 64 bits for a million vertices
 
     known = np.isin(number(cells["triangle"]), number(faces)).all()
     return {"tetra": cells["tetra"]} if known else cells
@@ -326,10 +326,10 @@ def without_faces(cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
 
 @contextmanager
 def ends_noticed() -> Iterator[None]:
-    """Let a reader fail when the file ends too early, where it would loop or take less.
+    """Make a reader fail if its file is truncated, instead of looping or returning less.
 
-    While it holds, files that are opened notice reads behind their end, and ``numpy.fromfile``
-    raises `CutError` for fewer numbers than were requested.
+    In this context opened files record reads past their end, and ``numpy.fromfile`` raises
+    `CutError` if there are fewer numbers than requested.
     """
     opened, fromfile = builtins.open, np.fromfile
     ends: list[int] = []
@@ -346,7 +346,7 @@ def ends_noticed() -> Iterator[None]:
 
     def whole(file: Any, *more: Any, **named: Any) -> np.ndarray:
         count = named.get("count", more[1] if len(more) > 1 else -1)
-        if count > os.fstat(file.fileno()).st_size:  # before as much memory is taken
+        if count > os.fstat(file.fileno()).st_size:  # before so much memory is allocated
             raise CutError(f"{count} numbers that follow each other, the file is shorter")
         array = fromfile(file, *more, **named)
         if len(array) < count:
@@ -367,7 +367,7 @@ def ends_noticed() -> Iterator[None]:
 
 
 class _Noticing:
-    """A file that notes in ``ends`` how often it was read behind its end."""
+    """Mixin of a file that appends to ``ends`` at each read past its end."""
 
     ends: list[int]
 
@@ -384,22 +384,22 @@ class _Noticing:
 
 
 class _Text(_Noticing, io.TextIOWrapper):
-    """A text file."""
+    """A text file that records reads past its end."""
 
 
 class _Bytes(_Noticing, io.BufferedReader):
-    """A binary file."""
+    """A binary file that records reads past its end."""
 
     def read(self, size: int | None = -1, /) -> bytes:
         content = super().read(size)
-        # readers of the whole file ask for all, or for large pieces
+        # a read of the whole file or of a large piece may reach past the end
         if size and len(content) < size < PIECE:
             self.note()
         return content
 
 
-# Statements that say nothing about the positions of vertices or the corners of faces. All others
-# (free-form surfaces, `call` of another file) are refused: without them a part would be missing.
+# Statements of .obj files without effect on vertex positions and faces. All other statements (free-
+# form surfaces, `call` of another file) are rejected, because a part of the mesh would be missing.
 IGNORED = frozenset(
     b"vt vn vp g o s l p mg usemtl mtllib usemap maplib bevel c_interp d_interp lod shadow_obj "
     b"trace_obj".split()
@@ -407,18 +407,18 @@ IGNORED = frozenset(
 
 
 def read_obj(path: Path) -> tuple[np.ndarray, np.ndarray]:
-    """Points (N, 3) and triangles (E, 3) of ``path``, from 0; weights w of vertices are for curves.
+    """Return points (N, 3), triangles (E, 3) from 0 of the .obj file ``path``; ignore weights w.
 
     Raises
     ------
     UnreadableError
-        A statement that is not read, faces of other than three corners, no number.
+        An unknown statement, corners of faces that are not integers, or an invalid number.
     """
-    # comments go first: one that ends in a backslash does not go on in the next line
+    # remove comments first: a backslash at their end does not continue the line
     content = re.sub(rb"#[^\n]*", b"", path.read_bytes())
     vertices: list[bytes] = []
     faces: list[bytes] = []
-    before: list[int] = []  # vertices when a face is read: negative indices count from there
+    before: list[int] = []  # number of vertices before each face, to which negative indices refer
     whole_lines = re.sub(rb"\\[ \t]*\r?\n", b" ", content)
     for line in whole_lines.splitlines():
         words = line.split(None, 1)
@@ -447,7 +447,7 @@ def read_obj(path: Path) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _numbers(rows: list[bytes], columns: int, what: str) -> np.ndarray:
-    """First ``columns`` numbers of every row, (rows, columns) float64; ``what`` names a fault."""
+    """Return the first ``columns`` numbers of each row; error messages begin with ``what``."""
     if not rows:
         return np.empty((0, columns))
     try:

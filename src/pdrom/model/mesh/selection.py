@@ -1,4 +1,4 @@
-"""Selections of vertices, as the configuration names them, and their vertices in the rest shape."""
+"""Selections of vertices of the rest shape: their configuration and the selected vertices."""
 
 from abc import abstractmethod
 from functools import reduce
@@ -22,7 +22,7 @@ class Shape(ConfigModel):
 
     @abstractmethod
     def chosen(self, mesh: Mesh) -> np.ndarray:
-        """Vertices (n,) of ``mesh``, ascending; perhaps none."""
+        """Return the selected vertices (n,) of ``mesh``, ascending, possibly none."""
 
 
 class Box(Shape):
@@ -94,7 +94,7 @@ class BoundaryLoop(Shape):
     def chosen(self, mesh: Mesh) -> np.ndarray:
         border = boundary_edges(mesh.triangles)
         lengths = np.linalg.norm(mesh.points[border[:, 0]] - mesh.points[border[:, 1]], axis=1)
-        # half of an edge for each of its ends
+        # half of the length of each edge for each of its two vertices
         shares = np.bincount(border.ravel(), np.repeat(lengths / 2.0, 2), minlength=mesh.vertices)
         return _part(mesh, border, np.unique(border), shares, "boundary loop", self.index)
 
@@ -147,7 +147,7 @@ KINDS = (
 
 
 def _tag(value: Any) -> str | None:
-    """Form of a selection that ``value`` has; None if it has none."""
+    """Return the kind of selection that ``value`` describes; None if it is not a selection."""
     if isinstance(value, str):
         return "side"
     if isinstance(value, (list, tuple)):
@@ -181,7 +181,7 @@ for _combination in (Union, Intersection, Complement):
 
 
 def require_ordered(box: Any) -> Any:
-    """``box``; ValueError if its ``lower`` corner is not below its ``upper`` one on every axis."""
+    """Return ``box``; ValueError if ``lower`` exceeds ``upper`` on an axis."""
     for axis, low, high in zip("xyz", box.lower, box.upper, strict=True):
         if low > high:
             raise ValueError(f"lower = {low:g} exceeds upper = {high:g} along {axis}")
@@ -189,7 +189,7 @@ def require_ordered(box: Any) -> Any:
 
 
 def require_direction(plane: Any) -> Any:
-    """``plane``; ValueError if its ``normal`` is too short to have a direction."""
+    """Return ``plane``; ValueError if its ``normal`` is too short to define a direction."""
     if not np.linalg.norm(plane.normal) >= 1e-12:
         raise ValueError(f"normal = {list(plane.normal)}: has no direction")
     return plane
@@ -204,18 +204,18 @@ SIDES = {
     "back": (2, -1),
     "front": (2, 1),
 }
-TOLERANCE = 1e-6  # relative to the extent
+TOLERANCE = 1e-6  # on coordinates, relative to the mesh extent
 
 
 def select_vertices(mesh: Mesh, selection: Selection) -> np.ndarray:
-    """Vertex indices (n,) int64, ascending, of a side (see `SIDES`), a list, or a shape.
+    """Return vertex indices (n,) int64, ascending, of a side (see `SIDES`), a list, or a shape.
 
     Raises
     ------
     SceneError
-        Unknown side, index out of range, a side that the mesh does not have (it is flat in this
-        direction, so that every vertex would be chosen), a loop or component that it does not
-        have, or an empty selection.
+        Unknown side, index out of range, a side in a direction in which the mesh is flat (every
+        vertex would be selected), a boundary loop or component that does not exist, or an empty
+        selection.
     """
     chosen = _chosen(mesh, selection)
     if len(chosen) == 0:
@@ -225,7 +225,7 @@ def select_vertices(mesh: Mesh, selection: Selection) -> np.ndarray:
 
 
 def _chosen(mesh: Mesh, selection: Selection) -> np.ndarray:
-    """Vertices by `select_vertices`, but a selection may be empty."""
+    """Return the result of `select_vertices`, without an error for an empty selection."""
     if isinstance(selection, str):
         return _side(mesh, selection)
     if isinstance(selection, Shape):
@@ -249,15 +249,15 @@ def _side(mesh: Mesh, side: str) -> np.ndarray:
 def _part(
     mesh: Mesh, edges: np.ndarray, among: np.ndarray, sizes: np.ndarray, what: str, index: int
 ) -> np.ndarray:
-    """Number ``index`` of the connected parts of a graph on the vertices ``among``.
+    """Return the vertices of connected component ``index`` of a graph on the vertices ``among``.
 
-    The largest sum of ``sizes`` (N,) comes first, of equal ones that with the smallest vertex.
+    Components are sorted by their sum of ``sizes`` (N,), largest first, then by smallest vertex.
     """
     n = mesh.vertices
     graph = sparse.coo_array((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(n, n))
     labels = csgraph.connected_components(graph, directed=False)[1][among]
     parts = [among[labels == label] for label in np.unique(labels)]
-    # rounded, so that symmetric sizes tie exactly on every machine
+    # round, so that sizes that are equal by symmetry are equal on every machine
     parts.sort(key=lambda part: (-round(float(sizes[part].sum()) / mesh.extent, 9), part[0]))
     if index >= len(parts):
         raise SceneError(f"selection {what}: index = {index}, the mesh has {len(parts)}")
@@ -265,9 +265,9 @@ def _part(
 
 
 def farthest_points(points: np.ndarray, candidates: np.ndarray, count: int) -> np.ndarray:
-    """``count`` of ``candidates`` (n,) by farthest-point sampling, the first nearest the centre.
+    """Return ``count`` of ``candidates`` (n,) by farthest-point sampling from the centre.
 
-    Ties go to the smallest index, so that the order is deterministic.
+    The first point is nearest to the centre of the bounding box. Ties: the first candidate.
 
     Parameters
     ----------
@@ -283,5 +283,5 @@ def farthest_points(points: np.ndarray, candidates: np.ndarray, count: int) -> n
 
 
 def _distance(points: np.ndarray, point: np.ndarray) -> np.ndarray:
-    # rounded, so that symmetric distances tie exactly on every machine
+    # round, so that distances that are equal by symmetry are equal on every machine
     return np.round(np.linalg.norm(points - point, axis=1), 12)

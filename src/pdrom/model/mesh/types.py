@@ -1,4 +1,4 @@
-"""The mesh that everything later works on: its arrays, lengths, measures and boundary."""
+"""The mesh data type, its HDF5 storage, allowed lengths, vertex measures and boundary edges."""
 
 import os
 from dataclasses import dataclass, field
@@ -11,7 +11,7 @@ from pydantic import Field
 from pdrom.core.packed import brief
 from pdrom.core.store import open_hdf5, write_hdf5
 
-# Sums and squares of lengths within these limits neither overflow nor lose every digit.
+# Sums and squares of lengths within these limits, in metres, neither overflow nor lose all digits.
 MIN_LENGTH, MAX_LENGTH = 1e-6, 1e6
 Length = Annotated[float, Field(ge=-MAX_LENGTH, le=MAX_LENGTH)]
 PositiveLength = Annotated[float, Field(ge=MIN_LENGTH, le=MAX_LENGTH)]
@@ -25,8 +25,8 @@ class Mesh:
     """A triangle or tetrahedron mesh at rest.
 
     points : (N, 3) float64, metres
-    triangles : (T, 3) int32; of a volume mesh its boundary, oriented outwards
-    tetrahedra : (E, 4) int32; empty for a surface
+    triangles : (T, 3) int32; in a volume mesh the boundary faces, oriented outwards
+    tetrahedra : (E, 4) int32; empty (0, 4) in a surface mesh
     """
 
     points: np.ndarray
@@ -46,7 +46,7 @@ class Mesh:
         return float(np.ptp(self.points, axis=0).max())
 
     def edges(self) -> np.ndarray:
-        """Unique edges (n, 2) int32 with a < b, in lexicographic order."""
+        """Return all edges (n, 2) int32 once, as (a, b) with a < b, in lexicographic order."""
         cells = self.tetrahedra if len(self.tetrahedra) else self.triangles
         corners = cells.shape[1]
         pairs = [cells[:, [i, j]] for i in range(corners) for j in range(i + 1, corners)]
@@ -61,20 +61,20 @@ def save_mesh(mesh: Mesh, path: str | os.PathLike[str], attributes: dict | None 
 
 
 def store_mesh(mesh: Mesh, group: h5py.Group) -> None:
-    """Write the arrays of a mesh into a group of a file."""
+    """Write the arrays of a ``mesh`` to an HDF5 ``group``."""
     for name in _ARRAYS:
         group[name] = getattr(mesh, name)
     group["points"].attrs["unit"] = "m"
 
 
 def load_mesh(path: str | os.PathLike[str]) -> Mesh:
-    """Read the file ``path`` by `save_mesh`; StorageError if it is damaged."""
+    """Return the mesh in the file ``path`` from `save_mesh`; StorageError if it is damaged."""
     with open_hdf5(path) as file:
         return stored_mesh(file)
 
 
 def stored_mesh(group: h5py.Group) -> Mesh:
-    """Mesh that `store_mesh` wrote into the HDF5 ``group``."""
+    """Return the mesh that `store_mesh` has written to the HDF5 ``group``."""
     return Mesh(*(group[name][...] for name in _ARRAYS))
 
 
@@ -86,9 +86,9 @@ def barycentric_areas(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 
 def vertex_measures(mesh: Mesh) -> np.ndarray:
-    """Share of each vertex in the rest shape (N,): m^3 of a volume mesh, m^2 of a surface.
+    """Return the rest volume, m^3, or the rest area, m^2, of a surface mesh, per vertex, (N,).
 
-    A vertex has a quarter of the adjacent tetrahedra, a third of the adjacent triangles.
+    It is a quarter of all adjacent tetrahedra, or a third of all adjacent triangles.
     """
     if len(mesh.tetrahedra) == 0:
         return barycentric_areas(mesh.points, mesh.triangles)
@@ -98,9 +98,9 @@ def vertex_measures(mesh: Mesh) -> np.ndarray:
 
 
 def boundary_edges(triangles: np.ndarray) -> np.ndarray:
-    """Edges (n, 2) that belong to one of the ``triangles`` (T, 3) only, sorted."""
+    """Return the edges (n, 2) of only one of ``triangles`` (T, 3), in lexicographic order."""
     edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    # one number an edge: rows are sorted twenty times slower
+    # one integer per edge: sorting rows would be twenty times slower
     size = int(edges.max()) + 1
     unique, count = np.unique(edges[:, 0] * np.int64(size) + edges[:, 1], return_counts=True)
     return np.column_stack(np.divmod(unique[count == 1], size)).astype(edges.dtype)
