@@ -157,7 +157,7 @@ class EdgeSpring(simplex.SimplexGroup):
     unit = "m"
     rows_per_element = 1
     per_element = ("rest",)
-    reordered = False  # edges are sorted by their vertices, and all are equally expensive
+    reordered = False  # edges are already sorted by vertices, and all are equally expensive
     split_from = 8192
     project_kernel = _project
     accumulate_kernel = _accumulate

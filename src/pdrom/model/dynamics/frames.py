@@ -6,7 +6,7 @@ The iterate ``y`` and the prediction ``s`` are flat arrays of rows of four numbe
 If local steps and solver are compiled, one compiled loop does the iterations of a frame. One call
 does several whole frames in scenes where Python has nothing to do between two frames: forces are
 constant or proportional to the velocity, local steps are compiled without frame-lagged data, and
-all contacts are floors. Such a call ends before a frame in which the set of held (prescribed)
+all contacts are floors. A call ends before a later frame in which the set of held (prescribed)
 vertices changes or a hold begins, because the targets of the vertices are known only then."""
 
 from collections.abc import Sequence

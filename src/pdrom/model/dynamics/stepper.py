@@ -57,7 +57,7 @@ class FrameReport:
 
 
 class Stepper:
-    """Advances a state frame by frame in the coordinates of a `Space`."""
+    """Step loop, which advances a state frame by frame in the coordinates of a `Space`."""
 
     def __init__(
         self,

@@ -100,7 +100,7 @@ class Start(Effect):
 
     @abstractmethod
     def velocity(self) -> np.ndarray:
-        """Initial velocity to add, (N, 3) m/s."""
+        """Return the velocity (N, 3) m/s that is added to the initial velocity."""
 
 
 class Force(Effect):

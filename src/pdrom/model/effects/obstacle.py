@@ -203,7 +203,7 @@ class Box(Obstacle):
         path, rows = end - start, np.arange(len(start))
         near_face = np.where(path > 0.0, self._lower, self._upper)
         far_face = np.where(path > 0.0, self._upper, self._lower)
-        # a path that does not move along an axis is between its faces for all t or for none
+        # a path that is (nearly) parallel to a pair of faces is between them for all t, or for no t
         with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
             near, far = (near_face - start) / path, (far_face - start) / path
             within = (start >= self._lower) & (start <= self._upper)

@@ -177,7 +177,7 @@ class MeshFile(MeshModel):
         path = root / self.path
         try:
             inside = path.resolve().is_relative_to(root.resolve())
-        except (OSError, RuntimeError) as error:  # a circle of links
+        except (OSError, RuntimeError) as error:  # a cycle of symbolic links
             raise MeshError(f"mesh.path = '{self.path}': leads nowhere") from error
         if not inside:
             raise MeshError(f"mesh.path = '{self.path}': a link that leads out of {root.resolve()}")

@@ -113,7 +113,7 @@ def read_mesh_file(path: Path) -> Mesh:
     """
     try:
         there = path.is_file()
-    except OSError as error:  # a name that is too long
+    except OSError as error:  # for example a file name that is too long
         raise MeshError(f"{shown(str(path), 60)}: no mesh file ({error.strerror})") from error
     if not there:
         raise MeshError(f"{path}: no such mesh file (looked in {path.parent.resolve()})")
