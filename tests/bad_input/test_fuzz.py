@@ -54,7 +54,7 @@ effects:
 reduce:
   spring: {train: 4}
   strain: {train: 3}
-held_out: {frames_factor: 1.25, reverse: true, kick: 0.5, kick_axes: [x], seed: 2}
+held_out: {frames_factor: 1.25, carry: 0.1, kick: 0.5, kick_axes: [x], seed: 2}
 """
 BAR_SCENE = SMALL_SCENE.replace(
     "{kind: cloth, rows: 5, columns: 4, plane: xz}", "{kind: bar, nx: 4, ny: 3, nz: 3, extent: 1.0}"

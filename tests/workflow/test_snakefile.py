@@ -195,7 +195,7 @@ def test_no_text_and_no_date_reruns_anything(finished: Checkout) -> None:
     """
     spring, script = "src/pdrom/model/constraints/spring.py", "workflow/scripts/artifact.py"
     finished.edit(spring, '"""Edge springs:', '"""Springs along edges:')
-    finished.edit(spring, "    # scaled: ", "    # divided: ")
+    finished.edit(spring, "    # scale so that ", "    # divide so that ")
     finished.edit(script, "    make(", "    # the job\n    make(")
     finished.edit(
         "src/pdrom/model/effects/poke.py", "self._order[turn : ", "self._order[0 + turn : "

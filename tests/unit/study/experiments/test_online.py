@@ -30,7 +30,7 @@ EFFECTS = (
     {"effect": "gravity", "acceleration": [0.0, 0.0, -9.81]},
     {"effect": "pins", "select": "top"},
 )
-JUDGED = ("motion", "relative_error_within_horizon", "horizon_frame")
+JUDGED = ("motion", "relative_error_within_horizon", "horizon_frame", "playback_error")
 NO_RERUNS = pd.DataFrame(columns=[*COLUMNS, *JUDGED])
 ONCE = Processes(repeats=1, processes=1)
 CHANGES = {"reduce": {"spring": {"train": 5}}, "held_out": {"kick": 0.5}}
