@@ -13,14 +13,14 @@ import pytest
 from places import ROOT
 
 LIMITS = {
-    "lines of src": 38_685,
-    "modules of src": 255,
-    "lines of tests": 26_654,
-    "words of documentation": 24_729,
+    "lines of src": 37_710,
+    "modules of src": 245,
+    "lines of tests": 26_387,
+    "words of documentation": 24_578,
     "tables": 25,
     "figures": 23,
     "experiments": 19,
-    "percent of src in decorators, signatures and imports": 20.22,
+    "percent of src in decorators, signatures and imports": 19.83,
 }
 PAGES = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "config/README.md", "docs/**/*.md")
 
