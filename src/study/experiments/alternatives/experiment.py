@@ -68,7 +68,8 @@ class Candidate:
     """A method with its settings.
 
     steps : number of steps of the loop in a frame
-    positions : maps coordinates of the loop to vertex positions
+    positions, output : map coordinates of the loop to vertex positions, the latter in single
+        precision (of a loop in a position subspace, whose ``columns`` it has)
     """
 
     labels: dict[str, object]
@@ -141,10 +142,9 @@ def candidates(
 def trained(training: Scene, settings: Comparison) -> Iterator[Trained]:
     """Position subspaces with sampled elements; columns and samples come from ``training``.
 
-    The columns hold its frames as they are, or converged, or converged frames of further motions,
-    too. The samples are trained on iterates of these motions in these columns, for every number of
-    substeps that a reduction takes. Of converged frames there is a coarse level, too, with more
-    samples.
+    The columns are modes of its frames, with the scene's own iterations or converged, or of those
+    of further motions, too. The samples are trained on iterates of these motions in these columns,
+    for every number of substeps that a reduction takes. Converged frames also give a coarse level.
     """
     vertices, own = training.mesh.vertices, settings.implicit
     taken, coarse = (

@@ -86,14 +86,14 @@ class Comparison(Processes):
     """Comparison of methods on one scene and one mesh.
 
     ``steps`` has pairs (substeps of a frame, iterations of each substep) for each method. Errors
-    are taken over ``compared`` frames of each of the held-out ``motions``. On its own mesh a scene
-    runs with each of its factors on all weights in ``stiffness`` (1 if it has none). Each of
-    ``processes`` new processes times ``frames`` of the first motion: a frame takes the same work
-    in all motions. The reduction has each of ``modes`` and samples elements to ``tau``; it is
-    trained on frames of the training motion with the scene's own iterations, or converged
-    (``trained_on``). The coarse level of two-level samples to ``coarse_tau`` and is trained on
-    converged frames. ``work`` bounds vertices x substeps x iterations of a frame of a method;
-    pairs with more are left out (converged: the implicit reference, one step of one iteration).
+    are taken over all frames of each of the held-out ``motions``. On its own mesh a scene runs with
+    each of its factors on all weights in ``stiffness`` (1 if it has none). Each of ``processes``
+    new processes times ``frames`` spread over the first motion. The reduction has each of ``modes``
+    and samples elements to ``tau``; it is trained (``trained_on``) on frames of the training motion
+    with the scene's own iterations, or converged, or on converged frames of ``training_motions`` in
+    all. The coarse level of two-level samples to ``coarse_tau``, trained on converged frames.
+    ``work`` bounds vertices x substeps x iterations of a frame of a method, without the pairs
+    beyond it.
     """
 
     stiffness: dict[str, Factors] = Field(default_factory=dict)

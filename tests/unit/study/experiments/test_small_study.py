@@ -187,7 +187,7 @@ def test_a_rerun_differs_from_the_full_order_by_what_its_table_says(array, table
         assert difference == pytest.approx(norms(positions[1:] - reference[1:]), abs=1e-5)
         sides = np.ptp(positions[1:], axis=1).max(axis=1) / np.ptp(reference[0], axis=0).max()
         assert row.max_extent == pytest.approx(sides.max(), abs=1e-6)
-    assert rows.relative_error.is_monotonic_decreasing == (run == "train")
+    assert run != "train" or rows.relative_error.is_monotonic_decreasing
 
 
 def test_small_perturbations_grow_in_proportion(table):

@@ -99,14 +99,14 @@ def test_a_part_of_the_iterations_stands_for_all():
 
 
 def test_the_positions_of_all_vertices_are_part_of_a_frame():
-    """They are made once in as many steps as a frame has; without them the time is zero."""
-    made = []
-    with_them, without = (
-        Variant({}, Clock("a", [], seconds(1.0, 1.0, 1.0, 1.0)), START, 4, output=output, steps=2)
-        for output in (lambda y: made.append(y[0, 0]), None)
-    )
-    own, other = measure([with_them, without], 0, 1)
+    """They are made after the two steps of a frame; frames may begin at states along a run."""
+    made, calls, times = [], [], seconds(1.0, 1.0, 1.0, 1.0)
+    show, starts = (lambda y: made.append(y[0, 0])), ((START, 5), (START, 9))
+    whole = Variant({}, Clock("a", [], times), START, 4, output=show, steps=2)
+    spread = Variant({}, Clock("b", calls, times), START, 4, steps=2, starts=starts)
+    own, other = measure([whole, spread], 0, 1)
     assert made == [2.0, 4.0]
+    assert calls == [("b", 5, 0.0), ("b", 6, 1.0), ("b", 9, 0.0), ("b", 10, 1.0)]
     assert own["ms_per_frame"] == pytest.approx(1000.0 + own["vertices_ms"], rel=1e-12)
     assert other["vertices_ms"] == 0.0
 
