@@ -27,7 +27,6 @@ COLUMNS = [
     "expected", "estimate", "level", "failed", "checks", "ms_per_frame", "full_level",
     "full_error", "full_ms", "own_ms", "playback_error",
 ]  # fmt: skip
-REPEATS = 2  # runs of a request, for the time
 
 
 class RequestedRuns(run.ToleranceSettings):
@@ -89,8 +88,7 @@ def _rows(
     own_run = Trajectory(Level(scene.config.iterations), scene).to(frames)
     known: dict[str, Trajectory] = {}
     for error in section.errors:
-        outcomes = [run.CheckedRun(own, scene, error).outcome() for _ in range(REPEATS)]
-        done, full = outcomes[0], own.full_order(error).level
+        done, full = run.CheckedRun(own, scene, error).outcome(), own.full_order(error).level
         if full.title not in known:
             known[full.title] = Trajectory(full, scene).to(frames)
         alone = known[full.title]
@@ -108,7 +106,7 @@ def _rows(
             "level": done.level,
             "failed": len(done.failed),
             "checks": len(done.checks),
-            "ms_per_frame": 1e3 * min(each.seconds for each in outcomes) / frames,
+            "ms_per_frame": 1e3 * done.seconds / frames,
             "full_level": full.title,
             "full_error": _error(motion, alone.positions, end, "position"),
             "full_ms": 1e3 * alone.seconds / frames,

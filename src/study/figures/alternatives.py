@@ -7,8 +7,7 @@ from pdrom.model.held_out import FIRST, PLAYBACK
 from pdrom.view import multiples, style
 from pdrom.view.artists import Axes, Figure
 from study.artifact.reads import TableOf
-from study.experiments.alternatives.settings import CONVERGED as ACCURATE
-from study.experiments.alternatives.settings import OWN, REDUCTIONS, SEVERAL
+from study.experiments.alternatives.settings import REDUCTIONS
 from study.figures.kit.declaration import figure
 from study.figures.kit.options import NothingToDraw, Options, Scenes
 
@@ -22,10 +21,10 @@ KINDS = {
     "refused": (style.GREY, 1.15),
 }
 BEST, DOT = ("full order, the best of all methods", style.BLACK), (0.55, 0.55, 0.55)
-# Colour of the reduction by the frames that it is trained on.
+# Colour of the reduction by the number of motions that it is trained on.
 TRAINED = {
-    "reduction, one training motion": ((OWN, ACCURATE), style.GREEN),
-    "reduction, several training motions": ((SEVERAL,), style.BLUE),
+    "reduction, one training motion": ("training_motions == 1", style.GREEN),
+    "reduction, several training motions": ("training_motions > 1", style.BLUE),
 }
 BARE = "the same without the vertices"
 
@@ -74,8 +73,8 @@ def _draw_case(ax: Axes, labels: tuple[str, int, float], case: pd.DataFrame) -> 
     errors = multiples.clipped(full.error.to_numpy(float), LOW, HIGH)
     ax.plot(full.ms_per_frame, errors, ".", color=DOT, markersize=3.0)
     _draw_best(ax, full, BEST[1], "-")
-    for trained_on, colour in TRAINED.values():
-        own = rows[inside & rows.trained_on.isin(trained_on)]
+    for trained, colour in TRAINED.values():
+        own = rows[inside].query(trained)
         _draw_best(ax, own, colour, "-")
         _draw_best(ax, own.assign(ms_per_frame=own.ms_per_frame - own.vertices_ms), colour, ":")
 

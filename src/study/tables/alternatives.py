@@ -50,11 +50,8 @@ KNOWN = 3.0  # a motion counts for an error limit of at least this factor times 
         ),
         SUBSTEPS,
         ITERATIONS,
-        text(
-            "trained_on",
-            f"frames that a reduction is trained on: {settings.OWN}, {settings.CONVERGED}, "
-            f"{settings.SEVERAL} (converged)",
-        ),
+        integer("training_motions", "motions that a reduction is trained on"),
+        timed(number("offline_s", "processor time of its training, full-order runs included", "s")),
         *shared("k elements_sampled"),
         MOTION,
         integer("frames", "frames that errors are taken over"),
@@ -92,10 +89,8 @@ def beside(rows: pd.DataFrame, times: pd.DataFrame) -> tuple[pd.DataFrame, list[
     """``rows`` with ``times`` (ms): a column for each process, with the names of these columns."""
     wide = times.set_index([*CANDIDATE, "process"]).ms_per_frame.unstack("process")
     wide["vertices_ms"] = times.groupby(CANDIDATE, dropna=False).vertices_ms.median()
-    words = {"trained_on": object}  # without any reduction, pandas would read a column of numbers
     own = rows.drop(columns="vertices_ms", errors="ignore")
-    both = (table.astype(words) for table in (own, wide.reset_index()))
-    return pd.merge(*both, on=CANDIDATE, how="left"), list(wide.columns[:-1])
+    return own.merge(wide.reset_index(), on=CANDIDATE, how="left"), list(wide.columns[:-1])
 
 
 # The winning row depends on the measured times, hence all columns about it are marked as timed.
@@ -125,8 +120,9 @@ def beside(rows: pd.DataFrame, times: pd.DataFrame) -> tuple[pd.DataFrame, list[
         timed(number("reduced_speedup_low", "2.5 % quantile of this median (bootstrap)")),
         timed(number("reduced_speedup_high", "97.5 % quantile")),
         timed(text("reduced_method", "the reduction that is the fastest to reach it")),
-        timed(text("reduced_trained_on", "the frames that it is trained on")),
+        timed(integer("reduced_training_motions", "the motions that it is trained on")),
         timed(integer("reduced_iterations", "its iterations of a substep")),
+        timed(number("reduced_pays_after", "frames after which its training is paid off")),
         timed(integer("from_plain", "vertices from which on a reduction beats plain iterations")),
         timed(integer("from_best", "vertices from which on it beats the best full-order method")),
         integer("motions", "held-out motions"),
@@ -186,14 +182,17 @@ def _best(rows: pd.DataFrame, limit: float, processes: list[int]) -> dict[str, o
         made["plain_ms"] = plain.ms_per_frame.iloc[0]
     if len(reduced):
         first = reduced.iloc[0]
-        made |= {f"reduced_{key}": first[key] for key in ("method", "trained_on", "iterations")}
-        made |= {"reduced_ms": first.ms_per_frame, "reduced_vertices_ms": first.vertices_ms}
+        same = ("method", "training_motions", "iterations", "vertices_ms")
+        made |= {f"reduced_{key}": first[key] for key in same}
+        made["reduced_ms"] = first.ms_per_frame
     if len(full):
         best = full.iloc[0]
         made |= best[["method", "substeps", "iterations", "error", "ms_per_frame"]].to_dict()
         if len(reduced):
             ratios = (best[processes] / first[processes]).astype(float).dropna()
             made |= zip(SPEEDUP, median_interval(ratios), strict=True)
+            saved = best.ms_per_frame - first.ms_per_frame
+            made["reduced_pays_after"] = 1e3 * first.offline_s / saved if saved > 0.0 else None
         others = full[full.method != best.method]
         if len(others):
             second = others.iloc[0]

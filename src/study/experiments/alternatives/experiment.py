@@ -9,6 +9,7 @@ import logging
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from time import process_time
 from typing import Any
 
 import numpy as np
@@ -28,7 +29,7 @@ from pdrom.reduction.subspace.space import coordinates, projector
 from study.artifact.paths import ALTERNATIVE_TIMES, ALTERNATIVES, File
 from study.artifact.reads import Settings, SourcesOf
 from study.experiments.alternatives import settings as names
-from study.experiments.alternatives.settings import CONVERGED, TWO_LEVEL, Comparison
+from study.experiments.alternatives.settings import CONVERGED, TRAINING, TWO_LEVEL, Comparison
 from study.experiments.alternatives.solvers.explicit import continuous
 from study.experiments.alternatives.solvers.projective import WINDOW
 from study.experiments.alternatives.solvers.substeps import METHODS
@@ -44,22 +45,24 @@ TIME_COLUMNS = [
 ]  # fmt: skip
 log = logging.getLogger(__name__)
 COLUMNS = [
-    "scene", "factor", "vertices", "stiffness", "method", "substeps", "iterations", "trained_on",
-    "k", "elements_sampled", "motion", "frames", "finite", "error_implicit", "error_continuous",
-    "reference_error", "span_error",
+    "scene", "factor", "vertices", "stiffness", "method", "substeps", "iterations",
+    "training_motions", "offline_s", "k", "elements_sampled", "motion", "frames", "finite",
+    "error_implicit", "error_continuous", "reference_error", "span_error",
 ]  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Trained:
-    """A reduced ``model`` for frames of so many ``substeps``, and the frames it is trained on.
+    """A reduced ``model`` for frames of so many ``substeps``, trained on so many ``motions``.
 
+    seconds : processor time of the training, its full-order runs included, s
     coarse : whether it is the coarse level of the two-level method and not a reduction
     """
 
-    trained_on: str
+    motions: int
     substeps: int
     model: SubspaceModel
+    seconds: float
     coarse: bool = False
 
 
@@ -122,7 +125,8 @@ def candidates(
             loop = METHODS.load(method)(scene, substeps, iterations, systems[substeps])
             yield Candidate(labels, loop, start)
     for own in models:
-        sizes = {"trained_on": own.trained_on, "k": own.model.columns.modes}
+        sizes: dict[str, object] = {"training_motions": own.motions, "offline_s": own.seconds}
+        sizes |= {"k": own.model.columns.modes}
         sizes["elements_sampled"] = own.model.elements_evaluated(scene)
         for method, substeps, iterations, labels in reduced:
             if substeps != own.substeps or own.coarse != (method == TWO_LEVEL):
@@ -140,43 +144,49 @@ def candidates(
 
 
 def trained(training: Scene, settings: Comparison) -> Iterator[Trained]:
-    """Position subspaces with sampled elements; columns and samples come from ``training``.
+    """Position subspaces with sampled elements; columns and samples come from training motions.
 
-    The columns are modes of its frames, with the scene's own iterations or converged, or of those
-    of further motions, too. The samples are trained on iterates of these motions in these columns,
-    for every number of substeps that a reduction takes. Converged frames also give a coarse level.
+    These are the motion of ``training`` and further ones that the scene draws by seeds. The columns
+    are modes of nearly converged frames, of n motions every n-th one. The samples are trained on
+    iterates of these motions in these columns, for every number of substeps that a reduction takes.
+    The first motion also gives a coarse level.
     """
     vertices, own = training.mesh.vertices, settings.implicit
     taken, coarse = (
         sorted({n for m in methods for n, _ in settings.pairs(m, vertices)})
         for methods in (names.REDUCTIONS, (TWO_LEVEL,))
     )
-    for trained_on in settings.trained_on if taken or coarse else ():
-        further: list[Scene] = []
-        if trained_on == names.SEVERAL:
-            seeds = range(1, settings.training_motions)
-            variants = map(training.config.training_variant, seeds)
-            further = [Scene.build(variant, training.mesh) for variant in variants]
-        runs: list[np.ndarray | None] = [None]
-        if trained_on == names.OWN:
-            runs = [trajectory(training, track_objective=False)]
-        elif settings.affords(CONVERGED, vertices):
-            runs = [converged_run(s, own.tolerance, own.limit) for s in (training, *further)]
-        frames = [run[1:] for run in runs if run is not None]
-        if len(frames) < len(runs):
+    scenes, runs, spent = [training], list[np.ndarray](), 0.0
+    for count in sorted(settings.training_motions) if taken or coarse else ():
+        if not settings.affords(TRAINING, count * vertices):
             continue
+        started = process_time()
+        while len(scenes) < count:
+            variant = training.config.training_variant(len(scenes))
+            scenes.append(Scene.build(variant, training.mesh))
+        for scene in scenes[len(runs) :]:
+            run = converged_run(scene, own.training_tolerance, own.limit)
+            if run is None:
+                log.warning("%s: a training motion does not converge", training.config.name)
+                return
+            runs.append(run[1:])
+        spent += process_time() - started
         for k in settings.modes:
-            columns = make_columns(training, np.concatenate(frames), "pod", k=k)
+            started = process_time()
+            frames = np.concatenate([run[::count] for run in runs])
+            columns = make_columns(training, frames, "pod", k=k)
+            in_columns = process_time() - started
             for substeps in sorted({*taken, *coarse}):
-                level = trained_on == CONVERGED and substeps in coarse
+                started = process_time()
+                level = count == 1 and substeps in coarse
                 tolerances = [settings.tau, *([settings.coarse_tau] if level else [])]
-                scene = substepped(training, substeps, training.config.iterations)
+                scene, *others = (substepped(s, substeps, s.config.iterations) for s in scenes)
                 ends = np.arange(substeps - 1, scene.config.frames, substeps)
-                others = [substepped(s, substeps, s.config.iterations) for s in further]
                 made = sample_elements(scene, columns, ends, tolerances, others=others)
+                seconds = spent + in_columns + process_time() - started
                 for tau, samples in dict(zip(tolerances, made, strict=True)).items():
                     model = SubspaceModel("pod", columns, samples)
-                    yield Trained(trained_on, substeps, model, coarse=tau != settings.tau)
+                    yield Trained(count, substeps, model, seconds, coarse=tau != settings.tau)
 
 
 def substepped(scene: Scene, substeps: int, iterations: int, window: int = 0) -> Scene:

@@ -1,6 +1,6 @@
 """Section ``alternatives``: methods, their steps, and what they are compared with."""
 
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, Final
 
 from pydantic import AfterValidator, Field
 
@@ -12,16 +12,14 @@ from study.experiments.kit.measurement import Processes
 from study.experiments.kit.settings import Count, Modes, Repeats, Sizes, Tolerance
 
 REDUCED, ACCELERATED = REDUCTIONS = "ecsw", "ecsw-anderson"  # the others are full-order ones
-OWN: Final = "own iterations"  # frames that a reduction may be trained on, as may converged ones
-SEVERAL: Final = "several motions"  # converged frames of the training motion and of further ones
 TWO_LEVEL: Final = "two-level"  # full order, with a trained subspace for its coarse level
 TRAINED: Final = (TWO_LEVEL, *REDUCTIONS)
 CONVERGED: Final = "converged"  # the implicit step solved to convergence
+TRAINING: Final = "training"  # the runs that a reduction is trained on
 
 # These columns together identify a candidate of a scene.
-SETTING: Final = ["method", "substeps", "iterations", "trained_on", "k"]
+SETTING: Final = ["method", "substeps", "iterations", "training_motions", "k"]
 
-Trained = Literal["own iterations", "converged", "several motions"]
 Factors = Annotated[tuple[Annotated[float, Field(gt=0.0, le=1e8)], ...], Field(min_length=1)]
 Work = Annotated[int, Field(ge=1, le=10**12, description="vertices times steps")]
 Steps = Annotated[tuple[Count, Count], Field(description="substeps of a frame, iterations of each")]
@@ -34,16 +32,16 @@ def _with_the_first(motions: tuple[HeldOutMotion, ...]) -> tuple[HeldOutMotion, 
 
 
 def _known(by_method: dict[str, Any]) -> dict[str, Any]:
-    allowed = (*METHODS, *TRAINED, CONVERGED)
+    allowed = (*METHODS, *TRAINED, CONVERGED, TRAINING)
     for name in by_method:
         if name not in allowed:
             raise ValueError(f"unknown method '{name}'{choices(name, allowed)}")
     return by_method
 
 
-def _without_converged(steps: dict[str, Any]) -> dict[str, Any]:
-    if CONVERGED in steps:
-        raise ValueError(f"{CONVERGED}: has no steps, it is the reference")
+def _methods(steps: dict[str, Any]) -> dict[str, Any]:
+    for name in {CONVERGED, TRAINING}.intersection(steps):
+        raise ValueError(f"{name}: has no steps, only a limit of its work")
     return steps
 
 
@@ -56,7 +54,7 @@ STEPS: dict[str, tuple[Steps, ...]] = {
     "anderson": ((1, 5), (1, 10), (1, 20), (1, 40), (1, 80), (5, 5), (10, 5)),
     "chebyshev": ((1, 10), (1, 20), (1, 40), (1, 80)),
     TWO_LEVEL: ((1, 2), (1, 3), (1, 5), (1, 10), (1, 20)),
-    REDUCED: ((1, 5), (1, 10), (1, 20), (1, 40), (1, 80), (1, 160)),
+    REDUCED: ((1, 5), (1, 10), (1, 20), (1, 40)),
     ACCELERATED: ((1, 5), (1, 10), (1, 20)),
 }  # fmt: skip
 
@@ -76,9 +74,11 @@ class ContinuousReference(ConfigModel):
 class ImplicitReference(ConfigModel):
     """The implicit step of the scene: a frame is converged when one more local/global iteration
     moves no vertex by more than ``tolerance`` times the extent; ``limit`` bounds the evaluations.
+    Runs that train a reduction stop at the larger ``training_tolerance``.
     """
 
     tolerance: Tolerance = 1e-7
+    training_tolerance: Tolerance = 1e-5
     limit: Annotated[int, Field(ge=2)] = 4000
 
 
@@ -89,23 +89,23 @@ class Comparison(Processes):
     are taken over all frames of each of the held-out ``motions``. On its own mesh a scene runs with
     each of its factors on all weights in ``stiffness`` (1 if it has none). Each of ``processes``
     new processes times ``frames`` spread over the first motion. The reduction has each of ``modes``
-    and samples elements to ``tau``; it is trained (``trained_on``) on frames of the training motion
-    with the scene's own iterations, or converged, or on converged frames of ``training_motions`` in
-    all. The coarse level of two-level samples to ``coarse_tau``, trained on converged frames.
-    ``work`` bounds vertices x substeps x iterations of a frame of a method, without the pairs
-    beyond it.
+    and samples elements to ``tau``; it is trained on each number of ``training_motions``, the first
+    of which is that of the scene. The coarse level of two-level samples to ``coarse_tau`` and is
+    trained on this one. ``work`` bounds vertices x substeps x iterations of a frame of a method,
+    and vertices x motions of the ``training``; what is beyond it is left out.
     """
 
     stiffness: dict[str, Factors] = Field(default_factory=dict)
     steps: Annotated[
-        dict[str, tuple[Steps, ...]], AfterValidator(_known), AfterValidator(_without_converged)
+        dict[str, tuple[Steps, ...]], AfterValidator(_known), AfterValidator(_methods)
     ] = STEPS
     work: Annotated[dict[str, Work], AfterValidator(_known)] = Field(default_factory=dict)
     modes: Annotated[tuple[Modes, ...], Field(min_length=1)] = (40,)
     tau: Tolerance = 1e-2
     coarse_tau: Tolerance = 5e-3
-    trained_on: Annotated[tuple[Trained, ...], Field(min_length=1)] = (OWN, CONVERGED, SEVERAL)
-    training_motions: Annotated[int, Field(ge=2, le=64)] = 4
+    training_motions: Annotated[
+        tuple[Annotated[int, Field(ge=1, le=64)], ...], Field(min_length=1)
+    ] = (1, 2, 4, 8)
     implicit: ImplicitReference = ImplicitReference()
     continuous: ContinuousReference = ContinuousReference()
     motions: Annotated[tuple[HeldOutMotion, ...], AfterValidator(_with_the_first)] = MOTIONS

@@ -39,6 +39,7 @@ def written(tmp_path_factory):
             stiffness={"test": (1.0, 4.0)},
             steps=STEPS,
             modes=(4,),
+            training_motions=(1, 3),
             frames=2,
             motions=("heldout", "stiffness"),
             repeats=1,
@@ -63,18 +64,17 @@ def test_rows_of_a_scene(written, table):
     assert made.columns.tolist() == experiment.COLUMNS
     assert read_table(written[1].path).columns.tolist() == experiment.TIME_COLUMNS
     assert len(table) == len(made)
-    # reductions are trained three times; the reference and playback have one row each
+    # reductions are trained twice; the reference and playback have one row each
     all_of = sum(map(len, STEPS.values()))
     assert table.motion.value_counts().to_dict() == dict.fromkeys(
-        ("heldout", "stiffness"), 2 * (2 + all_of + 6)
+        ("heldout", "stiffness"), 2 * (2 + all_of + 3)
     )
-    reduced = table[table.trained_on.notna()]
-    assert reduced.groupby("trained_on").size().to_dict() == {
-        "converged": 16, "own iterations": 12, "several motions": 12,
-    }  # fmt: skip
+    reduced = table[table.training_motions.notna()]
+    assert reduced.groupby("training_motions").size().to_dict() == {1: 16, 3: 12}
+    assert (reduced.groupby(["stiffness", "substeps"]).offline_s.nunique() >= 2).all()
     inside = reduced[reduced.method.str.startswith("ecsw")]
     assert (inside.span_error > 0.0).all()
-    assert (inside.groupby(["trained_on", "motion"]).span_error.nunique() == 2).all()
+    assert (inside.groupby(["training_motions", "motion"]).span_error.nunique() == 2).all()
     timed = table[~table.method.isin(["converged", "playback"])].set_index("method")
     assert (timed.ms_per_frame > 0.0).all()
     assert (timed.processes == 2).all()
@@ -88,8 +88,7 @@ def test_rows_of_a_scene(written, table):
 
 
 def test_errors_of_a_scene(table):
-    table = table[~table.trained_on.isin(["converged", "several motions"])]
-    table = table[table.motion == "heldout"]
+    table = table[(table.motion == "heldout") & (table.training_motions.fillna(1) == 1)]
     case = table[table.stiffness == 1.0].set_index(["method", "substeps", "iterations"])
     # many iterations end at the implicit step, many explicit steps in continuous time
     assert case.error_implicit["anderson", 1, 200] < 1e-4
@@ -134,8 +133,8 @@ def test_winners_are_the_cheapest_that_reach_the_error(tmp_path):
         ],
         columns=["method", "ms_per_frame", "error_implicit"],
     ).assign(
-        **labels, trained_on=lambda t: t.method.map({"ecsw": "own iterations"}),
-        vertices=9, vertices_ms=0.1, motion="heldout", error_continuous=lambda t: t.error_implicit,
+        **labels, training_motions=lambda t: t.method.map({"ecsw": 4}), offline_s=3.0, vertices=9,
+        vertices_ms=0.1, motion="heldout", error_continuous=lambda t: t.error_implicit,
         reference_error=1e-2,
     )  # fmt: skip
     # speed-ups are ratios within a process; in the second one both methods are slower
@@ -148,6 +147,7 @@ def test_winners_are_the_cheapest_that_reach_the_error(tmp_path):
     loose, strict = found.loc[("implicit", 0.1)], found.loc[("implicit", 0.01)]
     assert (loose.method, loose.second, loose.margin, loose.reduced_speedup) == ("a", "b", 2.0, 2.0)
     assert (loose.reduced_speedup_low, loose.reduced_speedup_high) == (2.0, 2.0)
+    assert (loose.reduced_training_motions, loose.reduced_pays_after) == (4, 6000.0)
     assert strict.method == "b"
     assert pd.isna(strict.reduced_ms)
     # the motion in continuous time is not known well enough for the smaller error
@@ -171,13 +171,14 @@ def test_faulty_settings_are_refused(changes, message):
 
 
 def test_steps_that_cost_too_much_are_left_out():
-    asked = Comparison(work={"anderson": 2000, "converged": 100}, steps=STEPS)
+    asked = Comparison(work={"anderson": 2000, "converged": 100, "training": 40}, steps=STEPS)
     assert asked.pairs("anderson", 10) == [(1, 200)]
     assert asked.pairs("anderson", 11) == []
     assert asked.pairs("explicit", 10**6) == [(1, 1), (64, 1)]
     assert asked.pairs("chebyshev", 1) == []
     assert asked.affords("converged", 100)
     assert not asked.affords("converged", 101)
+    assert [n for n in asked.training_motions if asked.affords("training", 10 * n)] == [1, 2, 4]
 
 
 def test_weights_vary_on_the_own_mesh_only():
