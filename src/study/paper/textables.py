@@ -7,10 +7,12 @@ from typing import Any
 
 import pandas as pd
 
+from pdrom.model.held_out import PLAYBACK
 from pdrom.view.text import escape
+from study.experiments.alternatives.settings import ACCELERATED
 from study.figures.kit.declaration import declarations
 from study.paper.macros import format_number
-from study.tables.alternatives import CURVE
+from study.tables.alternatives import CASE, CURVE
 from study.tables.kit.results import MEDIAN, in_words, over_motions, trained
 
 NONE = "--"
@@ -248,6 +250,34 @@ def pays(winners: pd.DataFrame) -> str:
     return tabular(header, rows, "lllrrrrr")
 
 
+def training(alternatives: pd.DataFrame) -> str:
+    """Errors of the accelerated reduction by its number of training motions, nearest motion, time.
+
+    The distance of the nearest motion in the subspace and the time of the training are those of the
+    least and of the largest number of motions.
+    """
+    reduced = alternatives[alternatives.method == ACCELERATED]
+    reduced = reduced[reduced.iterations == reduced.iterations.max()]
+    played = alternatives[alternatives.method == PLAYBACK].set_index(CASE).error_implicit
+    rows, counts = [], sorted(reduced.training_motions.unique())
+    for case, own in reduced.groupby(CASE, sort=False):
+        own = own[own.k == own.k.max()].set_index("training_motions").sort_index()
+        scene, vertices, stiffness, motion = case
+        stiff = "" if stiffness == 1.0 else rf" $\times {stiffness:g}$"
+        ends = (own.index[0], own.index[-1])
+        rows.append(
+            [
+                _name(scene) + stiff, str(vertices), motion, _known(played[case]),
+                *map(_known, own.error_implicit.reindex(counts)),
+                *(_known(own.span_error[end]) for end in ends),
+                *(_known(own.offline_s[end], format_number) for end in ends),
+            ]
+        )  # fmt: skip
+    header = ["scene", "vertices", "motion", "playback", *map(str, counts),
+              "nearest: least", "most", "training (s): least", "most"]  # fmt: skip
+    return tabular(header, rows, "lrl" + "r" * (5 + len(counts)))
+
+
 def scenes(reduced_reruns: pd.DataFrame, scenes: pd.DataFrame) -> str:
     """Scenes with their constraint groups, sizes and horizons."""
     horizon = trained(reduced_reruns).groupby("scene").horizon_frame.first()
@@ -352,6 +382,7 @@ TEX_TABLES: dict[str, Callable[..., str]] = {
     for make in (
         claims, claims_in_full, scenes, methods, ranks, reruns, local_share, stability, iterations,
         positions, break_even, speedups, payoff, pays,
+        training,
     )
 }  # fmt: skip
 

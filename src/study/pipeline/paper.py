@@ -82,6 +82,7 @@ def _study(study: Study) -> Row:
         "tolerance": settings.iterations.tolerance,
         "continuous_tolerance": settings.alternatives.continuous.tolerance,
         "opponent_frames": settings.alternatives.frames,
+        "opponent_processes": settings.alternatives.processes,
         "far": FAR,
         "carry": HeldOut().carry,
     }

@@ -8,12 +8,14 @@ import pandas as pd
 from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, TableOf
+from study.tables.accuracy_cost import FEWER
 from study.tables.kit.declaration import count, integer, number, shared, table, timed
-from study.tables.kit.results import FAILED, joined, trained, with_held_out
+from study.tables.kit.results import FAILED, HIGH, LOW, MEDIAN, joined, trained, with_held_out
 
 # Columns that identify a curve, the rows that differ only in size r.
 CURVE = ["scene", "group", "method", "factor"]
 OWN_MESH = "1"  # mesh factor of a scene's configured mesh, which the files ``own`` contain
+SHARE = 1e-3  # of the force of a scene, up to which a group counts for nothing
 _ERROR = "relative_error_within_horizon"
 
 
@@ -104,16 +106,26 @@ def break_even(r: Sequence[int], ratio: Sequence[float]) -> int | None:
         ),
         timed(integer("pays_heldout", "those that pay whose run has at most a tenth held out")),
     ),
-    reads={"reruns": TableOf("reduced_reruns")},
+    reads={
+        "reruns": TableOf("reduced_reruns"),
+        "points": TableOf("accuracy_cost"),
+        "effects": TableOf("effects_cost"),
+    },
 )
-def payoff(reruns: pd.DataFrame) -> pd.DataFrame:
+def payoff(reruns: pd.DataFrame, points: pd.DataFrame, effects: pd.DataFrame) -> pd.DataFrame:
     """One row per position basis and method, over all scenes and sizes that ran and were timed.
 
     Sizes are chosen by the training motion in the table ``reruns`` and evaluated on the held-out
-    motions, see `with_held_out`.
+    motions, see `with_held_out`. Groups with at most `SHARE` of the force of a scene are left out.
+    The first row is the full order with fewer iterations (of ``points``), against the same run of
+    the scene as all reductions; it needs no training, and nothing is held out from it.
     """
+    shares = effects.set_index(["scene", "effect"]).force_share
+    weak = shares.index[shares <= SHARE]
     runs = trained(reruns)
-    runs = with_held_out(runs[runs.speedup.notna() & runs.max_extent.notna()], reruns)
+    runs = runs[runs.speedup.notna() & runs.max_extent.notna()]
+    runs = runs[~pd.MultiIndex.from_frame(runs[["scene", "group"]]).isin(weak)]
+    runs = pd.concat([_fewer(points), with_held_out(runs, reruns)], ignore_index=True)
     rows = []
     for (basis, method), own in runs.groupby(["position_basis", "method"], sort=False):
         accurate = own[own[_ERROR] <= FAILED]
@@ -140,3 +152,12 @@ def payoff(reruns: pd.DataFrame) -> pd.DataFrame:
             "pays_heldout": int(np.sum((speed > 1.0) & (fastest.error_heldout <= FAILED))),
         })  # fmt: skip
     return pd.DataFrame(rows)
+
+
+def _fewer(points: pd.DataFrame) -> pd.DataFrame:
+    """Full-order runs with fewer iterations, with their speed-ups over those of the scenes."""
+    full = points[(points.method == "full") & (points.position_basis == "full")]
+    fewer = points[points.method == FEWER]
+    speedup = fewer.scene.map(full.set_index("scene").ms_per_frame) / fewer.ms_per_frame
+    unseen = dict.fromkeys((MEDIAN, LOW, HIGH), np.nan)
+    return fewer.assign(group="all", speedup=speedup, **unseen)

@@ -39,6 +39,17 @@ TABLES = {
         ("bar_a", "fom-anderson", 10, 0.0625, 3.0),
         ("bar_a", "pod", None, 0.03, 1.0),
     ),
+    "alternatives": frame(
+        "method iterations k training_motions error_implicit span_error offline_s",
+        ("converged", None, None, None, 0.0, None, None),
+        ("playback", None, None, None, 0.75, None, None),
+        ("anderson", 20, None, None, 0.001, None, None),
+        ("ecsw", 40, 8, 1, 0.5, 0.25, 4.0),
+        ("ecsw-anderson", 5, 8, 1, 0.5, 0.25, 4.0),
+        ("ecsw-anderson", 20, 8, 1, 0.25, 0.125, 4.0),
+        ("ecsw-anderson", 20, 4, 4, 0.5, 0.5, 8.0),
+        ("ecsw-anderson", 20, 8, 4, 0.125, 0.0625, 16.0),
+    ).assign(scene="bar_a", vertices=9, stiffness=1.0, motion="kick"),
     "breakeven": frame(
         "scene group method factor vertices r breakeven_r",
         ("bar_a", "edge_spring", "deim-joint", 1, 400, 6, 20.0),
@@ -134,6 +145,8 @@ def test_every_row_has_a_cell_for_every_column(name):
         ("reruns", r"\texttt{bar\_a} & edge spring & 0.25 & \textcolor{okred}{blow-up, 4} \\"),
         # what is above round-off
         ("ranks", r"\texttt{bar\_a} & edge spring & 3 & 0.50 & 0.010 & -- \\"),
+        # the largest numbers of modes and of iterations
+        ("training", r"\texttt{bar\_a} & 9 & kick & 0.75 & 0.25 & 0.12 & 0.12 & 0.062 & 4 & 16 \\"),
         # implementations in order
         ("local_share", r"\texttt{bar\_a} & 150 & 0.80 & 16 & 0.75 & 2 & 0.50 \\"),
     ],

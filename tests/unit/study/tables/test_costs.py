@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from builders import frame
 from pdrom.core.store import write_table
 from study.artifact.paths import File
 from study.experiments.kit.settings import Horizon
@@ -93,10 +94,16 @@ def tables(runs) -> pd.DataFrame:
     return pd.concat([both.drop(columns="held").assign(motion="train"), held])
 
 
+def paid(reruns: pd.DataFrame, *fewer: tuple, shares: tuple = ()) -> pd.DataFrame:
+    """Table payoff without other full-order runs than ``fewer``, and with groups of ``shares``."""
+    points = frame(f"scene method position_basis {ERROR} ms_per_frame", *fewer)
+    return payoff(reruns, points, frame("scene effect force_share", *shares))
+
+
 @given(st.lists(RUN, min_size=1, max_size=12))
 def test_the_fastest_accurate_run_of_each_scene_decides(runs):
     timed = [run for run in runs if run[3] is not None]
-    made = payoff.checked(payoff(tables(runs)))
+    made = payoff.checked(paid(tables(runs)))
     assert made.method.tolist() == list(dict.fromkeys(run[1] for run in timed))
     for row in made.itertuples():
         own = [run for run in timed if run[1] == row.method]
@@ -117,7 +124,7 @@ def test_the_fastest_accurate_run_of_each_scene_decides(runs):
 def test_the_held_out_error_is_that_of_the_fastest_run():
     runs = [("a", "deim", 0.01, 2.0, 0.2), ("a", "deim", 0.02, 8.0, 0.3)]
     runs += [("b", "deim", 0.03, 8.0, None), ("b", "deim", 1.0, 9.0, 0.2)]
-    (row,) = payoff(tables(runs)).itertuples()
+    (row,) = paid(tables(runs)).itertuples()
     assert (row.error_train, row.error_heldout, row.heldout) == (0.025, 0.3, 1)
 
 
@@ -127,7 +134,7 @@ def test_who_pays_is_scored_on_the_held_out_motions():
     reruns = tables([*runs, ("c", "deim", 0.05, 4.0, 0.2)])
     held = reruns[reruns.motion != "train"]
     motions = [held.assign(**{ERROR: factor * held[ERROR]}) for factor in (0.5, 1.5)]
-    (row,) = payoff(pd.concat([reruns, *motions])).itertuples()
+    (row,) = paid(pd.concat([reruns, *motions])).itertuples()
     assert (row.accurate, row.pays, row.loses) == (3, 2, 1)
     assert (row.accurate_heldout, row.pays_heldout, row.heldout) == (2, 1, 3)
     found = (row.error_heldout_low, row.error_heldout, row.error_heldout_high)
@@ -136,7 +143,7 @@ def test_who_pays_is_scored_on_the_held_out_motions():
 
 def test_what_did_not_run_does_not_count():
     reruns = tables([("a", "deim", 0.01, 2.0, None), ("b", "deim", 0.01, 2.0, None)])
-    (row,) = payoff(reruns.assign(max_extent=[1.0, None])).itertuples()
+    (row,) = paid(reruns.assign(max_extent=[1.0, None])).itertuples()
     assert (row.scenes, row.accurate, row.heldout) == (1, 1, 0)
 
 
@@ -223,3 +230,20 @@ def test_contributions_are_judged_before_the_horizon_and_bring_their_times(tmp_p
     assert by.acting_frames.tolist() == [3, 3, 3, 1]
     assert by.loc[("a", "bending"), ["ms_per_frame", "saved_ms"]].tolist() == [0.25, 0.2]
     assert pd.isna(by.ms_per_frame[("b", "kick")])
+
+
+def test_the_full_order_with_fewer_iterations_is_the_first_opponent():
+    early = [("a", "full", "full", 0.0, 6.0), ("b", "full", "full", 0.0, 4.0)]
+    early += [
+        ("a", "fewer-iterations", "full", error, ms) for error, ms in ((0.2, 1.0), (0.05, 2.0))
+    ]
+    early += [("b", "fewer-iterations", "full", 0.3, 1.0)]
+    first, _ = paid(tables([("a", "deim", 0.01, 2.0, None)]), *early).itertuples()
+    assert (first.method, first.scenes, first.accurate) == ("fewer-iterations", 2, 1)
+    assert (first.pays, first.best_speedup, first.heldout) == (1, 3.0, 0)
+
+
+def test_groups_without_force_do_not_count():
+    reruns = tables([("a", "deim", 0.01, 2.0, None), ("b", "deim", 0.01, 2.0, None)])
+    (row,) = paid(reruns, shares=[("a", "spring", 1e-3), ("b", "spring", 2e-3)]).itertuples()
+    assert row.scenes == 1
