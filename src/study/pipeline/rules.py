@@ -9,8 +9,7 @@ from study.artifact.markup import to_plain, to_rst
 from study.experiments.kit.declaration import Experiment
 from study.figures.kit.declaration import Declaration
 from study.paper.figure_numbers import Numbers, figure_numbers
-from study.pipeline.plan import Plan
-from study.pipeline.resolve import Job
+from study.pipeline.plan import Job, Plan
 from study.tables.kit.declaration import Table
 
 UNNUMBERED = "–"
@@ -41,7 +40,7 @@ def rules(plan: Plan, cores: int) -> Iterator[Rule]:
     """Yield the rule of each artifact of ``plan``; rules that measure times claim ``cores``."""
     for experiment in plan.experiments.values():
         yield _experiment(plan, experiment, cores)
-    numbers = figure_numbers(plan.root)
+    numbers = figure_numbers(plan.study.root)
     for folder, jobs in plan.fixed.items():
         for job in jobs:
             yield _fixed(plan, job, folder, numbers)

@@ -16,11 +16,10 @@ from pdrom.core.store import read_table, write_text
 from study.artifact.paths import MACHINE
 from study.pipeline.commandline import CommandLine, one_line, recall, remember
 from study.pipeline.failures import Failures
-from study.pipeline.folders import Folders
 from study.pipeline.fork_server import hold_pipe, start_server
 from study.pipeline.manifest import write_manifest
 from study.pipeline.plan import Plan
-from study.pipeline.progress import Expected
+from study.pipeline.progress import Expected, Preview
 from study.pipeline.running import (
     FOLDER,
     end_at_sigterm,
@@ -30,7 +29,7 @@ from study.pipeline.running import (
     stop_at_sigterm,
 )
 from study.pipeline.scenes import Coarsen
-from study.pipeline.summary import configuration, preview, summary
+from study.pipeline.summary import CONTENTS, configuration, contents, summary
 from study.pipeline.targets import check_targets
 from study.pipeline.tracked import COLUMNS, COSTS, kind_of
 
@@ -49,15 +48,15 @@ def expected_seconds(plan: Plan) -> Callable[[str], float]:
     Kinds of jobs that were never measured get the median of all kinds. Times are scaled by the
     speed of the machine that the plan's last run has recorded.
     """
-    full = plan.settings.coarsen == Coarsen()
+    root, full = plan.study.root, plan.study.settings.coarsen == Coarsen()
     study, column = ("full", "seconds") if full else ("tiny", "coarse_seconds")
-    table = read_table(plan.root / COSTS, COLUMNS, result=False)
+    table = read_table(root / COSTS, COLUMNS, result=False)
     try:
-        record = (plan.root / MACHINE.at(plan.results)).read_bytes()
+        record = (root / MACHINE.at(plan.results)).read_bytes()
         here = Machine.model_validate_json(record).units
     except (OSError, ValidationError):
         here = None  # before the first run, or a record of an older version
-    slower = 1.0 if here is None else here.unit_s / units_of(study, plan.root).unit_s
+    slower = 1.0 if here is None else here.unit_s / units_of(study, root).unit_s
     seconds = slower * table[column]
     known = dict(zip(table.kind, seconds, strict=True))
     usual = float(seconds.median())
@@ -120,10 +119,10 @@ class Run:
         logging.getLogger("snakemake.logging").addHandler(failures)
         return cls(command, failures)
 
-    def check(self, plan: Plan, folders: Folders, rules: Iterable[Any], cores: int) -> None:
-        """Check targets and report; register the preview of a dry run on ``cores``.
+    def check(self, plan: Plan, rules: Iterable[Any], cores: int) -> None:
+        """Check targets and report; print the jobs of a dry run on ``cores`` at its end.
 
-        ``plan``, ``folders`` and Snakemake's ``rules`` belong to the same workflow.
+        ``plan`` and Snakemake's ``rules`` belong to the same workflow.
 
         Raises
         ------
@@ -132,14 +131,15 @@ class Run:
         """
         check_targets(plan, self.command.targets, list(rules))
         reports = self.command.report and not self.command.targets
-        if reports and not Path(folders.manuscript).is_file():
+        manuscript = plan.folders.manuscript
+        if reports and not Path(manuscript).is_file():
             last = " ".join(recall())
             hint = f"the last run was of another one: add {last}" if last else "run it first"
-            raise ConfigurationError(
-                f"report: this configuration has no {folders.manuscript}; {hint}"
-            )
+            raise ConfigurationError(f"report: this configuration has no {manuscript}; {hint}")
         if self.command.plans:
-            preview(expected_seconds(plan), cores)
+            planned = Preview(expected_seconds(plan), cores)
+            logging.getLogger("snakemake.logging").addHandler(planned)
+            atexit.register(lambda: sys.stdout.write(planned.text()))
 
     def title(self, plan: Plan) -> str:
         """Name of this run's configuration, with a note if it is not the full study of ``plan``."""
@@ -162,19 +162,16 @@ class Run:
                 sys.exit(f"pdrom: {FOLDER}/run.pipe: cannot be made ({error.strerror})")
             start_server()
 
-    def succeed(self, workflow: Any, plan: Plan, folders: Folders) -> None:
-        """End a successful run: write overview and manifest into ``folders``, print the summary."""
-        # imported late: planning does not need this module
-        from study.pipeline.inventory import CONTENTS, contents
-
+    def succeed(self, workflow: Any, plan: Plan) -> None:
+        """End a successful run: write overview and manifest, print the summary."""
         try:
             if not self.command.targets:
-                text = contents(self.command, workflow.dag, folders)
-                write_text(text, CONTENTS.at(folders.results))
-            write_manifest(plan, folders, self.command.configuration)
+                text = contents(self.command, workflow.dag, plan.folders)
+                write_text(text, CONTENTS.at(plan.results))
+            write_manifest(plan, self.command.configuration)
         except PdromError as error:
             say_last(f"pdrom: {error}\n")
-        say_last(summary(self.command, folders, plan.figures, plan.table_paths, plan.study.apart))
+        say_last(summary(self.command, plan))
 
     def fail(self) -> None:
         """End a failed or interrupted run: print the causes and exit."""

@@ -119,13 +119,13 @@ def _allowed(study: Study, label: str, before: Mapping[str, str]) -> Collection[
 
 def _unknown(plan: Plan, target: str, rules: Collection[str]) -> str:
     """Last part of the message about an unknown target; ``rules`` are names without labels."""
-    scenes = {*scene_names(plan.root), *plan.study.scenes}
+    scenes = {*scene_names(plan.study.root), *plan.study.scenes}
     if target in scenes:
         example = paths.FULL_ORDER.at(plan.results, scene=target, run="train")
         return f"a scene; name one of its files, as {example}"
     known = [*declarations(), *plan.tables, *rules, *scenes]
     if "/" in target:
-        known = [*plan.table_paths, *plan.figures, *plan.measured]
+        known = list(plan.own_files)
     return (
         f"nothing makes it{suggestion(target, known)}; "
         f"targets are names of figures and tables, and files below {plan.results}"

@@ -57,7 +57,7 @@ class Subject:
         """Plan of the configuration, merged from its files and settings as by Snakemake."""
         command = CommandLine.parse(self.options)
         whole = merged(Path(DEFAULT), command.configfiles, command.settings)
-        return load_plan(whole, Path(), command.configfiles, folders=self.folders, quiet=True)
+        return load_plan(whole, command.configfiles, self.folders, quiet=True)
 
 
 class Status(IntEnum):

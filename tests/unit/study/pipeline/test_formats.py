@@ -61,7 +61,7 @@ def files(tmp_path_factory):
             "ranks": [3, "full"],
             "coarsen": {"resolution": 0.3, "frames": 0.1},
         }
-        plan = load_plan(config, Path(), folders=Folders(os.fspath(folder)), quiet=True)
+        plan = load_plan(config, folders=Folders(os.fspath(folder)), quiet=True)
         more = {
             "mesh": {"mesh": plan.study.mesh_of(SCENE)},
             "pod": {"basis": plan.study.methods[METHOD].basis_id},

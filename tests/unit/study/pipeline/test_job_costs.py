@@ -36,9 +36,8 @@ ROOM = 2.0
 def plan(**coarsen: float) -> SimpleNamespace:
     """A plan, as far as it is asked."""
     return SimpleNamespace(
-        root=ROOT,
+        study=SimpleNamespace(root=ROOT, settings=SimpleNamespace(coarsen=Coarsen(**coarsen))),
         results="results/studies/logs",
-        settings=SimpleNamespace(coarsen=Coarsen(**coarsen)),
     )
 
 

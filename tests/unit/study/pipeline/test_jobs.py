@@ -16,8 +16,7 @@ from study.experiments.timing import scaling
 from study.pipeline.contents import labels_of
 from study.pipeline.folders import Folders
 from study.pipeline.manifest import study_files
-from study.pipeline.plan import Plan
-from study.pipeline.resolve import Job
+from study.pipeline.plan import Job, Plan
 from study.pipeline.study import Study
 from study.tables import declared
 
@@ -170,4 +169,4 @@ def test_files_of_the_study_and_what_was_asked_for_beside_them(tmp_path, monkeyp
     for name in (*own, *asked_for, *others):
         Path(name).parent.mkdir(parents=True, exist_ok=True)
         Path(name).touch()
-    assert sorted(study_files(smallest, Folders())) == sorted([*own, *asked_for])
+    assert sorted(study_files(smallest)) == sorted([*own, *asked_for])

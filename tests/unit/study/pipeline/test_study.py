@@ -19,8 +19,7 @@ from study.artifact.paths import LABELS
 from study.experiments.kit.declaration import experiments
 from study.experiments.stability import stability
 from study.pipeline.contents import labels_of
-from study.pipeline.plan import check_live, check_subspaces
-from study.pipeline.resolve import Resolver
+from study.pipeline.plan import Plan, check_live, check_subspaces
 from study.pipeline.scenes import Replicate, Variants, read_scene
 from study.pipeline.study import Study, StudySettings
 
@@ -51,7 +50,7 @@ def test_short_runs_are_planned_where_the_study_holds_them():
     asked = {"scenes": ["strain_oop", "bar_release"], "ranks": [6, 20]}
     made = study(stability=asked)
     assert labels_of(made, paths.STABILITY) == [{"scene": "strain_oop"}]
-    job = Resolver(made, "results").job(stability, {"scene": "strain_oop"})
+    job = Plan(made).job(stability, {"scene": "strain_oop"})
     plain = job.settings["short"]
     assert plain["ranks"] == [6]
     # which scenes have short runs and how they are judged makes no run again

@@ -12,7 +12,7 @@ from study.artifact.usage import Usage
 from study.figures.kit.declaration import declarations
 from study.pipeline.commandline import CommandLine
 from study.pipeline.front import completed
-from study.pipeline.inventory import contents, costs, entries
+from study.pipeline.summary import contents, costs, entries
 from study.pipeline.targets import own_file
 from study.tables import declared
 from study.verification.subject import Subject
@@ -35,8 +35,7 @@ class Dag:
     """
 
     def __init__(self, subject: Subject) -> None:
-        documents = subject.folders.documents.values()
-        files = [*subject.plan.table_paths, *subject.plan.figures, *documents]
+        files = subject.plan.made
         first, second = (Job((f"{name}.h5",), (f"logs/{name}.log",)) for name in ("run", "basis"))
         last = [Job((file,), (f"logs/{Path(file).stem}{i}.log",)) for i, file in enumerate(files)]
         self.dependencies = {first: {}, second: {first: {}}} | {job: {second: {}} for job in last}
