@@ -64,18 +64,6 @@ def _with_subspaces(study: Study) -> list[str]:
     return _held(study, section.scenes or takes)
 
 
-def _requested(study: Study) -> list[str]:
-    """Configured scenes of the section `requested_tolerances`, else all, also large scenes."""
-    held, listed = [*study.scenes, *study.online], study.settings.requested_tolerances.scenes
-    return [scene for scene in held if scene in (listed or held)]
-
-
-def _live(study: Study) -> list[str]:
-    """Configured scenes of the live page for which the study has reduced models."""
-    held = {*_with_subspaces(study), *study.online}
-    return [scene for scene in study.settings.live.scenes if scene in held]
-
-
 # Values of the label "name" for kinds of files that every study has.
 NAMES: dict[Place, Callable[[], Iterable[str]]] = {
     paths.TABLE: declared,
@@ -83,21 +71,32 @@ NAMES: dict[Place, Callable[[], Iterable[str]]] = {
     paths.FIGURE_PICTURE: declarations,
     paths.PAPER_INPUT: lambda: FILES,
 }
+# Files of models in position subspaces.
+MODELS = (
+    paths.SUBSPACES, paths.SUBSPACES_TRAIN, paths.SUBSPACES_HELDOUT, paths.SUBSPACES_SECONDS,
+)  # fmt: skip
 # Scenes that have files of a kind; a mapping also gives the factors of the mesh size of each scene.
 SCENES: dict[Place, Callable[[Study], Iterable[str]]] = {
-    paths.SUBSPACES: _with_subspaces,
-    paths.SUBSPACES_TRAIN: _with_subspaces,
-    paths.SUBSPACES_HELDOUT: _with_subspaces,
-    paths.SUBSPACES_SECONDS: _with_subspaces,
+    **dict.fromkeys(MODELS, _with_subspaces),
     paths.SCALING: lambda study: study.settings.scaling.scenes,
     paths.BREAK_EVEN_SIZED: lambda study: study.settings.scaling.scenes,
     paths.ALTERNATIVES: lambda study: study.settings.alternatives.scenes,
     paths.ALTERNATIVE_TIMES: lambda study: study.settings.alternatives.scenes,
     paths.ONLINE: lambda study: study.online,
     paths.ONLINE_MODELS: lambda study: study.online,
-    paths.LIVE_MODEL: _live,
+    # scenes for which the study has reduced models
+    paths.LIVE_MODEL: lambda study: [
+        scene
+        for scene in study.settings.live.scenes
+        if scene in {*_with_subspaces(study), *study.online}
+    ],
     paths.STABILITY: lambda study: _held(study, study.settings.stability.scenes),
-    paths.REQUESTED_TOLERANCES: _requested,
+    # the configured scenes, else all, also large ones
+    paths.REQUESTED_TOLERANCES: lambda study: [
+        scene
+        for scene in (*study.scenes, *study.online)
+        if scene in (study.settings.requested_tolerances.scenes or (*study.scenes, *study.online))
+    ],
 }
 # Functions of study, scene and group: True if the reduced group has files of a kind.
 GROUPS: dict[Place, Callable[[Study, str, str], bool]] = {

@@ -196,16 +196,14 @@ def digest(root: Path, *names: str) -> str:
 
 def track_scripts(workflow: Any) -> None:
     """Make a hash of each rule's script a parameter of the rule, in place of the script's date."""
+    # imported late: a plan can be made without Snakemake
+    from snakemake.settings.types import RerunTrigger
+
     for rule in workflow.rules:
         if rule.script:
             text = (SCRIPTS / Path(rule.script).name).read_text(encoding="utf-8")
             rule.set_params(script=digest_of_source(text)[:16])
     # Snakemake sets the rerun triggers after it has read the rules, so that a property changes them
-    type(workflow).rerun_triggers = property(_triggers)
-
-
-def _triggers(workflow: Any) -> frozenset[Any]:
-    # imported late: a plan can be made without Snakemake
-    from snakemake.settings.types import RerunTrigger
-
-    return frozenset(workflow.dag_settings.rerun_triggers) - {RerunTrigger.CODE}
+    type(workflow).rerun_triggers = property(
+        lambda self: frozenset(self.dag_settings.rerun_triggers) - {RerunTrigger.CODE}
+    )

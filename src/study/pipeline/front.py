@@ -45,10 +45,10 @@ def completed(arguments: Sequence[str]) -> list[str]:
         from study.pipeline.targets import figure_arguments  # late: it imports the whole package
 
         arguments = figure_arguments(arguments[1:])
-    command = CommandLine.parse(arguments)
+    command = CommandLine(arguments)
     if command.report and not command.configfiles and not command.settings and recall():
         _say(f"a report of the last run, {' '.join(recall())}")
-        command = CommandLine.parse(command.rewritten(recall(), {t: [t] for t in command.targets}))
+        command = CommandLine(command.rewritten(recall(), {t: [t] for t in command.targets}))
     check_files(command.configfiles)
     cores = () if command.cores else ("--cores", "all")
     replaced = command.plans or not command.looks_only

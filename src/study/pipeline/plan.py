@@ -14,6 +14,7 @@ from typing import Any
 
 from pdrom.core.errors import ConfigurationError, SceneError, choices
 from pdrom.reduction.subspace.exported import DOUBLES, require_known
+from pdrom.view.text import require_typeset
 from study.article.build import article
 from study.artifact.artifact import Artifact, make, modules_in
 from study.artifact.logs import planning_log
@@ -27,7 +28,6 @@ from study.paper.build import paper, paper_inputs
 from study.pipeline.contents import labels_of
 from study.pipeline.fingerprint import digest, fingerprint
 from study.pipeline.folders import DEFAULT, Folders
-from study.pipeline.paper import check_texts
 from study.pipeline.scenes import not_taken, require_scenes
 from study.pipeline.study import Study, part_of
 from study.pipeline.values import DERIVED, scaled_methods
@@ -80,6 +80,25 @@ def _live_bytes(study: Study, name: str) -> float:
     entries = [vertices * (k + 4) for k in sizes]  # modes and four affine columns
     bases = sum(count * (8 if count <= DOUBLES else 4) for count in entries)
     return (vertices * 32 + bases) * 4 / 3  # written in base 64
+
+
+def check_texts(study: Study) -> None:
+    """Raise ConfigurationError for a text of ``study`` that figures or TeX cannot typeset."""
+    folder, ladder = study.root / "config", study.settings.ladder
+    for name, method in study.methods.items():
+        require_typeset(method.title, f"{folder / 'methods.yaml'}: {name}.title")
+    for key, rungs in {"up": ladder.up, "down": ladder.down}.items():
+        for i, rung in enumerate(rungs):
+            require_typeset(rung.title, f"ladder.{key}.{i}.title")
+    for name, claim in load_claims(folder / "claims.yaml").items():
+        words = ("text", "source", "paper", "section", "shown", "qualifiers")
+        texts = {key: getattr(claim, key) for key in words}
+        for part in ("published", "beyond"):
+            tests = enumerate(getattr(claim, part))
+            texts |= {f"{part}.{i}.what": test.what for i, test in tests}
+        texts |= {f"changes.{i}.reason": c.reason for i, c in enumerate(claim.changes)}
+        for key, text in texts.items():
+            require_typeset(text, f"{folder / 'claims.yaml'}: {name}.{key}")
 
 
 @dataclass(frozen=True)

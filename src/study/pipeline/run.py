@@ -5,6 +5,7 @@ import logging
 import os
 import sys
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -93,12 +94,12 @@ DATED = ("results", "paper", "config", "workflow")
 JOBSTEP = "slurm-jobstep"
 
 
+@dataclass(frozen=True)
 class Run:
     """The run of this process: locks its folder, starts the jobs' server, reports the outcome."""
 
-    def __init__(self, command: CommandLine, failures: Failures) -> None:
-        self.command = command
-        self.failures = failures
+    command: CommandLine
+    failures: Failures
 
     @classmethod
     def begin(cls) -> "Run":
@@ -108,7 +109,7 @@ class Run:
         """
         end_at_sigterm()
         with one_line():
-            command = CommandLine.parse(sys.argv[1:])
+            command = CommandLine(sys.argv[1:])
             if command.looks_only:
                 remove_stale_locks()
             else:
@@ -163,20 +164,20 @@ class Run:
             start_server()
 
     def succeed(self, workflow: Any, plan: Plan) -> None:
-        """End a successful run: write overview and manifest, print the summary."""
+        """End a successful run: write overview and manifest; print the summary at the very end."""
         try:
             if not self.command.targets:
                 text = contents(self.command, workflow.dag, plan.folders)
                 write_text(text, CONTENTS.at(plan.results))
             write_manifest(plan, self.command.configuration)
         except PdromError as error:
-            say_last(f"pdrom: {error}\n")
-        say_last(summary(self.command, plan))
+            atexit.register(sys.stderr.write, f"pdrom: {error}\n")
+        atexit.register(sys.stderr.write, summary(self.command, plan))
 
     def fail(self) -> None:
-        """End a failed or interrupted run: print the causes and exit."""
+        """End a failed or interrupted run: exit, and print the causes after Snakemake's lines."""
         text, status = self.failures.end()
-        say_last(text)
+        atexit.register(sys.stderr.write, text)
         sys.exit(status)
 
 
@@ -194,8 +195,3 @@ def say_compilation(cache: str) -> None:
     """Announce that kernels are compiled first, if the cache folder has no compiled time step."""
     if not any(Path(cache).glob("dynamics*/*.nbi")):
         sys.stderr.write("pdrom: the first jobs compile kernels (once, some minutes)\n")
-
-
-def say_last(text: str) -> None:
-    """Write ``text`` to standard error at the end of the process, after Snakemake's messages."""
-    atexit.register(sys.stderr.write, text)

@@ -2,14 +2,14 @@
 
 from collections.abc import Iterable
 from copy import copy
-from functools import cached_property, partial
+from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Any
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from pdrom.core.errors import ConfigurationError, choices
-from pdrom.core.yamlfile import ConfigModel, SceneName, read_yaml, validate
+from pdrom.core.yamlfile import SceneName, read_yaml, validate
 from pdrom.model.dynamics.system import DEFAULT_SOLVER
 from pdrom.model.mesh.config import MeshConfig
 from pdrom.model.scene import Scene, SceneConfig
@@ -31,8 +31,9 @@ from study.figures.kit.declaration import load_choices
 from study.figures.kit.options import Options
 from study.pipeline.folders import DEFAULT
 from study.pipeline.scenes import (
-    Changes,
+    Change,
     Coarsen,
+    GivenOnce,
     Replicate,
     Variants,
     bind,
@@ -42,7 +43,7 @@ from study.pipeline.scenes import (
 )
 
 
-class StudySettings(ConfigModel):
+class StudySettings(GivenOnce):
     """Content of config/default.yaml, possibly overridden by --configfile.
 
     A section is declared by the experiment whose settings it holds; a default stands there, or here
@@ -78,17 +79,9 @@ class StudySettings(ConfigModel):
     study: str | None = None
 
     @property
-    def changes(self) -> Changes:
-        """Changes that the study makes to every scene of config/scenes."""
-        return Changes(self.coarsen, self.replicate)
-
-    @model_validator(mode="after")
-    def _given_once(self) -> Self:
-        for key in ("scenes", "methods", "ranks"):
-            values = getattr(self, key)
-            if len(set(values)) < len(values):
-                raise ValueError(f"{key} = {list(values)}: an entry is given twice")
-        return self
+    def changes(self) -> tuple[Change, ...]:
+        """Changes that the study makes to every scene of config/scenes, in their order."""
+        return (self.replicate, self.coarsen)
 
 
 class Study:
@@ -102,9 +95,9 @@ class Study:
         self.titles: dict[str, str] = {}  # titles of scenes, for tables and figures
         self.vertices: dict[str, int] = {}
         self.bound: dict[str, Scene] = {
-            name: load_bound_scene(root, name, settings.changes) for name in settings.scenes
+            name: load_bound_scene(root, name, *settings.changes) for name in settings.scenes
         }
-        for config in settings.variants.of(partial(read_scene, root, changes=settings.changes)):
+        for config in settings.variants.of(lambda name: read_scene(root, name, *settings.changes)):
             self.bound[config.name] = bind(root, config, "variants")
         self.scenes = {name: self._physics(s) for name, s in self.bound.items()}
         self.online = {name: self._loaded(name) for name in settings.online.scenes}
@@ -156,7 +149,7 @@ class Study:
 
     def _loaded(self, name: str) -> SceneConfig:
         """Checked configuration of a scene whose built form the study does not store."""
-        return self._physics(load_bound_scene(self.root, name, self.settings.changes))
+        return self._physics(load_bound_scene(self.root, name, *self.settings.changes))
 
     def _physics(self, scene: Scene) -> SceneConfig:
         """Scene configuration with its title replaced by its name: jobs do not depend on titles."""
@@ -211,11 +204,14 @@ class Study:
 
     def mesh(self, identifier: str) -> MeshConfig:
         """Configuration of the mesh ``identifier`` of any scene in config/scenes or the study."""
-        if identifier in self.meshes:
-            return self.meshes[identifier]
-        changes = self.settings.changes
-        every = (read_scene(self.root, name, changes).mesh for name in scene_names(self.root))
-        return next(mesh for mesh in every if mesh.identifier == identifier)
+        return self.meshes.get(identifier) or self.every_mesh[identifier]
+
+    @cached_property
+    def every_mesh(self) -> dict[str, MeshConfig]:
+        """Mesh configurations of all scenes in config/scenes and of the study, by identifier."""
+        changes, names = self.settings.changes, scene_names(self.root)
+        meshes = [read_scene(self.root, name, *changes).mesh for name in names]
+        return {mesh.identifier: mesh for mesh in meshes} | self.meshes
 
     def basis(self, identifier: str) -> BasisSpec:
         """Specification of the basis ``identifier``, from the first method that uses it."""

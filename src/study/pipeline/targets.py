@@ -11,7 +11,7 @@ from study.figures.kit.declaration import declarations
 from study.paper.figure_numbers import SUPPLEMENT, figure_numbers
 from study.pipeline.folders import Folders
 from study.pipeline.plan import Plan
-from study.pipeline.scenes import read_scene, scene_names
+from study.pipeline.scenes import scene_names
 from study.pipeline.study import Study
 from study.tables import declared
 
@@ -111,9 +111,7 @@ def _allowed(study: Study, label: str, before: Mapping[str, str]) -> Collection[
         case "basis":
             return {spec.basis_id for spec in study.methods.values()}
         case "mesh":
-            changes = study.settings.changes
-            others = [read_scene(study.root, name, changes) for name in scene_names(study.root)]
-            return {*(scene.mesh.identifier for scene in others), *study.meshes}
+            return study.every_mesh
     return None
 
 

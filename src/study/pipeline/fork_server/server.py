@@ -17,7 +17,6 @@ import signal
 import socket
 import sys
 import threading
-from collections.abc import Sequence
 from contextlib import suppress
 from typing import Any, NoReturn
 
@@ -153,21 +152,17 @@ class Server:
         return script
 
 
-def load(libraries: Sequence[str]) -> None:
-    """Import ``libraries``; register numba's own functions once, which each fork would repeat."""
-    for library in libraries:
-        importlib.import_module(library)
-    if "numba" in libraries:
-        target = importlib.import_module("numba.core.registry").cpu_target
-        target.typing_context.refresh()
-        target.target_context.refresh()
-
-
 def main() -> None:
     """Load the libraries and serve; in a fork, run the job's script as an interpreter would."""
     listener = socket.socket(fileno=int(sys.argv[1]))
-    owner = int(sys.argv[2])
-    load(sys.argv[3:])
+    owner, libraries = int(sys.argv[2]), sys.argv[3:]
+    for library in libraries:
+        importlib.import_module(library)
+    if "numba" in libraries:
+        # register numba's own functions once, which each fork would repeat
+        target = importlib.import_module("numba.core.registry").cpu_target
+        target.typing_context.refresh()
+        target.target_context.refresh()
     gc.collect()
     gc.freeze()
     script = Server(listener, owner).serve()

@@ -28,7 +28,7 @@ def project(tmp_path, monkeypatch):
 
 
 def parse(text: str) -> CommandLine:
-    return CommandLine.parse(text.split())
+    return CommandLine(text.split())
 
 
 @pytest.mark.parametrize(
@@ -195,7 +195,7 @@ def test_a_faulty_configuration_file_is_named_before_snakemake_reads_it():
 
 def test_the_report_is_of_the_last_run(capsys):
     assert completed(["--report"]) == ["--report", "--cores", "all", *OPTIONS]
-    remember(CommandLine.parse(["--configfile", "my.yaml", "--config", "a=b", "c=d"]))
+    remember(CommandLine(["--configfile", "my.yaml", "--config", "a=b", "c=d"]))
     last = ["--configfile", "my.yaml", "--config", "a=b", "c=d"]
     assert recall() == last
     assert completed(["--report"]) == ["--report", *last, "--cores", "all", *OPTIONS]

@@ -168,6 +168,6 @@ def test_choices_among_jobs_start_no_timers(monkeypatch):
         monkeypatch.setattr(run, name, lambda *_: None)
     scheduler = SimpleNamespace(job_rate_limiter="1000 jobs in 20 seconds")
     workflow = SimpleNamespace(scheduler=scheduler, local_exec=False)
-    begun = Run(CommandLine.parse(["--executor", "touch"]), Failures())
+    begun = Run(CommandLine(["--executor", "touch"]), Failures())
     begun.start(workflow, plan=None)
     assert scheduler.job_rate_limiter is None

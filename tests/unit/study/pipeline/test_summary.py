@@ -41,7 +41,7 @@ def lines(*arguments: str, words: str = "") -> dict[str, str]:
     listed = {"figures": FIGURES, "tables": TABLES}
     fixed = {k: [SimpleNamespace(outputs={"": path}) for path in v] for k, v in listed.items()}
     plan = SimpleNamespace(folders=Folders(), study=SimpleNamespace(apart=words), fixed=fixed)
-    text = summary(CommandLine.parse(arguments), plan)
+    text = summary(CommandLine(arguments), plan)
     assert text.endswith("\n")
     said = [line.removeprefix("pdrom: ") for line in text.splitlines()]
     return dict(line.split(": ", 1) for line in said)

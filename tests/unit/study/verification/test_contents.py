@@ -51,7 +51,7 @@ def test_every_command_makes_what_its_entry_names(subject, monkeypatch):
         "claim", "figure", "table", "section", "manuscript",
     }  # fmt: skip
     for entry in listed:
-        command = CommandLine.parse(completed([*entry.words, *TINY]))
+        command = CommandLine(completed([*entry.words, *TINY]))
         assert command.configfiles == ("config/tiny.yaml",)
         wanted = (
             []
@@ -78,7 +78,7 @@ def test_costs_are_those_of_all_jobs_that_are_needed(subject, tmp_path, monkeypa
 
 def test_the_contents_name_every_entry_and_describe_every_figure_and_column(subject, monkeypatch):
     monkeypatch.chdir(ROOT)
-    page = contents(CommandLine.parse(TINY), Dag(subject), subject.folders)
+    page = contents(CommandLine(TINY), Dag(subject), subject.folders)
     assert "run of config/tiny.yaml" in page
     for entry in entries():
         command = shlex.join(["./reproduce", *entry.words, *TINY])
