@@ -1,5 +1,6 @@
 """Fingerprints: what changes a result changes them, what does not leaves them alone."""
 
+import ast
 import shutil
 
 import pytest
@@ -8,7 +9,12 @@ from pdrom.core.errors import ConfigurationError
 from pdrom.model.effects import EFFECTS
 from pdrom.reduction.method import SELECTIONS, MethodSpec
 from study.pipeline import fingerprint as module
-from study.pipeline.fingerprint import closure, digest_of_source, fingerprint
+from study.pipeline.fingerprint import closure, digest_of_code, fingerprint
+
+
+def digest_of_source(text: str, module: str = "") -> str:
+    return digest_of_code(ast.parse(text), module)
+
 
 SOURCE = '''"""Module."""
 
