@@ -4,7 +4,7 @@ The possible labels of a kind of file follow from the scenes, their constraint g
 methods of the study. Kinds that exist only for some of these are listed in this module.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 
 from pdrom.model.held_out import MOTIONS
 from study.artifact import paths
@@ -20,34 +20,27 @@ Labels = dict[str, str]
 
 def labels_of(study: Study, place: Place) -> list[Labels]:
     """Labels of every file of the kind ``place``, in the order of ``study``, without repetition."""
-    found = _found(study, place)
-    return list({tuple(labels.items()): labels for labels in found}.values())
-
-
-def _found(study: Study, place: Place) -> Iterator[Labels]:
     names = place.labels
     scenes = SCENES[place](study) if place in SCENES else study.scenes
+    known: Iterable[Labels] = [{}]
     if place in NAMES:
-        yield from ({"name": name} for name in NAMES[place]())
+        known = ({"name": name} for name in NAMES[place]())
     elif names == ["mesh"]:
-        yield from ({"mesh": mesh} for mesh in study.meshes)
+        known = ({"mesh": mesh} for mesh in study.meshes)
     elif "group" in names:
-        for scene, group in study.experiments:
-            if place in GROUPS and not GROUPS[place](study, scene, group):
-                continue
-            for name, method in study.methods.items():
-                known = {"scene": scene, "group": group, "method": name, "basis": method.basis_id}
-                yield {label: known[label] for label in names}
+        known = (
+            {"scene": scene, "group": group, "method": name, "basis": method.basis_id}
+            for scene, group in study.experiments
+            if place not in GROUPS or GROUPS[place](study, scene, group)
+            for name, method in study.methods.items()
+        )
     elif "factor" in names and isinstance(scenes, Mapping):
-        for scene in (name for name in scenes if name in study.scenes):
-            yield from ({"scene": scene, "factor": f"{factor:g}"} for factor in scenes[scene])
+        held = [scene for scene in scenes if scene in study.scenes]
+        known = ({"scene": name, "factor": f"{x:g}"} for name in held for x in scenes[name])
     elif "scene" in names:
-        for scene in scenes:
-            for run in ("train", *MOTIONS):
-                known = {"scene": scene, "run": run}
-                yield {label: known[label] for label in names}
-    else:
-        yield {}
+        known = ({"scene": name, "run": run} for name in scenes for run in ("train", *MOTIONS))
+    found = [{label: labels[label] for label in names} for labels in known]
+    return list({tuple(labels.items()): labels for labels in found}.values())
 
 
 def _held(study: Study, listed: Iterable[str]) -> list[str]:

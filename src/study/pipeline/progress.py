@@ -1,11 +1,6 @@
-"""Progress of a run: one line per job, with counts and an estimate of the remaining time.
-
-Of a dry run, the jobs and their expected time.
-"""
+"""Remaining time of a run, as an estimate, and the jobs of a dry run with their expected time."""
 
 import logging
-import sys
-import time
 from collections import Counter, defaultdict
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -13,10 +8,6 @@ from itertools import accumulate
 
 from snakemake_interface_logger_plugins.common import LogEvent
 
-NOTHING = "Nothing to be done"
-# Part of Snakemake's message about a failed job; the run's last lines report such jobs instead.
-JOB_FAULT = "RuleException"
-CLOSING = "At least one job did not complete successfully"
 # Least number of jobs, and least share of the expected work, done before an estimate is shown.
 ENOUGH_JOBS, ENOUGH = 2, 0.05
 # Least remaining time of an unfinished job, as a share of its expected time.
@@ -88,48 +79,6 @@ class Estimate:
             chain = max(chain, rest + job.after * slower)
         busy = sum(seconds * self.jobs[number].share for number, seconds in ran.items())
         return max(work * (now - min(begun.values())) / busy, chain)
-
-
-class Progress(logging.Handler):
-    """Log handler that prints a line for each started or failed job, and Snakemake's warnings."""
-
-    def start(self, plans: bool = False) -> None:
-        """Reset all counts; in a dry run (``plans`` is True) no jobs are printed."""
-        self._plans = plans
-        self._started = self._total = 0
-        self._messages: dict[int, str] = {}
-        self._estimate = Estimate()
-
-    def emit(self, record: logging.LogRecord) -> None:
-        """Print the part of a log ``record`` that concerns the user, and update the estimate."""
-        event, text = getattr(record, "event", None), record.getMessage()
-        news = event is None and (record.levelno >= logging.WARNING or NOTHING in text)
-        if event == LogEvent.RUN_INFO:
-            self._total = record.stats["total"]
-        elif hasattr(record, "expected"):
-            self._estimate = Estimate(record.expected)
-        elif event == LogEvent.JOB_INFO and not self._plans:
-            self._started += 1
-            what = self._messages[record.jobid] = record.rule_msg or record.rule_name
-            left = self._estimate.left(record.created)
-            self._estimate.begun[record.jobid] = record.created
-            self._write(record, what + (f"   {rounded(left)} left" if left is not None else ""))
-        elif event == LogEvent.JOB_FINISHED:
-            self._estimate.ended[record.job_id] = record.created
-        elif event == LogEvent.GROUP_ERROR:
-            self._write(record, f"FAILED: batch {record.groupid}")
-        elif event == LogEvent.JOB_ERROR and not getattr(record, "indent", False):
-            what = self._messages.get(record.jobid, record.rule_name)
-            self._write(record, f"FAILED: {what}")
-        elif event == LogEvent.ERROR:
-            news = record.exception != JOB_FAULT and CLOSING not in text
-        if news:
-            sys.stderr.write(text + "\n")
-
-    def _write(self, record: logging.LogRecord, text: str) -> None:
-        total = str(self._total)
-        clock = time.strftime("%H:%M", time.localtime(record.created))
-        sys.stderr.write(f"[{self._started:>{len(total)}}/{total}] {clock} {text}\n")
 
 
 def rounded(seconds: float) -> str:

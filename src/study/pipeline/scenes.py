@@ -167,23 +167,19 @@ class Variants(GivenOnce):
         The variant's name contains its factors: ``strain_oop_m1p5_w0p01_s3`` has 1.5 times the
         vertices along a side, 0.01 times the weight, and a random start with seed 3.
         """
-        for name in self.scenes:
-            scene = read(name)
-            for factor, ratio, seed in product(self.resolutions, self.stiffness_ratios, self.seeds):
-                yield self._variant(scene, factor, ratio, seed)
-
-    def _variant(self, scene: SceneConfig, factor: float, ratio: float, seed: int) -> SceneConfig:
-        h, frames = scene.time_step, scene.frames
-        stiff = varied(scene, h, ratio, h * frames, (frames, frames))
-        kick = {"effect": "kick", "speed": self.kick, "seed": seed}
-        return stiff.model_copy(
-            update={
-                "name": f"{scene.name}_m{_word(factor)}_w{_word(ratio)}_s{seed}",
-                "title": f"{scene.title}; mesh x {factor:g}, weight x {ratio:g}, start {seed}",
-                "mesh": scene.mesh.coarsened(factor),
-                "effects": (*stiff.effects, effect_config(kick, len(stiff.effects))),
-            }
-        )
+        lists = (self.resolutions, self.stiffness_ratios, self.seeds)
+        for scene, factor, ratio, seed in product(map(read, self.scenes), *lists):
+            h, frames = scene.time_step, scene.frames
+            stiff = varied(scene, h, ratio, h * frames, (frames, frames))
+            kick = {"effect": "kick", "speed": self.kick, "seed": seed}
+            yield stiff.model_copy(
+                update={
+                    "name": f"{scene.name}_m{_word(factor)}_w{_word(ratio)}_s{seed}",
+                    "title": f"{scene.title}; mesh x {factor:g}, weight x {ratio:g}, start {seed}",
+                    "mesh": scene.mesh.coarsened(factor),
+                    "effects": (*stiff.effects, effect_config(kick, len(stiff.effects))),
+                }
+            )
 
 
 def _word(number: float) -> str:
