@@ -4,7 +4,6 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -40,31 +39,17 @@ class Checkout:
 
     folder: Path
 
-    def snakemake(self, *arguments: str) -> subprocess.CompletedProcess[str]:
+    def snakemake(self, *arguments: str, **how) -> subprocess.CompletedProcess[str]:
         """Run snakemake in the copy, on the copy's package and one core."""
-        return self.looks("--cores", "1", *arguments)
+        return self.looks("--cores", "1", *arguments, **how)
 
-    def looks(
-        self,
-        *arguments: str,
-        python: str | Path = sys.executable,
-        program: Sequence[str] = ("-m", "snakemake"),
-    ) -> subprocess.CompletedProcess[str]:
+    def looks(self, *arguments, python=sys.executable, program=("-m", "snakemake")):
         """The same without a number of cores, which what only looks does not ask for."""
+        own = {"PYTHONPATH": f"{self.folder}/src", "XDG_CACHE_HOME": f"{self.folder}/.cache"}
         return subprocess.run(
-            [python, *program, *arguments],
-            cwd=self.folder,
-            env={
-                **os.environ,
-                "PYTHONPATH": str(self.folder / "src"),
-                "XDG_CACHE_HOME": str(self.folder / ".cache"),
-            },
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            text=True,
-            timeout=600,
-            check=False,
-        )
+            [python, *program, *arguments], cwd=self.folder, env={**os.environ, **own},
+            stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=600, check=False,
+        )  # fmt: skip
 
     def summary(self, *arguments: str) -> list[Made]:
         """Rows of Snakemake's summary of the plan."""
@@ -87,7 +72,7 @@ class Checkout:
             path = self.folder / name
             path.parent.mkdir(parents=True, exist_ok=True)
             path.touch()
-        done = self.looks("--cores", "1", "--forceall", *arguments, program=TOUCH)
+        done = self.snakemake("--forceall", *arguments, program=TOUCH)
         assert done.returncode == 0, done.stderr
 
     def edit(self, path: str, old: str, new: str) -> None:

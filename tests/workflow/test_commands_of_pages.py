@@ -52,7 +52,7 @@ def commands(start: str) -> list[str]:
     return [c for c in kept if c.startswith(start)]
 
 
-def test_every_command_is_executed_or_left_out_by_name() -> None:
+def test_every_command_is_executed_or_left_out_by_name():
     ways = ("./reproduce", "pdrom ", ".venv/bin/python ", ".venv/bin/pdrom", ".venv/bin/snakemake")
     assert [c for c in commands("") if not c.startswith((*ways, "find "))] == []
 
@@ -98,7 +98,7 @@ def run(words: list[str], folder: Path, checkout: Checkout) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("command", commands("./reproduce"))
-def test_a_run_is_planned(command: str, checkout: Checkout) -> None:
+def test_a_run_is_planned(command, checkout):
     words = shlex.split(command)[1:]
     if words[:1] in (["run"], ["--help"]):
         pytest.skip("the script itself: test_reproduce_script.py")
@@ -109,14 +109,12 @@ def test_a_run_is_planned(command: str, checkout: Checkout) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("command", commands(".venv/bin/python -m"))
-def test_a_module_is_run(command: str, checkout: Checkout) -> None:
+def test_a_module_is_run(command, checkout):
     run([sys.executable, *shlex.split(command)[1:]], checkout.folder, checkout)
 
 
 @pytest.mark.slow
-def test_the_command_line_works_in_the_order_of_its_page(
-    tmp_path: Path, checkout: Checkout
-) -> None:
+def test_the_command_line_works_in_the_order_of_its_page(tmp_path, checkout):
     sheet(tmp_path / "sheet.obj")
     shown = commands("pdrom ")
     assert len(shown) > 4
@@ -125,7 +123,7 @@ def test_the_command_line_works_in_the_order_of_its_page(
 
 
 @pytest.mark.parametrize("command", commands("find "))
-def test_checksums_are_compared(command: str, tmp_path: Path) -> None:
+def test_checksums_are_compared(command, tmp_path):
     (tmp_path / "paper").mkdir()
     result = tmp_path / "results" / "x.txt"
     result.parent.mkdir()
