@@ -1,15 +1,55 @@
-"""Each recipe of CONTRIBUTING.md is typed into a copy, and the pipeline makes what it adds."""
+"""Each recipe of CONTRIBUTING.md is typed into a copy, and the pipeline makes what it adds.
 
+A block of code below a line "`path`:" is a new file; one below "`path`, below `line`:" is added
+to a file that exists, under the line that reads so, indented as that is.
+"""
+
+import re
 import shutil
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
 import yaml
 from checkout import Checkout, copy_repository
-from recipes import recipe
 
 from pdrom.core.store import check_file, read_table
 from places import ROOT
+
+PAGE = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+BLOCK = re.compile(
+    r"^`(?P<path>[^`]+)`(?:, below `(?P<below>[^`]+)`)?:\n\n```\w+\n(?P<code>.*?)^```$",
+    re.MULTILINE | re.DOTALL,
+)
+
+
+@dataclass(frozen=True)
+class Block:
+    """Code that belongs into a file, below a line of it or as the whole."""
+
+    path: str
+    below: str | None
+    code: str
+
+    def add_to(self, checkout: Checkout) -> None:
+        """Do what the recipe says."""
+        file = checkout.folder / self.path
+        if self.below is None:
+            assert not file.exists(), f"{self.path} exists"
+            file.write_text(self.code, encoding="utf-8")
+            return
+        lines = file.read_text(encoding="utf-8").splitlines()
+        (place,) = [i for i, line in enumerate(lines) if line.strip() == self.below]
+        indent = " " * (len(lines[place]) - len(lines[place].lstrip()))
+        lines[place + 1 : place + 1] = [indent + line for line in self.code.splitlines()]
+        file.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def recipe(title: str) -> list[Block]:
+    """Blocks of a section of the page."""
+    (section,) = re.findall(rf"^## {title}\n(.*?)(?=^## |\Z)", PAGE, re.MULTILINE | re.DOTALL)
+    return [Block(**found.groupdict()) for found in BLOCK.finditer(section)]
+
 
 # Files that a recipe may touch at most; pages that a command writes from the declarations (a list
 # of tables, one of figures) are not counted.

@@ -12,11 +12,11 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import ValidationError
 
 from pdrom.core.errors import StorageError
 from pdrom.core.store import Checksum, Condition, check_file, read_checksum, write_text
-from pdrom.core.yamlfile import describe
+from pdrom.core.yamlfile import ConfigModel, describe
 from study.artifact import paths
 from study.pipeline.plan import Plan
 from study.pipeline.scenes import scene_names
@@ -25,11 +25,7 @@ LARGE = ".h5"
 _ENVIRONMENT = ("pdrom_version", "python_version", "library_versions")
 
 
-class _Record(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class Entry(_Record):
+class Entry(ConfigModel):
     """Result file: size, digests, and what made it; ``environment``: key in `environments`.
 
     sha256 : None for an HDF5 file, or a file that was damaged before the manifest was written
@@ -53,7 +49,7 @@ class Entry(_Record):
         return reported and check_file(path) is Condition.INTACT
 
 
-class Manifest(_Record):
+class Manifest(ConfigModel):
     """Entries of result files by path, relative to the folder of the manifest.
 
     options : command-line options that name the configuration

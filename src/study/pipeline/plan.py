@@ -25,11 +25,10 @@ from study.experiments.live import LARGEST
 from study.figures.kit.declaration import declarations
 from study.live.page import live_page
 from study.paper.build import paper, paper_inputs
-from study.pipeline.contents import labels_of
 from study.pipeline.fingerprint import digest, fingerprint
 from study.pipeline.folders import DEFAULT, Folders
 from study.pipeline.scenes import not_taken, require_scenes
-from study.pipeline.study import Study, part_of
+from study.pipeline.study import Study, labels_of, part_of
 from study.pipeline.values import DERIVED, scaled_methods
 from study.tables import declared
 from study.tables.claims.rules import load_claims

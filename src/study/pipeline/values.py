@@ -27,9 +27,8 @@ from study.figures.kit.declaration import declarations
 from study.figures.kit.options import Experiment, Options, Reduction
 from study.paper.build import PAGES, Facts
 from study.paper.source import source_files
-from study.pipeline.contents import labels_of
 from study.pipeline.folders import DEFAULT
-from study.pipeline.study import Study
+from study.pipeline.study import Study, labels_of
 from study.tables.kit.results import FAR
 
 # The preferred basis in tables that show one basis of each constraint group.
