@@ -106,20 +106,14 @@ def only_line(output: str) -> str:
 
 
 def copy_repository(folder: Path) -> Checkout:
-    """Copy the files that git knows (all but caches, where there is no git)."""
-    for path in _files():
-        target = folder / path
-        target.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copyfile(ROOT / path, target)
+    """Copy all that the workflow reads, but caches."""
+    ignored = shutil.ignore_patterns("__pycache__")
+    for part in PARTS:
+        (folder / part).parent.mkdir(parents=True, exist_ok=True)
+        if (ROOT / part).is_dir():
+            shutil.copytree(
+                ROOT / part, folder / part, ignore=ignored, copy_function=shutil.copyfile
+            )
+        else:
+            shutil.copyfile(ROOT / part, folder / part)
     return Checkout(folder)
-
-
-def _files() -> list[str]:
-    listed = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard", "--", *PARTS]
-    try:
-        done = subprocess.run(listed, cwd=ROOT, capture_output=True, text=True, check=True)
-        files = [name for name in done.stdout.split("\0") if name]
-    except (OSError, subprocess.CalledProcessError):
-        found = [p for part in PARTS for p in ((ROOT / part), *(ROOT / part).rglob("*"))]
-        files = [str(p.relative_to(ROOT)) for p in found if "__pycache__" not in p.parts]
-    return [name for name in files if (ROOT / name).is_file()]

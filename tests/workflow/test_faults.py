@@ -76,7 +76,7 @@ def heals(sandbox: Sandbox, undisturbed: Sandbox, target: str = TABLE) -> None:
 def test_a_lost_row_and_a_killed_job_are_named_and_made_again(undisturbed, sandbox):
     """The first run finds the row missing, the second one loses the job that reads it."""
     lose_a_row(sandbox.path(f"{SAMPLING}.csv"))
-    find_damage(sandbox, f"{SAMPLING}.csv", [TABLE])
+    find_damage(sandbox, f"{SAMPLING}.csv", (TABLE,))
     status, output = sandbox.run(TABLE, fault="kill:reconstruction_error")
     assert status != 0
     expected = f"job reconstruction_error_table failed while making {TABLE}: killed (SIGKILL)"
@@ -116,8 +116,7 @@ def test_a_job_that_is_killed_in_any_rule(rule, finished_study, tmp_path):
 def test_a_run_that_is_killed_with_all_its_jobs(undisturbed, fresh):
     """Half-written files and the locks of both programs are left, and nobody unlocks by hand."""
     for folder in ("fom", "snapshots", "pod", "reruns"):
-        process = _caught_writing(fresh, folder)
-        kill_all(process)
+        kill_all(_caught_writing(fresh, folder))
         assert list(fresh.path(".snakemake/locks").iterdir())
     heals(fresh, undisturbed)
 
@@ -142,26 +141,24 @@ def test_jobs_that_survive_their_run_do_no_harm(undisturbed, fresh):
 
 
 @slow
-def test_an_interrupted_run_goes_on(undisturbed, fresh):
-    process = _caught_writing(fresh, "fom")
-    os.killpg(process.pid, signal.SIGINT)
-    said, _ = process.communicate(timeout=60)
+@pytest.mark.parametrize(
+    ("end", "kind", "said"),
+    [
+        (lambda run: os.killpg(run.pid, signal.SIGINT), "slow", "pdrom: interrupted\n"),
+        # one of its jobs would never end by itself
+        (subprocess.Popen.terminate, "hold", "pdrom: ended by SIGTERM\n"),
+    ],
+    ids=["interrupted", "SIGTERM to the run alone"],
+)
+def test_a_run_that_is_ended_ends_its_jobs_and_goes_on(undisturbed, fresh, end, kind, said):
+    process = _caught_writing(fresh, "fom", kind)
+    end(process)
+    output, _ = process.communicate(timeout=60)
     assert process.returncode == 130
-    assert last_lines(said).startswith("pdrom: interrupted\n")
-    assert "Traceback" not in said
-    assert not fresh.temporaries()
-    heals(fresh, undisturbed)
-
-
-@slow
-def test_sigterm_to_the_run_alone_ends_its_jobs(undisturbed, fresh):
-    """One of which would never end by itself."""
-    process = _caught_writing(fresh, "fom", "hold")
-    process.terminate()
-    said, _ = process.communicate(timeout=60)
-    assert process.returncode == 130
-    assert "pdrom: SIGTERM: ending the jobs that run\n" in said
-    assert last_lines(said).startswith("pdrom: ended by SIGTERM\n")
+    assert last_lines(output).startswith(said)
+    assert ("pdrom: SIGTERM: ending the jobs that run\n" in output) == (kind == "hold")
+    assert "Traceback" not in output
+    assert kind == "hold" or not fresh.temporaries()
     heals(fresh, undisturbed)
 
 
@@ -312,58 +309,42 @@ def lose_the_checksum(path: Path) -> None:
     checksum_path(path).unlink()
 
 
-def find_damage(sandbox: Sandbox, damaged: str, missing: list[str], target: str = TABLE) -> None:
-    """Run what reads the damaged file: it is named and set aside."""
+def find_damage(sandbox: Sandbox, damaged: str, missing: tuple[str, ...]) -> None:
+    """Run what reads the damaged file, to the last of the missing ones: it is set aside."""
     for name in missing:
         sandbox.path(name).unlink()
-    status, output = sandbox.run(target)
+    status, output = sandbox.run(missing[-1])
     assert status != 0
     assert f"{damaged}: damaged, its c" in last_lines(output)
     assert f"set aside as {Path(damaged).name}.damaged, the next run" in last_lines(output)
     sandbox.path(f"{damaged}.damaged").unlink()
 
 
-# what lies between a damaged file and the table, or nothing would be read again
-BETWEEN = {
-    RUN: [SNAPSHOTS, BASIS, f"{SAMPLING}.h5", f"{SAMPLING}.csv", TABLE],
-    SNAPSHOTS: [f"{SAMPLING}.h5", f"{SAMPLING}.csv", TABLE],
-    BASIS: [f"{SAMPLING}.h5", f"{SAMPLING}.csv", TABLE],
-    f"{SAMPLING}.csv": [TABLE],
-}
+# what lies between a damaged file and the table or the manuscript, or nothing would be read again
+BELOW_SAMPLES = (f"{SAMPLING}.h5", f"{SAMPLING}.csv", TABLE)
+IN_PAPER = (f"{MICRO_RESULTS}/paper/main.bbl", MICRO_MANUSCRIPT)
 
 
 @slow
 @pytest.mark.parametrize(
-    ("name", "damage"),  # every kind of damage: test_checksum.py
+    ("name", "damage", "missing"),  # every kind of damage: test_checksum.py
     [
-        (RUN, truncate),
-        (SNAPSHOTS, flip_a_bit),
-        (BASIS, truncate),
-        (f"{SAMPLING}.csv", flip_a_bit),
-        (f"{SAMPLING}.csv", lose_the_checksum),
+        (RUN, truncate, (SNAPSHOTS, BASIS, *BELOW_SAMPLES)),
+        (SNAPSHOTS, flip_a_bit, BELOW_SAMPLES),
+        (BASIS, truncate, BELOW_SAMPLES),
+        (f"{SAMPLING}.csv", flip_a_bit, (TABLE,)),
+        (f"{SAMPLING}.csv", lose_the_checksum, (TABLE,)),
+        (f"{MICRO_RESULTS}/machine.json", flip_a_bit, IN_PAPER),
+        (f"{MICRO_RESULTS}/tables/claims.csv", flip_a_bit, IN_PAPER),
+        (f"{MICRO_RESULTS}/paper/macros.tex", flip_a_bit, (MICRO_MANUSCRIPT,)),
+        (f"{MICRO_RESULTS}/figures/singular_values.pdf", flip_a_bit, (MICRO_MANUSCRIPT,)),
     ],
 )
-def test_a_damaged_result(name, damage, undisturbed, sandbox):
-    damage(sandbox.path(name))
-    find_damage(sandbox, name, BETWEEN[name])
-    heals(sandbox, undisturbed)
-
-
-@slow
-@pytest.mark.parametrize(
-    ("name", "missing"),
-    [
-        (f"{MICRO_RESULTS}/machine.json", f"{MICRO_RESULTS}/paper/main.bbl"),
-        (f"{MICRO_RESULTS}/tables/claims.csv", f"{MICRO_RESULTS}/paper/main.bbl"),
-        (f"{MICRO_RESULTS}/paper/macros.tex", MICRO_MANUSCRIPT),
-        (f"{MICRO_RESULTS}/figures/singular_values.pdf", MICRO_MANUSCRIPT),
-    ],
-)
-def test_what_the_manuscript_is_made_from(name, missing, finished_study, tmp_path):
+def test_a_damaged_result(name, damage, missing, finished_study, tmp_path):
     sandbox = finished_study.copy(tmp_path / "run")
-    flip_a_bit(sandbox.path(name))
-    find_damage(sandbox, name, sorted({missing, MICRO_MANUSCRIPT}), MICRO_MANUSCRIPT)
-    heals(sandbox, finished_study, MICRO_MANUSCRIPT)
+    damage(sandbox.path(name))
+    find_damage(sandbox, name, missing)
+    heals(sandbox, finished_study, missing[-1])
 
 
 # Clocks and edited files ----------------------------------------------------------------------

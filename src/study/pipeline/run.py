@@ -65,7 +65,7 @@ def expected_seconds(plan: Plan) -> Callable[[str], float]:
 
 
 def tell_expectation(workflow: Any, plan: Plan) -> None:
-    """Log the expected seconds of every job of Snakemake's ``workflow`` for `Progress`.
+    """Log the expected seconds of every job of Snakemake's ``workflow`` for the lines of a run.
 
     A job's share of the machine is 1 if it measures times, or if jobs run on a cluster.
     """

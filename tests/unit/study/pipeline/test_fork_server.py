@@ -156,18 +156,13 @@ signal.pause()
     assert list(temporary.iterdir()) == []
 
 
-# A process that is a server with this address; its owner holds its standard input.
-SERVER = """
-import os, socket, sys
-from study.pipeline.fork_server.client import place_of
-from study.pipeline.fork_server.server import Server, run
-listener = socket.socket(socket.AF_UNIX)
-listener.bind(place_of(sys.argv[1]))
-listener.listen()
-print("listens", flush=True)
-script = Server(listener, os.dup(0)).serve()
-if script is not None:
-    run(script)
+# A process with a server whose address it says.
+HOST = """
+import os, sys
+from study.pipeline.fork_server import ADDRESS, start_server
+start_server(libraries=[])
+print(os.environ[ADDRESS], flush=True)
+sys.stdin.read()
 """
 
 
@@ -175,35 +170,34 @@ class ForkServer:
     """A server with clients that misbehave; it has to come to its end without a word."""
 
     def __init__(self, folder: Path) -> None:
-        self.folder = folder
-        self.process = subprocess.Popen(
-            [sys.executable, "-c", SERVER, str(folder)],
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-        )  # fmt: skip
+        self.job = folder / "job.py"
 
     def __enter__(self) -> "ForkServer":
-        assert self.process.stdout.readline() == "listens\n", self.process.stderr.read()
+        self.host = subprocess.Popen(
+            [sys.executable, "-c", HOST],
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        )  # fmt: skip
+        self.address = place_of(self.host.stdout.readline().strip())
+        (self.process,) = psutil.Process(self.host.pid).children()
         return self
 
     def __exit__(self, *_fault: object) -> None:
-        out, errors = self.process.communicate()
-        assert (out, errors) == ("", "")
+        assert self.host.communicate() == ("", "")
 
     def connect(self) -> socket.socket:
         """Connection of a client."""
         connection = socket.socket(socket.AF_UNIX)
-        connection.connect(place_of(str(self.folder)))
+        connection.connect(self.address)
         return connection
 
     def ask(self, connection: socket.socket, code: str, stream: int) -> None:
         """Request a job that runs ``code``, with one stream for all three."""
-        path = self.folder / "job.py"
-        path.write_text(code)
+        self.job.write_text(code)
         reader, writer = os.pipe()
         socket.send_fds(connection, [b"x"], [stream, stream, stream, reader])
         os.close(reader)
         with open(writer, "wb") as request:
-            request.write(f"/\0{path}\0A=b\0\0".encode())
+            request.write(f"/\0{self.job}\0A=b\0\0".encode())
 
     def serves(self) -> bool:
         """Whether another client gets its job, and the job's end."""
@@ -242,11 +236,11 @@ def test_a_client_that_is_gone_before_its_answer(tmp_path):
     """Its job ends with it: the pipe that the job holds closes, and others get their jobs."""
     reader, writer = os.pipe()
     with ForkServer(tmp_path) as server:
-        os.kill(server.process.pid, signal.SIGSTOP)
+        server.process.suspend()
         with server.connect() as connection:
             server.ask(connection, "import signal; signal.pause()", writer)
         os.close(writer)
-        os.kill(server.process.pid, signal.SIGCONT)
+        server.process.resume()
         assert os.read(reader, 1) == b""
         assert server.serves()
     os.close(reader)

@@ -67,6 +67,8 @@ def test_verdicts_of_another_study_are_told_from_those_of_the_full_one():
     words = "of coarse meshes, not those of the study"
     said = lines("--configfile", "my.yaml", words=words)
     assert said[f"verdicts (as published / beyond; {words})"].startswith("C1 holds")
+    Path(TABLES[0]).unlink()  # without verdicts the rest is said
+    assert not [word for word in lines() if word.startswith("verdicts")]
 
 
 @pytest.mark.parametrize(
@@ -89,11 +91,6 @@ def test_single_files():
     assert list(said) == ["configuration", "made", "time"]
     assert said["configuration"] == "my.yaml"
     assert said["made"] == "results/x, results/y"
-
-
-def test_without_verdicts_the_rest_is_said():
-    Path(TABLES[0]).unlink()
-    assert not [word for word in lines() if word.startswith("verdicts")]
 
 
 def test_processor_time_counts_what_this_process_waited_for():
