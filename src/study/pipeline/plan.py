@@ -277,11 +277,10 @@ class Plan:
 
     def value(self, key: str, labels: Labels) -> Any:
         """Configuration value of ``key``, or a value derived from ``labels`` (see `DERIVED`)."""
-        head, _, parts = key.partition(".")
+        head, *parts = key.split(".")
         if head not in DERIVED:
             return self.study.value(key)
-        value = DERIVED[head](self.study, labels)
-        return part_of(value, parts, key) if parts else value
+        return part_of(DERIVED[head](self.study, labels), parts, key)
 
 
 def listed(paths: Paths) -> list[str]:

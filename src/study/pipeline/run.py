@@ -15,20 +15,13 @@ from pdrom.core.errors import ConfigurationError, PdromError
 from pdrom.core.machine import Machine, Units
 from pdrom.core.store import read_table, write_text
 from study.artifact.paths import MACHINE
+from study.pipeline import running
 from study.pipeline.commandline import CommandLine, one_line, recall, remember
 from study.pipeline.failures import Failures
 from study.pipeline.fork_server import hold_pipe, start_server
 from study.pipeline.manifest import write_manifest
 from study.pipeline.plan import Plan
 from study.pipeline.progress import Expected, Preview
-from study.pipeline.running import (
-    FOLDER,
-    end_at_sigterm,
-    hold,
-    remove_stale_locks,
-    settle_dates,
-    stop_at_sigterm,
-)
 from study.pipeline.scenes import Coarsen
 from study.pipeline.summary import CONTENTS, configuration, contents, summary
 from study.pipeline.targets import check_targets
@@ -107,14 +100,14 @@ class Run:
 
         A command that runs no job, such as a dry run, takes no lock and works during another run.
         """
-        end_at_sigterm()
+        running.end_at_sigterm()
         with one_line():
             command = CommandLine(sys.argv[1:])
             if command.looks_only:
-                remove_stale_locks()
+                running.remove_stale_locks()
             else:
-                hold()
-                settle_dates(DATED)
+                running.hold()
+                running.settle_dates(DATED)
                 remember(command)
         failures = Failures()
         logging.getLogger("snakemake.logging").addHandler(failures)
@@ -153,14 +146,14 @@ class Run:
         # choice, which triggers another choice and another timer. At the end of a run these timers
         # take a third of a core, and the process waits for the last one.
         workflow.scheduler.job_rate_limiter = None
-        stop_at_sigterm(self.failures.note_sigterm)
+        running.stop_at_sigterm(self.failures.note_sigterm)
         say_compilation(os.environ.get("NUMBA_CACHE_DIR", ""))
         tell_expectation(workflow, plan)
         if workflow.local_exec:
             try:
-                hold_pipe(FOLDER / "run.pipe")
+                hold_pipe(running.FOLDER / "run.pipe")
             except OSError as error:
-                sys.exit(f"pdrom: {FOLDER}/run.pipe: cannot be made ({error.strerror})")
+                sys.exit(f"pdrom: {running.FOLDER}/run.pipe: cannot be made ({error.strerror})")
             start_server()
 
     def succeed(self, workflow: Any, plan: Plan) -> None:

@@ -141,7 +141,7 @@ class Study:
 
     def value(self, key: str) -> Any:
         """Value of the configuration at ``key``; ConfigurationError if the key does not exist."""
-        return part_of(self.settings, key, key)
+        return part_of(self.settings, key.split("."), key)
 
     @cached_property
     def every_method(self) -> dict[str, MethodSpec]:
@@ -236,9 +236,9 @@ class Study:
         return {name: known[name] for name in names}
 
 
-def part_of(value: Any, parts: str, key: str) -> Any:
-    """Entry of ``value`` at the path ``parts`` (a.b); ConfigurationError if it does not exist."""
-    for part in parts.split("."):
+def part_of(value: Any, parts: Iterable[str], key: str) -> Any:
+    """Entry of ``value`` at the path ``parts`` of ``key``; ConfigurationError if there is none."""
+    for part in parts:
         if not hasattr(value, part):
             known = choices(part, getattr(type(value), "model_fields", ()))
             raise ConfigurationError(f"the key '{key}': unknown{known}")

@@ -42,7 +42,6 @@ machine differ (in `claims`, only in claims about times).
 own tolerance if it has one (docs/verification.md).
 """
 CONTENTS = paths.Place("contents.md")
-CLAIMS = "claims"
 HEAD = """\
 # Contents
 
@@ -176,7 +175,7 @@ class Entry(NamedTuple):
 def entries() -> Iterator[Entry]:
     """Yield the entries of claims, figures, tables, sections and manuscript, in this order."""
     for name in load_claims(Path("config/claims.yaml")):
-        yield Entry("claim", name, (paths.TABLE.at(paths.RESULTS, name=CLAIMS),), (CLAIMS,))
+        yield Entry("claim", name, (paths.TABLE.at(paths.RESULTS, name="claims"),), ("claims",))
     for name, figure in declarations().items():
         number = f"{PREPRINT}{figure.number}" if figure.number else name
         yield Entry(

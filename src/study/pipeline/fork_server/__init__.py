@@ -31,24 +31,11 @@ SUPPORTED = sys.platform == "linux"
 # Modules that the server loads in advance: third-party libraries of most jobs or of all figures,
 # modules that every job imports first, and the most frequent experiment.
 LIBRARIES = (
-    "h5py",
-    "matplotlib.backends.backend_agg",
-    "matplotlib.backends.backend_pdf",
-    "numba",
-    "numpy",
-    "pandas",
-    "study.artifact.logs",
-    "pdrom.core.provenance",
-    "study.experiments.kit.declaration",
-    "study.experiments.reruns",
-    "pydantic",
-    "scipy.linalg",
-    "scipy.sparse.linalg",
-    "snakemake.iocontainers",
-    "snakemake.script",
-    "threadpoolctl",
-    "yaml",
-)
+    "h5py", "matplotlib.backends.backend_agg", "matplotlib.backends.backend_pdf", "numba", "numpy",
+    "pandas", "study.artifact.logs", "pdrom.core.provenance", "study.experiments.kit.declaration",
+    "study.experiments.reruns", "pydantic", "scipy.linalg", "scipy.sparse.linalg",
+    "snakemake.iocontainers", "snakemake.script", "threadpoolctl", "yaml",
+)  # fmt: skip
 
 
 def interpreter() -> str:

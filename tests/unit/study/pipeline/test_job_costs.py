@@ -164,7 +164,8 @@ def test_kernels_are_compiled_once(tmp_path, capsys):
 
 def test_choices_among_jobs_start_no_timers(monkeypatch):
     """Snakemake's scheduler starts one after every choice where it limits the rate of jobs."""
-    for name in ("stop_at_sigterm", "say_compilation", "tell_expectation"):
+    monkeypatch.setattr(run.running, "stop_at_sigterm", lambda _: None)
+    for name in ("say_compilation", "tell_expectation"):
         monkeypatch.setattr(run, name, lambda *_: None)
     scheduler = SimpleNamespace(job_rate_limiter="1000 jobs in 20 seconds")
     workflow = SimpleNamespace(scheduler=scheduler, local_exec=False)
