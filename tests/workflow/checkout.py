@@ -43,11 +43,14 @@ class Checkout:
         """Run snakemake in the copy, on the copy's package and one core."""
         return self.looks("--cores", "1", *arguments, **how)
 
-    def looks(self, *arguments, python=sys.executable, program=("-m", "snakemake")):
+    def looks(
+        self, *arguments, python=sys.executable, program=("-m", "snakemake"), cwd=None, **variables
+    ):
         """The same without a number of cores, which what only looks does not ask for."""
         own = {"PYTHONPATH": f"{self.folder}/src", "XDG_CACHE_HOME": f"{self.folder}/.cache"}
         return subprocess.run(
-            [python, *program, *arguments], cwd=self.folder, env={**os.environ, **own},
+            [python, *program, *arguments],
+            cwd=cwd or self.folder, env={**os.environ, **own, **variables},
             stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=600, check=False,
         )  # fmt: skip
 

@@ -87,7 +87,7 @@ class Sandbox:
     def start(self, *targets, program="./reproduce", fault="", **options):
         """``./reproduce`` on the micro study, in a session of its own."""
         return subprocess.Popen(
-            [program, "--cores", "2", "--configfile", MICRO_FILE, *targets],
+            [program, "--configfile", MICRO_FILE, "--cores", "2", *targets],
             cwd=self.folder, env={**os.environ, "PDROM_FAULT": fault}, start_new_session=True,
             stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
             **options,
