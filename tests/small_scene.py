@@ -6,9 +6,9 @@ from pathlib import Path
 from bad_input.project import SMALL_SCENE, make_project
 from pdrom.core.yamlfile import read_yaml
 from study.experiments.kit.declaration import experiments
-from study.pipeline.contents import labels_of
-from study.pipeline.resolve import Resolver
-from study.pipeline.study import Study
+from study.pipeline.folders import Folders
+from study.pipeline.plan import Plan
+from study.pipeline.study import Study, labels_of
 
 SCENE = "own"
 CHANGES = {
@@ -31,10 +31,10 @@ def small_study(root: Path) -> Study:
 
 def run_jobs(study: Study, results: str, names: Iterable[str], scene: str) -> None:
     """Every job of these experiments for a scene, in this process, as the workflow runs them."""
-    resolver = Resolver(study, results)
+    plan = Plan(study, Folders(results))
     for name in names:
         made = experiments()[name]
         kind = max(made.writes.values(), key=lambda place: len(place.labels))
         for labels in labels_of(study.only(scene), kind):
-            job = resolver.job(made, labels)
+            job = plan.job(made, labels)
             job.make(job.outputs)

@@ -1,12 +1,25 @@
 """Snakemake finds ``--logger pdrom`` by the name of this package."""
 
+import logging
+import sys
+import time
+
 from snakemake_interface_logger_plugins.base import LogHandlerBase
+from snakemake_interface_logger_plugins.common import LogEvent
 
-from study.pipeline.progress import Progress
+from study.pipeline.progress import Estimate, rounded
+
+NOTHING = "Nothing to be done"
+# Part of Snakemake's message about a failed job; the run's last lines report such jobs instead.
+JOB_FAULT = "RuleException"
+CLOSING = "At least one job did not complete successfully"
 
 
-class LogHandler(Progress, LogHandlerBase):
-    """One line a job on standard error; Snakemake's own account stays in its log."""
+class LogHandler(LogHandlerBase):
+    """One line a started or failed job on standard error, and Snakemake's warnings.
+
+    Snakemake's own account stays in its log. In a dry run no jobs are printed.
+    """
 
     writes_to_stream = True
     writes_to_file = False
@@ -15,4 +28,37 @@ class LogHandler(Progress, LogHandlerBase):
     needs_rulegraph = False
 
     def __post_init__(self) -> None:
-        self.start(self.common_settings.dryrun)
+        self._started = self._total = 0
+        self._messages: dict[int, str] = {}
+        self._estimate = Estimate()
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Print the part of a log ``record`` that concerns the user, and update the estimate."""
+        event, text = getattr(record, "event", None), record.getMessage()
+        news = event is None and (record.levelno >= logging.WARNING or NOTHING in text)
+        if event == LogEvent.RUN_INFO:
+            self._total = record.stats["total"]
+        elif hasattr(record, "expected"):
+            self._estimate = Estimate(record.expected)
+        elif event == LogEvent.JOB_INFO and not self.common_settings.dryrun:
+            self._started += 1
+            what = self._messages[record.jobid] = record.rule_msg or record.rule_name
+            left = self._estimate.left(record.created)
+            self._estimate.begun[record.jobid] = record.created
+            self._write(record, what + (f"   {rounded(left)} left" if left is not None else ""))
+        elif event == LogEvent.JOB_FINISHED:
+            self._estimate.ended[record.job_id] = record.created
+        elif event == LogEvent.GROUP_ERROR:
+            self._write(record, f"FAILED: batch {record.groupid}")
+        elif event == LogEvent.JOB_ERROR and not getattr(record, "indent", False):
+            what = self._messages.get(record.jobid, record.rule_name)
+            self._write(record, f"FAILED: {what}")
+        elif event == LogEvent.ERROR:
+            news = record.exception != JOB_FAULT and CLOSING not in text
+        if news:
+            sys.stderr.write(text + "\n")
+
+    def _write(self, record: logging.LogRecord, text: str) -> None:
+        total = str(self._total)
+        clock = time.strftime("%H:%M", time.localtime(record.created))
+        sys.stderr.write(f"[{self._started:>{len(total)}}/{total}] {clock} {text}\n")

@@ -43,20 +43,6 @@ def test_no_large_or_binary_file_is_tracked_or_about_to_be():
     assert [str(path.relative_to(ROOT)) for path in files if offends(path)] == []
 
 
-def test_a_wheel_and_a_large_table_would_be_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr(f"{__name__}.ROOT", tmp_path)
-    contents = {
-        "a.whl": b"PK\3\4\0",
-        "t.csv": b"1,2\n" * LARGEST,
-        "x.py": b"1\n",
-        "docs/a.png": b"\0",
-    }
-    for name, content in contents.items():
-        (tmp_path / name).parent.mkdir(exist_ok=True)
-        (tmp_path / name).write_bytes(content)
-    assert [name for name in contents if offends(tmp_path / name)] == ["a.whl", "t.csv"]
-
-
 def test_the_manifest_for_codecheckers_follows_version_2_and_names_what_the_study_makes():
     """https://raw.githubusercontent.com/codecheckers/register/master/rules-2.0.yml"""
     path = ROOT / "codecheck.yml"

@@ -4,7 +4,6 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -40,31 +39,20 @@ class Checkout:
 
     folder: Path
 
-    def snakemake(self, *arguments: str) -> subprocess.CompletedProcess[str]:
+    def snakemake(self, *arguments: str, **how) -> subprocess.CompletedProcess[str]:
         """Run snakemake in the copy, on the copy's package and one core."""
-        return self.looks("--cores", "1", *arguments)
+        return self.looks("--cores", "1", *arguments, **how)
 
     def looks(
-        self,
-        *arguments: str,
-        python: str | Path = sys.executable,
-        program: Sequence[str] = ("-m", "snakemake"),
-    ) -> subprocess.CompletedProcess[str]:
+        self, *arguments, python=sys.executable, program=("-m", "snakemake"), cwd=None, **variables
+    ):
         """The same without a number of cores, which what only looks does not ask for."""
+        own = {"PYTHONPATH": f"{self.folder}/src", "XDG_CACHE_HOME": f"{self.folder}/.cache"}
         return subprocess.run(
             [python, *program, *arguments],
-            cwd=self.folder,
-            env={
-                **os.environ,
-                "PYTHONPATH": str(self.folder / "src"),
-                "XDG_CACHE_HOME": str(self.folder / ".cache"),
-            },
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            text=True,
-            timeout=600,
-            check=False,
-        )
+            cwd=cwd or self.folder, env={**os.environ, **own, **variables},
+            stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=600, check=False,
+        )  # fmt: skip
 
     def summary(self, *arguments: str) -> list[Made]:
         """Rows of Snakemake's summary of the plan."""
@@ -87,7 +75,7 @@ class Checkout:
             path = self.folder / name
             path.parent.mkdir(parents=True, exist_ok=True)
             path.touch()
-        done = self.looks("--cores", "1", "--forceall", *arguments, program=TOUCH)
+        done = self.snakemake("--forceall", *arguments, program=TOUCH)
         assert done.returncode == 0, done.stderr
 
     def edit(self, path: str, old: str, new: str) -> None:
@@ -121,20 +109,14 @@ def only_line(output: str) -> str:
 
 
 def copy_repository(folder: Path) -> Checkout:
-    """Copy the files that git knows (all but caches, where there is no git)."""
-    for path in _files():
-        target = folder / path
-        target.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copyfile(ROOT / path, target)
+    """Copy all that the workflow reads, but caches."""
+    ignored = shutil.ignore_patterns("__pycache__")
+    for part in PARTS:
+        (folder / part).parent.mkdir(parents=True, exist_ok=True)
+        if (ROOT / part).is_dir():
+            shutil.copytree(
+                ROOT / part, folder / part, ignore=ignored, copy_function=shutil.copyfile
+            )
+        else:
+            shutil.copyfile(ROOT / part, folder / part)
     return Checkout(folder)
-
-
-def _files() -> list[str]:
-    listed = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard", "--", *PARTS]
-    try:
-        done = subprocess.run(listed, cwd=ROOT, capture_output=True, text=True, check=True)
-        files = [name for name in done.stdout.split("\0") if name]
-    except (OSError, subprocess.CalledProcessError):
-        found = [p for part in PARTS for p in ((ROOT / part), *(ROOT / part).rglob("*"))]
-        files = [str(p.relative_to(ROOT)) for p in found if "__pycache__" not in p.parts]
-    return [name for name in files if (ROOT / name).is_file()]

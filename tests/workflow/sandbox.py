@@ -84,40 +84,26 @@ class Sandbox:
             (self.folder / ".cache" / "numba").symlink_to(compiled)
         return self
 
-    def start(self, *targets: str, fault: str = "", **options: object) -> subprocess.Popen[str]:
+    def start(self, *targets, program="./reproduce", fault="", **options):
         """``./reproduce`` on the micro study, in a session of its own."""
-        command = ["./reproduce", "--cores", "2", "--configfile", MICRO_FILE, "--", *targets]
         return subprocess.Popen(
-            command,
-            cwd=self.folder,
-            env={**os.environ, "PDROM_FAULT": fault},
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            start_new_session=True,
+            [program, "--configfile", MICRO_FILE, "--cores", "2", *targets],
+            cwd=self.folder, env={**os.environ, "PDROM_FAULT": fault}, start_new_session=True,
+            stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
             **options,
-        )
+        )  # fmt: skip
 
-    def run(self, *targets: str, fault: str = "", **options: object) -> tuple[int, str]:
+    def run(self, *targets: str, **how) -> tuple[int, str]:
         """Exit status and all that the user reads; ``fault`` as in ``hooks/sitecustomize.py``."""
-        process = self.start(*targets, fault=fault, **options)
+        process = self.start("--", *targets, **how)
         output, _ = process.communicate(timeout=600)
         return process.returncode, output
 
     def snakemake(self, *arguments: str) -> tuple[int, str]:
         """The same by ``snakemake`` itself, without ``./reproduce``."""
-        done = subprocess.run(
-            [".venv/bin/snakemake", "--configfile", MICRO_FILE, "--cores", "2", *arguments],
-            cwd=self.folder,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            timeout=600,
-            check=False,
-        )
-        return done.returncode, done.stdout
+        process = self.start(*arguments, program=".venv/bin/snakemake")
+        output, _ = process.communicate(timeout=600)
+        return process.returncode, output
 
     def finish(self, *targets: str) -> None:
         """A run that must succeed."""

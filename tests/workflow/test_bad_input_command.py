@@ -5,8 +5,6 @@ One fault for each place at which the command reads input: a file that Snakemake
 others are those of the corpus, which `bad_input.test_bad_input` reads without a process.
 """
 
-from pathlib import Path
-
 import pytest
 from checkout import copy_repository, only_line
 from sandbox import MICRO_FILE, Sandbox
@@ -20,7 +18,7 @@ BY_NAME = {case.name: case for case in CASES}
 @pytest.mark.parametrize(
     "name", ["template that runs code", "mesh of mixed cells", "scene that leaves the folder"]
 )
-def test_broken_input_of_the_corpus(name: str, tmp_path: Path) -> None:
+def test_broken_input_of_the_corpus(name, tmp_path):
     case = BY_NAME[name]
     checkout = copy_repository(tmp_path)
     make_project(tmp_path, case.changes)
@@ -36,7 +34,7 @@ def test_broken_input_of_the_corpus(name: str, tmp_path: Path) -> None:
     ("content", "expected"),
     [(None, "no such configuration file"), (b"__use_yte__: true\n", "templates are not allowed")],
 )
-def test_a_broken_file_of_the_user(content: bytes | None, expected: str, tmp_path: Path) -> None:
+def test_a_broken_file_of_the_user(content, expected, tmp_path):
     """As ``./reproduce --configfile FILE``; Snakemake itself shows a traceback for some of them."""
     sandbox = Sandbox.make(tmp_path / "run")
     sandbox.path(MICRO_FILE).unlink()

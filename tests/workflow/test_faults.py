@@ -15,7 +15,6 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 from sandbox import Sandbox, kill_all, wait_for
@@ -74,12 +73,10 @@ def heals(sandbox: Sandbox, undisturbed: Sandbox, target: str = TABLE) -> None:
 # Killed jobs and runs -------------------------------------------------------------------------
 
 
-def test_a_lost_row_and_a_killed_job_are_named_and_made_again(
-    undisturbed: Sandbox, sandbox: Sandbox
-) -> None:
+def test_a_lost_row_and_a_killed_job_are_named_and_made_again(undisturbed, sandbox):
     """The first run finds the row missing, the second one loses the job that reads it."""
     lose_a_row(sandbox.path(f"{SAMPLING}.csv"))
-    find_damage(sandbox, f"{SAMPLING}.csv", [TABLE])
+    find_damage(sandbox, f"{SAMPLING}.csv", (TABLE,))
     status, output = sandbox.run(TABLE, fault="kill:reconstruction_error")
     assert status != 0
     expected = f"job reconstruction_error_table failed while making {TABLE}: killed (SIGKILL)"
@@ -104,9 +101,7 @@ RULES = {
 
 @slow
 @pytest.mark.parametrize("rule", RULES)
-def test_a_job_that_is_killed_in_any_rule(
-    rule: str, finished_study: Sandbox, tmp_path: Path
-) -> None:
+def test_a_job_that_is_killed_in_any_rule(rule, finished_study, tmp_path):
     sandbox = finished_study.copy(tmp_path / "run")
     (output,) = sandbox.folder.glob(RULES[rule])
     target = str(output.relative_to(sandbox.folder))
@@ -118,25 +113,24 @@ def test_a_job_that_is_killed_in_any_rule(
 
 
 @slow
-def test_a_run_that_is_killed_with_all_its_jobs(undisturbed: Sandbox, fresh: Sandbox) -> None:
+def test_a_run_that_is_killed_with_all_its_jobs(undisturbed, fresh):
     """Half-written files and the locks of both programs are left, and nobody unlocks by hand."""
     for folder in ("fom", "snapshots", "pod", "reruns"):
-        process = _caught_writing(fresh, folder)
-        kill_all(process)
+        kill_all(_caught_writing(fresh, folder))
         assert list(fresh.path(".snakemake/locks").iterdir())
     heals(fresh, undisturbed)
 
 
 def _caught_writing(sandbox: Sandbox, folder: str, kind: str = "slow") -> subprocess.Popen[str]:
     """A run one of whose jobs is at a file of ``folder``, kept there as ``kind`` says."""
-    process = sandbox.start(TABLE, fault=f"{kind}:/{MICRO_RESULTS}/{folder}/")
+    process = sandbox.start("--", TABLE, fault=f"{kind}:/{MICRO_RESULTS}/{folder}/")
     place = sandbox.path(MICRO_RESULTS) / folder
     wait_for(lambda: any(place in p.parents for p in sandbox.temporaries()), process)
     return process
 
 
 @slow
-def test_jobs_that_survive_their_run_do_no_harm(undisturbed: Sandbox, fresh: Sandbox) -> None:
+def test_jobs_that_survive_their_run_do_no_harm(undisturbed, fresh):
     """``kill -9`` of the main process alone: its jobs go on beside those of the next run."""
     process = _caught_writing(fresh, "fom")
     process.kill()
@@ -147,31 +141,29 @@ def test_jobs_that_survive_their_run_do_no_harm(undisturbed: Sandbox, fresh: San
 
 
 @slow
-def test_an_interrupted_run_goes_on(undisturbed: Sandbox, fresh: Sandbox) -> None:
-    process = _caught_writing(fresh, "fom")
-    os.killpg(process.pid, signal.SIGINT)
-    said, _ = process.communicate(timeout=60)
+@pytest.mark.parametrize(
+    ("end", "kind", "said"),
+    [
+        (lambda run: os.killpg(run.pid, signal.SIGINT), "slow", "pdrom: interrupted\n"),
+        # one of its jobs would never end by itself
+        (subprocess.Popen.terminate, "hold", "pdrom: ended by SIGTERM\n"),
+    ],
+    ids=["interrupted", "SIGTERM to the run alone"],
+)
+def test_a_run_that_is_ended_ends_its_jobs_and_goes_on(undisturbed, fresh, end, kind, said):
+    process = _caught_writing(fresh, "fom", kind)
+    end(process)
+    output, _ = process.communicate(timeout=60)
     assert process.returncode == 130
-    assert last_lines(said).startswith("pdrom: interrupted\n")
-    assert "Traceback" not in said
-    assert not fresh.temporaries()
+    assert last_lines(output).startswith(said)
+    assert ("pdrom: SIGTERM: ending the jobs that run\n" in output) == (kind == "hold")
+    assert "Traceback" not in output
+    assert kind == "hold" or not fresh.temporaries()
     heals(fresh, undisturbed)
 
 
 @slow
-def test_sigterm_to_the_run_alone_ends_its_jobs(undisturbed: Sandbox, fresh: Sandbox) -> None:
-    """One of which would never end by itself."""
-    process = _caught_writing(fresh, "fom", "hold")
-    process.terminate()
-    said, _ = process.communicate(timeout=60)
-    assert process.returncode == 130
-    assert "pdrom: SIGTERM: ending the jobs that run\n" in said
-    assert last_lines(said).startswith("pdrom: ended by SIGTERM\n")
-    heals(fresh, undisturbed)
-
-
-@slow
-def test_the_second_run_at_once_says_so_and_ends(undisturbed: Sandbox, fresh: Sandbox) -> None:
+def test_the_second_run_at_once_says_so_and_ends(undisturbed, fresh):
     """Whether by ``./reproduce`` or by ``snakemake``; what only looks works meanwhile."""
     first = _caught_writing(fresh, "fom", "hold")
     for second in (fresh.run(TABLE), fresh.snakemake(TABLE), fresh.snakemake("--unlock")):
@@ -187,7 +179,7 @@ def test_the_second_run_at_once_says_so_and_ends(undisturbed: Sandbox, fresh: Sa
 
 
 @slow
-def test_snakemake_itself_heals_after_a_kill(undisturbed: Sandbox, fresh: Sandbox) -> None:
+def test_snakemake_itself_heals_after_a_kill(undisturbed, fresh):
     kill_all(_caught_writing(fresh, "fom"))
     assert list(fresh.path(".snakemake/locks").iterdir())
     status, output = fresh.snakemake("--rerun-incomplete", TABLE)
@@ -196,7 +188,7 @@ def test_snakemake_itself_heals_after_a_kill(undisturbed: Sandbox, fresh: Sandbo
 
 
 @slow
-def test_a_blank_and_a_letter_beyond_ascii_in_the_path(tmp_path: Path) -> None:
+def test_a_blank_and_a_letter_beyond_ascii_in_the_path(tmp_path):
     """The interpreter, too, lies in the folder, as it does in ``.venv``."""
     folder = tmp_path / "Étude du projet"
     sandbox = Sandbox.make(folder, python=folder / "environment" / "bin" / "python")
@@ -230,7 +222,7 @@ def mount() -> Iterator[Callable[..., None]]:
 
 
 @slow
-def test_a_full_disk(undisturbed: Sandbox, fresh: Sandbox, mount: Callable[..., None]) -> None:
+def test_a_full_disk(undisturbed, fresh, mount):
     """A file system of its own for the results, which fills up while the runs are simulated."""
     results = fresh.path("results")
     results.mkdir()
@@ -257,9 +249,7 @@ def files_of_32_kb() -> None:
         (RUN, {"preexec_fn": files_of_32_kb}, "File too large"),
     ],
 )
-def test_a_write_that_fails(
-    target: str, how: dict[str, Any], words: str, undisturbed: Sandbox, sandbox: Sandbox
-) -> None:
+def test_a_write_that_fails(target, how, words, undisturbed, sandbox):
     sandbox.path(target).unlink()
     status, output = sandbox.run(target, **how)
     assert status != 0
@@ -269,9 +259,7 @@ def test_a_write_that_fails(
 
 
 @slow
-def test_results_that_are_read_only(
-    undisturbed: Sandbox, sandbox: Sandbox, mount: Callable[..., None]
-) -> None:
+def test_results_that_are_read_only(undisturbed, sandbox, mount):
     results = sandbox.path("results")
     sandbox.path(TABLE).unlink()
     mount(results, "--bind", str(results))
@@ -283,7 +271,7 @@ def test_results_that_are_read_only(
     heals(sandbox, undisturbed)
 
 
-def test_a_file_in_place_of_the_results(fresh: Sandbox) -> None:
+def test_a_file_in_place_of_the_results(fresh):
     fresh.path("results").write_text("")
     status, output = fresh.run(TABLE)
     assert status != 0
@@ -321,62 +309,42 @@ def lose_the_checksum(path: Path) -> None:
     checksum_path(path).unlink()
 
 
-def find_damage(sandbox: Sandbox, damaged: str, missing: list[str], target: str = TABLE) -> None:
-    """Run what reads the damaged file: it is named and set aside."""
+def find_damage(sandbox: Sandbox, damaged: str, missing: tuple[str, ...]) -> None:
+    """Run what reads the damaged file, to the last of the missing ones: it is set aside."""
     for name in missing:
         sandbox.path(name).unlink()
-    status, output = sandbox.run(target)
+    status, output = sandbox.run(missing[-1])
     assert status != 0
     assert f"{damaged}: damaged, its c" in last_lines(output)
     assert f"set aside as {Path(damaged).name}.damaged, the next run" in last_lines(output)
     sandbox.path(f"{damaged}.damaged").unlink()
 
 
-# what lies between a damaged file and the table, or nothing would be read again
-BETWEEN = {
-    RUN: [SNAPSHOTS, BASIS, f"{SAMPLING}.h5", f"{SAMPLING}.csv", TABLE],
-    SNAPSHOTS: [f"{SAMPLING}.h5", f"{SAMPLING}.csv", TABLE],
-    BASIS: [f"{SAMPLING}.h5", f"{SAMPLING}.csv", TABLE],
-    f"{SAMPLING}.csv": [TABLE],
-}
+# what lies between a damaged file and the table or the manuscript, or nothing would be read again
+BELOW_SAMPLES = (f"{SAMPLING}.h5", f"{SAMPLING}.csv", TABLE)
+IN_PAPER = (f"{MICRO_RESULTS}/paper/main.bbl", MICRO_MANUSCRIPT)
 
 
 @slow
 @pytest.mark.parametrize(
-    ("name", "damage"),  # every kind of damage: test_checksum.py
+    ("name", "damage", "missing"),  # every kind of damage: test_checksum.py
     [
-        (RUN, truncate),
-        (SNAPSHOTS, flip_a_bit),
-        (BASIS, truncate),
-        (f"{SAMPLING}.csv", flip_a_bit),
-        (f"{SAMPLING}.csv", lose_the_checksum),
+        (RUN, truncate, (SNAPSHOTS, BASIS, *BELOW_SAMPLES)),
+        (SNAPSHOTS, flip_a_bit, BELOW_SAMPLES),
+        (BASIS, truncate, BELOW_SAMPLES),
+        (f"{SAMPLING}.csv", flip_a_bit, (TABLE,)),
+        (f"{SAMPLING}.csv", lose_the_checksum, (TABLE,)),
+        (f"{MICRO_RESULTS}/machine.json", flip_a_bit, IN_PAPER),
+        (f"{MICRO_RESULTS}/tables/claims.csv", flip_a_bit, IN_PAPER),
+        (f"{MICRO_RESULTS}/paper/macros.tex", flip_a_bit, (MICRO_MANUSCRIPT,)),
+        (f"{MICRO_RESULTS}/figures/singular_values.pdf", flip_a_bit, (MICRO_MANUSCRIPT,)),
     ],
 )
-def test_a_damaged_result(
-    name: str, damage: Callable[[Path], None], undisturbed: Sandbox, sandbox: Sandbox
-) -> None:
-    damage(sandbox.path(name))
-    find_damage(sandbox, name, BETWEEN[name])
-    heals(sandbox, undisturbed)
-
-
-@slow
-@pytest.mark.parametrize(
-    ("name", "missing"),
-    [
-        (f"{MICRO_RESULTS}/machine.json", f"{MICRO_RESULTS}/paper/main.bbl"),
-        (f"{MICRO_RESULTS}/tables/claims.csv", f"{MICRO_RESULTS}/paper/main.bbl"),
-        (f"{MICRO_RESULTS}/paper/macros.tex", MICRO_MANUSCRIPT),
-        (f"{MICRO_RESULTS}/figures/singular_values.pdf", MICRO_MANUSCRIPT),
-    ],
-)
-def test_what_the_manuscript_is_made_from(
-    name: str, missing: str, finished_study: Sandbox, tmp_path: Path
-) -> None:
+def test_a_damaged_result(name, damage, missing, finished_study, tmp_path):
     sandbox = finished_study.copy(tmp_path / "run")
-    flip_a_bit(sandbox.path(name))
-    find_damage(sandbox, name, sorted({missing, MICRO_MANUSCRIPT}), MICRO_MANUSCRIPT)
-    heals(sandbox, finished_study, MICRO_MANUSCRIPT)
+    damage(sandbox.path(name))
+    find_damage(sandbox, name, missing)
+    heals(sandbox, finished_study, missing[-1])
 
 
 # Clocks and edited files ----------------------------------------------------------------------
@@ -396,9 +364,7 @@ ANY_ORDER = random.Random(1)
     ],
     ids=["back", "ahead", "in no order"],
 )
-def test_a_clock_that_jumped(
-    seconds: Callable[[], float], undisturbed: Sandbox, sandbox: Sandbox
-) -> None:
+def test_a_clock_that_jumped(seconds, undisturbed, sandbox):
     """The files of a finished run bear the wrong date."""
     for path in sandbox.path(MICRO_RESULTS).rglob("*"):
         stat = path.stat()
@@ -420,7 +386,7 @@ def sheet(height: float) -> str:
 
 @slow
 @pytest.mark.parametrize("date", [None, 0.0], ids=["now", "1970"])
-def test_a_changed_mesh_file_reruns_what_follows(tmp_path: Path, date: float | None) -> None:
+def test_a_changed_mesh_file_reruns_what_follows(tmp_path, date):
     """Also when the new file is older than the results, as after unpacking an archive."""
     first, second = (Sandbox.make(tmp_path / name) for name in ("first", "second"))
     for sandbox, height in ((first, 0.0), (second, 0.1)):

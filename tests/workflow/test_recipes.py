@@ -1,19 +1,55 @@
-"""Each recipe of CONTRIBUTING.md is typed into a copy, and the pipeline makes what it adds."""
+"""Each recipe of CONTRIBUTING.md is typed into a copy, and the pipeline makes what it adds.
 
-import os
+A block of code below a line "`path`:" is a new file; one below "`path`, below `line`:" is added
+to a file that exists, under the line that reads so, indented as that is.
+"""
+
+import re
 import shutil
-import subprocess
-import sys
-from pathlib import Path
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
 import yaml
 from checkout import Checkout, copy_repository
-from recipes import recipe
 
 from pdrom.core.store import check_file, read_table
 from places import ROOT
+
+PAGE = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+BLOCK = re.compile(
+    r"^`(?P<path>[^`]+)`(?:, below `(?P<below>[^`]+)`)?:\n\n```\w+\n(?P<code>.*?)^```$",
+    re.MULTILINE | re.DOTALL,
+)
+
+
+@dataclass(frozen=True)
+class Block:
+    """Code that belongs into a file, below a line of it or as the whole."""
+
+    path: str
+    below: str | None
+    code: str
+
+    def add_to(self, checkout: Checkout) -> None:
+        """Do what the recipe says."""
+        file = checkout.folder / self.path
+        if self.below is None:
+            assert not file.exists(), f"{self.path} exists"
+            file.write_text(self.code, encoding="utf-8")
+            return
+        lines = file.read_text(encoding="utf-8").splitlines()
+        (place,) = [i for i, line in enumerate(lines) if line.strip() == self.below]
+        indent = " " * (len(lines[place]) - len(lines[place].lstrip()))
+        lines[place + 1 : place + 1] = [indent + line for line in self.code.splitlines()]
+        file.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def recipe(title: str) -> list[Block]:
+    """Blocks of a section of the page."""
+    (section,) = re.findall(rf"^## {title}\n(.*?)(?=^## |\Z)", PAGE, re.MULTILINE | re.DOTALL)
+    return [Block(**found.groupdict()) for found in BLOCK.finditer(section)]
+
 
 # Files that a recipe may touch at most; pages that a command writes from the declarations (a list
 # of tables, one of figures) are not counted.
@@ -40,11 +76,8 @@ STUDY = {
 ARGUMENTS = ("--configfile", "own.yaml")
 EXPERIMENT = "src/study/experiments/rest_lengths.py"
 TABLE = "src/study/tables/mesh_sizes.py"
-GROUP_TESTS = (
-    "tests/physics",
-    "tests/unit/pdrom/model/constraints",
-    "tests/unit/pdrom/model/dynamics",
-)
+MODEL = "tests/unit/pdrom/model"
+GROUP_TESTS = ("tests/physics", f"{MODEL}/constraints", f"{MODEL}/dynamics")
 
 
 @pytest.fixture(scope="module")
@@ -77,12 +110,12 @@ def results(planned: set[str]) -> str:
 
 
 @pytest.mark.parametrize("title", MOST)
-def test_a_recipe_touches_few_files(title: str) -> None:
+def test_a_recipe_touches_few_files(title):
     paths = [block.path for block in recipe(title)]
     assert 0 < len(paths) == len(set(paths)) <= MOST[title]
 
 
-def test_what_was_added_belongs_to_the_study(planned: set[str], results: str) -> None:
+def test_what_was_added_belongs_to_the_study(planned, results):
     assert {
         f"{results}/figures/rest_shapes.png",
         f"{results}/tables/mesh_sizes.csv",
@@ -92,7 +125,7 @@ def test_what_was_added_belongs_to_the_study(planned: set[str], results: str) ->
     } <= planned
 
 
-def test_a_figures_option_is_typed_without_another_line(checkout: Checkout) -> None:
+def test_a_figures_option_is_typed_without_another_line(checkout):
     figures = checkout.folder / "config" / "figures.yaml"
     before = figures.read_text(encoding="utf-8")
     figures.write_text(before + "rest_shapes:\n  ranks: [6]\n", encoding="utf-8")
@@ -102,95 +135,66 @@ def test_a_figures_option_is_typed_without_another_line(checkout: Checkout) -> N
     assert "rest_shapes: unknown key 'ranks' (allowed: scenes)" in done.stderr
 
 
-def _targets(results: str) -> list[str]:
-    """One file of each recipe."""
-    names = (
-        "figures/rest_shapes.pdf",
-        "tables/mesh_sizes.csv",
-        "reruns/spring_oop/spring/leverage.csv",
-        "reruns/cable_sheet/cable/block-deim.csv",
-        "rest_lengths/spring_oop.csv",
-    )
-    return [f"{results}/{name}" for name in names]
+# One file of each recipe.
+MADE = (
+    "figures/rest_shapes.pdf", "tables/mesh_sizes.csv", "reruns/spring_oop/spring/leverage.csv",
+    "reruns/cable_sheet/cable/block-deim.csv", "rest_lengths/spring_oop.csv",
+)  # fmt: skip
 
 
 @pytest.fixture(scope="module")
-def ran(checkout: Checkout, results: str) -> str:
+def said(checkout: Checkout, results: str) -> str:
     """What a run said that made what the recipes add."""
-    done = checkout.snakemake(*ARGUMENTS, "--", *_targets(results))
+    done = checkout.snakemake(*ARGUMENTS, "--", *(f"{results}/{name}" for name in MADE))
     assert done.returncode == 0, done.stderr
     return done.stdout + done.stderr
 
 
-@pytest.fixture
-def made(checkout: Checkout, results: str, ran: str) -> Path:
-    """Folder of the results, with a file of each recipe."""
-    return checkout.folder / results
+@pytest.mark.slow
+def test_the_added_code_makes_its_files(checkout, results, said):
+    made = checkout.folder / results
+    assert {check_file(made / name) for name in MADE} == {"intact"}
+    assert (made / "figures/rest_shapes.pdf").read_bytes().startswith(b"%PDF")
+    assert (made / "figures/rest_shapes.png").is_file()
+    sizes = read_table(made / "tables/mesh_sizes.csv")
+    assert list(sizes) == ["mesh", "vertices", "large"]
+    assert set(sizes.vertices) == {25}
+    assert set(sizes.large) == {False}
+    sampled = read_table(made / "sampling/spring_oop/spring/leverage.csv")
+    assert len(sampled)
+    assert (sampled.elements_sampled == 3 * sampled.r).all()
+    reduced = read_table(made / "reruns/cable_sheet/cable/block-deim.csv")
+    assert list(reduced.r) == [2]
+    assert reduced.finite.all()
+    assert (reduced.relative_error < 1.0).all()
+    assert "Rest lengths of the springs of spring_oop" in said
+    lengths = read_table(made / "rest_lengths/spring_oop.csv").length
+    # sides and diagonals of the cells of a square sheet
+    short, long = sorted(set(lengths.round(9)))
+    assert np.isclose(long, np.sqrt(2.0) * short)
 
 
 @pytest.mark.slow
-class TestMade:
-    """Files that the pipeline made by the added code."""
-
-    def test_everything_has_its_checksum(self, made: Path) -> None:
-        assert {check_file(path) for path in _targets(str(made))} == {"intact"}
-
-    def test_the_figure_is_drawn(self, made: Path) -> None:
-        assert (made / "figures/rest_shapes.pdf").read_bytes().startswith(b"%PDF")
-        assert (made / "figures/rest_shapes.png").is_file()
-
-    def test_the_table_has_a_row_per_mesh_and_its_types(self, made: Path) -> None:
-        table = read_table(made / "tables/mesh_sizes.csv")
-        assert list(table) == ["mesh", "vertices", "large"]
-        assert list(table.vertices) == [25] * len(table)
-        assert list(table.large) == [False] * len(table)
-
-    def test_the_selection_samples_three_elements_a_mode(self, made: Path) -> None:
-        table = read_table(made / "sampling/spring_oop/spring/leverage.csv")
-        assert len(table)
-        assert (table.elements_sampled == 3 * table.r).all()
-
-    def test_the_group_is_reduced(self, made: Path) -> None:
-        table = read_table(made / "reruns/cable_sheet/cable/block-deim.csv")
-        assert list(table.r) == [2]
-        assert table.finite.all()
-        assert (table.relative_error < 1.0).all()
-
-    def test_the_experiment_says_its_label_and_writes_its_file(self, made: Path, ran: str) -> None:
-        assert "Rest lengths of the springs of spring_oop" in ran
-        table = read_table(made / "rest_lengths/spring_oop.csv")
-        # sides and diagonals of the cells of a square sheet
-        short, long = sorted(set(table.length.round(9)))
-        assert np.isclose(long, np.sqrt(2.0) * short)
-
-    @pytest.mark.parametrize(
-        ("name", "module", "old", "new"),
-        [
-            ("rest_lengths/spring_oop.csv", EXPERIMENT, "/ allowed", "/ allowed / 1.0"),
-            ("tables/mesh_sizes.csv", TABLE, "> extents", ">= extents"),
-        ],
-    )
-    def test_its_settings_and_its_code_make_it_again(
-        self, checkout: Checkout, results: str, ran: str, name: str, module: str, old: str, new: str
-    ) -> None:
-        target = f"{results}/{name}"
-        arguments = (target, *ARGUMENTS)
-        assert checkout.planned(*arguments) == set()
-        assert checkout.planned(*arguments, "--config", "blowup_extent=50") == {target}
-        checkout.edit(module, old, new)
-        assert checkout.planned(*arguments) == {target}
+@pytest.mark.parametrize(
+    ("name", "module", "old", "new"),
+    [
+        ("rest_lengths/spring_oop.csv", EXPERIMENT, "/ allowed", "/ allowed / 1.0"),
+        ("tables/mesh_sizes.csv", TABLE, "> extents", ">= extents"),
+    ],
+)
+def test_settings_and_code_make_it_again(checkout, results, said, name, module, old, new):
+    target = f"{results}/{name}"
+    arguments = (target, *ARGUMENTS)
+    assert checkout.planned(*arguments) == set()
+    assert checkout.planned(*arguments, "--config", "blowup_extent=50") == {target}
+    checkout.edit(module, old, new)
+    assert checkout.planned(*arguments) == {target}
 
 
 @pytest.mark.slow
-def test_the_group_has_the_properties_of_every_group(checkout: Checkout) -> None:
+def test_the_group_has_the_properties_of_every_group(checkout):
     """The copy's own tests of groups, on the group that its list of groups names now."""
-    done = subprocess.run(
-        [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "-k", "cable", *GROUP_TESTS],
-        cwd=checkout.folder,
-        env={**os.environ, "PYTHONPATH": str(checkout.folder / "src")},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    program = ("-m", "pytest", "-p", "no:cacheprovider", "-k", "cable")
+    done = checkout.looks(*GROUP_TESTS, program=program)
     assert done.returncode == 0, done.stdout
     assert " passed" in done.stdout

@@ -1,6 +1,7 @@
 """The script ``reproduce``: clear failures, one set-up at a time, arguments handed on."""
 
 import os
+import re
 import shutil
 import signal
 import socket
@@ -64,42 +65,37 @@ class Folder:
     def __init__(self, path: Path) -> None:
         self.path = path / "a folder"
         self.programs = path / "bin"
+        self.python = self.programs / "python3"
         self.path.mkdir()
         self.programs.mkdir()
         for tool in TOOLS:
             self.programs.joinpath(tool).symlink_to(shutil.which(tool))
         shutil.copy(SCRIPT, self.path)
-        platforms = self.path / PLATFORMS
-        platforms.parent.mkdir(parents=True)
-        shutil.copy(ROOT / PLATFORMS, platforms)
+        (self.path / PLATFORMS).parent.mkdir(parents=True)
+        shutil.copy(ROOT / PLATFORMS, self.path / PLATFORMS)
         self.path.joinpath("requirements.lock").write_text(LOCK_FILE, encoding="utf-8")
 
-    def add_python(
-        self, version: str = "3.12", too_old: bool = False, no_venv: bool = False
-    ) -> None:
+    def add_python(self, version: str = "3.12", too_old: int = 0, no_venv: int = 0) -> None:
         """Put a stand-in for Python on the path."""
-        text = PYTHON.format(
-            version=version, too_old=int(too_old), no_venv=int(no_venv), real=sys.executable,
-            packages=PACKAGES,
-        )  # fmt: skip
-        program = self.programs / "python3"
-        program.write_text(text, encoding="utf-8")
-        program.chmod(0o755)
+        values = {"version": version, "too_old": too_old, "no_venv": no_venv}
+        text = PYTHON.format(**values, real=sys.executable, packages=PACKAGES)
+        self.python.write_text(text, encoding="utf-8")
+        self.python.chmod(0o755)
 
-    def start(
-        self, *arguments: str, start_new_session: bool = False, **environment: str
-    ) -> subprocess.Popen[str]:
-        """Start the script from another working directory."""
+    def start(self, *arguments: str, new: bool = False, **environment: str) -> subprocess.Popen:
+        """Start the script from another working directory, maybe in a new session."""
         return subprocess.Popen(
             [self.path / "reproduce", *arguments],
-            cwd="/",
-            env={"PATH": str(self.programs), "HOME": str(self.path), **environment},
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-            start_new_session=start_new_session,
-        )
+            cwd="/", env={"PATH": str(self.programs), "HOME": str(self.path), **environment},
+            stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+            start_new_session=new,
+        )  # fmt: skip
+
+    def run(self, *arguments: str, **environment: str) -> tuple[int, list[str]]:
+        """Exit status and lines on standard error."""
+        process = self.start(*arguments, **environment)
+        _, errors = process.communicate(timeout=120)
+        return process.returncode, errors.splitlines()
 
     def refused(self, **environment: str) -> list[str]:
         """Lines on standard error of a run that fails."""
@@ -107,15 +103,18 @@ class Folder:
         assert status != 0
         return errors
 
+    def works(self) -> None:
+        """A run that makes the environment, and ends in the front of the pipeline."""
+        assert self.run()[0] == 0
+        assert self.calls == [FRONT]
+
     def touch(self, name: str, text: str = "") -> None:
         """Write a file of the folder."""
         self.path.joinpath(name).write_text(text)
 
-    def run(self, *arguments: str, **environment: str) -> tuple[int, list[str]]:
-        """Exit status and lines on standard error."""
-        process = self.start(*arguments, **environment)
-        _, errors = process.communicate(timeout=120)
-        return process.returncode, errors.splitlines()
+    def has(self, name: str) -> bool:
+        """Whether the folder has a file."""
+        return self.path.joinpath(name).exists()
 
     @property
     def calls(self) -> list[str]:
@@ -132,31 +131,58 @@ def folder(tmp_path: Path) -> Folder:
     return made
 
 
-def test_no_python(folder: Folder) -> None:
-    folder.programs.joinpath("python3").unlink()
+def rename(folder: Folder, name: str) -> None:
+    folder.path = folder.path.rename(folder.path.with_name(name))
+
+
+NO_WHEELS = r"\(some packages have no wheels for other ones\), found only"
+UNFIT = {
+    "no python": (
+        lambda f: f.python.unlink(),
+        r"Python 3\.11, 3\.12 or 3\.13 is needed.*found none \(set PYTHON to its path\)",
+    ),
+    "an old python": (lambda f: f.add_python("3.9", too_old=1), f"{NO_WHEELS} 3.9 .*"),
+    "a new python": (lambda f: f.add_python("3.14", too_old=1), f"{NO_WHEELS} 3.14 .*"),
+    "no venv": (lambda f: f.add_python(no_venv=1), "has no venv module.*"),
+    "nothing can be made": (lambda f: f.touch(".cache"), "no write permission in .*/a folder"),
+    "line break": (lambda f: rename(f, "two\nlines"), ".*line break.*"),
+    "line break at the end": (lambda f: rename(f, "ends\n"), ".*line break.*"),
+}
+
+
+@pytest.mark.parametrize("what", UNFIT)
+def test_what_does_not_fit_is_said_in_one_line_before_anything_is_made(what, folder):
+    change, words = UNFIT[what]
+    change(folder)
     (line,) = folder.refused()
-    assert line.startswith("reproduce: Python 3.11, 3.12 or 3.13 is needed")
-    assert line.endswith("found none (set PYTHON to its path)")
+    assert re.fullmatch(f"reproduce: .*{words}", line)
+    assert not folder.has(".venv")
 
 
-@pytest.mark.parametrize("version", ["3.9", "3.14"])
-def test_a_python_without_wheels(version: str, folder: Folder) -> None:
-    folder.add_python(version=version, too_old=True)
-    (line,) = folder.refused()
-    assert f"(some packages have no wheels for other ones), found only {version}" in line
+FULL = "ERROR: Could not install: [Errno 28] No space left on device (timed out)\n"
+BROKEN = (
+    r"linear algebra is broken on this machine: numpy 2\.1\.0: X\.T @ X crashes \(signal 11\), "
+)
+FAILING = {
+    "pip": ("pip-fails", "ERROR: no\n", "reproduce: the packages cannot be installed.*ERROR: no"),
+    "a full disk, not the network": ("pip-fails", FULL, ".*no space left on the disk.*"),
+    "the platform": ("unsupported", "", "no wheel for it"),
+    "linear algebra": ("broken", "", f"reproduce: {BROKEN}see .*/.cache/setup.log"),
+}
 
 
-def test_python_without_venv(folder: Folder) -> None:
-    folder.add_python(no_venv=True)
-    (line,) = folder.refused()
-    assert "has no venv module" in line
-    assert not (folder.path / ".venv").exists()
-
-
-def test_a_folder_in_which_nothing_can_be_made(folder: Folder) -> None:
-    folder.touch(".cache", "a file where the folder should be")
-    errors = folder.refused()
-    assert errors == [f"reproduce: no write permission in {folder.path}"]
+@pytest.mark.parametrize("what", FAILING)
+def test_a_failed_set_up_does_not_count_and_is_made_anew(what, folder):
+    name, text, words = FAILING[what]
+    folder.touch(name, text)
+    for _ in range(2):
+        assert re.fullmatch(words, folder.refused()[-1])
+        assert folder.calls == []
+    if what == "the platform":  # it ends before anything is made
+        assert not folder.has("installing")
+        assert not folder.has(".venv")
+    folder.path.joinpath(name).unlink()
+    folder.works()
 
 
 @pytest.fixture
@@ -168,7 +194,7 @@ def readable_by_all() -> Iterator[Path]:
     shutil.rmtree(path)
 
 
-def test_a_folder_of_another_user(readable_by_all: Path) -> None:
+def test_a_folder_of_another_user(readable_by_all):
     folder = Folder(readable_by_all)
     folder.path.chmod(0o555)
     command = [str(folder.path / "reproduce")]
@@ -184,8 +210,8 @@ def test_a_folder_of_another_user(readable_by_all: Path) -> None:
     assert done.stderr.splitlines() == [f"reproduce: no write permission in {folder.path}"]
 
 
-def test_no_network(folder: Folder) -> None:
-    folder.programs.joinpath("python3").unlink()
+def test_no_network(folder):
+    folder.python.unlink()
     with socket.socket() as listener:
         listener.bind(("127.0.0.1", 0))
         closed_port = listener.getsockname()[1]
@@ -201,27 +227,17 @@ def test_no_network(folder: Folder) -> None:
     assert Path(line.partition("See ")[2]).is_file()
 
 
-def test_a_failed_set_up_is_made_anew(folder: Folder) -> None:
-    folder.touch("pip-fails", "ERROR: no\n")
-    errors = folder.refused()
-    assert errors[-1].startswith("reproduce: the packages cannot be installed")
-    assert errors[-1].endswith("ERROR: no")
-    assert folder.calls == []
-    folder.path.joinpath("pip-fails").unlink()
-    status, errors = folder.run()
-    assert status == 0, errors
-    assert folder.calls == [FRONT]
-
-
-def test_the_environment_is_made_once_for_each_lock_file(folder: Folder) -> None:
+def test_the_environment_is_made_once_for_each_lock_file(folder):
     making = [any("making .venv" in line for line in folder.run()[1]) for _ in range(2)]
     folder.touch("requirements.lock", "")
     making.append(any("making .venv" in line for line in folder.run()[1]))
     assert making == [True, False, True]
+    # no number of a process stays that a later set-up would kill
+    assert not folder.has(".cache/pip.pid")
 
 
 @pytest.mark.parametrize("change", ["a version", "one more", "one less"])
-def test_packages_that_another_program_changed_are_noticed(change: str, folder: Folder) -> None:
+def test_packages_that_another_program_changed_are_noticed(change, folder):
     folder.run()
     assert folder.run()[1] == ["reproduce: planning"]
     packages = folder.path / ".venv" / PACKAGES
@@ -237,7 +253,7 @@ def test_packages_that_another_program_changed_are_noticed(change: str, folder: 
     assert why == "reproduce: .venv holds other packages than those of requirements.lock"
 
 
-def test_the_executor_for_clusters_may_be_added(folder: Folder) -> None:
+def test_the_executor_for_clusters_may_be_added(folder):
     folder.run()
     for name in _locked("requirements-cluster.lock"):
         (folder.path / ".venv" / PACKAGES / f"{name.replace('-', '_')}-1.0.dist-info").mkdir()
@@ -249,90 +265,40 @@ def _locked(name: str) -> list[str]:
     return [line.partition("==")[0] for line in lines if "==" in line]
 
 
-@pytest.mark.parametrize("name", ["two\nlines", "ends\n"])
-def test_a_path_with_a_line_break_is_refused(name: str, folder: Folder) -> None:
-    folder.path = folder.path.rename(folder.path.with_name(name))
-    (line,) = folder.refused()
-    assert line.startswith("reproduce: ")
-    assert "line break" in line
-    assert not (folder.path / ".venv").exists()
+def test_arguments_are_handed_on(folder):
+    """Only what plans says so; the set-up shows that it is alive."""
+    asked = (["-n", "results/figures/a b.pdf"], ["test", "-q", "tests/unit"], ["run", "true"], [])
+    said = [folder.run(*arguments)[1] for arguments in asked]
+    assert folder.calls == [" ".join([FRONT, *arguments]) for arguments in asked]
+    planning, making = ["reproduce: planning"], "reproduce: 10 of 1 packages"
+    assert said[0][1:] == [making, "reproduce: unpacking 11 packages", *planning]
+    assert said[1:] == [[], [], planning]
 
 
-def test_arguments_are_handed_on(folder: Folder) -> None:
-    folder.run("-n", "results/figures/a b.pdf")
-    folder.run("test", "-q", "tests/unit")
-    assert folder.calls == [f"{FRONT} -n results/figures/a b.pdf", f"{FRONT} test -q tests/unit"]
-
-
-def test_help_makes_nothing(folder: Folder) -> None:
+def test_help_makes_nothing(folder):
     process = folder.start("--help")
     output, _ = process.communicate(timeout=60)
     assert process.returncode == 0
     for word in ("TARGETS", "--configfile", "-n", "--report", "test", "results/tables"):
         assert word in output
     assert "set -eu" not in output
-    assert not (folder.path / ".venv").exists()
-
-
-def test_set_up_shows_that_it_is_alive(folder: Folder) -> None:
-    _, errors = folder.run()
-    assert errors[1:] == [
-        "reproduce: 10 of 1 packages",
-        "reproduce: unpacking 11 packages",
-        "reproduce: planning",
-    ]
-
-
-def test_only_what_plans_says_so(folder: Folder) -> None:
-    folder.run()
-    words = [folder.run(*arguments)[1] for arguments in ([], ["-n"], ["test"], ["run", "true"])]
-    assert words == [["reproduce: planning"], ["reproduce: planning"], [], []]
-
-
-def test_a_platform_without_wheels_ends_before_anything_is_made(folder: Folder) -> None:
-    folder.touch("unsupported")
-    errors = folder.refused()
-    assert errors[-1] == "no wheel for it"
-    assert not folder.path.joinpath("installing").exists()
-    assert not (folder.path / ".venv").exists()
-
-
-def test_a_full_disk_is_told_from_a_missing_network(folder: Folder) -> None:
-    said = "ERROR: Could not install: [Errno 28] No space left on device (timed out)\n"
-    folder.touch("pip-fails", said)
-    errors = folder.refused()
-    assert "no space left on the disk" in errors[-1]
-
-
-def test_broken_linear_algebra_is_named_and_the_environment_does_not_count(folder: Folder) -> None:
-    folder.touch("broken")
-    for _ in range(2):
-        assert folder.refused()[-1] == (
-            "reproduce: linear algebra is broken on this machine: numpy 2.1.0: X.T @ X crashes "
-            f"(signal 11), see {folder.path}/.cache/setup.log"
-        )
-        assert folder.calls == []
-    folder.path.joinpath("broken").unlink()
-    assert folder.run()[0] == 0
-    assert folder.calls == [FRONT]
+    assert not folder.has(".venv")
 
 
 @pytest.fixture
 def installing(folder: Folder) -> Iterator[tuple[Folder, subprocess.Popen[str]]]:
     """A set-up that stays at work."""
     folder.touch("hold")
-    process = folder.start(start_new_session=True)
+    process = folder.start(new=True)
     limit = time.monotonic() + 60
-    while not folder.path.joinpath("installing").exists() and time.monotonic() < limit:
+    while not folder.has("installing") and time.monotonic() < limit:
         time.sleep(0.02)
     yield folder, process
     folder.path.joinpath("hold").unlink(missing_ok=True)
     process.communicate(timeout=60)
 
 
-def test_the_second_of_two_set_ups_ends_at_once(
-    installing: tuple[Folder, subprocess.Popen[str]],
-) -> None:
+def test_the_second_of_two_set_ups_ends_at_once(installing):
     folder, first = installing
     errors = folder.refused()
     assert errors == [
@@ -345,42 +311,34 @@ def test_the_second_of_two_set_ups_ends_at_once(
     assert len(folder.calls) == 2
 
 
-def test_a_killed_set_up_leaves_no_lock(installing: tuple[Folder, subprocess.Popen[str]]) -> None:
+def test_a_killed_set_up_leaves_no_lock(installing):
     folder, first = installing
     os.killpg(first.pid, signal.SIGKILL)
     first.communicate(timeout=60)
     folder.path.joinpath("hold").unlink()
-    assert folder.run()[0] == 0
-    assert folder.calls == [FRONT]
+    folder.works()
 
 
 @pytest.mark.parametrize("whole", [True, False], ids=["all processes", "the script alone"])
-def test_an_interrupted_set_up_ends_and_says_so(
-    installing: tuple[Folder, subprocess.Popen[str]], whole: bool
-) -> None:
+def test_an_interrupted_set_up_ends_and_says_so(installing, whole):
     """It does not wait for the packages, which are no longer installed: the streams close."""
     folder, first = installing
     (os.killpg if whole else os.kill)(first.pid, signal.SIGTERM)
     _, errors = first.communicate(timeout=60)
-    assert folder.path.joinpath("hold").exists()
+    assert folder.has("hold")
     assert first.returncode == 130
     said = [line for line in errors.splitlines() if "packages" not in line]
     assert said[-1] == "reproduce: interrupted"
     assert folder.calls == []
 
 
-def test_no_number_of_a_process_stays_that_a_later_set_up_would_kill(folder: Folder) -> None:
-    folder.run()
-    assert not folder.path.joinpath(".cache/pip.pid").exists()
-
-
-def test_an_interrupted_set_up_kills_nothing_that_an_older_one_left(folder: Folder) -> None:
+def test_an_interrupted_set_up_kills_nothing_that_an_older_one_left(folder):
     folder.touch("hold-search")
     with subprocess.Popen(["sleep", "600"]) as stranger:
         folder.path.joinpath(".cache").mkdir()
         folder.touch(".cache/pip.pid", f"{stranger.pid}\n")
         process = folder.start()
-        while not folder.path.joinpath("searching").exists():
+        while not folder.has("searching"):
             time.sleep(0.02)
         process.send_signal(signal.SIGTERM)
         folder.path.joinpath("hold-search").unlink()

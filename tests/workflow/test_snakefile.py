@@ -37,6 +37,7 @@ MICRO_FILE = "micro.yaml"
 EDITED = ("workflow", "config", "paper", "src", "Snakefile", MICRO_FILE)
 DAY_NS = 86_400 * 10**9
 MICRO_ARGUMENTS = ("--configfile", MICRO_FILE)
+SPRING, SCRIPT = "src/pdrom/model/constraints/spring.py", "workflow/scripts/artifact.py"
 OUTSIDE = f"{MICRO_RESULTS}/fom/bar140/train.h5"
 PAGE = f"{MICRO_RESULTS}/article/live.html"
 ARTICLE = f"{MICRO_RESULTS}/article/index.html"
@@ -93,7 +94,7 @@ def finished(finished_once: Checkout, plan: dict[str, Made]) -> Iterator[Checkou
         os.utime(path, ns=(stat.st_atime_ns, stat.st_mtime_ns))
 
 
-def test_the_contents_count_the_jobs_of_a_run(finished: Checkout, plan: dict[str, Made]) -> None:
+def test_the_contents_count_the_jobs_of_a_run(finished, plan):
     text = (finished.folder / MICRO_RESULTS / "contents.md").read_text("utf-8")
     rows = [[cell.strip() for cell in line.split("|")] for line in text.splitlines()]
     listed = [row for row in rows if len(row) == 9 and "./reproduce" in row[3]]
@@ -104,14 +105,18 @@ def test_the_contents_count_the_jobs_of_a_run(finished: Checkout, plan: dict[str
     assert {row[5] for row in listed} == {""}  # nothing has run
 
 
-def test_a_fresh_clone_plans_the_whole_study_beside_a_run(
-    clean: Checkout, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Tables and figures, and the manuscript in the end."""
+@pytest.fixture
+def at_work(clean, monkeypatch):
+    """This process holds the lock of the clean copy, as a run does."""
     monkeypatch.chdir(clean.folder)
     descriptor = hold()
-    done = clean.snakemake("-n")
+    yield
     os.close(descriptor)
+
+
+def test_a_fresh_clone_plans_the_whole_study_beside_a_run(clean, at_work):
+    """Tables and figures, and the manuscript in the end."""
+    done = clean.snakemake("-n")
     assert done.returncode == 0, done.stderr
     log = done.stdout + done.stderr
     assert "Manuscript paper/main.pdf, paper/supplement.pdf" in log
@@ -126,12 +131,12 @@ def test_a_fresh_clone_plans_the_whole_study_beside_a_run(
     assert wanted | {"paper/main.pdf", "paper/supplement.pdf"} <= made
 
 
-def test_every_figure_is_made_for_pages_and_for_the_report(plan: dict[str, Made]) -> None:
+def test_every_figure_is_made_for_pages_and_for_the_report(plan):
     figures = [f"{MICRO_RESULTS}/figures/{name}" for name in declarations()]
     assert {f"{path}.{kind}" for path in figures for kind in ("pdf", "png")} <= set(plan)
 
 
-def test_another_snakemake_is_told_where_the_package_is(clean: Checkout, tmp_path: Path) -> None:
+def test_another_snakemake_is_told_where_the_package_is(clean, tmp_path):
     """One that has all packages of the lock file, but not this project's."""
     subprocess.run([sys.executable, "-m", "venv", "--without-pip", tmp_path], check=True)
     locked = Path(sysconfig.get_path("purelib"))
@@ -145,7 +150,7 @@ def test_another_snakemake_is_told_where_the_package_is(clean: Checkout, tmp_pat
     assert "has no package pdrom: use ./reproduce, or .venv/bin/snakemake" in only_line(done.stderr)
 
 
-def test_one_figure_needs_no_more_than_its_own_inputs(clean: Checkout) -> None:
+def test_one_figure_needs_no_more_than_its_own_inputs(clean):
     """No table of the whole study, and of the scenes only the two that it draws."""
     figure = "results/figures/spring_runs.pdf"
     planned = clean.planned(figure)
@@ -157,7 +162,7 @@ def test_one_figure_needs_no_more_than_its_own_inputs(clean: Checkout) -> None:
     assert _scenes(p for p in planned if _stage(p) in stages) == {"spring_stretch", "spring_twist"}
 
 
-def test_a_scene_outside_the_study_is_run_for_its_own_file(plan: dict[str, Made]) -> None:
+def test_a_scene_outside_the_study_is_run_for_its_own_file(plan):
     made = needed(plan, OUTSIDE)
     (mesh,) = (path for path in made if _stage(path) == "meshes")
     assert _below(mesh)[1].startswith("bar_")
@@ -171,35 +176,26 @@ def test_a_scene_outside_the_study_is_run_for_its_own_file(plan: dict[str, Made]
         (("--report", "report.html"), "report: this configuration has no paper/main.pdf"),
     ],
 )
-def test_what_nobody_makes_is_refused(
-    arguments: tuple[str, ...], words: str, clean: Checkout
-) -> None:
+def test_what_nobody_makes_is_refused(arguments, words, clean):
     assert words in only_line(clean.snakemake(*arguments).stderr)
 
 
-def test_one_run_at_a_time(clean: Checkout, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_one_run_at_a_time(clean, at_work):
     """A plan is made beside it, as the test above shows."""
-    monkeypatch.chdir(clean.folder)
-    descriptor = hold()
-    try:
-        line = only_line(clean.snakemake("results/fom/bar140/train.h5").stderr)
-    finally:
-        os.close(descriptor)
+    line = only_line(clean.snakemake("results/fom/bar140/train.h5").stderr)
     assert f"another run (process {os.getpid()} on " in line
 
 
-def test_no_text_and_no_date_reruns_anything(finished: Checkout) -> None:
+def test_no_text_and_no_date_reruns_anything(finished):
     """Nor does another number of cores, a new effect, or one that no scene lists.
 
     All sources are younger than the results, then all results are younger than now.
     """
-    spring, script = "src/pdrom/model/constraints/spring.py", "workflow/scripts/artifact.py"
-    finished.edit(spring, '"""Edge springs:', '"""Springs along edges:')
-    finished.edit(spring, "    # scale so that ", "    # divide so that ")
-    finished.edit(script, "    make(", "    # the job\n    make(")
-    finished.edit(
-        "src/pdrom/model/effects/poke.py", "self._order[turn : ", "self._order[0 + turn : "
-    )
+    finished.edit(SPRING, '"""Edge springs:', '"""Springs along edges:')
+    finished.edit(SPRING, "    # scale so that ", "    # divide so that ")
+    finished.edit(SCRIPT, "    make(", "    # the job\n    make(")
+    poke = "src/pdrom/model/effects/poke.py"
+    finished.edit(poke, "self._order[turn : ", "self._order[0 + turn : ")
     finished.register(*EFFECT)
     finished.register(*SELECTION)
     for late in (EDITED, ("results",)):
@@ -209,50 +205,58 @@ def test_no_text_and_no_date_reruns_anything(finished: Checkout) -> None:
         assert finished.planned("--cores", "3", *MICRO_ARGUMENTS) == set()
 
 
-def test_the_edited_script_reruns_every_job(finished: Checkout, plan: dict[str, Made]) -> None:
+def replanned(checkout: Checkout, *edit: str) -> set[str]:
+    """What is made again after an edit: file, old text, new text."""
+    checkout.edit(*edit)
+    return checkout.planned(*MICRO_ARGUMENTS)
+
+
+def test_the_edited_script_reruns_every_job(finished, plan):
     old, new = "code=snakemake.params.code", "code=str(snakemake.params.code)"
-    finished.edit("workflow/scripts/artifact.py", old, new)
     wanted = [needed(plan, target) for target in (MICRO_MANUSCRIPT, PAGE, ARTICLE)]
-    assert finished.planned(*MICRO_ARGUMENTS) == set[str]().union(*wanted)
+    assert replanned(finished, SCRIPT, old, new) == set[str]().union(*wanted)
 
 
-def test_a_kernel_reruns_the_scenes_that_use_it_and_what_follows(finished: Checkout) -> None:
-    finished.edit(
-        "src/pdrom/model/constraints/spring.py", "LOW, HIGH = 1e-280", "LOW, HIGH = 1e-281"
-    )
-    planned = finished.planned(*MICRO_ARGUMENTS)
+@pytest.mark.parametrize(
+    ("edit", "scene"),
+    [
+        ((SPRING, "LOW, HIGH = 1e-280", "LOW, HIGH = 1e-281"), "spring_oop"),
+        (("config/scenes/strain_oop.yaml", "  - {effect: floor}\n", ""), "strain_oop"),
+    ],
+    ids=["kernel", "effect that was listed"],
+)
+def test_an_edit_reruns_the_scene_that_it_concerns_and_what_follows(finished, edit, scene):
+    planned = replanned(finished, *edit)
     per_scene = {p for p in planned if _stage(p) not in SHARED}
-    assert _scenes(per_scene) == {"spring_oop"}
+    assert _scenes(per_scene) == {scene}
     stages = {"fom", "snapshots", "pod", "sampling", "reruns", "sensitivity", "timings"}
     assert {_stage(p) for p in per_scene} >= stages
     assert MICRO_MANUSCRIPT in planned
 
 
-def test_a_threshold_of_a_claim_reruns_verdicts_and_manuscript_only(finished: Checkout) -> None:
-    finished.edit("config/claims.yaml", "threshold: 0.7", "threshold: 0.71")
-    planned = finished.planned(*MICRO_ARGUMENTS)
+CLAIMS = ("claims", "claims_sensitivity", "claims_tests", "replication")
+MAP = "src/study/figures/stability_map.py"
+
+
+@pytest.mark.parametrize(
+    ("edit", "files"),
+    [
+        (
+            ("config/claims.yaml", "threshold: 0.7", "threshold: 0.71"),
+            {f"tables/{name}.csv" for name in CLAIMS},
+        ),
+        (
+            (MAP, 'Where each method can be trusted"', 'What can be trusted"'),
+            {f"figures/stability_map.{kind}" for kind in ("pdf", "png")},
+        ),
+    ],
+    ids=["threshold of a claim", "caption"],
+)
+def test_an_edit_reruns_what_shows_it_and_the_manuscript_only(finished, edit, files):
+    planned = replanned(finished, *edit)
+    others = {path for path in planned if _stage(path) not in ("paper", "article")}
+    assert others == {f"{MICRO_RESULTS}/{file}" for file in files}
     assert MICRO_MANUSCRIPT in planned
-    others = {p for p in planned if _stage(p) not in ("paper", "article")}
-    tables = {
-        f"{MICRO_RESULTS}/tables/{name}.csv"
-        for name in ("claims", "claims_sensitivity", "claims_tests", "replication")
-    }
-    assert others == tables
-
-
-def test_a_caption_rerenders_its_figure_and_the_manuscript_only(finished: Checkout) -> None:
-    source = "src/study/figures/stability_map.py"
-    finished.edit(source, 'Where each method can be trusted"', 'What can be trusted"')
-    planned = finished.planned(*MICRO_ARGUMENTS)
-    figure = {f"{MICRO_RESULTS}/figures/stability_map.{kind}" for kind in ("pdf", "png")}
-    assert {path for path in planned if _stage(path) not in ("paper", "article")} == figure
-    assert MICRO_MANUSCRIPT in planned
-
-
-def test_a_removed_effect_reruns_the_scene_that_listed_it(finished: Checkout) -> None:
-    finished.edit("config/scenes/strain_oop.yaml", "  - {effect: floor}\n", "")
-    planned = finished.planned(*MICRO_ARGUMENTS)
-    assert _scenes(p for p in planned if _stage(p) not in SHARED) == {"strain_oop"}
 
 
 # Registry, entry, module and its code.
@@ -283,31 +287,25 @@ class Nothing(Gravity):
 )  # fmt: skip
 
 
-def test_registering_a_selection_reruns_the_methods_that_use_it(finished: Checkout) -> None:
+def test_registering_a_selection_reruns_the_methods_that_use_it(finished):
     """One method of the study takes it."""
     finished.register(*SELECTION)
-    finished.edit(
-        "config/methods.yaml",
-        "rows: element, selection: greedy, solve: qr}",
-        "rows: element, selection: first, solve: qr}",
-    )
-    planned = finished.planned(*MICRO_ARGUMENTS)
+    old = "rows: element, selection: greedy, solve: qr}"
+    planned = replanned(finished, "config/methods.yaml", old, old.replace("greedy", "first"))
     assert {p for p in planned if _stage(p) == "reruns"}
     assert {Path(p).stem for p in planned if _stage(p) == "sampling"} == {"block-deim"}
     assert not {p for p in planned if _stage(p) in ("fom", "pod", "sensitivity")}
 
 
-def test_a_selection_reruns_the_methods_that_use_it(finished: Checkout) -> None:
+@pytest.mark.parametrize(
+    ("name", "methods"), [("qdeim", set()), ("greedy", {"deim", "block-deim"})]
+)
+def test_a_selection_reruns_the_methods_that_use_it(finished, name, methods):
     """The full order and other methods do not depend on it."""
-    greedy = "src/pdrom/reduction/sampling/qdeim.py"
-    finished.edit(greedy, "for r in ranks}", "for r in sorted(ranks)}")
-    planned = finished.planned(*MICRO_ARGUMENTS)
-    assert not {p for p in planned if _stage(p) in ("sampling", "reruns", "fom", "pod")}
-    greedy = "src/pdrom/reduction/sampling/greedy.py"
-    finished.edit(greedy, "for r in ranks}", "for r in sorted(ranks)}")
-    planned = finished.planned(*MICRO_ARGUMENTS)
-    methods = {Path(p).stem for p in planned if _stage(p) == "sampling"}
-    assert methods == {"deim", "block-deim"}
+    module = f"src/pdrom/reduction/sampling/{name}.py"
+    planned = replanned(finished, module, "for r in ranks}", "for r in sorted(ranks)}")
+    assert {Path(p).stem for p in planned if _stage(p) == "sampling"} == methods
+    assert bool({p for p in planned if _stage(p) == "reruns"}) == bool(methods)
     assert not {p for p in planned if _stage(p) in ("fom", "pod")}
 
 

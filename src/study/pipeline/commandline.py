@@ -10,7 +10,6 @@ import shlex
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -31,10 +30,11 @@ TEMPLATE_KEY = "__use_yte__"
 RECORD = Path(".snakemake/last_run.json")
 
 
-@dataclass(frozen=True)
 class CommandLine:
     """Options of Snakemake's command line that this project evaluates.
 
+    arguments : the whole command line, which is parsed by Snakemake's parser; that ends the process
+        for an unknown option
     configfiles : files of ``--configfile``, in order
     settings : ``key=value`` pairs of ``--config``
     targets : names of files and rules
@@ -43,50 +43,35 @@ class CommandLine:
     plans : True for a dry run (``-n``) without any other option of `LOOKS_ONLY`
     own_output, cores : whether an option of `OWN_OUTPUT`, or a number of cores or jobs, is given
     executor : Snakemake's executor, from command line or profile; None runs jobs on this machine
+
+    Raises
+    ------
+    ConfigurationError
+        A target stands where it is read as a value of ``--config`` or ``--configfile``.
     """
 
-    arguments: tuple[str, ...]
-    configfiles: tuple[str, ...]
-    settings: tuple[str, ...]
-    targets: tuple[str, ...]
-    report: str | None
-    looks_only: bool
-    plans: bool
-    own_output: bool
-    cores: bool
-    executor: str | None = None
-
-    @classmethod
-    def parse(cls, arguments: Sequence[str]) -> "CommandLine":
-        """Parse ``arguments`` by Snakemake's parser, which ends the process for an unknown option.
-
-        Raises
-        ------
-        ConfigurationError
-            A target stands where it is read as a value of ``--config`` or ``--configfile``.
-        """
+    def __init__(self, arguments: Sequence[str]) -> None:
         # imported late: Snakemake's jobs import this module too and need no parser
         from snakemake.cli import get_argument_parser
 
         found = vars(get_argument_parser().parse_args(list(arguments)))
-        if found["profile"]:
-            found |= _of_profile(arguments, found["profile"])
+        if profiles := found["profile"]:
+            # cores, jobs and executor as set by the command line or by a profile
+            whole = get_argument_parser(profiles).parse_args(_before_targets(arguments))
+            found |= {name: getattr(whole, name) for name in ("cores", "jobs", "executor")}
         looks = [name for name in LOOKS_ONLY if found[name]]
         reports = bool(found["report"] or found["reporter"]) and not found["report_after_run"]
-        command = cls(
-            arguments=tuple(arguments),
-            configfiles=_texts(found["configfile"]),
-            settings=_texts(found["config"]),
-            targets=_texts(found["targets"]),
-            report=str(found["report"]) if found["report"] and reports else None,
-            looks_only=bool(looks) or reports,
-            plans=looks == ["dryrun"],
-            own_output=any(found[name] is not None and found[name] for name in OWN_OUTPUT),
-            cores=found["cores"] is not None or found["jobs"] is not None,
-            executor=found["executor"],
+        self.arguments = tuple(arguments)
+        self.configfiles, self.settings, self.targets = (
+            tuple(map(str, found[name] or ())) for name in ("configfile", "config", "targets")
         )
-        command._check_values()
-        return command
+        self.report = str(found["report"]) if found["report"] and reports else None
+        self.looks_only = bool(looks) or reports
+        self.plans = looks == ["dryrun"]
+        self.own_output = any(found[name] is not None and found[name] for name in OWN_OUTPUT)
+        self.cores = found["cores"] is not None or found["jobs"] is not None
+        self.executor: str | None = found["executor"]
+        self._check_values()
 
     @property
     def configuration(self) -> list[str]:
@@ -118,21 +103,9 @@ class CommandLine:
         return [*options, *more, *(["--", *targets] if targets else [])]
 
 
-def _of_profile(arguments: Sequence[str], profiles: Sequence[str]) -> dict[str, Any]:
-    """Return cores, jobs and executor as set by the command line or by a profile."""
-    from snakemake.cli import get_argument_parser
-
-    found = vars(get_argument_parser(profiles).parse_args(_before_targets(arguments)))
-    return {name: found[name] for name in ("cores", "jobs", "executor")}
-
-
 def _before_targets(arguments: Sequence[str]) -> list[str]:
     """Return the arguments before the separator ``--``, or all of them without one."""
     return list(arguments)[: [*arguments, "--"].index("--")]
-
-
-def _texts(values: Any) -> tuple[str, ...]:
-    return tuple(str(value) for value in values or ())
 
 
 def check_files(paths: Iterable[str | Path]) -> None:

@@ -104,13 +104,6 @@ def crash(written: str, log: str) -> str:
     return f" at {frame['file']}:{frame['line']} in {frame['function']} (log: {log})"
 
 
-def batch(name: str, log: str) -> str:
-    """Error line for a batch of jobs that a cluster ran as one job, with the cause from its log."""
-    found = _BY_SLURM.search(_content(log))
-    how = (found["why"] or found["status"]).lower() if found else "a job of it failed"
-    return f"pdrom: batch {name} failed: {how} (log: {log})"
-
-
 class Failures(logging.Handler):
     """Log handler that collects failures of jobs and batches, and interruptions, of a run."""
 
@@ -156,7 +149,11 @@ class Failures(logging.Handler):
         Snakemake prints further messages after the message about a job, so every failed job is
         listed again here with the error from its log.
         """
-        lines = [batch(name, log) for name, log in self.batches]
+        lines = []
+        for name, log in self.batches:  # jobs that a cluster ran as one, with the cause in its log
+            found = _BY_SLURM.search(_content(log))
+            how = (found["why"] or found["status"]).lower() if found else "a job of it failed"
+            lines.append(f"pdrom: batch {name} failed: {how} (log: {log})")
         lines += [job.line(self._begun) for job in self.jobs]
         if self.stopped:
             # jobs that were ended together with the run are no failures of their own

@@ -7,13 +7,10 @@ newer, so that the code of a script is a parameter of its rule as well.
 """
 
 import ast
-import dis
 import hashlib
-import re
 from functools import cache
-from opcode import opmap
+from itertools import compress
 from pathlib import Path
-from types import CodeType
 from typing import Any
 
 import pdrom
@@ -28,13 +25,6 @@ PACKAGES = {
 # Snakemake compares the paths of a job's files itself. A new kind of file causes no rerun of jobs.
 LAYOUT = {"study.artifact.paths", "study.artifact.reads"}
 SCRIPTS = Path("workflow/scripts")
-_LINE = "__firstlineno__"
-_MODULE = rf"(?:{'|'.join(PACKAGES)})\b[\w.]*"
-# ``from NAME import (NAMES)``, ``from NAME import NAMES`` or ``import NAME``, inside functions too;
-# an import in a docstring's example matches as well and only adds an unneeded dependency
-_IMPORT = re.compile(
-    rf"^[ ]*(?:from ({_MODULE}) import (?:\(([^)]*)\)|(.*))|import ({_MODULE}))", re.M
-)
 
 
 @cache
@@ -80,107 +70,63 @@ def _locate(module: str) -> Path | None:
     if package not in PACKAGES:
         return None
     base = PACKAGES[package].joinpath(*parts)
-    for candidate in (base / "__init__.py", base.with_suffix(".py")):
-        if candidate.is_file():
-            return candidate
-    return None
+    candidates = (base / "__init__.py", base.with_suffix(".py"))
+    return next((path for path in candidates if path.is_file()), None)
 
 
 @cache
-def _read(module: str) -> tuple[tuple[str, ...], str]:
-    """Names of the project's modules that ``module`` imports, and the hash of its code."""
+def _read(module: str) -> tuple[list[str], str]:
+    """Names of the project's modules that ``module`` imports, and the hash of its code.
+
+    Parent packages of the modules are included; imports inside functions are found, too.
+    """
     path = _locate(module)
     if path is None:
         raise ConfigurationError(f"fingerprint: no module '{module}' in the packages")
-    source = path.read_text(encoding="utf-8")
-    return _imports(source, module), digest_of_source(source, module)
-
-
-def _imports(source: str, module: str) -> tuple[str, ...]:
-    """Modules of these packages that a source text imports, together with their parent packages."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
     found: set[str] = set()
-    for name, enclosed, names, plain in _IMPORT.findall(source):
-        if plain:
-            found.add(plain)
-        else:
-            listed = re.sub("#.*", "", enclosed or names).split(",")
-            found |= {name, *(f"{name}.{entry.split()[0]}" for entry in listed if entry.strip())}
+    for node in _statements(tree):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            found |= {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)}
     for parts in [name.split(".") for name in found]:
         found |= {".".join(parts[:i]) for i in range(1, len(parts))}
     known = {name for name in found if _locate(name) is not None}
     # the __init__ files of the top-level packages contain the version only
-    return tuple(sorted(known - {*PACKAGES, module} - LAYOUT))
+    return sorted(known - {*PACKAGES, module} - LAYOUT), digest_of_code(tree, module)
 
 
-def digest_of_source(source: str, module: str = "") -> str:
-    """Hash of source text without comments, layout, docstrings and names of other modules' code.
+def _statements(tree: ast.AST) -> list[ast.AST]:
+    """Return ``tree`` and all statements in it; to visit expressions too would take far longer."""
+    found = [tree]
+    for node in found:  # the list grows
+        for field in ("body", "handlers", "orelse", "finalbody", "cases"):
+            found += getattr(node, field, ())
+    return found
 
-    These names are registry entries that refer to modules other than ``module``. Compilation drops
-    comments, docstrings and assertions, far faster than a walk over the syntax tree.
+
+def digest_of_code(tree: ast.Module, module: str = "") -> str:
+    """Hash of parsed code without comments, layout, docstrings and names of other modules' code.
+
+    These names are registry entries that refer to modules other than ``module``.
     """
-    program = _without_others(ast.parse(source), module) if Registry.__name__ in source else source
-    code = compile(program, "", "exec", dont_inherit=True, optimize=2)
-    return hashlib.sha256(_text(code).encode()).hexdigest()
+    for node in _statements(tree):
+        if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef)):
+            node.body = [s for s in node.body if not _is_text(s)] or [ast.Pass()]
+        elif isinstance(node, ast.Assign):
+            match node.value:
+                case ast.Call(ast.Name(Registry.__name__), [_, ast.Dict(keys, values) as entries]):
+                    names = [getattr(value, "value", None) for value in values]
+                    own = [not isinstance(n, str) or n.split(":")[0] == module for n in names]
+                    entries.keys = [*compress(keys, own)]
+                    entries.values = [*compress(values, own)]
+    return hashlib.sha256(ast.dump(tree).encode()).hexdigest()
 
 
-def _text(code: CodeType) -> str:
-    """Return the content of compiled code as text, without its line numbers."""
-    if _LINE in code.co_names:
-        return repr((code.co_name, _of_class(code), code.co_exceptiontable))
-    return repr(
-        (
-            code.co_name,
-            code.co_flags,
-            (code.co_argcount, code.co_posonlyargcount, code.co_kwonlyargcount),
-            _instructions(code.co_code),
-            code.co_exceptiontable,
-            (code.co_names, code.co_varnames, code.co_freevars, code.co_cellvars),
-            [_constant(value) for value in code.co_consts],
-        )
-    )
-
-
-def _of_class(code: CodeType) -> list[tuple[str, object]]:
-    """Instructions of a class body, without the two constants that Python 3.13 adds to it.
-
-    These constants are the line number of the class and the attributes that its methods set.
-    """
-    steps = [(step.opname, _constant(step.argval)) for step in dis.get_instructions(code)]
-    stores = [("STORE_NAME", name) for name in (_LINE, "__static_attributes__")]
-    added = {place for i, step in enumerate(steps) if step in stores for place in (i - 1, i)}
-    return [step for i, step in enumerate(steps) if i not in added and step[0] != "NOP"]
-
-
-def _instructions(code: bytes) -> bytes:
-    """Return two-byte instructions without NOP, the instruction that replaces a docstring."""
-    operations, parts, start = code[::2], [], 0
-    while (place := operations.find(opmap["NOP"], start)) >= 0:
-        parts.append(code[2 * start : 2 * place])
-        start = place + 1
-    return b"".join([*parts, code[2 * start :]])
-
-
-def _constant(value: object) -> object:
-    if isinstance(value, CodeType):
-        return _text(value)
-    # the order of a set differs between processes, so that its elements are sorted
-    return sorted(map(repr, value)) if isinstance(value, frozenset) else value
-
-
-def _without_others(tree: ast.Module, module: str) -> ast.Module:
-    """Return the syntax tree without registry entries that refer to other modules."""
-    for node in ast.walk(tree):
-        match node:
-            case ast.Call(ast.Name(Registry.__name__), [_, ast.Dict(keys, values) as entries]):
-                kept = [
-                    (key, value)
-                    for key, value in zip(keys, values, strict=True)
-                    if not (isinstance(value, ast.Constant) and isinstance(value.value, str))
-                    or value.value.partition(":")[0] == module
-                ]
-                entries.keys = [key for key, _ in kept]
-                entries.values = [value for _, value in kept]
-    return tree
+def _is_text(node: ast.stmt) -> bool:
+    """Return whether a statement is a constant, such as a docstring, and so has no effect."""
+    return isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
 
 
 def digest(root: Path, *names: str) -> str:
@@ -196,16 +142,14 @@ def digest(root: Path, *names: str) -> str:
 
 def track_scripts(workflow: Any) -> None:
     """Make a hash of each rule's script a parameter of the rule, in place of the script's date."""
-    for rule in workflow.rules:
-        if rule.script:
-            text = (SCRIPTS / Path(rule.script).name).read_text(encoding="utf-8")
-            rule.set_params(script=digest_of_source(text)[:16])
-    # Snakemake sets the rerun triggers after it has read the rules, so that a property changes them
-    type(workflow).rerun_triggers = property(_triggers)
-
-
-def _triggers(workflow: Any) -> frozenset[Any]:
     # imported late: a plan can be made without Snakemake
     from snakemake.settings.types import RerunTrigger
 
-    return frozenset(workflow.dag_settings.rerun_triggers) - {RerunTrigger.CODE}
+    for rule in workflow.rules:
+        if rule.script:
+            text = (SCRIPTS / Path(rule.script).name).read_text(encoding="utf-8")
+            rule.set_params(script=digest_of_code(ast.parse(text))[:16])
+    # Snakemake sets the rerun triggers after it has read the rules, so that a property changes them
+    type(workflow).rerun_triggers = property(
+        lambda self: frozenset(self.dag_settings.rerun_triggers) - {RerunTrigger.CODE}
+    )

@@ -52,7 +52,10 @@ def folders(configfiles: Iterable[str | Path], settings: Iterable[str]) -> Folde
     files = [str(file) for file in configfiles if Path(file).resolve() != default]
     if not files and not pairs:
         return Folders()
-    name = _name(files, pairs)
+    contents = [read_yaml(Path(file)) for file in reversed(files)]
+    named = [pair.removeprefix(f"{KEY}=") for pair in reversed(pairs) if pair.startswith(f"{KEY}=")]
+    named += [str(c[KEY]) for c in contents if isinstance(c, dict) and c.get(KEY) is not None]
+    name = [*named, Path(files[-1]).stem if files else OWN][0]
     if not _NAME.fullmatch(name):
         raise ConfigurationError(
             f"{KEY} = '{name}': no name of a folder; letters, digits, _ and - are allowed, "
@@ -66,15 +69,3 @@ def folders_of(workflow: Any) -> Folders:
     """Return the `folders` of the configuration of Snakemake's ``workflow``."""
     settings = [f"{key}={value}" for key, value in workflow.config_settings.config.items()]
     return folders(workflow.overwrite_configfiles, settings)
-
-
-def _name(files: list[str], settings: list[str]) -> str:
-    for pair in reversed(settings):
-        key, _, value = pair.partition("=")
-        if key == KEY:
-            return value
-    for file in reversed(files):
-        content = read_yaml(Path(file))
-        if isinstance(content, dict) and content.get(KEY) is not None:
-            return str(content[KEY])
-    return Path(files[-1]).stem if files else OWN

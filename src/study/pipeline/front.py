@@ -45,10 +45,10 @@ def completed(arguments: Sequence[str]) -> list[str]:
         from study.pipeline.targets import figure_arguments  # late: it imports the whole package
 
         arguments = figure_arguments(arguments[1:])
-    command = CommandLine.parse(arguments)
+    command = CommandLine(arguments)
     if command.report and not command.configfiles and not command.settings and recall():
-        _say(f"a report of the last run, {' '.join(recall())}")
-        command = CommandLine.parse(command.rewritten(recall(), {t: [t] for t in command.targets}))
+        sys.stderr.write(f"reproduce: a report of the last run, {' '.join(recall())}\n")
+        command = CommandLine(command.rewritten(recall(), {t: [t] for t in command.targets}))
     check_files(command.configfiles)
     cores = () if command.cores else ("--cores", "all")
     replaced = command.plans or not command.looks_only
@@ -66,12 +66,8 @@ def _made(command: CommandLine) -> dict[str, list[str]]:
     made = {target: files(target, own) for target in command.targets}
     for target, found in made.items():
         if found != [target]:
-            _say(f"{described(target)}: {', '.join(found)}")
+            sys.stderr.write(f"reproduce: {described(target)}: {', '.join(found)}\n")
     return made
-
-
-def _say(line: str) -> None:
-    sys.stderr.write(f"reproduce: {line}\n")
 
 
 def _start(command: Sequence[str]) -> NoReturn:

@@ -12,13 +12,12 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import ValidationError
 
 from pdrom.core.errors import StorageError
 from pdrom.core.store import Checksum, Condition, check_file, read_checksum, write_text
-from pdrom.core.yamlfile import describe
+from pdrom.core.yamlfile import ConfigModel, describe
 from study.artifact import paths
-from study.pipeline.folders import Folders
 from study.pipeline.plan import Plan
 from study.pipeline.scenes import scene_names
 
@@ -26,11 +25,7 @@ LARGE = ".h5"
 _ENVIRONMENT = ("pdrom_version", "python_version", "library_versions")
 
 
-class _Record(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class Entry(_Record):
+class Entry(ConfigModel):
     """Result file: size, digests, and what made it; ``environment``: key in `environments`.
 
     sha256 : None for an HDF5 file, or a file that was damaged before the manifest was written
@@ -54,7 +49,7 @@ class Entry(_Record):
         return reported and check_file(path) is Condition.INTACT
 
 
-class Manifest(_Record):
+class Manifest(ConfigModel):
     """Entries of result files by path, relative to the folder of the manifest.
 
     options : command-line options that name the configuration
@@ -67,18 +62,18 @@ class Manifest(_Record):
     files: dict[str, Entry]
 
 
-def write_manifest(plan: Plan, folders: Folders, options: Iterable[str]) -> None:
+def write_manifest(plan: Plan, options: Iterable[str]) -> None:
     """Write the manifest of a study after a successful run."""
     environments: dict[str, dict[str, str]] = {}
     files = {}
-    for path in sorted(study_files(plan, folders)):
+    for path in sorted(study_files(plan)):
         checksum = read_checksum(path)
         if checksum is not None:
-            inside = os.path.relpath(path, folders.results)
+            inside = os.path.relpath(path, plan.results)
             files[inside] = _entry(Path(path), checksum, environments)
     made = Manifest(options=tuple(options), environments=environments, files=files)
     text = f"{made.model_dump_json(indent=1, exclude_none=True)}\n"
-    write_text(text, paths.MANIFEST.at(folders.results))
+    write_text(text, paths.MANIFEST.at(plan.results))
 
 
 def read_manifest(results: str) -> Manifest:
@@ -93,38 +88,31 @@ def read_manifest(results: str) -> Manifest:
         raise StorageError(f"{path}: {fault}") from error
 
 
-def own_files(plan: Plan) -> set[str]:
-    """Paths of all files that a complete run of the study makes according to ``plan``."""
-    return {*plan.made, *plan.measured}
+def study_files(plan: Plan) -> Iterator[str]:
+    """Existing files of a study: files of its plan, and files requested by command-line targets.
+
+    Logs, hidden files and other studies in the results folder are left out.
+    """
+    yield from (path for path in plan.own_files if Path(path).is_file())
+    for folder, below, names in os.walk(plan.results):
+        if folder == plan.results:
+            below[:] = [name for name in below if name not in ("logs", "studies")]
+        visible = [f"{folder}/{name}" for name in names if not name.startswith(".")]
+        yield from asked_for(visible, plan)
 
 
-def study_files(plan: Plan, folders: Folders) -> Iterator[str]:
-    """Existing files of a study: files of its plan, and files requested by command-line targets."""
-    yield from (path for path in own_files(plan) if Path(path).is_file())
-    yield from asked_for(_visible(folders.results), plan, folders)
-
-
-def asked_for(found: Iterable[str], plan: Plan, folders: Folders) -> Iterator[str]:
+def asked_for(found: Iterable[str], plan: Plan) -> Iterator[str]:
     """Yield the paths of ``found`` outside the plan that a command-line target may have requested.
 
     The scene and the method in such a path exist.
     """
-    own = own_files(plan)
-    scenes, methods = set(scene_names(plan.root)), {*plan.study.methods, ""}
+    scenes, methods = set(scene_names(plan.study.root)), {*plan.study.methods, ""}
     for path in found:
-        if path not in own and any(
+        if path not in plan.own_files and any(
             labels.get("scene") in scenes and labels.get("method", "") in methods
-            for labels in paths.labels_in(path, folders.results)
+            for labels in paths.labels_in(path, plan.results)
         ):
             yield path
-
-
-def _visible(results: str) -> Iterator[str]:
-    """Yield the files below a results folder, except logs, hidden files and other studies."""
-    for folder, below, names in os.walk(results):
-        if folder == results:
-            below[:] = [name for name in below if name not in ("logs", "studies")]
-        yield from (f"{folder}/{name}" for name in names if not name.startswith("."))
 
 
 def _entry(path: Path, checksum: Checksum, environments: dict[str, dict[str, str]]) -> Entry:

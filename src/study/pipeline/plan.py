@@ -1,30 +1,35 @@
-"""Plan of a study for the workflow rules: file names, parameters and code fingerprints."""
+"""Plan of a study for the workflow rules: jobs of artifacts, from the declarations and the study.
+
+The jobs have file names, parameters and code fingerprints.
+"""
 
 import logging
 import os
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
-from pdrom.core.errors import ConfigurationError, SceneError
+from pdrom.core.errors import ConfigurationError, SceneError, choices
 from pdrom.reduction.subspace.exported import DOUBLES, require_known
+from pdrom.view.text import require_typeset
 from study.article.build import article
+from study.artifact.artifact import Artifact, make, modules_in
 from study.artifact.logs import planning_log
-from study.artifact.paths import LIVE_MODEL
+from study.artifact.paths import LIVE_MODEL, TABLE, Place
+from study.artifact.reads import EditedFiles, Labels, Paths
 from study.experiments.kit.declaration import experiments
 from study.experiments.live import LARGEST
 from study.figures.kit.declaration import declarations
 from study.live.page import live_page
 from study.paper.build import paper, paper_inputs
-from study.pipeline.contents import labels_of
+from study.pipeline.fingerprint import digest, fingerprint
 from study.pipeline.folders import DEFAULT, Folders
-from study.pipeline.paper import check_texts
-from study.pipeline.resolve import Job, Resolver
 from study.pipeline.scenes import not_taken, require_scenes
-from study.pipeline.study import Study
-from study.pipeline.values import scaled_methods
+from study.pipeline.study import Study, labels_of, part_of
+from study.pipeline.values import DERIVED, scaled_methods
 from study.tables import declared
 from study.tables.claims.rules import load_claims
 
@@ -38,26 +43,16 @@ def check_subspaces(study: Study) -> None:
         for name, config in {**study.scenes, **study.online}.items()
         if (effects := not_taken(config))
     }
-    settings = study.settings
-    asking = {
-        "subspace.scenes": settings.subspace.scenes,
-        "scaling.scenes": settings.scaling.scenes,
-        "online.scenes": settings.online.scenes,
-        "alternatives.scenes": settings.alternatives.scenes,
-    }
-    for key, scenes in asking.items():
-        for name in scenes:
+    for key in ("subspace", "scaling", "online", "alternatives"):
+        for name in getattr(study.settings, key).scenes:
             if name in outside:
                 raise ConfigurationError(
-                    f"{key}: scene '{name}' has the effect '{outside[name][0]}', which no position "
-                    "subspace takes"
+                    f"{key}.scenes: scene '{name}' has the effect '{outside[name][0]}', which no "
+                    "position subspace takes"
                 )
     for name, effects in outside.items():
-        log.warning(
-            "%s: no position subspaces, since none takes the effect '%s'",
-            name,
-            "', '".join(effects),
-        )
+        words = "', '".join(effects)
+        log.warning("%s: no position subspaces, since none takes the effect '%s'", name, words)
 
 
 def check_live(study: Study) -> None:
@@ -86,12 +81,66 @@ def _live_bytes(study: Study, name: str) -> float:
     return (vertices * 32 + bases) * 4 / 3  # written in base 64
 
 
+def check_texts(study: Study) -> None:
+    """Raise ConfigurationError for a text of ``study`` that figures or TeX cannot typeset."""
+    folder, ladder = study.root / "config", study.settings.ladder
+    for name, method in study.methods.items():
+        require_typeset(method.title, f"{folder / 'methods.yaml'}: {name}.title")
+    for key, rungs in {"up": ladder.up, "down": ladder.down}.items():
+        for i, rung in enumerate(rungs):
+            require_typeset(rung.title, f"ladder.{key}.{i}.title")
+    for name, claim in load_claims(folder / "claims.yaml").items():
+        words = ("text", "source", "paper", "section", "shown", "qualifiers")
+        texts = {key: getattr(claim, key) for key in words}
+        for part in ("published", "beyond"):
+            tests = enumerate(getattr(claim, part))
+            texts |= {f"{part}.{i}.what": test.what for i, test in tests}
+        texts |= {f"changes.{i}.reason": c.reason for i, c in enumerate(claim.changes)}
+        for key, text in texts.items():
+            require_typeset(text, f"{folder / 'claims.yaml'}: {name}.{key}")
+
+
+@dataclass(frozen=True)
+class Job:
+    """A job: an artifact for one set of labels such as scene and group.
+
+    inputs, outputs : paths by name
+    settings : plain data
+    content : checksum of the hand-edited files among the inputs, whose dates may be set back
+    code : fingerprint of the code that the job runs
+    """
+
+    artifact: Artifact
+    labels: dict[str, str]
+    inputs: dict[str, Paths]
+    outputs: dict[str, str]
+    settings: dict[str, Any]
+    content: str
+    code: str
+
+    def make(self, outputs: Mapping[str, str]) -> None:
+        """Run the job in this process; ``outputs`` are the paths of the files to write, by name."""
+        make(
+            self.artifact.address,
+            self.artifact.rule,
+            settings=self.settings,
+            labels=self.labels,
+            code=self.code,
+            inputs=self.inputs,
+            outputs=outputs,
+        )
+
+    @property
+    def files(self) -> list[str]:
+        """All input paths of the job."""
+        return [path for paths in self.inputs.values() for path in listed(paths)]
+
+
 OF_STUDY = Folders()
 
 
 def load_plan(
     config: dict[str, Any],
-    root: Path,
     files: Sequence[str | Path] = (),
     folders: Folders = OF_STUDY,
     quiet: bool = False,
@@ -108,39 +157,33 @@ def load_plan(
     PdromError
         The configuration is faulty.
     """
-    names = [os.path.relpath(path, root) for path in files] or [DEFAULT]
+    names = [os.path.relpath(path) for path in files] or [DEFAULT]
     source = f"configuration ({', '.join(sorted(set(names)))})"
     others = ", ".join(sorted({*names} - {DEFAULT})) or "the command line"
     with planning_log(quiet):
-        plan = Plan(Study.load(config, root, source, others), folders)
+        plan = Plan(Study.load(config, ".", source, others), folders)
         plan.check()
     return plan
 
 
-class Plan(Resolver):
-    """Jobs, files and settings of a study that the workflow rules need."""
+class Plan:
+    """Jobs, files and settings of a study that the workflow rules need.
+
+    It answers to the reads of artifacts, as an implementation of `Sources`.
+    """
 
     def __init__(self, study: Study, folders: Folders = OF_STUDY) -> None:
-        super().__init__(study, folders.results)
-        self.root = study.root
-        self.settings = study.settings
-        self.documents = folders.documents
+        self.study, self.folders, self.results = study, folders, folders.results
+        self._jobs: dict[tuple[str, ...], Job] = {}
         self.experiments = experiments()
         self.tables = declared()
 
     def check(self) -> None:
         """Read every file that the configuration names, so that faults show before any job."""
-        settings = self.settings
-        load_claims(self.root / "config" / "claims.yaml", settings.claim_sets)
-        named = {
-            "ladder.scenes": settings.ladder.scenes,
-            "live.scenes": settings.live.scenes,
-            "subspace.scenes": settings.subspace.scenes,
-            "scaling.scenes": settings.scaling.scenes,
-            "stability.scenes": settings.stability.scenes,
-        }
-        for place, scenes in named.items():
-            require_scenes(self.root, scenes, place)
+        settings = self.study.settings
+        load_claims(self.study.root / "config" / "claims.yaml", settings.claim_sets)
+        for key in ("ladder", "live", "subspace", "scaling", "stability"):
+            require_scenes(self.study.root, getattr(settings, key).scenes, f"{key}.scenes")
         check_subspaces(self.study)
         check_live(self.study)
         check_texts(self.study)
@@ -152,16 +195,6 @@ class Plan(Resolver):
                 raise ConfigurationError(f"table {table.name} reads {error}") from error
         self.fixed  # noqa: B018 : resolving all jobs checks every figure and text
 
-    @property
-    def measured(self) -> list[str]:
-        """Paths of all files that the study's experiments write."""
-        places = [place for made in self.experiments.values() for place in made.writes.values()]
-        return [
-            place.at(self.results, **labels)
-            for place in places
-            for labels in labels_of(self.study, place)
-        ]
-
     @cached_property
     def fixed(self) -> dict[str, list[Job]]:
         """Jobs of tables, figures, pages and manuscript, by the name of their log folder."""
@@ -170,7 +203,10 @@ class Plan(Resolver):
             "figures": [self.job(figure) for figure in declarations().values()],
             "article": [self.job(live_page), self.job(article)],
             # the configuration determines where the manuscript's PDFs lie
-            "paper": [self.job(paper_inputs), replace(self.job(paper), outputs=self.documents)],
+            "paper": [
+                self.job(paper_inputs),
+                replace(self.job(paper), outputs=self.folders.documents),
+            ],
         }
 
     @property
@@ -179,12 +215,74 @@ class Plan(Resolver):
         jobs = [job for jobs in self.fixed.values() for job in jobs]
         return [path for job in jobs for path in job.outputs.values()]
 
-    @property
-    def table_paths(self) -> list[str]:
-        """Paths of the CSV files of all tables."""
-        return [job.outputs["table"] for job in self.fixed["tables"]]
+    @cached_property
+    def own_files(self) -> set[str]:
+        """Paths of all files that a complete run of the study makes."""
+        places = [place for made in self.experiments.values() for place in made.writes.values()]
+        measured = [
+            place.at(self.results, **labels)
+            for place in places
+            for labels in labels_of(self.study, place)
+        ]
+        return {*self.made, *measured}
 
-    @property
-    def figures(self) -> list[str]:
-        """Paths of the PDF files of all figures."""
-        return [job.outputs["pdf"] for job in self.fixed["figures"]]
+    def job(self, artifact: Artifact, labels: Labels = MappingProxyType({})) -> Job:
+        """Return the job with these labels; ConfigurationError if an input or a key is unknown."""
+        own = {name: labels[name] for name in artifact.labels}
+        key = (artifact.rule, *own.values())
+        if key not in self._jobs:
+            known = {**own, "figure": artifact.name}  # options of a figure are found by its name
+            settings, inputs = artifact.settings(self, known), artifact.inputs(self, known)
+            edited = [k for k, read in artifact.files.items() if isinstance(read, EditedFiles)]
+            content = [path for name in edited for path in listed(inputs[name])]
+            self._jobs[key] = Job(
+                artifact,
+                own,
+                inputs,
+                {k: place.at(self.results, **own) for k, place in artifact.writes.items()},
+                artifact.plain(settings),
+                digest(self.study.root, *content) if content else "",
+                fingerprint(artifact.module, *sorted(set(modules_in(settings)))),
+            )
+        return self._jobs[key]
+
+    # Methods of the protocol `Sources`, used by declarations -------------------------------------
+
+    def file(self, place: Place, labels: Labels) -> str:
+        """Path of the file of the kind ``place`` that belongs to a job with these ``labels``.
+
+        A missing label "mesh" follows from the scene, a missing label "basis" from the method.
+        """
+        found = dict(labels)
+        if "mesh" in place.labels and "mesh" not in found:
+            found["mesh"] = self.study.mesh_of(found["scene"])
+        if "basis" in place.labels and "basis" not in found:
+            found["basis"] = self.study.methods[found["method"]].basis_id
+        return place.at(self.results, **{name: found[name] for name in place.labels})
+
+    def files(self, place: Place, labels: Labels) -> list[str]:
+        """Paths of all files of the kind ``place`` whose labels agree with ``labels`` of a job."""
+        study = self.study.only(labels["scene"]) if "scene" in labels else self.study
+        return [
+            place.at(self.results, **held)
+            for held in labels_of(study, place)
+            if all(held[name] == labels[name] for name in held.keys() & labels.keys())
+        ]
+
+    def table(self, name: str) -> str:
+        """Path of the table ``name``; ConfigurationError if there is no such table."""
+        if name not in declared():
+            raise ConfigurationError(f"'{name}': unknown{choices(name, declared())}")
+        return TABLE.at(self.results, name=name)
+
+    def value(self, key: str, labels: Labels) -> Any:
+        """Configuration value of ``key``, or a value derived from ``labels`` (see `DERIVED`)."""
+        head, *parts = key.split(".")
+        if head not in DERIVED:
+            return self.study.value(key)
+        return part_of(DERIVED[head](self.study, labels), parts, key)
+
+
+def listed(paths: Paths) -> list[str]:
+    """Return ``paths``, one path or a list of paths, as a list."""
+    return [paths] if isinstance(paths, str) else list(paths)

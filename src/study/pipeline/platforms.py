@@ -38,13 +38,7 @@ def obstacle(system: str, processor: str, python: tuple[int, int], libc: str) ->
     return None
 
 
-def main() -> None:
-    """End the process with the reason if the packages cannot be installed on this machine."""
-    libc = platform.libc_ver()[0] if platform.system() == "Linux" else ""
-    found = obstacle(platform.system(), platform.machine(), sys.version_info[:2], libc)
-    if found:
-        sys.exit(found)
-
-
 if __name__ == "__main__":
-    main()
+    libc = platform.libc_ver()[0] if platform.system() == "Linux" else ""
+    # the reason ends the process, if there is one
+    sys.exit(obstacle(platform.system(), platform.machine(), sys.version_info[:2], libc))

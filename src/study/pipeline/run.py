@@ -5,6 +5,7 @@ import logging
 import os
 import sys
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -14,23 +15,15 @@ from pdrom.core.errors import ConfigurationError, PdromError
 from pdrom.core.machine import Machine, Units
 from pdrom.core.store import read_table, write_text
 from study.artifact.paths import MACHINE
+from study.pipeline import running
 from study.pipeline.commandline import CommandLine, one_line, recall, remember
 from study.pipeline.failures import Failures
-from study.pipeline.folders import Folders
 from study.pipeline.fork_server import hold_pipe, start_server
 from study.pipeline.manifest import write_manifest
 from study.pipeline.plan import Plan
-from study.pipeline.progress import Expected
-from study.pipeline.running import (
-    FOLDER,
-    end_at_sigterm,
-    hold,
-    remove_stale_locks,
-    settle_dates,
-    stop_at_sigterm,
-)
+from study.pipeline.progress import Expected, Preview
 from study.pipeline.scenes import Coarsen
-from study.pipeline.summary import configuration, preview, summary
+from study.pipeline.summary import CONTENTS, configuration, contents, summary
 from study.pipeline.targets import check_targets
 from study.pipeline.tracked import COLUMNS, COSTS, kind_of
 
@@ -49,15 +42,15 @@ def expected_seconds(plan: Plan) -> Callable[[str], float]:
     Kinds of jobs that were never measured get the median of all kinds. Times are scaled by the
     speed of the machine that the plan's last run has recorded.
     """
-    full = plan.settings.coarsen == Coarsen()
+    root, full = plan.study.root, plan.study.settings.coarsen == Coarsen()
     study, column = ("full", "seconds") if full else ("tiny", "coarse_seconds")
-    table = read_table(plan.root / COSTS, COLUMNS, result=False)
+    table = read_table(root / COSTS, COLUMNS, result=False)
     try:
-        record = (plan.root / MACHINE.at(plan.results)).read_bytes()
+        record = (root / MACHINE.at(plan.results)).read_bytes()
         here = Machine.model_validate_json(record).units
     except (OSError, ValidationError):
         here = None  # before the first run, or a record of an older version
-    slower = 1.0 if here is None else here.unit_s / units_of(study, plan.root).unit_s
+    slower = 1.0 if here is None else here.unit_s / units_of(study, root).unit_s
     seconds = slower * table[column]
     known = dict(zip(table.kind, seconds, strict=True))
     usual = float(seconds.median())
@@ -65,7 +58,7 @@ def expected_seconds(plan: Plan) -> Callable[[str], float]:
 
 
 def tell_expectation(workflow: Any, plan: Plan) -> None:
-    """Log the expected seconds of every job of Snakemake's ``workflow`` for `Progress`.
+    """Log the expected seconds of every job of Snakemake's ``workflow`` for the lines of a run.
 
     A job's share of the machine is 1 if it measures times, or if jobs run on a cluster.
     """
@@ -94,12 +87,12 @@ DATED = ("results", "paper", "config", "workflow")
 JOBSTEP = "slurm-jobstep"
 
 
+@dataclass(frozen=True)
 class Run:
     """The run of this process: locks its folder, starts the jobs' server, reports the outcome."""
 
-    def __init__(self, command: CommandLine, failures: Failures) -> None:
-        self.command = command
-        self.failures = failures
+    command: CommandLine
+    failures: Failures
 
     @classmethod
     def begin(cls) -> "Run":
@@ -107,23 +100,23 @@ class Run:
 
         A command that runs no job, such as a dry run, takes no lock and works during another run.
         """
-        end_at_sigterm()
+        running.end_at_sigterm()
         with one_line():
-            command = CommandLine.parse(sys.argv[1:])
+            command = CommandLine(sys.argv[1:])
             if command.looks_only:
-                remove_stale_locks()
+                running.remove_stale_locks()
             else:
-                hold()
-                settle_dates(DATED)
+                running.hold()
+                running.settle_dates(DATED)
                 remember(command)
         failures = Failures()
         logging.getLogger("snakemake.logging").addHandler(failures)
         return cls(command, failures)
 
-    def check(self, plan: Plan, folders: Folders, rules: Iterable[Any], cores: int) -> None:
-        """Check targets and report; register the preview of a dry run on ``cores``.
+    def check(self, plan: Plan, rules: Iterable[Any], cores: int) -> None:
+        """Check targets and report; print the jobs of a dry run on ``cores`` at its end.
 
-        ``plan``, ``folders`` and Snakemake's ``rules`` belong to the same workflow.
+        ``plan`` and Snakemake's ``rules`` belong to the same workflow.
 
         Raises
         ------
@@ -132,14 +125,15 @@ class Run:
         """
         check_targets(plan, self.command.targets, list(rules))
         reports = self.command.report and not self.command.targets
-        if reports and not Path(folders.manuscript).is_file():
+        manuscript = plan.folders.manuscript
+        if reports and not Path(manuscript).is_file():
             last = " ".join(recall())
             hint = f"the last run was of another one: add {last}" if last else "run it first"
-            raise ConfigurationError(
-                f"report: this configuration has no {folders.manuscript}; {hint}"
-            )
+            raise ConfigurationError(f"report: this configuration has no {manuscript}; {hint}")
         if self.command.plans:
-            preview(expected_seconds(plan), cores)
+            planned = Preview(expected_seconds(plan), cores)
+            logging.getLogger("snakemake.logging").addHandler(planned)
+            atexit.register(lambda: sys.stdout.write(planned.text()))
 
     def title(self, plan: Plan) -> str:
         """Name of this run's configuration, with a note if it is not the full study of ``plan``."""
@@ -152,34 +146,31 @@ class Run:
         # choice, which triggers another choice and another timer. At the end of a run these timers
         # take a third of a core, and the process waits for the last one.
         workflow.scheduler.job_rate_limiter = None
-        stop_at_sigterm(self.failures.note_sigterm)
+        running.stop_at_sigterm(self.failures.note_sigterm)
         say_compilation(os.environ.get("NUMBA_CACHE_DIR", ""))
         tell_expectation(workflow, plan)
         if workflow.local_exec:
             try:
-                hold_pipe(FOLDER / "run.pipe")
+                hold_pipe(running.FOLDER / "run.pipe")
             except OSError as error:
-                sys.exit(f"pdrom: {FOLDER}/run.pipe: cannot be made ({error.strerror})")
+                sys.exit(f"pdrom: {running.FOLDER}/run.pipe: cannot be made ({error.strerror})")
             start_server()
 
-    def succeed(self, workflow: Any, plan: Plan, folders: Folders) -> None:
-        """End a successful run: write overview and manifest into ``folders``, print the summary."""
-        # imported late: planning does not need this module
-        from study.pipeline.inventory import CONTENTS, contents
-
+    def succeed(self, workflow: Any, plan: Plan) -> None:
+        """End a successful run: write overview and manifest; print the summary at the very end."""
         try:
             if not self.command.targets:
-                text = contents(self.command, workflow.dag, folders)
-                write_text(text, CONTENTS.at(folders.results))
-            write_manifest(plan, folders, self.command.configuration)
+                text = contents(self.command, workflow.dag, plan.folders)
+                write_text(text, CONTENTS.at(plan.results))
+            write_manifest(plan, self.command.configuration)
         except PdromError as error:
-            say_last(f"pdrom: {error}\n")
-        say_last(summary(self.command, folders, plan.figures, plan.table_paths, plan.study.apart))
+            atexit.register(sys.stderr.write, f"pdrom: {error}\n")
+        atexit.register(sys.stderr.write, summary(self.command, plan))
 
     def fail(self) -> None:
-        """End a failed or interrupted run: print the causes and exit."""
+        """End a failed or interrupted run: exit, and print the causes after Snakemake's lines."""
         text, status = self.failures.end()
-        say_last(text)
+        atexit.register(sys.stderr.write, text)
         sys.exit(status)
 
 
@@ -197,8 +188,3 @@ def say_compilation(cache: str) -> None:
     """Announce that kernels are compiled first, if the cache folder has no compiled time step."""
     if not any(Path(cache).glob("dynamics*/*.nbi")):
         sys.stderr.write("pdrom: the first jobs compile kernels (once, some minutes)\n")
-
-
-def say_last(text: str) -> None:
-    """Write ``text`` to standard error at the end of the process, after Snakemake's messages."""
-    atexit.register(sys.stderr.write, text)

@@ -6,7 +6,7 @@ A configuration can also derive variants of scenes: finer meshes, other weights,
 from collections.abc import Callable, Iterable, Iterator
 from itertools import product
 from pathlib import Path
-from typing import Annotated, NamedTuple, Self
+from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
@@ -21,6 +21,17 @@ from study.experiments.kit.scenes import varied
 
 Fraction = Annotated[float, Field(gt=0.0, le=1.0)]
 Positive = Annotated[float, Field(gt=0.0, le=1e12, allow_inf_nan=False)]
+
+
+class GivenOnce(ConfigModel):
+    """Base of models in whose lists no entry is given twice."""
+
+    @model_validator(mode="after")
+    def _given_once(self) -> Self:
+        for key, values in self:
+            if isinstance(values, tuple) and len(set(values)) < len(values):
+                raise ValueError(f"{key} = {list(values)}: an entry is given twice")
+        return self
 
 
 class Coarsen(ConfigModel):
@@ -59,19 +70,7 @@ class Replicate(ConfigModel):
         return scene.model_copy(update={"effects": tuple(effects), "held_out": held_out})
 
 
-class Changes(NamedTuple):
-    """Changes that a study makes to every scene of config/scenes: coarsening and replication."""
-
-    coarsen: Coarsen = Coarsen()
-    replicate: Replicate = Replicate()
-
-    def of(self, scene: SceneConfig) -> SceneConfig:
-        """Return ``scene`` with both changes applied."""
-        return self.coarsen.of(self.replicate.of(scene))
-
-
-Change = Coarsen | Replicate | Changes
-UNCHANGED = Changes()
+Change = Coarsen | Replicate
 
 
 def scene_names(root: Path) -> list[str]:
@@ -87,7 +86,7 @@ def require_scenes(root: Path, names: Iterable[str], key: str) -> None:
             raise ConfigurationError(f"{key}: unknown scene '{name}'{choices(name, known)}")
 
 
-def load_bound_scene(root: Path, name: str, changes: Change = UNCHANGED) -> Scene:
+def load_bound_scene(root: Path, name: str, *changes: Change) -> Scene:
     """Return scene ``name`` of ``root`` with ``changes``, built on its mesh to detect every fault.
 
     Raises
@@ -95,7 +94,7 @@ def load_bound_scene(root: Path, name: str, changes: Change = UNCHANGED) -> Scen
     ConfigurationError
         The scene or its held-out variant is faulty; the message names file and fault.
     """
-    return bind(root, read_scene(root, name, changes), str(scene_file(root, name)))
+    return bind(root, read_scene(root, name, *changes), str(scene_file(root, name)))
 
 
 def bind(root: Path, scene: SceneConfig, source: str) -> Scene:
@@ -120,7 +119,7 @@ def bind(root: Path, scene: SceneConfig, source: str) -> Scene:
     return bound
 
 
-def read_scene(root: Path, name: str, changes: Change = UNCHANGED) -> SceneConfig:
+def read_scene(root: Path, name: str, *changes: Change) -> SceneConfig:
     """Return the configuration of scene ``name`` below ``root``, with ``changes``; builds no mesh.
 
     The path of a mesh file becomes relative to ``root``. Raises ConfigurationError for a fault.
@@ -133,7 +132,9 @@ def read_scene(root: Path, name: str, changes: Change = UNCHANGED) -> SceneConfi
     if isinstance(scene.mesh, MeshFile):
         folder = path.parent.relative_to(root).as_posix()
         scene = scene.model_copy(update={"mesh": scene.mesh.below(folder)})
-    return changes.of(scene)
+    for change in changes:
+        scene = change.of(scene)
+    return scene
 
 
 def scene_file(root: Path, name: str) -> Path:
@@ -146,7 +147,7 @@ def not_taken(scene: SceneConfig) -> list[str]:
     return [e.effect for e in scene.effects if not EFFECTS.load(e.effect).in_subspace]
 
 
-class Variants(ConfigModel):
+class Variants(GivenOnce):
     """Section ``variants``: every combination of the lists, of every scene.
 
     resolutions : factors of the vertices along each side of the mesh
@@ -160,37 +161,25 @@ class Variants(ConfigModel):
     seeds: Annotated[tuple[Seed, ...], Field(min_length=1)] = (1,)
     kick: Annotated[float, Field(gt=0.0, le=1e3)] = 0.5
 
-    @model_validator(mode="after")
-    def _given_once(self) -> Self:
-        for key in ("scenes", "resolutions", "stiffness_ratios", "seeds"):
-            values = getattr(self, key)
-            if len(set(values)) < len(values):
-                raise ValueError(f"{key} = {list(values)}: an entry is given twice")
-        return self
-
     def of(self, read: Callable[[str], SceneConfig]) -> Iterator[SceneConfig]:
         """Yield every variant of the scenes; ``read`` returns the configuration of a scene by name.
 
         The variant's name contains its factors: ``strain_oop_m1p5_w0p01_s3`` has 1.5 times the
         vertices along a side, 0.01 times the weight, and a random start with seed 3.
         """
-        for name in self.scenes:
-            scene = read(name)
-            for factor, ratio, seed in product(self.resolutions, self.stiffness_ratios, self.seeds):
-                yield self._variant(scene, factor, ratio, seed)
-
-    def _variant(self, scene: SceneConfig, factor: float, ratio: float, seed: int) -> SceneConfig:
-        h, frames = scene.time_step, scene.frames
-        stiff = varied(scene, h, ratio, h * frames, (frames, frames))
-        kick = {"effect": "kick", "speed": self.kick, "seed": seed}
-        return stiff.model_copy(
-            update={
-                "name": f"{scene.name}_m{_word(factor)}_w{_word(ratio)}_s{seed}",
-                "title": f"{scene.title}; mesh x {factor:g}, weight x {ratio:g}, start {seed}",
-                "mesh": scene.mesh.coarsened(factor),
-                "effects": (*stiff.effects, effect_config(kick, len(stiff.effects))),
-            }
-        )
+        lists = (self.resolutions, self.stiffness_ratios, self.seeds)
+        for scene, factor, ratio, seed in product(map(read, self.scenes), *lists):
+            h, frames = scene.time_step, scene.frames
+            stiff = varied(scene, h, ratio, h * frames, (frames, frames))
+            kick = {"effect": "kick", "speed": self.kick, "seed": seed}
+            yield stiff.model_copy(
+                update={
+                    "name": f"{scene.name}_m{_word(factor)}_w{_word(ratio)}_s{seed}",
+                    "title": f"{scene.title}; mesh x {factor:g}, weight x {ratio:g}, start {seed}",
+                    "mesh": scene.mesh.coarsened(factor),
+                    "effects": (*stiff.effects, effect_config(kick, len(stiff.effects))),
+                }
+            )
 
 
 def _word(number: float) -> str:

@@ -1,19 +1,25 @@
-"""The study: the scenes, methods and settings that one configuration covers."""
+"""The study: the scenes, methods and settings that one configuration covers, and its files.
 
-from collections.abc import Iterable
+The possible labels of a kind of file follow from the scenes, their constraint groups and the
+methods of the study. Kinds that exist only for some of these are listed at the end.
+"""
+
+from collections.abc import Callable, Iterable, Mapping
 from copy import copy
-from functools import cached_property, partial
+from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Any
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from pdrom.core.errors import ConfigurationError, choices
-from pdrom.core.yamlfile import ConfigModel, SceneName, read_yaml, validate
+from pdrom.core.yamlfile import SceneName, read_yaml, validate
 from pdrom.model.dynamics.system import DEFAULT_SOLVER
+from pdrom.model.held_out import MOTIONS
 from pdrom.model.mesh.config import MeshConfig
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.method import BasisSpec, MethodSpec, load_methods
+from study.artifact import paths
 from study.experiments.alternatives.settings import Alternatives
 from study.experiments.frame_times import FrameTimes
 from study.experiments.hard_cases.outcomes import HardCases
@@ -27,22 +33,26 @@ from study.experiments.sensitivity import Sensitivity
 from study.experiments.stability import Stability
 from study.experiments.subspaces import Online, Subspace
 from study.experiments.timing import Scaling, Timing
-from study.figures.kit.declaration import load_choices
+from study.figures.kit.declaration import declarations, load_choices
 from study.figures.kit.options import Options
+from study.paper.build import FILES
 from study.pipeline.folders import DEFAULT
 from study.pipeline.scenes import (
-    Changes,
+    Change,
     Coarsen,
+    GivenOnce,
     Replicate,
     Variants,
     bind,
     load_bound_scene,
+    not_taken,
     read_scene,
     scene_names,
 )
+from study.tables import declared
 
 
-class StudySettings(ConfigModel):
+class StudySettings(GivenOnce):
     """Content of config/default.yaml, possibly overridden by --configfile.
 
     A section is declared by the experiment whose settings it holds; a default stands there, or here
@@ -78,17 +88,9 @@ class StudySettings(ConfigModel):
     study: str | None = None
 
     @property
-    def changes(self) -> Changes:
-        """Changes that the study makes to every scene of config/scenes."""
-        return Changes(self.coarsen, self.replicate)
-
-    @model_validator(mode="after")
-    def _given_once(self) -> Self:
-        for key in ("scenes", "methods", "ranks"):
-            values = getattr(self, key)
-            if len(set(values)) < len(values):
-                raise ValueError(f"{key} = {list(values)}: an entry is given twice")
-        return self
+    def changes(self) -> tuple[Change, ...]:
+        """Changes that the study makes to every scene of config/scenes, in their order."""
+        return (self.replicate, self.coarsen)
 
 
 class Study:
@@ -102,9 +104,9 @@ class Study:
         self.titles: dict[str, str] = {}  # titles of scenes, for tables and figures
         self.vertices: dict[str, int] = {}
         self.bound: dict[str, Scene] = {
-            name: load_bound_scene(root, name, settings.changes) for name in settings.scenes
+            name: load_bound_scene(root, name, *settings.changes) for name in settings.scenes
         }
-        for config in settings.variants.of(partial(read_scene, root, changes=settings.changes)):
+        for config in settings.variants.of(lambda name: read_scene(root, name, *settings.changes)):
             self.bound[config.name] = bind(root, config, "variants")
         self.scenes = {name: self._physics(s) for name, s in self.bound.items()}
         self.online = {name: self._loaded(name) for name in settings.online.scenes}
@@ -139,7 +141,7 @@ class Study:
 
     def value(self, key: str) -> Any:
         """Value of the configuration at ``key``; ConfigurationError if the key does not exist."""
-        return part_of(self.settings, key, key)
+        return part_of(self.settings, key.split("."), key)
 
     @cached_property
     def every_method(self) -> dict[str, MethodSpec]:
@@ -156,7 +158,7 @@ class Study:
 
     def _loaded(self, name: str) -> SceneConfig:
         """Checked configuration of a scene whose built form the study does not store."""
-        return self._physics(load_bound_scene(self.root, name, self.settings.changes))
+        return self._physics(load_bound_scene(self.root, name, *self.settings.changes))
 
     def _physics(self, scene: Scene) -> SceneConfig:
         """Scene configuration with its title replaced by its name: jobs do not depend on titles."""
@@ -211,11 +213,14 @@ class Study:
 
     def mesh(self, identifier: str) -> MeshConfig:
         """Configuration of the mesh ``identifier`` of any scene in config/scenes or the study."""
-        if identifier in self.meshes:
-            return self.meshes[identifier]
-        changes = self.settings.changes
-        every = (read_scene(self.root, name, changes).mesh for name in scene_names(self.root))
-        return next(mesh for mesh in every if mesh.identifier == identifier)
+        return self.meshes.get(identifier) or self.every_mesh[identifier]
+
+    @cached_property
+    def every_mesh(self) -> dict[str, MeshConfig]:
+        """Mesh configurations of all scenes in config/scenes and of the study, by identifier."""
+        changes, names = self.settings.changes, scene_names(self.root)
+        meshes = [read_scene(self.root, name, *changes).mesh for name in names]
+        return {mesh.identifier: mesh for mesh in meshes} | self.meshes
 
     def basis(self, identifier: str) -> BasisSpec:
         """Specification of the basis ``identifier``, from the first method that uses it."""
@@ -231,11 +236,98 @@ class Study:
         return {name: known[name] for name in names}
 
 
-def part_of(value: Any, parts: str, key: str) -> Any:
-    """Entry of ``value`` at the path ``parts`` (a.b); ConfigurationError if it does not exist."""
-    for part in parts.split("."):
+def part_of(value: Any, parts: Iterable[str], key: str) -> Any:
+    """Entry of ``value`` at the path ``parts`` of ``key``; ConfigurationError if there is none."""
+    for part in parts:
         if not hasattr(value, part):
             known = choices(part, getattr(type(value), "model_fields", ()))
             raise ConfigurationError(f"the key '{key}': unknown{known}")
         value = getattr(value, part)
     return value
+
+
+Labels = dict[str, str]
+
+
+def labels_of(study: Study, place: paths.Place) -> list[Labels]:
+    """Labels of every file of the kind ``place``, in the order of ``study``, without repetition."""
+    names = place.labels
+    scenes = SCENES[place](study) if place in SCENES else study.scenes
+    known: Iterable[Labels] = [{}]
+    if place in NAMES:
+        known = ({"name": name} for name in NAMES[place]())
+    elif names == ["mesh"]:
+        known = ({"mesh": mesh} for mesh in study.meshes)
+    elif "group" in names:
+        known = (
+            {"scene": scene, "group": group, "method": name, "basis": method.basis_id}
+            for scene, group in study.experiments
+            if place not in GROUPS or GROUPS[place](study, scene, group)
+            for name, method in study.methods.items()
+        )
+    elif "factor" in names and isinstance(scenes, Mapping):
+        held = [scene for scene in scenes if scene in study.scenes]
+        known = ({"scene": name, "factor": f"{x:g}"} for name in held for x in scenes[name])
+    elif "scene" in names:
+        known = ({"scene": name, "run": run} for name in scenes for run in ("train", *MOTIONS))
+    found = [{label: labels[label] for label in names} for labels in known]
+    return list({tuple(labels.items()): labels for labels in found}.values())
+
+
+def _held(study: Study, listed: Iterable[str]) -> list[str]:
+    """Scenes of the study that are in ``listed``, in the order of the study."""
+    return [scene for scene in study.scenes if scene in {*listed}]
+
+
+def _with_subspaces(study: Study) -> list[str]:
+    """Scenes with position subspaces: the configured ones, else all whose effects allow these."""
+    section = study.settings.subspace
+    if not (section.bases and section.sizes):
+        return []
+    takes = [name for name, scene in study.scenes.items() if not not_taken(scene)]
+    return _held(study, section.scenes or takes)
+
+
+# Values of the label "name" for kinds of files that every study has.
+NAMES: dict[paths.Place, Callable[[], Iterable[str]]] = {
+    paths.TABLE: declared,
+    paths.FIGURE: declarations,
+    paths.FIGURE_PICTURE: declarations,
+    paths.PAPER_INPUT: lambda: FILES,
+}
+# Files of models in position subspaces.
+MODELS = (
+    paths.SUBSPACES, paths.SUBSPACES_TRAIN, paths.SUBSPACES_HELDOUT, paths.SUBSPACES_SECONDS,
+)  # fmt: skip
+# Scenes that have files of a kind; a mapping also gives the factors of the mesh size of each scene.
+SCENES: dict[paths.Place, Callable[[Study], Iterable[str]]] = {
+    **dict.fromkeys(MODELS, _with_subspaces),
+    paths.SCALING: lambda study: study.settings.scaling.scenes,
+    paths.BREAK_EVEN_SIZED: lambda study: study.settings.scaling.scenes,
+    paths.ALTERNATIVES: lambda study: study.settings.alternatives.scenes,
+    paths.ALTERNATIVE_TIMES: lambda study: study.settings.alternatives.scenes,
+    paths.ONLINE: lambda study: study.online,
+    paths.ONLINE_MODELS: lambda study: study.online,
+    # scenes for which the study has reduced models
+    paths.LIVE_MODEL: lambda study: [
+        scene
+        for scene in study.settings.live.scenes
+        if scene in {*_with_subspaces(study), *study.online}
+    ],
+    paths.STABILITY: lambda study: _held(study, study.settings.stability.scenes),
+    # the configured scenes, else all, also large ones
+    paths.REQUESTED_TOLERANCES: lambda study: [
+        scene
+        for scene in (*study.scenes, *study.online)
+        if scene in (study.settings.requested_tolerances.scenes or (*study.scenes, *study.online))
+    ],
+}
+# Functions of study, scene and group: True if the reduced group has files of a kind.
+GROUPS: dict[paths.Place, Callable[[Study, str, str], bool]] = {
+    paths.REPETITIONS: lambda study, scene, group: any(
+        scene in cell.scenes for cell in study.settings.repetitions.cells
+    ),
+    paths.NOISE: lambda study, scene, group: study.settings.noise.cases.get(scene) == group,
+    paths.NOISE_RUNS: lambda study, scene, group: study.settings.noise.cases.get(scene) == group,
+    paths.LADDER: lambda study, scene, group: scene in study.settings.ladder.scenes,
+}

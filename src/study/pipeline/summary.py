@@ -1,43 +1,57 @@
-"""Last lines of a run: outcome and times; of a dry run, its jobs and their expected time."""
+"""Texts about a finished run: its last lines, and results/contents.md, an overview of the study.
 
-import atexit
-import logging
+The overview lists every claim, figure, table and section of the text with the command that makes it
+and its processor minutes, then the captions of the figures and the columns of the tables.
+"""
+
 import os
 import shlex
-import sys
 import time
-from collections import Counter, defaultdict
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import psutil
-from snakemake_interface_logger_plugins.common import LogEvent
 
 from pdrom.core.store import Condition, check_file, read_table
 from study.artifact import paths
+from study.artifact.reads import Every, ProjectFile, Read, Setting, TableOf
+from study.artifact.usage import usage_of
+from study.figures.kit.declaration import declarations
+from study.paper.figure_numbers import figures_page
+from study.paper.macros import keys_of
+from study.paper.source import source_files
 from study.pipeline.commandline import CommandLine
 from study.pipeline.folders import Folders
-from study.pipeline.progress import rounded
-
-# Beginnings of Snakemake's reasons for a job, with shorter texts. The last reason only follows from
-# other jobs and is left out if there is another reason.
-FOLLOWS = "Input files updated by another job"
-REASONS = {
-    "Forced execution": "forced",
-    "Missing output files": "output is missing",
-    "Incomplete output files": "output is incomplete",
-    "Updated input files": "input is newer",
-    "Set of input files has changed": "other input files",
-    "Code has changed": "script has changed",
-    "Params have changed": "settings or code have changed",
-    "Software environment definition has changed": "environment has changed",
-    FOLLOWS: "input is made again",
-}
-END = "This was a dry-run"
+from study.pipeline.plan import Plan
+from study.pipeline.targets import PREPRINT, own_file
+from study.tables import declared
+from study.tables.claims.rules import load_claims
+from study.tables.kit.declaration import Table
 
 # Load average per core, over five minutes, above which other programs must have been running.
 BUSY = 1.7
 LISTED = 8  # largest number of targets that the summary names
+TABLES_HEAD = """# Tables
+
+Tables are CSV with one row per observation, SI units unless a unit says otherwise, and an empty
+cell where there is no value.
+A column marked "timed" depends on timing or on the memory in use: only there may two runs on one
+machine differ (in `claims`, only in claims about times).
+"Compared as" is the kind for which `./reproduce verify` has a tolerance, followed by the column's
+own tolerance if it has one (docs/verification.md).
+"""
+CONTENTS = paths.Place("contents.md")
+HEAD = """\
+# Contents
+
+Written by the run of {configuration}.
+Minutes are processor time of all jobs that an entry needs, from nothing; empty where a job was not
+measured by this run.
+
+| kind | name | command | jobs | minutes | as published | beyond |
+|---|---|---|---|---|---|---|
+"""
 
 
 def processor_seconds() -> float:
@@ -54,21 +68,14 @@ def processor_seconds() -> float:
     return total
 
 
-def summary(
-    command: CommandLine,
-    folders: Folders,
-    figures: Sequence[str],
-    tables: Sequence[str],
-    apart: str = "",
-) -> str:
+def summary(command: CommandLine, plan: Plan) -> str:
     """Return the last lines of a successful run.
 
     Parameters
     ----------
-    command, folders : command line of the run, and the folders of its results
-    figures, tables : paths of all figures and tables of the complete study
-    apart : words that mark verdicts of a study other than the full one; else empty
+    command, plan : command line of the run, and its plan
     """
+    folders, apart = plan.folders, plan.study.apart
     wall = time.time() - psutil.Process().create_time()
     lines = [f"configuration: {configuration(command)}"]
     if command.targets:
@@ -82,7 +89,8 @@ def summary(
             lines.append(f"verdicts ({words}): {', '.join(said)}")
         lines.append(f"manuscript: {', '.join(folders.documents.values())}")
         lines.append(f"as pages: {paths.ARTICLE.at(folders.results, name='index.html')}")
-        for kind, files in (("figures", figures), ("tables", tables)):
+        for kind in ("figures", "tables"):
+            files = [next(iter(job.outputs.values())) for job in plan.fixed[kind]]
             found = sum(Path(file).is_file() for file in files)
             lines.append(f"{kind}: {found} in {folders.results}/{kind}")
         lines.append(f"report: {shlex.join(['./reproduce', '--report', 'report.html'])}")
@@ -117,61 +125,112 @@ def verdicts_in(results: str) -> dict[str, tuple[str, str]]:
     return {row.claim: (row.verdict, row.verdict_beyond) for row in table.itertuples()}
 
 
-class Preview(logging.Handler):
-    """Log handler that counts the jobs of a dry run, from Snakemake's log.
+def _section(table: Table) -> str:
+    """Markdown that describes a table and its columns."""
+    sources = dict.fromkeys(_source(read) for read in table.reads.values())
+    lines = [
+        f"## {table.name}",
+        "",
+        f"{table.title}.\nMade by `{table.module}` from {', '.join(sources)}.",
+        "",
+        "| column | type | unit | timed | compared as | meaning |",
+        "|---|---|---|---|---|---|",
+    ]
+    for column in table.columns:
+        timed = "timed" if column.timed else ""
+        own = "" if column.tolerance is None else f", {column.tolerance:g}"
+        kind = f"{column.quantity}{own}"
+        cells = (column.name, column.kind, column.unit, timed, kind, column.meaning)
+        lines.append(f"| {' | '.join(cells)} |")
+    return "\n".join(lines) + "\n"
+
+
+def _source(read: Read) -> str:
+    match read:
+        case Every(place):
+            return f"`{place.pattern}`"
+        case TableOf(name):
+            return f"table [{name}](#{name})"
+        case Setting(key):
+            return f"setting `{key}`"
+        case ProjectFile(path):
+            return f"`{path}`"
+    raise TypeError(f"{read} has no words")
+
+
+class Entry(NamedTuple):
+    """A line of the overview.
+
+    kind : claim, figure, table, section (source file of the text with numbers) or manuscript
+    files : paths of its files in the default configuration
+    words : arguments of ./reproduce that make these files
+    """
+
+    kind: str
+    name: str
+    files: tuple[str, ...]
+    words: tuple[str, ...]
+
+
+def entries() -> Iterator[Entry]:
+    """Yield the entries of claims, figures, tables, sections and manuscript, in this order."""
+    for name in load_claims(Path("config/claims.yaml")):
+        yield Entry("claim", name, (paths.TABLE.at(paths.RESULTS, name="claims"),), ("claims",))
+    for name, figure in declarations().items():
+        number = f"{PREPRINT}{figure.number}" if figure.number else name
+        yield Entry(
+            "figure", name, (paths.FIGURE.at(paths.RESULTS, name=name),), ("figure", number)
+        )
+    tables = {name: paths.TABLE.at(paths.RESULTS, name=name) for name in declared()}
+    # where a figure has the same name, the name stands for both, so that the table's path is used
+    words = {name: path if name in declarations() else name for name, path in tables.items()}
+    for name, path in tables.items():
+        yield Entry("table", name, (path,), (words[name],))
+    for source in source_files(Path()):
+        keys = keys_of(Path(source).read_text(encoding="utf-8"))
+        if held := sorted({key.partition("|")[0] for key in keys} & tables.keys()):
+            files, targets = (tuple(names[name] for name in held) for names in (tables, words))
+            yield Entry("section", Path(source).stem, files, targets)
+    documents = tuple(Folders().documents.values())
+    yield Entry("manuscript", documents[0], documents, ())
+
+
+def contents(command: CommandLine, dag: Any, folders: Folders) -> str:
+    """Text of the overview of a run that has made everything.
 
     Parameters
     ----------
-    seconds : function that returns the expected processor seconds of a job, given its log
-    cores : number of cores, all of which a job that measures times claims
+    command : command line that started the run
+    dag : Snakemake's graph of all jobs of the study
+    folders : folders of the study's results
     """
-
-    def __init__(self, seconds: Callable[[str], float], cores: int) -> None:
-        super().__init__(logging.INFO)
-        self._of_job, self._cores = seconds, cores
-        self._jobs: Counter[str] = Counter()
-        self._reasons: defaultdict[str, set[str]] = defaultdict(set)
-        self._processor = self._wall = 0.0
-        self._ended = False
-
-    def emit(self, record: logging.LogRecord) -> None:
-        """Add the job of a log ``record`` to the counts, reasons and times."""
-        self._ended = self._ended or END in record.getMessage()
-        if getattr(record, "event", None) != LogEvent.JOB_INFO:
-            return
-        self._jobs[record.rule_name] += 1
-        self._reasons[record.rule_name] |= shortened(record.reason)
-        if record.log:  # rules that only collect targets have no log and take no time
-            seconds = self._of_job(str(record.log[0]))
-            self._processor += seconds
-            self._wall += seconds * min(record.threads, self._cores) / self._cores
-
-    def text(self) -> str:
-        """One line per rule, then totals of jobs and time; empty if the dry run did not finish."""
-        if not self._ended:
-            return ""
-        width = max(map(len, self._jobs))
-        lines = [
-            f"{count:>5} {rule:<{width}}  {', '.join(sorted(self._reasons[rule]))}"
-            for rule, count in self._jobs.items()
-        ]
-        wall = f"{rounded(self._wall)} on {self._cores} core{'s' * (self._cores > 1)}"
-        lines.append(
-            f"pdrom: {sum(self._jobs.values())} jobs, {wall}, "
-            f"{rounded(self._processor)} of processor time"
-        )
-        return "\n".join(lines) + "\n"
+    listed, verdicts = list(entries()), verdicts_in(folders.results)
+    lines = []
+    for entry, (jobs, minutes) in zip(listed, costs(listed, dag, folders), strict=True):
+        words = shlex.join(["./reproduce", *entry.words, *command.configuration])
+        measured = "" if minutes is None else f"{minutes:.1f}"
+        judged = verdicts.get(entry.name, ("", "")) if entry.kind == "claim" else ("", "")
+        cells = (entry.kind, entry.name, f"`{words}`", f"{jobs}", measured, *judged)
+        lines.append(f"| {' | '.join(cells)} |\n")
+    head = HEAD.format(configuration=configuration(command)) + "".join(lines)
+    tables = declared().values()
+    names = "\n".join(f"- [{table.name}](#{table.name}): {table.title}" for table in tables)
+    described = [TABLES_HEAD, f"{names}\n", *map(_section, tables)]
+    return "\n".join([head, figures_page(Path()), *described])
 
 
-def shortened(reason: str) -> set[str]:
-    """Short texts of the reasons in Snakemake's message ``reason``, as a set."""
-    found = [text for text in REASONS if reason.startswith(text) or f"; {text}" in reason]
-    own = [text for text in found if text != FOLLOWS] or found
-    return {REASONS[text] for text in own}
+def costs(
+    listed: Sequence[Entry], dag: Any, folders: Folders
+) -> Iterator[tuple[int, float | None]]:
+    """Yield for each entry its number of jobs, with all prerequisites, and their processor minutes.
 
-
-def preview(seconds: Callable[[str], float], cores: int) -> None:
-    """Print the jobs of this dry run at the end of the process; arguments as in `Preview`."""
-    planned = Preview(seconds, cores)
-    logging.getLogger("snakemake.logging").addHandler(planned)
-    atexit.register(lambda: sys.stdout.write(planned.text()))
+    The minutes are None if a job was not measured. ``dag`` is Snakemake's graph of jobs.
+    """
+    makers = {str(file): job for job in dag.jobs for file in job.output}
+    used = {job: usage_of(job.log[0]) for job in makers.values()}
+    for entry in listed:
+        own = {makers[own_file(file, folders)] for file in entry.files}
+        needed = [used[job] for job in dag.bfs(dag.dependencies, *own)]
+        measured = [usage.processor for usage in needed if usage is not None]
+        whole = len(measured) == len(needed)
+        yield len(needed), sum(measured) / 60.0 if whole else None

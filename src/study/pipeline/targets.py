@@ -11,7 +11,7 @@ from study.figures.kit.declaration import declarations
 from study.paper.figure_numbers import SUPPLEMENT, figure_numbers
 from study.pipeline.folders import Folders
 from study.pipeline.plan import Plan
-from study.pipeline.scenes import read_scene, scene_names
+from study.pipeline.scenes import scene_names
 from study.pipeline.study import Study
 from study.tables import declared
 
@@ -111,21 +111,19 @@ def _allowed(study: Study, label: str, before: Mapping[str, str]) -> Collection[
         case "basis":
             return {spec.basis_id for spec in study.methods.values()}
         case "mesh":
-            changes = study.settings.changes
-            others = [read_scene(study.root, name, changes) for name in scene_names(study.root)]
-            return {*(scene.mesh.identifier for scene in others), *study.meshes}
+            return study.every_mesh
     return None
 
 
 def _unknown(plan: Plan, target: str, rules: Collection[str]) -> str:
     """Last part of the message about an unknown target; ``rules`` are names without labels."""
-    scenes = {*scene_names(plan.root), *plan.study.scenes}
+    scenes = {*scene_names(plan.study.root), *plan.study.scenes}
     if target in scenes:
         example = paths.FULL_ORDER.at(plan.results, scene=target, run="train")
         return f"a scene; name one of its files, as {example}"
     known = [*declarations(), *plan.tables, *rules, *scenes]
     if "/" in target:
-        known = [*plan.table_paths, *plan.figures, *plan.measured]
+        known = list(plan.own_files)
     return (
         f"nothing makes it{suggestion(target, known)}; "
         f"targets are names of figures and tables, and files below {plan.results}"

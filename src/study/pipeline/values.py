@@ -7,31 +7,32 @@ The label of a figure's job is the name of the figure. Its options choose what t
 """
 
 from collections.abc import Callable
+from types import SimpleNamespace
 from typing import Any
 
 from pdrom.model import constraints
+from pdrom.model.constraints.base import GroupConfig
 from pdrom.model.effects import EFFECTS
+from pdrom.model.held_out import HeldOut
 from pdrom.reduction.method import MethodSpec
 from study.artifact import paths
-from study.artifact.paths import File
+from study.artifact.markup import to_tex
 from study.artifact.reads import Labels
 from study.experiments.frame_times import NamedScene, ProjectionCase, SubspaceCase
 from study.experiments.kit.settings import Horizon
 from study.experiments.live import JOINT, JointRows, OfScene
 from study.experiments.repetitions import Repeated
 from study.experiments.stability import Stability
+from study.figures.kit.declaration import declarations
 from study.figures.kit.options import Experiment, Options, Reduction
-from study.pipeline import paper
-from study.pipeline.contents import labels_of
-from study.pipeline.study import Study
+from study.paper.build import PAGES, Facts
+from study.paper.source import source_files
+from study.pipeline.folders import DEFAULT
+from study.pipeline.study import Study, labels_of
+from study.tables.kit.results import FAR
 
 # The preferred basis in tables that show one basis of each constraint group.
 USUAL_BASIS = "none-none-vectorised"
-
-
-def _horizon(study: Study, labels: Labels) -> Horizon:
-    section = study.settings.sensitivity
-    return Horizon(perturbation=section.reference, threshold=section.threshold)
 
 
 def _stability(study: Study, labels: Labels) -> Stability:
@@ -41,14 +42,14 @@ def _stability(study: Study, labels: Labels) -> Stability:
     return section.model_copy(update={"ranks": held})
 
 
-def _usual_bases(study: Study, labels: Labels) -> list[File]:
+def _usual_bases(study: Study, labels: Labels) -> list[paths.File]:
     """Basis file of each reduced group: `USUAL_BASIS` if a method uses it, else the first."""
     chosen: dict[tuple[str, str], Labels] = {}
     for held in labels_of(study, paths.BASIS):
         group = (held["scene"], held["group"])
         if group not in chosen or held["basis"] == USUAL_BASIS:
             chosen[group] = held
-    return [File("", dict(held)) for held in chosen.values()]
+    return [paths.File("", dict(held)) for held in chosen.values()]
 
 
 def _holds(study: Study, place: paths.Place, labels: Labels) -> bool:
@@ -175,10 +176,64 @@ def _runs(study: Study, labels: Labels) -> tuple[Run, ...]:
     )
 
 
-def _drawn_subspaces(study: Study, labels: Labels) -> tuple[Experiment, ...]:
-    """Reduced groups of a figure in scenes for which the study makes position-subspace models."""
-    held = {found["scene"] for found in labels_of(study, paths.SUBSPACES)}
-    return tuple(each for each in _experiments(study, labels) if each.scene in held)
+def _facts(study: Study, labels: Labels) -> Facts:
+    """Facts that the manuscript states and that are no results: captions, settings, page limits."""
+    own = study.is_own
+    said = [(name, each.words(study.value)) for name, each in declarations().items()]
+    return Facts(
+        captions={name: f"{to_tex(title)}. {to_tex(text)}" for name, (title, text) in said},
+        part=None if study.is_full or own else study.configuration,
+        full_study=study.configuration if own else DEFAULT,
+        pages={} if own else PAGES,
+        tables={
+            "study": [_numbers(study)],
+            "methods": [
+                {"method": name, **method.model_dump(mode="json")}
+                for name, method in study.methods.items()
+            ],
+            "scenes": [_scene(study, name) for name in study.scenes],
+        },
+    )
+
+
+def _numbers(study: Study) -> dict[str, Any]:
+    settings = study.settings
+    return {
+        "scenes": len(study.scenes),
+        "experiments": len(study.experiments),
+        "threshold": settings.sensitivity.threshold,
+        "perturbation": settings.sensitivity.reference,
+        "seeds": len(settings.sensitivity.seeds),
+        "noise_repetitions": settings.noise.repetitions,
+        "repeats": settings.timing.repeats,
+        "timed_frames": settings.timing.frames,
+        "processes": settings.frame_times.processes,
+        "blowup_extent": settings.blowup_extent,
+        "ranks": ", ".join(str(r) for r in settings.ranks),
+        "wrong": settings.stability.wrong,
+        "left": settings.stability.left,
+        "tolerance": settings.iterations.tolerance,
+        "continuous_tolerance": settings.alternatives.continuous.tolerance,
+        "opponent_frames": settings.alternatives.frames,
+        "opponent_processes": settings.alternatives.processes,
+        "far": FAR,
+        "carry": HeldOut().carry,
+    }
+
+
+def _scene(study: Study, name: str) -> dict[str, Any]:
+    config, scene = study.scenes[name], study.bound[name]
+    weights = {e.effect: e.weight for e in config.effects if isinstance(e, GroupConfig)}
+    return {
+        "scene": name,
+        "groups": ", ".join(f"{group} ({weights[group]:g})" for group in config.groups),
+        "vertices": scene.mesh.vertices,
+        "elements": sum(group.elements for group in scene.groups),
+        "frames": config.frames,
+        "iterations": config.iterations,
+        "time_step": config.time_step,
+        "vertex_mass": config.vertex_mass,
+    }
 
 
 DERIVED: dict[str, Callable[[Study, Labels], Any]] = {
@@ -198,7 +253,10 @@ DERIVED: dict[str, Callable[[Study, Labels], Any]] = {
     "own_noise": lambda study, labels: (
         study.settings.noise if _holds(study, paths.NOISE, labels) else None
     ),
-    "horizon": _horizon,
+    "horizon": lambda study, _: Horizon(
+        perturbation=study.settings.sensitivity.reference,
+        threshold=study.settings.sensitivity.threshold,
+    ),
     "stability": _stability,
     "scaled_methods": scaled_methods,
     "noise_methods": lambda study, labels: study.named_methods(
@@ -220,11 +278,17 @@ DERIVED: dict[str, Callable[[Study, Labels], Any]] = {
     "reductions": _reductions,
     "runs": _runs,
     "first_run": lambda study, labels: _runs(study, labels)[:1],
-    "drawn_subspaces": _drawn_subspaces,
+    # reduced groups of a figure in scenes for which the study makes position-subspace models
+    "drawn_subspaces": lambda study, labels: tuple(
+        each
+        for each in _experiments(study, labels)
+        if _holds(study, paths.SUBSPACES, {"scene": each.scene})
+    ),
     # names of all kinds of constraint groups
     "groups": lambda study, labels: [
         name for name in EFFECTS if EFFECTS[name].startswith(constraints.__name__)
     ],
-    "manuscript": paper.manuscript,
-    "facts": paper.facts,
+    # TeX files of paper and supplement
+    "manuscript": lambda study, _: SimpleNamespace(sources=source_files(study.root, study.is_own)),
+    "facts": _facts,
 }

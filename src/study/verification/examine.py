@@ -10,7 +10,7 @@ import pandas as pd
 from pdrom.core.errors import StorageError
 from pdrom.core.store import Condition, check_file, read_table
 from study.artifact.paths import TABLE
-from study.pipeline.resolve import Job
+from study.pipeline.plan import Job
 from study.tables import declared
 from study.tables.claims.rules import load_claims
 from study.verification.compare import RUNS, Comparison, Context, kept, names_row

@@ -19,8 +19,8 @@ from pdrom.core.errors import PdromError, StorageError
 from pdrom.core.store import Condition, check_file
 from study.artifact.paths import MANIFEST
 from study.artifact.reads import Every
-from study.pipeline.manifest import Entry, asked_for, own_files, read_manifest
-from study.pipeline.resolve import Job
+from study.pipeline.manifest import Entry, asked_for, read_manifest
+from study.pipeline.plan import Job
 from study.tables import declared
 from study.verification.subject import Status, Subject, say
 
@@ -48,8 +48,8 @@ def verify_files(subject: Subject) -> Status:
         say(f"{error}; {hint}")
         return Status.DIFFERS
     entries = {os.path.normpath(Path(subject.results, name)): e for name, e in listed.items()}
-    own = own_files(subject.plan)
-    ours = own | set(asked_for(entries, subject.plan, subject.folders))
+    own = subject.plan.own_files
+    ours = own | set(asked_for(entries, subject.plan))
     paths = [*entries, *sorted(own - set(entries))]
     found = {path: _fault(path, entries.get(path), path in ours) for path in paths}
     faults = {path: fault for path, fault in found.items() if fault}

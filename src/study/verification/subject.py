@@ -38,7 +38,7 @@ class Subject:
         """
         files = ["--configfile", *configfiles] if configfiles else []
         options = [*files, *(["--config", *settings] if settings else [])] or recall()
-        command = CommandLine.parse(options)
+        command = CommandLine(options)
         check_files([DEFAULT, *command.configfiles])
         return cls(tuple(options), folders(command.configfiles, command.settings))
 
@@ -55,9 +55,9 @@ class Subject:
     @cached_property
     def plan(self) -> Plan:
         """Plan of the configuration, merged from its files and settings as by Snakemake."""
-        command = CommandLine.parse(self.options)
+        command = CommandLine(self.options)
         whole = merged(Path(DEFAULT), command.configfiles, command.settings)
-        return load_plan(whole, Path(), command.configfiles, folders=self.folders, quiet=True)
+        return load_plan(whole, command.configfiles, self.folders, quiet=True)
 
 
 class Status(IntEnum):

@@ -4,11 +4,11 @@ A job's interpreter needs about a second to load NumPy, SciPy, pandas and numba,
 hundreds of jobs. One server process loads them once; each job is a fork of it. The workflow starts
 scripts by `client.py`, which asks the server for a fork, hands over its streams, environment and
 folder, and ends as the fork ends. Where no server answers (a platform without safe forks, a server
-that was killed), the client becomes the plain interpreter itself (`alone.py`).
+that was killed), the client becomes the plain interpreter itself.
 
 No job outlives its run, whichever process is killed. The server ends the forks of a killed client
 or run, the operating system ends the forks of a killed server, the client ends the processes that
-those forks had started, and a plain interpreter ends itself when its run ends (`alone.py`).
+those forks had started, and a plain interpreter ends itself when its run ends.
 """
 
 import os
@@ -20,8 +20,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from study.pipeline.fork_server.alone import PIPE
-from study.pipeline.fork_server.client import ADDRESS, place_of
+from study.pipeline.fork_server.client import ADDRESS, PIPE, place_of
 
 # Path of the Python interpreter; the workflow uses the command of `interpreter` in its place.
 PYTHON = sys.executable
@@ -32,24 +31,11 @@ SUPPORTED = sys.platform == "linux"
 # Modules that the server loads in advance: third-party libraries of most jobs or of all figures,
 # modules that every job imports first, and the most frequent experiment.
 LIBRARIES = (
-    "h5py",
-    "matplotlib.backends.backend_agg",
-    "matplotlib.backends.backend_pdf",
-    "numba",
-    "numpy",
-    "pandas",
-    "study.artifact.logs",
-    "pdrom.core.provenance",
-    "study.experiments.kit.declaration",
-    "study.experiments.reruns",
-    "pydantic",
-    "scipy.linalg",
-    "scipy.sparse.linalg",
-    "snakemake.iocontainers",
-    "snakemake.script",
-    "threadpoolctl",
-    "yaml",
-)
+    "h5py", "matplotlib.backends.backend_agg", "matplotlib.backends.backend_pdf", "numba", "numpy",
+    "pandas", "study.artifact.logs", "pdrom.core.provenance", "study.experiments.kit.declaration",
+    "study.experiments.reruns", "pydantic", "scipy.linalg", "scipy.sparse.linalg",
+    "snakemake.iocontainers", "snakemake.script", "threadpoolctl", "yaml",
+)  # fmt: skip
 
 
 def interpreter() -> str:

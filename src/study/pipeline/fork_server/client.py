@@ -1,6 +1,8 @@
 """Run a script in a fork of the server, or in a plain interpreter where no server answers.
 
-This file is started by its path, for every job: it imports a few standard modules only.
+This file is started by its path, for every job: it imports a few standard modules only. A plain
+interpreter ends itself when the run that started it has ended: the run keeps one end of a pipe open
+(`study.pipeline.fork_server.hold_pipe`), which a killed run closes, on every platform.
 """
 
 import os
@@ -11,6 +13,8 @@ import sys
 from contextlib import suppress
 
 ADDRESS = "PDROM_JOB_SERVER"
+PIPE = "PDROM_RUN_PIPE"
+ALONE = "--alone"
 FORWARDED = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
@@ -24,7 +28,7 @@ def main() -> int:
     answer = ask(connection) if connection else b""
     if connection is None or not answer:
         signal.pthread_sigmask(signal.SIG_UNBLOCK, FORWARDED)
-        alone = [os.path.join(os.path.dirname(__file__), "alone.py")] if script else []
+        alone = [__file__, ALONE] if script else []
         os.execv(sys.executable, [sys.executable, *alone, *sys.argv[1:]])
     job = int(answer)
     for number in FORWARDED:
@@ -70,13 +74,18 @@ def of_this_user(connection: socket.socket) -> bool:
 
 
 def ask(connection: socket.socket) -> bytes:
-    """Request a fork over ``connection``; return its process number, b"" if the server is gone."""
+    """Request a fork over ``connection``; return its process number, b"" if the server is gone.
+
+    The server gets the standard streams and a pipe, from which the fork reads what it needs.
+    """
     environment = [f"{key}={value}" for key, value in os.environ.items() if key != ADDRESS]
     parts = [os.getcwd(), os.path.abspath(sys.argv[1]), *environment]
-    request = "\0".join(parts).encode("utf-8", "surrogateescape")
+    reader, writer = os.pipe()
     try:
-        socket.send_fds(connection, [b"%20d" % len(request)], [0, 1, 2])
-        connection.sendall(request)
+        socket.send_fds(connection, [b"\n"], [0, 1, 2, reader])
+        os.close(reader)
+        with open(writer, "wb") as request:
+            request.write("\0".join([*parts, "", ""]).encode("utf-8", "surrogateescape"))
     except OSError:
         return b""
     return receive(connection)
@@ -84,16 +93,9 @@ def ask(connection: socket.socket) -> bytes:
 
 def receive(connection: socket.socket) -> bytes:
     """Read a number of twenty characters from ``connection``; return b"" if the server is gone."""
-    text = b""
-    while len(text) < 20:
-        try:
-            more = connection.recv(20 - len(text))
-        except OSError:
-            more = b""
-        if not more:
-            return b""
-        text += more
-    return text
+    with suppress(OSError):
+        return connection.recv(20, socket.MSG_WAITALL)
+    return b""
 
 
 def forward(job: int, number: int) -> None:
@@ -102,5 +104,31 @@ def forward(job: int, number: int) -> None:
         os.killpg(job, number)
 
 
+def run_alone() -> None:
+    """Run the script whose path is the second argument as the main module, while the run lives."""
+    import runpy
+    import threading
+
+    if pipe := os.environ.get(PIPE):
+        threading.Thread(target=end_with, args=(pipe,), daemon=True).start()
+    del sys.argv[:2]
+    sys.path[0] = os.path.dirname(sys.argv[0])
+    runpy.run_path(sys.argv[0], run_name="__main__")
+
+
+def end_with(pipe: str) -> None:
+    """Kill this job when the run ends, which closes ``pipe``: only the run opens it to write."""
+    try:
+        # without O_NONBLOCK, open would wait for a writer if the run has already ended
+        number = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
+        os.set_blocking(number, True)
+        os.read(number, 1)
+    finally:
+        os.kill(os.getpid(), signal.SIGKILL)
+
+
 if __name__ == "__main__":
-    sys.exit(main())
+    if sys.argv[1:2] == [ALONE]:
+        run_alone()
+    else:
+        sys.exit(main())

@@ -27,7 +27,8 @@ from study.experiments.iterations import IterationSweep, iterations
 from study.experiments.kit.declaration import Experiment
 from study.experiments.repetitions import LadderSection, Options, repetitions
 from study.experiments.stability import ShortRuns, stability
-from study.pipeline.resolve import Resolver
+from study.pipeline.folders import Folders
+from study.pipeline.plan import Plan
 from study.pipeline.study import Study
 
 SCENE, GROUP, METHOD = "small", "spring", "block-deim"
@@ -89,7 +90,7 @@ def again_at(study: Study, at: PathOf, folder: Path) -> Callable[..., dict[str, 
     def made(experiment: Experiment, **changes: object) -> dict[str, pd.DataFrame]:
         labels = {"scene": SCENE, "group": GROUP}
         results = str(Path(at(paths.MACHINE)).parent)
-        job = Resolver(study, results).job(experiment, labels)
+        job = Plan(study, Folders(results)).job(experiment, labels)
         given = {name: read.content(job.inputs[name]) for name, read in experiment.files.items()}
         asked = {k: t for k, t in experiment.types.items() if k not in changes}
         given |= {k: t.validate_python(job.settings[k]) for k, t in asked.items()} | changes
@@ -340,7 +341,7 @@ def test_every_rung_of_a_ladder_is_run_and_judged(study, again, array):
     """Whole elements with shared coefficients are worse than the best by their gain at most."""
     few = {"r": 2, "signs": 2, "repetitions": 3, "sizes": (2, 50), "repeated": (SCENE,)}
     asked = LadderSection(**read_yaml(CONFIG / "default.yaml")["ladder"]).model_copy(update=few)
-    job = Resolver(study, "results").job(repetitions, {"scene": SCENE, "group": GROUP})
+    job = Plan(study).job(repetitions, {"scene": SCENE, "group": GROUP})
     settings = Options(**{**job.settings["settings"], "repeated": (), "own_ladder": asked})
     rows = again(repetitions, settings=settings)["rungs"]
     kinds = {"up": len(asked.up), "down": len(asked.down), "signs": 2, "square": len(asked.square)}

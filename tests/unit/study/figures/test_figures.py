@@ -97,13 +97,14 @@ DRAW_ALL = """
 import json, sys
 from pathlib import Path
 from study.figures.kit.declaration import declarations
-from study.pipeline.resolve import Resolver
+from study.pipeline.folders import Folders
+from study.pipeline.plan import Plan
 from study.pipeline.study import Study
 
 settings, project, root, out = sys.argv[1:]
-resolver = Resolver(Study.load(json.loads(settings), project), root)
+plan = Plan(Study.load(json.loads(settings), project), Folders(root))
 for name, figure in declarations().items():
-    job = resolver.job(figure, {})
+    job = plan.job(figure, {})
     figure.perform(job.settings, job.inputs, {kind: f"{out}/{name}.{kind}" for kind in job.outputs})
 """
 

@@ -28,7 +28,7 @@ def project(tmp_path, monkeypatch):
 
 
 def parse(text: str) -> CommandLine:
-    return CommandLine.parse(text.split())
+    return CommandLine(text.split())
 
 
 @pytest.mark.parametrize(
@@ -129,26 +129,18 @@ def test_the_folder_of_a_configuration(files, settings, name):
 
 @pytest.mark.parametrize("name", ["a b", "../x", "", "a/b", "a" * 61])
 def test_a_name_that_is_no_folder_is_refused(name):
-    with pytest.raises(ConfigurationError, match=r"study = '.*': no name of a folder.* 60 at most"):
-        folders((), (f"study={name}",))
-
-
-def test_a_file_whose_name_is_no_folder_needs_the_key():
-    with pytest.raises(ConfigurationError, match="set the key study"):
-        folders(("a b.yaml",), ())
+    for files, settings in (((), (f"study={name}",)), (("a b.yaml",), ())):
+        with pytest.raises(ConfigurationError, match=r"study = '.*': no name of a folder.* 60 at"):
+            folders(files, settings)
 
 
 def test_options_are_added_and_cores_unless_given():
     assert completed(["-n"]) == ["-n", "--cores", "all", *LINES, *OPTIONS]
-    assert completed(["-n", "--verbose"]) == ["-n", "--verbose", "--cores", "all", *OPTIONS]
-    assert completed(["-n", "--summary"]) == ["-n", "--summary", "--cores", "all", *OPTIONS]
+    # who asks for Snakemake's own output gets it
+    for option in ("--summary", "--verbose", "-p", "--quiet"):
+        assert completed(["-n", option]) == ["-n", option, "--cores", "all", *OPTIONS]
     assert completed(["-j2"]) == ["-j2", *LINES, *OPTIONS]
     assert completed(["--cores", "1"]) == ["--cores", "1", *LINES, *OPTIONS]
-
-
-@pytest.mark.parametrize("option", ["--verbose", "-p", "--quiet"])
-def test_who_asks_for_snakemakes_own_output_gets_it(option):
-    assert "--logger" not in completed([option])
 
 
 def test_names_become_files_and_it_is_said(capsys):
@@ -177,25 +169,25 @@ def test_a_figure_has_two_numbers_and_a_name(name, document, preprint, asked, ca
 @pytest.mark.parametrize(
     ("asked", "message"),
     [
-        ([], r"figure: its number or name is missing \(allowed: 1, .*, preprint:1, .*, ladder"),
-        (["99"], r"figure 99: there is none \(allowed: 1, 2, 3,"),
-        (["preprint:10"], r"figure preprint:10: there is none \(allowed: 1, 2, 3,"),
-        (["strain_run"], "figure strain_run: .*did you mean 'strain_runs'"),
+        (
+            ["figure"],
+            r"figure: its number or name is missing \(allowed: 1, .*, preprint:1, .*, ladder",
+        ),
+        (["figure", "99"], r"figure 99: there is none \(allowed: 1, 2, 3,"),
+        (["figure", "preprint:10"], r"figure preprint:10: there is none \(allowed: 1, 2, 3,"),
+        (["figure", "strain_run"], "figure strain_run: .*did you mean 'strain_runs'"),
+        # a faulty file is named before Snakemake reads it
+        (["--configfile", "none.yaml"], r"none\.yaml: no such configuration file"),
     ],
 )
-def test_an_unknown_figure_says_which_there_are(asked, message):
+def test_what_does_not_exist_is_said_with_what_there_is(asked, message):
     with pytest.raises(ConfigurationError, match=message):
-        completed(["figure", *asked])
-
-
-def test_a_faulty_configuration_file_is_named_before_snakemake_reads_it():
-    with pytest.raises(ConfigurationError, match=r"none\.yaml: no such configuration file"):
-        completed(["--configfile", "none.yaml"])
+        completed(asked)
 
 
 def test_the_report_is_of_the_last_run(capsys):
     assert completed(["--report"]) == ["--report", "--cores", "all", *OPTIONS]
-    remember(CommandLine.parse(["--configfile", "my.yaml", "--config", "a=b", "c=d"]))
+    remember(CommandLine(["--configfile", "my.yaml", "--config", "a=b", "c=d"]))
     last = ["--configfile", "my.yaml", "--config", "a=b", "c=d"]
     assert recall() == last
     assert completed(["--report"]) == ["--report", *last, "--cores", "all", *OPTIONS]

@@ -92,20 +92,22 @@ def test_kernels_are_the_newest_that_every_processor_has(system, machine, cpuinf
     assert core_type(system, machine, processor_features(CPUINFO[cpuinfo])) == expected
 
 
+def said(code: str, environment: dict[str, str]) -> list:
+    """What a program prints as JSON in an environment."""
+    command = [sys.executable, "-c", f"import json; {code}"]
+    return json.loads(subprocess.run(command, env=environment, stdout=-1, check=True).stdout)
+
+
 def test_the_kernels_are_those_of_numpy_and_of_scipy():
     """Set as a run sets them, both libraries report them."""
     kernels = core_type(platform.system(), platform.machine(), features_here())
     if not kernels:
         pytest.skip("nothing to choose on this machine")
     code = (
-        "import json; from pdrom.core.machine import loaded_kernels as k;"
+        "from pdrom.core.machine import loaded_kernels as k;"
         "print(json.dumps([[x.architecture, x.library] for x in k() if x.kind == 'blas']))"
     )
-    environment = {**os.environ, "OPENBLAS_CORETYPE": kernels}
-    done = subprocess.run(
-        [sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True
-    )
-    found = json.loads(done.stdout)
+    found = said(code, {**os.environ, "OPENBLAS_CORETYPE": kernels})
     assert [name.lower() for name, _ in found] == [kernels.lower()] * 2
     assert {library for _, library in found} == {"openblas"}
 
@@ -124,17 +126,13 @@ def test_kernels_are_compiled_for_the_target():
     """What numba says it compiled a kernel for, and keys its cache by, is what was chosen."""
     target = compiled_for(platform.machine(), features_here())
     code = (
-        "import json; from pdrom.model.compiled.dots import dot; import numpy as np;"
+        "from pdrom.model.compiled.dots import dot; import numpy as np;"
         "dot(np.ones(3), np.ones(3)); library = dot.overloads[dot.signatures[0]].library;"
         "print(json.dumps(library.codegen.magic_tuple()[1:]))"
     )
     # another processor: had the inherited name any effect, it would be seen
     inherited = {**os.environ, "NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""}
-    environment = settled(inherited, None, target)
-    done = subprocess.run(
-        [sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True
-    )
-    name, features = json.loads(done.stdout)
+    name, features = said(code, settled(inherited, None, target))
     if target:
         assert [name, features] == list(target.values())
     else:

@@ -27,11 +27,11 @@ def snakemake():
     return logger
 
 
-def fail(logger, rule, log, said, output=("results/x.h5",)):
+def fail(logger, rule, log, said):
     """A failed job as Snakemake logs it."""
     logger.error(f"RuleException:\n{said}", extra={"event": LogEvent.ERROR})
-    extra = {"event": LogEvent.JOB_ERROR, "rule_name": rule, "log": [log], "output": list(output)}
-    logger.error("Error in rule", extra=extra)
+    job = {"rule_name": rule, "log": [str(log)], "output": ["results/x.h5"]}
+    logger.error("Error in rule", extra={"event": LogEvent.JOB_ERROR, **job})
 
 
 def end(logger):
@@ -97,14 +97,10 @@ def test_every_failed_job_is_named_with_its_error(snakemake, tmp_path):
     log = tmp_path / "job.log"
     with pytest.raises(SystemExit), job_log(str(log)):
         raise ValueError("vertex 3 is nan")
-    fail(snakemake, "pod", str(log), ENDED + "returned non-zero exit status 1.")
-    fail(snakemake, "fom", str(tmp_path / "none.log"), ENDED + "died with <Signals.SIGKILL: 9>.")
-    status, lines = end(snakemake)
-    assert status == 1
-    assert lines == [
-        f"pdrom: job pod failed: ValueError: vertex 3 is nan (traceback in {log})",
-        f"{FOM}: killed (SIGKILL): out of memory?",
-    ]
+    fail(snakemake, "pod", log, ENDED + "returned non-zero exit status 1.")
+    fail(snakemake, "fom", tmp_path / "none.log", ENDED + "died with <Signals.SIGKILL: 9>.")
+    error = f"pdrom: job pod failed: ValueError: vertex 3 is nan (traceback in {log})"
+    assert end(snakemake) == (1, [error, f"{FOM}: killed (SIGKILL): out of memory?"])
 
 
 CRASHING = """
@@ -125,7 +121,7 @@ def test_a_job_that_crashes_is_named_with_the_line_it_was_at(snakemake, tmp_path
     log = tmp_path / "job.log"
     done = subprocess.run([sys.executable, "-c", CRASHING, log], capture_output=True, check=False)
     assert done.returncode == -signal.SIGSEGV
-    fail(snakemake, "fom", str(log), ENDED + "died with <Signals.SIGSEGV: 11>.")
+    fail(snakemake, "fom", log, ENDED + "died with <Signals.SIGSEGV: 11>.")
     _, (line,) = end(snakemake)
     begin = f"{FOM}: crashed (SIGSEGV) at "
     assert line.startswith(begin)
@@ -136,7 +132,7 @@ def test_a_job_that_crashes_is_named_with_the_line_it_was_at(snakemake, tmp_path
     # the crash of an earlier run is not this one
     os.utime(log, (1, 1))
     snakemake.failures.jobs.clear()
-    fail(snakemake, "fom", str(log), ENDED + "died with <Signals.SIGKILL: 9>.")
+    fail(snakemake, "fom", log, ENDED + "died with <Signals.SIGKILL: 9>.")
     assert end(snakemake)[1] == [f"{FOM}: killed (SIGKILL): out of memory?"]
 
 
@@ -145,7 +141,7 @@ def test_the_error_of_an_earlier_run_is_not_the_cause(snakemake, tmp_path):
     log = tmp_path / "job.log"
     with pytest.raises(SystemExit), job_log(str(log)):
         raise ValueError("long ago")
-    fail(snakemake, "fom", str(log), ENDED + "returned non-zero exit status 127.")
+    fail(snakemake, "fom", log, ENDED + "returned non-zero exit status 127.")
     assert end(snakemake)[1] == [f"{FOM}: its interpreter was not found"]
 
 

@@ -61,7 +61,7 @@ def files(tmp_path_factory):
             "ranks": [3, "full"],
             "coarsen": {"resolution": 0.3, "frames": 0.1},
         }
-        plan = load_plan(config, Path(), folders=Folders(os.fspath(folder)), quiet=True)
+        plan = load_plan(config, folders=Folders(os.fspath(folder)), quiet=True)
         more = {
             "mesh": {"mesh": plan.study.mesh_of(SCENE)},
             "pod": {"basis": plan.study.methods[METHOD].basis_id},
@@ -75,18 +75,11 @@ def files(tmp_path_factory):
 
 def value(expression: str, symbols: dict[str, int], size: int) -> int:
     """A shape's entry; a single new symbol is defined by the size that it has."""
-    terms = expression.split(" + ")
     if expression not in symbols and expression.isalpha():
         symbols[expression] = size
-    if terms[0] == "G":
+    if expression.startswith("G + "):
         symbols.setdefault("G", size - 1)
-    total = 0
-    for term in terms:
-        product = 1
-        for factor in term.split():
-            product *= int(factor) if factor.isdigit() else symbols[factor]
-        total += product
-    return total
+    return eval(expression.replace(" + ", "+").replace(" ", "*"), symbols.copy())
 
 
 @pytest.mark.parametrize("pattern", list(documented()))
@@ -113,13 +106,9 @@ def test_a_written_file_has_the_layout_of_the_page(pattern, files):
             entries = shape.split(" x ")
             # sizes that belong to one part of a file
             local = {key: size for key, size in known.items() if key not in "stG"}
-            expected = [value(*pair) for pair in zip_shapes(entries, local, data.shape)]
+            pairs = zip(entries, data.shape, strict=True)
+            expected = [value(entry, local, size) for entry, size in pairs]
             known |= {key: size for key, size in local.items() if key not in "stG"}
             assert (list(data.shape), str(data.dtype)) == (expected, kind)
             assert data.attrs.get("unit", unit) == unit
     assert seen == set(told)
-
-
-def zip_shapes(entries: list[str], symbols: dict[str, int], shape: tuple[int, ...]) -> list[tuple]:
-    """Arguments of `value` for each entry of a shape."""
-    return [(entry, symbols, size) for entry, size in zip(entries, shape, strict=True)]

@@ -36,9 +36,8 @@ ROOM = 2.0
 def plan(**coarsen: float) -> SimpleNamespace:
     """A plan, as far as it is asked."""
     return SimpleNamespace(
-        root=ROOT,
+        study=SimpleNamespace(root=ROOT, settings=SimpleNamespace(coarsen=Coarsen(**coarsen))),
         results="results/studies/logs",
-        settings=SimpleNamespace(coarsen=Coarsen(**coarsen)),
     )
 
 
@@ -165,10 +164,11 @@ def test_kernels_are_compiled_once(tmp_path, capsys):
 
 def test_choices_among_jobs_start_no_timers(monkeypatch):
     """Snakemake's scheduler starts one after every choice where it limits the rate of jobs."""
-    for name in ("stop_at_sigterm", "say_compilation", "tell_expectation"):
+    monkeypatch.setattr(run.running, "stop_at_sigterm", lambda _: None)
+    for name in ("say_compilation", "tell_expectation"):
         monkeypatch.setattr(run, name, lambda *_: None)
     scheduler = SimpleNamespace(job_rate_limiter="1000 jobs in 20 seconds")
     workflow = SimpleNamespace(scheduler=scheduler, local_exec=False)
-    begun = Run(CommandLine.parse(["--executor", "touch"]), Failures())
+    begun = Run(CommandLine(["--executor", "touch"]), Failures())
     begun.start(workflow, plan=None)
     assert scheduler.job_rate_limiter is None

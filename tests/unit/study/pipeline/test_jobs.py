@@ -13,12 +13,10 @@ from study.artifact.reads import Setting, TableOf
 from study.experiments.fom import mesh
 from study.experiments.subspaces import online
 from study.experiments.timing import scaling
-from study.pipeline.contents import labels_of
 from study.pipeline.folders import Folders
 from study.pipeline.manifest import study_files
-from study.pipeline.plan import Plan
-from study.pipeline.resolve import Job
-from study.pipeline.study import Study
+from study.pipeline.plan import Job, Plan
+from study.pipeline.study import Study, labels_of
 from study.tables import declared
 
 CONFIG = {"scenes": ["spring_oop", "strain_oop"], "methods": ["deim", "block-deim"]}
@@ -114,14 +112,11 @@ def changed(root: Path, old: str, new: str) -> set[str]:
     return {key[0] for key in before if before[key] != after[key]}
 
 
-def test_an_edited_title_plans_only_what_prints_it(tmp_path: Path) -> None:
+def test_an_edit_plans_what_reads_or_prints_it(tmp_path):
+    """A title the page of models alone, a weight the simulation."""
     root = make_project(tmp_path, {})
     (root / STUDY).write_text((root / STUDY).read_text() + LIVE)
     assert changed(root, "title: A small sheet", "title: Another one") == {"live"}
-
-
-def test_an_edited_weight_plans_the_simulation(tmp_path: Path) -> None:
-    root = make_project(tmp_path, {})
     found = changed(root, "weight: 1.0e+5", "weight: 2.0e+5")
     assert {"fom", "timing", "sensitivity"} <= found
     assert "mesh" not in found
@@ -170,4 +165,4 @@ def test_files_of_the_study_and_what_was_asked_for_beside_them(tmp_path, monkeyp
     for name in (*own, *asked_for, *others):
         Path(name).parent.mkdir(parents=True, exist_ok=True)
         Path(name).touch()
-    assert sorted(study_files(smallest, Folders())) == sorted([*own, *asked_for])
+    assert sorted(study_files(smallest)) == sorted([*own, *asked_for])

@@ -28,8 +28,7 @@ def estimate(expected: dict[int, Expected], ran: Iterable[tuple[int, float, floa
     """After some jobs that ran, each with its start and end."""
     made = Estimate(expected)
     for job, start, end in ran:
-        made.start(job, start)
-        made.finish(job, end)
+        made.begun[job], made.ended[job] = start, end
     return made
 
 
@@ -60,7 +59,7 @@ def test_what_waits_for_each_other_takes_as_long_as_the_chain():
 
 def test_what_runs_is_counted_by_its_rest():
     made = estimate(jobs(3, share=1.0), [(0, 0.0, 10.0), (1, 10.0, 20.0)])
-    made.start(2, 20.0)
+    made.begun[2] = 20.0
     assert made.left(24.0) == pytest.approx(6.0)
     assert 0.0 < made.left(60.0) < 6.0
 
@@ -76,11 +75,11 @@ def quotients(name: str, slower: float) -> tuple[list[float], float]:
     run = pd.read_csv(RUNS / f"{name}.csv")
     rows = list(run.itertuples())
     made = Estimate({job.Index: Expected(job.expected, job.share, job.after) for job in rows})
-    starts = [(slower * job.start, made.start, job.Index) for job in rows]
-    ends = [(slower * job.end, made.finish, job.Index) for job in rows]
+    starts = [(slower * job.start, made.begun, job.Index) for job in rows]
+    ends = [(slower * job.end, made.ended, job.Index) for job in rows]
     found, silent, end = [], 0.0, slower * run.end.max()
-    for now, happens, job in sorted([*starts, *ends], key=lambda event: event[0]):
-        if happens == made.start:
+    for now, times, job in sorted([*starts, *ends], key=lambda event: event[0]):
+        if times is made.begun:
             left = made.left(now)
             if left is None:
                 silent = now / end
@@ -88,7 +87,7 @@ def quotients(name: str, slower: float) -> tuple[list[float], float]:
                 words = rounded(left)
                 true = max(end - now, 60.0) if words.startswith("less") else end - now
                 found.append(seconds_of(words) / true)
-        happens(job, now)
+        times[job] = now
     return found, silent
 
 

@@ -7,7 +7,6 @@ from typing import Any
 
 import pytest
 import yaml
-from pydantic import ValidationError
 
 from pdrom.core.errors import ConfigurationError
 from pdrom.core.yamlfile import read_yaml, validate
@@ -18,11 +17,9 @@ from study.artifact import paths
 from study.artifact.paths import LABELS
 from study.experiments.kit.declaration import experiments
 from study.experiments.stability import stability
-from study.pipeline.contents import labels_of
-from study.pipeline.plan import check_live, check_subspaces
-from study.pipeline.resolve import Resolver
+from study.pipeline.plan import Plan, check_live, check_subspaces
 from study.pipeline.scenes import Replicate, Variants, read_scene
-from study.pipeline.study import Study, StudySettings
+from study.pipeline.study import Study, StudySettings, labels_of
 
 STUDY = {"scenes": ["spring_oop", "strain_oop"], "methods": ["deim", "gappy"], "ranks": [6, "full"]}
 
@@ -39,11 +36,13 @@ def study(**sections) -> Study:
         ({"stability": {"min_frames": 50, "max_frames": 40}}, "max_frames = 40: at least"),
         ({"stability": {"left": 1.0}}, "stability.left = 1.0"),
         ({"stability": {"departure": 3.0}}, "unknown key 'stability.departure'"),
+        ({"variants": {"scenes": ["spring_oup"]}}, "unknown scene 'spring_oup'"),
+        ({"variants": {"seeds": [1, 1]}}, "seeds = [1, 1]: an entry is given twice"),
     ],
 )
 def test_faults_are_named(section, message):
     with pytest.raises(ConfigurationError) as error:
-        validate(StudySettings, STUDY | section, "study")
+        study(**section)
     assert message in str(error.value)
 
 
@@ -51,7 +50,7 @@ def test_short_runs_are_planned_where_the_study_holds_them():
     asked = {"scenes": ["strain_oop", "bar_release"], "ranks": [6, 20]}
     made = study(stability=asked)
     assert labels_of(made, paths.STABILITY) == [{"scene": "strain_oop"}]
-    job = Resolver(made, "results").job(stability, {"scene": "strain_oop"})
+    job = Plan(made).job(stability, {"scene": "strain_oop"})
     plain = job.settings["short"]
     assert plain["ranks"] == [6]
     # which scenes have short runs and how they are judged makes no run again
@@ -165,23 +164,6 @@ def test_a_replicated_scene_is_faster_and_starts_elsewhere() -> None:
     assert read_scene(ROOT, "bar_twist", Replicate()) == base
 
 
-def test_an_unknown_scene_is_named() -> None:
-    config = {"scenes": ["strain_oop"], "methods": ["deim"], "variants": {"scenes": ["spring_oup"]}}
-    with pytest.raises(ConfigurationError, match="spring_oup"):
-        Study.load(config, ROOT)
-
-
-def test_an_entry_that_is_given_twice_is_refused() -> None:
-    with pytest.raises(ValidationError, match="twice"):
-        Variants(seeds=(1, 1))
-
-
-# What only a position subspace has.
-INSIDE = (
-    paths.SUBSPACES, paths.SUBSPACES_TRAIN, paths.SUBSPACES_HELDOUT, paths.SUBSPACES_SECONDS,
-)  # fmt: skip
-
-
 @pytest.fixture
 def root(tmp_path):
     """A project with a scene of its own, in which wind blows."""
@@ -211,7 +193,9 @@ def test_what_no_subspace_takes_has_all_but_what_is_of_a_subspace(root):
         if {"scene": "spring_oop"} in labels_of(held, place)
         and {"scene": "windy"} not in labels_of(held, place)
     }
-    assert without == set(INSIDE)
+    assert without == {
+        paths.SUBSPACES, paths.SUBSPACES_TRAIN, paths.SUBSPACES_HELDOUT, paths.SUBSPACES_SECONDS,
+    }  # fmt: skip
 
 
 def test_one_line_says_what_the_scene_goes_without(root, caplog):
@@ -223,17 +207,17 @@ def test_one_line_says_what_the_scene_goes_without(root, caplog):
 
 
 @pytest.mark.parametrize(
-    ("key", "section"),
+    ("key", "scenes"),
     [
-        ("subspace.scenes", {"subspace": {"scenes": ["windy"]}}),
-        ("scaling.scenes", {"scaling": {"scenes": {"windy": [1.0]}}}),
-        ("online.scenes", {"online": {"scenes": ["windy"]}}),
-        ("alternatives.scenes", {"alternatives": {"scenes": {"windy": [1.0]}}}),
+        ("subspace", ["windy"]),
+        ("scaling", {"windy": [1.0]}),
+        ("online", ["windy"]),
+        ("alternatives", {"windy": [1.0]}),
     ],
 )
-def test_where_a_subspace_is_asked_for_the_scene_is_refused(root, key, section):
-    with pytest.raises(ConfigurationError, match=rf"{key}: scene 'windy' has the effect 'wind'"):
-        check_subspaces(windy(root, **section))
+def test_where_a_subspace_is_asked_for_the_scene_is_refused(root, key, scenes):
+    with pytest.raises(ConfigurationError, match=rf"{key}.scenes: scene 'windy' has the effect"):
+        check_subspaces(windy(root, **{key: {"scenes": scenes}}))
 
 
 @pytest.mark.parametrize(

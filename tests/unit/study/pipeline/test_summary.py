@@ -5,6 +5,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pandas as pd
 import pytest
@@ -15,8 +16,9 @@ from pdrom.core.yamlfile import read_yaml
 from places import ROOT
 from study.pipeline.commandline import CommandLine
 from study.pipeline.folders import Folders
+from study.pipeline.progress import Preview, shortened
 from study.pipeline.study import Study
-from study.pipeline.summary import Preview, minutes, processor_seconds, shortened, summary
+from study.pipeline.summary import minutes, processor_seconds, summary
 
 FIGURES = ("results/figures/a.pdf", "results/figures/b.pdf")
 TABLES = ("results/tables/claims.csv",)
@@ -36,7 +38,10 @@ def project(tmp_path, monkeypatch):
 
 
 def lines(*arguments: str, words: str = "") -> dict[str, str]:
-    text = summary(CommandLine.parse(arguments), Folders(), FIGURES, TABLES, words)
+    listed = {"figures": FIGURES, "tables": TABLES}
+    fixed = {k: [SimpleNamespace(outputs={"": path}) for path in v] for k, v in listed.items()}
+    plan = SimpleNamespace(folders=Folders(), study=SimpleNamespace(apart=words), fixed=fixed)
+    text = summary(CommandLine(arguments), plan)
     assert text.endswith("\n")
     said = [line.removeprefix("pdrom: ") for line in text.splitlines()]
     return dict(line.split(": ", 1) for line in said)
@@ -62,6 +67,8 @@ def test_verdicts_of_another_study_are_told_from_those_of_the_full_one():
     words = "of coarse meshes, not those of the study"
     said = lines("--configfile", "my.yaml", words=words)
     assert said[f"verdicts (as published / beyond; {words})"].startswith("C1 holds")
+    Path(TABLES[0]).unlink()  # without verdicts the rest is said
+    assert not [word for word in lines() if word.startswith("verdicts")]
 
 
 @pytest.mark.parametrize(
@@ -84,11 +91,6 @@ def test_single_files():
     assert list(said) == ["configuration", "made", "time"]
     assert said["configuration"] == "my.yaml"
     assert said["made"] == "results/x, results/y"
-
-
-def test_without_verdicts_the_rest_is_said():
-    Path(TABLES[0]).unlink()
-    assert not [word for word in lines() if word.startswith("verdicts")]
 
 
 def test_processor_time_counts_what_this_process_waited_for():

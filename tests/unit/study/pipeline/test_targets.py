@@ -1,7 +1,7 @@
 """Names stand for files, a study's files lie in its own folder, misspelt ones get a suggestion."""
 
 import re
-from dataclasses import dataclass
+from types import SimpleNamespace
 
 import pytest
 
@@ -38,27 +38,18 @@ def test_files_that_have_a_place_of_their_own():
         assert files(name, TINY) == [f"results/studies/tiny/{name}"]
 
 
-@dataclass
-class Rule:
+def rule(name: str, pattern: str, wildcards: bool = False) -> SimpleNamespace:
     """A rule of Snakemake that makes what its pattern matches."""
-
-    name: str
-    pattern: str
-    wildcards: bool = False
-
-    def has_wildcards(self) -> bool:
-        return self.wildcards
-
-    def is_producer(self, requested_output: str) -> bool:
-        return re.fullmatch(self.pattern, requested_output) is not None
+    makes = re.compile(pattern).fullmatch
+    return SimpleNamespace(name=name, has_wildcards=lambda: wildcards, is_producer=makes)
 
 
 RULES = [
-    Rule("fom", r"results/fom/[a-z_0-9]+/(train|heldout)\.h5", True),
-    Rule("mesh", r"results/meshes/[A-Za-z0-9_.-]+\.h5", True),
-    Rule("snapshots", r"results/snapshots/[a-z_]+/[a-z_]+\.h5", True),
-    Rule("reruns", r"results/reruns/[a-z_]+/[a-z_]+/[a-z-]+\.h5", True),
-    Rule("scaling_table", r"results/tables/scaling\.csv"),
+    rule("fom", r"results/fom/[a-z_0-9]+/(train|heldout)\.h5", True),
+    rule("mesh", r"results/meshes/[A-Za-z0-9_.-]+\.h5", True),
+    rule("snapshots", r"results/snapshots/[a-z_]+/[a-z_]+\.h5", True),
+    rule("reruns", r"results/reruns/[a-z_]+/[a-z_]+/[a-z-]+\.h5", True),
+    rule("scaling_table", r"results/tables/scaling\.csv"),
 ]
 
 

@@ -12,7 +12,7 @@ from study.artifact.usage import Usage
 from study.figures.kit.declaration import declarations
 from study.pipeline.commandline import CommandLine
 from study.pipeline.front import completed
-from study.pipeline.inventory import contents, costs, entries
+from study.pipeline.summary import contents, costs, entries
 from study.pipeline.targets import own_file
 from study.tables import declared
 from study.verification.subject import Subject
@@ -35,8 +35,7 @@ class Dag:
     """
 
     def __init__(self, subject: Subject) -> None:
-        documents = subject.folders.documents.values()
-        files = [*subject.plan.table_paths, *subject.plan.figures, *documents]
+        files = subject.plan.made
         first, second = (Job((f"{name}.h5",), (f"logs/{name}.log",)) for name in ("run", "basis"))
         last = [Job((file,), (f"logs/{Path(file).stem}{i}.log",)) for i, file in enumerate(files)]
         self.dependencies = {first: {}, second: {first: {}}} | {job: {second: {}} for job in last}
@@ -52,7 +51,7 @@ def test_every_command_makes_what_its_entry_names(subject, monkeypatch):
         "claim", "figure", "table", "section", "manuscript",
     }  # fmt: skip
     for entry in listed:
-        command = CommandLine.parse(completed([*entry.words, *TINY]))
+        command = CommandLine(completed([*entry.words, *TINY]))
         assert command.configfiles == ("config/tiny.yaml",)
         wanted = (
             []
@@ -79,7 +78,7 @@ def test_costs_are_those_of_all_jobs_that_are_needed(subject, tmp_path, monkeypa
 
 def test_the_contents_name_every_entry_and_describe_every_figure_and_column(subject, monkeypatch):
     monkeypatch.chdir(ROOT)
-    page = contents(CommandLine.parse(TINY), Dag(subject), subject.folders)
+    page = contents(CommandLine(TINY), Dag(subject), subject.folders)
     assert "run of config/tiny.yaml" in page
     for entry in entries():
         command = shlex.join(["./reproduce", *entry.words, *TINY])

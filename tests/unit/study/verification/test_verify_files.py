@@ -21,7 +21,7 @@ from study.paper.build import paper_inputs
 from study.pipeline import manifest
 from study.pipeline.folders import Folders
 from study.pipeline.manifest import read_manifest, write_manifest
-from study.pipeline.resolve import Job
+from study.pipeline.plan import Job
 from study.tables import declared
 from study.verification import files
 from study.verification.files import differing, verify_files
@@ -67,9 +67,9 @@ def study(tmp_path, monkeypatch):
             file["x"] = [1.0, 2.0]
         write_text("x\n3.0\n2.5\n", NAMES[2])
         write_text(r"\val", NAMES[3])
-    plan = SimpleNamespace(fixed={"paper": [job_of(MANUSCRIPT)]})
+    fixed = {"paper": [job_of(MANUSCRIPT)]}
+    plan = SimpleNamespace(fixed=fixed, own_files=set(NAMES), results="results")
     monkeypatch.setitem(vars(SUBJECT), "plan", plan)
-    monkeypatch.setattr(files, "own_files", lambda *_: set(NAMES))
     monkeypatch.setattr(files, "asked_for", lambda paths, *_: [])
     renew_checksum(monkeypatch)
 
@@ -78,7 +78,7 @@ def renew_checksum(monkeypatch):
     """Write the manifest of what is there, as a run does or somebody who hides an edit."""
     found = [name for name in NAMES if Path(name).is_file()]
     monkeypatch.setattr(manifest, "study_files", lambda *_: found)
-    write_manifest(None, Folders(), OPTIONS)
+    write_manifest(SUBJECT.plan, OPTIONS)
 
 
 def rewrite(change):
@@ -97,7 +97,7 @@ def test_an_entry_has_checksums_and_what_made_the_file_and_equal_results_have_eq
     environment = entries["paper/m.tex"].environment
     assert "numpy" in read_manifest("results").environments[environment]["library_versions"]
     before = Path("results/manifest.json").read_bytes()
-    write_manifest(None, Folders(), OPTIONS)
+    write_manifest(SUBJECT.plan, OPTIONS)
     assert Path("results/manifest.json").read_bytes() == before
 
 
@@ -142,14 +142,14 @@ def test_a_name_that_is_no_file_of_the_study_is_noticed(name, capsys):
 
 
 def test_what_a_target_names_beside_the_study_may_be_listed(monkeypatch):
-    monkeypatch.setattr(files, "own_files", lambda *_: set(NAMES[1:]))
+    monkeypatch.setattr(SUBJECT.plan, "own_files", set(NAMES[1:]))
     monkeypatch.setattr(files, "asked_for", lambda paths, *_: [NAMES[0]])
     assert verify_files(SUBJECT) is Status.HOLDS
 
 
 def test_many_faults_are_counted(monkeypatch, capsys):
     more = {f"results/tables/{i}.csv" for i in range(30)}
-    monkeypatch.setattr(files, "own_files", lambda *_: {*NAMES, *more})
+    monkeypatch.setattr(SUBJECT.plan, "own_files", {*NAMES, *more})
     assert verify_files(SUBJECT) is Status.MISSING
     said = capsys.readouterr().out
     assert "and 10 more; finish the study by ./reproduce --configfile 'my study.yaml'\n" in said
@@ -182,7 +182,7 @@ def lost_and_unlisted(monkeypatch):
 
 def damaged_before_a_later_run(_):
     Path(NAMES[0]).write_text("x\n1.5\n2.6\n")
-    write_manifest(None, Folders(), OPTIONS)
+    write_manifest(SUBJECT.plan, OPTIONS)
 
 
 @pytest.mark.parametrize(

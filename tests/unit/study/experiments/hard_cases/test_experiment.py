@@ -19,7 +19,7 @@ from study.experiments.hard_cases.outcomes import (
     hard_cases,
     surprise,
 )
-from study.pipeline.resolve import Resolver
+from study.pipeline.plan import Plan
 from study.pipeline.study import Study
 
 METHODS = {
@@ -102,6 +102,6 @@ def test_an_unknown_refused_or_slow_case_is_named(name):
 
 def test_every_method_takes_part_not_only_those_of_the_study():
     study = Study.load(read_yaml(ROOT / "config" / "tiny.yaml"), ROOT)
-    asked = Resolver(study, "results").job(hard_cases, {}).settings["every_method"]
+    asked = Plan(study).job(hard_cases, {}).settings["every_method"]
     assert set(asked) == set(read_yaml(ROOT / "config" / "methods.yaml"))
     assert set(asked) > set(study.methods)
