@@ -2,10 +2,8 @@
 
 import numpy as np
 import pytest
-from pydantic import ValidationError
 
 from builders import make_scene
-from pdrom.core.errors import SceneError
 from pdrom.model.runs import trajectory
 
 SPRING = {"effect": "spring", "weight": 1e5}
@@ -50,22 +48,3 @@ def test_a_heavy_side_moves_less_and_the_centre_of_mass_stays():
     assert moved[left].max() < 0.01 * moved[~left].max()
     centre = np.einsum("n,fna->fa", scene.masses, positions) / scene.masses.sum()
     assert np.abs(centre - centre[0]).max() < 1e-12
-
-
-@pytest.mark.parametrize(
-    ("entry", "message"),
-    [
-        ({"select": "top"}, "either vertex_mass or density"),
-        ({"vertex_mass": 1.0, "density": 1.0}, "either vertex_mass or density"),
-        ({"density": 0.0}, "density"),
-        ({"select": 1, "density": 1.0}, "select"),
-    ],
-)
-def test_faulty_entries_are_named(entry, message):
-    with pytest.raises(ValidationError, match=message):
-        make_scene(SPRING, masses=[entry])
-
-
-def test_a_selection_that_the_mesh_does_not_have_is_named():
-    with pytest.raises(SceneError, match=r"scene 'test', masses\[1\]: .*flat along this axis"):
-        make_scene(SPRING, masses=[{"density": 1.0}, {"select": "front", "vertex_mass": 1.0}])

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from pydantic import ValidationError
 
 from builders import OBSTACLES, make_scene
 from pdrom.model.runs import trajectory
@@ -144,18 +143,3 @@ def test_a_cloth_lies_on_a_ball_and_does_not_glide_off_with_friction():
         moved[friction] = last[40, 0]
     assert moved[0.0] > 0.5
     assert abs(moved[np.inf]) < 0.05
-
-
-@pytest.mark.parametrize(
-    ("effect", "message"),
-    [
-        ({"effect": "plane", "normal": [0, 0, 0]}, "normal = .* has no direction"),
-        ({"effect": "box", "lower": [0, 1, 0], "upper": [1, 0, 1]}, "lower = 1 exceeds upper = 0"),
-        ({"effect": "sphere", "centre": [0, 0, 0], "radius": 0}, "radius"),
-        ({"effect": "plane", "friction": -0.1}, "friction = -0.1"),
-        ({"effect": "plane", "friction": float("nan")}, "friction"),
-    ],
-)
-def test_faults_name_key_and_value(effect, message):
-    with pytest.raises(ValidationError, match=message):
-        make_scene(SPRING, effect)
