@@ -349,6 +349,11 @@ MESH_CASES = [
 OTHER_CASES = [
     Case("empty methods", {METHODS: ""}, (METHODS, "a mapping of method names is required")),
     Case("no methods file", {METHODS: None}, (METHODS, "no such configuration file")),
+    Case("methods as a list", {METHODS: "[deim]"}, (METHODS, "a mapping of method names")),
+    other("method without a title", METHODS, "title: POD projection, ", "", "'pod'", "title"),
+    other("unknown key of a method", METHODS, "rows: all", "rows: all, extra: 1", "'pod'", "extra"),
+    other("method that contradicts itself", METHODS, "rows: joint, selection: greedy",
+          "rows: joint, selection: pivoted-qr", "only 'greedy'"),
     other("method with an unknown ingredient", METHODS, "rows: all", "rows: every",
           "'pod'", "rows = 'every'", "'all', 'scalar', 'joint' or 'element'"),
     other("unknown selection", METHODS, "selection: pivoted-qr", "selection: pivoted-rq", "'qdeim'",
