@@ -131,3 +131,8 @@ def test_long_values_are_cut():
 
 def test_keys_use_their_alias():
     assert keys_of(Outer) == ["name", "inner", "optional", "many", "row", "another"]
+
+
+def test_line_breaks_and_signals_of_terminals_in_a_message_are_escaped():
+    error = ConfigurationError("scene 'a\nb\x1b[2J\u2028ä': no such scene")
+    assert str(error) == r"scene 'a\nb\x1b[2J\u2028ä': no such scene"

@@ -10,15 +10,11 @@ SPRING = {"effect": "spring", "weight": 1e5}
 BAR = {"kind": "bar", "nx": 4, "ny": 3, "nz": 3, "extent": 2.0}
 
 
-def test_the_default_is_one_mass_for_all():
-    assert (make_scene(SPRING, vertex_mass=3.0).masses == 3.0).all()
-
-
 def test_later_entries_change_what_they_select():
     entries = [{"select": "top", "vertex_mass": 5.0}, {"select": [0], "vertex_mass": 7.0}]
-    scene = make_scene(SPRING, masses=entries)
+    scene = make_scene(SPRING, vertex_mass=3.0, masses=entries)
     top = scene.mesh.points[:, 1] == scene.mesh.points[:, 1].max()
-    expected = np.where(top, 5.0, 10.0)
+    expected = np.where(top, 5.0, 3.0)
     expected[0] = 7.0
     assert np.array_equal(scene.masses, expected)
 

@@ -105,20 +105,6 @@ def test_a_strip_with_one_side_is_refused():
     assert 0 not in turned_alike(Mesh(np.zeros((6, 3)), strip[:-1]), "open strip")[1]
 
 
-def test_a_mesh_file_with_a_triangle_the_other_way_round(tmp_path, caplog):
-    mesh = cloth(3, 3)
-    cells = mesh.triangles.copy()
-    cells[2] = cells[2, ::-1]
-    lines = [f"v {x} {y} {z}" for x, y, z in mesh.points]
-    lines += [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in cells]
-    (tmp_path / "sheet.obj").write_text("\n".join(lines))
-    read = MeshFile(kind="file", path="sheet.obj").build(tmp_path)
-    assert "1 of 8 triangles are listed the other way round" in caplog.text
-    sides = np.cross(*(read.points[read.triangles[:, k]] - read.points[read.triangles[:, 0]]
-                       for k in (1, 2)))  # fmt: skip
-    assert (sides[:, 2] > 0.0).all()
-
-
 EMPTY = np.empty((0, 4), dtype=np.int32)
 
 
@@ -179,6 +165,16 @@ def test_a_tetrahedron_of_negative_volume_is_turned(tmp_path):
     corner = (mesh := read(tmp_path, BAR.points, tetra=cells)).points[mesh.tetrahedra]
     assert (np.linalg.det(corner[:, 1:] - corner[:, :1]) > 0.0).all()
     assert np.array_equal(np.sort(mesh.tetrahedra, axis=1), np.sort(BAR.tetrahedra, axis=1))
+
+
+def test_a_triangle_the_other_way_round_is_turned_and_said(tmp_path, caplog):
+    cells = SHEET.triangles.copy()
+    cells[2] = cells[2, ::-1]
+    found = read(tmp_path, SHEET.points, triangle=cells)
+    assert "1 of 8 triangles are listed the other way round" in caplog.text
+    corner = found.points[found.triangles]
+    sides = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    assert len(np.unique(np.sign(sides[:, 1]))) == 1
 
 
 def two_sheets(joined: bool) -> tuple[np.ndarray, np.ndarray]:

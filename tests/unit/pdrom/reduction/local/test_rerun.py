@@ -108,12 +108,8 @@ def test_replaced_group_keeps_the_others_and_their_order():
     assert [s is g for s, g in zip(steps, scene.groups, strict=True)] == [False, True]
     assert steps[0] is other
     assert scene.groups[0] is not other
-
-
-def test_replacing_what_is_not_there_names_what_is():
-    scene = scene_with("spring", "strain")
     with pytest.raises(SceneError, match=r"no group 'bending' \(spring, strain\)"):
-        replace_group(scene, "bending", Pushing(lambda: 0.0))
+        replace_group(scene, "bending", other)
 
 
 def test_steps_are_those_of_the_velocities():

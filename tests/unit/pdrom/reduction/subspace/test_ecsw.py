@@ -12,12 +12,6 @@ from pdrom.model.dynamics.stepper import State, Stepper
 from pdrom.model.runs import trajectory
 from pdrom.reduction.subspace import ecsw
 from pdrom.reduction.subspace.columns import build_columns
-from pdrom.reduction.subspace.ecsw import (
-    TrainingFrame,
-    ecsw_elements,
-    training_equations,
-    training_run,
-)
 from pdrom.reduction.subspace.interpolation import SubspaceLocalStep
 from pdrom.reduction.subspace.model import SubspaceModel, make_columns, rerun_model, sample_elements
 from pdrom.reduction.subspace.space import ReducedSpace, coordinates
@@ -76,14 +70,14 @@ def everything(group) -> np.ndarray:
 
 def test_sampled_equations_meet_the_tolerance(pulled):
     scene, _, columns = pulled
-    training = training_run(scene, columns, np.arange(0, 12, 3))
+    training = ecsw.training_run(scene, columns, np.arange(0, 12, 3))
     for group in scene.groups:
-        rows, total = training_equations(group, columns, training, everything(group))
+        rows, total = ecsw.training_equations(group, columns, training, everything(group))
         np.testing.assert_allclose(rows.sum(axis=1), total, atol=1e-9)
         counts = []
         tolerances = [0.3, 1e-2, 1e-3]
         for tolerance, (elements, factors) in zip(
-            tolerances, ecsw_elements(group, columns, training, tolerances), strict=True
+            tolerances, ecsw.ecsw_elements(group, columns, training, tolerances), strict=True
         ):
             assert (factors > 0.0).all()
             assert len(np.unique(elements)) == len(elements) < group.elements
@@ -100,11 +94,11 @@ def test_a_part_of_a_group_stands_for_all_and_grows_where_it_misses(
     """Half of the candidates of one group, three of the other, which are too few."""
     scene, _, columns = pulled
     group = scene.groups[number]
-    training = training_run(scene, columns, [2, 8])
-    rows, total = training_equations(group, columns, training, everything(group))
+    training = ecsw.training_run(scene, columns, [2, 8])
+    rows, total = ecsw.training_equations(group, columns, training, everything(group))
     candidates = group.elements // 2 if number else 3
     monkeypatch.setattr(ecsw, "CANDIDATES", candidates)
-    ((elements, factors),) = ecsw_elements(group, columns, training, [tolerance])
+    ((elements, factors),) = ecsw.ecsw_elements(group, columns, training, [tolerance])
     assert number or len(elements) > candidates
     assert len(np.unique(elements)) == len(elements)
     left = rows[:, elements] @ factors - total
@@ -117,7 +111,7 @@ def test_factors_of_one_repeat_the_iterations(pulled):
     steps = [SubspaceLocalStep(group, columns) for group in scene.groups]
     space = ReducedSpace(scene, columns, [step.matrix for step in steps])
     inertia = space.matrix - sum(step.matrix for step in steps)
-    frame = training_run(scene, columns, [5])[0]
+    frame = ecsw.training_run(scene, columns, [5])[0]
     fixed = np.concatenate(columns.atom_columns)
     free = np.setdiff1d(np.arange(len(inertia)), fixed)
     sums = []
@@ -170,8 +164,8 @@ def test_training_equations_are_those_of_the_elements(rng):
         difference = dense[own] @ columns.B @ after - projected[own]
         expected[:, e] = (left @ difference).ravel()
     expected /= np.linalg.norm(expected.sum(axis=1))
-    frame = TrainingFrame(before, pair[None], measure)
-    rows, total = training_equations(group, columns, [frame], np.arange(group.elements))
+    frame = ecsw.TrainingFrame(before, pair[None], measure)
+    rows, total = ecsw.training_equations(group, columns, [frame], np.arange(group.elements))
     assert rows.shape == (count + 1, group.elements)
     np.testing.assert_allclose(rows.sum(axis=1), total, atol=1e-12)
     np.testing.assert_allclose(rows[-1], group.weights / group.weights.sum(), rtol=1e-14)
@@ -182,7 +176,7 @@ def test_training_equations_are_those_of_the_elements(rng):
     assert {-1.0, 1.0} <= set(hashing.round().ravel().tolist())
     some = np.array([3, 0])
     np.testing.assert_array_equal(
-        training_equations(group, columns, [frame], some)[0], rows[:, some]
+        ecsw.training_equations(group, columns, [frame], some)[0], rows[:, some]
     )
 
 
@@ -191,9 +185,9 @@ def test_a_group_at_rest_keeps_its_stiffness(pulled):
     scene, _, columns = pulled
     rest = coordinates(columns, scene.masses, scene.mesh.points)
     measure = np.eye(len(rest))
-    still = TrainingFrame(rest, np.stack([[rest, rest]]), measure)
+    still = ecsw.TrainingFrame(rest, np.stack([[rest, rest]]), measure)
     for group in scene.groups:
-        elements, factors = ecsw_elements(group, columns, [still], [1e-2])[0]
+        elements, factors = ecsw.ecsw_elements(group, columns, [still], [1e-2])[0]
         assert len(elements) > 0
         kept = factors @ group.weights[elements] / group.weights.sum()
         assert kept == pytest.approx(1.0, abs=0.2)
@@ -218,7 +212,7 @@ def hanging():
 def test_the_response_norm_is_the_root_mean_square_of_the_recursion(hanging):
     """Reference: the squares of the recursion's answer to one impulse, added up, mode by mode."""
     scene, columns, space, fixed = hanging
-    (frame,) = training_run(scene, columns, [FRAME], norm="response")
+    (frame,) = ecsw.training_run(scene, columns, [FRAME], norm="response")
     free = np.setdiff1d(np.arange(len(space.matrix)), fixed)
     block = np.ix_(free, free)
     a, mass = space.matrix[block], space.inertia_matrix[block]  # M + h^2 K and M, over h^2
