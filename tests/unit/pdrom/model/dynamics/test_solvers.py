@@ -8,8 +8,7 @@ from scipy import sparse
 
 from builders import make_scene
 from pdrom.core.errors import SolverError
-from pdrom.model.dynamics.solvers import SOLVERS, panels
-from pdrom.model.dynamics.sweeps import WIDTHS, sweep
+from pdrom.model.dynamics.solvers import SOLVERS
 from pdrom.model.dynamics.system import GlobalSystem
 
 NAMES = sorted(SOLVERS)
@@ -112,25 +111,3 @@ def test_masses_that_round_off_swallows_do_no_harm_to_a_held_body(name):
     rhs = scene.groups[0].S.T @ (scene.groups[0].row_weights[:, None] * scene.groups[0].rest)
     elimination.solve(rhs, y)
     assert y == pytest.approx(scene.mesh.points, abs=1e-9)
-
-
-@pytest.mark.parametrize("size", [1, 2, 5, 9, 23])
-def test_panels_hold_the_factor(size, rng):
-    """Swept forward and backward with unit vectors, they give the inverse of L D L^T."""
-    lower = np.tril(rng.standard_normal((size, size)) * (rng.random((size, size)) < 0.5), -1)
-    lower += np.eye(size)
-    diagonal = rng.uniform(0.5, 2.0, size)
-    sparse_lower = sparse.csc_array(lower)
-    sparse_lower.sort_indices()
-    factor = panels(sparse_lower, diagonal)
-    assert factor[0][[0, -1]].tolist() == [0, size]
-    assert set(np.diff(factor[0])) <= set(WIDTHS)
-    inverse = np.linalg.inv(lower @ np.diag(diagonal) @ lower.T)
-    for column in range(size):
-        rhs, y = np.zeros((2, 4 * size))
-        rhs[4 * column] = 1.0
-        order, zeros = np.arange(size, dtype=np.int32), np.zeros(4 * size)
-        sweep(factor, order, zeros, np.empty(4 * size), rhs, y)
-        scale = np.abs(inverse).max()
-        np.testing.assert_allclose(y[::4], inverse[:, column], atol=1e-12 * scale)
-        assert not y.reshape(-1, 4)[:, 1:].any()

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import nnls
 
-from pdrom.reduction.subspace.ecsw import _remove_row, nnls_path
+from pdrom.reduction.subspace.ecsw import nnls_path
 
 SMOOTH = np.exp(-np.outer(np.linspace(0.0, 1.0, 60), np.linspace(0.1, 5.0, 200)))
 
@@ -71,18 +71,6 @@ def test_a_path_meets_each_of_its_tolerances():
     assert len(path[1][0]) <= len(path[2][0]) <= len(path[0][0])
     for one, two in zip(path[1], stopped(g, b, 0.5), strict=True):
         np.testing.assert_array_equal(one, two)
-
-
-@given(n=st.integers(1, 12), data=st.data())
-def test_a_removed_row_leaves_the_factor_of_the_rest(n, data):
-    removed = data.draw(st.integers(0, n - 1))
-    x = np.random.default_rng(data.draw(st.integers(0, 99))).standard_normal((n + 3, n))
-    matrix = x.T @ x
-    factor = np.asfortranarray(np.linalg.cholesky(matrix))
-    _remove_row(factor, n, removed)
-    rest = np.delete(np.delete(matrix, removed, 0), removed, 1)
-    left = np.tril(factor[: n - 1, : n - 1])
-    np.testing.assert_allclose(left @ left.T, rest, rtol=1e-9, atol=1e-9)
 
 
 def test_support_is_bounded(rng):
