@@ -8,6 +8,7 @@ from pymor.algorithms.pod import pod as pymor_pod
 from pymor.vectorarrays.numpy import NumpyVectorSpace
 from scipy import linalg
 
+from pdrom.reduction import basis as module
 from pdrom.reduction.basis import fix_signs, numerical_rank, pod, thin_qr
 
 SHAPES = st.tuples(st.integers(1, 60), st.integers(1, 12), st.integers(0, 2**32 - 1))
@@ -138,9 +139,18 @@ def growing(m: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize("m", [30, 70])
-def test_an_ill_conditioned_factor_is_noticed(m):
+def test_an_ill_conditioned_factor_is_noticed(m, monkeypatch):
     """For m = 70 the first Cholesky factorisation fails, for 30 the departure tells."""
+    calls = []
+    reflect = module._by_reflections
+
+    def counted(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        calls.append(matrix.shape)
+        return reflect(matrix)
+
+    monkeypatch.setattr(module, "_by_reflections", counted)
     check(growing(m))
+    assert calls == [(m + 3, m)]
 
 
 def test_zero_has_no_direction_of_its_own():
