@@ -126,20 +126,3 @@ def test_a_plane_is_a_floor():
     assert floor[..., 1].min() >= 0.0
     assert np.abs(floor[-1, :, 1]).max() < 1e-12
     assert np.abs(plane - floor).max() < 1e-9
-
-
-def test_a_cloth_lies_on_a_ball_and_does_not_glide_off_with_friction():
-    """Pushed sideways it glides off a smooth ball; where it sticks, it stays."""
-    effects = [
-        {"effect": "gravity", "acceleration": [3, -9.81, 0]},
-        {"effect": "spring", "weight": 1e4},
-    ]
-    mesh = {"kind": "cloth", "rows": 9, "columns": 9, "plane": "xz", "lift": 1.05}
-    moved = {}
-    for friction in (0.0, np.inf):
-        ball = {"effect": "sphere", "centre": [0, 0.5, 0], "radius": 0.5, "friction": friction}
-        last = trajectory(make_scene(*effects, ball, mesh=mesh, frames=60))[-1]
-        assert (np.linalg.norm(last - [0, 0.5, 0], axis=1) >= 0.5 - 1e-9).all()
-        moved[friction] = last[40, 0]
-    assert moved[0.0] > 0.5
-    assert abs(moved[np.inf]) < 0.05

@@ -27,9 +27,7 @@ def test_cloth_has_the_counts_of_the_study():
     assert mesh.points.mean(axis=0) == pytest.approx([0.0, 2.0, 0.0])
     # cell (0, 0): ll, ur, ul and ll, lr, ur
     assert mesh.triangles[:2].tolist() == [[0, 21, 1], [0, 20, 21]]
-
-
-def test_cloth_triangles_face_one_way_and_tile_the_sheet():
+    # triangles face one way and tile the sheet
     mesh = cloth(5, 7)
     a, b, c = (mesh.points[mesh.triangles[:, i]] for i in range(3))
     normal = np.cross(b - a, c - a)
@@ -41,9 +39,7 @@ def test_bar_has_the_counts_of_the_study():
     mesh = bar(40, 5, 5)
     assert (mesh.vertices, len(mesh.tetrahedra)) == (1000, 3120)
     assert mesh.extent == pytest.approx(1.0)
-
-
-def test_bar_is_conforming_and_fills_its_box():
+    # it is conforming and fills its box
     mesh = bar(4, 3, 5)
     corner = mesh.points[mesh.tetrahedra]
     volume = np.linalg.det(corner[:, 1:] - corner[:, :1]) / 6.0
@@ -64,16 +60,12 @@ def test_round_trip(tmp_path):
         assert np.array_equal(getattr(loaded, name), getattr(mesh, name))
 
 
-def test_sides_of_a_sheet():
+def test_sides_of_a_sheet_and_farthest_points_that_start_at_the_centre():
     mesh = cloth(4, 3)
     assert select_vertices(mesh, "top").tolist() == [2, 5, 8, 11]
     assert select_vertices(mesh, "left").tolist() == [0, 1, 2]
     assert select_vertices(mesh, [5, 1, 5]).tolist() == [1, 5]
-
-
-def test_farthest_points_start_at_the_centre_and_spread():
-    mesh = cloth(5, 5)
-    chosen = farthest_points(mesh.points, np.arange(25), 5)
+    chosen = farthest_points(cloth(5, 5).points, np.arange(25), 5)
     assert chosen[0] == 12
     assert set(chosen[1:].tolist()) == {0, 4, 20, 24}
 
