@@ -8,8 +8,6 @@ import pytest
 
 from builders import GRAVITY, TOP, make_scene
 from pdrom.core.store import open_hdf5
-from pdrom.model.compiled import rows
-from pdrom.model.constraints.local_kernel import OWN, LocalKernel, call, local_kernel
 from pdrom.model.dynamics.stepper import State
 from pdrom.model.runs import run, trajectory
 from places import ROOT
@@ -27,27 +25,6 @@ def test_unlisted_groups_leave_no_matrix_entry():
     expected += np.diag(scene.masses / scene.config.time_step**2)
     assert np.array_equal(matrix.toarray(), expected)
     assert not np.array_equal(both.system_with("supernodal").matrix.toarray(), expected)
-
-
-@local_kernel
-def _counted(y, rhs, record, part):
-    """Counts its calls and hands them on."""
-    entries = rows.indices(record, OWN + 3)
-    rows.doubles(entries[OWN + 1], 1)[0] += 1.0
-    return call(entries[OWN], y, rhs, entries[OWN + 2], part)
-
-
-def test_unlisted_groups_are_never_evaluated():
-    """Calls per run: K a frame for each listed group, none for others, none without forces."""
-    scene = make_scene(SPRING, {"effect": "strain", "weight": 1e5}, frames=3, iterations=4)
-    calls = {}
-    for group in scene.groups:
-        own, calls[group.name] = group.local_kernel, np.zeros(1)
-        group.local_kernel = LocalKernel(
-            _counted, scene.mesh.vertices, 1, [calls[group.name], own.record], [own.address]
-        )
-    trajectory(scene)
-    assert calls == {"spring": 12, "strain": 12}
     assert scene.forces == scene.boundaries == scene.contacts == scene.starts == []
 
 
