@@ -2,7 +2,7 @@
 
 import math
 from copy import copy
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numba import carray
@@ -363,16 +363,14 @@ class VertexBending(ConstraintGroup):
         put_poles(self._manifold, curved, self.side, self.normals)
 
     def sampler(self, elements: np.ndarray) -> LocalKernel:
-        return LocalKernel(
-            project_vertices,
-            self.S.shape[1],
-            lanes.blocks(self.elements),
-            arrays=self._arrays(elements),
-            numbers=(self.elements, len(elements)),
-        )
+        return self._kernel(project_vertices, elements)
 
-    def _arrays(self, elements: np.ndarray) -> tuple[np.ndarray, ...]:
-        return (*self._operator(), self._manifold, self._work, elements, self._taken)
+    def _kernel(self, function: Any, elements: np.ndarray, touched: Any = None) -> LocalKernel:
+        """Return the kernel of a ``function`` that projects ``elements``, or accumulates all."""
+        operator = self.S.indptr, self.S.indices, self.S.data
+        arrays = (*operator, self._manifold, self._work, elements, self._taken)
+        numbers, count = (self.elements, len(elements)), lanes.blocks(self.elements)
+        return LocalKernel(function, self.S.shape[1], count, arrays, numbers, touched)
 
     def restricted(
         self, elements: np.ndarray, factors: np.ndarray
@@ -396,9 +394,6 @@ class VertexBending(ConstraintGroup):
         part._set_kernel()
         return part, vertices
 
-    def _operator(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        return self.S.indptr, self.S.indices, self.S.data
-
     def _set_kernel(self) -> None:
         self.S.indptr = self.S.indptr.astype(np.int32)
         self.S.indices = self.S.indices.astype(np.int32)
@@ -406,16 +401,12 @@ class VertexBending(ConstraintGroup):
         self._manifold = lanes.pack(np.column_stack(numbers))
         self._work = lanes.workspaces(SIZE)
         self._taken = lanes.workspace(MANIFOLD)
-        self.local_kernel = LocalKernel(
-            accumulate_vertices,
-            self.S.shape[1],
-            lanes.blocks(self.elements),
-            arrays=self._arrays(np.empty(0, np.int64)),
-            numbers=(self.elements, 0),
-            touched=(lambda block: self.S.indices[self.S.indptr[block * lanes.LANES] :])
-            if self.elements >= self.split_from
-            else None,
-        )
+
+        def touched(block: int) -> np.ndarray:
+            return self.S.indices[self.S.indptr[block * lanes.LANES] :]
+
+        split, none = self.elements >= self.split_from, np.empty(0, np.int64)
+        self.local_kernel = self._kernel(accumulate_vertices, none, touched if split else None)
 
     def kernel_parameters(self) -> np.ndarray:
         return self._manifold
