@@ -1,9 +1,12 @@
 """Builders of small scenes."""
 
+from pathlib import Path
+
 import numpy as np
 import pandas as pd
 from numba import njit
 
+from pdrom.core import store
 from pdrom.model.constraints.local_kernel import call_gradients
 from pdrom.model.scene import Scene, SceneConfig
 from places import ROOT
@@ -64,6 +67,19 @@ def with_effects(scene: Scene, *effects: dict) -> Scene:
 def frame(header: str, *rows: tuple) -> pd.DataFrame:
     """Rows under the columns that a header names."""
     return pd.DataFrame(list(rows), columns=header.split())
+
+
+def write_result(path: Path, value: float = 0.1) -> None:
+    """A small result of the kind that its name says, which holds the value."""
+    if path.suffix == ".h5":
+        with store.write_hdf5(path) as file:
+            file["x"] = np.linspace(0.0, value, 64)
+            file["x"].attrs["unit"] = "m"
+            file["group/y"] = np.arange(30)
+    elif path.suffix == ".csv":
+        store.write_table(frame("scene error", ("a", value), ("b", np.nan), ("c", 1e-300)), path)
+    else:
+        store.write_text(f"\\newcommand{{\\val}}{{{value}}}\n" * 3, path)
 
 
 def random_rotation(rng: np.random.Generator) -> np.ndarray:

@@ -48,11 +48,6 @@ def compiled() -> dict[str, int]:
     return found
 
 
-def loaded() -> list[str]:
-    """Modules of the package."""
-    return sorted(name for name in sys.modules if name.startswith("pdrom."))
-
-
 def state_of(group: str) -> dict:
     """What a scene with one constraint group holds, and what its run gives."""
     from builders import make_scene
@@ -73,7 +68,8 @@ def report(group: str, effects: list[str]) -> dict[str, object]:
     """A scene of ``group`` alone, before anything else was loaded and after each effect was."""
     from pdrom.model.effects import EFFECTS
 
-    found: dict[str, object] = {"alone": state_of(group), "modules": loaded()}
+    found: dict[str, object] = {"alone": state_of(group)}
+    found["modules"] = sorted(name for name in sys.modules if name.startswith("pdrom."))
     for effect in effects:
         EFFECTS.load(effect)
         found[effect] = state_of(group)

@@ -8,13 +8,7 @@ from pdrom.core.store import write_hdf5
 from pdrom.model.mesh.types import save_mesh
 from pdrom.model.runs import trajectory
 from pdrom.model.scene import Scene
-from pdrom.reduction.subspace.model import (
-    Samples,
-    SubspaceModel,
-    make_columns,
-    store_columns,
-    store_model,
-)
+from pdrom.reduction.subspace import model as subspaces
 from places import ROOT
 from study.artifact.paths import File
 from study.experiments.live import LiveModels, Options, live
@@ -32,20 +26,22 @@ def write_page(folder: Path, models: list[Path]) -> Path:
 
 def write_models(
     scene: Scene, folder: Path, every: int = 2, k: int = 3
-) -> tuple[Path, SubspaceModel]:
+) -> tuple[Path, subspaces.SubspaceModel]:
     """File of one model of ``k`` modes that samples some of the elements, and the model."""
     reference = trajectory(scene, track_objective=False)
     (group,) = scene.groups
     elements = np.arange(0, group.elements, every)
-    samples = {group.name: Samples(elements, np.full(len(elements), float(every)))}
-    model = SubspaceModel("pod", make_columns(scene, reference[1:], "pod", k), samples)
+    samples = {group.name: subspaces.Samples(elements, np.full(len(elements), float(every)))}
+    model = subspaces.SubspaceModel(
+        "pod", subspaces.make_columns(scene, reference[1:], "pod", k), samples
+    )
     save_mesh(scene.mesh, folder / "mesh.h5")
     with write_hdf5(folder / "train.h5") as file:
         file["positions"] = reference
     with write_hdf5(folder / "models.h5") as file:
-        store_columns(file.create_group("columns/own"), model.columns)
+        subspaces.store_columns(file.create_group("columns/own"), model.columns)
         labels = {"method": "ecsw-1e-02", "position_basis": "pod", "k": k, "base": "own"}
-        store_model(file.create_group("models/own"), labels, samples)
+        subspaces.store_model(file.create_group("models/own"), labels, samples)
     asked = LiveModels(sizes=(k,))
     options = Options(scene=scene.config, title="A title", live=asked, joint_rows=())
     mesh, train, models, out = (

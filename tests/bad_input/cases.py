@@ -8,6 +8,7 @@ import yaml
 
 from bad_input.project import MESH, SCENE, SMALL_SCENE, SMALL_STUDY, STUDY, Content, LinkTo, Replace
 from pdrom.core.yamlfile import read_yaml
+from pdrom.model.mesh.selection import KINDS
 from places import CONFIG
 
 METHODS, FIGURES, CLAIMS = (f"config/{name}.yaml" for name in ("methods", "figures", "claims"))
@@ -49,6 +50,16 @@ def scene(name: str, old: str, new: str, *parts: str) -> Case:
     return Case(name, {SCENE: Replace(old, new)}, (SCENE, *parts))
 
 
+def effect(name: str, entry: str, *parts: str) -> Case:
+    """The scene's file with another effect in place of its gravity."""
+    return scene(name, "- {effect: gravity}", f"- {{{entry}}}", *parts)
+
+
+def select(name: str, selection: str, *parts: str) -> Case:
+    """The scene's file with another selection of its pins."""
+    return scene(name, "select: left", f"select: {selection}", *parts)
+
+
 def mesh(name: str, content: Content, *parts: str, path: str = MESH) -> Case:
     """A mesh file with broken content."""
     use = Replace("{kind: cloth, rows: 5, columns: 4, plane: xz}", f"{{kind: file, path: {path}}}")
@@ -72,6 +83,7 @@ def ladder(name: str, old: str, new: str, *parts: str) -> Case:
     return more(name, LADDER.replace(old, new, 1), *parts)
 
 
+BIG = 99999999999999999999
 BOMB = "a: &a [x, x]\n" + "".join(
     f"{b}: &{b} [{', '.join(['*' + a] * 9)}]\n" for a, b in zip("abcdefgh", "bcdefghi", strict=True)
 )
@@ -179,26 +191,18 @@ SCENE_CASES = [
     scene("huge gravity", "effect: gravity", "effect: gravity, acceleration: [0, -1.0e+300, 0]",
           "(gravity)", "acceleration.1 = -1e+300"),
     scene("effect given twice", "- {effect: gravity}", "- {effect: spring, weight: 1.0}", "twice"),
-    scene("pin of no side", "select: left", "select: middle", "pins", "'middle'", "left, right"),
-    scene("pin that selects nothing", "select: left", "select: []", "pins", "selects no vertex"),
-    scene("pin of a flat side", "select: left", "select: top", "pins", "selects nothing", "flat"),
-    scene("pin out of range", "select: left", "select: [0, 20]", "pins", "0 to 19"),
-    scene("pin before the first vertex", "select: left", "select: [-1]", "pins", "0 to 19"),
-    scene("pin of a huge index", "select: left", "select: [99999999999999999999]", "pins",
-          "0 to 19"),
-    scene("pin with fractions", "select: left", "select: [0.5]", "(pins)", "select"),
-    scene("pin that ends before it starts", "select: left", "select: left, start: 5, until: 5",
-          "(pins)", "until = 5"),
-    scene("handle against pin", "- {effect: gravity}",
-          "- {effect: translate, select: left, offset: [1, 0, 0], over: 3}",
-          "held by 'translate' and by 'pins' in frame 0"),
-    scene("handle over no frames", "- {effect: gravity}",
-          "- {effect: translate, select: right, offset: [1, 0, 0], over: 0}", "(translate)",
-          "over = 0"),
-    scene("more pokes than vertices", "- {effect: gravity}", "- {effect: poke, count: 500}",
-          "count = 500", "20 vertices"),
-    scene("kick of no axis", "- {effect: gravity}",
-          "- {effect: kick, speed: 1, seed: 1, axes: []}", "(kick)", "axes = []"),
+    select("pin of no side", "middle", "pins", "'middle'", "left, right"),
+    select("pin that selects nothing", "[]", "pins", "selects no vertex"),
+    select("pin of a flat side", "top", "pins", "selects nothing", "flat"),
+    *(select(f"pin of vertex {index}", f"[{index}]", "pins", "0 to 19") for index in (20, -1, BIG)),
+    select("pin with fractions", "[0.5]", "(pins)", "select"),
+    select("pin that ends before it starts", "left, start: 5, until: 5", "(pins)", "until = 5"),
+    effect("handle against pin", "effect: translate, select: left, offset: [1, 0, 0], over: 3",
+           "held by 'translate' and by 'pins' in frame 0"),
+    effect("handle over no frames", "effect: translate, select: right, offset: [1, 0, 0], over: 0",
+           "(translate)", "over = 0"),
+    effect("more pokes than vertices", "effect: poke, count: 500", "count = 500", "20 vertices"),
+    effect("kick of no axis", "effect: kick, speed: 1, seed: 1, axes: []", "(kick)", "axes = []"),
     scene("group that is not there", "spring: {train: 4}", "strain: {train: 4}", "reduce.strain",
           "allowed: spring"),
     scene("more training than frames", "train: 4", "train: 5", "reduce.spring.train = 5", "4 even"),
@@ -216,6 +220,57 @@ SCENE_CASES = [
     scene("bar of too many vertices", "kind: cloth, rows: 5, columns: 4, plane: xz",
           "kind: bar, nx: 2000, ny: 2000, nz: 2000", "mesh.bar", "8000000000 vertices"),
     scene("unknown plane", "plane: xz", "plane: zx", "mesh.cloth.plane = 'zx'", "'xy' or 'xz'"),
+    *(scene(f"masses {entry}", "frames: 8", f"frames: 8\nmasses: [{entry}]", part)
+      for entry, part in (
+        ("{select: top}", "either vertex_mass or density"),
+        ("{vertex_mass: 1, density: 1}", "either vertex_mass or density"),
+        ("{density: 0}", "density"),
+        ("{select: 1, density: 1}", "select"),
+        ("{density: 1}, {select: top, vertex_mass: 1}", "masses[1]: "),
+        ("{density: 2}, {select: top, vertex_mass: 1}", "flat along this axis"),
+      )),
+    *(effect(f"keys {keys}", f"effect: keyframes, select: right, keys: [{keys}]", part)
+      for keys, part in (
+        ("", "keys"),
+        ("{at: 0}", "keys.0.at = 0"),
+        ("{at: 5}, {at: 5}", "at = 5 must be greater than 5"),
+        ("{at: 5, ofset: [0, 0, 0]}", "unknown key 'keys.0.ofset'"),
+        ("{at: 6, ofset: [0, 0, 0]}", "did you mean 'offset'"),
+        ("{at: 5, offset: [0, 0, .inf]}", "offset"),
+      )),
+    effect("plane without direction", "effect: plane, normal: [0, 0, 0]", "has no direction"),
+    effect("box turned inside out", "effect: box, lower: [0, 1, 0], upper: [1, 0, 1]",
+           "lower = 1 exceeds upper = 0"),
+    effect("sphere of no size", "effect: sphere, centre: [0, 0, 0], radius: 0", "radius"),
+    effect("negative friction", "effect: plane, friction: -0.1", "friction = -0.1"),
+    effect("friction NaN", "effect: plane, friction: .nan", "friction"),
+    scene("factor without selection", "weight: 1.0e+5", "weight: 1.0, factors: [{factor: 1}]",
+          "factors.0.select"),
+    scene("factor zero", "weight: 1.0e+5", "weight: 1.0, factors: [{select: left, factor: 0}]",
+          "factors.0.factor"),
+    scene("factor of no element", "weight: 1.0e+5",
+          "weight: 1.0, factors: [{select: [0], factor: 2}]", "effect 'spring': factors[0]",
+          "selects no element", "edge"),
+    select("selection as a number", "3.5", "select = 3.5: a side, a list of vertices, or a mapping",
+           "whose kind is one of box"),
+    select("selection of no kind", "{kind: bxo}", f"one of {', '.join(KINDS)}"),
+    select("box without an end", "{kind: box, lower: [0, 0, 0]}", "select.box.upper' is missing"),
+    select("empty box", "{kind: box, lower: [0, 0, 1], upper: [1, 1, 0]}", "lower = 1 exceeds"),
+    select("empty sphere", "{kind: sphere, centre: [0, 0, 0], radius: 0}",
+           "select.sphere.radius = 0"),
+    select("plane of no normal", "{kind: plane, point: [0, 0, 0], normal: [0, 0, 0]}",
+           "has no direction"),
+    select("union of nothing", "{kind: union, of: []}", "select.union.of"),
+    select("complement misspelt", "{kind: complement, of: {kind: nearest, pt: 1}}",
+           "complement.of.nearest.pt"),
+    select("vertex as a letter", "[0, a]", "select.vertices.1 = 'a'"),
+    select("second part of one", "{kind: component, index: 1}", "scene 'small', effect 'pins'",
+           "component: index = 1, the mesh has 1"),
+    select("nearest of too many", "{kind: nearest, point: [0, 0, 0], count: 31}",
+           "count = 31 of 20 vertices"),
+    select("union with no side", "{kind: union, of: [left, middle]}",
+           "selection 'middle': allowed are left"),
+    select("all but all", f"{{kind: complement, of: {[*range(20)]}}}", "selects no vertex"),
     scene("tetrahedra on a sheet", "effects:\n",
           "effects:\n  - {effect: tetrahedron_strain, weight: 1.0}\n",
           "tetrahedron_strain", "needs tetrahedra"),
@@ -294,6 +349,11 @@ MESH_CASES = [
 OTHER_CASES = [
     Case("empty methods", {METHODS: ""}, (METHODS, "a mapping of method names is required")),
     Case("no methods file", {METHODS: None}, (METHODS, "no such configuration file")),
+    Case("methods as a list", {METHODS: "[deim]"}, (METHODS, "a mapping of method names")),
+    other("method without a title", METHODS, "title: POD projection, ", "", "'pod'", "title"),
+    other("unknown key of a method", METHODS, "rows: all", "rows: all, extra: 1", "'pod'", "extra"),
+    other("method that contradicts itself", METHODS, "rows: joint, selection: greedy",
+          "rows: joint, selection: pivoted-qr", "only 'greedy'"),
     other("method with an unknown ingredient", METHODS, "rows: all", "rows: every",
           "'pod'", "rows = 'every'", "'all', 'scalar', 'joint' or 'element'"),
     other("unknown selection", METHODS, "selection: pivoted-qr", "selection: pivoted-rq", "'qdeim'",

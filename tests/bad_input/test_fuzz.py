@@ -16,16 +16,7 @@ import yaml
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from bad_input.project import (
-    CONFIG,
-    MESH,
-    SCENE,
-    SMALL_SCENE,
-    STUDY,
-    load_project,
-    make_project,
-    small_study,
-)
+from bad_input import project as small
 from pdrom.core.errors import PdromError
 
 SPARE_BYTES = 2_000_000_000
@@ -56,12 +47,13 @@ reduce:
   strain: {train: 3}
 held_out: {frames_factor: 1.25, carry: 0.1, kick: 0.5, kick_axes: [x], seed: 2}
 """
-BAR_SCENE = SMALL_SCENE.replace(
+BAR_SCENE = small.SMALL_SCENE.replace(
     "{kind: cloth, rows: 5, columns: 4, plane: xz}", "{kind: bar, nx: 4, ny: 3, nz: 3, extent: 1.0}"
 ).replace("effect: spring, weight", "effect: tetrahedron_strain, minimum: 0.9, weight")
 BAR_SCENE = BAR_SCENE.replace("  spring:", "  tetrahedron_strain:")
-FILE_SCENE = SMALL_SCENE.replace(
-    "{kind: cloth, rows: 5, columns: 4, plane: xz}", f"{{kind: file, path: {MESH}, scale: 1.0}}"
+FILE_SCENE = small.SMALL_SCENE.replace(
+    "{kind: cloth, rows: 5, columns: 4, plane: xz}",
+    f"{{kind: file, path: {small.MESH}, scale: 1.0}}",
 )
 
 EXTREME = st.sampled_from(
@@ -117,7 +109,7 @@ def _mutate(draw: Callable, owner: Any, key: Any) -> None:
 @pytest.fixture(scope="module")
 def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A project whose files each example overwrites."""
-    return make_project(tmp_path_factory.mktemp("fuzz"), {})
+    return small.make_project(tmp_path_factory.mktemp("fuzz"), {})
 
 
 @pytest.fixture(autouse=True)
@@ -134,7 +126,7 @@ def accepted_or_named(root: Path, overrides: dict | None = None) -> None:
     """Load the project; the only failure is a named error on one short line."""
     message = ""
     try:
-        load_project(root, overrides)
+        small.load_project(root, overrides)
     except PdromError as error:
         message = str(error)
     assert "\n" not in message
@@ -149,23 +141,23 @@ FUZZ = settings(suppress_health_check=list(HealthCheck))
 @pytest.mark.parametrize("text", [RICH_SCENE, BAR_SCENE, FILE_SCENE], ids=["rich", "bar", "file"])
 def test_mutated_scenes(project: Path, text: str, data: st.DataObject) -> None:
     scene = data.draw(mutated(yaml.safe_load(text)))
-    (project / SCENE).write_text(yaml.safe_dump(scene), encoding="utf-8")
+    (project / small.SCENE).write_text(yaml.safe_dump(scene), encoding="utf-8")
     accepted_or_named(project)
 
 
 @pytest.mark.parametrize("text", [RICH_SCENE, BAR_SCENE, FILE_SCENE], ids=["rich", "bar", "file"])
 def test_the_scenes_are_valid_before_they_are_mutated(project: Path, text: str) -> None:
-    (project / SCENE).write_text(text, encoding="utf-8")
-    assert load_project(project).study.bound["small"].mesh.vertices > 0
+    (project / small.SCENE).write_text(text, encoding="utf-8")
+    assert small.load_project(project).study.bound["small"].mesh.vertices > 0
 
 
 @FUZZ
 @given(data=st.data())
 @pytest.mark.parametrize("section", [None, "ladder", "hard_cases"])
 def test_mutated_studies(project: Path, section: str | None, data: st.DataObject) -> None:
-    full = yaml.safe_load((CONFIG / "default.yaml").read_text(encoding="utf-8"))
-    base = {**full, **small_study(), "subspace": {**full["subspace"], "scenes": ["small"]}}
-    (project / SCENE).write_text(SMALL_SCENE, encoding="utf-8")
+    full = yaml.safe_load((small.CONFIG / "default.yaml").read_text(encoding="utf-8"))
+    base = {**full, **small.small_study(), "subspace": {**full["subspace"], "scenes": ["small"]}}
+    (project / small.SCENE).write_text(small.SMALL_SCENE, encoding="utf-8")
     accepted_or_named(project, data.draw(mutated({section: base[section]} if section else base)))
 
 
@@ -173,8 +165,8 @@ def test_mutated_studies(project: Path, section: str | None, data: st.DataObject
 @given(data=st.data())
 @pytest.mark.parametrize("name", FILES)
 def test_mutated_files(project: Path, name: str, data: st.DataObject) -> None:
-    (project / SCENE).write_text(SMALL_SCENE, encoding="utf-8")
-    original = CONFIG / f"{name}.yaml"
+    (project / small.SCENE).write_text(small.SMALL_SCENE, encoding="utf-8")
+    original = small.CONFIG / f"{name}.yaml"
     broken = data.draw(mutated(yaml.safe_load(original.read_text(encoding="utf-8"))))
     target = project / "config" / original.name
     try:
@@ -186,7 +178,7 @@ def test_mutated_files(project: Path, name: str, data: st.DataObject) -> None:
 
 @FUZZ
 @given(content=st.binary(max_size=200) | st.text(max_size=60).map(str.encode))
-@pytest.mark.parametrize("path", [STUDY, SCENE])
+@pytest.mark.parametrize("path", [small.STUDY, small.SCENE])
 def test_any_bytes_as_a_file(project: Path, path: str, content: bytes) -> None:
     original = (project / path).read_bytes()
     try:

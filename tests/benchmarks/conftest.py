@@ -10,14 +10,11 @@ def pytest_benchmark_update_json(
 ) -> None:
     """Shorten the file that `--benchmark-json` writes."""
     for benchmark in output_json["benchmarks"]:
-        benchmark["stats"] = {
-            key: _short(v) for key, v in benchmark["stats"].items() if key != "data"
-        }
+        benchmark["stats"].pop("data", None)
+        for key, value in benchmark["stats"].items():
+            if isinstance(value, float):
+                benchmark["stats"][key] = float(f"{value:.4g}")
         benchmark["options"] = {}
-
-
-def _short(value: Any) -> Any:
-    return float(f"{value:.4g}") if isinstance(value, float) else value
 
 
 def pytest_benchmark_update_machine_info(config: Any, machine_info: dict[str, Any]) -> None:

@@ -2,8 +2,6 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from builders import GRAVITY, GROUPS, LEFT, Pushing, make_scene
 from pdrom.model.constraints.base import ConstraintGroup
@@ -14,10 +12,9 @@ from study.experiments.hard_cases.outcomes import BOUNDED
 SHEET = {"kind": "cloth", "rows": 4, "columns": 3}
 BAR = {"kind": "bar", "nx": 3, "ny": 2, "nz": 2}
 MESHES = {"spring": SHEET, "strain": SHEET, "bending": SHEET, "deformation_gradient": BAR}
-FRAMES = 16
+FRAMES, ITERATIONS = 16, 2
 SCENES = 300
 RIGHT = {"effect": "pins", "select": "right"}
-RELEASED = [{**LEFT, "until": 20}, {**RIGHT, "start": 10, "until": 30}]
 MOVED = {"effect": "translate", "select": "left", "over": 6, "offset": [0.3, 0.0, 0.2]}
 HOLDS: list[list[dict]] = [
     [],
@@ -72,10 +69,10 @@ def modes(scene: Scene, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return squares[moving], root[:, None] * vectors[:, moving]
 
 
-def differences(scene: Scene, draw, without) -> np.ndarray:
-    """|e|_K (F,) after each frame of two runs with the forces of ``draw`` and ``without``."""
+def differences(scene: Scene, draw) -> np.ndarray:
+    """|e|_K (F,) after each frame of two runs, with the forces of ``draw`` and without."""
     ends = []
-    for forces in (draw, without):
+    for forces in (draw, lambda: 0.0):
         loop = scene.stepper(local_steps=[Pushing(forces)], track_objective=False)
         state, positions = scene.initial_state(), []
         for frame in range(scene.config.frames):
@@ -96,25 +93,6 @@ def allowed(scene: Scene) -> np.ndarray:
     return bound
 
 
-@pytest.mark.parametrize("holds", [[], [LEFT], RELEASED], ids=["free", "held", "released"])
-@pytest.mark.parametrize("group", ["spring", "strain", "deformation_gradient"])
-def test_a_run_with_any_bounded_projections_stays_within_its_bound(group, holds, rng):
-    """Other random projections in every iteration, a hundred times as large as projections are."""
-    own = {"effect": group, "weight": 1e4}
-    scene = make_scene(GRAVITY, *holds, own, mesh=GROUPS[group], frames=60)
-    g = scene.group(group)
-    radii = 100.0 * largest_projections(g, scene.mesh.points)
-
-    def drawn() -> np.ndarray:
-        p = rng.standard_normal((g.elements, g.rows_per_element * 3))
-        p *= (radii / np.linalg.norm(p, axis=1))[:, None]
-        return g.S.T @ (g.row_weights[:, None] * p.reshape(-1, 3))
-
-    beta = float(np.sqrt(g.weights @ radii**2))  # | p |_W, which bounds | S^T W p |_{K^+}
-    energy = differences(scene, drawn, lambda: 0.0)
-    assert (energy <= (1 + 1e-9) * allowed(scene) * beta).all()
-
-
 def random_scene(rng: np.random.Generator) -> Scene:
     """Masses over two decades, any mixture of the forces with a rate, any of `HOLDS`."""
     group, h = str(rng.choice(list(MESHES))), float(10.0 ** rng.uniform(-2.5, -1.0))
@@ -125,13 +103,15 @@ def random_scene(rng: np.random.Generator) -> Scene:
         effects.append({"effect": "drag", "coefficient": 10.0 ** rng.uniform(-1.0, 4.0)})
     effects += HOLDS[rng.integers(len(HOLDS))]
     effects.append({"effect": group, "weight": float(10.0 ** rng.uniform(1.0, 6.0))})
-    scene = make_scene(*effects, mesh=MESHES[group], frames=FRAMES, time_step=h, iterations=1)
+    scene = make_scene(
+        *effects, mesh=MESHES[group], frames=FRAMES, time_step=h, iterations=ITERATIONS
+    )
     masses = 10.0 ** rng.uniform(-1.0, 1.0, scene.mesh.vertices)
     return Scene.build(scene.config, scene.mesh, masses=masses)
 
 
 def random_forces(scene: Scene, rng: np.random.Generator) -> tuple[np.ndarray, float]:
-    """Forces (F, N, 3) of projections of each frame, and the largest of their norms in K^+.
+    """Forces (2 F, N, 3) of projections of each iteration, and the largest norm of them in K^+.
 
     Random ones, or one mode in step with its own answers, which is what carries farthest.
     """
@@ -141,14 +121,14 @@ def random_forces(scene: Scene, rng: np.random.Generator) -> tuple[np.ndarray, f
     free = np.arange(len(stiffness)) if free is None else free
     squares, vectors = modes(scene, free)
     if rng.random() < 0.4 or len(squares) == 0:
-        p = rng.standard_normal((FRAMES, group.S.shape[0], 3))
+        p = rng.standard_normal((ITERATIONS * FRAMES, group.S.shape[0], 3))
         forces = np.stack([group.S.T @ (group.row_weights[:, None] * one) for one in p])
     else:
         mode = rng.integers(min(3, len(squares)))
         angle = np.arctan(scene.config.time_step * np.sqrt(squares[mode]))
         field = np.zeros((len(stiffness), 3))
         field[free] = vectors[:, [mode]] * rng.standard_normal(3)
-        signs = np.sign(np.sin(np.arange(FRAMES, 0, -1) * angle))
+        signs = np.sign(np.sin(np.arange(FRAMES, 0, -1) * angle)).repeat(ITERATIONS)
         forces = signs[:, None, None] * (stiffness @ field)
     inverse = np.linalg.pinv(stiffness[np.ix_(free, free)], rcond=1e-11, hermitian=True)
     norms = [np.sqrt(np.sum(f[free] * (inverse @ f[free]))) for f in forces]
@@ -166,7 +146,7 @@ def test_the_bound_holds_in_random_scenes_and_is_nearly_met():
         if np.abs(kept_velocity(scene)).max() <= 1.0:
             forces, beta = random_forces(scene, rng)
             push = iter(forces)
-            energy = differences(scene, lambda push=push: next(push), lambda: 0.0)
+            energy = differences(scene, lambda push=push: next(push))
             used.append(float((energy / (allowed(scene) * beta + 1e-300)).max()))
     assert len(used) == SCENES
     assert 0.9 < max(used) <= 1.0 + 1e-6
@@ -195,16 +175,6 @@ def test_growth_for_ever_is_that_of_a_resonance(tangent):
     assert x == pytest.approx(growth(np.array([angle]), len(m)), rel=1e-9)
     closed = 1.0 / np.tan(angle / 2.0)
     assert 0.6 * closed < x <= closed
-
-
-@given(st.floats(1e-3, 50.0))
-def test_the_poles_of_a_frame_lie_inside_the_unit_circle(tangent):
-    """a z^2 - 2 z + 1 with a = 1 + t^2 has the roots cos(t) exp(+-i t)."""
-    roots = np.roots([1.0 + tangent**2, -2.0, 1.0])
-    angle = np.arctan(tangent)
-    expected = np.cos(angle) * np.exp(1j * angle)
-    assert np.sort_complex(roots)[-1] == pytest.approx(expected, rel=1e-6)
-    assert np.abs(roots).max() < 1.0
 
 
 @pytest.mark.parametrize("group", sorted(GROUPS))

@@ -105,19 +105,6 @@ def test_rotation_and_translation_equivariance(group_scene, rng):
     assert np.abs(other.positions - expected).max() < 1e-9
 
 
-def test_pins_hold_exactly_and_release():
-    scene = make_scene(
-        GRAVITY,
-        {"effect": "pins", "select": "top", "until": 10},
-        {"effect": "spring", "weight": 1e5},
-        frames=20,
-    )
-    positions = trajectory(scene)
-    top = np.flatnonzero(scene.mesh.points[:, 1] > scene.mesh.points[:, 1].max() - 1e-9)
-    assert np.array_equal(positions[10, top], positions[0, top])
-    assert (positions[12, top, 1] < positions[0, top, 1]).all()
-
-
 def test_handles_reach_their_target():
     scene = make_scene(
         {"effect": "translate", "select": "top", "offset": [0.1, 0.2, -0.3], "over": 5},

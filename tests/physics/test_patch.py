@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from builders import GROUPS, make_scene, random_rotation
+from builders import make_scene
+from pdrom.model.runs import trajectory
 
 GRADIENT = np.array([[1.3, 0.2, -0.1], [0.05, 0.8, 0.3], [-0.2, 0.1, 1.1]])
 
@@ -30,14 +31,6 @@ def test_tetrahedra_see_a_constant_gradient():
     assert f == pytest.approx(np.broadcast_to(GRADIENT, f.shape), abs=1e-11)
 
 
-@pytest.mark.parametrize("group", ["strain", "tetrahedron_strain", "deformation_gradient"])
-def test_rigid_motions_cost_nothing(group, rng):
-    scene = make_scene({"effect": group, "weight": 1e6}, mesh=GROUPS[group])
-    moved = scene.mesh.points @ random_rotation(rng).T + rng.standard_normal(3)
-    rhs = np.zeros_like(moved)
-    assert scene.groups[0].accumulate(moved, rhs) < 1e-18 * 1e6
-
-
 def test_stretched_spring_relaxes_to_its_rest_length():
     """One loose triangle of springs, heavy damping by the implicit step: rest lengths return."""
     mesh = {"kind": "cloth", "rows": 2, "columns": 2}
@@ -45,10 +38,7 @@ def test_stretched_spring_relaxes_to_its_rest_length():
         {"effect": "spring", "weight": 1e5}, {"effect": "damping", "rate": 10.0}, mesh=mesh,
         frames=300,
     )  # fmt: skip
-    from pdrom.model.runs import simulate
-
     stretched = 0.2 * (scene.mesh.points - scene.mesh.points.mean(axis=0))
-    *_, (state, _) = simulate(scene, perturbation=stretched)
     group = scene.groups[0]
-    lengths = np.linalg.norm(group.S @ state.positions, axis=1)
+    lengths = np.linalg.norm(group.S @ trajectory(scene, stretched)[-1], axis=1)
     assert lengths == pytest.approx(np.linalg.norm(group.rest, axis=1), rel=1e-3)

@@ -217,13 +217,8 @@ def _requested(scene: Scene, file: h5py.File) -> RequestedRun:
 def _reduced(scene: Scene, file: h5py.File) -> ReducedRun:
     full = FullRun(scene, file["full"][...].astype(float), file["full_ms"][...], {})
     positions, blowup = file["reduced"][...].astype(float), int(file.attrs["blowup_frame"])
-    outcome = Rerun(
-        positions,
-        file["difference"][...],
-        file["extent"][...],
-        None if blowup < 0 else blowup,
-        positions,
-    )
+    difference, extent = file["difference"][...], file["extent"][...]
+    outcome = Rerun(positions, difference, extent, None if blowup < 0 else blowup, positions)
     group, method = str(file.attrs["group"]), str(file.attrs["method"])
     r, gain, ms = int(file.attrs["r"]), float(file.attrs["gain"]), float(file.attrs["ms_per_frame"])
     return ReducedRun(full, group, method, r, gain, outcome, ms)

@@ -5,7 +5,7 @@ import json
 import math
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from pdrom.command.base import Command, Status
 
@@ -60,13 +60,6 @@ VOLUME = """\
 """
 KILOGRAMS = 10.0  # of a vertex of the study's scenes, for which the weights are meant
 ENOUGH = 3  # fewest held vertices with which a body cannot turn about a line
-
-
-ARGUMENTS: dict[str, dict[str, Any]] = {
-    "scene": {"metavar": "SCENE", "help": "file to write; .yaml is added to a name"},
-    "--mesh": {"metavar": "FILE", "help": "mesh file (.obj, .vtu, .msh ...)"},
-    "--up": {"choices": "xyz", "default": "y", "help": "axis of the mesh that points up (y)"},
-}
 
 
 def perform(arguments: argparse.Namespace) -> Status:
@@ -190,6 +183,10 @@ def _floor(mesh: "Mesh", axis: int) -> str:
 COMMAND = Command(
     "Write the file of a new scene, with comments",
     "pdrom new sheet.yaml --mesh sheet.obj",
-    ARGUMENTS,
+    {
+        "scene": {"metavar": "SCENE", "help": "file to write; .yaml is added to a name"},
+        "--mesh": {"metavar": "FILE", "help": "mesh file (.obj, .vtu, .msh ...)"},
+        "--up": {"choices": "xyz", "default": "y", "help": "axis of the mesh that points up (y)"},
+    },
     perform,
 )

@@ -20,7 +20,9 @@ class _Line:
         self._name, self._stream = name, stream or sys.stderr
         self._terminal = self._stream.isatty()
         self._began = self._shown = monotonic()
-        if not kernels_are_kept():
+        folder = os.environ.get("NUMBA_CACHE_DIR")
+        # a step loop in the folder of compiled kernels; where no folder is known, nothing is said
+        if folder is not None and not any(Path(folder).glob("dynamics*/*.nbi")):
             self._stream.write(f"{name}: compiling kernels (once, up to a minute)\n")
             self._stream.flush()
 
@@ -68,12 +70,6 @@ def line(name: str, done: int, frames: int, ms: float, left: float) -> str:
     full = WIDTH * done // frames
     bar = "#" * full + "." * (WIDTH - full)
     return f"{name} [{bar}] frame {done} of {frames}, {ms:.2f} ms a frame, {left:.0f} s left"
-
-
-def kernels_are_kept() -> bool:
-    """Whether the folder of compiled kernels has a step loop; True where no folder is known."""
-    folder = os.environ.get("NUMBA_CACHE_DIR")
-    return folder is None or any(Path(folder).glob("dynamics*/*.nbi"))
 
 
 class LevelProgress(_Line):

@@ -3,7 +3,7 @@
 import argparse
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from pdrom.command.base import SCENE, UNCHECKED, Command, Status, files_of, require_output
 
@@ -20,27 +20,6 @@ def _size(text: str) -> int:
     if size < 1:
         raise argparse.ArgumentTypeError(f"{size}: a number of modes is required, at least 1")
     return size
-
-
-ARGUMENTS: dict[str, dict[str, Any]] = {
-    "scene": SCENE,
-    "--group": {"metavar": "G", "help": "constraint group to reduce"},
-    "--error": {
-        "metavar": "E",
-        "help": "largest relative error of the run, 0.01 or velocity=0.05: the whole scene is "
-        "reduced as far as that allows, or not at all (reduce.error of the scene)",
-    },
-    "--method": {"metavar": "M", "default": "gappy", "help": "name in config/methods.yaml (gappy)"},
-    "--r": {"metavar": "R", "type": _size, "default": 20, "help": "number of modes (20)"},
-    "--run": {
-        "metavar": "FILE",
-        "help": "full-order run by pdrom run; made first if it is left out, required with --error, "
-        "where it may be of another motion of the same mesh",
-    },
-    "--out": {"metavar": "FILE", "help": "file to write (HDF5); SCENE_G_M_R.h5 without it"},
-    "--plot": {"metavar": "FILE", "help": "picture of the error against time to write"},
-    "--unchecked": UNCHECKED,
-}
 
 
 def perform(arguments: argparse.Namespace) -> Status:
@@ -186,7 +165,29 @@ def _done(made: "RequestedRun") -> list[str]:
 COMMAND = Command(
     "Run a scene with the projections of one group reduced, and compare it with the full order",
     "pdrom reduce sheet.yaml --group spring --method gappy --r 20 --plot error.png",
-    ARGUMENTS,
+    {
+        "scene": SCENE,
+        "--group": {"metavar": "G", "help": "constraint group to reduce"},
+        "--error": {
+            "metavar": "E",
+            "help": "largest relative error of the run, 0.01 or velocity=0.05: the whole scene is "
+            "reduced as far as that allows, or not at all (reduce.error of the scene)",
+        },
+        "--method": {
+            "metavar": "M",
+            "default": "gappy",
+            "help": "name in config/methods.yaml (gappy)",
+        },
+        "--r": {"metavar": "R", "type": _size, "default": 20, "help": "number of modes (20)"},
+        "--run": {
+            "metavar": "FILE",
+            "help": "full-order run by pdrom run; made first if it is left out, required with "
+            "--error, where it may be of another motion of the same mesh",
+        },
+        "--out": {"metavar": "FILE", "help": "file to write (HDF5); SCENE_G_M_R.h5 without it"},
+        "--plot": {"metavar": "FILE", "help": "picture of the error against time to write"},
+        "--unchecked": UNCHECKED,
+    },
     perform,
     one_of=("--group", "--error"),
 )

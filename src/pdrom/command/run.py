@@ -6,13 +6,6 @@ from pathlib import Path
 
 from pdrom.command.base import SCENE, Command, Status, files_of, require_output
 
-ARGUMENTS = {
-    "scene": SCENE,
-    "--out": {
-        "metavar": "FILE", "help": "file to write (HDF5); SCENE.h5 beside the scene without it",
-    },
-}  # fmt: skip
-
 
 def perform(arguments: argparse.Namespace) -> Status:
     """Run the scene of ``arguments`` with a line about its progress, and say what was written."""
@@ -35,5 +28,14 @@ def perform(arguments: argparse.Namespace) -> Status:
 
 
 COMMAND = Command(
-    "Run a scene in full order", "pdrom run sheet.yaml --out sheet.h5", ARGUMENTS, perform
+    "Run a scene in full order",
+    "pdrom run sheet.yaml --out sheet.h5",
+    {
+        "scene": SCENE,
+        "--out": {
+            "metavar": "FILE",
+            "help": "file to write (HDF5); SCENE.h5 beside the scene without it",
+        },
+    },
+    perform,
 )

@@ -12,12 +12,6 @@ from pdrom.command.base import Command, Status
 LONGEST = 100  # characters of an attribute's value
 
 
-ARGUMENTS: dict[str, dict[str, Any]] = {
-    "file": {"metavar": "FILE", "help": "a result of the pipeline or of this command"},
-    "--configuration": {"action": "store_true", "help": "the whole configuration, as YAML"},
-}
-
-
 def perform(arguments: argparse.Namespace) -> Status:
     """Say what the file of ``arguments`` holds; nothing is changed."""
     from pdrom.core.provenance import RECORD
@@ -121,6 +115,9 @@ def _short(value: Any) -> str:
 COMMAND = Command(
     "Say what a result is: content, shapes, units, configuration, provenance",
     "pdrom show results/fom/spring_oop/train.h5",
-    ARGUMENTS,
+    {
+        "file": {"metavar": "FILE", "help": "a result of the pipeline or of this command"},
+        "--configuration": {"action": "store_true", "help": "the whole configuration, as YAML"},
+    },
     perform,
 )

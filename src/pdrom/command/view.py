@@ -4,18 +4,8 @@ import argparse
 import sys
 import webbrowser
 from pathlib import Path
-from typing import Any
 
 from pdrom.command.base import UNCHECKED, Command, Status, require_output
-
-ARGUMENTS: dict[str, dict[str, Any]] = {
-    "results": {"metavar": "RESULT", "nargs": "+", "help": "files of pdrom run and pdrom reduce"},
-    "--out": {"metavar": "FILE", "help": "page to write; the first RESULT as .html"},
-    "--open": {"action": "store_true", "help": "open it in the browser"},
-    "--png": {"metavar": "FILE", "help": "picture of four frames of each run, too"},
-    "--vtk": {"metavar": "FOLDER", "help": "files for ParaView, too: one a frame, and run.pvd"},
-    "--unchecked": UNCHECKED,
-}
 
 
 def perform(arguments: argparse.Namespace) -> Status:
@@ -56,6 +46,17 @@ def perform(arguments: argparse.Namespace) -> Status:
 COMMAND = Command(
     "Write a page on which runs are looked at, a picture, or files for ParaView",
     "pdrom view sheet_spring_gappy_20.h5 --open",
-    ARGUMENTS,
+    {
+        "results": {
+            "metavar": "RESULT",
+            "nargs": "+",
+            "help": "files of pdrom run and pdrom reduce",
+        },
+        "--out": {"metavar": "FILE", "help": "page to write; the first RESULT as .html"},
+        "--open": {"action": "store_true", "help": "open it in the browser"},
+        "--png": {"metavar": "FILE", "help": "picture of four frames of each run, too"},
+        "--vtk": {"metavar": "FOLDER", "help": "files for ParaView, too: one a frame, and run.pvd"},
+        "--unchecked": UNCHECKED,
+    },
     perform,
 )

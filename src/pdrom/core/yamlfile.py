@@ -180,16 +180,12 @@ def check_lengths(path: str) -> None:
             raise ValueError(f"names of at most {MAX_NAME} bytes are required")
 
 
-def name_of(stem: str) -> str:
-    """Make a valid scene name from ``stem``, the scene's file name without its ending."""
-    return re.sub(r"[^a-z0-9_]+", "_", stem.lower()).lstrip("_0123456789")[:64] or "scene"
-
-
 def named(keys: Any, stem: str) -> Any:
     """Add a missing name and title, made from the file name ``stem``, to a scene's ``keys``."""
     if not isinstance(keys, dict):
         return keys
-    name = keys.get("name", name_of(stem))
+    valid = re.sub(r"[^a-z0-9_]+", "_", stem.lower()).lstrip("_0123456789")[:64] or "scene"
+    name = keys.get("name", valid)
     return {"name": name, "title": str(name).replace("_", " ").capitalize(), **keys}
 
 

@@ -74,19 +74,16 @@ def _draw(scene: ViewedScene) -> Figure:
     return draw_rows(rows, NO_LIMIT)
 
 
-def panel_of(run: ViewedRun, frame: int) -> RunPanel:
-    """Panel of ``run`` at ``frame``; of a run that ended earlier, its last frame and the reason."""
-    last = len(run.positions) - 1
-    failure = f"blew up at frame {run.blowup_frame}" if run.blowup_frame is not None else "ended"
-    positions = run.positions[min(frame, last)].astype(float)
-    return RunPanel("", _colour(run.group), positions, failure if frame > last else None)
-
-
 def _panel(run: ViewedRun, frame: int) -> RunPanel:
-    panel, last = panel_of(run, frame).seen_by(CAMERA), len(run.positions) - 1
-    drawn = f"drawn: frame {last}" if last else "drawn: initial state"
-    remark = drawn if panel.failure else f"relative error {run.error[frame - 1]:.1g}"
-    return replace(panel, remark=remark if frame else None)
+    """Panel of ``run`` at ``frame``; of a run that ended earlier, its last frame and the reason."""
+    last, failure, remark = len(run.positions) - 1, None, None
+    if frame > last:
+        failure = "ended" if run.blowup_frame is None else f"blew up at frame {run.blowup_frame}"
+        remark = f"drawn: frame {last}" if last else "drawn: initial state"
+    elif frame:
+        remark = f"relative error {run.error[frame - 1]:.1g}"
+    positions = run.positions[min(frame, last)].astype(float)
+    return RunPanel("", _colour(run.group), positions, failure, remark).seen_by(CAMERA)
 
 
 def _colour(group: str) -> tuple[float, float, float]:

@@ -1,4 +1,4 @@
-"""Readers of result files for figures: positions of runs, bases and samplings."""
+"""Readers of result files for figures: positions of runs and samplings."""
 
 from dataclasses import dataclass
 
@@ -110,34 +110,6 @@ def rerun_positions(path: str, info: RerunInfo, frame: int) -> tuple[int, np.nda
             if np.isfinite(positions).all():
                 return entry, positions
     return None
-
-
-@dataclass(frozen=True)
-class BasisView:
-    """Modes V (3 e p, rank) of a group, their singular values, and the snapshots' mean (3 e p,)."""
-
-    V: np.ndarray
-    mean: np.ndarray
-    singular_values: np.ndarray
-    rank: int
-    rows_per_element: int
-
-    @property
-    def elements(self) -> int:
-        """Number e of elements."""
-        return len(self.V) // (3 * self.rows_per_element)
-
-
-def read_basis(path: str) -> BasisView:
-    """Basis of a group in the file ``path``; StorageError if that is damaged."""
-    with open_hdf5(path) as file:
-        return BasisView(
-            V=file["V"][...],
-            mean=file["mean"][...],
-            singular_values=file["singular_values"][...],
-            rank=int(file.attrs["rank"]),
-            rows_per_element=int(file.attrs["rows_per_element"]),
-        )
 
 
 @dataclass(frozen=True)

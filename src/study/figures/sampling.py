@@ -7,13 +7,14 @@ import numpy as np
 from pdrom.core.errors import StorageError
 from pdrom.core.store import open_hdf5
 from pdrom.model.mesh.types import load_mesh
+from pdrom.reduction.basis import load_basis
 from pdrom.view import style
 from pdrom.view.artists import Axes, Figure, ScalarMappable
 from pdrom.view.camera import Camera, window_of
 from pdrom.view.mesh_render import draw_surface, set_window
 from pdrom.view.multiples import panels, rows_of
 from pdrom.view.panels import fit_aspect
-from pdrom.view.read import SamplingView, read_basis, read_samplings
+from pdrom.view.read import SamplingView, read_samplings
 from study.artifact.paths import BASIS, MESH, SAMPLING, SNAPSHOTS, File
 from study.artifact.reads import EachOf
 from study.figures.kit.declaration import figure
@@ -89,7 +90,7 @@ def deim_iterations(
     if not samples or reduction is None or reduction.rows == "all":
         raise NothingToDraw(f"samples of {options.words()}")
     experiment, path = drawn.experiments[0], samples[0].path
-    basis, samplings = read_basis(bases[0].path), read_samplings(path)
+    basis, samplings = load_basis(bases[0].path), read_samplings(path)
     if not samplings:
         raise NothingToDraw(f"nothing was sampled for {experiment.title}")
     entries, camera = samplings[-1].entries, options.camera(experiment)

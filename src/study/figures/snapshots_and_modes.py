@@ -3,13 +3,14 @@
 import numpy as np
 
 from pdrom.model.mesh.types import load_mesh
+from pdrom.reduction.basis import Basis, load_basis
 from pdrom.reduction.snapshots import load_snapshots
 from pdrom.view import style
 from pdrom.view.artists import Axes, Figure
 from pdrom.view.camera import Camera, Window, window_of
 from pdrom.view.mesh_render import set_window
 from pdrom.view.panels import fit_aspect
-from pdrom.view.read import BasisView, positions_at, read_basis
+from pdrom.view.read import positions_at
 from study.artifact.paths import BASIS, MESH, SNAPSHOTS, TRAIN, File
 from study.artifact.reads import EachOf
 from study.figures.kit.declaration import figure
@@ -62,7 +63,7 @@ def snapshots_and_modes(
     if not bases:
         raise NothingToDraw(options.words())
     experiment, path = drawn.experiments[0], bases[0].path
-    basis, snapshots = read_basis(path), load_snapshots(sets[0].path)
+    basis, snapshots = load_basis(path), load_snapshots(sets[0].path)
     mesh = load_mesh(meshes[0].path)
     elements = element_map(experiment.group, mesh, snapshots.elements, source=str(path))
     centred = snapshots.train.reshape(len(snapshots.train), -1).T - basis.mean[:, None]
@@ -98,7 +99,7 @@ def _height(window: Window, count: int) -> float:
     return min(TALLEST, (style.WIDTH - LEFT) / count * window.height / window.width)
 
 
-def _draw_product(figure: Figure, basis: BasisView, centred: np.ndarray, title: str) -> None:
+def _draw_product(figure: Figure, basis: Basis, centred: np.ndarray, title: str) -> None:
     """Draw the four matrices; rows of snapshots and modes are sorted by axis, first x."""
     from matplotlib.colors import LogNorm
 

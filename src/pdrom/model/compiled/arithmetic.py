@@ -4,6 +4,8 @@ Operations are never reordered, so that the result of a lane does not depend on 
 A product and a sum are rounded once (fused) if the processor supports it.
 """
 
+from functools import wraps
+
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
@@ -11,138 +13,130 @@ from numba.extending import intrinsic
 
 from pdrom.model.compiled.rows import INDICES, NUMBERS, ROW, WIDTH
 
+_NUMBER = types.float64
+
 
 def spread(builder, number):
     """Return an LLVM vector that ``builder`` makes, with ``number`` in all lanes."""
     undefined = ir.Constant(NUMBERS, ir.Undefined)
-    first = builder.insert_element(undefined, number, ir.Constant(ir.IntType(32), 0))
+    first = builder.insert_element(undefined, number, _lane(0))
     return builder.shuffle_vector(first, undefined, ir.Constant(INDICES, [0] * WIDTH))
 
 
 def multiply_add(builder, a, b, c):
     """Return the LLVM vector a b + c that ``builder`` makes, fused if the processor supports it."""
-    kind = ir.FunctionType(NUMBERS, [NUMBERS] * 3)
-    function = cgutils.get_or_insert_function(builder.module, kind, "llvm.fmuladd.v4f64")
-    return builder.call(function, [a, b, c])
+    return _call(builder, "fmuladd", a, b, c)
 
 
-@intrinsic
-def constant(_context, _number):
+def _call(builder, name, *vectors):
+    kind = ir.FunctionType(NUMBERS, [NUMBERS] * len(vectors))
+    function = cgutils.get_or_insert_function(builder.module, kind, f"llvm.{name}.v4f64")
+    return builder.call(function, vectors)
+
+
+def _lane(number):
+    return ir.Constant(ir.IntType(32), number)
+
+
+def _operation(result, *kinds):
+    """Return a decorator of ``write(builder, *arguments)``, which makes an LLVM value.
+
+    The decorated function is an intrinsic with arguments of these ``kinds`` and this ``result``.
+    """
+
+    def decorate(write):
+        @wraps(write)
+        def typed(_context, *_kinds):
+            return result(*kinds), lambda _target, builder, _signature, own: write(builder, *own)
+
+        return intrinsic(typed)
+
+    return decorate
+
+
+@_operation(ROW, _NUMBER)
+def constant(builder, number):
     """Return a row with the same number in all lanes."""
-
-    def generate(_target, builder, _signature, arguments):
-        return spread(builder, arguments[0])
-
-    return ROW(types.float64), generate
+    return spread(builder, number)
 
 
-def _lanewise(operation, name, description):
-    def typed(_context, _a, _b):
-        def generate(_target, builder, _signature, arguments):
-            return getattr(builder, operation)(*arguments)
-
-        return ROW(ROW, ROW), generate
-
-    typed.__name__ = typed.__qualname__ = name
-    typed.__doc__ = description
-    return intrinsic(typed)
+@_operation(ROW, ROW, ROW)
+def add(builder, a, b):
+    """a + b."""
+    return builder.fadd(a, b)
 
 
-add = _lanewise("fadd", "add", "a + b.")
-subtract = _lanewise("fsub", "subtract", "a - b.")
-multiply = _lanewise("fmul", "multiply", "a b, lane by lane.")
-divide = _lanewise("fdiv", "divide", "a / b, lane by lane.")
+@_operation(ROW, ROW, ROW)
+def subtract(builder, a, b):
+    """a - b."""
+    return builder.fsub(a, b)
 
 
-@intrinsic
-def scaled(_context, _s, _b):
+@_operation(ROW, ROW, ROW)
+def multiply(builder, a, b):
+    """a b, lane by lane."""
+    return builder.fmul(a, b)
+
+
+@_operation(ROW, ROW, ROW)
+def divide(builder, a, b):
+    """a / b, lane by lane."""
+    return builder.fdiv(a, b)
+
+
+@_operation(ROW, _NUMBER, ROW)
+def scaled(builder, s, b):
     """Product s b of a number s and a row b."""
-
-    def generate(_target, builder, _signature, arguments):
-        return builder.fmul(spread(builder, arguments[0]), arguments[1])
-
-    return ROW(types.float64, ROW), generate
+    return builder.fmul(spread(builder, s), b)
 
 
-@intrinsic
-def add_scaled(_context, _a, _s, _b):
+@_operation(ROW, ROW, _NUMBER, ROW)
+def add_scaled(builder, a, s, b):
     """Sum a + s b of rows a and b, with a number s."""
-
-    def generate(_target, builder, _signature, arguments):
-        a, s, b = arguments
-        return multiply_add(builder, spread(builder, s), b, a)
-
-    return ROW(ROW, types.float64, ROW), generate
+    return multiply_add(builder, spread(builder, s), b, a)
 
 
-@intrinsic
-def add_product(_context, _a, _b, _c):
+@_operation(ROW, ROW, ROW, ROW)
+def add_product(builder, a, b, c):
     """Sum a + b c of rows a, b and c, lane by lane."""
-
-    def generate(_target, builder, _signature, arguments):
-        a, b, c = arguments
-        return multiply_add(builder, b, c, a)
-
-    return ROW(ROW, ROW, ROW), generate
+    return multiply_add(builder, b, c, a)
 
 
-def _function_of_row(name, description):
-    def typed(_context, _a):
-        def generate(_target, builder, _signature, arguments):
-            kind = ir.FunctionType(NUMBERS, [NUMBERS])
-            full_name = f"llvm.{name}.v4f64"
-            function = cgutils.get_or_insert_function(builder.module, kind, full_name)
-            return builder.call(function, arguments)
-
-        return ROW(ROW), generate
-
-    typed.__name__ = typed.__qualname__ = name
-    typed.__doc__ = description
-    return intrinsic(typed)
+@_operation(ROW, ROW)
+def square_root(builder, a):
+    """Square root, lane by lane."""
+    return _call(builder, "sqrt", a)
 
 
-square_root = _function_of_row("sqrt", "Square root, lane by lane.")
-magnitude = _function_of_row("fabs", "Absolute value, lane by lane.")
+@_operation(ROW, ROW)
+def magnitude(builder, a):
+    """Absolute value, lane by lane."""
+    return _call(builder, "fabs", a)
 
 
-@intrinsic
-def total(_context, _row):
+@_operation(_NUMBER, ROW)
+def total(builder, row):
     """Sum of the four components of a row, added from the first to the last."""
-
-    def generate(_target, builder, _signature, arguments):
-        sums = builder.extract_element(arguments[0], ir.Constant(ir.IntType(32), 0))
-        for lane in range(1, WIDTH):
-            number = builder.extract_element(arguments[0], ir.Constant(ir.IntType(32), lane))
-            sums = builder.fadd(sums, number)
-        return sums
-
-    return types.float64(ROW), generate
+    sums = builder.extract_element(row, _lane(0))
+    for lane in range(1, WIDTH):
+        sums = builder.fadd(sums, builder.extract_element(row, _lane(lane)))
+    return sums
 
 
-@intrinsic
-def first_three(_context, _row):
+@_operation(types.UniTuple(_NUMBER, 3), ROW)
+def first_three(builder, row):
     """Return the first three components of a row as a tuple of numbers."""
-    result = types.UniTuple(types.float64, 3)
-
-    def generate(context, builder, signature, arguments):
-        lanes = [ir.Constant(ir.IntType(32), lane) for lane in range(3)]
-        numbers = [builder.extract_element(arguments[0], lane) for lane in lanes]
-        return context.make_tuple(builder, signature.return_type, numbers)
-
-    return result(ROW), generate
+    numbers = [builder.extract_element(row, _lane(lane)) for lane in range(3)]
+    return cgutils.pack_array(builder, numbers)
 
 
-@intrinsic
-def of_three(_context, _x, _y, _z):
+@_operation(ROW, _NUMBER, _NUMBER, _NUMBER)
+def of_three(builder, x, y, z):
     """Return the row (x, y, z, 0)."""
-
-    def generate(_target, builder, _signature, arguments):
-        row = ir.Constant(NUMBERS, [0.0] * WIDTH)
-        for lane, number in enumerate(arguments):
-            row = builder.insert_element(row, number, ir.Constant(ir.IntType(32), lane))
-        return row
-
-    return ROW(types.float64, types.float64, types.float64), generate
+    row = ir.Constant(NUMBERS, [0.0] * WIDTH)
+    for lane, number in enumerate((x, y, z)):
+        row = builder.insert_element(row, number, _lane(lane))
+    return row
 
 
 def _within(builder, row, low, high):
@@ -151,46 +145,32 @@ def _within(builder, row, low, high):
     return builder.and_(above, below)
 
 
-@intrinsic
-def all_within(_context, _row, _low, _high):
+@_operation(types.boolean, ROW, _NUMBER, _NUMBER)
+def all_within(builder, row, low, high):
     """Return whether all components lie in [low, high]; false if one of them is NaN."""
-
-    def generate(_target, builder, _signature, arguments):
-        inside = builder.bitcast(_within(builder, *arguments), ir.IntType(WIDTH))
-        return builder.icmp_unsigned("==", inside, ir.Constant(ir.IntType(WIDTH), -1))
-
-    return types.boolean(ROW, types.float64, types.float64), generate
+    inside = builder.bitcast(_within(builder, row, low, high), ir.IntType(WIDTH))
+    return builder.icmp_unsigned("==", inside, ir.Constant(ir.IntType(WIDTH), -1))
 
 
-@intrinsic
-def choose_within(_context, _row, _low, _high, _a, _b):
+@_operation(ROW, ROW, _NUMBER, _NUMBER, ROW, ROW)
+def choose_within(builder, row, low, high, a, b):
     """Return a row with lane k of a where lane k of ``row`` is in [low, high], else of b."""
-
-    def generate(_target, builder, _signature, arguments):
-        row, low, high, a, b = arguments
-        return builder.select(_within(builder, row, low, high), a, b)
-
-    return ROW(ROW, types.float64, types.float64, ROW, ROW), generate
+    return builder.select(_within(builder, row, low, high), a, b)
 
 
-@intrinsic
-def transposed(_context, _a, _b, _c, _d):
+@_operation(types.UniTuple(ROW, WIDTH), ROW, ROW, ROW, ROW)
+def transposed(builder, a, b, c, d):
     """Return the four columns of the 4 x 4 matrix with the rows a, b, c, d."""
-    result = types.UniTuple(ROW, WIDTH)
 
-    def shuffle(builder, a, b, order):
+    def shuffle(a, b, *order):
         return builder.shuffle_vector(a, b, ir.Constant(INDICES, order))
 
-    def generate(context, builder, signature, arguments):
-        a, b, c, d = arguments
-        low, high = shuffle(builder, a, b, [0, 4, 2, 6]), shuffle(builder, a, b, [1, 5, 3, 7])
-        lower, higher = shuffle(builder, c, d, [0, 4, 2, 6]), shuffle(builder, c, d, [1, 5, 3, 7])
-        columns = [
-            shuffle(builder, low, lower, [0, 1, 4, 5]),
-            shuffle(builder, high, higher, [0, 1, 4, 5]),
-            shuffle(builder, low, lower, [2, 3, 6, 7]),
-            shuffle(builder, high, higher, [2, 3, 6, 7]),
-        ]
-        return context.make_tuple(builder, signature.return_type, columns)
-
-    return result(ROW, ROW, ROW, ROW), generate
+    low, high = shuffle(a, b, 0, 4, 2, 6), shuffle(a, b, 1, 5, 3, 7)
+    lower, higher = shuffle(c, d, 0, 4, 2, 6), shuffle(c, d, 1, 5, 3, 7)
+    columns = [
+        shuffle(low, lower, 0, 1, 4, 5),
+        shuffle(high, higher, 0, 1, 4, 5),
+        shuffle(low, lower, 2, 3, 6, 7),
+        shuffle(high, higher, 2, 3, 6, 7),
+    ]
+    return cgutils.pack_array(builder, columns)

@@ -24,6 +24,17 @@ def _summed(a, b, c):
     return first_three(add(add(first, third), add(second, fourth)))
 
 
+@compiled(forceinline=True)
+def _products(matrix, i, j, k, vector, p, sums):
+    """Return three ``sums`` plus the products of four numbers of each row, from index ``p`` on."""
+    v = load(vector, p)
+    return (
+        add_product(sums[0], load(matrix, i + p), v),
+        add_product(sums[1], load(matrix, j + p), v),
+        add_product(sums[2], load(matrix, k + p), v),
+    )
+
+
 @compiled(forceinline=True, fastmath={"contract"})
 def dots(matrix, i, j, k, count, vector, starts):
     """Return ``starts`` (three numbers) plus the inner products of three rows with ``vector``.
@@ -35,42 +46,24 @@ def dots(matrix, i, j, k, count, vector, starts):
     x, y, z = starts
     blocks, vectors = count - count % (4 * WIDTH), count - count % WIDTH
     if blocks:
-        a, b, c = of_three(x, 0.0, 0.0), of_three(y, 0.0, 0.0), of_three(z, 0.0, 0.0)
-        a1 = a2 = a3 = b1 = b2 = b3 = c1 = c2 = c3 = constant(0.0)
+        none = constant(0.0)
+        r = of_three(x, 0.0, 0.0), of_three(y, 0.0, 0.0), of_three(z, 0.0, 0.0)
+        s = t = u = (none, none, none)
         for p in range(0, blocks, 4 * WIDTH):
-            v = load(vector, p)
-            a = add_product(a, load(matrix, i + p), v)
-            b = add_product(b, load(matrix, j + p), v)
-            c = add_product(c, load(matrix, k + p), v)
-            q = p + WIDTH
-            v = load(vector, q)
-            a1 = add_product(a1, load(matrix, i + q), v)
-            b1 = add_product(b1, load(matrix, j + q), v)
-            c1 = add_product(c1, load(matrix, k + q), v)
-            q = p + 2 * WIDTH
-            v = load(vector, q)
-            a2 = add_product(a2, load(matrix, i + q), v)
-            b2 = add_product(b2, load(matrix, j + q), v)
-            c2 = add_product(c2, load(matrix, k + q), v)
-            q = p + 3 * WIDTH
-            v = load(vector, q)
-            a3 = add_product(a3, load(matrix, i + q), v)
-            b3 = add_product(b3, load(matrix, j + q), v)
-            c3 = add_product(c3, load(matrix, k + q), v)
-        a, b, c = (
-            add(add(a, a1), add(a2, a3)),
-            add(add(b, b1), add(b2, b3)),
-            add(add(c, c1), add(c2, c3)),
+            r = _products(matrix, i, j, k, vector, p, r)
+            s = _products(matrix, i, j, k, vector, p + WIDTH, s)
+            t = _products(matrix, i, j, k, vector, p + 2 * WIDTH, t)
+            u = _products(matrix, i, j, k, vector, p + 3 * WIDTH, u)
+        x, y, z = _summed(
+            add(add(r[0], s[0]), add(t[0], u[0])),
+            add(add(r[1], s[1]), add(t[1], u[1])),
+            add(add(r[2], s[2]), add(t[2], u[2])),
         )
-        x, y, z = _summed(a, b, c)
     if vectors > blocks:
-        a, b, c = of_three(x, 0.0, 0.0), of_three(y, 0.0, 0.0), of_three(z, 0.0, 0.0)
+        r = of_three(x, 0.0, 0.0), of_three(y, 0.0, 0.0), of_three(z, 0.0, 0.0)
         for p in range(blocks, vectors, WIDTH):
-            v = load(vector, p)
-            a = add_product(a, load(matrix, i + p), v)
-            b = add_product(b, load(matrix, j + p), v)
-            c = add_product(c, load(matrix, k + p), v)
-        x, y, z = _summed(a, b, c)
+            r = _products(matrix, i, j, k, vector, p, r)
+        x, y, z = _summed(*r)
     for p in range(vectors, count):
         v = at(vector, p)
         x += at(matrix, i + p) * v

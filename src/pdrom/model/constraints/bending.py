@@ -2,7 +2,7 @@
 
 import math
 from copy import copy
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numba import carray
@@ -11,28 +11,8 @@ from scipy import sparse
 from pdrom.core.errors import SceneError
 from pdrom.model.compiled import arithmetic, rows
 from pdrom.model.compiled.rows import WIDTH, at
+from pdrom.model.constraints import lanes
 from pdrom.model.constraints.base import ConstraintGroup, GroupConfig, directions, require_cells
-from pdrom.model.constraints.lanes import (
-    LANES,
-    SMALLEST,
-    absolute_sum,
-    blocks,
-    choose,
-    cross,
-    dot,
-    kernel,
-    lane_function,
-    load,
-    mix,
-    pack,
-    perpendicular,
-    save,
-    scaled,
-    square_distance,
-    take,
-    workspace,
-    workspaces,
-)
 from pdrom.model.constraints.local_kernel import (
     FIRST,
     OWN,
@@ -58,15 +38,17 @@ H, P, HEIGHT, SIZE = 0, 3, 6, 7
 ELEMENTS, COUNT, START, INDICES, DATA, SPHERES, WORK, SAMPLED, TAKEN, ARRAYS = range(OWN, OWN + 10)
 
 
-@kernel
+@lanes.kernel
 def put_poles(manifold, elements, side, normals):
     """Write ``side`` (m,) times ``normals`` (m, 3) of some elements to the packed ``manifold``."""
     for e in elements:
-        place = (e // LANES * MANIFOLD + POLE) * LANES + e % LANES
-        save(manifold, 0, place, scaled(side[e], (normals[e, 0], normals[e, 1], normals[e, 2])))
+        place = (e // lanes.LANES * MANIFOLD + POLE) * lanes.LANES + e % lanes.LANES
+        lanes.save(
+            manifold, 0, place, lanes.scaled(side[e], (normals[e, 0], normals[e, 1], normals[e, 2]))
+        )
 
 
-@lane_function
+@lanes.lane_function
 def _curvature(y, e, start, indices, data):
     """Mean-curvature vector of element e at the positions y, from the operator S in CSR form."""
     h = arithmetic.constant(0.0)
@@ -75,53 +57,57 @@ def _curvature(y, e, start, indices, data):
     return h
 
 
-@lane_function
+@lanes.lane_function
 def _without(a, part, n):
     """Return the direction and the length of the vector a - part n."""
-    rest = mix(1.0, a, -part, n)
-    length = np.sqrt(dot(rest, rest))
-    return scaled(1.0 / length, rest), length
+    rest = lanes.mix(1.0, a, -part, n)
+    length = np.sqrt(lanes.dot(rest, rest))
+    return lanes.scaled(1.0 / length, rest), length
 
 
-@lane_function
+@lanes.lane_function
 def _half_spheres(work, manifold, block):
     """Project the curvature vector of each element of a block onto its half sphere."""
     first, wrong = block * MANIFOLD, 0.0
-    for lane in range(LANES):
-        h, n = load(work, H, lane), load(manifold, first + POLE, lane)
+    for lane in range(lanes.LANES):
+        h, n = lanes.load(work, H, lane), lanes.load(manifold, first + POLE, lane)
         # scale the vector so that its squares neither overflow nor underflow
-        scale = absolute_sum(h)
-        unit = scaled(1.0 / (scale + SMALLEST), h)
-        unit = scaled(1.0 / np.sqrt(dot(unit, unit)), unit)
-        save(work, P, lane, unit)
-        work[HEIGHT * LANES + lane] = dot(unit, n)
-    for lane in range(LANES):
-        wrong += 1.0 if work[HEIGHT * LANES + lane] < 0.0 else 0.0
+        scale = lanes.absolute_sum(h)
+        unit = lanes.scaled(1.0 / (scale + lanes.SMALLEST), h)
+        unit = lanes.scaled(1.0 / np.sqrt(lanes.dot(unit, unit)), unit)
+        lanes.save(work, P, lane, unit)
+        work[HEIGHT * lanes.LANES + lane] = lanes.dot(unit, n)
+    for lane in range(lanes.LANES):
+        wrong += 1.0 if work[HEIGHT * lanes.LANES + lane] < 0.0 else 0.0
     if wrong > 0.0:
         _to_rims(work, manifold, first)
-    for lane in range(LANES):
-        n, unit = load(manifold, first + POLE, lane), load(work, P, lane)
-        magnitude = at(manifold, (first + MAGNITUDE) * LANES + lane)
-        pole = choose(dot(n, n) == 0.0, load(manifold, first + REST, lane), scaled(magnitude, n))
-        vanishes = absolute_sum(load(work, H, lane)) == 0.0
-        save(work, P, lane, choose(vanishes, pole, scaled(magnitude, unit)))
+    for lane in range(lanes.LANES):
+        n, unit = lanes.load(manifold, first + POLE, lane), lanes.load(work, P, lane)
+        magnitude = at(manifold, (first + MAGNITUDE) * lanes.LANES + lane)
+        pole = lanes.choose(
+            lanes.dot(n, n) == 0.0,
+            lanes.load(manifold, first + REST, lane),
+            lanes.scaled(magnitude, n),
+        )
+        vanishes = lanes.absolute_sum(lanes.load(work, H, lane)) == 0.0
+        lanes.save(work, P, lane, lanes.choose(vanishes, pole, lanes.scaled(magnitude, unit)))
 
 
-@lane_function
+@lanes.lane_function
 def _to_rims(work, manifold, first):
     """Replace each direction below the equator by the nearest direction on the equator (rim)."""
-    for lane in range(LANES):
-        n, unit = load(manifold, first + POLE, lane), load(work, P, lane)
-        height = work[HEIGHT * LANES + lane]
+    for lane in range(lanes.LANES):
+        n, unit = lanes.load(manifold, first + POLE, lane), lanes.load(work, P, lane)
+        height = work[HEIGHT * lanes.LANES + lane]
         rim, length = _without(unit, height, n)
-        again, left = _without(rim, dot(rim, n), n)
+        again, left = _without(rim, lanes.dot(rim, n), n)
         # a difference of unit vectors that is mostly parallel to n consists of round-off
-        again = choose(length > RIM and left > 0.5, again, perpendicular(n))
-        rim = choose(length > NEAR_POLE, rim, again)
-        save(work, P, lane, choose(height < 0.0, rim, unit))
+        again = lanes.choose(length > RIM and left > 0.5, again, lanes.perpendicular(n))
+        rim = lanes.choose(length > NEAR_POLE, rim, again)
+        lanes.save(work, P, lane, lanes.choose(height < 0.0, rim, unit))
 
 
-@lane_function
+@lanes.lane_function
 def _operator(y_place, record):
     """Return the positions y and the three CSR arrays of S, from their addresses."""
     entries = rows.indices(record, ARRAYS)
@@ -131,13 +117,13 @@ def _operator(y_place, record):
     return y, start, rows.integers(entries[INDICES], count), rows.doubles(entries[DATA], count)
 
 
-@lane_function
+@lanes.lane_function
 def _spheres(record, part):
     """Return the packed numbers of all elements and the working array of a ``part``."""
     entries = rows.indices(record, ARRAYS)
     return (
-        rows.doubles(entries[SPHERES], entries[FIRST + 2] * MANIFOLD * LANES),
-        rows.doubles(entries[WORK] + 8 * SIZE * LANES * part, SIZE * LANES),
+        rows.doubles(entries[SPHERES], entries[FIRST + 2] * MANIFOLD * lanes.LANES),
+        rows.doubles(entries[WORK] + 8 * SIZE * lanes.LANES * part, SIZE * lanes.LANES),
     )
 
 
@@ -152,17 +138,19 @@ def project_vertices(y_place, p_place, record, part):
     entries = rows.indices(record, ARRAYS)
     count = entries[COUNT]
     elements = rows.indices(entries[SAMPLED], count)
-    taken = rows.doubles(entries[TAKEN], MANIFOLD * LANES)
+    taken = rows.doubles(entries[TAKEN], MANIFOLD * lanes.LANES)
     p = rows.doubles(p_place, 3 * count)
-    for begin in range(0, count, LANES):
-        for lane in range(LANES):
+    for begin in range(0, count, lanes.LANES):
+        for lane in range(lanes.LANES):
             e = elements[min(begin + lane, count - 1)]
-            save(work, H, lane, arithmetic.first_three(_curvature(y, e, start, indices, data)))
-        take(manifold, MANIFOLD, elements, begin, taken)
+            lanes.save(
+                work, H, lane, arithmetic.first_three(_curvature(y, e, start, indices, data))
+            )
+        lanes.take(manifold, MANIFOLD, elements, begin, taken)
         _half_spheres(work, taken, 0)
-        for lane in range(min(LANES, count - begin)):
+        for lane in range(min(lanes.LANES, count - begin)):
             i = 3 * (begin + lane)
-            p[i], p[i + 1], p[i + 2] = load(work, P, lane)
+            p[i], p[i + 1], p[i + 2] = lanes.load(work, P, lane)
     return 0.0
 
 
@@ -178,8 +166,8 @@ def accumulate_vertices(y_place, rhs_place, record, part):
     rhs, elements = rows.doubles(rhs_place, WIDTH * entries[VERTICES]), entries[ELEMENTS]
     energy = 0.0
     for block in range(entries[FIRST + part], entries[FIRST + part + 1]):
-        begin = block * LANES
-        used = min(LANES, elements - begin)
+        begin = block * lanes.LANES
+        used = min(lanes.LANES, elements - begin)
         for lane in range(0, used, WIDTH):
             e, last = begin + lane, elements - 1
             hx, hy, hz, _ = arithmetic.transposed(
@@ -188,15 +176,15 @@ def accumulate_vertices(y_place, rhs_place, record, part):
                 _curvature(y, min(e + 2, last), start, indices, data),
                 _curvature(y, min(e + 3, last), start, indices, data),
             )
-            place = H * LANES + lane
+            place = H * lanes.LANES + lane
             rows.store(work, place, hx)
-            rows.store(work, place + LANES, hy)
-            rows.store(work, place + 2 * LANES, hz)
+            rows.store(work, place + lanes.LANES, hy)
+            rows.store(work, place + 2 * lanes.LANES, hz)
         _half_spheres(work, manifold, block)
         for lane in range(used):
-            w = at(manifold, (block * MANIFOLD + WEIGHT) * LANES + lane)
-            h, p = load(work, H, lane), load(work, P, lane)
-            energy += w * square_distance(h, p)
+            w = at(manifold, (block * MANIFOLD + WEIGHT) * lanes.LANES + lane)
+            h, p = lanes.load(work, H, lane), lanes.load(work, P, lane)
+            energy += w * lanes.square_distance(h, p)
             force = arithmetic.of_three(w * p[0], w * p[1], w * p[2])
             for k in range(at(start, begin + lane), at(start, begin + lane + 1)):
                 v = WIDTH * at(indices, k)
@@ -211,17 +199,17 @@ def project_gradients(d_pointer, manifold_pointer, p_pointer, m):
     ``p_pointer``, ``d_pointer`` and ``manifold_pointer`` are explained at `gradient_kernel`.
     """
     d, p = carray(d_pointer, (m, 3)), carray(p_pointer, (m, 3))
-    blocks = (m + LANES - 1) // LANES
-    manifold = carray(manifold_pointer, (blocks * MANIFOLD * LANES,))
-    work = np.zeros(SIZE * LANES)
+    blocks = (m + lanes.LANES - 1) // lanes.LANES
+    manifold = carray(manifold_pointer, (blocks * MANIFOLD * lanes.LANES,))
+    work = np.zeros(SIZE * lanes.LANES)
     for block in range(blocks):
-        for lane in range(LANES):
-            e = min(block * LANES + lane, m - 1)
-            save(work, H, lane, (d[e, 0], d[e, 1], d[e, 2]))
+        for lane in range(lanes.LANES):
+            e = min(block * lanes.LANES + lane, m - 1)
+            lanes.save(work, H, lane, (d[e, 0], d[e, 1], d[e, 2]))
         _half_spheres(work, manifold, block)
-        for lane in range(min(LANES, m - block * LANES)):
-            i = block * LANES + lane
-            p[i, 0], p[i, 1], p[i, 2] = load(work, P, lane)
+        for lane in range(min(lanes.LANES, m - block * lanes.LANES)):
+            i = block * lanes.LANES + lane
+            p[i, 0], p[i, 1], p[i, 2] = lanes.load(work, P, lane)
 
 
 def interior_vertices(triangles: np.ndarray, vertices: int) -> np.ndarray:
@@ -259,7 +247,7 @@ def vertex_fans(triangles: np.ndarray, vertices: int) -> tuple[np.ndarray, np.nd
     return start, (order // 3).astype(np.int64)
 
 
-@lane_function
+@lanes.lane_function
 def _sides(q, triangle):
     """Return the two edge vectors of a triangle that begin at its first corner."""
     a, b, c = triangle[0], triangle[1], triangle[2]
@@ -269,7 +257,7 @@ def _sides(q, triangle):
     )
 
 
-@kernel
+@lanes.kernel
 def fan_normals(q, vertices, elements, start, fan, triangles, normals):
     """Write the area-weighted unit normals of the vertices of some elements to ``normals``.
 
@@ -288,18 +276,18 @@ def fan_normals(q, vertices, elements, start, fan, triangles, normals):
         largest = 0.0
         for k in range(first, last):
             u, v = _sides(q, triangles[fan[k]])
-            largest = max(largest, absolute_sum(u), absolute_sum(v))
+            largest = max(largest, lanes.absolute_sum(u), lanes.absolute_sum(v))
         # scale by a power of two: no rounding, and products neither overflow nor underflow
         power = 2.0 ** min(-math.frexp(largest)[1], 1000)
         nx, ny, nz = 0.0, 0.0, 0.0
         for k in range(first, last):
             u, v = _sides(q, triangles[fan[k]])
-            x, y, z = cross(scaled(power, u), scaled(power, v))
+            x, y, z = lanes.cross(lanes.scaled(power, u), lanes.scaled(power, v))
             nx, ny, nz = nx + x, ny + y, nz + z
-        scale = absolute_sum((nx, ny, nz))
+        scale = lanes.absolute_sum((nx, ny, nz))
         if scale > 0.0:
-            unit = scaled(1.0 / (scale + SMALLEST), (nx, ny, nz))
-            nx, ny, nz = scaled(1.0 / np.sqrt(dot(unit, unit)), unit)
+            unit = lanes.scaled(1.0 / (scale + lanes.SMALLEST), (nx, ny, nz))
+            nx, ny, nz = lanes.scaled(1.0 / np.sqrt(lanes.dot(unit, unit)), unit)
         normals[i, 0], normals[i, 1], normals[i, 2] = nx, ny, nz
 
 
@@ -375,16 +363,14 @@ class VertexBending(ConstraintGroup):
         put_poles(self._manifold, curved, self.side, self.normals)
 
     def sampler(self, elements: np.ndarray) -> LocalKernel:
-        return LocalKernel(
-            project_vertices,
-            self.S.shape[1],
-            blocks(self.elements),
-            arrays=self._arrays(elements),
-            numbers=(self.elements, len(elements)),
-        )
+        return self._kernel(project_vertices, elements)
 
-    def _arrays(self, elements: np.ndarray) -> tuple[np.ndarray, ...]:
-        return (*self._operator(), self._manifold, self._work, elements, self._taken)
+    def _kernel(self, function: Any, elements: np.ndarray, touched: Any = None) -> LocalKernel:
+        """Return the kernel of a ``function`` that projects ``elements``, or accumulates all."""
+        operator = self.S.indptr, self.S.indices, self.S.data
+        arrays = (*operator, self._manifold, self._work, elements, self._taken)
+        numbers, count = (self.elements, len(elements)), lanes.blocks(self.elements)
+        return LocalKernel(function, self.S.shape[1], count, arrays, numbers, touched)
 
     def restricted(
         self, elements: np.ndarray, factors: np.ndarray
@@ -408,26 +394,19 @@ class VertexBending(ConstraintGroup):
         part._set_kernel()
         return part, vertices
 
-    def _operator(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        return self.S.indptr, self.S.indices, self.S.data
-
     def _set_kernel(self) -> None:
         self.S.indptr = self.S.indptr.astype(np.int32)
         self.S.indices = self.S.indices.astype(np.int32)
         numbers = (self.weights, self.magnitude, self.rest, self.side[:, None] * self.normals)
-        self._manifold = pack(np.column_stack(numbers))
-        self._work = workspaces(SIZE)
-        self._taken = workspace(MANIFOLD)
-        self.local_kernel = LocalKernel(
-            accumulate_vertices,
-            self.S.shape[1],
-            blocks(self.elements),
-            arrays=self._arrays(np.empty(0, np.int64)),
-            numbers=(self.elements, 0),
-            touched=(lambda block: self.S.indices[self.S.indptr[block * LANES] :])
-            if self.elements >= self.split_from
-            else None,
-        )
+        self._manifold = lanes.pack(np.column_stack(numbers))
+        self._work = lanes.workspaces(SIZE)
+        self._taken = lanes.workspace(MANIFOLD)
+
+        def touched(block: int) -> np.ndarray:
+            return self.S.indices[self.S.indptr[block * lanes.LANES] :]
+
+        split, none = self.elements >= self.split_from, np.empty(0, np.int64)
+        self.local_kernel = self._kernel(accumulate_vertices, none, touched if split else None)
 
     def kernel_parameters(self) -> np.ndarray:
         return self._manifold

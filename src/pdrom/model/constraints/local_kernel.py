@@ -163,12 +163,7 @@ def _table(kernels: Sequence[LocalKernel], part: int) -> Table:
     return addresses, records, part
 
 
-_GRADIENTS = types.void(
-    types.CPointer(types.float64),
-    types.CPointer(types.float64),
-    types.CPointer(types.float64),
-    types.intp,
-)
+_GRADIENTS = types.void(*3 * [types.CPointer(types.float64)], types.intp)
 
 
 def gradient_kernel(function):

@@ -67,14 +67,9 @@ class SimplexGroup(StencilGroup):
         by_lane[-1:, WEIGHT, e - LANES * (blocks(e) - 1) :] = 0.0
         self._work = workspaces(self.work_size)
         self._taken = (np.empty(m * LANES, np.int32), rows.zeros(LANES * numbers.shape[1]))
-        self.local_kernel = LocalKernel(
-            self.accumulate_kernel,
-            vertices,
-            blocks(e),
-            arrays=self._arrays(np.empty(0, np.int64)),
-            numbers=(self._work.shape[1], 0),
-            touched=(lambda block: visited[block * LANES :]) if e >= self.split_from else None,
-        )
+        touched = (lambda block: visited[block * LANES :]) if e >= self.split_from else None
+        none = np.empty(0, np.int64)
+        self.local_kernel = self._kernel(self.accumulate_kernel, none, touched)
 
     def _visited(self, values: np.ndarray) -> np.ndarray:
         """Return the values (e, ...) of all elements in the order in which kernels visit them."""
@@ -82,17 +77,15 @@ class SimplexGroup(StencilGroup):
 
     def sampler(self, elements: np.ndarray) -> LocalKernel:
         places = elements if self._order is None else np.argsort(self._order)[elements]
-        return LocalKernel(
-            self.project_kernel,
-            self.S.shape[1],
-            blocks(self.elements),
-            arrays=self._arrays(places),
-            numbers=(self._work.shape[1], len(elements)),
-        )
+        return self._kernel(self.project_kernel, places)
 
-    def _arrays(self, elements: np.ndarray) -> tuple[np.ndarray, ...]:
+    def _kernel(self, function: Any, elements: np.ndarray, touched: Any = None) -> LocalKernel:
+        """Return the kernel of a ``function`` that projects ``elements``, or accumulates all."""
         data = (self._corners, self._geometry, np.array(self.allowed), self._work)
-        return (*data, elements, *self._taken, *self._own_arrays)
+        arrays = (*data, elements, *self._taken, *self._own_arrays)
+        numbers = self._work.shape[1], len(elements)
+        count = blocks(self.elements)
+        return LocalKernel(function, self.S.shape[1], count, arrays, numbers, touched)
 
     def _extra(self) -> list[np.ndarray]:
         """Return packed numbers after the weight: the operator without the column of corner 0."""

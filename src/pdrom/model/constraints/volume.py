@@ -9,20 +9,7 @@ from typing import Literal
 
 import numpy as np
 
-from pdrom.model.constraints import products, singular_values, svd3, triangle_strain
-from pdrom.model.constraints.lanes import (
-    LANES,
-    cross,
-    dot,
-    lane_function,
-    load,
-    load_matrix,
-    mix,
-    save,
-    save_matrix,
-    scaled,
-    unmarked,
-)
+from pdrom.model.constraints import lanes, products, singular_values, svd3, triangle_strain
 from pdrom.model.constraints.local_kernel import gradient_kernel, local_kernel
 from pdrom.model.constraints.simplex import SIZE, F, P
 from pdrom.model.constraints.svd3 import FOUND, SIGMA, rotated_pair
@@ -32,23 +19,23 @@ from pdrom.model.constraints.tetrahedron import TetrahedronGroup, forces, gradie
 VALUES, WORK = svd3.SIZE, svd3.SIZE + products.SIZE
 
 
-@lane_function
+@lanes.lane_function
 def _nearest(work, low, high):
     """Write the projections of a block to ``work``; F is its own projection if det F is allowed."""
-    for lane in range(LANES):
-        f0, f1, f2 = load_matrix(work, F, lane)
-        volume = dot(f0, cross(f1, f2))
-        save_matrix(work, P, lane, (f0, f1, f2))
-        work[FOUND * LANES + lane] = 1.0 if volume >= low and volume <= high else 0.0
-    if unmarked(work, FOUND) == 0.0:
+    for lane in range(lanes.LANES):
+        f0, f1, f2 = lanes.load_matrix(work, F, lane)
+        volume = lanes.dot(f0, lanes.cross(f1, f2))
+        lanes.save_matrix(work, P, lane, (f0, f1, f2))
+        work[FOUND * lanes.LANES + lane] = 1.0 if volume >= low and volume <= high else 0.0
+    if lanes.unmarked(work, FOUND) == 0.0:
         return
     svd3.factor_block(work)
-    values = work[VALUES * LANES :]
-    for lane in range(LANES):
-        save(values, products.VALUES, lane, load(work, SIGMA, lane))
+    values = work[VALUES * lanes.LANES :]
+    for lane in range(lanes.LANES):
+        lanes.save(values, products.VALUES, lane, lanes.load(work, SIGMA, lane))
     products.nearest_block(values, low, high, True)
-    for lane in range(LANES):
-        save(work, SIGMA, lane, load(values, products.VALUES, lane))
+    for lane in range(lanes.LANES):
+        lanes.save(work, SIGMA, lane, lanes.load(values, products.VALUES, lane))
     svd3.compose_block(work)
 
 
@@ -94,27 +81,28 @@ U, COSINE, SINE = SIZE, SIZE + 6, SIZE + 7
 AREA_VALUES, AREA_WORK = SIZE + 8, SIZE + 8 + products.SIZE
 
 
-@lane_function
+@lanes.lane_function
 def _nearest_area(work, low, high):
     """Write the projections of a block of triangles to ``work``."""
-    values = work[AREA_VALUES * LANES :]
-    for lane in range(LANES):
-        f0, f1 = load(work, F, lane), load(work, F + 3, lane)
+    values = work[AREA_VALUES * lanes.LANES :]
+    for lane in range(lanes.LANES):
+        f0, f1 = lanes.load(work, F, lane), lanes.load(work, F + 3, lane)
         scale, c, s, swapped, pair = rotated_pair(f0, f1, -1.0)
         u0, u1, s0, s1 = pair
-        save(work, U, lane, u0)
-        save(work, U + 3, lane, u1)
+        lanes.save(work, U, lane, u0)
+        lanes.save(work, U + 3, lane, u1)
         # rotating by another 90 degrees puts the longer column first
-        work[COSINE * LANES + lane] = s if swapped else c
-        work[SINE * LANES + lane] = -c if swapped else s
-        save(values, products.VALUES, lane, (scale * s0, 1.0, scale * s1))
+        work[COSINE * lanes.LANES + lane] = s if swapped else c
+        work[SINE * lanes.LANES + lane] = -c if swapped else s
+        lanes.save(values, products.VALUES, lane, (scale * s0, 1.0, scale * s1))
     products.nearest_block(values, low, high, False)
-    for lane in range(LANES):
-        sigma = load(values, products.VALUES, lane)
-        a, b = scaled(sigma[0], load(work, U, lane)), scaled(sigma[2], load(work, U + 3, lane))
-        c, s = work[COSINE * LANES + lane], work[SINE * LANES + lane]
-        save(work, P, lane, mix(c, a, s, b))
-        save(work, P + 3, lane, mix(c, b, -s, a))
+    for lane in range(lanes.LANES):
+        sigma = lanes.load(values, products.VALUES, lane)
+        a = lanes.scaled(sigma[0], lanes.load(work, U, lane))
+        b = lanes.scaled(sigma[2], lanes.load(work, U + 3, lane))
+        c, s = work[COSINE * lanes.LANES + lane], work[SINE * lanes.LANES + lane]
+        lanes.save(work, P, lane, lanes.mix(c, a, s, b))
+        lanes.save(work, P + 3, lane, lanes.mix(c, b, -s, a))
 
 
 @local_kernel

@@ -16,6 +16,11 @@ from pdrom.model.dynamics.acceleration import Anderson
 from pdrom.model.dynamics.space import Solve, Space
 
 PHASES = ("inertia", "local", "global", "finish")
+Observer = Callable[[np.ndarray], None] | None
+"""Called with the iterate y at which the last local step of a frame is computed."""
+
+
+Vectors = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 class LocalStep(Protocol):
@@ -79,7 +84,7 @@ class Stepper:
         self._compiled, self._whole = space.compiled(self.local_steps, acceleration)
 
     def step(
-        self, state: State, frame: int, on_last_iterate: Callable[[np.ndarray], None] | None = None
+        self, state: State, frame: int, on_last_iterate: Observer = None
     ) -> tuple[State, FrameReport]:
         """Do ``frame`` (0-based) from ``state``; call ``on_last_iterate`` with the last local y."""
         if on_last_iterate is None:
@@ -138,12 +143,7 @@ class Stepper:
         return s, elimination, base
 
     def _iterate(
-        self,
-        s: np.ndarray,
-        base: np.ndarray,
-        elimination: Solve,
-        seconds: np.ndarray,
-        on_last_iterate: Callable[[np.ndarray], None] | None,
+        self, s: np.ndarray, base: np.ndarray, system: Solve, seconds: np.ndarray, watch: Observer
     ) -> tuple[np.ndarray, np.ndarray]:
         """Do all iterations of a frame from y = s; return the last y and the objective (K,).
 
@@ -156,29 +156,26 @@ class Stepper:
         compiled = self._compiled
         k, last = 0, self.iterations - 1
         while k <= last:
-            if on_last_iterate is not None and k == last:
-                on_last_iterate(y)
-            if compiled is None or not compiled.takes(elimination):
-                self._in_python(k, s, base, elimination, y, objective, seconds)
+            if watch is not None and k == last:
+                watch(y)
+            if compiled is None or not compiled.takes(system):
+                self._in_python(k, (s, base, y), system, objective, seconds)
                 k += 1
                 continue
-            end = last if on_last_iterate is not None and k < last else self.iterations
+            end = last if watch is not None and k < last else self.iterations
             which = range(k, end)
-            compiled.run(which, self.iterations, objective, y, s, base, elimination, seconds)
+            compiled.run(which, self.iterations, objective, y, s, base, system, seconds)
             k = end
         return y, objective
 
     def _in_python(
-        self,
-        k: int,
-        s: np.ndarray,
-        base: np.ndarray,
-        elimination: Solve,
-        y: np.ndarray,
-        objective: np.ndarray,
-        seconds: np.ndarray,
+        self, k: int, vectors: Vectors, system: Solve, objective: np.ndarray, seconds: np.ndarray
     ) -> None:
-        """Do iteration k with any local steps: update y, ``objective`` and ``seconds`` in place."""
+        """Do iteration k with any local steps: update y, ``objective`` and ``seconds`` in place.
+
+        ``vectors`` are s, (M/h^2) s and y.
+        """
+        s, base, y = vectors
         space, acceleration = self.space, self._acceleration
         before = perf_counter()
         rhs = space.copy(base)
@@ -191,11 +188,11 @@ class Stepper:
             objective[k] = energy + space.inertia_energy(y - s)
         before = perf_counter()
         if acceleration is None:
-            elimination.solve(rhs, y)
+            system.solve(rhs, y)
         elif acceleration.refuse(y, energy + space.inertia_energy(y - s)):
             objective[k : k + 1] = objective[k - 1 : k]
         else:
-            elimination.solve(rhs, y)
+            system.solve(rhs, y)
             # the last image is not accelerated: its objective cannot be larger
             if k < self.iterations - 1:
                 acceleration.combine(y)

@@ -35,15 +35,11 @@ class Gravity(Force):
 
     rate = 0.0
 
-    def __init__(self, config: Config, mesh: Mesh, masses: np.ndarray) -> None:
-        super().__init__(config, mesh, masses)
-        self._acceleration = np.array(config.acceleration)
-
     def acceleration(self, positions: np.ndarray, velocities: np.ndarray) -> np.ndarray:
-        return self._acceleration
+        return np.array(self.config.acceleration)
 
     def potential(self, positions: np.ndarray, masses: np.ndarray) -> float:
-        return -float(self._acceleration @ (masses @ positions))
+        return -float(self.config.acceleration @ (masses @ positions))
 
 
 class Damping(Force):
@@ -123,7 +119,6 @@ class Wind(Force):
 
     def __init__(self, config: Config, mesh: Mesh, masses: np.ndarray) -> None:
         super().__init__(config, mesh, masses)
-        self._velocity = np.array(config.velocity)
         self._half_density = 0.5 * config.density * config.coefficient
         self._triangles, self._masses = mesh.triangles, masses
 
@@ -132,7 +127,7 @@ class Wind(Force):
         vector = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         area = np.linalg.norm(vector, axis=1)
         normal = vector / np.where(area > 0.0, area, 1.0)[:, None]
-        relative = self._velocity - velocities[self._triangles].mean(axis=1)
+        relative = self.config.velocity - velocities[self._triangles].mean(axis=1)
         speed = np.einsum("ij,ij->i", relative, normal)
         kappa = self._half_density * self._at_vertices(area / 3.0) / self._masses
         slowing = 1.0 + self.time_step * kappa[self._triangles].max(axis=1) * np.abs(speed)

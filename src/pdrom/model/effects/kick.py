@@ -26,8 +26,7 @@ class Kick(Start):
 
     def __init__(self, config: Config, mesh: Mesh, masses: np.ndarray) -> None:
         super().__init__(config, mesh, masses)
-        self._points = mesh.points
-        self._extent = mesh.extent
+        self._points, self._extent = mesh.points, mesh.extent
 
     def velocity(self) -> np.ndarray:
         x, y, z = ((self._points - self._points.mean(axis=0)) / (0.5 * self._extent)).T

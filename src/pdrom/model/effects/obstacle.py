@@ -1,7 +1,7 @@
 """Contacts of vertices with a plane, sphere or box, with Coulomb friction, and with a floor."""
 
 from abc import abstractmethod
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -93,9 +93,7 @@ class Plane(Obstacle):
         point: Vector = (0.0, 0.0, 0.0)
         normal: Vector = (0.0, 1.0, 0.0)
 
-        @model_validator(mode="after")
-        def _directed(self) -> Self:
-            return require_direction(self)
+        _directed = model_validator(mode="after")(require_direction)
 
         def body(self, low: np.ndarray, high: np.ndarray) -> Mesh:
             return square(np.array(self.point), np.array(self.normal), low, high=high)
@@ -134,22 +132,18 @@ class Sphere(Obstacle):
         def body(self, low: np.ndarray, high: np.ndarray) -> Mesh:
             return ball(np.array(self.centre), self.radius)
 
-    def __init__(self, config: Config, mesh: Mesh, masses: np.ndarray) -> None:
-        super().__init__(config, mesh, masses)
-        self._centre = np.array(config.centre)
-
     def depths(self, points: np.ndarray) -> np.ndarray:
-        return self.config.radius - np.linalg.norm(points - self._centre, axis=1)
+        return self.config.radius - np.linalg.norm(points - self.config.centre, axis=1)
 
     def normals(self, points: np.ndarray) -> np.ndarray:
         """Return outward unit normals (n, 3) at ``points`` (n, 3) m; at the centre: upwards."""
-        arm = points - self._centre
+        arm = points - self.config.centre
         length = np.linalg.norm(arm, axis=1)[:, None]
         return np.where(length > 0.0, arm / np.where(length > 0.0, length, 1.0), UP)
 
     def entries(self, start: np.ndarray, end: np.ndarray) -> Entries:
         """Return entries at the smaller root t in [0, 1] of |start + t (end - start) - c| = r."""
-        arm, path = start - self._centre, end - start
+        arm, path = start - self.config.centre, end - start
         square = np.einsum("ij,ij->i", path, path)
         inwards = -np.einsum("ij,ij->i", arm, path)
         outside = np.einsum("ij,ij->i", arm, arm) - self.config.radius**2
@@ -172,23 +166,17 @@ class Box(Obstacle):
         lower: Vector
         upper: Vector
 
-        @model_validator(mode="after")
-        def _ordered(self) -> Self:
-            return require_ordered(self)
+        _ordered = model_validator(mode="after")(require_ordered)
 
         def body(self, low: np.ndarray, high: np.ndarray) -> Mesh:
             return cuboid(np.array(self.lower), np.array(self.upper))
-
-    def __init__(self, config: Config, mesh: Mesh, masses: np.ndarray) -> None:
-        super().__init__(config, mesh, masses)
-        self._lower, self._upper = np.array(config.lower), np.array(config.upper)
 
     def depths(self, points: np.ndarray) -> np.ndarray:
         return self._to_faces(points).min(axis=1)
 
     def _to_faces(self, points: np.ndarray) -> np.ndarray:
         """Return distances (n, 6) m to lower x, y, z and upper x, y, z faces; negative outside."""
-        return np.hstack([points - self._lower, self._upper - points])
+        return np.hstack([points - self.config.lower, self.config.upper - points])
 
     def normals(self, points: np.ndarray) -> np.ndarray:
         """Return normals (n, 3) of the faces nearest to ``points``, the first if equally near."""
@@ -201,12 +189,13 @@ class Box(Obstacle):
         A path enters the box at the last of its crossings with the nearer faces of the three axes.
         """
         path, rows = end - start, np.arange(len(start))
-        near_face = np.where(path > 0.0, self._lower, self._upper)
-        far_face = np.where(path > 0.0, self._upper, self._lower)
+        lower, upper = np.array(self.config.lower), np.array(self.config.upper)
+        near_face = np.where(path > 0.0, lower, upper)
+        far_face = np.where(path > 0.0, upper, lower)
         # a path that is (nearly) parallel to a pair of faces is between them for all t, or for no t
         with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
             near, far = (near_face - start) / path, (far_face - start) / path
-            within = (start >= self._lower) & (start <= self._upper)
+            within = (start >= lower) & (start <= upper)
             near = np.where(path != 0.0, near, np.where(within, -np.inf, np.inf))
             far = np.where(path != 0.0, far, np.inf)
             axis = near.argmax(axis=1)

@@ -50,7 +50,6 @@ class Poke(Boundary):
         self._order = farthest_points(mesh.points, free, config.count)
         self.vertices = np.sort(self._order)
         self._anchor: np.ndarray | None = None
-        self._turn = -1
 
     def active(self, frame: int) -> bool:
         turn, phase = divmod(frame, self.config.over + self.config.rest)
@@ -64,9 +63,9 @@ class Poke(Boundary):
         return frame % (self.config.over + self.config.rest) == 0
 
     def targets(self, frame: int, current: np.ndarray) -> np.ndarray:
-        turn, phase = divmod(frame, self.config.over + self.config.rest)
+        phase = frame % (self.config.over + self.config.rest)
         if self._anchor is None or self.takes_hold(frame):
-            self._turn, self._anchor = turn, current.copy()
+            self._anchor = current.copy()
         progress = (phase + 1) / self.config.over
         target = self._anchor.copy()
         times = np.linspace(0.0, 1.0, len(KNOTS))

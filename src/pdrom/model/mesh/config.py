@@ -44,10 +44,6 @@ class MeshModel(ConfigModel):
         """Return the mesh for any ``factor``, as files and given arrays have one resolution."""
         return self
 
-    def build(self, root: Path) -> Mesh:
-        """Return the mesh, generated or read from a file in the folder ``root``."""
-        raise NotImplementedError(f"{type(self).__name__} has no mesh")
-
 
 _DIGITS = 32  # length of a hexadecimal digest
 Count = Annotated[int, Field(ge=2, le=2000)]

@@ -2,7 +2,7 @@
 
 from abc import abstractmethod
 from functools import reduce
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Discriminator, Field, Tag, model_validator
@@ -15,6 +15,21 @@ from pdrom.model.mesh.types import Length, Mesh, PositiveLength, boundary_edges
 
 Point = tuple[Length, Length, Length]
 Index = Annotated[int, Field(ge=0, le=1_000_000)]
+
+
+def require_ordered(box: Any) -> Any:
+    """Return ``box``; ValueError if ``lower`` exceeds ``upper`` on an axis."""
+    for axis, low, high in zip("xyz", box.lower, box.upper, strict=True):
+        if low > high:
+            raise ValueError(f"lower = {low:g} exceeds upper = {high:g} along {axis}")
+    return box
+
+
+def require_direction(plane: Any) -> Any:
+    """Return ``plane``; ValueError if its ``normal`` is too short to define a direction."""
+    if not np.linalg.norm(plane.normal) >= 1e-12:
+        raise ValueError(f"normal = {list(plane.normal)}: has no direction")
+    return plane
 
 
 class Shape(ConfigModel):
@@ -32,9 +47,7 @@ class Box(Shape):
     lower: Point
     upper: Point
 
-    @model_validator(mode="after")
-    def _ordered(self) -> Self:
-        return require_ordered(self)
+    _ordered = model_validator(mode="after")(require_ordered)
 
     def chosen(self, mesh: Mesh) -> np.ndarray:
         slack = TOLERANCE * mesh.extent
@@ -61,9 +74,7 @@ class Plane(Shape):
     point: Point
     normal: Point
 
-    @model_validator(mode="after")
-    def _directed(self) -> Self:
-        return require_direction(self)
+    _directed = model_validator(mode="after")(require_direction)
 
     def chosen(self, mesh: Mesh) -> np.ndarray:
         normal = np.array(self.normal) / np.linalg.norm(self.normal)
@@ -178,21 +189,6 @@ Selection = Annotated[
 
 for _combination in (Union, Intersection, Complement):
     _combination.model_rebuild()
-
-
-def require_ordered(box: Any) -> Any:
-    """Return ``box``; ValueError if ``lower`` exceeds ``upper`` on an axis."""
-    for axis, low, high in zip("xyz", box.lower, box.upper, strict=True):
-        if low > high:
-            raise ValueError(f"lower = {low:g} exceeds upper = {high:g} along {axis}")
-    return box
-
-
-def require_direction(plane: Any) -> Any:
-    """Return ``plane``; ValueError if its ``normal`` is too short to define a direction."""
-    if not np.linalg.norm(plane.normal) >= 1e-12:
-        raise ValueError(f"normal = {list(plane.normal)}: has no direction")
-    return plane
 
 
 # side name -> (axis, +1 for the maximal side, -1 for the minimal one)

@@ -17,7 +17,7 @@ one after the other, and are read and written four numbers at a time: their arra
 what that needs (`vectors`). The order of every sum is that of the columns, whatever the processor.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from time import perf_counter
 
 import numpy as np
@@ -30,7 +30,7 @@ from pdrom.model.constraints.local_kernel import call_gradients
 from pdrom.model.dynamics.acceleration import NO_HISTORY, Anderson, History, combine, forget, refuse
 from pdrom.model.dynamics.frames import BLOCK, Blocks
 from pdrom.model.dynamics.space import Solve
-from pdrom.model.dynamics.stepper import LocalStep, Stepper
+from pdrom.model.dynamics.stepper import LocalStep, Observer, Stepper
 from pdrom.reduction.subspace.interpolation import SubspaceLocalStep
 from pdrom.reduction.subspace.space import DenseElimination, ReducedSpace
 
@@ -60,18 +60,12 @@ class FusedStepper(Stepper):
                 self._whole = self._fused
 
     def _iterate(
-        self,
-        s: np.ndarray,
-        base: np.ndarray,
-        elimination: Solve,
-        seconds: np.ndarray,
-        on_last_iterate: Callable[[np.ndarray], None] | None,
+        self, s: np.ndarray, base: np.ndarray, system: Solve, seconds: np.ndarray, watch: Observer
     ) -> tuple[np.ndarray, np.ndarray]:
-        watched = on_last_iterate is not None
-        if self._fused is None or watched or not isinstance(elimination, DenseElimination):
-            return super()._iterate(s, base, elimination, seconds, on_last_iterate)
+        if self._fused is None or watch is not None or not isinstance(system, DenseElimination):
+            return super()._iterate(s, base, system, seconds, watch)
         before = perf_counter()
-        y = self._fused.iterate(elimination, s, base, self.iterations)
+        y = self._fused.iterate(system, s, base, self.iterations)
         seconds[1] += perf_counter() - before
         return y, np.empty(0)
 

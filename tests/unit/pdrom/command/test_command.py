@@ -82,6 +82,14 @@ def test_a_requested_error_is_met_said_and_viewed(folder, capsys):
 REDUCE = ["reduce", "small.yaml", "--group", "spring", "--r", "1"]
 
 
+def refusal(capsys: pytest.CaptureFixture[str], arguments: list[str]) -> str:
+    """The line with which a command refuses."""
+    capsys.readouterr()
+    assert run(arguments) == Status.FAULTY
+    (told,) = capsys.readouterr().err.splitlines()
+    return told
+
+
 def content(folder: Path) -> dict[str, bytes]:
     """Every file of a folder."""
     return {path.name: path.read_bytes() for path in folder.iterdir()}
@@ -111,9 +119,7 @@ def test_a_file_of_others_is_never_moved_changed_or_removed(folder, name, capsys
         h5py.File(name, "w").create_dataset("numbers", data=[1.0]).file.close()
     before = content(folder)
     for arguments in reads_of(name)[:3]:
-        assert run(arguments) == Status.FAULTY
-        (told,) = capsys.readouterr().err.splitlines()
-        assert told.startswith(f"pdrom: {name}: ")
+        assert refusal(capsys, arguments).startswith(f"pdrom: {name}: ")
     run(["show", name])
     assert content(folder) == before
 
@@ -124,9 +130,9 @@ def test_a_damaged_run_is_refused_and_left_where_it_is(folder, finished, positio
     damaged[position] ^= 1
     Path("small.h5").write_bytes(damaged)
     before = content(folder)
+    damage = "small.h5: damaged, its content and its checksum differ"
     for arguments in reads_of("small.h5")[:3]:
-        assert run(arguments) == Status.FAULTY
-        assert "small.h5: damaged, its content and its checksum differ" in capsys.readouterr().err
+        assert damage in refusal(capsys, arguments)
     assert content(folder) == before
 
 
@@ -134,8 +140,7 @@ def test_a_run_without_a_checksum_is_read_if_that_is_asked_for(folder, finished,
     whole = (finished / "small.h5").read_bytes()[BLOCK:]
     Path("small.h5").write_bytes(whole)
     before = content(folder)
-    assert run([*REDUCE, "--run", "small.h5"]) == Status.FAULTY
-    (told,) = capsys.readouterr().err.splitlines()
+    told = refusal(capsys, [*REDUCE, "--run", "small.h5"])
     assert told.startswith("pdrom: small.h5: no checksum inside (")
     assert "--unchecked" in told
     assert content(folder) == before
@@ -143,9 +148,7 @@ def test_a_run_without_a_checksum_is_read_if_that_is_asked_for(folder, finished,
     assert run(["view", "small.h5", "--unchecked"]) == Status.DONE
     with h5py.File("small.h5", "r+") as file:
         del file["timings"]
-    capsys.readouterr()
-    assert run([*REDUCE, "--run", "small.h5", "--unchecked"]) == Status.FAULTY
-    (told,) = capsys.readouterr().err.splitlines()
+    told = refusal(capsys, [*REDUCE, "--run", "small.h5", "--unchecked"])
     assert told.startswith("pdrom: small.h5: holds no run that could be opened")
 
 
@@ -165,8 +168,7 @@ def test_a_new_scene_is_valid_and_replaces_nothing(folder, capsys):
     (folder / "Two Words.yaml").write_text(re.sub("(?m)^(name|title): .*", "", text))
     config = load_scene("Two Words.yaml").config
     assert (config.name, config.title) == ("two_words", "Two words")
-    assert run(["new", "My Sheet-1.yaml"]) == Status.FAULTY
-    assert "there is such a file already" in capsys.readouterr().err
+    assert "there is such a file already" in refusal(capsys, ["new", "My Sheet-1.yaml"])
     assert (folder / "My Sheet-1.yaml").read_text("utf-8") == text
 
 
@@ -214,10 +216,8 @@ def test_a_new_scene_tells_of_its_mesh_and_runs(folder, capsys, caplog):
     assert -9.0 < floor.height <= -7.5
     assert run(["run", "in/no.yaml"]) == Status.DONE
     assert caplog.messages == []
-    assert run(["new", "other", "--mesh", "in/../../x.obj"]) == Status.FAULTY
-    assert "required is a file below" in capsys.readouterr().err
-    assert run(["new", "other", "--mesh", "in/none.obj"]) == Status.FAULTY
-    assert "no such mesh file" in capsys.readouterr().err
+    for mesh, words in (("../../x", "required is a file below"), ("none", "no such mesh file")):
+        assert words in refusal(capsys, ["new", "other", "--mesh", f"in/{mesh}.obj"])
     assert not (folder / "other.yaml").exists()
 
 
@@ -314,8 +314,7 @@ def test_files_of_others_and_the_mesh_of_the_scene_are_not_overwritten(folder, c
         reduce = ["reduce", scene, "--run", "none.h5"]
         wishes = (["--group", "spring"], ["--error", "0.1"])
         for command in (["run", scene], *([*reduce, *wish] for wish in wishes)):
-            assert run([*command, "--out", out]) == Status.FAULTY
-            assert f"{out}: {words}" in capsys.readouterr().err
+            assert f"{out}: {words}" in refusal(capsys, [*command, "--out", out])
         assert Path(out).read_bytes() == before
 
 
@@ -335,8 +334,8 @@ def test_a_deleted_working_folder_is_one_line(tmp_path, monkeypatch, capsys):
     gone.mkdir()
     monkeypatch.chdir(gone)
     gone.rmdir()
-    assert run(["show", "x.h5"]) == Status.FAULTY
-    assert capsys.readouterr().err.startswith("pdrom: the working folder is not there any more")
+    told = refusal(capsys, ["show", "x.h5"])
+    assert told.startswith("pdrom: the working folder is not there any more")
     monkeypatch.chdir(tmp_path)
 
 
@@ -350,9 +349,7 @@ def test_what_cannot_be_written_is_found_before_anything_runs(
     (folder / "folder.png").mkdir()
     monkeypatch.setattr("pdrom.api.load", called)
     monkeypatch.setattr("pdrom.api.runs.run_full_order", called)
-    assert run(arguments) == Status.FAULTY
-    (told,) = capsys.readouterr().err.splitlines()
-    assert words in told
+    assert words in refusal(capsys, arguments)
     assert (folder / "small.yaml").read_text("utf-8") == SMALL
 
 
@@ -390,8 +387,7 @@ def test_an_output_that_cannot_be_written_is_one_line(folder):
 def test_a_run_of_another_scene_is_not_reduced(folder, finished, capsys):
     shutil.copy(finished / "small.h5", folder)
     (folder / "small.yaml").write_text(SMALL.replace("1.0e+5", "2.0e+5"))
-    assert run(["reduce", "small.yaml", "--group", "spring", "--run", "small.h5"]) == Status.FAULTY
-    assert "a run of another scene" in capsys.readouterr().err
+    assert "a run of another scene" in refusal(capsys, [*REDUCE, "--run", "small.h5"])
 
 
 def test_a_blow_up_has_a_code_of_its_own(folder, monkeypatch, capsys):

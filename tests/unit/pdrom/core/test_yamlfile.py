@@ -52,9 +52,7 @@ def written(tmp_path, content: str | bytes):
 def test_reads_plain_yaml(tmp_path):
     path = written(tmp_path, "a: 1\nb: [1.5, x, null]\nc: {d: true}\n")
     assert read_yaml(path) == {"a": 1, "b": [1.5, "x", None], "c": {"d": True}}
-
-
-def test_a_byte_order_mark_is_no_part_of_the_text(tmp_path):
+    # a byte order mark is no part of the text
     assert read_yaml(written(tmp_path, b"\xef\xbb\xbfa: 1\n")) == {"a": 1}
 
 
@@ -117,16 +115,11 @@ INNER = r"\(allowed: size, kind\)"
         ({**GOOD, "inner": {"size": 0}}, r"inner\.size = 0: .*greater than or equal to 1"),
         ({**GOOD, "inner": {"size": 1, "kind": "c"}}, r"inner\.kind = 'c': .*'a' or 'b'"),
         ({**GOOD, "name": 3}, "name = 3: .*valid string"),
+        *((data, "a mapping of keys is required") for data in (None, [], "text", 3)),
     ],
 )
 def test_faults_name_source_key_and_what_is_allowed(data, message):
     with pytest.raises(ConfigurationError, match=f"^source: {message}"):
-        validate(Outer, data, "source")
-
-
-@pytest.mark.parametrize("data", [None, [], "text", 3])
-def test_what_is_no_mapping_is_shown(data):
-    with pytest.raises(ConfigurationError, match="source: a mapping of keys is required"):
         validate(Outer, data, "source")
 
 
@@ -138,3 +131,8 @@ def test_long_values_are_cut():
 
 def test_keys_use_their_alias():
     assert keys_of(Outer) == ["name", "inner", "optional", "many", "row", "another"]
+
+
+def test_line_breaks_and_signals_of_terminals_in_a_message_are_escaped():
+    error = ConfigurationError("scene 'a\nb\x1b[2J\u2028ä': no such scene")
+    assert str(error) == r"scene 'a\nb\x1b[2J\u2028ä': no such scene"

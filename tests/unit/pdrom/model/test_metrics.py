@@ -27,29 +27,21 @@ def test_relative_errors_have_no_unit(seed, unit):
     assert relative_errors(unit * p, unit * p_hat, unit * 1e-9) == pytest.approx(expected)
 
 
-@pytest.mark.parametrize("size", [0.0, 1e-17, 1e-12])
-def test_an_axis_of_round_off_has_no_error(rng, size):
-    p = rng.standard_normal((6, 8, 3))
-    p[..., 2] *= size
-    errors = relative_errors(p, 0.9 * p, 1e-10)
-    assert errors[:3] == pytest.approx([0.1, 0.1, 0.1])
-    assert errors[3] is None
-
-
-def test_round_off_relative_to_the_largest_axis_counts_without_a_level(rng):
-    p = rng.standard_normal((6, 8, 3)) * [1.0, 1.0, 1e-17]
-    assert relative_errors(p, 0.9 * p, 0.0)[3] is None
-
-
-def test_small_data_above_their_round_off_have_an_error(rng):
-    p = 1e-14 * rng.standard_normal((6, 8, 3))
-    assert relative_errors(p, 0.9 * p, 1e-20) == pytest.approx([0.1] * 4)
-    assert relative_errors(p, 0.9 * p, 1e-12) == [None] * 4
-
-
-def test_nothing_has_no_error():
-    zero = np.zeros((2, 4, 3))
-    assert relative_errors(zero, zero, 0.0) == [None] * 4
+@pytest.mark.parametrize(
+    ("size", "level", "expected"),
+    [
+        ([1.0, 1.0, 0.0], 1e-10, [0.1, 0.1, 0.1, None]),
+        ([1.0, 1.0, 1e-12], 1e-10, [0.1, 0.1, 0.1, None]),
+        # without a level the largest axis tells
+        ([1.0, 1.0, 1e-17], 0.0, [0.1, 0.1, 0.1, None]),
+        (1e-14, 1e-20, [0.1] * 4),
+        (1e-14, 1e-12, [None] * 4),
+        (0.0, 0.0, [None] * 4),
+    ],
+)
+def test_round_off_has_no_error(rng, size, level, expected):
+    p = rng.standard_normal((6, 8, 3)) * size
+    assert relative_errors(p, 0.9 * p, level) == pytest.approx(expected)
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, 1e300])

@@ -1,12 +1,13 @@
-"""Scenes: what is listed is built, what is not is not; faults have one clear message."""
+"""Scenes: what is listed is built, what is not is not; faults have one clear message.
+
+Masses are one for all, by selection, or by density; runs obey them.
+"""
 
 import numpy as np
 import pytest
 
 from builders import GRAVITY, TOP, make_scene
 from pdrom.core.store import open_hdf5
-from pdrom.model.compiled import rows
-from pdrom.model.constraints.local_kernel import OWN, LocalKernel, call, local_kernel
 from pdrom.model.dynamics.stepper import State
 from pdrom.model.runs import run, trajectory
 from places import ROOT
@@ -24,27 +25,6 @@ def test_unlisted_groups_leave_no_matrix_entry():
     expected += np.diag(scene.masses / scene.config.time_step**2)
     assert np.array_equal(matrix.toarray(), expected)
     assert not np.array_equal(both.system_with("supernodal").matrix.toarray(), expected)
-
-
-@local_kernel
-def _counted(y, rhs, record, part):
-    """Counts its calls and hands them on."""
-    entries = rows.indices(record, OWN + 3)
-    rows.doubles(entries[OWN + 1], 1)[0] += 1.0
-    return call(entries[OWN], y, rhs, entries[OWN + 2], part)
-
-
-def test_unlisted_groups_are_never_evaluated():
-    """Calls per run: K a frame for each listed group, none for others, none without forces."""
-    scene = make_scene(SPRING, {"effect": "strain", "weight": 1e5}, frames=3, iterations=4)
-    calls = {}
-    for group in scene.groups:
-        own, calls[group.name] = group.local_kernel, np.zeros(1)
-        group.local_kernel = LocalKernel(
-            _counted, scene.mesh.vertices, 1, [calls[group.name], own.record], [own.address]
-        )
-    trajectory(scene)
-    assert calls == {"spring": 12, "strain": 12}
     assert scene.forces == scene.boundaries == scene.contacts == scene.starts == []
 
 
@@ -104,3 +84,42 @@ def test_a_changed_scene_has_the_mesh_and_masses_of_the_first():
     assert (heavy.config.frames, scene.config.frames) == (3, 8)
     assert np.array_equal(heavy.masses, 2.0 * scene.masses)
     assert heavy.mesh is scene.mesh
+
+
+BAR = {"kind": "bar", "nx": 4, "ny": 3, "nz": 3, "extent": 2.0}
+
+
+def test_later_entries_change_what_they_select():
+    entries = [{"select": "top", "vertex_mass": 5.0}, {"select": [0], "vertex_mass": 7.0}]
+    scene = make_scene(SPRING, vertex_mass=3.0, masses=entries)
+    top = scene.mesh.points[:, 1] == scene.mesh.points[:, 1].max()
+    expected = np.where(top, 5.0, 3.0)
+    expected[0] = 7.0
+    assert np.array_equal(scene.masses, expected)
+
+
+@pytest.mark.parametrize(
+    ("effect", "mesh"),
+    [
+        (SPRING, {"kind": "cloth", "rows": 6, "columns": 5, "extent": 2.0}),
+        ({"effect": "tetrahedron_strain", "weight": 1.0}, BAR),
+    ],
+)
+def test_a_density_weighs_the_rest_shape(effect, mesh):
+    """Total mass is density times area or volume; vertices inside have more than corners."""
+    scene = make_scene(effect, mesh=mesh, masses=[{"density": 0.25}])
+    sides = np.ptp(scene.mesh.points, axis=0)
+    assert scene.masses.sum() == pytest.approx(0.25 * np.prod(sides[sides > 1e-9]))
+    assert scene.masses.max() > 1.5 * scene.masses.min()
+
+
+def test_a_heavy_side_moves_less_and_the_centre_of_mass_stays():
+    heavy = [{"select": "left", "vertex_mass": 1e5}]
+    scene = make_scene(SPRING, masses=heavy, frames=10)
+    start = 0.05 * (scene.mesh.points - scene.mesh.points.mean(axis=0))
+    positions = trajectory(scene, perturbation=start)
+    moved = np.linalg.norm(positions[-1] - positions[0], axis=1)
+    left = scene.masses > 100.0
+    assert moved[left].max() < 0.01 * moved[~left].max()
+    centre = np.einsum("n,fna->fa", scene.masses, positions) / scene.masses.sum()
+    assert np.abs(centre - centre[0]).max() < 1e-12

@@ -3,7 +3,6 @@
 import pytest
 from pydantic import ValidationError
 
-from pdrom.core.errors import ConfigurationError
 from pdrom.reduction.method import MethodSpec, load_methods
 from places import CONFIG
 
@@ -80,21 +79,3 @@ def test_a_method_cannot_be_changed():
     method = MethodSpec(title="t", rows="all")
     with pytest.raises(ValidationError, match="frozen"):
         method.rows = "joint"
-
-
-@pytest.mark.parametrize(
-    ("text", "named"),
-    [
-        ("deim: {title: a, rows: vertices}", "deim.*rows"),
-        ("deim: {title: a, rows: all, extra: 1}", "deim.*extra"),
-        ("deim: {rows: all}", "deim.*title"),
-        ("[deim]", "mapping"),
-        ("", "mapping"),
-        ("deim: {title: a, rows: joint, selection: pivoted-qr}", "deim.*only 'greedy'"),
-    ],
-)
-def test_faults_name_file_method_and_key(tmp_path, text, named):
-    path = tmp_path / "methods.yaml"
-    path.write_text(text, encoding="utf-8")
-    with pytest.raises(ConfigurationError, match=rf"methods\.yaml.*{named}"):
-        load_methods(path)

@@ -10,23 +10,15 @@ from pdrom.core.errors import SnapshotError, StorageError
 from pdrom.core.store import open_hdf5, write_hdf5
 from pdrom.model.runs import run
 from pdrom.reduction import snapshots
-from pdrom.reduction.snapshots import (
-    collect,
-    load_snapshots,
-    row_masses,
-    save_snapshots,
-    stored_frames,
-    training_frames,
-)
 
 FRAMES = st.integers(4, 500)
-TRAIN = training_frames(12, 3)
+TRAIN = snapshots.training_frames(12, 3)
 
 
 @given(frames=FRAMES, data=st.data())
 def test_training_and_test_frames_are_disjoint_and_spread(frames, data):
     count = data.draw(st.integers(2, (frames + 1) // 2))
-    train, test = training_frames(frames, count), snapshots.test_frames(frames)
+    train, test = snapshots.training_frames(frames, count), snapshots.test_frames(frames)
     assert len(train) == len(np.unique(train)) == count
     assert not np.intersect1d(train, test).size
     assert train[0] == 0
@@ -35,20 +27,20 @@ def test_training_and_test_frames_are_disjoint_and_spread(frames, data):
     np.testing.assert_array_equal(test, [f for f in range(frames) if f % 2])
     gaps = np.diff(train)
     assert gaps.max() - gaps.min() <= 2
-    stored = stored_frames(frames, count)
+    stored = snapshots.stored_frames(frames, count)
     np.testing.assert_array_equal(stored, sorted({*train.tolist(), *test.tolist()}))
 
 
 def test_known_frames():
-    assert training_frames(9, 3).tolist() == [0, 4, 8]
-    assert training_frames(10, 5).tolist() == [0, 2, 4, 6, 8]
-    assert stored_frames(5, 2).tolist() == [0, 1, 3, 4]
+    assert snapshots.training_frames(9, 3).tolist() == [0, 4, 8]
+    assert snapshots.training_frames(10, 5).tolist() == [0, 2, 4, 6, 8]
+    assert snapshots.stored_frames(5, 2).tolist() == [0, 1, 3, 4]
 
 
 def test_row_masses_hand_out_all_mass(group_scene, rng):
     group = group_scene.groups[0]
     masses = rng.uniform(0.5, 2.0, group_scene.mesh.vertices)
-    rows = row_masses(group, masses).reshape(group.elements, group.rows_per_element)
+    rows = snapshots.row_masses(group, masses).reshape(group.elements, group.rows_per_element)
     assert (rows == rows[:, :1]).all()
     touched = np.asarray(abs(group.S).sum(axis=0)).ravel() > 0
     assert rows[:, 0].sum() == pytest.approx(masses[touched].sum(), rel=1e-12)
@@ -65,7 +57,7 @@ def test_row_mass_of_springs_by_hand():
     valence = ends.sum(axis=0)
     masses = np.arange(1.0, 10.0)
     expected = [sum(masses[v] / valence[v] for v in np.flatnonzero(row)) for row in ends]
-    assert row_masses(group, masses) == pytest.approx(expected, rel=1e-13)
+    assert snapshots.row_masses(group, masses) == pytest.approx(expected, rel=1e-13)
 
 
 @pytest.fixture(scope="module")
@@ -74,7 +66,7 @@ def runs(tmp_path_factory):
     folder = tmp_path_factory.mktemp("runs")
     effects = [GRAVITY, TOP]
     scene = make_scene(*effects, {"effect": "spring", "weight": 1e4}, frames=12)
-    run(scene, folder / "train.h5", {"spring": stored_frames(12, 3)})
+    run(scene, folder / "train.h5", {"spring": snapshots.stored_frames(12, 3)})
     run(scene, folder / "held.h5", {"spring": np.array([1, 6])})
     return scene, folder
 
@@ -83,7 +75,7 @@ def collected(runs, frames=TRAIN, **paths):
     """Snapshots of the runs, or of other files in their place."""
     scene, folder = runs
     files = {name: folder / f"{name}.h5" for name in ("train", "held")} | paths
-    return collect(files["train"], files["held"], scene.groups[0], scene.masses, frames)
+    return snapshots.collect(files["train"], files["held"], scene.groups[0], scene.masses, frames)
 
 
 def test_splits_hold_their_frames(runs):
@@ -111,8 +103,8 @@ def test_round_off_of_a_projection_is_small_but_not_zero(runs):
 
 def test_file_round_trip(runs, tmp_path):
     got = collected(runs)
-    save_snapshots(got, tmp_path / "s.h5")
-    back = load_snapshots(tmp_path / "s.h5")
+    snapshots.save_snapshots(got, tmp_path / "s.h5")
+    back = snapshots.load_snapshots(tmp_path / "s.h5")
     for name, value in vars(got).items():
         if name == "frames":
             assert value.keys() == back.frames.keys()

@@ -121,7 +121,8 @@ def _write_bases(results, scene, group, count, rank, rng) -> np.ndarray:
         with write_hdf5(path) as file:
             file["V"], file["mean"] = V, np.zeros(len(V))
             file["singular_values"] = 0.5 ** np.arange(14)
-            file.attrs.update(rank=rank, roundoff=1e-12, rows_per_element=rows)
+            own = {"separate_axes": False, "active_axes": [True] * 3}
+            file.attrs.update(rank=rank, roundoff=1e-12, rows_per_element=rows, **own)
     with write_hdf5(results.path(paths.SNAPSHOTS, scene, group)) as file:
         for split in ("train", "test", "heldout"):
             file[split] = rng.standard_normal((10, rows * count, 3))

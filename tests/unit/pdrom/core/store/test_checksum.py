@@ -4,43 +4,20 @@ import errno
 import os
 import shutil
 import subprocess
+from collections.abc import Iterator
 from pathlib import Path
 
 import h5py
-import numpy as np
-import pandas as pd
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from builders import write_result
 from pdrom import __version__
+from pdrom.core import store
 from pdrom.core.errors import StorageError
-from pdrom.core.store import (
-    check_file,
-    checksum_path,
-    open_hdf5,
-    provenance_of,
-    read_table,
-    read_text,
-    require_intact,
-    write_hdf5,
-    write_table,
-    write_text,
-)
+from pdrom.core.store import open_hdf5
 from pdrom.core.store.checksum import BLOCK, damaged_set_aside
-
-
-def write_one(path: Path) -> None:
-    """A small result of the kind that the name says."""
-    if path.suffix == ".h5":
-        with write_hdf5(path) as file:
-            file["x"] = np.linspace(0.0, 1.0, 64)
-            file["x"].attrs["unit"] = "m"
-            file["group/y"] = np.arange(30)
-    elif path.suffix == ".csv":
-        write_table(pd.DataFrame({"scene": ["a", "b", "c"], "error": [0.1, np.nan, 1e-300]}), path)
-    else:
-        write_text("\\newcommand{\\val}{1}\n" * 3, path)
 
 
 def read_one(path: Path) -> None:
@@ -49,29 +26,33 @@ def read_one(path: Path) -> None:
         with open_hdf5(path) as file:
             file.visititems(lambda _, item: item[()] if isinstance(item, h5py.Dataset) else None)
     elif path.suffix == ".csv":
-        read_table(path)
+        store.read_table(path)
     else:
-        read_text(path)
+        store.read_text(path)
 
 
 @pytest.fixture(scope="module", params=["r.h5", "r.csv", "r.tex"])
 def result(request, tmp_path_factory) -> Path:
     """A small result with its checksum; `noticed` undoes the changes of a test."""
     path = tmp_path_factory.mktemp("result") / request.param
-    write_one(path)
-    assert check_file(path) == "intact"
+    write_result(path)
+    assert store.check_file(path) == "intact"
     assert [p.name for p in path.parent.iterdir() if p != path] == hidden(path)
     return path
 
 
 def hidden(path: Path) -> list[str]:
     """Names of the files beside a result; only HDF5 files contain their own checksum."""
-    return [] if path.suffix == ".h5" else [checksum_path(path).name]
+    return [] if path.suffix == ".h5" else [store.checksum_path(path).name]
 
 
 def checksum_of(path: Path) -> bytes:
     """The bytes of a result's checksum, inside it or beside it."""
-    return path.read_bytes()[:BLOCK] if path.suffix == ".h5" else checksum_path(path).read_bytes()
+    return (
+        path.read_bytes()[:BLOCK]
+        if path.suffix == ".h5"
+        else store.checksum_path(path).read_bytes()
+    )
 
 
 def places(checksum: bytes) -> list[int]:
@@ -91,9 +72,9 @@ def noticed(path: Path, content: bytes | None = None, checksum: bytes | None = N
     if checksum is not None and path.suffix == ".h5":
         path.write_bytes(checksum + path.read_bytes()[BLOCK:])
     elif checksum is not None:
-        checksum_path(path).write_bytes(checksum)
+        store.checksum_path(path).write_bytes(checksum)
     changed = {p: p.read_bytes() for p in path.parent.iterdir()}
-    assert check_file(path) == "damaged"
+    assert store.check_file(path) == "damaged"
     with pytest.raises(
         StorageError, match=r"damaged, its content and its checksum differ \([^;]*$"
     ):
@@ -117,57 +98,43 @@ def flipped(content: bytes, bit: int) -> bytes:
     return bytes(changed)
 
 
-@pytest.mark.parametrize("count", [1, 512, 4096])
-def test_a_zeroed_end_is_noticed(result, count):
+def damages(content: bytes) -> Iterator[bytes]:
+    """The content with an overwritten end, cut, with a line lost or repeated, with bytes behind."""
+    for count in (1, 512, 4096):
+        kept = content[: max(0, len(content) - count)]
+        yield from (kept.ljust(len(content), filler) for filler in (b"\0", b"\xff"))
+    lines = content.splitlines(keepends=True)
+    for i in range(len(lines)):
+        yield b"".join(lines[:i])
+        yield b"".join(lines[:i] + lines[i + 1 :])
+        yield b"".join(lines[: i + 1] + lines[i:])
+    yield from (content[:kept] for kept in (*range(0, len(content), 512), len(content) - 1))
+    yield from (content + more for more in (b"\0", b"\n", b"a,b\n"))
+
+
+def test_every_damage_is_noticed(result):
     content = result.read_bytes()
-    count = min(count, len(content))
-    kept = content[: len(content) - count]
-    ends = {kept + bytes([filler]) * count for filler in (0, 255)} - {content}
-    for changed in ends:  # the last byte of an HDF5 file may be a zero
+    for changed in {*damages(content)} - {content}:  # the last byte of an HDF5 file may be a zero
         assert noticed(result, changed)
 
 
-def test_every_cut_is_noticed(result):
-    content = result.read_bytes()
-    line_ends = [i + 1 for i, byte in enumerate(content) if byte == ord("\n")]
-    for kept in {*range(0, len(content), 512), *line_ends, len(content) - 1} - {len(content)}:
-        assert noticed(result, content[:kept])
-
-
-def test_every_lost_or_repeated_line_is_noticed(result):
-    lines = result.read_bytes().splitlines(keepends=True)
-    for i in range(len(lines)):
-        assert noticed(result, b"".join(lines[:i] + lines[i + 1 :]))
-        assert noticed(result, b"".join(lines[: i + 1] + lines[i:]))
-
-
-def test_appended_bytes_are_noticed(result):
-    for more in (b"\0", b"\n", b"a,b\n"):
-        assert noticed(result, result.read_bytes() + more)
-
-
-def test_a_changed_bit_in_every_byte_of_the_checksum_is_noticed(result):
+def test_every_changed_bit_and_every_cut_of_the_checksum_is_noticed(result):
     checksum = checksum_of(result)
-    for i in places(checksum):
-        assert noticed(result, checksum=flipped(checksum, 8 * i + i % 8))
-
-
-def test_every_cut_checksum_is_noticed(result):
-    checksum = checksum_of(result)
+    flips = [flipped(checksum, 8 * i + i % 8) for i in places(checksum)]
     # an HDF5 file that has lost its whole block is a file without a checksum
     cuts = [checksum[:kept] for kept in places(checksum) if kept or result.suffix != ".h5"]
-    for changed in (*cuts, checksum + b"\n", checksum.upper()):
+    for changed in (*flips, *cuts, checksum + b"\n", checksum.upper()):
         assert noticed(result, checksum=changed)
 
 
 def test_the_checksum_tells_the_provenance_and_counts_without_it(result):
-    assert provenance_of(result)["pdrom_version"] == __version__
+    assert store.provenance_of(result)["pdrom_version"] == __version__
     if result.suffix == ".h5":
         return
-    checksum = checksum_path(result).read_bytes()
-    checksum_path(result).write_bytes(checksum.split(b"\n", 1)[1])
-    assert (check_file(result), provenance_of(result)) == ("intact", {})
-    checksum_path(result).write_bytes(checksum)
+    checksum = store.checksum_path(result).read_bytes()
+    store.checksum_path(result).write_bytes(checksum.split(b"\n", 1)[1])
+    assert (store.check_file(result), store.provenance_of(result)) == ("intact", {})
+    store.checksum_path(result).write_bytes(checksum)
 
 
 @given(data=st.data())
@@ -184,9 +151,9 @@ def test_a_copy_without_its_checksum_is_refused_and_left_alone_but_by_a_job(resu
     copy = Path(shutil.copy(result, tmp_path))
     if copy.suffix == ".h5":  # the checksum is inside
         read_one(copy)
-        assert check_file(copy) == "intact"
+        assert store.check_file(copy) == "intact"
         return
-    assert check_file(copy) == "no checksum"
+    assert store.check_file(copy) == "no checksum"
     with pytest.raises(
         StorageError, match=r"its checksum \.r\..* is missing \(copied without it\?\)$"
     ):
@@ -200,7 +167,7 @@ def test_a_copy_without_its_checksum_is_refused_and_left_alone_but_by_a_job(resu
 
 def test_a_folder_that_is_copied_or_renamed_stays_intact(result, tmp_path):
     shutil.copytree(result.parent, tmp_path / "copy")
-    assert check_file(tmp_path / "copy" / result.name) == "intact"
+    assert store.check_file(tmp_path / "copy" / result.name) == "intact"
     read_one(tmp_path / "copy" / result.name)
 
 
@@ -208,35 +175,38 @@ def test_the_checksum_of_another_result_does_not_fit(result, tmp_path):
     """Equal content under another name has another checksum, where the checksum is not inside."""
     shutil.copy(result, tmp_path / "other")
     if result.suffix == ".h5":
-        assert check_file(tmp_path / "other") == "intact"
+        assert store.check_file(tmp_path / "other") == "intact"
         return
-    shutil.copy(checksum_path(result), checksum_path(tmp_path / "other"))
-    assert check_file(tmp_path / "other") == "damaged"
+    shutil.copy(store.checksum_path(result), store.checksum_path(tmp_path / "other"))
+    assert store.check_file(tmp_path / "other") == "damaged"
 
 
 def test_a_new_file_heals(result, tmp_path):
     path = tmp_path / result.name
-    write_one(path)
+    write_result(path)
     path.write_bytes(b"")
     with damaged_set_aside(), pytest.raises(StorageError, match="set aside"):
-        require_intact(path)
-    write_one(path)
+        store.require_intact(path)
+    write_result(path)
     read_one(path)
     assert path.read_bytes() == result.read_bytes()
 
 
 def test_what_is_not_there_is_named(tmp_path):
-    for check in (check_file, require_intact):
+    for check in (store.check_file, store.require_intact):
         with pytest.raises(StorageError, match=r"none\.csv: no such file"):
             check(tmp_path / "none.csv")
 
 
 def test_a_wrong_checksum_is_refused_also_by_who_asks_for_none(tmp_path):
     path = tmp_path / "r.h5"
-    write_one(path)
+    write_result(path)
     content = path.read_bytes()
     path.write_bytes(flipped(content, 4 * len(content)))
-    with pytest.raises(StorageError, match="checksum differ"), open_hdf5(path, unchecked=True):
+    with (
+        pytest.raises(StorageError, match="checksum differ"),
+        open_hdf5(path, unchecked=True),
+    ):
         pass
 
 
@@ -246,7 +216,7 @@ def test_a_wrong_checksum_is_refused_also_by_who_asks_for_none(tmp_path):
 def test_only_what_the_disk_lost_is_set_aside(tmp_path, monkeypatch, number, aside):
     """A file that may not be read, or not now, is not damaged."""
     path = tmp_path / "t.csv"
-    write_one(path)
+    write_result(path)
 
     def fail(*_):
         raise OSError(number, os.strerror(number))
@@ -254,7 +224,7 @@ def test_only_what_the_disk_lost_is_set_aside(tmp_path, monkeypatch, number, asi
     monkeypatch.setattr("hashlib.file_digest", fail)
     expected = "set aside" if aside else os.strerror(number)
     with damaged_set_aside(), pytest.raises(StorageError, match=expected):
-        read_table(path)
+        store.read_table(path)
     assert path.exists() != aside
 
 
@@ -266,13 +236,13 @@ def test_the_checksum_is_what_b2sum_checks(result):
         done = subprocess.run(["b2sum"], input=behind, capture_output=True, check=True)
         assert done.stdout in checksum_of(result)
         return
-    command = ["b2sum", "--check", "--strict", checksum_path(result).name]
+    command = ["b2sum", "--check", "--strict", store.checksum_path(result).name]
     assert subprocess.run(command, cwd=folder, check=False).returncode == 0
 
 
 def test_a_file_without_checksum_that_replaces_one_with_it_takes_the_checksum_along(tmp_path):
     path = tmp_path / "t.txt"
-    write_text("result", path)
-    write_text("a user's own", path, with_checksum=False)
+    store.write_text("result", path)
+    store.write_text("a user's own", path, with_checksum=False)
     assert list(tmp_path.iterdir()) == [path]
-    assert check_file(path) == "no checksum"
+    assert store.check_file(path) == "no checksum"

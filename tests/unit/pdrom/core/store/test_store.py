@@ -11,70 +11,39 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from builders import write_result
+from pdrom.core import store
 from pdrom.core.errors import SceneError, StorageError
-from pdrom.core.store import (
-    MARK,
-    atomic_path,
-    check_file,
-    checksum_path,
-    open_hdf5,
-    read_table,
-    read_text,
-    require_finite,
-    require_own,
-    require_place,
-    require_self_contained,
-    write_hdf5,
-    write_table,
-    write_text,
-)
+from pdrom.core.store import open_hdf5
 from pdrom.core.store.checksum import damaged_set_aside, new_checksum
 
 
-def test_name_appears_only_when_complete(tmp_path):
+def test_a_complete_file_takes_the_name_and_who_reads_the_old_one_keeps_it(tmp_path):
     path = tmp_path / "new" / "folder" / "result.txt"
-    with atomic_path(path) as temporary:
-        temporary.write_text("whole")
+    with store.atomic_path(path) as temporary:
+        temporary.write_text("old")
         assert not path.exists()
         assert temporary.parent == path.parent
         assert temporary.suffix == path.suffix
-    assert path.read_text() == "whole"
-    assert sorted(path.parent.iterdir()) == sorted([path, checksum_path(path)])
-
-
-def test_who_reads_the_old_file_keeps_it(tmp_path):
-    """The new file takes the name, it is not written into the old one."""
-    path = tmp_path / "result.txt"
-    path.write_text("old")
     with open(path) as reader:
-        with atomic_path(path) as temporary:
+        with store.atomic_path(path) as temporary:
             temporary.write_text("new and longer")
         assert reader.read() == "old"
     assert path.read_text() == "new and longer"
+    assert sorted(path.parent.iterdir()) == sorted([path, store.checksum_path(path)])
 
 
-def write_one(path, kind, value=1.0):
-    """Write ``path`` in one of the ways that the package has."""
-    if kind == "hdf5":
-        with write_hdf5(path) as file:
-            file["x"] = np.full(100, value)
-    elif kind == "table":
-        write_table(pd.DataFrame({"x": [value]}), path)
-    else:
-        write_text(f"{value}\n", path)
-
-
-def old_file(tmp_path, kind):
+def old_file(tmp_path, suffix):
     """Write an intact file; return its path and a check that nothing in its folder changed."""
-    path = tmp_path / "result"
-    write_one(path, kind)
+    path = tmp_path / f"result{suffix}"
+    write_result(path)
     before = path.read_bytes()
     names = sorted(tmp_path.iterdir())
-    assert names == sorted([path] if kind == "hdf5" else [path, checksum_path(path)])
+    assert names == sorted([path] if suffix == ".h5" else [path, store.checksum_path(path)])
 
     def untouched():
         assert path.read_bytes() == before
-        assert check_file(path) == "intact"
+        assert store.check_file(path) == "intact"
         assert sorted(tmp_path.iterdir()) == names
         return True
 
@@ -95,32 +64,32 @@ def let_through(monkeypatch, call, count, fault):
 
 
 # Kind of file, and number of calls that work; a separate checksum file needs a second call.
-CALLS = [("hdf5", 0), ("table", 0), ("table", 1), ("text", 0), ("text", 1)]
+CALLS = [(".h5", 0), (".csv", 0), (".csv", 1), (".txt", 0), (".txt", 1)]
 
 
-@pytest.mark.parametrize(("kind", "count"), CALLS)
+@pytest.mark.parametrize(("suffix", "count"), CALLS)
 @pytest.mark.parametrize("call", ["fsync", "replace"])
 @pytest.mark.parametrize("number", [errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO])
 def test_a_system_call_that_fails_leaves_the_old_file(
-    tmp_path, monkeypatch, kind, call, count, number
+    tmp_path, monkeypatch, suffix, call, count, number
 ):
-    path, untouched = old_file(tmp_path, kind)
+    path, untouched = old_file(tmp_path, suffix)
     let_through(monkeypatch, call, count, OSError(number, os.strerror(number)))
     with pytest.raises(StorageError) as caught:
-        write_one(path, kind, 2.0)
+        write_result(path, 2.0)
     assert str(caught.value) == f"{path}: cannot be written ({os.strerror(number)})"
     assert untouched()
 
 
-@pytest.mark.parametrize(("kind", "count"), CALLS)
+@pytest.mark.parametrize(("suffix", "count"), CALLS)
 @pytest.mark.parametrize("interruption", [KeyboardInterrupt, SystemExit, MemoryError])
 def test_an_interruption_is_handed_on_and_leaves_the_old_file(
-    tmp_path, monkeypatch, kind, count, interruption
+    tmp_path, monkeypatch, suffix, count, interruption
 ):
-    path, untouched = old_file(tmp_path, kind)
+    path, untouched = old_file(tmp_path, suffix)
     let_through(monkeypatch, "replace", count, interruption())
     with pytest.raises(interruption):
-        write_one(path, kind, 2.0)
+        write_result(path, 2.0)
     assert untouched()
 
 
@@ -144,15 +113,15 @@ def test_a_kill_between_the_checksum_and_the_file_is_healed(tmp_path, existed, c
     """The old file is intact, or noticed as damaged; a file without a checksum is never left."""
     path = tmp_path / "result.txt"
     if existed:
-        write_text("old", path)
+        store.write_text("old", path)
     command = [sys.executable, "-c", KILLED_AT_A_NAME, path, str(count)]
     assert subprocess.run(command, check=False).returncode == -signal.SIGKILL
     assert path.exists() == existed
     if existed:
-        assert check_file(path) == ("damaged" if count else "intact")
-    write_text("new", path)
-    assert read_text(path) == "new"
-    assert sorted(tmp_path.iterdir()) == sorted([path, checksum_path(path)])
+        assert store.check_file(path) == ("damaged" if count else "intact")
+    store.write_text("new", path)
+    assert store.read_text(path) == "new"
+    assert sorted(tmp_path.iterdir()) == sorted([path, store.checksum_path(path)])
 
 
 KILLED = """
@@ -173,7 +142,7 @@ def test_what_a_killed_process_left_goes_with_the_next_write(tmp_path):
     subprocess.run([sys.executable, "-c", KILLED, path], check=False)
     (left,) = [p for p in tmp_path.iterdir() if p != other]
     assert left.name.startswith(".result.")
-    write_one(path, "hdf5")
+    write_result(path)
     assert sorted(tmp_path.iterdir()) == sorted([path, other])
 
 
@@ -191,7 +160,7 @@ def occupied(folder, kind):
 
 
 @pytest.mark.parametrize("kind", ["a link", "no regular file", "a folder"])
-@pytest.mark.parametrize("place", [require_place, lambda path: write_text("new", path)])
+@pytest.mark.parametrize("place", [store.require_place, lambda path: store.write_text("new", path)])
 def test_what_is_no_regular_file_is_refused_and_stays(tmp_path, kind, place):
     path = occupied(tmp_path, kind)
     before, names = path.lstat(), sorted(tmp_path.iterdir())
@@ -204,34 +173,34 @@ def test_what_is_no_regular_file_is_refused_and_stays(tmp_path, kind, place):
 
 def test_a_file_of_another_program_is_refused(tmp_path):
     path = tmp_path / "result.txt"
-    require_own(path)
+    store.require_own(path)
     path.write_text("mine")
     with pytest.raises(StorageError, match="a file that pdrom has not made"):
-        require_own(path)
-    write_text("ours", path)
-    require_own(path)
-    path.write_bytes(b"<meta content='" + MARK + b"'>")
-    require_own(path)
+        store.require_own(path)
+    store.write_text("ours", path)
+    store.require_own(path)
+    path.write_bytes(b"<meta content='" + store.MARK + b"'>")
+    store.require_own(path)
     path.write_text("# sheet made by pdrom's author")
     with pytest.raises(StorageError, match="a file that pdrom has not made"):
-        require_own(path)
+        store.require_own(path)
 
 
 def test_a_hidden_file_of_another_program_stays(tmp_path):
     path = tmp_path / "page.html"
-    checksum_path(path).write_text("mine")
-    write_text("page", path, with_checksum=False)
-    assert checksum_path(path).read_text() == "mine"
+    store.checksum_path(path).write_text("mine")
+    store.write_text("page", path, with_checksum=False)
+    assert store.checksum_path(path).read_text() == "mine"
 
 
 def test_who_writes_the_same_file_at_once_keeps_the_own(tmp_path):
     path = tmp_path / "result.txt"
-    with atomic_path(path) as first:
+    with store.atomic_path(path) as first:
         first.write_text("first")
-        write_text("second", path)
+        store.write_text("second", path)
         assert first.read_text() == "first"
     assert path.read_text() == "first"
-    assert sorted(path.parent.iterdir()) == sorted([path, checksum_path(path)])
+    assert sorted(path.parent.iterdir()) == sorted([path, store.checksum_path(path)])
 
 
 @pytest.mark.parametrize("kind", ["external", "soft", "storage", "virtual"])
@@ -242,7 +211,7 @@ def test_a_file_that_reads_others_is_refused(tmp_path, kind):
     with h5py.File(path, "w") as file:
         inside = file.create_group("inside")
         inside["back"] = file  # a circle of groups
-        require_self_contained(file, path)
+        store.require_self_contained(file, path)
         if kind == "external":
             inside["x"] = h5py.ExternalLink(str(other), "/x")
         elif kind == "soft":
@@ -255,7 +224,7 @@ def test_a_file_that_reads_others_is_refused(tmp_path, kind):
             layout[:] = h5py.VirtualSource(str(other), "x", (4,))
             inside.create_virtual_dataset("x", layout)
         with pytest.raises(StorageError, match="x is no data of this file"):
-            require_self_contained(file, path)
+            store.require_self_contained(file, path)
 
 
 TABLE = pd.DataFrame(
@@ -269,22 +238,18 @@ TABLE = pd.DataFrame(
 
 
 def test_table_round_trip(tmp_path):
+    """Empty cells and digits, too."""
     path = tmp_path / "t.csv"
-    write_table(TABLE, path)
-    back = read_table(path, ["scene", "error"])
+    store.write_table(TABLE, path)
+    lines = b"scene,r,error,finite\na,1,0.1,True\nb,,,False\nc,3,1e-300,True\n"
+    assert path.read_bytes() == lines
+    back = store.read_table(path, ["scene", "error"])
     assert list(back.columns) == list(TABLE.columns)
     np.testing.assert_allclose(back.error, TABLE.error, rtol=1e-9)
     assert back.r.isna().tolist() == [False, True, False]
     assert back.finite.tolist() == [True, False, True]
-    write_table(back.astype({"r": "Int64"}), tmp_path / "again.csv")
+    store.write_table(back.astype({"r": "Int64"}), tmp_path / "again.csv")
     assert (tmp_path / "again.csv").read_bytes() == path.read_bytes()
-
-
-def test_empty_cells_and_digits_of_a_table(tmp_path):
-    write_table(TABLE, tmp_path / "t.csv")
-    assert (tmp_path / "t.csv").read_bytes() == (
-        b"scene,r,error,finite\na,1,0.1,True\nb,,,False\nc,3,1e-300,True\n"
-    )
 
 
 @pytest.mark.parametrize(
@@ -302,48 +267,33 @@ def test_faulty_tables_are_named(tmp_path, content, message):
     if content is not None:
         path.write_bytes(content)
     with pytest.raises(StorageError, match=rf"t\.csv.*{message}"):
-        read_table(path, ["a", "c", "d"], result=False)
+        store.read_table(path, ["a", "c", "d"], result=False)
 
 
 def test_a_table_that_no_run_makes_needs_no_checksum_and_stays(tmp_path):
     path = tmp_path / "reference.csv"
     path.write_text("a,b\n1,2\n")
-    assert len(read_table(path, result=False)) == 1
+    assert len(store.read_table(path, result=False)) == 1
     path.write_text("a,b\n1,2\n3,")
     with pytest.raises(StorageError, match="end of its last line is missing"):
-        read_table(path, result=False)
+        store.read_table(path, result=False)
     assert list(tmp_path.iterdir()) == [path]
-
-
-def test_a_table_of_the_results_needs_its_checksum(tmp_path):
-    (tmp_path / "t.csv").write_text("a,b\n1,2\n")
-    with pytest.raises(StorageError, match=r"t\.csv: its checksum .* is missing"):
-        read_table(tmp_path / "t.csv")
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
 def test_first_number_that_is_none_is_named(bad):
     array = np.zeros((3, 4))
-    assert require_finite("x", array, SceneError) is array
+    assert store.require_finite("x", array, SceneError) is array
     array[1, 2] = array[2, 0] = bad
     with pytest.raises(SceneError, match=rf"x: entry \(1, 2\) is {bad}"):
-        require_finite("x", array, SceneError)
-
-
-def test_equal_content_equal_bytes(tmp_path):
-    for name in ("one.h5", "two.h5"):
-        with write_hdf5(tmp_path / name) as file:
-            file.attrs["title"] = "t"
-            file["b"] = np.linspace(0.0, 1.0, 50)
-            file["a/c"] = np.arange(4)
-    assert (tmp_path / "one.h5").read_bytes() == (tmp_path / "two.h5").read_bytes()
+        store.require_finite("x", array, SceneError)
 
 
 def test_missing_pieces_are_named(tmp_path):
     path = tmp_path / "few.h5"
     with pytest.raises(StorageError, match=r"few\.h5: no such file"), open_hdf5(path):
         pass
-    with write_hdf5(path) as file:
+    with store.write_hdf5(path) as file:
         file["x"] = 1
     with pytest.raises(StorageError, match=r"few\.h5.*'?y'?"), open_hdf5(path) as file:
         file["y"][...]
@@ -356,7 +306,7 @@ def test_missing_pieces_are_named(tmp_path):
 def test_a_failure_inside_hdf5_leaves_the_old_file(tmp_path, fault):
     path = tmp_path / "result.h5"
     path.write_text("old")
-    with pytest.raises(fault), write_hdf5(path) as file:
+    with pytest.raises(fault), store.write_hdf5(path) as file:
         file["x"] = np.arange(1000.0)
         raise fault
     assert path.read_text() == "old"
@@ -367,6 +317,7 @@ LIMITED = """
 import resource, sys
 import numpy as np
 from pdrom.core.errors import StorageError
+from pdrom.core.store import open_hdf5
 from pdrom.core.store import write_hdf5
 resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))
 try:
@@ -397,7 +348,10 @@ def test_a_file_that_is_not_hdf5_is_named_and_left_alone(tmp_path):
         (tmp_path / name).write_text("no HDF5")
         for unchecked in (False, True):
             expected = rf"{name}: .*(checksum|cannot be read)"
-            with pytest.raises(StorageError, match=expected), open_hdf5(tmp_path / name, unchecked):
+            with (
+                pytest.raises(StorageError, match=expected),
+                open_hdf5(tmp_path / name, unchecked),
+            ):
                 pass
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.h5", "a.yaml"]
 
@@ -408,35 +362,38 @@ def plain(tmp_path):
     path = tmp_path / "old.h5"
     with h5py.File(path, "w") as file:
         file["x"] = np.arange(1000)
-    checksum_path(path).write_bytes(new_checksum("0" * 128, path.name).content)
+    store.checksum_path(path).write_bytes(new_checksum("0" * 128, path.name).content)
     return path
 
 
 def test_a_file_without_a_checksum_inside_is_refused_unless_asked_for(plain):
-    assert check_file(plain) == "no checksum"
+    assert store.check_file(plain) == "no checksum"
     expected = r"old\.h5: no checksum inside .*; --unchecked \(.*\) reads it if it is sound$"
     with pytest.raises(StorageError, match=expected), open_hdf5(plain):
         pass
     with open_hdf5(plain, unchecked=True) as file:
         assert file["x"][...].sum() == 499500
     os.truncate(plain, 3000)
-    with pytest.raises(StorageError, match=r"old\.h5: cannot be read"), open_hdf5(plain, True):
+    with (
+        pytest.raises(StorageError, match=r"old\.h5: cannot be read"),
+        open_hdf5(plain, True),
+    ):
         pass
-    assert sorted(plain.parent.iterdir()) == sorted([plain, checksum_path(plain)])
+    assert sorted(plain.parent.iterdir()) == sorted([plain, store.checksum_path(plain)])
 
 
 def test_a_new_file_takes_the_hidden_checksum_of_an_old_one_along(plain):
-    with write_hdf5(plain) as file:
+    with store.write_hdf5(plain) as file:
         file["x"] = 1
     assert list(plain.parent.iterdir()) == [plain]
-    assert check_file(plain) == "intact"
+    assert store.check_file(plain) == "intact"
 
 
 @pytest.mark.parametrize("damaged", [True, False])
 def test_an_error_while_reading_leads_to_another_check(tmp_path, damaged):
     """A file damaged after the first check is renamed; any other read error is not damage."""
     path = tmp_path / "a.h5"
-    with write_hdf5(path) as file:
+    with store.write_hdf5(path) as file:
         file["x"] = 1
     message = "set aside" if damaged else os.strerror(errno.ENOLCK)
     with damaged_set_aside(), pytest.raises(StorageError, match=message), open_hdf5(path):

@@ -1,9 +1,14 @@
-"""Rows of four: where they begin, and which arrays share them."""
+"""Rows of four: where they begin, which arrays share them, and products of three with a vector.
+
+Products of whole numbers are exact in every order of the sums.
+"""
 
 import numpy as np
 import pytest
 
 from pdrom.model.compiled import rows
+from pdrom.model.compiled.dots import dots
+from pdrom.model.compiled.functions import compiled
 from pdrom.model.compiled.rows import WIDTH
 from pdrom.model.constraints.lanes import LANES, pack, workspaces
 from pdrom.model.dynamics.frames import predict, weighted
@@ -39,3 +44,27 @@ def test_a_view_of_rows_is_shared_and_nothing_else_is(rng):
         assert not rows.shares(other, flat)
         assert np.array_equal(flat.reshape(-1, WIDTH)[:, :3], other)
         assert (flat[WIDTH - 1 :: WIDTH] == 0.0).all()
+
+
+@compiled
+def _of(matrix, rows, count, vector, starts):
+    return dots(matrix, rows[0], rows[1], rows[2], count, vector, starts)
+
+
+@pytest.mark.parametrize("rows", [(0, 1, 2), (4, 0, 3), (2, 2, 2)])
+def test_rows_of_every_length(rows, rng):
+    for count in range(41):
+        matrix = rng.integers(-99, 99, (5, count)).astype(float)
+        vector = rng.integers(-99, 99, count).astype(float)
+        starts = (7.0, -3.0, 0.0)
+        begins = tuple(count * row for row in rows)
+        found = _of(matrix.ravel(), begins, count, vector, starts)
+        assert found == tuple(matrix[list(rows)] @ vector + starts)
+
+
+@pytest.mark.parametrize("place", [0, 17, 36])
+def test_what_is_not_a_number_stays_in_its_row(place):
+    matrix = np.ones((3, 37))
+    matrix[1, place] = np.nan
+    found = _of(matrix.ravel(), (0, 37, 74), 37, np.ones(37), (0.0, 0.0, 0.0))
+    np.testing.assert_array_equal(found, (37.0, np.nan, 37.0))

@@ -2,10 +2,8 @@
 
 import numpy as np
 import pytest
-from pydantic import ValidationError
 
 from builders import GROUPS, make_scene
-from pdrom.core.errors import SceneError
 from pdrom.model.runs import trajectory
 from study.experiments.kit.scenes import varied
 
@@ -45,19 +43,3 @@ def test_another_stiffness_keeps_the_factors():
     stiffer = varied(config, config.time_step, 10.0, 0.1, (1, 100))
     (effect,) = stiffer.effects
     assert (effect.weight, effect.factors) == (1e5, config.effects[0].factors)
-
-
-def test_a_selection_without_an_element_is_named():
-    with pytest.raises(
-        SceneError, match=r"effect 'spring': factors\[0\]: selects no element.*edge"
-    ):
-        scene_with("spring", {"select": [0], "factor": 2.0})
-
-
-@pytest.mark.parametrize(
-    ("entry", "message"),
-    [({"factor": 1.0}, "factors.0.select"), ({"select": "top", "factor": 0.0}, "factors.0.factor")],
-)
-def test_faults_name_key_and_value(entry, message):
-    with pytest.raises(ValidationError, match=message):
-        scene_with("spring", entry)

@@ -1,10 +1,18 @@
-"""Compiled kernels against the NumPy reference, and projections against their definition."""
+"""Compiled kernels against the NumPy reference, and projections against their definition.
+
+Elements of an unstructured mesh are visited in an order of their own, which nobody sees.
+"""
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from builders import GROUPS, call_kernel, make_scene
 from pdrom.model.constraints.base import ConstraintGroup
+from pdrom.model.constraints.local_kernel import projections
+from pdrom.model.constraints.simplex import visiting_order
+from pdrom.model.mesh.generators import bar, cloth
 from study.experiments.timing import IMPLEMENTATIONS
 
 STATES = {
@@ -42,17 +50,19 @@ def test_kernels_equal_the_numpy_reference(group_scene, rng, state):
     d = (group.S @ y).reshape(group.elements, group.rows_per_element, 3)
     reference = group.reference_project(d, np.arange(group.elements)).reshape(-1, 3)
     # at the rest state bending divides round-off by round-off only where the rest is flat
-    assert group.project(y) == pytest.approx(reference, rel=1e-10, abs=1e-10)
+    whole = group.project(y)
+    assert whole == pytest.approx(reference, rel=1e-10, abs=1e-10)
+    elements = np.arange(0, group.elements, 3)
+    expected = group.project_elements(y, elements).reshape(len(elements), -1, 3)
+    assert np.array_equal(expected, whole.reshape(d.shape)[elements])
     if group.gradient_kernel is None:
         return
-    elements = np.arange(0, group.elements, 3)
     some = np.ascontiguousarray(d[elements])
     p = np.full_like(some, np.nan)
     part, vertices = group.restricted(elements, np.ones(len(elements)))
     part.begin_frame(y[vertices])
     parameters = np.ascontiguousarray(part.kernel_parameters(), dtype=float)
     call_kernel(group.gradient_kernel.address, some, parameters, p, len(elements))
-    expected = group.project_elements(y, elements).reshape(p.shape)
     np.testing.assert_allclose(p, expected, rtol=1e-10, atol=1e-12)
     assert group.frame_lagged == (type(group).begin_frame is not ConstraintGroup.begin_frame)
 
@@ -68,27 +78,6 @@ def test_every_implementation_accumulates_the_same(group_scene, rng, implementat
     scale = np.abs(compiled).max()
     assert np.abs(compiled - other).max() < 1e-10 * scale
     assert energy == pytest.approx(other_energy, rel=1e-10)
-
-
-def test_some_elements_equal_all_elements(group_scene, rng):
-    group = group_scene.groups[0]
-    y = rng.standard_normal(group_scene.mesh.points.shape)
-    picked = rng.permutation(group.elements)[: group.elements // 2]
-    p = group.project(y).reshape(group.elements, -1, 3)
-    some = group.project_elements(y, picked).reshape(len(picked), -1, 3)
-    assert np.array_equal(some, p[picked])
-
-
-def test_bending_never_flips():
-    """The mirrored sheet is pulled back to its rest side: p never points to the wrong one."""
-    scene = make_scene({"effect": "bending", "weight": 1.0}, mesh=GROUPS["bending"])
-    group = scene.groups[0]
-    flipped = scene.mesh.points * [1.0, 1.0, -1.0]
-    group.begin_frame(flipped)
-    p = group.project(flipped)
-    curved = group.side != 0.0
-    against = group.side * np.einsum("ij,ij->i", p, group.normals)
-    assert (against[curved] >= -1e-12 * group.magnitude[curved]).all()
 
 
 def test_flat_rest_shape_has_nothing_to_project(rng):
@@ -108,3 +97,56 @@ def test_a_group_may_keep_no_element(name):
     assert group.project_elements(np.zeros((50, 3)), none).shape == (0, 3)
     rhs = np.empty((len(vertices), 3))
     assert part.accumulate(rhs.copy(), rhs) == 0.0
+
+
+SHAPES = {
+    "strain": "disc.obj",
+    "tetrahedron_strain": "torus.vtu",
+    "deformation_gradient": "torus.vtu",
+}
+
+
+@pytest.mark.parametrize(
+    ("cells", "vertices"),
+    [(cloth(20, 20).triangles, 400), (bar(40, 5, 5).tetrahedra, 1000), (cloth(3, 3).triangles, 9)],
+)
+def test_grids_keep_their_order(cells, vertices):
+    assert visiting_order(cells, vertices) is None
+
+
+@settings(max_examples=10)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_a_shuffled_mesh_gets_neighbours_into_blocks(seed):
+    mesh = cloth(20, 20)
+    rng = np.random.default_rng(seed)
+    cells = rng.permutation(400).astype(np.int32)[rng.permutation(mesh.triangles)]
+    order = visiting_order(cells, 400)
+    assert np.array_equal(np.sort(order), np.arange(len(cells)))
+    shared = [len(np.unique(cells[order[k : k + 32]])) for k in range(0, len(cells), 32)]
+    # 32 triangles of a grid, row by row, have 34 vertices
+    assert np.mean(shared) < 40
+
+
+@pytest.mark.parametrize("effect", SHAPES)
+def test_what_others_see_is_in_the_order_of_the_mesh(effect):
+    mesh = {"kind": "file", "path": f"config/scenes/meshes/{SHAPES[effect]}"}
+    scene = make_scene({"effect": effect, "weight": 1e4}, mesh=mesh)
+    group = scene.groups[0]
+    order = visiting_order(group.stencil, scene.mesh.vertices)
+    assert order is not None
+    assert not np.array_equal(order, np.arange(group.elements))
+    rng = np.random.default_rng(5)
+    y = scene.mesh.points + 0.02 * rng.standard_normal(scene.mesh.points.shape)
+    d = (group.S @ y).reshape(group.elements, group.rows_per_element, 3)
+    every = np.arange(group.elements)
+    expected = group.reference_project(d, every).reshape(-1, 3)
+    assert group.project(y) == pytest.approx(expected, abs=1e-11)
+    some = rng.permutation(every)[:70]
+    p = projections(group.sampler(some), y, 70 * group.rows_per_element)
+    rows = (group.rows_per_element * some[:, None] + np.arange(group.rows_per_element)).ravel()
+    assert p == pytest.approx(expected[rows], abs=1e-11)
+    rhs = np.zeros_like(y)
+    energy = group.accumulate(y, rhs)
+    weights = group.row_weights[:, None]
+    assert rhs == pytest.approx(group.S.T @ (weights * expected), rel=1e-9, abs=1e-6)
+    assert energy == pytest.approx(0.5 * np.sum(weights * (group.S @ y - expected) ** 2), rel=1e-9)

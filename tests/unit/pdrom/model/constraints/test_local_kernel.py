@@ -4,16 +4,6 @@ import numpy as np
 import pytest
 
 from builders import GRAVITY, GROUPS, LEFT, make_scene
-from pdrom.model.compiled import rows
-from pdrom.model.constraints.local_kernel import (
-    FIRST,
-    OWN,
-    PREPARE,
-    VERTICES,
-    LocalKernel,
-    LocalPass,
-    local_kernel,
-)
 from pdrom.model.effects import EFFECTS
 from pdrom.model.scene import Scene
 
@@ -63,48 +53,6 @@ def test_compiled_iterations_add_both_parts(monkeypatch):
         ]
     moved = np.abs(states[0].positions - scene.mesh.points).max()
     assert np.abs(states[0].positions - states[1].positions).max() <= 1e-11 * moved
-
-
-@local_kernel
-def _recording(y_place, rhs_place, record, part):
-    """Adds 1 to the first number of each of its units; counts them, and the calls of each part."""
-    entries = rows.indices(record, OWN + 1)
-    rhs = rows.doubles(rhs_place, 4 * entries[VERTICES])
-    notes = rows.doubles(entries[OWN], 3)
-    notes[part] += 1.0
-    if part == PREPARE:
-        return 0.0
-    for unit in range(entries[FIRST + part], entries[FIRST + part + 1]):
-        rhs[4 * unit] += 1.0
-    return float(entries[FIRST + part + 1] - entries[FIRST + part])
-
-
-def recording(split: bool, prepares: bool) -> tuple[LocalKernel, np.ndarray]:
-    """A kernel of five units that touch six vertices, and how often each part was called."""
-    notes = np.zeros(3)
-    touched = (lambda unit: np.arange(unit, 6)) if split else None
-    return LocalKernel(_recording, 6, 5, [notes], [], touched, prepares), notes
-
-
-@pytest.mark.parametrize("prepares", [True, False])
-@pytest.mark.parametrize("split", [True, False])
-def test_parts_cover_all_units_once(split, prepares):
-    kernel, notes = recording(split, prepares)
-    local, rhs = LocalPass([kernel]), np.full((6, 3), 5.0)
-    assert bool(local.touched) == split
-    for _ in range(3):
-        assert local.accumulate(np.zeros((6, 3)), rhs) == 5.0
-    expected = np.full((6, 3), 5.0)
-    expected[:5, 0] += 3.0
-    assert np.array_equal(rhs, expected)
-    assert notes.tolist() == [3.0, 3.0 * split, 3.0 * prepares]
-
-
-def test_a_pass_adds_all_its_kernels():
-    kernels = [recording(split, False)[0] for split in (True, False, True)]
-    rhs = np.zeros((6, 3))
-    assert LocalPass(kernels).accumulate(np.zeros((6, 3)), rhs) == 15.0
-    assert rhs[:, 0].tolist() == [3.0] * 5 + [0.0]
 
 
 def test_a_group_without_a_kernel_writes_its_own_local_step():

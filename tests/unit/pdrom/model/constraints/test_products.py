@@ -7,11 +7,11 @@ from hypothesis import strategies as st
 
 from builders import random_rotation
 from pdrom.model.constraints.products import reference_nearest
-from pdrom.model.constraints.volume import TetrahedronVolume, TriangleArea
+from pdrom.model.effects import EFFECTS
 from simplices import bound, projected
 
 LOW, HIGH = 0.99, 1.01
-KINDS = {"volume": (TetrahedronVolume, 3), "area": (TriangleArea, 2)}
+KINDS = {"volume": 3, "area": 2}
 COUNT = 40  # more than a block of lanes
 
 # round-off, flat, repeated, in range, far too large, and any size
@@ -20,9 +20,8 @@ SIZES = st.one_of(
     st.floats(0.0, 4.0),
     st.floats(-6.0, 6.0).map(lambda x: 10.0**x),
 )
-
-
-GROUPS = {kind: bound(*group, COUNT, minimum=LOW, maximum=HIGH) for kind, group in KINDS.items()}
+ENDS = {"minimum": LOW, "maximum": HIGH}
+GROUPS = {kind: bound(EFFECTS.load(kind), rows, COUNT, **ENDS) for kind, rows in KINDS.items()}
 
 
 def signed(f: np.ndarray) -> np.ndarray:
@@ -36,7 +35,7 @@ def signed(f: np.ndarray) -> np.ndarray:
 @st.composite
 def matrices(draw, kind: str) -> np.ndarray:
     """F^T of `COUNT` elements: one set of singular values, maybe mirrored, in many frames."""
-    rows = KINDS[kind][1]
+    rows = KINDS[kind]
     sigma = np.array([draw(SIZES) for _ in range(rows)])
     if draw(st.booleans()):
         sigma[-1] = -sigma[-1]
@@ -64,7 +63,7 @@ def test_the_projection_is_in_range_and_as_near_as_bisection_finds(kind, data):
     assert (np.abs(distance - nearest) <= 1e-11).all()
     # what a matrix of this size can hold of its smallest singular values
     size = signed(p).prod(axis=1)
-    rounding = 1e-13 * scale ** KINDS[kind][1]
+    rounding = 1e-13 * scale ** KINDS[kind]
     assert ((size >= LOW - rounding) & (size <= HIGH + rounding)).all()
 
 
@@ -86,7 +85,7 @@ def test_projecting_twice_changes_nothing_and_turns_commute(kind, data):
 @pytest.mark.parametrize("kind", KINDS)
 def test_what_keeps_its_size_stays_however_it_is_sheared(kind):
     """A shear and a stretch along one axis that another gives back change no volume and no area."""
-    rows = KINDS[kind][1]
+    rows = KINDS[kind]
     members = [np.eye(3), np.diag([1.25, 0.8, 1.0]), np.eye(3) + 3.0 * np.eye(3, k=1)]
     f = np.stack([members[i % 3][:rows] for i in range(COUNT)])
     if rows == 2:

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from pydantic import ValidationError
 from scipy.spatial.transform import Rotation
 
 from builders import make_scene
@@ -63,18 +62,3 @@ def test_another_speed_and_direction():
     assert back.keys[1].offset == (-0.1, 0.0, -0.3)
     assert back.keys[1].turn == (0.0, -90.0, 0.0)
     assert back.redirected([0, 1]) == effect
-
-
-@pytest.mark.parametrize(
-    ("keys", "message"),
-    [
-        ([], "keys"),
-        ([{"at": 0}], "keys.0.at = 0"),
-        ([{"at": 5}, {"at": 5}], "at = 5 must be greater than 5"),
-        ([{"at": 5, "ofset": [0, 0, 0]}], "unknown key 'keys.0.ofset'.*did you mean 'offset'"),
-        ([{"at": 5, "offset": [0, 0, float("inf")]}], "offset"),
-    ],
-)
-def test_faults_name_key_and_value(keys, message):
-    with pytest.raises(ValidationError, match=message):
-        handle(keys=keys)

@@ -1,12 +1,15 @@
-"""Obstacles: nothing ends inside or passes through, friction is Coulomb's, the floor is a plane."""
+"""Obstacles: nothing ends inside or passes through, friction is Coulomb's, the floor is a plane.
+
+Their drawn surfaces are on the obstacles themselves, closed, and turned outwards.
+"""
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from pydantic import ValidationError
 
 from builders import OBSTACLES, make_scene
+from pdrom.model.effects.base import effect_config
 from pdrom.model.runs import trajectory
 from strategies import SEEDS
 
@@ -129,33 +132,49 @@ def test_a_plane_is_a_floor():
     assert np.abs(plane - floor).max() < 1e-9
 
 
-def test_a_cloth_lies_on_a_ball_and_does_not_glide_off_with_friction():
-    """Pushed sideways it glides off a smooth ball; where it sticks, it stays."""
-    effects = [
-        {"effect": "gravity", "acceleration": [3, -9.81, 0]},
-        {"effect": "spring", "weight": 1e4},
-    ]
-    mesh = {"kind": "cloth", "rows": 9, "columns": 9, "plane": "xz", "lift": 1.05}
-    moved = {}
-    for friction in (0.0, np.inf):
-        ball = {"effect": "sphere", "centre": [0, 0.5, 0], "radius": 0.5, "friction": friction}
-        last = trajectory(make_scene(*effects, ball, mesh=mesh, frames=60))[-1]
-        assert (np.linalg.norm(last - [0, 0.5, 0], axis=1) >= 0.5 - 1e-9).all()
-        moved[friction] = last[40, 0]
-    assert moved[0.0] > 0.5
-    assert abs(moved[np.inf]) < 0.05
+LOW, HIGH = np.array([-0.5, 1.0, -0.5]), np.array([0.7, 2.0, 0.5])
+BODIES = {"floor": {"height": 0.3}, **OBSTACLES}
 
 
-@pytest.mark.parametrize(
-    ("effect", "message"),
-    [
-        ({"effect": "plane", "normal": [0, 0, 0]}, "normal = .* has no direction"),
-        ({"effect": "box", "lower": [0, 1, 0], "upper": [1, 0, 1]}, "lower = 1 exceeds upper = 0"),
-        ({"effect": "sphere", "centre": [0, 0, 0], "radius": 0}, "radius"),
-        ({"effect": "plane", "friction": -0.1}, "friction = -0.1"),
-        ({"effect": "plane", "friction": float("nan")}, "friction"),
-    ],
-)
-def test_faults_name_key_and_value(effect, message):
-    with pytest.raises(ValidationError, match=message):
-        make_scene(SPRING, effect)
+def body(name):
+    return effect_config({"effect": name, **BODIES[name]}, 0).body(LOW, HIGH)
+
+
+@pytest.mark.parametrize("name", OBSTACLES)
+def test_corners_are_on_the_surface_that_keeps_vertices_out(name):
+    (obstacle,) = make_scene(
+        {"effect": "spring", "weight": 1.0}, {"effect": name, **OBSTACLES[name]}
+    ).contacts
+    assert np.abs(obstacle.depths(body(name).points)).max() < 1e-12
+
+
+def test_the_floor_is_at_its_height():
+    assert body("floor").points[:, 1] == pytest.approx(np.full(4, 0.3))
+
+
+@pytest.mark.parametrize("name", ["sphere", "box"])
+def test_a_body_is_closed_and_turned_outwards(name):
+    """Every edge has a triangle on each side; the enclosed volume is that of the formula."""
+    made = body(name)
+    ends = np.sort(made.triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    assert (np.unique(ends, axis=0, return_counts=True)[1] == 2).all()
+    volume = np.linalg.det(made.points[made.triangles]).sum() / 6.0
+    exact = {"sphere": 4.0 / 3.0 * np.pi * 0.7**3, "box": 1.1**3}[name]
+    assert volume == pytest.approx(exact, rel=0.01)
+
+
+@pytest.mark.parametrize("name", ["floor", "plane"])
+@given(seed=SEEDS)
+def test_a_plane_covers_the_region(name, seed):
+    """Whatever lies in the region, its foot on the plane is inside the square."""
+    made = body(name)
+    point = np.random.default_rng(seed).uniform(LOW, HIGH)
+    centre, sides = made.points.mean(axis=0), made.points[[1, 3]] - made.points[0]
+    along = sides @ (point - centre) / np.einsum("ij,ij->i", sides, sides)
+    assert np.abs(along).max() <= 0.5 + 1e-12
+    assert abs(sides[0] @ sides[1]) < 1e-12
+
+
+def test_what_is_no_obstacle_has_no_body():
+    assert effect_config({"effect": "gravity"}, 0).body(LOW, HIGH) is None
+    assert effect_config({"effect": "self_collision", "thickness": 0.1}, 0).body(LOW, HIGH) is None

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from scipy.spatial.distance import pdist, squareform
 
-from builders import GRAVITY, LEFT, make_scene
+from builders import GRAVITY, make_scene
 from pdrom.core.errors import NotReducibleError
 from pdrom.model.runs import trajectory
 from pdrom.reduction.subspace.model import make_columns
@@ -43,20 +43,6 @@ def test_no_pair_ends_closer_than_nine_tenths(start):
     for frame in range(40):
         state, _ = loop.step(state, frame)
     assert closest(scene, state.positions) >= 0.9
-
-
-def test_a_folded_cloth_keeps_its_layers_apart():
-    """One half is laid over the other by a handle; without the effect the layers meet."""
-    over = {
-        "effect": "keyframes", "select": "right", "interpolation": "smooth",
-        "keys": [{"at": 30, "offset": [-0.5, 0.5, 0]}, {"at": 60, "offset": [-0.9, 0.1, 0]}],
-    }  # fmt: skip
-    effects = [GRAVITY, {"effect": "floor"}, LEFT]
-    with_it = sheet(*effects, over, frames=80)
-    last = trajectory(with_it)[-1]
-    assert closest(with_it, last) >= 0.9
-    without = make_scene(*GROUPS, *effects, over, mesh=SHEET, frames=80)
-    assert closest(with_it, trajectory(without)[-1]) < 0.5
 
 
 @given(seed=SEEDS)

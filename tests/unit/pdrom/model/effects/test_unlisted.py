@@ -59,17 +59,12 @@ def report(group: str) -> dict:
 
 
 @pytest.mark.parametrize("effect", EFFECTS)
-def test_a_scene_without_it_does_not_import_it(effect):
-    group = other_group(effect)
-    modules = report(group)["modules"]
-    assert EFFECTS.module(group) in modules
-    assert EFFECTS.module(effect) not in modules
-
-
-@pytest.mark.parametrize("effect", EFFECTS)
-def test_a_scene_without_it_compiles_and_holds_no_more_once_it_is_loaded(effect):
+def test_a_scene_without_it_neither_imports_it_nor_holds_more_once_it_is_loaded(effect):
     """The same compiled functions of its own, arrays and bytes, and the same bits of its run."""
-    found = report(other_group(effect))
+    group = other_group(effect)
+    found = report(group)
+    assert EFFECTS.module(group) in found["modules"]
+    assert EFFECTS.module(effect) not in found["modules"]
     alone, beside = found["alone"], found[effect]
     assert alone["arrays"] > 5
     for what in ("arrays", "bytes", "run"):

@@ -12,7 +12,6 @@ from mesh_files import KINDS, write_mesh, zeros_vtu
 from pdrom.core.errors import ConfigurationError, MeshError
 from pdrom.model.mesh import files, reader
 from pdrom.model.mesh.files import MeshLimits, mesh_limits, read_mesh_file
-from pdrom.model.mesh.types import Mesh
 
 SQUARE = "v 0 0 0\nv 1 0 0\nv 1 0 1\nv 0 0 1\nf 1 2 3\nf 1 3 4\n"
 
@@ -36,30 +35,18 @@ def replaced(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, script: str) -> No
     monkeypatch.setattr(reader, "__file__", str(path))
 
 
-@pytest.mark.parametrize(
-    ("suffix", "name"),
-    [
-        pytest.param(*kind, marks=[pytest.mark.slow] if i % 6 else [])
-        for i, kind in enumerate(KINDS)
-    ],
-)
-def test_every_format_is_read(tmp_path, suffix, name):
+@pytest.mark.parametrize("suffix", [".obj", ".vtu"])
+def test_a_file_is_read_wherever_it_lies(tmp_path, suffix):
     """By the reader's process, also where the path holds a blank and letters beyond ASCII.
 
-    Each starts a process; without one `test_guards` reads all formats by default.
+    It starts a process; without one `test_guards` reads all formats.
     """
     folder = tmp_path / "Étude du maillage"
     folder.mkdir()
-    mesh = write_mesh(folder / f"größe{suffix}", name)
+    mesh = write_mesh(folder / f"größe{suffix}", suffix[1:])
     loaded = read_mesh_file(folder / f"größe{suffix}")
-    assert loaded.vertices == mesh.vertices
-    for kind in ("triangles", "tetrahedra"):
-        assert np.array_equal(centres(loaded, kind), centres(mesh, kind))
-
-
-def centres(mesh: Mesh, kind: str) -> np.ndarray:
-    """Centres of all cells, in an order of their own: some formats renumber the vertices."""
-    return np.unique(mesh.points[getattr(mesh, kind)].mean(axis=1).round(5), axis=0)
+    assert np.array_equal(loaded.points, mesh.points)
+    assert np.array_equal(loaded.triangles, mesh.triangles)
 
 
 # Reads every file of its arguments, and says which files Python opened meanwhile.

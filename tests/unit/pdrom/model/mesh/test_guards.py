@@ -79,47 +79,32 @@ def test_what_is_written_is_read_and_what_is_cut_is_not(tmp_path, writer, suffix
             assert said.startswith(("not a readable mesh (", "holds cells ")), said
 
 
-def numbered(numbers: list[int], line: str) -> str:
-    """Lines of the vertices, with their numbers."""
-    rows = zip(numbers, POINTS.tolist(), strict=True)
-    return "".join(line.format(number, *point) for number, point in rows)
-
-
-def listed(numbers: list[int], line: str) -> str:
-    """Lines of the triangles, whose corners have these numbers."""
-    rows = [[numbers[corner] for corner in triangle] for triangle in TRIANGLES]
-    return "".join(line.format(1 + place, *row) for place, row in enumerate(rows))
+# Of each format a whole file, a line of a vertex with its number, and one of a triangle.
+BY_HAND = {
+    ".nas": ("BEGIN BULK\n{}{}ENDDATA\n", "GRID,{},,{},{},{}\n", "CTRIA3,{},1,{},{},{}\n"),
+    ".avs": ("4 2 0 0 0\n{}{}", "{} {} {} {}\n", "{} 1 tri {} {} {}\n"),
+    ".dato": (
+        "$COOR\n{}$ELEMENT TYPE=TRIA3\n{}$END STRUCTURE\n$FIN\n", "{} {} {} {}\n", "{} {} {} {}\n"
+    ),
+    ".f3grid": ("{}{}", "G {} {} {} {}\n", "F T3 {} {} {} {}\n"),
+    ".msh": (
+        "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n4\n{}$EndNodes\n"
+        "$Elements\n2\n{}$EndElements\n", "{} {} {} {}\n", "{} 2 2 0 1 {} {} {}\n"
+    ),
+    ".su2": (
+        "NDIME= 3\nNELEM= 2\n{1}NPOIN= 4\n{0}NMARK= 0\n", "{1} {2} {3} {0}\n", "5 {1} {2} {3} {0}\n"
+    ),
+}  # fmt: skip
 
 
 def text(suffix: str, numbers: list[int]) -> str:
     """A file of the format, by hand, in which the vertices have these numbers."""
-    match suffix:
-        case ".nas":
-            grid = numbered(numbers, "GRID,{},,{},{},{}\n")
-            return f"BEGIN BULK\n{grid}" + listed(numbers, "CTRIA3,{},1,{},{},{}\n") + "ENDDATA\n"
-        case ".avs":
-            nodes = numbered(numbers, "{} {} {} {}\n")
-            return f"4 2 0 0 0\n{nodes}" + listed(numbers, "{} 1 tri {} {} {}\n")
-        case ".dato":
-            nodes = numbered(numbers, "{} {} {} {}\n")
-            faces = listed(numbers, "{} {} {} {}\n")
-            return f"$COOR\n{nodes}$ELEMENT TYPE=TRIA3\n{faces}$END STRUCTURE\n$FIN\n"
-        case ".f3grid":
-            nodes = numbered(numbers, "G {} {} {} {}\n")
-            return nodes + listed(numbers, "F T3 {} {} {} {}\n")
-        case ".msh":
-            nodes = numbered(numbers, "{} {} {} {}\n")
-            faces = listed(numbers, "{} 2 2 0 1 {} {} {}\n")
-            return (
-                f"$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n4\n{nodes}$EndNodes\n"
-                f"$Elements\n2\n{faces}$EndElements\n"
-            )
-    points = "".join(
-        "{} {} {} {}\n".format(*point, number)
-        for number, point in zip(numbers, POINTS.tolist(), strict=True)
-    )
-    faces = "".join("5 {1} {2} {3} {0}\n".format(n, *t) for n, t in enumerate(TRIANGLES))
-    return f"NDIME= 3\nNELEM= 2\n{faces}NPOIN= 4\n{points}NMARK= 0\n"
+    whole, vertex, triangle = BY_HAND[suffix]
+    rows = zip(numbers, POINTS.tolist(), strict=True)
+    corners = [[numbers[corner] for corner in row] for row in TRIANGLES]
+    vertices = "".join(vertex.format(number, *point) for number, point in rows)
+    triangles = "".join(triangle.format(place, *row) for place, row in enumerate(corners, 1))
+    return whole.format(vertices, triangles)
 
 
 NUMBERS = [[1, 2, 3, 4], [4, 2, 1, 3], [70, 8, 900, 15]]

@@ -27,9 +27,7 @@ def test_cloth_has_the_counts_of_the_study():
     assert mesh.points.mean(axis=0) == pytest.approx([0.0, 2.0, 0.0])
     # cell (0, 0): ll, ur, ul and ll, lr, ur
     assert mesh.triangles[:2].tolist() == [[0, 21, 1], [0, 20, 21]]
-
-
-def test_cloth_triangles_face_one_way_and_tile_the_sheet():
+    # triangles face one way and tile the sheet
     mesh = cloth(5, 7)
     a, b, c = (mesh.points[mesh.triangles[:, i]] for i in range(3))
     normal = np.cross(b - a, c - a)
@@ -41,9 +39,7 @@ def test_bar_has_the_counts_of_the_study():
     mesh = bar(40, 5, 5)
     assert (mesh.vertices, len(mesh.tetrahedra)) == (1000, 3120)
     assert mesh.extent == pytest.approx(1.0)
-
-
-def test_bar_is_conforming_and_fills_its_box():
+    # it is conforming and fills its box
     mesh = bar(4, 3, 5)
     corner = mesh.points[mesh.tetrahedra]
     volume = np.linalg.det(corner[:, 1:] - corner[:, :1]) / 6.0
@@ -64,16 +60,12 @@ def test_round_trip(tmp_path):
         assert np.array_equal(getattr(loaded, name), getattr(mesh, name))
 
 
-def test_sides_of_a_sheet():
+def test_sides_of_a_sheet_and_farthest_points_that_start_at_the_centre():
     mesh = cloth(4, 3)
     assert select_vertices(mesh, "top").tolist() == [2, 5, 8, 11]
     assert select_vertices(mesh, "left").tolist() == [0, 1, 2]
     assert select_vertices(mesh, [5, 1, 5]).tolist() == [1, 5]
-
-
-def test_farthest_points_start_at_the_centre_and_spread():
-    mesh = cloth(5, 5)
-    chosen = farthest_points(mesh.points, np.arange(25), 5)
+    chosen = farthest_points(cloth(5, 5).points, np.arange(25), 5)
     assert chosen[0] == 12
     assert set(chosen[1:].tolist()) == {0, 4, 20, 24}
 
@@ -103,20 +95,6 @@ def test_a_strip_with_one_side_is_refused():
     with pytest.raises(MeshError, match=r"strip: the surface about triangle 0 .* one side only"):
         turned_alike(Mesh(np.zeros((6, 3)), strip), "strip")
     assert 0 not in turned_alike(Mesh(np.zeros((6, 3)), strip[:-1]), "open strip")[1]
-
-
-def test_a_mesh_file_with_a_triangle_the_other_way_round(tmp_path, caplog):
-    mesh = cloth(3, 3)
-    cells = mesh.triangles.copy()
-    cells[2] = cells[2, ::-1]
-    lines = [f"v {x} {y} {z}" for x, y, z in mesh.points]
-    lines += [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in cells]
-    (tmp_path / "sheet.obj").write_text("\n".join(lines))
-    read = MeshFile(kind="file", path="sheet.obj").build(tmp_path)
-    assert "1 of 8 triangles are listed the other way round" in caplog.text
-    sides = np.cross(*(read.points[read.triangles[:, k]] - read.points[read.triangles[:, 0]]
-                       for k in (1, 2)))  # fmt: skip
-    assert (sides[:, 2] > 0.0).all()
 
 
 EMPTY = np.empty((0, 4), dtype=np.int32)
@@ -179,6 +157,16 @@ def test_a_tetrahedron_of_negative_volume_is_turned(tmp_path):
     corner = (mesh := read(tmp_path, BAR.points, tetra=cells)).points[mesh.tetrahedra]
     assert (np.linalg.det(corner[:, 1:] - corner[:, :1]) > 0.0).all()
     assert np.array_equal(np.sort(mesh.tetrahedra, axis=1), np.sort(BAR.tetrahedra, axis=1))
+
+
+def test_a_triangle_the_other_way_round_is_turned_and_said(tmp_path, caplog):
+    cells = SHEET.triangles.copy()
+    cells[2] = cells[2, ::-1]
+    found = read(tmp_path, SHEET.points, triangle=cells)
+    assert "1 of 8 triangles are listed the other way round" in caplog.text
+    corner = found.points[found.triangles]
+    sides = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    assert len(np.unique(np.sign(sides[:, 1]))) == 1
 
 
 def two_sheets(joined: bool) -> tuple[np.ndarray, np.ndarray]:

@@ -2,17 +2,15 @@
 
 import numpy as np
 import pytest
-from pydantic import TypeAdapter, ValidationError
+from pydantic import TypeAdapter
 
-from builders import make_scene
 from pdrom.core.errors import SceneError
 from pdrom.model.mesh.generators import bar, cloth
-from pdrom.model.mesh.selection import KINDS, Selection, select_vertices
+from pdrom.model.mesh.selection import Selection, select_vertices
 from pdrom.model.mesh.types import Mesh
 
 SELECTION = TypeAdapter(Selection)
 SHEET = cloth(6, 5, "xy")
-SPRING = {"effect": "spring", "weight": 1.0}
 
 
 def chosen(selection, mesh=SHEET):
@@ -97,36 +95,3 @@ def test_combinations_are_those_of_sets():
     assert set(chosen({"kind": "union", "of": [left, top, ball]})) == set.union(*sets)
     both = {"kind": "intersection", "of": [top, {"kind": "complement", "of": ball}]}
     assert set(chosen(both)) == sets[1] - sets[2]
-
-
-@pytest.mark.parametrize(
-    ("select", "message"),
-    [
-        (3.5, r"select = 3.5: a side, a list of vertices, or a mapping whose kind is one of box"),
-        ({"kind": "bxo"}, f"one of {', '.join(KINDS)}"),
-        ({"kind": "box", "lower": [0, 0, 0]}, "select.box.upper' is missing"),
-        ({"kind": "box", "lower": [0, 0, 1], "upper": [1, 1, 0]}, "lower = 1 exceeds upper = 0 al"),
-        ({"kind": "sphere", "centre": [0, 0, 0], "radius": 0}, "select.sphere.radius = 0"),
-        ({"kind": "plane", "point": [0, 0, 0], "normal": [0, 0, 0]}, "has no direction"),
-        ({"kind": "union", "of": []}, "select.union.of"),
-        ({"kind": "complement", "of": {"kind": "nearest", "pt": 1}}, "complement.of.nearest.pt"),
-        ([0, "a"], "select.vertices.1 = 'a'"),
-    ],
-)
-def test_faults_name_key_and_value(select, message):
-    with pytest.raises(ValidationError, match=message):
-        make_scene(SPRING, {"effect": "pins", "select": select})
-
-
-@pytest.mark.parametrize(
-    ("select", "message"),
-    [
-        ({"kind": "component", "index": 1}, "component: index = 1, the mesh has 1"),
-        ({"kind": "nearest", "point": [0, 0, 0], "count": 31}, "count = 31 of 30 vertices"),
-        ({"kind": "union", "of": ["top", "middle"]}, "selection 'middle': allowed are left"),
-        ({"kind": "complement", "of": list(range(30))}, "selects no vertex"),
-    ],
-)
-def test_what_the_mesh_does_not_have_is_named(select, message):
-    with pytest.raises(SceneError, match=f"scene 'test', effect 'pins': .*{message}"):
-        make_scene(SPRING, {"effect": "pins", "select": select})

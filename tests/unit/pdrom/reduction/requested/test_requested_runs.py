@@ -9,20 +9,10 @@ from pdrom.model.runs import trajectory
 from pdrom.model.scene import Scene
 from pdrom.reduction.requested import run as requested
 from pdrom.reduction.requested.levels import Level, Trajectory, last_within, relative_errors
-from pdrom.reduction.requested.run import (
-    Calibration,
-    CheckedRun,
-    Request,
-    ToleranceSettings,
-    calibrate,
-    check_frames,
-    read_request,
-    transferred,
-)
 
 EFFECTS = (GRAVITY, LEFT, {"effect": "spring", "weight": 1e5})
 SHEET = {"kind": "cloth", "rows": 7, "columns": 7, "plane": "xz"}
-SETTINGS = ToleranceSettings(modes=(8,), tolerances=(1e-2,), iterations=(10,), factor=2.0)
+SETTINGS = requested.ToleranceSettings(modes=(8,), tolerances=(1e-2,), iterations=(10,), factor=2.0)
 FRAMES, KICK = 24, {"effect": "kick", "speed": 0.4, "seed": 7}
 
 
@@ -32,8 +22,8 @@ def sheet(*more, weight: float = 1e5, **keys) -> Scene:
 
 
 @pytest.fixture(scope="module")
-def own() -> Calibration:
-    return calibrate(sheet(), SETTINGS, Request(error=0.005))
+def own() -> requested.Calibration:
+    return requested.calibrate(sheet(), SETTINGS, requested.Request(error=0.005))
 
 
 def error_of(scene: Scene, positions: np.ndarray, frames: int) -> float:
@@ -47,7 +37,7 @@ def error_of(scene: Scene, positions: np.ndarray, frames: int) -> float:
 @pytest.mark.parametrize("error", [0.1, 0.03, 0.01])
 def test_a_tolerance_is_met_on_another_motion(own, error):
     scene = sheet(KICK)
-    done = CheckedRun(own, scene, error).outcome()
+    done = requested.CheckedRun(own, scene, error).outcome()
     assert done.met
     assert error_of(scene, done.positions, done.frames) <= error
     assert done.estimate <= error
@@ -59,23 +49,27 @@ def test_a_tolerance_is_met_on_another_motion(own, error):
 @pytest.mark.parametrize("error", [0.05, 0.01])
 def test_what_a_calibration_rests_on_may_differ_when_it_is_made_again(changes, error):
     scene = sheet(**changes)
-    calibration = calibrate(transferred(sheet(), scene), SETTINGS, Request(error=error))
-    done = CheckedRun(calibration, scene, error).outcome()
+    calibration = requested.calibrate(
+        requested.transferred(sheet(), scene), SETTINGS, requested.Request(error=error)
+    )
+    done = requested.CheckedRun(calibration, scene, error).outcome()
     assert not done.met or error_of(scene, done.positions, done.frames) <= error
 
 
 def test_other_cells_or_groups_are_refused():
     with pytest.raises(ConfigurationError, match="another mesh or other constraint groups"):
-        transferred(sheet(), make_scene(*EFFECTS, mesh={**SHEET, "rows": 6}, frames=FRAMES))
+        requested.transferred(
+            sheet(), make_scene(*EFFECTS, mesh={**SHEET, "rows": 6}, frames=FRAMES)
+        )
     strained = make_scene(*EFFECTS[:2], {"effect": "strain", "weight": 1e5}, mesh=SHEET)
     with pytest.raises(ConfigurationError, match="another mesh or other constraint groups"):
-        transferred(sheet(), strained)
+        requested.transferred(sheet(), strained)
 
 
 def test_a_tolerance_below_the_reference_s_own_error_is_refused(own):
     """The most accurate full order runs in its place."""
     assert own.admissible(1e-14) == []
-    done = CheckedRun(own, sheet(KICK), 1e-14).outcome()
+    done = requested.CheckedRun(own, sheet(KICK), 1e-14).outcome()
     assert (done.met, done.reduced) == (False, False)
     assert done.limit
     assert done.level == own.most_accurate.level.title
@@ -95,19 +89,19 @@ def test_a_full_order_is_checked_too_and_replaced_by_a_better_one(own, monkeypat
         return run.defects[frame]
 
     monkeypatch.setattr(Trajectory, "check", poor)
-    done = CheckedRun(own, sheet(), 0.05).outcome()
+    done = requested.CheckedRun(own, sheet(), 0.05).outcome()
     assert done.failed[0] == levels[0] != done.level
 
 
 def test_a_run_that_departs_from_its_second_run_is_met_for_fewer_frames(own, monkeypatch):
     late = np.where(np.arange(FRAMES) < 10, 0.0, np.inf)
-    monkeypatch.setattr(CheckedRun, "_amplified", lambda *_: late)
-    done = CheckedRun(own, sheet(), 0.05).outcome()
+    monkeypatch.setattr(requested.CheckedRun, "_amplified", lambda *_: late)
+    done = requested.CheckedRun(own, sheet(), 0.05).outcome()
     assert (done.frames, done.limit) == (10, requested.AMPLIFIED)
 
 
 def test_two_runs_are_the_same_to_the_last_bit(own):
-    run = CheckedRun(own, sheet(KICK), 0.03)
+    run = requested.CheckedRun(own, sheet(KICK), 0.03)
     first, again = run.outcome(), run.outcome()
     assert np.array_equal(first.positions, again.positions)
     for name in ("level", "checks", "estimate"):
@@ -127,9 +121,7 @@ def test_velocities_are_differences_of_positions():
     np.testing.assert_allclose(
         relative_errors(wrong, reference, "velocity"), 0.1 / np.sqrt([1.0, 2.0, 3.0])
     )
-
-
-def test_errors_of_a_still_motion_are_zero_or_infinite():
+    # of a still motion they are zero or infinite
     still = np.zeros((3, 2, 3))
     assert relative_errors(still[1:], still, "position").tolist() == [0.0, 0.0]
     assert relative_errors(still[1:] + 1.0, still, "position").tolist() == [np.inf, np.inf]
@@ -145,17 +137,19 @@ def test_frames_within_a_tolerance_are_counted_to_the_last():
 )
 def test_a_tolerance_that_is_none_is_named(wish):
     with pytest.raises(ConfigurationError, match="error"):
-        read_request(wish)
+        requested.read_request(wish)
 
 
 def test_a_tolerance_may_be_of_the_velocities():
-    assert read_request("velocity=0.05") == Request(error=0.05, quantity="velocity")
-    assert str(read_request(0.01)) == "1 % of the positions"
+    assert requested.read_request("velocity=0.05") == requested.Request(
+        error=0.05, quantity="velocity"
+    )
+    assert str(requested.read_request(0.01)) == "1 % of the positions"
 
 
 @pytest.mark.parametrize(("frames", "count"), [(100, 5), (100, 0), (3, 9), (1, 1)])
 def test_checks_are_spread_and_two_at_least(frames, count):
-    found = check_frames(frames, count)
+    found = requested.check_frames(frames, count)
     assert len(found) == min(max(2, count), frames)
     assert all(0 <= frame < frames for frame in found)
 

@@ -240,6 +240,10 @@ def test_path_holds_the_selection_of_every_rank(name):
         alone = select(basis, spec, r)
         np.testing.assert_array_equal(sampling.entries, alone.entries)
         np.testing.assert_array_equal(sampling.elements, alone.elements)
+    assert select_path(basis, spec, []) == {}
+    for ranks in ([0, 3], [3, 9], [-1]):
+        with pytest.raises(RankError, match=f"allowed are 1 to {basis.rank}"):
+            select_path(basis, spec, ranks)
 
 
 def test_selection_is_what_the_specification_says():
@@ -258,21 +262,6 @@ def test_more_modes_than_rows_end_in_an_infinite_gain():
     reduction = reduction_of(p, np.ones(6), PRESETS["deim-joint"], 9)
     assert reduction.gain == np.inf
     assert len(reduction.elements) == 3
-
-
-@pytest.mark.parametrize("ranks", [[0], [0, 3], [9], [3, 9], [-1]])
-def test_impossible_ranks_are_named(ranks):
-    p, mass = data(25)
-    basis = compute_basis(p, mass, 0.0, P, PRESETS["deim-joint"])
-    with pytest.raises(RankError, match="allowed are 1 to 8"):
-        select_path(basis, PRESETS["deim-joint"], ranks)
-
-
-def test_no_rank_no_selection():
-    basis = compute_basis(np.zeros((4, ROWS, 3)), np.ones(ROWS), 0.0, P, PRESETS["deim"])
-    assert select_path(basis, PRESETS["deim"], []) == {}
-    with pytest.raises(RankError, match="numerical rank 0"):
-        select(basis, PRESETS["deim"], 1)
 
 
 @pytest.mark.parametrize("preset", PRESETS)

@@ -10,15 +10,7 @@ from hypothesis import strategies as st
 from builders import TOP, make_scene, random_rotation
 from pdrom.core.errors import SolverError
 from pdrom.model.runs import trajectory
-from pdrom.reduction.subspace.columns import (
-    affine_columns,
-    atoms,
-    build_columns,
-    displacement_modes,
-    orthonormal,
-    skinning_modes,
-    skinning_weights,
-)
+from pdrom.reduction.subspace import columns as spaces
 from pdrom.reduction.subspace.model import make_columns
 from pdrom.reduction.subspace.space import DenseElimination, coordinates
 
@@ -41,7 +33,7 @@ SETS = st.lists(
 
 @given(SETS)
 def test_atoms_partition_what_is_held(boundaries):
-    found = atoms([Units(*units) for units in boundaries], 20)
+    found = spaces.atoms([Units(*units) for units in boundaries], 20)
     units = [unit for boundary in boundaries for unit in boundary]
     members = np.concatenate(found) if found else np.array([], dtype=int)
     assert len(members) == len(set(members.tolist()))
@@ -61,7 +53,7 @@ def test_orthonormal_keeps_the_span(n, m, rank, seed):
     rng = np.random.default_rng(seed)
     rank = min(rank, n, m)
     columns = rng.standard_normal((n, rank)) @ rng.standard_normal((rank, m))
-    q = orthonormal(columns)
+    q = spaces.orthonormal(columns)
     assert q.shape == (n, rank)
     np.testing.assert_allclose(q.T @ q, np.eye(rank), atol=1e-12)
     np.testing.assert_allclose(q @ (q.T @ columns), columns, atol=1e-7 * (1 + abs(columns).max()))
@@ -70,7 +62,7 @@ def test_orthonormal_keeps_the_span(n, m, rank, seed):
 def test_orthonormal_leaves_out_dependent_and_zero_columns():
     e = np.eye(4)
     columns = np.column_stack([np.zeros(4), e[0], 3 * e[0], e[1], e[0] - e[1], e[2]])
-    np.testing.assert_allclose(orthonormal(columns), e[:, :3], atol=1e-15)
+    np.testing.assert_allclose(spaces.orthonormal(columns), e[:, :3], atol=1e-15)
 
 
 HELD = (
@@ -149,16 +141,16 @@ def test_displacement_modes_are_the_mass_weighted_pod(moved):
     """Against a dense SVD of the snapshots that have lost their affine part."""
     scene, run = moved
     points, masses = scene.mesh.points, scene.masses
-    modes = displacement_modes(run[1:], points, masses, 5)
+    modes = spaces.displacement_modes(run[1:], points, masses, 5)
     root = np.sqrt(masses)[:, None]
     snapshots = np.hstack([root * (q - points) for q in run[1:]])
-    affine = np.linalg.qr(root * affine_columns(points)[:, :3])[0]
+    affine = np.linalg.qr(root * spaces.affine_columns(points)[:, :3])[0]
     u = np.linalg.svd(snapshots - affine @ (affine.T @ snapshots))[0][:, :5]
     mine = root * modes
     np.testing.assert_allclose(mine.T @ mine, np.eye(5), atol=1e-10)
     np.testing.assert_allclose(mine @ mine.T, u @ u.T, atol=1e-7)
     np.testing.assert_allclose(
-        affine_columns(points).T @ (masses[:, None] * modes), 0.0, atol=1e-10
+        spaces.affine_columns(points).T @ (masses[:, None] * modes), 0.0, atol=1e-10
     )
 
 
@@ -167,18 +159,20 @@ def test_there_are_no_more_modes_than_the_data_hold(moved):
     points = scene.mesh.points
     bump = np.zeros_like(points)
     bump[7, 2] = 1.0
-    few = displacement_modes(np.stack([points + bump, points + 3 * bump]), points, scene.masses, 9)
+    few = spaces.displacement_modes(
+        np.stack([points + bump, points + 3 * bump]), points, scene.masses, 9
+    )
     assert few.shape[1] == 1
     rigid = np.stack([points + 1.0, 2.0 * points])
-    assert displacement_modes(rigid, points, scene.masses, 9).shape[1] == 0
+    assert spaces.displacement_modes(rigid, points, scene.masses, 9).shape[1] == 0
 
 
 def test_atoms_get_modes_for_what_they_do_when_released(moved):
     """The bottom row is let go in frame 8 and bends: its motion is in its columns."""
     scene, run = moved
     columns = make_columns(scene, run[1:], "pod", 8)
-    straight = build_columns(
-        displacement_modes(run[1:], scene.mesh.points, scene.masses, 8),
+    straight = spaces.build_columns(
+        spaces.displacement_modes(run[1:], scene.mesh.points, scene.masses, 8),
         scene.mesh.points, scene.masses, columns.atoms, run[1:8],
     )  # fmt: skip
     for atom, own, few in zip(
@@ -195,7 +189,7 @@ def test_atoms_get_modes_for_what_they_do_when_released(moved):
 @pytest.mark.parametrize("handles", [1, 2, 5, 12, 30])
 def test_skinning_weights_are_a_partition_of_unity(handles):
     points = make_scene(SPRING).mesh.points
-    weights = skinning_weights(points, handles)
+    weights = spaces.skinning_weights(points, handles)
     assert weights.shape == (30, handles)
     assert (weights >= 0.0).all()
     assert (weights <= 1.0).all()
@@ -207,7 +201,9 @@ def test_skinning_weights_are_a_partition_of_unity(handles):
 def test_skinning_weights_do_not_depend_on_place_and_size(rng):
     points = rng.standard_normal((40, 3))
     np.testing.assert_allclose(
-        skinning_weights(7.0 * points + 3.0, 5), skinning_weights(points, 5), atol=1e-12
+        spaces.skinning_weights(7.0 * points + 3.0, 5),
+        spaces.skinning_weights(points, 5),
+        atol=1e-12,
     )
 
 
@@ -215,14 +211,16 @@ def test_skinning_weights_do_not_depend_on_place_and_size(rng):
 def test_skinning_modes_are_mass_orthonormal_without_affine_part(moved, k):
     scene, _ = moved
     points, masses = scene.mesh.points, scene.masses
-    modes = skinning_modes(points, masses, k)
+    modes = spaces.skinning_modes(points, masses, k)
     np.testing.assert_allclose(modes.T @ (masses[:, None] * modes), np.eye(k), atol=1e-9)
-    np.testing.assert_allclose(affine_columns(points).T @ (masses[:, None] * modes), 0.0, atol=1e-8)
+    np.testing.assert_allclose(
+        spaces.affine_columns(points).T @ (masses[:, None] * modes), 0.0, atol=1e-8
+    )
 
 
 def test_skinning_ends_at_the_size_of_the_mesh(moved):
     scene, _ = moved
-    modes = skinning_modes(scene.mesh.points, scene.masses, 500)
+    modes = spaces.skinning_modes(scene.mesh.points, scene.masses, 500)
     # everything but the three affine columns of a flat sheet
     assert modes.shape[1] == scene.mesh.vertices - 3
 

@@ -1,4 +1,7 @@
-"""Energy-conserving sampling and weighting: few elements that stand for all, and stability."""
+"""Energy-conserving sampling and weighting: few elements that stand for all, and stability.
+
+Its non-negative least squares with early stop are compared with SciPy's and with all supports.
+"""
 
 from copy import copy
 
@@ -6,18 +9,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.optimize import nnls
 
 from builders import GRAVITY, GROUPS, LEFT, TOP, make_scene
 from pdrom.model.dynamics.stepper import State, Stepper
 from pdrom.model.runs import trajectory
 from pdrom.reduction.subspace import ecsw
 from pdrom.reduction.subspace.columns import build_columns
-from pdrom.reduction.subspace.ecsw import (
-    TrainingFrame,
-    ecsw_elements,
-    training_equations,
-    training_run,
-)
+from pdrom.reduction.subspace.ecsw import nnls_path
 from pdrom.reduction.subspace.interpolation import SubspaceLocalStep
 from pdrom.reduction.subspace.model import SubspaceModel, make_columns, rerun_model, sample_elements
 from pdrom.reduction.subspace.space import ReducedSpace, coordinates
@@ -76,14 +75,14 @@ def everything(group) -> np.ndarray:
 
 def test_sampled_equations_meet_the_tolerance(pulled):
     scene, _, columns = pulled
-    training = training_run(scene, columns, np.arange(0, 12, 3))
+    training = ecsw.training_run(scene, columns, np.arange(0, 12, 3))
     for group in scene.groups:
-        rows, total = training_equations(group, columns, training, everything(group))
+        rows, total = ecsw.training_equations(group, columns, training, everything(group))
         np.testing.assert_allclose(rows.sum(axis=1), total, atol=1e-9)
         counts = []
         tolerances = [0.3, 1e-2, 1e-3]
         for tolerance, (elements, factors) in zip(
-            tolerances, ecsw_elements(group, columns, training, tolerances), strict=True
+            tolerances, ecsw.ecsw_elements(group, columns, training, tolerances), strict=True
         ):
             assert (factors > 0.0).all()
             assert len(np.unique(elements)) == len(elements) < group.elements
@@ -100,11 +99,11 @@ def test_a_part_of_a_group_stands_for_all_and_grows_where_it_misses(
     """Half of the candidates of one group, three of the other, which are too few."""
     scene, _, columns = pulled
     group = scene.groups[number]
-    training = training_run(scene, columns, [2, 8])
-    rows, total = training_equations(group, columns, training, everything(group))
+    training = ecsw.training_run(scene, columns, [2, 8])
+    rows, total = ecsw.training_equations(group, columns, training, everything(group))
     candidates = group.elements // 2 if number else 3
     monkeypatch.setattr(ecsw, "CANDIDATES", candidates)
-    ((elements, factors),) = ecsw_elements(group, columns, training, [tolerance])
+    ((elements, factors),) = ecsw.ecsw_elements(group, columns, training, [tolerance])
     assert number or len(elements) > candidates
     assert len(np.unique(elements)) == len(elements)
     left = rows[:, elements] @ factors - total
@@ -117,7 +116,7 @@ def test_factors_of_one_repeat_the_iterations(pulled):
     steps = [SubspaceLocalStep(group, columns) for group in scene.groups]
     space = ReducedSpace(scene, columns, [step.matrix for step in steps])
     inertia = space.matrix - sum(step.matrix for step in steps)
-    frame = training_run(scene, columns, [5])[0]
+    frame = ecsw.training_run(scene, columns, [5])[0]
     fixed = np.concatenate(columns.atom_columns)
     free = np.setdiff1d(np.arange(len(inertia)), fixed)
     sums = []
@@ -170,8 +169,8 @@ def test_training_equations_are_those_of_the_elements(rng):
         difference = dense[own] @ columns.B @ after - projected[own]
         expected[:, e] = (left @ difference).ravel()
     expected /= np.linalg.norm(expected.sum(axis=1))
-    frame = TrainingFrame(before, pair[None], measure)
-    rows, total = training_equations(group, columns, [frame], np.arange(group.elements))
+    frame = ecsw.TrainingFrame(before, pair[None], measure)
+    rows, total = ecsw.training_equations(group, columns, [frame], np.arange(group.elements))
     assert rows.shape == (count + 1, group.elements)
     np.testing.assert_allclose(rows.sum(axis=1), total, atol=1e-12)
     np.testing.assert_allclose(rows[-1], group.weights / group.weights.sum(), rtol=1e-14)
@@ -182,7 +181,7 @@ def test_training_equations_are_those_of_the_elements(rng):
     assert {-1.0, 1.0} <= set(hashing.round().ravel().tolist())
     some = np.array([3, 0])
     np.testing.assert_array_equal(
-        training_equations(group, columns, [frame], some)[0], rows[:, some]
+        ecsw.training_equations(group, columns, [frame], some)[0], rows[:, some]
     )
 
 
@@ -191,9 +190,9 @@ def test_a_group_at_rest_keeps_its_stiffness(pulled):
     scene, _, columns = pulled
     rest = coordinates(columns, scene.masses, scene.mesh.points)
     measure = np.eye(len(rest))
-    still = TrainingFrame(rest, np.stack([[rest, rest]]), measure)
+    still = ecsw.TrainingFrame(rest, np.stack([[rest, rest]]), measure)
     for group in scene.groups:
-        elements, factors = ecsw_elements(group, columns, [still], [1e-2])[0]
+        elements, factors = ecsw.ecsw_elements(group, columns, [still], [1e-2])[0]
         assert len(elements) > 0
         kept = factors @ group.weights[elements] / group.weights.sum()
         assert kept == pytest.approx(1.0, abs=0.2)
@@ -218,7 +217,7 @@ def hanging():
 def test_the_response_norm_is_the_root_mean_square_of_the_recursion(hanging):
     """Reference: the squares of the recursion's answer to one impulse, added up, mode by mode."""
     scene, columns, space, fixed = hanging
-    (frame,) = training_run(scene, columns, [FRAME], norm="response")
+    (frame,) = ecsw.training_run(scene, columns, [FRAME], norm="response")
     free = np.setdiff1d(np.arange(len(space.matrix)), fixed)
     block = np.ix_(free, free)
     a, mass = space.matrix[block], space.inertia_matrix[block]  # M + h^2 K and M, over h^2
@@ -238,3 +237,97 @@ def test_samples_meet_a_tolerance_in_either_norm(hanging, norm):
     coarse, fine = sample_elements(scene, columns, np.arange(0, 100, 5), [0.3, 1e-3], norm=norm)
     assert 0 < len(coarse["spring"].elements) <= len(fine["spring"].elements)
     assert (fine["spring"].factors > 0.0).all()
+
+
+SMOOTH = np.exp(-np.outer(np.linspace(0.0, 1.0, 60), np.linspace(0.1, 5.0, 200)))
+
+
+def stopped(g: np.ndarray, b: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
+    return nnls_path(g, b, [tolerance])[0]
+
+
+def dense(support, values, size) -> np.ndarray:
+    x = np.zeros(size)
+    x[support] = values
+    return x
+
+
+@given(
+    m=st.integers(1, 25), e=st.integers(1, 25), seed=st.integers(0, 2**31), scale=st.floats(-6, 6)
+)
+def test_without_tolerance_it_is_the_method_of_lawson_and_hanson(m, e, seed, scale):
+    rng = np.random.default_rng(seed)
+    g = 10.0**scale * rng.standard_normal((m, e)) * 10.0 ** rng.uniform(-2, 2, e)
+    b = rng.standard_normal(m)
+    before = g.copy(), b.copy()
+    support, values = stopped(g, b, 0.0)
+    np.testing.assert_array_equal(g, before[0])
+    np.testing.assert_array_equal(b, before[1])
+    x = dense(support, values, e)
+    best, norm = nnls(g, b)
+    assert (values > 0.0).all()
+    assert (np.diff(support) > 0).all()
+    assert np.linalg.norm(g @ x - b) <= norm + 1e-7 * np.linalg.norm(b)
+    np.testing.assert_allclose(g @ x, g @ best, atol=1e-5 * np.linalg.norm(b))
+
+
+@pytest.mark.parametrize("tolerance", [0.5, 0.1, 1e-2, 1e-4])
+def test_stops_at_the_tolerance_with_few_columns(tolerance):
+    """Sum of many smooth columns: far fewer of them suffice."""
+    g, b = SMOOTH, SMOOTH.sum(axis=1)
+    support, values = stopped(g, b, tolerance)
+    assert np.linalg.norm(g[:, support] @ values - b) <= tolerance * np.linalg.norm(b)
+    assert 0 < len(support) < 15
+    finer = stopped(g, b, tolerance / 10.0)[0]
+    assert len(finer) >= len(support)
+
+
+def test_blocks_of_columns_end_at_the_same_minimum(rng):
+    """Large enough that several columns join at a time and that columns leave."""
+    g = rng.standard_normal((150, 400)) + 0.2 * rng.standard_normal((150, 1))
+    b = g[:, :80].sum(axis=1) + 10.0 * rng.standard_normal(150)
+    support, values = stopped(g, b, 0.0)
+    best, norm = nnls(g, b)
+    assert len(support) > 40
+    assert np.linalg.norm(g @ dense(support, values, 400) - b) == pytest.approx(norm, rel=1e-8)
+    np.testing.assert_allclose(dense(support, values, 400), best, atol=1e-6)
+
+
+def test_a_path_meets_each_of_its_tolerances():
+    g, b = SMOOTH, SMOOTH.sum(axis=1)
+    path = nnls_path(g, b, [1e-3, 0.5, 1e-2])
+    for (support, values), tolerance in zip(path, [1e-3, 0.5, 1e-2], strict=True):
+        assert (values > 0.0).all()
+        assert np.linalg.norm(g[:, support] @ values - b) <= tolerance * np.linalg.norm(b)
+    assert len(path[1][0]) <= len(path[2][0]) <= len(path[0][0])
+    for one, two in zip(path[1], stopped(g, b, 0.5), strict=True):
+        np.testing.assert_array_equal(one, two)
+
+
+def test_support_is_bounded(rng):
+    g = np.abs(rng.standard_normal((40, 60)))
+    b = g.sum(axis=1)
+    assert 7 < len(stopped(g, b, 0.0)[0]) <= 40
+
+
+@pytest.mark.parametrize(
+    ("g", "b", "expected"),
+    [
+        (np.eye(3), np.array([1.0, -1.0, 2.0]), {0: 1.0, 2: 2.0}),
+        (np.eye(3), -np.ones(3), {}),
+        (np.eye(3), np.zeros(3), {}),
+        (np.zeros((3, 4)), np.ones(3), {}),
+        (np.column_stack([np.zeros(2), [2.0, 0.0]]), np.array([4.0, 0.0]), {1: 2.0}),
+    ],
+)
+def test_known_solutions(g, b, expected):
+    support, values = stopped(g, b, 0.0)
+    assert dict(zip(support.tolist(), values.tolist(), strict=True)) == pytest.approx(expected)
+
+
+def test_repeated_columns_end(rng):
+    column = np.abs(rng.standard_normal(30))
+    g = np.column_stack([column] * 10 + [2.0 * column] * 5)
+    support, values = stopped(g, 3.0 * column + 1e-3, 0.0)
+    assert len(support) == 1
+    assert g[:, support] @ values == pytest.approx(3.0 * column, rel=0.1)

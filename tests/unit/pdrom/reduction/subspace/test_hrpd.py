@@ -12,14 +12,8 @@ from pdrom.model.runs import trajectory
 from pdrom.reduction.basis import compute_basis
 from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.sampling import Reduction, select
+from pdrom.reduction.subspace import hrpd
 from pdrom.reduction.subspace.columns import skinning_weights
-from pdrom.reduction.subspace.hrpd import (
-    HrpdSpec,
-    SampledSpace,
-    element_centres,
-    hrpd,
-    sampled_space,
-)
 from pdrom.reduction.subspace.interpolation import (
     InterpolatedLocalStep,
     SubspaceLocalStep,
@@ -31,7 +25,7 @@ from pdrom.reduction.subspace.space import coordinates
 
 def test_centres_are_the_mean_of_the_elements_vertices(group_scene):
     group, points = group_scene.groups[0], group_scene.mesh.points
-    centres, p = element_centres(group, points), group.rows_per_element
+    centres, p = hrpd.element_centres(group, points), group.rows_per_element
     dense = group.S.toarray().reshape(group.elements, p, -1)
     for e in (0, group.elements // 2, group.elements - 1):
         own = np.flatnonzero((dense[e] != 0.0).any(axis=0))
@@ -40,7 +34,7 @@ def test_centres_are_the_mean_of_the_elements_vertices(group_scene):
 
 def test_space_is_orthonormal_in_the_weights_and_starts_with_the_rest_vectors(group_scene):
     group, points = group_scene.groups[0], group_scene.mesh.points
-    space = sampled_space(group, points, HrpdSpec(dimension=10, samples=40))
+    space = hrpd.sampled_space(group, points, hrpd.HrpdSpec(dimension=10, samples=40))
     V = space.V
     assert V.shape[1] == 10
     np.testing.assert_allclose(V.T @ (group.row_weights[:, None] * V), np.eye(10), atol=1e-10)
@@ -57,13 +51,13 @@ def test_blended_linear_maps_are_reproduced_exactly(name, seed, handles):
     scene = make_scene({"effect": name, "weight": 1e4}, mesh=GROUPS[name])
     group, points, rng = scene.groups[0], scene.mesh.points, np.random.default_rng(seed)
     rest = group.S @ points
-    blend = skinning_weights(element_centres(group, points), handles)
+    blend = skinning_weights(hrpd.element_centres(group, points), handles)
     maps = rng.standard_normal((handles, 3, 3))
     field = np.einsum("eh,epi,hij->epj", blend, rest.reshape(group.elements, -1, 3), maps)
     field = field.reshape(-1, 3)
     active = int(np.linalg.matrix_rank(rest))
-    spec = HrpdSpec(dimension=active * handles, samples=20)
-    space = sampled_space(group, points, spec)
+    spec = hrpd.HrpdSpec(dimension=active * handles, samples=20)
+    space = hrpd.sampled_space(group, points, spec)
     p = group.rows_per_element
     rows = (space.elements[:, None] * p + np.arange(p)).ravel()
     assert len(space.elements) < group.elements or group.elements <= 20
@@ -73,7 +67,7 @@ def test_blended_linear_maps_are_reproduced_exactly(name, seed, handles):
 
 def test_fit_is_weighted_least_squares(group_scene, rng):
     group, points = group_scene.groups[0], group_scene.mesh.points
-    space = sampled_space(group, points, HrpdSpec(dimension=6, samples=12))
+    space = hrpd.sampled_space(group, points, hrpd.HrpdSpec(dimension=6, samples=12))
     p = group.rows_per_element
     rows = (space.elements[:, None] * p + np.arange(p)).ravel()
     values = rng.standard_normal((len(rows), 3))
@@ -87,10 +81,12 @@ def test_samples_spread_over_the_mesh():
     """Farthest points: with twice as many, none is farther from a sample than before."""
     scene = make_scene({"effect": "strain", "weight": 1.0})
     group, points = scene.groups[0], scene.mesh.points
-    centres = element_centres(group, points)
+    centres = hrpd.element_centres(group, points)
 
     def radius(samples: int) -> float:
-        chosen = sampled_space(group, points, HrpdSpec(dimension=2, samples=samples)).elements
+        chosen = hrpd.sampled_space(
+            group, points, hrpd.HrpdSpec(dimension=2, samples=samples)
+        ).elements
         return float(np.linalg.norm(centres[:, None] - centres[chosen], axis=2).min(axis=1).max())
 
     assert radius(20) < 0.7 * radius(5)
@@ -100,7 +96,7 @@ def test_samples_spread_over_the_mesh():
 def test_too_few_samples_are_a_named_error(group_scene):
     group, points = group_scene.groups[0], group_scene.mesh.points
     with pytest.raises(SamplingError, match=f"'{group.name}': 2 samples do not determine a space"):
-        sampled_space(group, points, HrpdSpec(dimension=12, samples=2))
+        hrpd.sampled_space(group, points, hrpd.HrpdSpec(dimension=12, samples=2))
 
 
 def test_a_singular_sample_is_a_named_error(group_scene):
@@ -108,16 +104,16 @@ def test_a_singular_sample_is_a_named_error(group_scene):
     V = np.zeros((group.elements * group.rows_per_element, 2))
     V[:, 0] = 1.0
     with pytest.raises(SamplingError, match="allowed are more samples or a smaller dimension"):
-        SampledSpace(group, V, np.arange(group.elements))
+        hrpd.SampledSpace(group, V, np.arange(group.elements))
 
 
 def test_a_group_without_rest_vectors_has_no_space():
     scene = make_scene({"effect": "bending", "weight": 1.0})
-    assert sampled_space(scene.groups[0], scene.mesh.points, HrpdSpec()) is None
+    assert hrpd.sampled_space(scene.groups[0], scene.mesh.points, hrpd.HrpdSpec()) is None
 
 
 R = 4
-HRPD = HrpdSpec(dimension=8, samples=20)
+HRPD = hrpd.HrpdSpec(dimension=8, samples=20)
 
 
 def right_hand_sides(scene, columns, interpolation, q, y):
@@ -137,12 +133,12 @@ def right_hand_sides(scene, columns, interpolation, q, y):
 
 def test_hrpd_with_all_elements_and_dimensions_is_the_full_projection(group_scene, rng):
     scene, group = group_scene, group_scene.groups[0]
-    spec = HrpdSpec(dimension=group.elements * group.rows_per_element, samples=group.elements)
-    space = sampled_space(group, scene.mesh.points, spec)
+    spec = hrpd.HrpdSpec(dimension=group.elements * group.rows_per_element, samples=group.elements)
+    space = hrpd.sampled_space(group, scene.mesh.points, spec)
     assert space.V.shape[1] == spec.dimension
     columns = whole_space(scene)
     y = scene.mesh.points + 0.1 * rng.standard_normal(scene.mesh.points.shape)
-    found = hrpd(group, columns, space)
+    found = hrpd.hrpd(group, columns, space)
     one, two = right_hand_sides(scene, columns, found, scene.mesh.points, y)
     np.testing.assert_allclose(one, two, atol=1e-8 * np.abs(two).max())
 
@@ -151,7 +147,7 @@ def test_hrpd_is_exact_for_the_rest_shape_in_every_orientation(group_scene, rng)
     """One linear map for all elements is in the space, whatever its dimension and samples."""
     scene, group = group_scene, group_scene.groups[0]
     columns = make_columns(scene, scene.mesh.points[None], "skinning", 3)
-    found = hrpd(group, columns, sampled_space(group, scene.mesh.points, HRPD))
+    found = hrpd.hrpd(group, columns, hrpd.sampled_space(group, scene.mesh.points, HRPD))
     assert len(found.elements) == min(HRPD.samples, group.elements)
     y = scene.mesh.points @ random_rotation(rng).T + rng.standard_normal(3)
     one, two = right_hand_sides(scene, columns, found, y, y)
