@@ -1,6 +1,8 @@
 """Outcomes of the comparison for the claims, figures and tables of a results folder."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
 from functools import cache, cached_property
 from pathlib import Path
 
@@ -13,17 +15,54 @@ from study.artifact.paths import TABLE
 from study.pipeline.resolve import Job
 from study.tables import declared
 from study.tables.claims.rules import load_claims
-from study.verification.compare import RUNS, Comparison, Context, kept, names_row
+from study.verification.compare import (
+    RUNS,
+    Comparison,
+    Context,
+    in_words,
+    judge,
+    kept,
+    names_row,
+)  # fmt: skip
 from study.verification.files import is_derived, made
-from study.verification.judge import in_words, judge
-from study.verification.lines import Line, Outcome
-from study.verification.references import Reference, folder_of, read_reference
+from study.verification.references import Reference, folder_of, read_references
 from study.verification.subject import Subject
 
 RULES = Path("config/claims.yaml")
 CLAIMS = "claims"
 # Verdict columns of the table of claims, with the name of their tests in the rules and a label.
 PARTS = {"verdict": ("published", "as published"), "verdict_beyond": ("beyond", "beyond")}
+
+
+class Outcome(StrEnum):
+    """Outcome of the comparison of one claim, figure or table."""
+
+    REPRODUCED = "reproduced"
+    DIFFERS = "differs"
+    NOT_COMPARABLE = "not comparable on this machine"
+    NO_REFERENCE = "no reference"
+    MISSING = "not there"
+
+
+@dataclass(frozen=True)
+class Line:
+    """Outcome of one claim, figure or table.
+
+    kind : claim, figure or table
+    text : size and place of the largest difference, or a reason
+    details : all differences as text, largest first
+    """
+
+    kind: str
+    name: str
+    outcome: Outcome
+    text: str = ""
+    details: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        return f"{self.kind} {self.name}: {self.outcome}" + (f", {self.text}" if self.text else "")
+
+
 GOOD = (Outcome.REPRODUCED, Outcome.NOT_COMPARABLE)
 
 
@@ -74,9 +113,7 @@ class Examination:
     @cached_property
     def expected(self) -> dict[str, Reference]:
         """Existing references of tables, by name."""
-        folder = folder_of(self.subject.results)
-        read = {name: read_reference(table, folder) for name, table in declared().items()}
-        return {name: reference for name, reference in read.items() if reference is not None}
+        return read_references(folder_of(self.subject.results))
 
     @cached_property
     def context(self) -> Context:
@@ -121,18 +158,17 @@ class Examination:
             return line(Outcome.DIFFERS, f"not what the tables at hand give, {other}")
         lacking = set(frame.columns) - set(reference.columns)
         known = table.checked(frame.assign(**dict.fromkeys(lacking, None)))
-        judgement = judge(Comparison(table, reference.frame, known, self.context))
-        if judgement.differences:
-            first, *others = map(str, judgement.differences)
-            more = f" and {len(others)} more" if others else ""
-            return line(Outcome.DIFFERS, first + more, first, *others)
+        differences, compared = judge(Comparison(table, reference.frame, known, self.context))
+        if differences:
+            more = f" and {len(differences) - 1} more" if differences[1:] else ""
+            return line(Outcome.DIFFERS, differences[0] + more, *differences)
         columns = kept(table)
         if new := sorted(lacking & set(columns)):
             return line(Outcome.NO_REFERENCE, f"column(s) {', '.join(new)}: run verify --update")
         if all(map(names_row, columns.values())):
             text = "its numbers are times or round-off; names and sizes agree"
             return line(Outcome.NOT_COMPARABLE, text)
-        return line(Outcome.REPRODUCED, str(judgement))
+        return line(Outcome.REPRODUCED, compared)
 
     def claims(self) -> list[Line]:
         """Lines with the outcomes of all claims."""

@@ -16,6 +16,7 @@ import pandas as pd
 from pdrom.core.errors import StorageError
 from study.artifact.paths import RESULTS
 from study.pipeline.tracked import write_tracked
+from study.tables import declared
 from study.tables.kit.declaration import Table
 from study.verification.compare import kept
 
@@ -87,6 +88,12 @@ def read_reference(table: Table, folder: Path) -> Reference | None:
         raise StorageError(f"{path}: cannot be read ({' '.join(str(error).split())})") from error
     whole = frame.reindex(columns=list(table.column_names))
     return Reference(table.checked(whole), tuple(frame.columns))
+
+
+def read_references(folder: Path) -> dict[str, Reference]:
+    """Return the existing references in ``folder`` by the table's name; errors as for one."""
+    read = {name: read_reference(table, folder) for name, table in declared().items()}
+    return {name: reference for name, reference in read.items() if reference is not None}
 
 
 def note(folder: Path, reason: str, day: date, code: str) -> None:

@@ -14,10 +14,9 @@ from study.artifact.reads import TableOf
 from study.tables import declared
 from study.verification.examine import Examination
 from study.verification.files import is_derived, made
-from study.verification.references import folder_of, read_reference, write_reference
+from study.verification.references import folder_of, read_references, write_reference
 from study.verification.subject import Subject
 
-REFERENCES = ROOT / "results" / "reference"
 RESULTS = "results/studies/tiny"
 
 
@@ -34,9 +33,8 @@ def subject():
 @pytest.fixture(scope="session")
 def tracked():
     """Expected tables of the tiny study as they are kept; a new one may have none yet."""
-    folder = REFERENCES / "studies" / "tiny" / "tables"
-    read = {name: read_reference(table, folder) for name, table in declared().items()}
-    return {name: reference.frame for name, reference in read.items() if reference is not None}
+    read = read_references(ROOT / folder_of(RESULTS))
+    return {name: reference.frame for name, reference in read.items()}
 
 
 def make(path):

@@ -8,7 +8,7 @@ import pytest
 
 from pdrom.core.store import atomic_path, read_table, write_table
 from study.artifact.paths import TABLE
-from study.verification.lines import Outcome
+from study.verification.examine import Outcome
 
 RESULTS = "results/studies/tiny"
 RERUNS = "reduced_reruns"

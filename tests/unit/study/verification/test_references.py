@@ -8,9 +8,9 @@ import pytest
 from pdrom.core.errors import ConfigurationError, StorageError
 from places import ROOT
 from study.tables import declared
+from study.tables.kit.declaration import TOLERANCES
 from study.verification import references
 from study.verification.command import update
-from study.verification.compare import NOT_COMPARED
 from study.verification.references import compact, folder_of, note, read_reference, write_reference
 from study.verification.subject import Subject
 
@@ -30,7 +30,7 @@ def test_a_reference_comes_back_as_it_was_kept_without_what_a_clock_has_a_say_in
     pd.testing.assert_frame_equal(
         found.frame, TABLE.checked(compact(TABLE, frame).reindex(columns=list(TABLE.column_names)))
     )
-    assert set(found.columns) == {c.name for c in TABLE.columns if c.quantity not in NOT_COMPARED}
+    assert set(found.columns) == {c.name for c in TABLE.columns if c.quantity in TOLERANCES}
     assert "relative_error" in found.columns
     assert "speedup" not in found.columns
     assert [path.name for path in tmp_path.iterdir()] == ["reduced_reruns.csv"]

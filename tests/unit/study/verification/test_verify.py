@@ -16,9 +16,9 @@ from study.article.build import INDEX, VERIFIED
 from study.artifact.paths import ARTICLE, TABLE
 from study.figures.kit.declaration import declarations
 from study.tables import declared
-from study.verification.command import NOTHING, update, verify, verify_tables
+from study.verification.command import NOTHING, status_of, update, verify, verify_tables
+from study.verification.examine import Line, Outcome
 from study.verification.files import made
-from study.verification.lines import Line, Outcome, status_of
 from study.verification.references import LOG, folder_of
 from study.verification.subject import Status
 
