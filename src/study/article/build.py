@@ -19,7 +19,7 @@ from pdrom.view.page import safe_json
 from study.article.latex import linked_table, prepared
 from study.article.tables import FACTS, claims_page, list_page, table_page
 from study.article.tree import Labels, Node, attributes, boxed, numbered, plain, resolved, words
-from study.artifact.artifact import Files
+from study.artifact.artifact import Artifact
 from study.artifact.paths import ARTICLE, FIGURE_PICTURE, File, Place
 from study.artifact.reads import Every, ProjectFile, Setting, TableOf
 from study.figures.kit.declaration import declarations
@@ -279,7 +279,7 @@ def _run(words: Sequence[str], folder: str | None, given: str) -> str:
     return done.stdout
 
 
-article = Files(
+article = Artifact(
     "article",
     "The manuscript as a page",
     {

@@ -5,11 +5,12 @@ labels. The pipeline chooses the results folder itself, one for each configurati
 """
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from string import Formatter
+from typing import Any
 
 from pdrom.core.errors import StorageError
 
@@ -64,6 +65,14 @@ class Place:
     def files(self, paths: Iterable[str]) -> "list[File]":
         """Return the `File` of each path in ``paths``, in order."""
         return [self.file(path) for path in paths]
+
+    def paths(self, sources: Any, labels: Mapping[str, str]) -> str:
+        """Return the path that `study.artifact.reads.Sources` have for a job with ``labels``."""
+        return str(sources.file(self, labels))
+
+    def content(self, paths: Any) -> "File":
+        """Return the argument of an artifact's function that reads its own file of this kind."""
+        return self.file(str(paths))
 
     @cached_property
     def _expression(self) -> re.Pattern[str]:

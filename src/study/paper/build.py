@@ -20,9 +20,9 @@ from pdrom.core.machine import Machine
 from pdrom.core.store import read_table, read_text, require_intact, write_text
 from pdrom.core.yamlfile import describe
 from pdrom.view.text import replaced
-from study.artifact.artifact import Files
+from study.artifact.artifact import Artifact
 from study.artifact.paths import FIGURE, MACHINE, PAPER_INPUT, TABLE, File
-from study.artifact.reads import Every, One, ProjectFile, Setting, SourcesOf
+from study.artifact.reads import Every, ProjectFile, Setting, SourcesOf
 from study.paper.macros import captions, decisions, keys_of, macros, number_of, provenance
 from study.paper.source import DOCUMENTS, documents
 from study.paper.tex import build_pdfs
@@ -167,21 +167,21 @@ FILES = (
     NUMBERS, "macros.tex", "figures.tex", *(f"{document}.bbl" for document in DOCUMENTS),
     *(f"{name}.tex" for name in TEX_TABLES),
 )  # fmt: skip
-paper_inputs = Files(
+paper_inputs = Artifact(
     "paper_inputs",
     "Numbers, tables and references of the manuscript",
     {
         "source": SourcesOf("manuscript"),
         "references": ProjectFile(REFERENCES),
         "tables": Every(TABLE),
-        "machine": One(MACHINE),
+        "machine": MACHINE,
         "facts": Setting("facts"),
     },
     {Path(name).stem: PAPER_INPUT.where(name=name) for name in FILES},
     write_inputs,
 )
 # the output paths depend on the configuration, see `study.pipeline.folders`
-paper = Files(
+paper = Artifact(
     "paper",
     "Manuscript",
     {

@@ -36,15 +36,9 @@ class Job:
 
     def make(self, outputs: Mapping[str, str]) -> None:
         """Run the job in this process; ``outputs`` are the paths of the files to write, by name."""
-        make(
-            self.artifact.address,
-            self.artifact.rule,
-            settings=self.settings,
-            labels=self.labels,
-            code=self.code,
-            inputs=self.inputs,
-            outputs=outputs,
-        )
+        own = self.artifact
+        job = {"settings": self.settings, "inputs": self.inputs, "outputs": outputs}
+        make(own.address, own.rule, self.code, self.labels, **job)
 
     @property
     def files(self) -> list[str]:

@@ -10,7 +10,7 @@ from pydantic import ValidationError
 
 from pdrom.core.store import checksum_path, read_table, write_table
 from pdrom.core.yamlfile import ConfigModel
-from study.artifact.artifact import Artifact, declare, declared_in, load, make, modules_in, normal
+from study.artifact.artifact import Artifact, declare, declared_in, load, make, modules_in
 from study.artifact.paths import File, Place
 from study.artifact.reads import (
     EachOf,
@@ -114,7 +114,7 @@ def test_faulty_settings_are_refused(settings, tmp_path):
     ],
 )
 def test_files_are_asked_of_the_study(read, paths):
-    made = Artifact("a", "", normal({"x": read}), {"out": GROUP}, multiplied.function)
+    made = Artifact("a", "", {"x": read}, {"out": GROUP}, multiplied.function)
     assert made.inputs(Sources(), {"scene": "s", "group": "g"}) == {"x": paths}
 
 

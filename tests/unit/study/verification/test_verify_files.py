@@ -14,7 +14,6 @@ from places import ROOT
 from study.article.build import article
 from study.artifact.artifact import Artifact
 from study.artifact.paths import TABLE, File, Place
-from study.artifact.reads import One
 from study.figures.kit.declaration import declarations
 from study.live.page import live_page
 from study.paper.build import paper_inputs
@@ -46,7 +45,7 @@ def _pages(page: File, other: File) -> None:
         write_text(text, file.path)
 
 
-TABLES, PDF = {"table": One(TABLE)}, {"out": Place("main.pdf")}
+TABLES, PDF = {"table": TABLE}, {"out": Place("main.pdf")}
 MANUSCRIPT = Artifact("MANUSCRIPT", "", TABLES, PDF, _doubled)
 BROKEN = Artifact("BROKEN", "", TABLES, PDF, _broken)
 PLACES = {"page": Place("a.html"), "other": Place("tables/a.html")}
