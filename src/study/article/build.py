@@ -24,7 +24,7 @@ from study.artifact.paths import ARTICLE, FIGURE_PICTURE, File, Place
 from study.artifact.reads import Every, ProjectFile, Setting, TableOf
 from study.figures.kit.declaration import declarations
 from study.paper.build import NUMBERS, Facts, fact_tables, paper, paper_inputs
-from study.paper.source import DOCUMENTS, documents
+from study.paper.source import DOCUMENTS, FIGURE, documents
 from study.tables import declared
 from study.tables.claims.rules import Added, load_claims
 
@@ -107,7 +107,6 @@ def write_verified(found: Mapping[str, str], folder: Path) -> None:
 
 
 FOLDER = Path("src/study/article")
-CLAIMS = "config/claims.yaml"
 ASSETS = {
     "text": "article.html",
     "plain": "plain.html",
@@ -119,7 +118,6 @@ ASSETS = {
 PAGES = dict(zip(DOCUMENTS, (INDEX, "supplement.html"), strict=True))
 TITLES = dict(zip(DOCUMENTS, ("Paper", "Supplement"), strict=True))
 LINKS = {"tables.html": "Tables", "claims.html": "Claims", "live.html": "A model, running"}
-_FIGURE = re.compile(r"\\figureof\{(\w+)\}")
 _PREFIX = re.compile(r"\\renewcommand\{?\\thefigure\}?\{([A-Z]+)")
 
 
@@ -157,7 +155,7 @@ def write_article(
     known |= {table["name"]: read_table(table.path) for table in tables}
     templates = {name: path.read_text("utf-8") for name, path in assets.items()}
     texts = documents(source[0].parent)
-    pages = {name: PAGES[stem] for stem, text in texts.items() for name in _FIGURE.findall(text)}
+    pages = {name: PAGES[stem] for stem, text in texts.items() for name in FIGURE.findall(text)}
     rules, plain = load_claims(claims, added), templates["plain"]
     written = {name: templates[name] for name in ("style", "script")}
     for name, content in csv.items():
@@ -286,7 +284,7 @@ article = Artifact(
         **paper_inputs.reads,
         **paper.reads,
         "pictures": Every(FIGURE_PICTURE),
-        "claims": ProjectFile(CLAIMS),
+        "claims": ProjectFile("config/claims.yaml"),
         **{name: ProjectFile(str(FOLDER / file)) for name, file in ASSETS.items()},
         "added": Setting("claim_sets"),
     },

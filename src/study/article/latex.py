@@ -13,14 +13,13 @@ import pandas as pd
 from pdrom.view.text import escape
 from study.paper.build import Facts
 from study.paper.macros import NOTED, SHOWN, closing, matching, note, sentences
+from study.paper.source import COMMENT, FIGURE
 
 ORIGIN = "origin:"
-_COMMENT = re.compile(r"(?m)^[ \t]*%.*\n|(?<!\\)%.*$")
 _VAL = re.compile(r"\\val\{([^{}]*)\}")
 _MATH = re.compile(r"(?<!\\)\$((?:[^$\\]|\\.)*)\$", re.DOTALL)
 _ENSURED = re.compile(r"\\ensuremath\{((?:[^{}]|\{[^{}]*\})*)\}")
 _CAPTION = re.compile(r"\\csname caption@(\w+)\\endcsname")
-_FIGURE = re.compile(r"\\figureof\{(\w+)\}")
 _PART = re.compile(
     r"\\ifpart(?![A-Za-z])(.*?)(?:\\else(?![A-Za-z])(.*?))?\\fi(?![A-Za-z])", re.DOTALL
 )
@@ -35,6 +34,10 @@ _NUMBER = re.compile(
 )
 _TAIL = re.compile(r"(\(|, )(\d[\d/, ]*)([)}]?)$")  # last number, as in "holds (20/20)"
 END = r" \\"
+_FIGURE = (
+    r"\\begin{figure}\\includegraphics{\1.pdf}"
+    r"\\caption{\\csname caption@\1\\endcsname}\\label{fig:\1}\\end{figure}"
+)
 # Short definitions of the preamble, which pandoc reads; definitions of layout are replaced.
 _SHORT = re.compile(r"(?m)^\\(?:newcommand\{\\(?!longtableof|tablefile)\w+\}.*\}|newtheorem.*)$")
 REPLACED = r"""
@@ -51,8 +54,8 @@ def prepared(source: str, document: str, origins: Mapping[str, Any], facts: Fact
     """
     preamble, begin, text = source.partition(r"\begin{document}")
     left_out = rf"\emph{{[{note(facts.part, facts.full_study)}]}}"
-    text = _COMMENT.sub("", _decided(text, origins["known"][document], left_out))
-    text = _FIGURE.sub(_figure, text)
+    text = COMMENT.sub("", _decided(text, origins["known"][document], left_out))
+    text = FIGURE.sub(_FIGURE, text)
     text = _CAPTION.sub(lambda found: facts.captions[found[1]], text)
     text = _PART.sub(lambda found: (found[1] if facts.part else found[2]) or "", text)
     full = facts.full_study
@@ -79,20 +82,10 @@ def _decided(source: str, known: Sequence[str], left_out: str) -> str:
     r"""Return ``source`` with its ``\known`` and ``\row`` blocks shown, noted or dropped."""
     pieces, start = [], 0
     for sentence, decision in zip(sentences(source), known, strict=True):
-        opening = (r"\row{" if sentence.is_row else r"\known{") + sentence.text + "}"
-        place = source.index(opening, start)
         shown = {SHOWN: sentence.text, NOTED: left_out}.get(decision, "")
-        pieces += [source[start:place], shown]
-        start = place + len(opening)
+        pieces += [source[start : sentence.start], shown]
+        start = sentence.end
     return "".join([*pieces, source[start:]])
-
-
-def _figure(found: re.Match[str]) -> str:
-    name = found[1]
-    return (
-        rf"\begin{{figure}}\includegraphics{{{name}.pdf}}"
-        rf"\caption{{\csname caption@{name}\endcsname}}\label{{fig:{name}}}\end{{figure}}"
-    )
 
 
 def _apart(found: re.Match[str]) -> str:

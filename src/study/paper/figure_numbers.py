@@ -7,11 +7,9 @@ from pathlib import Path
 from study.artifact.markup import to_plain
 from study.artifact.reads import Every, ProjectFile, Read, TableOf
 from study.figures.kit.declaration import declarations
-from study.paper.source import documents
+from study.paper.source import COMMENT, FIGURE, documents
 
 SUPPLEMENT = "S"  # prefix of the figure numbers in the supplement
-_COMMENT = re.compile(r"(?<!\\)%.*")
-_PLACED = re.compile(r"\\figureof\{(\w+)\}")
 
 
 @dataclass(frozen=True)
@@ -47,7 +45,7 @@ def figure_numbers(root: Path) -> dict[str, Numbers]:
     """
     counted: dict[str, str] = {}
     for prefix, source in zip(("", SUPPLEMENT), documents(root / "paper").values(), strict=True):
-        placed = _PLACED.findall(_COMMENT.sub("", source))
+        placed = FIGURE.findall(COMMENT.sub("", source))
         counted |= {name: f"{prefix}{number}" for number, name in enumerate(placed, 1)}
     return {name: Numbers(counted.get(name), f.number) for name, f in declarations().items()}
 
