@@ -1,4 +1,4 @@
-"""Numbers of the figures: those that LaTeX gives them, in the order of the source."""
+"""Numbers of the figures in the order of the source; LaTeX's are asked in test_article.py."""
 
 import re
 
@@ -7,9 +7,8 @@ import pytest
 from pdrom.core.errors import PaperError
 from places import ROOT
 from study.paper.figure_numbers import Numbers, figure_numbers
-from study.paper.macros import captions, sentences
+from study.paper.macros import sentences
 from study.paper.source import documents
-from study.paper.tex import build_pdfs
 
 PAPER = ROOT / "paper"
 
@@ -40,28 +39,3 @@ def test_nothing_but_figureof_makes_a_figure_and_every_configuration_has_all():
     for text in documents(PAPER).values():
         assert len(re.findall(r"\\begin\{figure", text)) == 1, "the definition of \\figureof"
         assert [s.text for s in sentences(text) if "figureof" in s.text] == []
-
-
-@pytest.mark.parametrize("document", ["main", "supplement"])
-def test_latex_gives_the_same_numbers(tmp_path, document):
-    r"""Every \figureof of the manuscript as it is defined there; LaTeX fails at a wrong number."""
-    numbers = {k: n.manuscript for k, n in figure_numbers(ROOT).items() if n.manuscript}
-    source = documents(PAPER)[document]
-    definition = re.search(r"\\newcommand\{\\figureof\}.*?\\end\{figure\}\}", source, re.DOTALL)
-    placed = re.findall(r"\\figureof\{(\w+)\}", source)
-    assert definition
-    prefix = "S" if document == "supplement" else ""
-    own = {name: n for name, n in numbers.items() if n.startswith("S") == bool(prefix)}
-    assert set(placed) == set(own)
-    lines = [
-        r"\documentclass{article}\usepackage[T1]{fontenc}\usepackage{lmodern}",
-        r"\newcommand{\includegraphics}[2][]{}",
-        captions(dict.fromkeys(numbers, "text")),
-        definition[0],
-        r"\newcommand{\due}[1]{\ifnum\value{figure}=#1\else\errmessage{not #1}\fi}",
-        r"\begin{document}",
-        *(rf"\figureof{{{name}}}\due{{{own[name].removeprefix(prefix)}}}" for name in placed),
-        r"\end{document}",
-    ]
-    (tmp_path / "main.tex").write_text("\n".join(lines))
-    build_pdfs({tmp_path / "main.tex": tmp_path / "main.pdf"}, [])

@@ -18,7 +18,6 @@ from study.paper.macros import (
     provenance,
     sentences,
 )
-from study.paper.tex import build_pdfs
 
 TABLES = {
     "runs": pd.DataFrame(
@@ -182,26 +181,6 @@ def test_a_sentence_needs_all_of_its_numbers_and_a_row_goes_without_a_note():
 )
 def test_what_a_configuration_holds(key, held):
     assert is_held(key, HELD) is held
-
-
-def pages(tmp_path, part):
-    """Length of the document that TeX makes of the source."""
-    known = provenance({"main": decisions(BLOCKS, HELD)}, part, "config/default.yaml")
-    document = "\n".join(
-        [r"\documentclass{article}", r"\usepackage[T1]{fontenc}\usepackage{lmodern,xcolor}",
-         r"\definecolor{okgrey}{gray}{0.4}",
-         macros(BLOCKS, HELD) + known, r"\begin{document}",
-         r"\ifpart PART \configuration\ of \fullstudy\fi", BLOCKS, r"\typeout{end}",
-         r"\end{document}"]
-    )  # fmt: skip
-    (tmp_path / "main.tex").write_text(document, encoding="utf-8")
-    build_pdfs({tmp_path / "main.tex": tmp_path / "main.pdf"}, [])
-    return (tmp_path / "main.pdf").stat().st_size
-
-
-def test_tex_accepts_what_is_left(tmp_path):
-    whole, part = pages(tmp_path, None), pages(tmp_path, "config/my_study.yaml")
-    assert 0 < whole < part
 
 
 def test_the_note_names_the_configuration_that_holds_the_numbers():
