@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from functools import cache, cached_property
 from importlib import import_module
 from pathlib import Path
-from typing import Any, TypeVar, get_type_hints
+from typing import Any, ClassVar, TypeVar, get_type_hints
 
 from pydantic import BaseModel, TypeAdapter
 
@@ -50,11 +50,12 @@ class Artifact:
     writes: Mapping[str, Place]
     function: Callable[..., Any]
     alone: bool = False
+    rule_pattern: ClassVar[str] = "{}"
 
     @property
     def rule(self) -> str:
         """Name of the workflow rule that makes the artifact."""
-        return self.name
+        return self.rule_pattern.format(self.name)
 
     @property
     def module(self) -> str:
@@ -94,11 +95,9 @@ class Artifact:
 
     def settings(self, sources: Sources, labels: Labels) -> dict[str, Any]:
         """Typed settings of a job by parameter name; ConfigurationError if a key is unknown."""
-        return {
-            name: self.types[name].validate_python(read.value(sources, labels))
-            for name, read in self.reads.items()
-            if isinstance(read, SettingRead)
-        }
+        reads = [(name, read) for name, read in self.reads.items() if isinstance(read, SettingRead)]
+        values = {name: read.value(sources, labels) for name, read in reads}
+        return {name: self.types[name].validate_python(value) for name, value in values.items()}
 
     def plain(self, settings: Mapping[str, Any]) -> dict[str, Any]:
         """Return typed ``settings`` as plain data, reduced to the fields of the annotated types."""

@@ -9,9 +9,9 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from study.artifact.logs import usage_of
 from study.artifact.paths import FIGURE, RESULTS, TABLE, Place
 from study.artifact.reads import Every, ProjectFile, Read, Setting, TableOf
-from study.artifact.usage import usage_of
 from study.figures.kit.declaration import declarations
 from study.paper.figure_numbers import figures_page
 from study.paper.macros import keys_of

@@ -74,33 +74,24 @@ def pairs(table: Table, expected: pd.DataFrame, found: pd.DataFrame) -> list[tup
     named = [c.name for c in table.columns if names_row(c)]
     counts = [c.name for c in table.columns if c.quantity == "value" and c.kind == "integer"]
     made: list[tuple[int, int]] = []
-    left = [list(range(len(expected))), list(range(len(found)))]
+    left = [
+        frame[[*named, *counts]].map(_key).assign(row=range(len(frame)))
+        for frame in (expected, found)
+    ]
     for columns in ([*named, *counts], named):
-        if all(left):
-            here, there = _places(expected, columns, left[0]), _places(found, columns, left[1])
-            made += [(row, there[key]) for key, row in here.items() if key in there]
-            left = [
-                [row for key, row in own.items() if key not in other]
-                for own, other in ((here, there), (there, here))
-            ]
+        # equal rows match in order
+        e, f = (rows.assign(place=rows.groupby(columns).cumcount()) for rows in left)
+        both = e.merge(f, on=[*columns, "place"])
+        made += zip(both.row_x, both.row_y, strict=True)
+        left = [e[~e.row.isin(both.row_x)], f[~f.row.isin(both.row_y)]]
     return sorted(made)
 
 
-def _places(frame: pd.DataFrame, columns: Sequence[str], rows: list[int]) -> dict[tuple, int]:
-    """Map the cells of each row, and the count of equal rows before it, to the row's number."""
-    seen, places = Counter[tuple](), {}
-    cells = [[_key(cell) for cell in frame[name].iloc[rows]] for name in columns]
-    for row, key in zip(rows, zip(*cells, strict=True), strict=True):
-        places[*key, seen[key]] = row
-        seen[key] += 1
-    return places
-
-
-def _key(cell: object) -> object:
-    """Cell rounded to fewer digits than references have; empty text for a missing value."""
+def _key(cell: object) -> str:
+    """Cell as text, of fewer digits than references have; empty text for a missing value."""
     if cell is None or cell is pd.NA or cell != cell:
         return ""
-    return f"{cell:.6g}" if isinstance(cell, float) else cell
+    return f"{cell:.6g}" if isinstance(cell, float) else str(cell)
 
 
 @dataclass(frozen=True)

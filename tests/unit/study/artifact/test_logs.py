@@ -17,8 +17,7 @@ from threadpoolctl import threadpool_info, threadpool_limits
 
 from pdrom.core.errors import INTERRUPTED, MeshError
 from pdrom.core.store.checksum import sets_aside
-from study.artifact.logs import job_log, planning_log
-from study.artifact.usage import Usage, usage_of, usage_since
+from study.artifact.logs import Usage, job_log, planning_log, usage_of, usage_since
 
 LOGGER = logging.getLogger("pdrom")
 

@@ -8,7 +8,7 @@ import snakemake.cli  # noqa: F401 : before the graph, which cannot be imported 
 from snakemake.dag import DAG
 
 from places import ROOT
-from study.artifact.usage import Usage
+from study.artifact.logs import Usage
 from study.figures.kit.declaration import declarations
 from study.pipeline.commandline import CommandLine
 from study.pipeline.front import completed
