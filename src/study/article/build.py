@@ -20,7 +20,7 @@ from study.article.latex import linked_table, prepared
 from study.article.tables import FACTS, claims_page, list_page, table_page
 from study.article.tree import Labels, Node, attributes, boxed, numbered, plain, resolved, words
 from study.artifact.artifact import Artifact
-from study.artifact.paths import ARTICLE, FIGURE_PICTURE, File, Place
+from study.artifact.paths import ARTICLE, FIGURE_PICTURE, File
 from study.artifact.reads import Every, ProjectFile, Setting, TableOf
 from study.figures.kit.declaration import declarations
 from study.paper.build import NUMBERS, Facts, fact_tables, paper, paper_inputs
@@ -215,14 +215,12 @@ def _write_figures(
     return made
 
 
-def _writes() -> dict[str, Place]:
-    names = {**PAGES, "tables": "tables.html", "claims": "claims.html"}
-    names |= {"style": "article.css", "script": "article.js"}
-    names |= {f"table_{name}": f"tables/{name}.html" for name in (*declared(), *FACTS)}
-    names |= {f"picture_{name}": f"figures/{name}.webp" for name in declarations()}
-    return {key: ARTICLE.where(name=name) for key, name in names.items()}
-
-
+WRITES = {
+    **PAGES, "tables": "tables.html", "claims": "claims.html", "style": "article.css",
+    "script": "article.js", **{f"table_{name}": f"tables/{name}.html" for name in declared()},
+    **{f"table_{name}": f"tables/{name}.html" for name in FACTS},
+    **{f"picture_{name}": f"figures/{name}.webp" for name in declarations()},
+}  # fmt: skip
 LIMIT = 300.0  # s, for pandoc, which never ends for a definition that expands to itself
 
 
@@ -288,6 +286,6 @@ article = Artifact(
         **{name: ProjectFile(str(FOLDER / file)) for name, file in ASSETS.items()},
         "added": Setting("claim_sets"),
     },
-    _writes(),
+    {key: ARTICLE.where(name=name) for key, name in WRITES.items()},
     write_article,
 )

@@ -45,22 +45,10 @@ def folder_of(results: str) -> Path:
     return root / "reference" / Path(results).relative_to(root) / "tables"
 
 
-def compact(table: Table, frame: pd.DataFrame) -> pd.DataFrame:
-    """Return the columns of ``frame`` that a reference of ``table`` stores, numbers rounded."""
-    columns = {name: frame[name] for name in kept(table)}
-    for name, column in kept(table).items():
-        if column.kind == "number":
-            texts = [f"{value:.{DIGITS}g}" for value in frame[name].to_numpy(dtype=float)]
-            columns[name] = pd.Series(map(float, texts), frame.index, dtype=float)
-    return pd.DataFrame(columns, index=frame.index)
-
-
 def write_reference(table: Table, frame: pd.DataFrame, folder: Path) -> None:
     """Write the reference of ``table``, from its content ``frame``, into ``folder``."""
-    plain = compact(table, frame).to_csv(
-        index=False, float_format=f"%.{DIGITS}g", lineterminator="\n"
-    )
-    content = plain.encode()
+    stored, form = frame[list(kept(table))], f"%.{DIGITS}g"
+    content = stored.to_csv(index=False, float_format=form, lineterminator="\n").encode()
     path, other = _paths(table.name, folder)
     if len(content) > PACKED_FROM:
         path, other, content = other, path, lzma.compress(content, preset=9)
