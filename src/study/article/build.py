@@ -25,6 +25,7 @@ from study.artifact.reads import Every, ProjectFile, Setting, TableOf
 from study.figures.kit.declaration import declarations
 from study.paper.build import NUMBERS, Facts, fact_tables, paper, paper_inputs
 from study.paper.source import DOCUMENTS, FIGURE, documents
+from study.paper.textables import tex_rows
 from study.tables import declared
 from study.tables.claims.rules import Added, load_claims
 
@@ -164,9 +165,7 @@ def write_article(
     written["claims"] = claims_page(rules, known["claims_tests"], known["claims"], pages, plain)
     drawn = _write_figures(figures, pictures, outputs)
     files = {
-        f"{name}.tex": linked_table(
-            read_text(made[f"{name}.tex"]), {table: known[table] for table in read}
-        )
+        f"{name}.tex": linked_table(tex_rows(name, known), {table: known[table] for table in read})
         for name, read in origins["tables"].items()
     }
     labels: dict[str, tuple[str, str]] = {}

@@ -14,6 +14,7 @@ from pdrom.view.text import escape
 from study.paper.build import Facts
 from study.paper.macros import NOTED, SHOWN, closing, matching, note, sentences
 from study.paper.source import COMMENT, FIGURE
+from study.paper.textables import Rows, tabular
 
 ORIGIN = "origin:"
 _VAL = re.compile(r"\\val\{([^{}]*)\}")
@@ -26,14 +27,12 @@ _PART = re.compile(
 _DROPPED = re.compile(
     r"\\(?:tableofcontents|renewcommand\{.*)|(?:\{\\\w+\s*)?\\input\{\w+\.bbl\}\}?"
 )
-_HEAD = re.compile(r"\\endfirsthead.*?\\endhead\n", re.DOTALL)
 _SPEC = re.compile(r"\\(?:begin\{(?:tabular|longtable)\}|multicolumn\{\d+\})(?=\{)")
 _NUMBER = re.compile(
     r"(?:[^A-Za-z]|\\(?:ensuremath|cdot|infty|times|ge|le)(?![A-Za-z])|\b(?:to|of)\b)*\d"
     r"(?:[^A-Za-z]|\bloses\b)*"
 )
 _TAIL = re.compile(r"(\(|, )(\d[\d/, ]*)([)}]?)$")  # last number, as in "holds (20/20)"
-END = r" \\"
 _FIGURE = (
     r"\\begin{figure}\\includegraphics{\1.pdf}"
     r"\\caption{\\csname caption@\1\\endcsname}\\label{fig:\1}\\end{figure}"
@@ -101,26 +100,20 @@ def _link(key: str, text: str) -> str:
     return rf"\href{{{ORIGIN}{key.encode().hex()}}}{{{shown}}}"
 
 
-def linked_table(text: str, tables: Mapping[str, pd.DataFrame]) -> str:
-    """Return the TeX table ``text`` with its numbers as links to rows of the study's tables.
+def linked_table(table: Rows, tables: Mapping[str, pd.DataFrame]) -> str:
+    """Return the TeX ``table`` with its numbers as links to rows of the study's tables.
 
     The links lead to the one of ``tables`` with most columns in common. If both have equally many
     rows, these correspond in order. Otherwise a link selects rows with equal cells in the common
     columns, as far as such rows exist (the cell may be a rounded number, a sum or a title).
     """
-    text = _HEAD.sub("", text).replace("\\captionrow\n", "").replace("longtable", "tabular")
-    lines = text.split("\n")
-    split = [line.removesuffix(END).split(" & ") if line.endswith(END) else [] for line in lines]
-    first = next(place for place, cells in enumerate(split) if cells)
-    header = split[first]
-    body = [n for n, cells in enumerate(split) if n > first and len(cells) == len(header)]
+    (columns, header), *body = table
     origin = max(tables, key=lambda name: len({*header} & {*tables[name]}))
-    one_to_one = len(body) == len(tables[origin])
-    for row, line in enumerate(body, 1):
-        own = [f"row={row}"] if one_to_one else _agreeing(tables[origin], header, split[line])
-        key = "|".join([origin, *own])
-        lines[line] = " & ".join(_linked_cell(cell, key) for cell in split[line]) + END
-    return plain_columns(_ENSURED.sub(r"$\1$", "\n".join(lines)))
+    one_to_one, rows = len(body) == len(tables[origin]), []
+    for row, cells in enumerate(body, 1):
+        own = [f"row={row}"] if one_to_one else _agreeing(tables[origin], header, cells)
+        rows.append([_linked_cell(cell, "|".join([origin, *own])) for cell in cells])
+    return plain_columns(_ENSURED.sub(r"$\1$", tabular(header, rows, columns)))
 
 
 def _agreeing(table: pd.DataFrame, header: Sequence[str], cells: Sequence[str]) -> list[str]:

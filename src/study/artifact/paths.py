@@ -9,7 +9,6 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
-from string import Formatter
 from typing import Any
 
 from pdrom.core.errors import StorageError
@@ -27,6 +26,7 @@ LABELS = {
     "factor": r"[0-9.]+",
     "name": r"[A-Za-z0-9_.]+",
 }
+_LABEL = re.compile(r"\{(\w+)\}")
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class Place:
     @property
     def labels(self) -> list[str]:
         """Names of the labels in the pattern."""
-        return [label for _, label, _, _ in Formatter().parse(self.pattern) if label is not None]
+        return _LABEL.findall(self.pattern)
 
     def file(self, path: str) -> "File":
         """Return ``path`` as a `File` with its labels; StorageError if it is not of this kind."""
@@ -76,12 +76,10 @@ class Place:
 
     @cached_property
     def _expression(self) -> re.Pattern[str]:
-        parts = []
-        for text, label, _, _ in Formatter().parse(self.pattern):
-            parts.append(re.escape(text))
-            if label is not None:
-                parts.append(f"(?P<{label}>{LABELS[label]})")
-        return re.compile(rf"(?:^|/){''.join(parts)}$")
+        texts = _LABEL.split(self.pattern)  # every other one is a label
+        texts[::2] = map(re.escape, texts[::2])
+        texts[1::2] = [f"(?P<{label}>{LABELS[label]})" for label in texts[1::2]]
+        return re.compile(rf"(?:^|/){''.join(texts)}$")
 
 
 @dataclass(frozen=True)

@@ -342,7 +342,12 @@ def reads(name: str) -> list[str]:
     return list(signature(TEX_TABLES[name]).parameters)
 
 
+def tex_rows(name: str, tables: Mapping[str, pd.DataFrame]) -> Rows:
+    """Yield column definitions and header of the TeX table ``name``, then its rows."""
+    return TEX_TABLES[name](*(tables[read] for read in reads(name)))
+
+
 def tex_table(name: str, tables: Mapping[str, pd.DataFrame]) -> str:
     """TeX table ``name``, made from the study's ``tables`` by name."""
-    (columns, header), *rows = TEX_TABLES[name](*(tables[read] for read in reads(name)))
+    (columns, header), *rows = tex_rows(name, tables)
     return (longtable if name in LONG else tabular)(header, rows, columns)

@@ -146,10 +146,7 @@ def write_study(folder: Path) -> dict[str, object]:
         "facts": facts,
     }
     inputs = {Path(name).stem: folder / "inputs" / name for name in INPUTS}
-    with pytest.MonkeyPatch.context() as patch:
-        for module in (build, textables):
-            patch.setattr(module, "TEX_TABLES", {"tab_ranks": ranks})
-        build.write_inputs(**given, outputs=inputs)
+    build.write_inputs(**given, outputs=inputs)
     write_text(CLAIM, folder / "claims.yaml")
     for name in facts.captions:
         write_text("%PDF-1.4", folder / "figures" / f"{name}.pdf")
@@ -175,6 +172,15 @@ def write_pages(given: dict[str, object], out: Path) -> Path:
     outputs = {name: str(out / place.pattern) for name, place in article.writes.items()}
     article.function(**given, outputs=outputs)
     return out / "article"
+
+
+@pytest.fixture(scope="module", autouse=True)
+def one_table() -> Iterator[None]:
+    """The table that the manuscripts of these tests contain, in place of those of the study."""
+    with pytest.MonkeyPatch.context() as patch:
+        for module in (build, textables):
+            patch.setattr(module, "TEX_TABLES", {"tab_ranks": ranks})
+        yield
 
 
 @pytest.fixture(scope="module")
@@ -279,11 +285,8 @@ RUNS = frame("scene group error", ("a_b", "x_y", 0.0123), ("a_b", "z", 0.25), ("
     ],
 )
 def test_rows_agree_in_what_both_tables_have(cells, key):
-    text = rf"""\begin{{tabular}}{{llr}}
-scene & group & error \\
-{cells} \\
-\end{{tabular}}"""
-    made = linked_table(text, {"other": pd.DataFrame({"scene": ["c"]}), "runs": RUNS})
+    table = [("llr", ["scene", "group", "error"]), cells.split(" & ")]
+    made = linked_table(table, {"other": pd.DataFrame({"scene": ["c"]}), "runs": RUNS})
     number = cells.rpartition(" & ")[2]
     assert f"{key.encode().hex()}}}{{{number}}}" in made
 
@@ -299,7 +302,7 @@ scene & group & error \\
     ],
 )
 def test_a_number_among_words_is_a_link(cell, number):
-    made = linked_table(f"a & b \\\\\nnone & {cell} \\\\", {"runs": RUNS})
+    made = linked_table([("ll", ["a", "b"]), ["none", cell]], {"runs": RUNS})
     assert f"}}{{{number}}}" in made
     assert "{none}" not in made
 
