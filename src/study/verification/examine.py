@@ -15,15 +15,7 @@ from study.artifact.paths import TABLE
 from study.pipeline.resolve import Job
 from study.tables import declared
 from study.tables.claims.rules import load_claims
-from study.verification.compare import (
-    RUNS,
-    Comparison,
-    Context,
-    in_words,
-    judge,
-    kept,
-    names_row,
-)  # fmt: skip
+from study.verification import compare
 from study.verification.files import is_derived, made
 from study.verification.references import Reference, folder_of, read_references
 from study.verification.subject import Subject
@@ -116,13 +108,13 @@ class Examination:
         return read_references(folder_of(self.subject.results))
 
     @cached_property
-    def context(self) -> Context:
+    def context(self) -> compare.Context:
         """Context of the comparison, from the expected tables and the found table of runs."""
         tables = {name: reference.frame for name, reference in self.expected.items()}
         try:
-            return Context.of(tables, self.found(RUNS))
+            return compare.Context.of(tables, self.found(compare.RUNS))
         except StorageError:
-            return Context.of(tables)
+            return compare.Context.of(tables)
 
     def _again(self, name: str) -> pd.DataFrame | None:
         """Return the table ``name`` made again from existing tables, if it reads tables only.
@@ -158,14 +150,16 @@ class Examination:
             return line(Outcome.DIFFERS, f"not what the tables at hand give, {other}")
         lacking = set(frame.columns) - set(reference.columns)
         known = table.checked(frame.assign(**dict.fromkeys(lacking, None)))
-        differences, compared = judge(Comparison(table, reference.frame, known, self.context))
+        differences, compared = compare.judge(
+            compare.Comparison(table, reference.frame, known, self.context)
+        )
         if differences:
             more = f" and {len(differences) - 1} more" if differences[1:] else ""
             return line(Outcome.DIFFERS, differences[0] + more, *differences)
-        columns = kept(table)
+        columns = compare.kept(table)
         if new := sorted(lacking & set(columns)):
             return line(Outcome.NO_REFERENCE, f"column(s) {', '.join(new)}: run verify --update")
-        if all(map(names_row, columns.values())):
+        if all(map(compare.names_row, columns.values())):
             text = "its numbers are times or round-off; names and sizes agree"
             return line(Outcome.NOT_COMPARABLE, text)
         return line(Outcome.REPRODUCED, compared)
@@ -251,5 +245,5 @@ def _first_difference(found: pd.DataFrame, again: pd.DataFrame) -> str | None:
     if not len(places):
         return None
     row, column = places[0]
-    old, new = (in_words(frame.iloc[row, column]) for frame in (found, again))
+    old, new = (compare.in_words(frame.iloc[row, column]) for frame in (found, again))
     return f"as in row {row + 1} {found.columns[column]}: found {old}, they give {new}"

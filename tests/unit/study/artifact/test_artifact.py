@@ -10,17 +10,9 @@ from pydantic import ValidationError
 
 from pdrom.core.store import checksum_path, read_table, write_table
 from pdrom.core.yamlfile import ConfigModel
+from study.artifact import reads
 from study.artifact.artifact import Artifact, declare, declared_in, load, make, modules_in
 from study.artifact.paths import File, Place
-from study.artifact.reads import (
-    EachOf,
-    Every,
-    ProjectFile,
-    Setting,
-    Settings,
-    SourcesOf,
-    TableOf,
-)
 from study.experiments.kit.declaration import Experiment, experiment, experiments
 
 SCENE, GROUP = Place("a/{scene}.csv"), Place("b/{scene}/{group}.csv")
@@ -50,7 +42,7 @@ class Whole(Section):
 
 @experiment(
     "Rows of {scene} times a factor",
-    reads={"table": SCENE, "section": Setting("section")},
+    reads={"table": SCENE, "section": reads.Setting("section")},
     writes={"out": Place("c/{scene}.csv")},
 )
 def multiplied(table: File, section: Section, out: File) -> None:
@@ -107,10 +99,10 @@ def test_faulty_settings_are_refused(settings, tmp_path):
     ("read", "paths"),
     [
         (GROUP, "r/b/s/g.csv"),
-        (Every(SCENE), ["r/a/s.csv", "r/a/t.csv"]),
-        (TableOf("payoff"), "r/tables/payoff.csv"),
-        (ProjectFile("config/claims.yaml"), "config/claims.yaml"),
-        (SourcesOf("section"), ["mesh.obj"]),
+        (reads.Every(SCENE), ["r/a/s.csv", "r/a/t.csv"]),
+        (reads.TableOf("payoff"), "r/tables/payoff.csv"),
+        (reads.ProjectFile("config/claims.yaml"), "config/claims.yaml"),
+        (reads.SourcesOf("section"), ["mesh.obj"]),
     ],
 )
 def test_files_are_asked_of_the_study(read, paths):
@@ -120,12 +112,12 @@ def test_files_are_asked_of_the_study(read, paths):
 
 def test_one_file_for_each_entry_of_a_setting():
     entries = [File("", {"scene": scene}) for scene in "tst"]
-    read = EachOf(SCENE, "cases")
+    read = reads.EachOf(SCENE, "cases")
     assert read.paths(Sources({"cases": entries}), {}) == ["r/a/t.csv", "r/a/s.csv", "r/a/t.csv"]
 
 
 def test_settings_that_go_together_are_one_model():
-    read = Settings(Section)
+    read = reads.Settings(Section)
     assert read.value(Sources({"factor": 3.0}), {}) == Section(factor=3.0)
 
 
@@ -135,7 +127,7 @@ def test_labels_are_those_of_what_is_written():
 
 
 def test_a_function_that_does_not_take_what_is_declared_is_refused():
-    made = Artifact("a", "", {"table": Every(SCENE)}, {"out": SCENE}, multiplied.function)
+    made = Artifact("a", "", {"table": reads.Every(SCENE)}, {"out": SCENE}, multiplied.function)
     with pytest.raises(TypeError, match="a: missing a required argument: 'section'"):
         declare(made, "out")
 
