@@ -133,13 +133,6 @@ Next. \known{{Both: {BAR}, {CLOTH}.}}
 """
 
 
-def test_blocks_are_found_with_their_paragraphs():
-    found = tex.sentences(BLOCKS)
-    assert [sentence.paragraph for sentence in found] == [0, 0, 0, 1, 2, 2]
-    assert [sentence.is_row for sentence in found] == [False] * 4 + [True] * 2
-    assert found[0].text == rf"The bar has {BAR} \emph{{so}}."
-
-
 @pytest.mark.parametrize(
     "source", [r"\known{open {x}", r"\known{a \known{b} c}", r"\known{\row{b} c}"]
 )

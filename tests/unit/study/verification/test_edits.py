@@ -135,13 +135,6 @@ def test_an_edit_is_noticed(name, examination):
     assert found.outcome is Outcome.DIFFERS, found
 
 
-def test_untouched_tables_are_not_noticed(examination):
-    good = (Outcome.REPRODUCED, Outcome.NOT_COMPARABLE)
-    lines = {name: examination.table(name) for name, *_ in dict.fromkeys(EDITS.values())}
-    assert [str(line) for line in lines.values() if line.outcome not in good] == []
-    assert {line.outcome for line in examination.claims()} == {Outcome.REPRODUCED}
-
-
 def test_a_table_that_was_cut_one_that_is_lost_and_one_that_is_none_are_noticed(examination):
     cut, lost, more = (TABLE.at(RESULTS, name=name) for name in ("ladder", "stability", "more"))
     content = Path(cut).read_bytes()

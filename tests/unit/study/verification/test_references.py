@@ -11,7 +11,7 @@ from study.tables import declared
 from study.tables.kit.declaration import TOLERANCES
 from study.verification import references
 from study.verification.command import update
-from study.verification.references import folder_of, note, read_reference, write_reference
+from study.verification.references import note, read_reference, write_reference
 from study.verification.subject import Subject
 
 TABLE = declared()["reduced_reruns"]
@@ -70,11 +70,6 @@ def test_tracked_references_are_small_and_whole():
         assert names <= set(declared())
         assert all(read_reference(declared()[name], own) for name in names)
         assert {"claims", "reduced_reruns", "reconstruction_error"} <= names
-
-
-def test_folders_of_references():
-    assert str(folder_of("results")) == "results/reference/tables"
-    assert str(folder_of("results/studies/tiny")) == "results/reference/studies/tiny/tables"
 
 
 @pytest.fixture
