@@ -7,29 +7,15 @@ pipeline finds paths and values (`Sources`); the artifact's function gets the co
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from pdrom.core.store import read_table
 from study.artifact.paths import Place
 
 Labels = Mapping[str, str]
 Paths = str | list[str]
-
-
-class Sources(Protocol):
-    """Interface by which reads find the paths and settings of a study for a job's labels."""
-
-    def file(self, place: Place, labels: Labels) -> str:
-        """Return the path of the file of kind ``place`` of a job with these ``labels``."""
-
-    def files(self, place: Place, labels: Labels) -> list[str]:
-        """Return all paths of the kind ``place`` whose labels agree with ``labels`` of a job."""
-
-    def table(self, name: str) -> str:
-        """Return the path of the table ``name``."""
-
-    def value(self, key: str, labels: Labels) -> Any:
-        """Return the configuration value of ``key``, or a value derived from ``labels``."""
+# Finds the paths and settings of a study for a job's labels: `study.pipeline.resolve.Resolver`.
+Sources = Any
 
 
 class FileRead:

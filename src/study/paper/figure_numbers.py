@@ -66,12 +66,11 @@ def figures_page(root: Path = Path()) -> str:
     parts = [HEAD]
     numbers = figure_numbers(root)
     for name, figure in declarations().items():
-        number = f" ({numbers[name].words})" if numbers[name].words else ""
         keys = ", ".join(f"`{key}`" for key in figure.options.model_fields)
         read = filter(None, map(_words, figure.reads.values()))
         caption = re.sub(r"\. (?=[A-Z`])", ".\n", _text(figure.caption))  # one line per sentence
         parts.append(
-            f"## `{name}`{number}\n\n**{_text(figure.title)}.**\n{caption}\n\n"
+            f"## {numbers[name].label(f'`{name}`')}\n\n**{_text(figure.title)}.**\n{caption}\n\n"
             f"Keys: {keys}.\nReads: {', '.join(dict.fromkeys(read))}.\n"
         )
     return "\n".join(parts)

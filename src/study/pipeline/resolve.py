@@ -47,7 +47,7 @@ class Job:
 
 
 class Resolver:
-    """Answers to the reads of artifacts for one study, an implementation of `Sources`.
+    """Answers to the reads of artifacts for one study, their `Sources`.
 
     results : path of the results folder
     """
@@ -81,7 +81,7 @@ class Resolver:
             fingerprint(artifact.module, *sorted(set(modules_in(settings)))),
         )
 
-    # Methods of the protocol `Sources`, used by declarations -------------------------------------
+    # Methods that reads of artifacts call -------------------------------------------------------
 
     def file(self, place: Place, labels: Labels) -> str:
         """Path of the file of the kind ``place`` that belongs to a job with these ``labels``.
