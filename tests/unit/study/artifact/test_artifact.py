@@ -1,8 +1,7 @@
 """Artifacts: declarations are checked, settings typed, jobs run from plain data."""
 
-from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
 
 import pandas as pd
 import pytest
@@ -34,11 +33,6 @@ class Whole(Section):
 
     others: tuple[str, ...] = ("b",)
 
-    @property
-    def sources(self) -> list[str]:
-        """Files that people edit."""
-        return ["mesh.obj"]
-
 
 @experiment(
     "Rows of {scene} times a factor",
@@ -50,29 +44,15 @@ def multiplied(table: File, section: Section, out: File) -> None:
     write_table(read_table(table.path) * section.factor, out.path)
 
 
-@dataclass
-class Sources:
-    """A study of two scenes."""
-
-    values: dict[str, Any] = field(default_factory=lambda: {"section": Whole(factor=2.0)})
-
-    def file(self, place, labels):
-        return place.at("r", **{name: labels[name] for name in place.labels})
-
-    def files(self, place, labels):
-        return [place.at("r", scene=scene) for scene in ("s", "t")]
-
-    def table(self, name):
-        return f"r/tables/{name}.csv"
-
-    def value(self, key, labels):
-        return self.values[key]
+# A study, as far as it is asked; the files of a real one: test_jobs.py.
+SETTINGS = {"section": Whole(factor=2.0), "factor": 3.0}
+STUDY = SimpleNamespace(value=lambda key, labels: SETTINGS[key])
 
 
 def test_a_job_runs_from_plain_data_and_says_what_made_it(tmp_path):
     source, out = str(tmp_path / "a" / "s.csv"), str(tmp_path / "c" / "s.csv")
     write_table(pd.DataFrame({"x": [1.0, 2.0]}), source)
-    settings = multiplied.settings(Sources(), {"scene": "s"})
+    settings = multiplied.settings(STUDY, {"scene": "s"})
     make(
         multiplied.address, multiplied.rule, settings=multiplied.plain(settings),
         labels={"scene": "s"}, code="c0de", inputs={"table": source}, outputs={"out": out},
@@ -82,7 +62,7 @@ def test_a_job_runs_from_plain_data_and_says_what_made_it(tmp_path):
 
 
 def test_a_job_depends_on_as_much_of_a_section_as_its_function_asks_for():
-    settings = multiplied.settings(Sources(), {"scene": "s"})
+    settings = multiplied.settings(STUDY, {"scene": "s"})
     assert multiplied.plain(settings) == {"section": {"factor": 2.0}}
     assert list(modules_in(settings)) == ["pdrom.model.effects.forces"]
 
@@ -95,30 +75,8 @@ def test_faulty_settings_are_refused(settings, tmp_path):
         multiplied.perform(settings, inputs, {"out": str(tmp_path / "c" / "s.csv")})
 
 
-@pytest.mark.parametrize(
-    ("read", "paths"),
-    [
-        (GROUP, "r/b/s/g.csv"),
-        (reads.Every(SCENE), ["r/a/s.csv", "r/a/t.csv"]),
-        (reads.TableOf("payoff"), "r/tables/payoff.csv"),
-        (reads.ProjectFile("config/claims.yaml"), "config/claims.yaml"),
-        (reads.SourcesOf("section"), ["mesh.obj"]),
-    ],
-)
-def test_files_are_asked_of_the_study(read, paths):
-    made = Artifact("a", "", {"x": read}, {"out": GROUP}, multiplied.function)
-    assert made.inputs(Sources(), {"scene": "s", "group": "g"}) == {"x": paths}
-
-
-def test_one_file_for_each_entry_of_a_setting():
-    entries = [File("", {"scene": scene}) for scene in "tst"]
-    read = reads.EachOf(SCENE, "cases")
-    assert read.paths(Sources({"cases": entries}), {}) == ["r/a/t.csv", "r/a/s.csv", "r/a/t.csv"]
-
-
 def test_settings_that_go_together_are_one_model():
-    read = reads.Settings(Section)
-    assert read.value(Sources({"factor": 3.0}), {}) == Section(factor=3.0)
+    assert reads.Settings(Section).value(STUDY, {}) == Section(factor=3.0)
 
 
 def test_labels_are_those_of_what_is_written():
