@@ -39,10 +39,6 @@ class Place:
         """Path of the file with these labels in the folder ``results``."""
         return f"{results}/{self.pattern.format(**labels)}"
 
-    def rule(self, results: str) -> str:
-        """Path pattern in ``results`` with labels in braces, as a Snakemake rule needs it."""
-        return f"{results}/{self.pattern}"
-
     def where(self, **labels: str) -> "Place":
         """Return the kind of file with some labels fixed to values."""
         pattern = self.pattern

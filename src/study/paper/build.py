@@ -129,12 +129,6 @@ def build(
 _CITE = re.compile(r"\\cite\{([^}]*)\}")
 
 
-def cited_keys(source: str) -> list[str]:
-    """Return the keys that a TeX source cites, in order of first citation."""
-    keys = [key.strip() for group in _CITE.findall(source) for key in group.split(",")]
-    return list(dict.fromkeys(keys))
-
-
 def bibliography(source: str, references: Path) -> str:
     """Return the TeX bibliography of the entries that ``source`` cites, in order of citation.
 
@@ -143,7 +137,8 @@ def bibliography(source: str, references: Path) -> str:
     PaperError
         A cited key is not in ``references`` or lacks a field, or the file is not BibTeX.
     """
-    keys = cited_keys(source)
+    cited = [key.strip() for group in _CITE.findall(source) for key in group.split(",")]
+    keys = list(dict.fromkeys(cited))
     set_strict_mode(False)
     try:
         entries = parse_file(str(references)).entries

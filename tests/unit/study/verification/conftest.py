@@ -1,6 +1,7 @@
 """The tracked tables of the tiny study as a folder of results that agrees with its references."""
 
 import shutil
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import numpy as np
@@ -37,14 +38,6 @@ def tracked():
     return {name: reference.frame for name, reference in read.items()}
 
 
-def make(path):
-    """A small file with its checksum."""
-    if path.endswith(".h5"):
-        with write_hdf5(path):
-            return
-    write_text("there\n", path)
-
-
 def timed(table, frame):
     """A table with numbers in place of times, which references do not have."""
     rows = np.arange(len(frame))
@@ -73,21 +66,21 @@ def project(tracked, subject, tmp_path_factory):
             write_reference(table, frame, folder_of(RESULTS))
         figures = subject.plan.fixed["figures"]
         read = {path for job in figures for path in job.files if path.startswith("results/")}
-        for path in read | {path for job in figures for path in job.outputs.values()}:
-            if not Path(path).exists():
-                make(path)
+        read |= {path for job in figures for path in job.outputs.values()}
+        for path in (path for path in read if not Path(path).exists()):
+            if path.endswith(".h5"):
+                with write_hdf5(path):
+                    pass
+            else:
+                write_text("there\n", path)
     return folder
 
 
 def derived_tables():
     """Tables that are made from others, these first."""
-    names = [name for name in declared() if is_derived(name)]
-
-    def rank(name):
-        reads = declared()[name].reads.values()
-        return max([1 + rank(r.name) for r in reads if isinstance(r, TableOf)], default=0)
-
-    return sorted(names, key=rank)
+    reads = {name: table.reads.values() for name, table in declared().items()}
+    graph = {name: [r.name for r in own if isinstance(r, TableOf)] for name, own in reads.items()}
+    return filter(is_derived, TopologicalSorter(graph).static_order())
 
 
 @pytest.fixture
