@@ -247,21 +247,6 @@ class Comparison:
         same = (a == b) | (np.isnan(a) & np.isnan(b))
         return np.where(same, 0.0, np.where(np.isnan(apart), np.inf, apart))
 
-    def unpaired(self) -> tuple[pd.DataFrame, pd.DataFrame]:
-        """Return the rows of the expected table, and of the found table, without a matching row.
-
-        Some tables list only runs that have an error (`Table.only_with_error`). In these, a row is
-        not returned if its run has an error here but none in the other table.
-        """
-        alone = []
-        for side, frame in enumerate((self.expected, self.found)):
-            rows = frame[~np.isin(np.arange(len(frame)), [pair[side] for pair in self.pairs])]
-            if self.table.only_with_error:
-                ended = self.context.ended[1 - side] - self.context.ended[side]
-                rows = rows[[name not in ended for name in names(rows, RUN)]]
-            alone.append(rows)
-        return alone[0], alone[1]
-
 
 def judge(comparison: Comparison) -> tuple[list[str], str]:
     """Return texts of all differences, largest first, and how many cells were compared, in words.
@@ -289,13 +274,22 @@ def _difference(
 
 
 def _rows(comparison: Comparison) -> Iterator[Difference]:
-    missing, new = comparison.unpaired()
-    for frame, expected, found in ((missing, "a row", "none"), (new, "none", "a row")):
-        for i in range(len(frame)):
-            yield _difference(_row_in_words(comparison.table, frame, i), expected, found)
+    """Yield differences for rows without a matching row in the other table, and for their order.
+
+    Some tables list only runs that have an error (`Table.only_with_error`). In these, a row makes
+    no difference if its run has an error in its table but none in the other one.
+    """
+    table, context, words = comparison.table, comparison.context, ("a row", "none")
+    for side, frame in enumerate((comparison.expected, comparison.found)):
+        rows = frame[~np.isin(np.arange(len(frame)), [pair[side] for pair in comparison.pairs])]
+        if table.only_with_error:
+            ended = context.ended[1 - side] - context.ended[side]
+            rows = rows[[name not in ended for name in names(rows, RUN)]]
+        for i in range(len(rows)):
+            yield _difference(_row_in_words(table, rows, i), words[side], words[1 - side])
     moved = np.flatnonzero(np.diff([row for _, row in comparison.pairs]) < 0)
     if len(moved):
-        place = _row_in_words(comparison.table, comparison.e, int(moved[0]) + 1)
+        place = _row_in_words(table, comparison.e, int(moved[0]) + 1)
         yield _difference(f"order of the rows, {place}", "further down", "further up")
 
 

@@ -1,7 +1,7 @@
 """What an entry takes is the sum over the jobs that it needs; its command makes its files."""
 
 import shlex
-from dataclasses import dataclass
+from collections import namedtuple
 from pathlib import Path
 
 import snakemake.cli  # noqa: F401 : before the graph, which cannot be imported first
@@ -20,12 +20,7 @@ from study.verification.subject import Subject
 TINY = ["--configfile", "config/tiny.yaml"]
 
 
-@dataclass(frozen=True)
-class Job:
-    """A job of Snakemake, as far as it is asked."""
-
-    output: tuple[str, ...]
-    log: tuple[str, ...]
+Job = namedtuple("Job", "output log")  # a job of Snakemake, as far as it is asked
 
 
 class Dag:
