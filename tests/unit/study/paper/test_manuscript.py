@@ -1,4 +1,4 @@
-"""The manuscript types no result: every number of its prose comes from a table."""
+"""The manuscript: every number of its prose comes from a table; its references and figures."""
 
 import re
 
@@ -6,10 +6,12 @@ import pandas as pd
 import pytest
 from matplotlib.figure import Figure
 
+from pdrom.core.errors import PaperError
 from pdrom.core.yamlfile import read_yaml
 from places import ROOT
 from study.figures.kit.declaration import declarations
 from study.paper.build import PAGES, bibliography, paper
+from study.paper.figure_numbers import Numbers, figure_numbers
 from study.paper.macros import AGGREGATES, keys_of, number_of, sentences
 from study.paper.source import documents
 from study.paper.tex import build_pdfs, packages_of
@@ -215,3 +217,82 @@ def test_the_pdf_has_the_title_and_the_authors_of_the_manuscript():
         assert author
         assert re.search(rf"\\hypersetup\{{\s*pdftitle=\{{{re.escape(title[1])}", source)
         assert rf"pdfauthor={{{author[1]}}}" in source
+
+
+# Bibliography and numbers of figures -----------------------------------------------------------
+
+BIB = """
+@article{beta, author = {Bea B{\\'e}ta}, title = {The {DEIM} of beta}, journal = {J. Beta},
+  year = 2011, volume = 3, pages = {1--2}}
+@book{alpha, author = {Al Alpha and Cy Gamma}, title = {Alpha & more}, publisher = {Pub},
+  year = 2001}
+@misc{unused, author = {No One}, title = {Unused}, year = 1999}
+"""
+
+
+@pytest.fixture
+def references(tmp_path):
+    """A small BibTeX file."""
+    path = tmp_path / "references.bib"
+    path.write_text(BIB.replace("&", "\\&"))
+    return path
+
+
+def test_cited_entries_only_in_order(references):
+    text = bibliography(r"\cite{beta} \cite{alpha,beta}", references)
+    assert text.startswith(r"\begin{thebibliography}")
+    assert text.rstrip().endswith(r"\end{thebibliography}")
+    assert text.index(r"\bibitem{beta}") < text.index(r"\bibitem{alpha}")
+    assert text.count(r"\bibitem") == 2
+    assert "Unused" not in text
+    for piece in ("Bea B{é}ta", "{DEIM}", "2011", "Cy~Gamma", r"Alpha \& more", "2001"):
+        assert piece in text
+    assert text == bibliography(r"\cite{beta, alpha} \citet{unused} \cite {unused}", references)
+
+
+@pytest.mark.parametrize(
+    ("content", "source", "message"),
+    [
+        (BIB.replace("&", "\\&"), r"\cite{alpha,gone} \cite{lost}", "no entry for gone, lost"),
+        ("@article{alpha, title = {unfinished", r"\cite{alpha}", ""),
+        ("@inbook{alpha, author = {A}, title = {T}, chapter = 3, year = 2001}", r"\cite{alpha}",
+         "missing publisher in alpha"),
+    ],
+)  # fmt: skip
+def test_faults_are_named_with_the_file(tmp_path, content, source, message):
+    path = tmp_path / "references.bib"
+    path.write_text(content)
+    with pytest.raises(PaperError, match=rf"references\.bib.*{message}"):
+        bibliography(source, path)
+
+
+def test_no_citation_no_item(references):
+    assert r"\bibitem" not in bibliography("text", references)
+
+
+def test_figures_are_numbered_as_the_source_places_them(tmp_path):
+    (tmp_path / "paper" / "sections").mkdir(parents=True)
+    text = "\\figureof{ladder}\n% \\figureof{noise}\n\\input{sections/a.tex}\\figureof{scaling}"
+    (tmp_path / "paper" / "main.tex").write_text(text)
+    (tmp_path / "paper" / "supplement.tex").write_text(r"\figureof{singular_values}")
+    section = tmp_path / "paper" / "sections" / "a.tex"
+    section.write_text(r"at 5\% \figureof{bar_runs}\figureof{strain_runs}")
+    found = figure_numbers(tmp_path)
+    numbers = {name: n.manuscript for name, n in found.items() if n.manuscript}
+    own = {"ladder": "1", "bar_runs": "2", "strain_runs": "3", "scaling": "4"}
+    assert numbers == own | {"singular_values": "S1"}
+    assert found["strain_runs"].words == "figure 3 of main.pdf, figure 7 of the preprint"
+    words = "figure S1 of supplement.pdf, figure 9 of the preprint"
+    assert found["singular_values"].words == words
+    assert found["bending_runs"].words == "figure 5 of the preprint"
+    assert Numbers(None, None).label("a") == "a"
+    assert Numbers("4", None).label("a") == "a (figure 4 of main.pdf)"
+    section.unlink()
+    with pytest.raises(PaperError, match=r"no file .*a\.tex"):
+        figure_numbers(tmp_path)
+
+
+def test_nothing_but_figureof_makes_a_figure_and_every_configuration_has_all():
+    for text in SOURCES.values():
+        assert len(re.findall(r"\\begin\{figure", text)) == 1, "the definition of \\figureof"
+        assert [s.text for s in sentences(text) if "figureof" in s.text] == []
