@@ -3,7 +3,6 @@
 import json
 import re
 from collections.abc import Mapping
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -78,7 +77,7 @@ def write_inputs(
         written[document] = bibliography(text, references)
     origins = {
         "known": decided,
-        "numbers": {key: asdict(number_of(key, data)) for key in keys_of(whole)},
+        "numbers": {key: number_of(key, data)._asdict() for key in keys_of(whole)},
         "tables": {name: reads(name) for name in TEX_TABLES},
     }
     written[Path(NUMBERS).stem] = json.dumps(origins, indent=1, allow_nan=False) + "\n"

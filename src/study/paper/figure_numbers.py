@@ -1,8 +1,8 @@
 """Numbers of the figures in paper, supplement and preprint, and a page that lists all figures."""
 
 import re
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from study.artifact.markup import to_plain
 from study.artifact.reads import Every, ProjectFile, Read, TableOf
@@ -12,8 +12,7 @@ from study.paper.source import COMMENT, FIGURE, documents
 SUPPLEMENT = "S"  # prefix of the figure numbers in the supplement
 
 
-@dataclass(frozen=True)
-class Numbers:
+class Numbers(NamedTuple):
     """Numbers of a figure: manuscript, "3" for the paper or "S7" for its supplement, and preprint.
 
     A number is None if the document does not contain the figure.

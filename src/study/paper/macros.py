@@ -16,8 +16,7 @@ replaces the first such sentence of each paragraph.
 
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -69,8 +68,7 @@ def _defined(lines: Sequence[str], kind: str, texts: Mapping[str, str]) -> str:
     return "\n".join([*lines, *made, r"\makeatother"]) + "\n"
 
 
-@dataclass(frozen=True)
-class Number:
+class Number(NamedTuple):
     """A number in the manuscript's text, and its origin.
 
     text : the number as TeX
@@ -190,8 +188,7 @@ _BLANK_LINE = re.compile(r"\n[ \t]*\n")
 SHOWN, NOTED, DROPPED = "shown", "noted", "dropped"
 
 
-@dataclass(frozen=True)
-class Sentence:
+class Sentence(NamedTuple):
     """A block: its text, the number of its paragraph, if it is a table row, and where it lies."""
 
     text: str

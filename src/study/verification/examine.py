@@ -1,10 +1,10 @@
 """Outcomes of the comparison for the claims, figures and tables of a results folder."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from enum import StrEnum
 from functools import cache, cached_property
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -36,8 +36,7 @@ class Outcome(StrEnum):
     MISSING = "not there"
 
 
-@dataclass(frozen=True)
-class Line:
+class Line(NamedTuple):
     """Outcome of one claim, figure or table.
 
     kind : claim, figure or table

@@ -7,9 +7,9 @@ that the total size remains small.
 
 import io
 import lzma
-from dataclasses import dataclass
 from datetime import date
 from pathlib import Path
+from typing import NamedTuple
 
 import pandas as pd
 
@@ -31,8 +31,7 @@ Written by `./reproduce verify --update --reason "..."`, newest last.
 """
 
 
-@dataclass(frozen=True)
-class Reference:
+class Reference(NamedTuple):
     """An expected table: ``frame`` has all declared columns, ``columns`` the stored ones."""
 
     frame: pd.DataFrame
