@@ -18,9 +18,9 @@ from study.pipeline.front import completed
 from study.pipeline.study import StudySettings
 from study.tables import declared
 from study.tables.kit.results import trained
-from study.verification.bundle import parser as bundle_parser
-from study.verification.command import parser as verify_parser
+from study.verification.command import parser
 from study.verification.references import folder_of, read_reference
+from study.verification.subject import options_parser
 
 PAGES = sorted([ROOT / "README.md", ROOT / "config" / "README.md", *(ROOT / "docs").rglob("*.md")])
 ADDING = ROOT / "docs" / "adding.md"
@@ -95,9 +95,9 @@ def test_commands_are_understood(command: str, monkeypatch: pytest.MonkeyPatch) 
     # the scene and the study that a reader makes stand for any
     words = command.replace("my_sheet", "spring_oop").replace("mine.yaml", "tiny.yaml")
     first, *others = shlex.split(words)
-    parsers = {"verify": verify_parser, "bundle": bundle_parser}
+    parsers = {"verify": parser(), "bundle": options_parser("bundle", "")}
     if first in parsers:
-        assert parsers[first]().parse_args(others)
+        assert parsers[first].parse_args(others)
     else:
         assert completed([first, *others])
 

@@ -19,12 +19,13 @@ from pdrom.view.page import safe_json
 from study.article.latex import linked_table, prepared
 from study.article.tables import FACTS, claims_page, list_page, table_page
 from study.article.tree import Labels, Node, attributes, boxed, numbered, plain, resolved, words
-from study.artifact.artifact import Files
-from study.artifact.paths import ARTICLE, FIGURE_PICTURE, File, Place
+from study.artifact.artifact import Artifact
+from study.artifact.paths import ARTICLE, FIGURE_PICTURE, File
 from study.artifact.reads import Every, ProjectFile, Setting, TableOf
 from study.figures.kit.declaration import declarations
 from study.paper.build import NUMBERS, Facts, fact_tables, paper, paper_inputs
-from study.paper.source import DOCUMENTS, documents
+from study.paper.source import DOCUMENTS, FIGURE, documents
+from study.paper.textables import tex_rows
 from study.tables import declared
 from study.tables.claims.rules import Added, load_claims
 
@@ -107,7 +108,6 @@ def write_verified(found: Mapping[str, str], folder: Path) -> None:
 
 
 FOLDER = Path("src/study/article")
-CLAIMS = "config/claims.yaml"
 ASSETS = {
     "text": "article.html",
     "plain": "plain.html",
@@ -119,7 +119,6 @@ ASSETS = {
 PAGES = dict(zip(DOCUMENTS, (INDEX, "supplement.html"), strict=True))
 TITLES = dict(zip(DOCUMENTS, ("Paper", "Supplement"), strict=True))
 LINKS = {"tables.html": "Tables", "claims.html": "Claims", "live.html": "A model, running"}
-_FIGURE = re.compile(r"\\figureof\{(\w+)\}")
 _PREFIX = re.compile(r"\\renewcommand\{?\\thefigure\}?\{([A-Z]+)")
 
 
@@ -157,7 +156,7 @@ def write_article(
     known |= {table["name"]: read_table(table.path) for table in tables}
     templates = {name: path.read_text("utf-8") for name, path in assets.items()}
     texts = documents(source[0].parent)
-    pages = {name: PAGES[stem] for stem, text in texts.items() for name in _FIGURE.findall(text)}
+    pages = {name: PAGES[stem] for stem, text in texts.items() for name in FIGURE.findall(text)}
     rules, plain = load_claims(claims, added), templates["plain"]
     written = {name: templates[name] for name in ("style", "script")}
     for name, content in csv.items():
@@ -166,9 +165,7 @@ def write_article(
     written["claims"] = claims_page(rules, known["claims_tests"], known["claims"], pages, plain)
     drawn = _write_figures(figures, pictures, outputs)
     files = {
-        f"{name}.tex": linked_table(
-            read_text(made[f"{name}.tex"]), {table: known[table] for table in read}
-        )
+        f"{name}.tex": linked_table(tex_rows(name, known), {table: known[table] for table in read})
         for name, read in origins["tables"].items()
     }
     labels: dict[str, tuple[str, str]] = {}
@@ -217,14 +214,12 @@ def _write_figures(
     return made
 
 
-def _writes() -> dict[str, Place]:
-    names = {**PAGES, "tables": "tables.html", "claims": "claims.html"}
-    names |= {"style": "article.css", "script": "article.js"}
-    names |= {f"table_{name}": f"tables/{name}.html" for name in (*declared(), *FACTS)}
-    names |= {f"picture_{name}": f"figures/{name}.webp" for name in declarations()}
-    return {key: ARTICLE.where(name=name) for key, name in names.items()}
-
-
+WRITES = {
+    **PAGES, "tables": "tables.html", "claims": "claims.html", "style": "article.css",
+    "script": "article.js", **{f"table_{name}": f"tables/{name}.html" for name in declared()},
+    **{f"table_{name}": f"tables/{name}.html" for name in FACTS},
+    **{f"picture_{name}": f"figures/{name}.webp" for name in declarations()},
+}  # fmt: skip
 LIMIT = 300.0  # s, for pandoc, which never ends for a definition that expands to itself
 
 
@@ -279,17 +274,17 @@ def _run(words: Sequence[str], folder: str | None, given: str) -> str:
     return done.stdout
 
 
-article = Files(
+article = Artifact(
     "article",
     "The manuscript as a page",
     {
         **paper_inputs.reads,
         **paper.reads,
         "pictures": Every(FIGURE_PICTURE),
-        "claims": ProjectFile(CLAIMS),
+        "claims": ProjectFile("config/claims.yaml"),
         **{name: ProjectFile(str(FOLDER / file)) for name, file in ASSETS.items()},
         "added": Setting("claim_sets"),
     },
-    _writes(),
+    {key: ARTICLE.where(name=name) for key, name in WRITES.items()},
     write_article,
 )

@@ -13,28 +13,30 @@ import pandas as pd
 from pdrom.view.text import escape
 from study.paper.build import Facts
 from study.paper.macros import NOTED, SHOWN, closing, matching, note, sentences
+from study.paper.source import COMMENT, FIGURE
+from study.paper.textables import Rows, tabular
 
 ORIGIN = "origin:"
-_COMMENT = re.compile(r"(?m)^[ \t]*%.*\n|(?<!\\)%.*$")
 _VAL = re.compile(r"\\val\{([^{}]*)\}")
 _MATH = re.compile(r"(?<!\\)\$((?:[^$\\]|\\.)*)\$", re.DOTALL)
 _ENSURED = re.compile(r"\\ensuremath\{((?:[^{}]|\{[^{}]*\})*)\}")
 _CAPTION = re.compile(r"\\csname caption@(\w+)\\endcsname")
-_FIGURE = re.compile(r"\\figureof\{(\w+)\}")
 _PART = re.compile(
     r"\\ifpart(?![A-Za-z])(.*?)(?:\\else(?![A-Za-z])(.*?))?\\fi(?![A-Za-z])", re.DOTALL
 )
 _DROPPED = re.compile(
     r"\\(?:tableofcontents|renewcommand\{.*)|(?:\{\\\w+\s*)?\\input\{\w+\.bbl\}\}?"
 )
-_HEAD = re.compile(r"\\endfirsthead.*?\\endhead\n", re.DOTALL)
 _SPEC = re.compile(r"\\(?:begin\{(?:tabular|longtable)\}|multicolumn\{\d+\})(?=\{)")
 _NUMBER = re.compile(
     r"(?:[^A-Za-z]|\\(?:ensuremath|cdot|infty|times|ge|le)(?![A-Za-z])|\b(?:to|of)\b)*\d"
     r"(?:[^A-Za-z]|\bloses\b)*"
 )
 _TAIL = re.compile(r"(\(|, )(\d[\d/, ]*)([)}]?)$")  # last number, as in "holds (20/20)"
-END = r" \\"
+_FIGURE = (
+    r"\\begin{figure}\\includegraphics{\1.pdf}"
+    r"\\caption{\\csname caption@\1\\endcsname}\\label{fig:\1}\\end{figure}"
+)
 # Short definitions of the preamble, which pandoc reads; definitions of layout are replaced.
 _SHORT = re.compile(r"(?m)^\\(?:newcommand\{\\(?!longtableof|tablefile)\w+\}.*\}|newtheorem.*)$")
 REPLACED = r"""
@@ -51,8 +53,8 @@ def prepared(source: str, document: str, origins: Mapping[str, Any], facts: Fact
     """
     preamble, begin, text = source.partition(r"\begin{document}")
     left_out = rf"\emph{{[{note(facts.part, facts.full_study)}]}}"
-    text = _COMMENT.sub("", _decided(text, origins["known"][document], left_out))
-    text = _FIGURE.sub(_figure, text)
+    text = COMMENT.sub("", _decided(text, origins["known"][document], left_out))
+    text = FIGURE.sub(_FIGURE, text)
     text = _CAPTION.sub(lambda found: facts.captions[found[1]], text)
     text = _PART.sub(lambda found: (found[1] if facts.part else found[2]) or "", text)
     full = facts.full_study
@@ -79,20 +81,10 @@ def _decided(source: str, known: Sequence[str], left_out: str) -> str:
     r"""Return ``source`` with its ``\known`` and ``\row`` blocks shown, noted or dropped."""
     pieces, start = [], 0
     for sentence, decision in zip(sentences(source), known, strict=True):
-        opening = (r"\row{" if sentence.is_row else r"\known{") + sentence.text + "}"
-        place = source.index(opening, start)
         shown = {SHOWN: sentence.text, NOTED: left_out}.get(decision, "")
-        pieces += [source[start:place], shown]
-        start = place + len(opening)
+        pieces += [source[start : sentence.start], shown]
+        start = sentence.end
     return "".join([*pieces, source[start:]])
-
-
-def _figure(found: re.Match[str]) -> str:
-    name = found[1]
-    return (
-        rf"\begin{{figure}}\includegraphics{{{name}.pdf}}"
-        rf"\caption{{\csname caption@{name}\endcsname}}\label{{fig:{name}}}\end{{figure}}"
-    )
 
 
 def _apart(found: re.Match[str]) -> str:
@@ -108,26 +100,20 @@ def _link(key: str, text: str) -> str:
     return rf"\href{{{ORIGIN}{key.encode().hex()}}}{{{shown}}}"
 
 
-def linked_table(text: str, tables: Mapping[str, pd.DataFrame]) -> str:
-    """Return the TeX table ``text`` with its numbers as links to rows of the study's tables.
+def linked_table(table: Rows, tables: Mapping[str, pd.DataFrame]) -> str:
+    """Return the TeX ``table`` with its numbers as links to rows of the study's tables.
 
     The links lead to the one of ``tables`` with most columns in common. If both have equally many
     rows, these correspond in order. Otherwise a link selects rows with equal cells in the common
     columns, as far as such rows exist (the cell may be a rounded number, a sum or a title).
     """
-    text = _HEAD.sub("", text).replace("\\captionrow\n", "").replace("longtable", "tabular")
-    lines = text.split("\n")
-    split = [line.removesuffix(END).split(" & ") if line.endswith(END) else [] for line in lines]
-    first = next(place for place, cells in enumerate(split) if cells)
-    header = split[first]
-    body = [n for n, cells in enumerate(split) if n > first and len(cells) == len(header)]
+    (columns, header), *body = table
     origin = max(tables, key=lambda name: len({*header} & {*tables[name]}))
-    one_to_one = len(body) == len(tables[origin])
-    for row, line in enumerate(body, 1):
-        own = [f"row={row}"] if one_to_one else _agreeing(tables[origin], header, split[line])
-        key = "|".join([origin, *own])
-        lines[line] = " & ".join(_linked_cell(cell, key) for cell in split[line]) + END
-    return plain_columns(_ENSURED.sub(r"$\1$", "\n".join(lines)))
+    one_to_one, rows = len(body) == len(tables[origin]), []
+    for row, cells in enumerate(body, 1):
+        own = [f"row={row}"] if one_to_one else _agreeing(tables[origin], header, cells)
+        rows.append([_linked_cell(cell, "|".join([origin, *own])) for cell in cells])
+    return plain_columns(_ENSURED.sub(r"$\1$", tabular(header, rows, columns)))
 
 
 def _agreeing(table: pd.DataFrame, header: Sequence[str], cells: Sequence[str]) -> list[str]:

@@ -13,9 +13,8 @@ from study.figures.kit.declaration import declarations
 from study.tables import declared
 from study.tables.claims.metrics import METRICS
 from study.tables.claims.rules import ClaimRule, TestRule
-from study.tables.kit.declaration import QUANTITIES
+from study.tables.kit.declaration import QUANTITIES, TOLERANCES
 
-NOT_JUDGED = ("timed", "skipped")
 FACTS = {
     "study": "Settings of the study that its text states",
     "methods": "Methods of the configuration",
@@ -31,7 +30,7 @@ def table_page(name: str, csv: bytes, template: str) -> str:
         f"<tr data-column='{c.name}'><th scope=row>{c.name}</th>"
         f"<td>{escape(c.meaning)}</td><td>{escape(c.unit)}</td>"
         f"<td>{c.quantity}: {escape(QUANTITIES[c.quantity])}</td>"
-        f"<td>{'not judged' if c.quantity in NOT_JUDGED else f'{c.within:g}'}</td></tr>"
+        f"<td>{f'{c.within:g}' if c.quantity in TOLERANCES else 'not judged'}</td></tr>"
         for c in (table.columns if table else ())
     )
     packed = gzip.compress(csv, 9, mtime=0)

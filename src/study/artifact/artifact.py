@@ -19,13 +19,13 @@ from dataclasses import dataclass
 from functools import cache, cached_property
 from importlib import import_module
 from pathlib import Path
-from typing import Any, TypeVar, get_type_hints
+from typing import Any, ClassVar, TypeVar, get_type_hints
 
 from pydantic import BaseModel, TypeAdapter
 
 from pdrom.core.provenance import made_by
 from study.artifact.paths import Place
-from study.artifact.reads import FileRead, Labels, One, Paths, Read, SettingRead, Sources
+from study.artifact.reads import FileRead, Labels, Paths, Read, SettingRead, Sources
 
 A = TypeVar("A", bound="Artifact")
 
@@ -33,6 +33,9 @@ A = TypeVar("A", bound="Artifact")
 @dataclass(frozen=True)
 class Artifact:
     """A function that makes files of the study, with what it reads and writes.
+
+    A function with the parameter ``outputs`` gets all output paths in it, by name, as for many
+    files or files in configurable folders, and writes the files itself.
 
     name : name of the function
     title : message of a run when the job starts, with labels in braces
@@ -47,11 +50,12 @@ class Artifact:
     writes: Mapping[str, Place]
     function: Callable[..., Any]
     alone: bool = False
+    rule_pattern: ClassVar[str] = "{}"
 
     @property
     def rule(self) -> str:
         """Name of the workflow rule that makes the artifact."""
-        return self.name
+        return self.rule_pattern.format(self.name)
 
     @property
     def module(self) -> str:
@@ -69,9 +73,10 @@ class Artifact:
         return list(dict.fromkeys(name for place in self.writes.values() for name in place.labels))
 
     @property
-    def files(self) -> dict[str, FileRead]:
+    def files(self) -> dict[str, FileRead | Place]:
         """Reads that are files, by parameter name."""
-        return {name: read for name, read in self.reads.items() if isinstance(read, FileRead)}
+        reads = self.reads.items()
+        return {name: read for name, read in reads if not isinstance(read, SettingRead)}
 
     @cached_property
     def types(self) -> dict[str, TypeAdapter[Any]]:
@@ -90,12 +95,9 @@ class Artifact:
 
     def settings(self, sources: Sources, labels: Labels) -> dict[str, Any]:
         """Typed settings of a job by parameter name; ConfigurationError if a key is unknown."""
-        found: dict[str, Any] = {}
-        for name, read in self.reads.items():
-            if isinstance(read, SettingRead):
-                value = read.value(sources, labels)
-                found[name] = self.types[name].validate_python(value)
-        return found
+        reads = [(name, read) for name, read in self.reads.items() if isinstance(read, SettingRead)]
+        values = {name: read.value(sources, labels) for name, read in reads}
+        return {name: self.types[name].validate_python(value) for name, value in values.items()}
 
     def plain(self, settings: Mapping[str, Any]) -> dict[str, Any]:
         """Return typed ``settings`` as plain data, reduced to the fields of the annotated types."""
@@ -112,7 +114,8 @@ class Artifact:
             A setting does not have the type of the function's annotation.
         """
         made = {name: place.file(str(outputs[name])) for name, place in self.writes.items()}
-        self.function(**self.read(settings, inputs), **made)
+        whole = "outputs" in inspect.signature(self.function).parameters
+        self.function(**self.read(settings, inputs), **({"outputs": outputs} if whole else made))
 
     def read(self, settings: Mapping[str, Any], inputs: Mapping[str, Any]) -> dict[str, Any]:
         """Return the function's arguments: content of the files ``inputs``, typed ``settings``."""
@@ -120,39 +123,17 @@ class Artifact:
         return content | {k: t.validate_python(settings[k]) for k, t in self.types.items()}
 
 
-class Files(Artifact):
-    """An artifact whose function receives all output paths in one argument ``outputs``, by name.
-
-    The function writes the files itself, as for many files or files in configurable folders.
-    """
-
-    def perform(
-        self, settings: Mapping[str, Any], inputs: Mapping[str, Any], outputs: Mapping[str, str]
-    ) -> None:
-        """Run a job: call the function with all ``outputs``, paths by name."""
-        self.function(**self.read(settings, inputs), outputs=outputs)
-
-
-def make(
-    address: str,
-    rule: str,
-    *,
-    settings: Mapping[str, Any],
-    labels: Labels,
-    code: str,
-    inputs: Mapping[str, Any],
-    outputs: Mapping[str, str],
-) -> None:
+def make(address: str, rule: str, code: str, labels: Labels, **job: Mapping[str, Any]) -> None:
     """Run a job of the artifact at ``address``; its outputs record rule, settings and code.
 
     Parameters
     ----------
-    code : fingerprint of the code that the job runs
-    inputs, outputs : paths by name
     rule : name of the workflow's rule
+    code : fingerprint of the code that the job runs
+    job : plain ``settings``, and paths ``inputs`` and ``outputs``, by parameter name
     """
-    with made_by(rule, {**settings, "labels": dict(labels)}, code):
-        load(address).perform(settings, inputs, outputs)
+    with made_by(rule, {**job["settings"], "labels": dict(labels)}, code):
+        load(address).perform(**job)
 
 
 def declare(made: A, *parameters: str) -> A:
@@ -162,11 +143,6 @@ def declare(made: A, *parameters: str) -> A:
     except TypeError as error:
         raise TypeError(f"{made.rule}: {error}") from error
     return made
-
-
-def normal(reads: Mapping[str, Read | Place]) -> dict[str, Read]:
-    """Return ``reads`` with every bare `Place` replaced by ``One(place)``, the job's own file."""
-    return {k: One(read) if isinstance(read, Place) else read for k, read in reads.items()}
 
 
 def load(address: str) -> Artifact:
@@ -200,9 +176,6 @@ def modules_in(value: Any) -> Iterator[str]:
         yield from getattr(value, "modules", ())
         for name in type(value).model_fields:
             yield from modules_in(getattr(value, name))
-    elif isinstance(value, Mapping):
-        for entry in value.values():
-            yield from modules_in(entry)
-    elif isinstance(value, (list, tuple)):
-        for entry in value:
+    elif isinstance(value, (Mapping, list, tuple)):
+        for entry in value.values() if isinstance(value, Mapping) else value:
             yield from modules_in(entry)

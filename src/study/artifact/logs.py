@@ -1,13 +1,20 @@
-"""Log file of a job, and the message that the user sees when the job fails."""
+"""Log file of a job, its time and memory, and the message that the user sees when the job fails.
+
+Time and memory are measured in the job's own process and are the last line of its log: Snakemake's
+``benchmark:`` samples only every 30 s, which is longer than most jobs take.
+"""
 
 import errno
 import faulthandler
 import logging
+import re
+import resource
 import sys
 import time
 import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from io import TextIOWrapper
 from pathlib import Path
 
@@ -15,9 +22,14 @@ from threadpoolctl import threadpool_limits
 
 from pdrom.core.errors import INTERRUPTED, PdromError
 from pdrom.core.store.checksum import damaged_set_aside
-from study.artifact.usage import usage_since
 
 PACKAGES = ("pdrom", "study")
+MB = 1e6
+_PEAK = 1.0 if sys.platform == "darwin" else 1024.0  # bytes per unit of ru_maxrss
+_WORDS = re.compile(
+    r"used (?P<wall>[0-9.]+) s, (?P<processor>[0-9.]+) s of processor time, "
+    r"(?P<memory>[0-9.]+) MB of memory$"
+)
 FORMAT = "%(asctime)s %(levelname)-7s %(name)s: %(message)s"
 
 
@@ -106,3 +118,49 @@ def _fault(error: Exception) -> str:
     if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
         return f"no space left on the disk ({error})"
     return f"{type(error).__name__}: {error}"
+
+
+@dataclass(frozen=True)
+class Usage:
+    """Time and memory of a job.
+
+    wall : seconds from its start to its end
+    processor : user and system seconds of the job and of the processes that it started
+    memory : largest resident memory, MB, of the job or of one process that it started; memory of
+        libraries that jobs share is included for each job
+    """
+
+    wall: float
+    processor: float
+    memory: float
+
+    def __str__(self) -> str:
+        return (
+            f"used {self.wall:.3f} s, {self.processor:.3f} s of processor time, "
+            f"{self.memory:.1f} MB of memory"
+        )
+
+
+def usage_since(start: float) -> Usage:
+    """Usage since ``start``, s of the monotonic clock; processor time and memory of the process.
+
+    Processor time starts at zero in a forked job.
+    """
+    used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return Usage(
+        wall=time.monotonic() - start,
+        processor=sum(one.ru_utime + one.ru_stime for one in used),
+        memory=max(one.ru_maxrss for one in used) * _PEAK / MB,
+    )
+
+
+def usage_of(log: str | Path) -> Usage | None:
+    """Read the usage from the log of a job; None without a log or if the job failed."""
+    try:
+        lines = Path(log).read_text(encoding="utf-8", errors="replace").splitlines()
+    except FileNotFoundError:
+        return None
+    found = _WORDS.search(lines[-1]) if lines else None
+    if found is None:
+        return None
+    return Usage(**{name: float(value) for name, value in found.groupdict().items()})

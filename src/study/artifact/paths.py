@@ -5,11 +5,11 @@ labels. The pipeline chooses the results folder itself, one for each configurati
 """
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
-from string import Formatter
+from typing import Any
 
 from pdrom.core.errors import StorageError
 
@@ -26,6 +26,7 @@ LABELS = {
     "factor": r"[0-9.]+",
     "name": r"[A-Za-z0-9_.]+",
 }
+_LABEL = re.compile(r"\{(\w+)\}")
 
 
 @dataclass(frozen=True)
@@ -38,10 +39,6 @@ class Place:
         """Path of the file with these labels in the folder ``results``."""
         return f"{results}/{self.pattern.format(**labels)}"
 
-    def rule(self, results: str) -> str:
-        """Path pattern in ``results`` with labels in braces, as a Snakemake rule needs it."""
-        return f"{results}/{self.pattern}"
-
     def where(self, **labels: str) -> "Place":
         """Return the kind of file with some labels fixed to values."""
         pattern = self.pattern
@@ -52,7 +49,7 @@ class Place:
     @property
     def labels(self) -> list[str]:
         """Names of the labels in the pattern."""
-        return [label for _, label, _, _ in Formatter().parse(self.pattern) if label is not None]
+        return _LABEL.findall(self.pattern)
 
     def file(self, path: str) -> "File":
         """Return ``path`` as a `File` with its labels; StorageError if it is not of this kind."""
@@ -65,14 +62,20 @@ class Place:
         """Return the `File` of each path in ``paths``, in order."""
         return [self.file(path) for path in paths]
 
+    def paths(self, sources: Any, labels: Mapping[str, str]) -> str:
+        """Return the path that `study.artifact.reads.Sources` have for a job with ``labels``."""
+        return str(sources.file(self, labels))
+
+    def content(self, paths: Any) -> "File":
+        """Return the argument of an artifact's function that reads its own file of this kind."""
+        return self.file(str(paths))
+
     @cached_property
     def _expression(self) -> re.Pattern[str]:
-        parts = []
-        for text, label, _, _ in Formatter().parse(self.pattern):
-            parts.append(re.escape(text))
-            if label is not None:
-                parts.append(f"(?P<{label}>{LABELS[label]})")
-        return re.compile(rf"(?:^|/){''.join(parts)}$")
+        texts = _LABEL.split(self.pattern)  # every other one is a label
+        texts[::2] = map(re.escape, texts[::2])
+        texts[1::2] = [f"(?P<{label}>{LABELS[label]})" for label in texts[1::2]]
+        return re.compile(rf"(?:^|/){''.join(texts)}$")
 
 
 @dataclass(frozen=True)

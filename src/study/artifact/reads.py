@@ -7,33 +7,15 @@ pipeline finds paths and values (`Sources`); the artifact's function gets the co
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from pdrom.core.store import read_table
 from study.artifact.paths import Place
 
 Labels = Mapping[str, str]
 Paths = str | list[str]
-
-
-class Sources(Protocol):
-    """Interface by which reads find the paths and settings of a study for a job's labels."""
-
-    def file(self, place: Place, labels: Labels) -> str:
-        """Return the path of the file of kind ``place`` of a job with these ``labels``."""
-        ...
-
-    def files(self, place: Place, labels: Labels) -> list[str]:
-        """Return all paths of the kind ``place`` whose labels agree with ``labels`` of a job."""
-        ...
-
-    def table(self, name: str) -> str:
-        """Return the path of the table ``name``."""
-        ...
-
-    def value(self, key: str, labels: Labels) -> Any:
-        """Return the configuration value of ``key``, or a value derived from ``labels``."""
-        ...
+# Finds the paths and settings of a study for a job's labels: `study.pipeline.resolve.Resolver`.
+Sources = Any
 
 
 class FileRead:
@@ -56,20 +38,7 @@ class SettingRead:
         raise NotImplementedError
 
 
-Read = FileRead | SettingRead
-
-
-@dataclass(frozen=True)
-class One(FileRead):
-    """The file of the kind ``place`` with the job's labels; a bare `Place` declares it, too."""
-
-    place: Place
-
-    def paths(self, sources: Sources, labels: Labels) -> Paths:
-        return sources.file(self.place, labels)
-
-    def content(self, paths: Any) -> Any:
-        return self.place.file(str(paths))
+Read = FileRead | SettingRead | Place  # a `Place` is the job's own file of its kind
 
 
 @dataclass(frozen=True)
@@ -113,7 +82,7 @@ class EditedFiles(FileRead):
     """Base class of reads of hand-edited files; jobs rerun for new content, not for new dates."""
 
     def content(self, paths: Any) -> Any:
-        return [Path(path) for path in paths]
+        return Path(paths) if isinstance(paths, str) else [Path(path) for path in paths]
 
 
 @dataclass(frozen=True)
@@ -124,9 +93,6 @@ class ProjectFile(EditedFiles):
 
     def paths(self, sources: Sources, labels: Labels) -> Paths:
         return self.path
-
-    def content(self, paths: Any) -> Any:
-        return Path(paths)
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from pathlib import Path
 from pdrom.core.errors import StorageError
 from pdrom.core.store import read_text, write_text
 from pdrom.view.page import filled, safe_json
-from study.artifact.artifact import Files, declare
+from study.artifact.artifact import Artifact
 from study.artifact.paths import LIVE_MODEL, LIVE_PAGE, File
 from study.artifact.reads import Every, ProjectFile
 
@@ -46,21 +46,18 @@ def _asset(name: str, folder: str = "study/live") -> ProjectFile:
     return ProjectFile(f"src/{folder}/{name}")
 
 
-live_page = declare(
-    Files(
-        "live_page",
-        "Page on which models run",
-        {
-            "models": Every(LIVE_MODEL),
-            "html": _asset("live.html"),
-            "style": _asset("live.css"),
-            "packed": _asset("packed.js", "pdrom/view"),
-            "engine": _asset("engine.js"),
-            "drawing": _asset("drawing.js", "pdrom/view"),
-            "script": _asset("live.js"),
-        },
-        {"out": LIVE_PAGE},
-        _write,
-    ),
-    "outputs",
+live_page = Artifact(
+    "live_page",
+    "Page on which models run",
+    {
+        "models": Every(LIVE_MODEL),
+        "html": _asset("live.html"),
+        "style": _asset("live.css"),
+        "packed": _asset("packed.js", "pdrom/view"),
+        "engine": _asset("engine.js"),
+        "drawing": _asset("drawing.js", "pdrom/view"),
+        "script": _asset("live.js"),
+    },
+    {"out": LIVE_PAGE},
+    _write,
 )

@@ -3,7 +3,6 @@
 import json
 import re
 from collections.abc import Mapping
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -20,9 +19,9 @@ from pdrom.core.machine import Machine
 from pdrom.core.store import read_table, read_text, require_intact, write_text
 from pdrom.core.yamlfile import describe
 from pdrom.view.text import replaced
-from study.artifact.artifact import Files
+from study.artifact.artifact import Artifact
 from study.artifact.paths import FIGURE, MACHINE, PAPER_INPUT, TABLE, File
-from study.artifact.reads import Every, One, ProjectFile, Setting, SourcesOf
+from study.artifact.reads import Every, ProjectFile, Setting, SourcesOf
 from study.paper.macros import captions, decisions, keys_of, macros, number_of, provenance
 from study.paper.source import DOCUMENTS, documents
 from study.paper.tex import build_pdfs
@@ -78,7 +77,7 @@ def write_inputs(
         written[document] = bibliography(text, references)
     origins = {
         "known": decided,
-        "numbers": {key: asdict(number_of(key, data)) for key in keys_of(whole)},
+        "numbers": {key: number_of(key, data)._asdict() for key in keys_of(whole)},
         "tables": {name: reads(name) for name in TEX_TABLES},
     }
     written[Path(NUMBERS).stem] = json.dumps(origins, indent=1, allow_nan=False) + "\n"
@@ -129,12 +128,6 @@ def build(
 _CITE = re.compile(r"\\cite\{([^}]*)\}")
 
 
-def cited_keys(source: str) -> list[str]:
-    """Return the keys that a TeX source cites, in order of first citation."""
-    keys = [key.strip() for group in _CITE.findall(source) for key in group.split(",")]
-    return list(dict.fromkeys(keys))
-
-
 def bibliography(source: str, references: Path) -> str:
     """Return the TeX bibliography of the entries that ``source`` cites, in order of citation.
 
@@ -143,7 +136,8 @@ def bibliography(source: str, references: Path) -> str:
     PaperError
         A cited key is not in ``references`` or lacks a field, or the file is not BibTeX.
     """
-    keys = cited_keys(source)
+    cited = [key.strip() for group in _CITE.findall(source) for key in group.split(",")]
+    keys = list(dict.fromkeys(cited))
     set_strict_mode(False)
     try:
         entries = parse_file(str(references)).entries
@@ -167,21 +161,21 @@ FILES = (
     NUMBERS, "macros.tex", "figures.tex", *(f"{document}.bbl" for document in DOCUMENTS),
     *(f"{name}.tex" for name in TEX_TABLES),
 )  # fmt: skip
-paper_inputs = Files(
+paper_inputs = Artifact(
     "paper_inputs",
     "Numbers, tables and references of the manuscript",
     {
         "source": SourcesOf("manuscript"),
         "references": ProjectFile(REFERENCES),
         "tables": Every(TABLE),
-        "machine": One(MACHINE),
+        "machine": MACHINE,
         "facts": Setting("facts"),
     },
     {Path(name).stem: PAPER_INPUT.where(name=name) for name in FILES},
     write_inputs,
 )
 # the output paths depend on the configuration, see `study.pipeline.folders`
-paper = Files(
+paper = Artifact(
     "paper",
     "Manuscript",
     {

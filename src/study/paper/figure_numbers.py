@@ -1,21 +1,18 @@
 """Numbers of the figures in paper, supplement and preprint, and a page that lists all figures."""
 
 import re
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from study.artifact.markup import to_plain
 from study.artifact.reads import Every, ProjectFile, Read, TableOf
 from study.figures.kit.declaration import declarations
-from study.paper.source import documents
+from study.paper.source import COMMENT, FIGURE, documents
 
 SUPPLEMENT = "S"  # prefix of the figure numbers in the supplement
-_COMMENT = re.compile(r"(?<!\\)%.*")
-_PLACED = re.compile(r"\\figureof\{(\w+)\}")
 
 
-@dataclass(frozen=True)
-class Numbers:
+class Numbers(NamedTuple):
     """Numbers of a figure: manuscript, "3" for the paper or "S7" for its supplement, and preprint.
 
     A number is None if the document does not contain the figure.
@@ -47,7 +44,7 @@ def figure_numbers(root: Path) -> dict[str, Numbers]:
     """
     counted: dict[str, str] = {}
     for prefix, source in zip(("", SUPPLEMENT), documents(root / "paper").values(), strict=True):
-        placed = _PLACED.findall(_COMMENT.sub("", source))
+        placed = FIGURE.findall(COMMENT.sub("", source))
         counted |= {name: f"{prefix}{number}" for number, name in enumerate(placed, 1)}
     return {name: Numbers(counted.get(name), f.number) for name, f in declarations().items()}
 
@@ -68,12 +65,11 @@ def figures_page(root: Path = Path()) -> str:
     parts = [HEAD]
     numbers = figure_numbers(root)
     for name, figure in declarations().items():
-        number = f" ({numbers[name].words})" if numbers[name].words else ""
         keys = ", ".join(f"`{key}`" for key in figure.options.model_fields)
         read = filter(None, map(_words, figure.reads.values()))
         caption = re.sub(r"\. (?=[A-Z`])", ".\n", _text(figure.caption))  # one line per sentence
         parts.append(
-            f"## `{name}`{number}\n\n**{_text(figure.title)}.**\n{caption}\n\n"
+            f"## {numbers[name].label(f'`{name}`')}\n\n**{_text(figure.title)}.**\n{caption}\n\n"
             f"Keys: {keys}.\nReads: {', '.join(dict.fromkeys(read))}.\n"
         )
     return "\n".join(parts)

@@ -16,8 +16,7 @@ replaces the first such sentence of each paragraph.
 
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -60,15 +59,16 @@ def macros(source: str, tables: Mapping[str, pd.DataFrame]) -> str:
         r"\newcommand{\val}[1]{\@ifundefined{val@#1}{\errmessage{no value for #1}}"
         r"{\csname val@#1\endcsname}}",
     ]
-    for key in keys_of(source):
-        text = number_of(key, tables).text
-        lines.append(rf"\expandafter\def\csname val@{key}\endcsname{{{text}}}")
-    lines.append(r"\makeatother")
-    return "\n".join(lines) + "\n"
+    return _defined(lines, "val", {key: number_of(key, tables).text for key in keys_of(source)})
 
 
-@dataclass(frozen=True)
-class Number:
+def _defined(lines: Sequence[str], kind: str, texts: Mapping[str, str]) -> str:
+    """TeX ``lines`` with a macro ``kind@NAME`` for each of ``texts``, and the end of the block."""
+    made = [rf"\expandafter\def\csname {kind}@{k}\endcsname{{{text}}}" for k, text in texts.items()]
+    return "\n".join([*lines, *made, r"\makeatother"]) + "\n"
+
+
+class Number(NamedTuple):
     """A number in the manuscript's text, and its origin.
 
     text : the number as TeX
@@ -188,13 +188,14 @@ _BLANK_LINE = re.compile(r"\n[ \t]*\n")
 SHOWN, NOTED, DROPPED = "shown", "noted", "dropped"
 
 
-@dataclass(frozen=True)
-class Sentence:
-    """A block: its text, the number of its paragraph, and whether it is a table row."""
+class Sentence(NamedTuple):
+    """A block: its text, the number of its paragraph, if it is a table row, and where it lies."""
 
     text: str
     paragraph: int
     is_row: bool
+    start: int
+    end: int
 
 
 def sentences(source: str) -> list[Sentence]:
@@ -213,7 +214,7 @@ def sentences(source: str) -> list[Sentence]:
         if _OPENING.search(text):
             raise PaperError(f"{opening[0]}{text[:40]} ...: holds another one")
         paragraph = len(_BLANK_LINE.findall(source[: opening.start()]))
-        found.append(Sentence(text, paragraph, is_row=opening[1] == "row"))
+        found.append(Sentence(text, paragraph, opening[1] == "row", opening.start(), end + 1))
         opening = _OPENING.search(source, end)
     return found
 
@@ -281,9 +282,5 @@ def closing(source: str, start: int) -> int:
 
 def captions(texts: Mapping[str, str]) -> str:
     r"""Return TeX macros ``caption@NAME`` with the captions of all figures, given as TeX."""
-    lines = ["% generated from the declarations of the figures", r"\makeatletter"]
-    lines += [
-        rf"\expandafter\def\csname caption@{name}\endcsname{{{text}}}"
-        for name, text in texts.items()
-    ]
-    return "\n".join([*lines, r"\makeatother"]) + "\n"
+    first = ["% generated from the declarations of the figures", r"\makeatletter"]
+    return _defined(first, "caption", texts)

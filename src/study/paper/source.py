@@ -7,6 +7,8 @@ from pdrom.core.errors import PaperError
 
 DOCUMENTS = ("main", "supplement")
 OWN = "paper/own"
+FIGURE = re.compile(r"\\figureof\{(\w+)\}")
+COMMENT = re.compile(r"(?m)^[ \t]*%.*\n|(?<!\\)%.*$")
 _PART = re.compile(r"\\input\{((?:sections/|supplement/|preamble)[^{}]*\.tex)\}")
 
 
@@ -29,13 +31,7 @@ def whole_source(document: Path) -> str:
 
 
 def documents(folder: Path) -> dict[str, str]:
-    """Whole source of each document of the manuscript in ``folder``, by its name.
-
-    Raises
-    ------
-    PaperError
-        An included file is missing.
-    """
+    """Whole source of each document of the manuscript in ``folder``, by name; errors as for one."""
     return {name: whole_source(folder / f"{name}.tex") for name in DOCUMENTS}
 
 

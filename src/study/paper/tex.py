@@ -4,14 +4,12 @@ import logging
 import os
 import re
 import shutil
-import stat
 import subprocess
 import sys
 import tempfile
 from collections.abc import Mapping
 from importlib.util import find_spec
 from pathlib import Path
-from types import MappingProxyType
 
 from pdrom.core.errors import PaperError
 from pdrom.core.store import atomic_path
@@ -57,7 +55,7 @@ def find_pdflatex(packages: list[str], scratch: Path) -> Path:
     copy = scratch / "tinytex" / "bin" / platform / "pdflatex"
     copy.parent.mkdir(parents=True, exist_ok=True)
     shutil.copyfile(binary.resolve(), copy)
-    copy.chmod(copy.stat().st_mode | stat.S_IXUSR)
+    copy.chmod(0o755)
     # pdflatex finds its files relative to its own path
     for name in ("texmf-dist", "texmf-var"):
         link = scratch / "tinytex" / name
@@ -69,7 +67,7 @@ def find_pdflatex(packages: list[str], scratch: Path) -> Path:
 def build_pdfs(
     documents: Mapping[Path, Path],
     search: list[Path],
-    most: Mapping[str, int] = MappingProxyType({}),
+    most: Mapping[str, int] | None = None,
 ) -> None:
     """Compile TeX sources until their references, also to each other, are stable; write the PDFs.
 
@@ -109,7 +107,7 @@ def build_pdfs(
                 break
             previous = current
         for source in sources:
-            _check_log(job / f"{source.stem}.log", source, most.get(source.stem))
+            _check_log(job / f"{source.stem}.log", source, (most or {}).get(source.stem))
         for source, output in documents.items():
             with atomic_path(output) as temporary:
                 shutil.copyfile(job / f"{source.stem}.pdf", temporary)

@@ -1,7 +1,7 @@
 """TeX tables of the manuscript; each function's parameters name the study's tables it reads."""
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from inspect import signature
 from typing import Any
 
@@ -17,6 +17,9 @@ from study.tables.kit.results import MEDIAN, in_words, over_motions, trained
 
 NONE = "--"
 LEFT = r">{\raggedright\arraybackslash}"
+# Column definitions with the header of a table, then its rows; all cells are TeX.
+Rows = Iterator[Any]
+LONG = ("tab_scenes", "tab_ranks", "tab_local_share")  # tables that may break across pages
 FULL = "full"  # name in the tables for positions without a reduced basis
 
 
@@ -78,10 +81,11 @@ _SHOWN = {"C11": "reruns", "C12": "positions"}
 _SIGNS = {">=": r"$\ge$", "<=": r"$\le$"}
 
 
-def claims(claims_tests: pd.DataFrame, claims: pd.DataFrame) -> str:
+def claims(claims_tests: pd.DataFrame, claims: pd.DataFrame) -> Rows:
     """Both verdicts on each claim, with the number of rows that satisfy each deciding test."""
     tests = claims_tests[claims_tests.decides.astype(bool)]
-    rows = []
+    columns = rf"l{LEFT}p{{4.7cm}}{LEFT}p{{3.2cm}}{LEFT}p{{4.1cm}}l"
+    yield columns, ["claim", "the preprint says", "as published", "beyond", "shown in"]
     for row in claims.itertuples():
         cells = []
         for part, verdict in zip(_PARTS, (row.verdict, row.verdict_beyond), strict=True):
@@ -94,50 +98,45 @@ def claims(claims_tests: pd.DataFrame, claims: pd.DataFrame) -> str:
             place = rf"table~\ref{{tab:{_SHOWN[row.claim]}}}"
         else:
             place = rf"figure~\ref{{fig:{shown}}}" if shown in declarations() else _name(shown)
-        rows.append([row.claim, escape(row.paper), *cells, place])
-    header = ["claim", "the preprint says", "as published", "beyond", "shown in"]
-    return tabular(header, rows, rf"l{LEFT}p{{4.7cm}}{LEFT}p{{3.2cm}}{LEFT}p{{4.1cm}}l")
+        yield [row.claim, escape(row.paper), *cells, place]
 
 
-def claims_in_full(claims_tests: pd.DataFrame) -> str:
+def claims_in_full(claims_tests: pd.DataFrame) -> Rows:
     """Tests that decide a verdict: limit, number of rows that satisfy it, range of the values."""
     tests = claims_tests[claims_tests.decides.astype(bool)]
-    rows = []
+    yield "llrrrrr", ["", "test", "limit", "rows", "least", "median", "most"]
     for (claim, part), found in tests.groupby(["claim", "part"], sort=False):
         for place, test in enumerate(found.itertuples()):
             limit = f"{_SIGNS[test.compare]} {format_number(test.threshold)}"
             opening = ["" if place else f"{claim} {_PARTS[part]}", escape(test.what), limit]
             spread = map(_known, (test.least, test.median, test.most))
-            rows.append([*opening, f"{test.satisfied} of {test.of}", *spread])
-    header = ["", "test", "limit", "rows", "least", "median", "most"]
-    return tabular(header, rows, "llrrrrr")
+            yield [*opening, f"{test.satisfied} of {test.of}", *spread]
 
 
 # Columns of the table of iterations: method and number of local-global iterations K.
 _RUNS = (("fom", 1), ("fom", 5), ("fom", 10), ("fom", 40), ("fom-anderson", 10))
 
 
-def iterations(accuracy_cost: pd.DataFrame) -> str:
+def iterations(accuracy_cost: pd.DataFrame) -> Rows:
     """Full-order runs: error against the converged run, and time per frame."""
 
     def text(run: pd.Series) -> str:
         error, time = map(format_number, (run.relative_error_within_horizon, run.ms_per_frame))
         return f"{error} ({time})"
 
-    rows = []
-    for scene, part in accuracy_cost.groupby("scene", sort=False):
-        runs = [_rows(part, method=method, iterations=count) for method, count in _RUNS]
-        rows.append([_name(scene), *(_cell(run, text) for run in runs)])
     titles = [
         f"$K = {count}$" + (", accelerated" if method != "fom" else "") for method, count in _RUNS
     ]
-    return tabular(["scene", *titles], rows, "l" + "r" * len(_RUNS))
+    yield "l" + "r" * len(_RUNS), ["scene", *titles]
+    for scene, part in accuracy_cost.groupby("scene", sort=False):
+        runs = [_rows(part, method=method, iterations=count) for method, count in _RUNS]
+        yield [_name(scene), *(_cell(run, text) for run in runs)]
 
 
 _TOLERANCE = "ecsw-1e-02"
 
 
-def positions(reduced_reruns: pd.DataFrame) -> str:
+def positions(reduced_reruns: pd.DataFrame) -> Rows:
     """Errors and speed-ups of runs in position subspaces of the largest dimension k."""
 
     def error(run: pd.Series) -> str:
@@ -159,7 +158,7 @@ def positions(reduced_reruns: pd.DataFrame) -> str:
         "hrpd": ("pod", "hrpd", error),
         "skinning, all": ("skinning", "full", error),
     }
-    rows = []
+    yield "l" + "r" * len(columns), ["scene", *columns]
     for scene in reduced_reruns.scene.unique():
         runs = trained(_rows(reduced_reruns, scene=scene, group="all"))
         runs = runs[runs.k == runs.k.max()]
@@ -168,89 +167,82 @@ def positions(reduced_reruns: pd.DataFrame) -> str:
                 _cell(_rows(runs, position_basis=basis, method=method), text)
                 for basis, method, text in columns.values()
             ]
-            rows.append([_name(scene), *cells])
-    return tabular(["scene", *columns], rows, "l" + "r" * len(columns))
+            yield [_name(scene), *cells]
 
 
 _METHODS = ("deim-joint", "block-deim", "gappy")
 
 
-def break_even(breakeven: pd.DataFrame) -> str:
+def break_even(breakeven: pd.DataFrame) -> Rows:
     """Smallest size r from which a reduced local step takes longer than the full local step."""
 
     def text(part: pd.DataFrame) -> str:
         crossed = part.breakeven_r.dropna()
         return NONE if part.empty else "pays" if crossed.empty else _whole(crossed.max())
 
-    rows = []
     keys = ["scene", "group", "vertices"]
+    yield "llr" + "r" * len(_METHODS), [*keys, *map(escape, _METHODS)]
     for (scene, group, vertices), part in breakeven.groupby(keys, sort=False):
         cells = [text(_rows(part, method=method)) for method in _METHODS]
-        rows.append([_name(scene), _group(group), _whole(vertices), *cells])
-    return tabular([*keys, *map(escape, _METHODS)], rows, "llr" + "r" * len(_METHODS))
+        yield [_name(scene), _group(group), _whole(vertices), *cells]
 
 
-def speedups(speedups: pd.DataFrame) -> str:
+def speedups(speedups: pd.DataFrame) -> Rows:
     """Speed-ups that the text cites, with intervals, errors and costs of training."""
-    rows = []
+    yield "llrlrrrrr", [
+        "scene", "reduction", "full ms", "speed-up", "training", "held out", "run (s)",
+        "reduction (s)", "frames",
+    ]  # fmt: skip
     for row in speedups.itertuples():
         size = f"r = {int(row.r)}" if row.position_basis == FULL else f"k = {int(row.k)}"
         frames = row.frames_to_break_even  # shown with two significant digits
-        rows.append(
-            [
-                _name(row.scene),
-                _name(f"{row.method}, {size}"),
-                _known(row.full_ms),
-                escape(row.shown) + (" (loses)" if row.loses else ""),
-                *map(_known, (row.error_train, row.error_heldout, row.training_s, row.reduction_s)),
-                "never" if pd.isna(frames) else _whole(float(f"{frames:.1e}")),
-            ]
-        )
-    header = ["scene", "reduction", "full ms", "speed-up", "training", "held out", "run (s)",
-              "reduction (s)", "frames"]  # fmt: skip
-    return tabular(header, rows, "llrlrrrrr")
+        yield [
+            _name(row.scene),
+            _name(f"{row.method}, {size}"),
+            _known(row.full_ms),
+            escape(row.shown) + (" (loses)" if row.loses else ""),
+            *map(_known, (row.error_train, row.error_heldout, row.training_s, row.reduction_s)),
+            "never" if pd.isna(frames) else _whole(float(f"{frames:.1e}")),
+        ]
 
 
-def payoff(payoff: pd.DataFrame) -> str:
+def payoff(payoff: pd.DataFrame) -> Rows:
     """Reductions with the numbers of scenes in which each is accurate, pays off, or is slower."""
-    rows = []
+    yield "lrrrrrrrrrrr", [
+        "reduction", "runs in", "accurate in", "pays in", "loses in", "least", "median", "most",
+        "training", "held out (of)", "accurate", "pays",
+    ]  # fmt: skip
     for row in payoff.itertuples():
         basis = "" if row.position_basis == FULL else f", {row.position_basis}"
         errors = _known(row.error_train), f"{_known(row.error_heldout)} ({row.heldout})"
         gains = map(_known, (row.least_speedup, row.best_speedup, row.most_speedup))
         counts = map(str, (row.scenes, row.accurate, row.pays, row.loses))
         unseen = map(str, (row.accurate_heldout, row.pays_heldout))
-        rows.append([_name(f"{row.method}{basis}"), *counts, *gains, *errors, *unseen])
-    header = ["reduction", "runs in", "accurate in", "pays in", "loses in", "least", "median",
-              "most", "training", "held out (of)", "accurate", "pays"]  # fmt: skip
-    return tabular(header, rows, "lrrrrrrrrrrr")
+        yield [_name(f"{row.method}{basis}"), *counts, *gains, *errors, *unseen]
 
 
-def pays(winners: pd.DataFrame) -> str:
+def pays(winners: pd.DataFrame) -> Rows:
     """Mesh sizes from which a reduction is faster than its opponents, per limit of the error."""
-    rows = []
+    header = ["scene", "against", "error", "vertices", "plain", "all", "speed-up", "motions"]
+    yield "lllrrrrr", header
     for _, curve in winners.groupby(CURVE, sort=False):
         row, smallest, largest = curve.iloc[0], curve.vertices.min(), curve.vertices.max()
         stiffness = "" if row.stiffness == 1.0 else rf" $\times {row.stiffness:g}$"
-        rows.append(
-            [
-                _name(row.scene) + stiffness,
-                row.reference,
-                format_number(row.limit),
-                str(smallest) if smallest == largest else f"{smallest} to {largest}",
-                _known(row.from_plain, _whole),
-                _known(row.from_best, _whole),
-                NONE
-                if pd.isna(row.speedup)
-                else in_words(row.speedup, row.speedup_low, row.speedup_high),
-                f"{row.reached} of {row.motions}",
-            ]
-        )
-    header = ["scene", "against", "error", "vertices", "plain", "all", "speed-up", "motions"]
-    return tabular(header, rows, "lllrrrrr")
+        yield [
+            _name(row.scene) + stiffness,
+            row.reference,
+            format_number(row.limit),
+            str(smallest) if smallest == largest else f"{smallest} to {largest}",
+            _known(row.from_plain, _whole),
+            _known(row.from_best, _whole),
+            NONE
+            if pd.isna(row.speedup)
+            else in_words(row.speedup, row.speedup_low, row.speedup_high),
+            f"{row.reached} of {row.motions}",
+        ]
 
 
-def training(alternatives: pd.DataFrame) -> str:
+def training(alternatives: pd.DataFrame) -> Rows:
     """Errors of the accelerated reduction by its number of training motions, nearest motion, time.
 
     The distance of the nearest motion in the subspace and the time of the training are those of the
@@ -259,68 +251,59 @@ def training(alternatives: pd.DataFrame) -> str:
     reduced = alternatives[alternatives.method == ACCELERATED]
     reduced = reduced[reduced.iterations == reduced.iterations.max()]
     played = alternatives[alternatives.method == PLAYBACK].set_index(CASE).error_implicit
-    rows, counts = [], sorted(reduced.training_motions.unique())
+    counts = sorted(reduced.training_motions.unique())
+    header = ["scene", "vertices", "motion", "playback", *map(str, counts)]
+    header += ["nearest: least", "most", "training (s): least", "most"]
+    yield "lrl" + "r" * (5 + len(counts)), header
     for case, own in reduced.groupby(CASE, sort=False):
         own = own[own.k == own.k.max()].set_index("training_motions").sort_index()
         scene, vertices, stiffness, motion = case
         stiff = "" if stiffness == 1.0 else rf" $\times {stiffness:g}$"
-        ends = (own.index[0], own.index[-1])
-        rows.append(
-            [
-                _name(scene) + stiff, str(vertices), motion, _known(played[case]),
-                *map(_known, own.error_implicit.reindex(counts)),
-                *(_known(own.span_error[end]) for end in ends),
-                *(_known(own.offline_s[end], format_number) for end in ends),
-            ]
-        )  # fmt: skip
-    header = ["scene", "vertices", "motion", "playback", *map(str, counts),
-              "nearest: least", "most", "training (s): least", "most"]  # fmt: skip
-    return tabular(header, rows, "lrl" + "r" * (5 + len(counts)))
+        ends = own.iloc[[0, -1]]
+        numbers = [played[case], *own.error_implicit.reindex(counts), *ends.span_error]
+        numbers += [*ends.offline_s]
+        yield [_name(scene) + stiff, str(vertices), motion, *map(_known, numbers)]
 
 
-def scenes(reduced_reruns: pd.DataFrame, scenes: pd.DataFrame) -> str:
+def scenes(reduced_reruns: pd.DataFrame, scenes: pd.DataFrame) -> Rows:
     """Scenes with their constraint groups, sizes and horizons."""
     horizon = trained(reduced_reruns).groupby("scene").horizon_frame.first()
-    rows = []
+    header = ["scene", "groups (weight)", "vertices", "elements", "frames", "horizon"]
+    yield rf"l{LEFT}p{{5.2cm}}rrrr", header
     for row in scenes.itertuples():
         end = horizon.get(row.scene)
         shown = "run" if end == row.frames and not pd.isna(end) else _known(end, _whole)
         # numbers such as 1e+06 are written as powers of ten
         powers = re.sub(r"([\d.]+)e\+?(-?)0*(\d+)", r"$\1\\cdot 10^{\2\3}$", _group(row.groups))
         sizes = map(str, (row.vertices, row.elements, row.frames))
-        rows.append([_name(row.scene), powers.replace(r"$1\cdot 10", "$10"), *sizes, shown])
-    header = ["scene", "groups (weight)", "vertices", "elements", "frames", "horizon"]
-    return longtable(header, rows, rf"l{LEFT}p{{5.2cm}}rrrr")
+        yield [_name(row.scene), powers.replace(r"$1\cdot 10", "$10"), *sizes, shown]
 
 
-def methods(methods: pd.DataFrame) -> str:
+def methods(methods: pd.DataFrame) -> Rows:
     """Parts of each reduction method: centring, rows, selection, number of samples, solver."""
-    rows = []
+    header = ["method", "title", "centring", "rows", "selection", "samples", "solve"]
+    yield rf"l{LEFT}p{{3.3cm}}lllll", header
     for row in methods.itertuples():
         least = "one" if row.oversampling == 1 else row.oversampling
         bound = row.gain_bound
         samples = f"{least} a mode" if pd.isna(bound) else rf"$\gamma \le {bound:g}$"
         chosen = [NONE, NONE] if row.rows == "all" else [row.selection, samples]
         titles = [_name(row.method), escape(row.title), row.centring, row.rows]
-        rows.append([*titles, *chosen, row.solve])
-    header = ["method", "title", "centring", "rows", "selection", "samples", "solve"]
-    return tabular(header, rows, rf"l{LEFT}p{{3.3cm}}lllll")
+        yield [*titles, *chosen, row.solve]
 
 
-def ranks(singular_values: pd.DataFrame) -> str:
+def ranks(singular_values: pd.DataFrame) -> Rows:
     """Numerical rank and singular value decay of the snapshots of each constraint group."""
-    rows = []
+    decays = [r"$\sigma_6/\sigma_1$", r"$\sigma_{10}/\sigma_1$", r"$\sigma_{20}/\sigma_1$"]
+    yield "llrrrr", ["scene", "group", "rank", *decays]
     for (scene, group), part in singular_values.groupby(["scene", "group"], sort=False):
         real = part[part.above_roundoff]
         cells = [_rows(real, component=component) for component in (6, 10, 20)]
         decay = [_cell(cell, lambda row: format_number(row.relative)) for cell in cells]
-        rows.append([_name(scene), _group(group), str(len(real)), *decay])
-    header = ["scene", "group", "rank", r"$\sigma_6/\sigma_1$", r"$\sigma_{10}/\sigma_1$",
-              r"$\sigma_{20}/\sigma_1$"]  # fmt: skip
-    return longtable(header, rows, "llrrrr")
+        yield [_name(scene), _group(group), str(len(real)), *decay]
 
 
-def reruns(reduced_reruns: pd.DataFrame, methods: pd.DataFrame) -> str:
+def reruns(reduced_reruns: pd.DataFrame, methods: pd.DataFrame) -> Rows:
     """Error within the horizon of every method at the largest size r that has a run."""
 
     def text(run: pd.Series) -> str:
@@ -332,17 +315,15 @@ def reruns(reduced_reruns: pd.DataFrame, methods: pd.DataFrame) -> str:
 
     table = _rows(trained(reduced_reruns), position_basis=FULL)
     ran = table[(table.frames > 0) | table.blowup_frame.notna()]
-    rows = []
+    yield "ll" + "r" * len(methods), ["scene", "group", *map(escape, methods.method)]
     for (scene, group), part in ran.groupby(["scene", "group"], sort=False):
         runs = [_rows(part, method=method).sort_values("r").tail(1) for method in methods.method]
-        rows.append([_name(scene), _group(group), *(_cell(run, text) for run in runs)])
-    header = ["scene", "group", *map(escape, methods.method)]
-    return tabular(header, rows, "ll" + "r" * len(methods))
+        yield [_name(scene), _group(group), *(_cell(run, text) for run in runs)]
 
 
-def local_share(local_share: pd.DataFrame) -> str:
+def local_share(local_share: pd.DataFrame) -> Rows:
     """Share of the local step in the time of a frame, by implementation."""
-    rows = []
+    yield "lrrrrrr", ["scene", "interp.\\ ms", "share", "NumPy ms", "share", "compiled ms", "share"]
     for scene, part in local_share.groupby("scene", sort=False):
         by = part.set_index("implementation")
         cells = []
@@ -350,19 +331,18 @@ def local_share(local_share: pd.DataFrame) -> str:
             row = by.loc[kind]
             total = row.local_ms + row.assembly_ms + row.global_ms
             cells += [format_number(total), format_number(row.local_share)]
-        rows.append([_name(scene), *cells])
-    header = ["scene", "interp.\\ ms", "share", "NumPy ms", "share", "compiled ms", "share"]
-    return longtable(header, rows, "lrrrrrr")
+        yield [_name(scene), *cells]
 
 
 _OUTCOMES = ("accurate", "wrong", "left the scene", "blow-up")
 
 
-def stability(stability: pd.DataFrame) -> str:
+def stability(stability: pd.DataFrame) -> Rows:
     """Numbers of runs by method and outcome: standard reruns, then other time steps, stiffness."""
     full_order = (stability.method == "full") & (stability.position_basis == FULL)
     table = stability[(stability.outcome != "not run") & ~full_order]
-    rows = []
+    last = ["energy (median)", "(max)", "$h$, stiffness: accurate", "energy (max)"]
+    yield "l" + r">{\raggedleft\arraybackslash}p{1.25cm}" * 8, ["method", *_OUTCOMES, *last]
     for (basis, method), part in table.groupby(["position_basis", "method"], sort=False):
         runs, sweep = (_rows(part, experiment=kind) for kind in ("rerun", "sweep"))
         energies = runs.energy_ratio.median(), runs.energy_ratio.max(), sweep.energy_ratio.max()
@@ -370,14 +350,10 @@ def stability(stability: pd.DataFrame) -> str:
         accurate = f"{(sweep.outcome == 'accurate').sum()} of {len(sweep)}"
         counts = [str((runs.outcome == outcome).sum()) for outcome in _OUTCOMES]
         title = method if basis == FULL else f"{method}, {basis} subspace"
-        rows.append([_name(title), *counts, median, largest, accurate, of_sweep])
-    header = ["method", *_OUTCOMES, "energy (median)", "(max)", "$h$, stiffness: accurate",
-              "energy (max)"]  # fmt: skip
-    narrow = r">{\raggedleft\arraybackslash}p{1.25cm}"
-    return tabular(header, rows, "l" + narrow * 8)
+        yield [_name(title), *counts, median, largest, accurate, of_sweep]
 
 
-TEX_TABLES: dict[str, Callable[..., str]] = {
+TEX_TABLES: dict[str, Callable[..., Rows]] = {
     f"tab_{make.__name__}": make
     for make in (
         claims, claims_in_full, scenes, methods, ranks, reruns, local_share, stability, iterations,
@@ -392,6 +368,12 @@ def reads(name: str) -> list[str]:
     return list(signature(TEX_TABLES[name]).parameters)
 
 
+def tex_rows(name: str, tables: Mapping[str, pd.DataFrame]) -> Rows:
+    """Yield column definitions and header of the TeX table ``name``, then its rows."""
+    return TEX_TABLES[name](*(tables[read] for read in reads(name)))
+
+
 def tex_table(name: str, tables: Mapping[str, pd.DataFrame]) -> str:
     """TeX table ``name``, made from the study's ``tables`` by name."""
-    return TEX_TABLES[name](*(tables[read] for read in reads(name)))
+    (columns, header), *rows = tex_rows(name, tables)
+    return (longtable if name in LONG else tabular)(header, rows, columns)

@@ -44,7 +44,9 @@ def _experiment(plan: Plan, experiment: Experiment, cores: int) -> SimpleNamespa
     return SimpleNamespace(
         name=experiment.rule,
         input={name: paths(name) for name in experiment.files},
-        output={name: place.rule(plan.results) for name, place in experiment.writes.items()},
+        output={
+            name: f"{plan.results}/{place.pattern}" for name, place in experiment.writes.items()
+        },
         log=f"{plan.results}/logs/{experiment.rule}{'/' if labels else ''}{labels}.log",
         # scenes share no jobs except their meshes, so that a scene's jobs form a batch on a cluster
         group=None if experiment.alone or "scene" not in experiment.labels else "scene",

@@ -15,8 +15,8 @@ import psutil
 
 from pdrom.core.store import Condition, check_file, read_table
 from study.artifact import paths
+from study.artifact.logs import usage_of
 from study.artifact.reads import Every, ProjectFile, Read, Setting, TableOf
-from study.artifact.usage import usage_of
 from study.figures.kit.declaration import declarations
 from study.paper.figure_numbers import figures_page
 from study.paper.macros import keys_of

@@ -19,8 +19,8 @@ import pandas as pd
 
 from pdrom.core.errors import ConfigurationError, PdromError, choices
 from pdrom.core.store import atomic_path, read_table
+from study.artifact.logs import usage_of
 from study.artifact.paths import TABLE
-from study.artifact.usage import usage_of
 from study.pipeline.folders import folders
 from study.tables.claims.rules import load_claims
 from study.tables.claims.verdicts import MEASURED, RULES

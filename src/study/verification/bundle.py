@@ -3,7 +3,6 @@
 Equal commits and results give equal bytes: files are sorted, and dated as results are.
 """
 
-import argparse
 import gzip
 import io
 import os
@@ -19,14 +18,14 @@ from pdrom.core.store import atomic_path
 from study.artifact import paths
 from study.pipeline.manifest import read_manifest
 from study.verification.files import verify_files
-from study.verification.subject import Status, Subject, ended, say
+from study.verification.subject import Status, Subject, ended, options_parser, say
 
 NAME = f"pdrom-{__version__}"
 
 
 def bundle(arguments: Sequence[str]) -> Status:
     """Write the archive of a finished study; otherwise print its missing or damaged files."""
-    chosen = parser().parse_args(arguments)
+    chosen = options_parser("bundle", __doc__).parse_args(arguments)
     subject = Subject.of(chosen.configfile, chosen.config)
     status = verify_files(subject)
     if status is not Status.HOLDS:
@@ -62,14 +61,6 @@ def write_archive(root: Path, results: Mapping[str, Path], target: Path) -> None
                 archive.addfile(entry, content)
     with atomic_path(target) as temporary:
         temporary.write_bytes(gzip.compress(made.getvalue(), mtime=date))
-
-
-def parser() -> argparse.ArgumentParser:
-    """Return the parser of the arguments after the word ``bundle``."""
-    made = argparse.ArgumentParser(prog="./reproduce bundle", description=__doc__)
-    made.add_argument("--configfile", nargs="+", default=[], metavar="FILE")
-    made.add_argument("--config", nargs="+", default=[], metavar="KEY=VALUE")
-    return made
 
 
 def _git(root: Path, *words: str) -> bytes:

@@ -3,7 +3,7 @@
 import argparse
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -13,13 +13,16 @@ from pdrom.core.store import Condition, check_file, read_table, write_text
 from study.article.build import INDEX, write_verified
 from study.artifact.paths import ARTICLE, TABLE
 from study.tables import declared
-from study.verification.examine import Examination
+from study.verification.examine import Examination, Line, Outcome
 from study.verification.files import verify_files
-from study.verification.lines import counted, page, status_of
 from study.verification.references import LOG, folder_of, note, write_reference
-from study.verification.subject import Status, Subject, ended, say
+from study.verification.subject import Status, Subject, ended, options_parser, say
 
 NOTHING = "Nothing to be done"
+CODES = "exit codes: 0 all holds; 1 faulty input; 2 not understood; 3 differs; 4 not there"
+PAGE = "verification.md"
+# Largest number of differences per line that the page lists.
+ON_PAGE = 20
 
 
 def update(subject: Subject, reason: str) -> Path:
@@ -63,19 +66,10 @@ def update(subject: Subject, reason: str) -> Path:
     return folder
 
 
-CODES = "exit codes: 0 all holds; 1 faulty input; 2 not understood; 3 differs; 4 not there"
-PAGE = "verification.md"
-
-
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the arguments after the word ``verify``."""
-    made = argparse.ArgumentParser(
-        prog="./reproduce verify",
-        description="Whether the results of the last run are the expected ones.",
-        epilog=CODES,
-    )
-    made.add_argument("--configfile", nargs="+", default=[], metavar="FILE")
-    made.add_argument("--config", nargs="+", default=[], metavar="KEY=VALUE")
+    about = "Whether the results of the last run are the expected ones."
+    made = options_parser("verify", about, CODES)
     what = made.add_mutually_exclusive_group()
     what.add_argument(
         "--files",
@@ -123,10 +117,7 @@ def verify_tables(subject: Subject) -> Status:
     for line in lines:
         say(str(line))
     written = Path(subject.results) / PAGE
-    about = (
-        f"Results in `{subject.results}`, expected ones in `{folder}` (`{LOG}` says why).",
-        "What is compared, and what the outcomes mean, is in `docs/verification.md`.",
-    )
+    about = f"Results in `{subject.results}`, expected ones in `{folder}` (`{LOG}` says why)."
     write_text(page(lines, about), written)
     pages = Path(ARTICLE.at(subject.results, name=INDEX))
     if pages.is_file():
@@ -135,6 +126,45 @@ def verify_tables(subject: Subject) -> Status:
     say(counted(lines))
     say(f"page: {written}")
     return status_of(lines)
+
+
+def status_of(lines: Iterable[Line]) -> Status:
+    """Exit code of ``lines``: a missing result before a difference, else success."""
+    outcomes = {line.outcome for line in lines}
+    if Outcome.MISSING in outcomes:
+        return Status.MISSING
+    holds = outcomes.isdisjoint((Outcome.DIFFERS, Outcome.NO_REFERENCE))
+    return Status.HOLDS if holds else Status.DIFFERS
+
+
+def counted(lines: Sequence[Line]) -> str:
+    """Numbers of ``lines`` by kind and outcome, as text."""
+    parts = []
+    for kind in dict.fromkeys(line.kind for line in lines):
+        own = [line.outcome for line in lines if line.kind == kind]
+        counts = ", ".join(f"{own.count(o)} {o}" for o in Outcome if o in own)
+        parts.append(f"{kind}s: {counts}")
+    return "; ".join(parts)
+
+
+def page(lines: Sequence[Line], about: str) -> str:
+    """Return the Markdown page of all ``lines``; ``about`` says on its top what was compared."""
+    meaning = "What is compared, and what the outcomes mean, is in `docs/verification.md`."
+    parts = ["# Verification", "", about, meaning, "", counted(lines) + ".", ""]
+    for kind in dict.fromkeys(line.kind for line in lines):
+        parts += [f"## {kind.capitalize()}s", "", f"| {kind} | outcome | what |", "|---|---|---|"]
+        for line in lines:
+            if line.kind == kind:
+                text = line.text.replace("|", "\\|")
+                parts.append(f"| {line.name} | {line.outcome} | {text} |")
+        parts.append("")
+    differing = [line for line in lines if line.details]
+    parts += ["## What differs", ""] if differing else []
+    for line in differing:
+        shown, more = line.details[:ON_PAGE], len(line.details) - ON_PAGE
+        parts += [f"### {line.kind} {line.name}", "", *(f"- {text}" for text in shown)]
+        parts += [f"- and {more} more", ""] if more > 0 else [""]
+    return "\n".join(parts)
 
 
 if __name__ == "__main__":

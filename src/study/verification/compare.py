@@ -1,11 +1,12 @@
-"""Comparison of a table with the expected table: pairs of rows, and distances of their cells.
+"""Comparison of a table with the expected table: pairs of rows, distances of cells, differences.
 
 Rounding errors decide some rows, such as chaotic or ill-conditioned runs (`Context`).
 """
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -13,11 +14,9 @@ import pandas as pd
 
 from study.artifact.reads import ProjectFile
 from study.tables import declared
-from study.tables.kit.declaration import Column, Quantity, Table
+from study.tables.kit.declaration import TOLERANCES, Column, Table
 from study.tables.kit.results import trained
 
-# Kinds of columns that are not compared with a reference.
-NOT_COMPARED: tuple[Quantity, ...] = ("timed", "skipped")
 # Differences up to this size count as rounding errors of sums.
 FLOOR = 1e-12
 # Relative tolerances of sample numbers that a fit determines, and of the numbers of wrong runs.
@@ -35,11 +34,25 @@ OF_RUN = ("relative_error_within_horizon", "relative_error")
 # Columns that identify the samples of a reduction; below, columns that identify a run.
 SAMPLES = ("scene", "group", "method", "r")
 RUN = (*SAMPLES, "position_basis", "k")
+# Largest number of cells that describe a row in a message.
+NAMED = 6
+# A column of at least `LEAST` numbers must also agree far more closely than the tolerance of one
+# cell: nine of ten cells if it has at least `TEN` errors, else half of its cells, are closer than
+# `CLOSE`, or than 1/`OWN` of the column's own tolerance. In a shorter column without own tolerance
+# all cells are closer than `LONE`.
+MOST, HALF, TEN, LEAST = 0.9, 0.5, 10, 3
+CLOSE, OWN, LONE = 1e-5, 50, 0.01
+# Limits for cells that rounding decides: (share of runs that may be off, distance that counts as
+# off, columns by which runs are grouped). A tenth may be off by a factor 10, half by a factor 2.
+LOOSE = ((0.1, 1 - 1 / 10, ("scene", "noisy_axes", "method")), (0.5, 1 - 1 / 2, ("scene",)))
+# Least number of differing cells that a text or flag column with a tolerance may have.
+FEW = 3
+Difference = tuple[float, str]  # distance of the cells (inf without a measure), text of a message
 
 
 def kept(table: Table) -> dict[str, Column]:
     """Columns of ``table`` that are stored in its reference and compared, by name."""
-    return {c.name: c for c in table.columns if c.quantity not in NOT_COMPARED}
+    return {c.name: c for c in table.columns if c.quantity in TOLERANCES}
 
 
 def names_row(column: Column) -> bool:
@@ -61,33 +74,24 @@ def pairs(table: Table, expected: pd.DataFrame, found: pd.DataFrame) -> list[tup
     named = [c.name for c in table.columns if names_row(c)]
     counts = [c.name for c in table.columns if c.quantity == "value" and c.kind == "integer"]
     made: list[tuple[int, int]] = []
-    left = [list(range(len(expected))), list(range(len(found)))]
+    left = [
+        frame[[*named, *counts]].map(_key).assign(row=range(len(frame)))
+        for frame in (expected, found)
+    ]
     for columns in ([*named, *counts], named):
-        if all(left):
-            here, there = _places(expected, columns, left[0]), _places(found, columns, left[1])
-            made += [(row, there[key]) for key, row in here.items() if key in there]
-            left = [
-                [row for key, row in own.items() if key not in other]
-                for own, other in ((here, there), (there, here))
-            ]
+        # equal rows match in order
+        e, f = (rows.assign(place=rows.groupby(columns).cumcount()) for rows in left)
+        both = e.merge(f, on=[*columns, "place"])
+        made += zip(both.row_x, both.row_y, strict=True)
+        left = [e[~e.row.isin(both.row_x)], f[~f.row.isin(both.row_y)]]
     return sorted(made)
 
 
-def _places(frame: pd.DataFrame, columns: Sequence[str], rows: list[int]) -> dict[tuple, int]:
-    """Map the cells of each row, and the count of equal rows before it, to the row's number."""
-    seen, places = Counter[tuple](), {}
-    cells = [[_key(cell) for cell in frame[name].iloc[rows]] for name in columns]
-    for row, key in zip(rows, zip(*cells, strict=True), strict=True):
-        places[*key, seen[key]] = row
-        seen[key] += 1
-    return places
-
-
-def _key(cell: object) -> object:
-    """Cell rounded to fewer digits than references have; empty text for a missing value."""
+def _key(cell: object) -> str:
+    """Cell as text, of fewer digits than references have; empty text for a missing value."""
     if cell is None or cell is pd.NA or cell != cell:
         return ""
-    return f"{cell:.6g}" if isinstance(cell, float) else cell
+    return f"{cell:.6g}" if isinstance(cell, float) else str(cell)
 
 
 @dataclass(frozen=True)
@@ -142,7 +146,7 @@ class Comparison:
         self.pairs = pairs(self.table, self.expected, self.found)
         self.e = self.expected.iloc[[i for i, _ in self.pairs]].reset_index(drop=True)
         self.f = self.found.iloc[[j for _, j in self.pairs]].reset_index(drop=True)
-        self._loose: dict[str, dict[str, np.ndarray]] = {}
+        self.loose = cache(self._loose)  # function of a column
         self._timed: Sequence = [()] * len(self.e)  # names of timed columns, for each row
         if self.table.timed_cells is not None:
             reads = self.table.reads.items()
@@ -157,13 +161,10 @@ class Comparison:
         """Boolean array (rows): True where rounding errors do not decide the column's cell."""
         return ~np.any([np.zeros(len(self.e)), *self.loose(column).values()], axis=0)
 
-    def loose(self, column: Column) -> dict[str, np.ndarray]:
+    def _loose(self, column: Column) -> dict[str, np.ndarray]:
         """Boolean arrays (rows) by reason: True where rounding errors decide the column's cell."""
-        if column.name not in self._loose:
-            self._loose[column.name] = {} if names_row(column) else self._of_rounding(column)
-        return self._loose[column.name]
-
-    def _of_rounding(self, column: Column) -> dict[str, np.ndarray]:
+        if names_row(column):
+            return {}
         chaotic = self.e.filter(items=["scene"]).isin(list(self.context.chaotic)).any(axis=1)
         found = {"chaotic scene": chaotic.to_numpy(dtype=bool)}
         if column.quantity == "value" and column.kind == "integer" and "case" not in self.e:
@@ -246,17 +247,124 @@ class Comparison:
         same = (a == b) | (np.isnan(a) & np.isnan(b))
         return np.where(same, 0.0, np.where(np.isnan(apart), np.inf, apart))
 
-    def unpaired(self) -> tuple[pd.DataFrame, pd.DataFrame]:
-        """Return the rows of the expected table, and of the found table, without a matching row.
 
-        Some tables list only runs that have an error (`Table.only_with_error`). In these, a row is
-        not returned if its run has an error here but none in the other table.
-        """
-        alone = []
-        for side, frame in enumerate((self.expected, self.found)):
-            rows = frame[~np.isin(np.arange(len(frame)), [pair[side] for pair in self.pairs])]
-            if self.table.only_with_error:
-                ended = self.context.ended[1 - side] - self.context.ended[side]
-                rows = rows[[name not in ended for name in names(rows, RUN)]]
-            alone.append(rows)
-        return alone[0], alone[1]
+def judge(comparison: Comparison) -> tuple[list[str], str]:
+    """Return texts of all differences, largest first, and how many cells were compared, in words.
+
+    Cells that rounding decides are compared by counts; the words number them by the reason.
+    """
+    found = [*_rows(comparison)]
+    compared, loose = 0, Counter[str]()
+    for column in kept(comparison.table).values():
+        found += _cells(comparison, column)
+        compared += int(comparison.compared(column).sum())
+        loose.update({why: int(c.sum()) for why, c in comparison.loose(column).items()})
+    found.sort(key=lambda difference: -difference[0])
+    reasons = ", ".join(f"{reason} {count}" for reason, count in (+loose).most_common())
+    words = f"{compared} cells" + (f"; by count: {reasons}" if reasons else "")
+    return [text for _, text in found], words if compared else "it has no rows"
+
+
+def _difference(
+    where: str, expected: str, found: str, size: float = np.inf, allowed: float = 0.0
+) -> Difference:
+    """Difference of a ``size``, and its text with the place ``where``: row and column in words."""
+    off = f" (off by {size:.2g}, allowed {allowed:.2g})" if np.isfinite(size) else ""
+    return size, f"{where}: expected {expected}, found {found}{off}"
+
+
+def _rows(comparison: Comparison) -> Iterator[Difference]:
+    """Yield differences for rows without a matching row in the other table, and for their order.
+
+    Some tables list only runs that have an error (`Table.only_with_error`). In these, a row makes
+    no difference if its run has an error in its table but none in the other one.
+    """
+    table, context, words = comparison.table, comparison.context, ("a row", "none")
+    for side, frame in enumerate((comparison.expected, comparison.found)):
+        rows = frame[~np.isin(np.arange(len(frame)), [pair[side] for pair in comparison.pairs])]
+        if table.only_with_error:
+            ended = context.ended[1 - side] - context.ended[side]
+            rows = rows[[name not in ended for name in names(rows, RUN)]]
+        for i in range(len(rows)):
+            yield _difference(_row_in_words(table, rows, i), words[side], words[1 - side])
+    moved = np.flatnonzero(np.diff([row for _, row in comparison.pairs]) < 0)
+    if len(moved):
+        place = _row_in_words(table, comparison.e, int(moved[0]) + 1)
+        yield _difference(f"order of the rows, {place}", "further down", "further up")
+
+
+def _cells(comparison: Comparison, column: Column) -> Iterator[Difference]:
+    beyond, firm = comparison.beyond(column), comparison.firm(column)
+    if column.kind in ("text", "flag") and column.tolerance:
+        allowed = max(FEW, column.within * len(beyond))
+        if beyond.sum() > allowed:
+            place = _row_in_words(comparison.table, comparison.e, int(np.argmax(beyond)))
+            words = f"at most {int(allowed)} other cells", f"{beyond.sum()}"
+            yield _difference(f"{column.name}, as of {place}", *words)
+        return
+    apart, limits = comparison.apart(column), comparison.limits(column)
+    for row in map(int, np.flatnonzero(beyond & firm)):
+        place = f"{_row_in_words(comparison.table, comparison.e, row)} {column.name}".strip()
+        expected, found = (
+            in_words(frame[column.name].iloc[row]) for frame in (comparison.e, comparison.f)
+        )
+        yield _difference(place, expected, found, float(apart[row]), float(limits[row]))
+    if not (beyond & firm).any() and column.kind in ("number", "integer"):
+        yield from _shifted(comparison, column, firm & ~comparison.wrong(column))
+    yield from _loose(comparison, column, ~firm)
+
+
+def _shifted(comparison: Comparison, column: Column, firm: np.ndarray) -> Iterator[Difference]:
+    """Yield a difference if most cells of a column are off by little, as by a small shift."""
+    there = (comparison.e[column.name].fillna(0) != 0).to_numpy(dtype=bool)
+    cells = firm & there & comparison.compared(column)
+    own, count = column.tolerance, cells.sum()
+    if not count or (own is not None and count < LEAST):
+        return
+    strict = column.quantity == "error" and own is None and count >= TEN
+    share, close = MOST if strict else HALF, CLOSE if own is None else own / OWN
+    if count < LEAST:
+        share, close = 1.0, LONE
+    size = float(np.quantile(comparison.apart(column)[cells], share))
+    if size > close:
+        words = f"a share of {share:g} of the cells within {close:g}", f"within {size:.2g}"
+        yield _difference(column.name, *words, size, close)
+
+
+def _loose(comparison: Comparison, column: Column, cells: np.ndarray) -> Iterator[Difference]:
+    """Yield differences where too many runs have cells off, among cells that rounding decides.
+
+    A value that is missing in one table counts as off. Cells of the same run count once.
+    """
+    rows = comparison.e[cells]
+    run = [*SAMPLES, *({"seed"} & set(rows.columns))]
+    for share, wider, by in LOOSE:
+        other = comparison.beyond(column, wider if column.kind == "number" else 0.0)[cells]
+        if not other.any():
+            continue
+        runs = names(rows, run) if set(run) <= set(rows.columns) else range(len(rows))
+        counted = pd.DataFrame({"run": runs, "other": other}, rows.index)
+        named = [rows[name] for name in by if name in rows and "scene" in rows]
+        all_rows = [pd.Series("all rows", rows.index)]
+        for group, part in counted.groupby(named or all_rows, dropna=False):
+            of_runs = part.groupby("run").other.any()
+            allowed = max(1.0, share * len(of_runs))
+            if of_runs.sum() > allowed:
+                place = f"{column.name} of {', '.join(map(str, group))}"
+                words = f"at most {int(allowed)} of {len(of_runs)} other", f"{of_runs.sum()}"
+                yield _difference(place, *words)
+
+
+def in_words(value: object) -> str:
+    """Cell ``value`` as text for a message."""
+    if pd.isna(value):
+        return "nothing"
+    return f"{value:.6g}" if isinstance(value, float) else str(value)[:60]
+
+
+def _row_in_words(table: Table, frame: pd.DataFrame, row: int) -> str:
+    """Text that identifies a ``row`` of ``frame``: its names, sizes and values, at most `NAMED`."""
+    columns = [c.name for c in table.columns if names_row(c) or c.quantity == "value"]
+    cells = [(name, frame[name].iloc[row]) for name in columns]
+    named = [f"{name} {in_words(value)}" for name, value in cells if not pd.isna(value)]
+    return ", ".join(named[:NAMED])

@@ -1,8 +1,10 @@
 """Outcomes of the comparison for the claims, figures and tables of a results folder."""
 
 from collections.abc import Mapping, Sequence
+from enum import StrEnum
 from functools import cache, cached_property
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -13,17 +15,45 @@ from study.artifact.paths import TABLE
 from study.pipeline.plan import Job
 from study.tables import declared
 from study.tables.claims.rules import load_claims
-from study.verification.compare import RUNS, Comparison, Context, kept, names_row
+from study.verification import compare
 from study.verification.files import is_derived, made
-from study.verification.judge import in_words, judge
-from study.verification.lines import Line, Outcome
-from study.verification.references import Reference, folder_of, read_reference
+from study.verification.references import Reference, folder_of, read_references
 from study.verification.subject import Subject
 
 RULES = Path("config/claims.yaml")
 CLAIMS = "claims"
 # Verdict columns of the table of claims, with the name of their tests in the rules and a label.
 PARTS = {"verdict": ("published", "as published"), "verdict_beyond": ("beyond", "beyond")}
+
+
+class Outcome(StrEnum):
+    """Outcome of the comparison of one claim, figure or table."""
+
+    REPRODUCED = "reproduced"
+    DIFFERS = "differs"
+    NOT_COMPARABLE = "not comparable on this machine"
+    NO_REFERENCE = "no reference"
+    MISSING = "not there"
+
+
+class Line(NamedTuple):
+    """Outcome of one claim, figure or table.
+
+    kind : claim, figure or table
+    text : size and place of the largest difference, or a reason
+    details : all differences as text, largest first
+    """
+
+    kind: str
+    name: str
+    outcome: Outcome
+    text: str = ""
+    details: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        return f"{self.kind} {self.name}: {self.outcome}" + (f", {self.text}" if self.text else "")
+
+
 GOOD = (Outcome.REPRODUCED, Outcome.NOT_COMPARABLE)
 
 
@@ -74,18 +104,16 @@ class Examination:
     @cached_property
     def expected(self) -> dict[str, Reference]:
         """Existing references of tables, by name."""
-        folder = folder_of(self.subject.results)
-        read = {name: read_reference(table, folder) for name, table in declared().items()}
-        return {name: reference for name, reference in read.items() if reference is not None}
+        return read_references(folder_of(self.subject.results))
 
     @cached_property
-    def context(self) -> Context:
+    def context(self) -> compare.Context:
         """Context of the comparison, from the expected tables and the found table of runs."""
         tables = {name: reference.frame for name, reference in self.expected.items()}
         try:
-            return Context.of(tables, self.found(RUNS))
+            return compare.Context.of(tables, self.found(compare.RUNS))
         except StorageError:
-            return Context.of(tables)
+            return compare.Context.of(tables)
 
     def _again(self, name: str) -> pd.DataFrame | None:
         """Return the table ``name`` made again from existing tables, if it reads tables only.
@@ -121,18 +149,19 @@ class Examination:
             return line(Outcome.DIFFERS, f"not what the tables at hand give, {other}")
         lacking = set(frame.columns) - set(reference.columns)
         known = table.checked(frame.assign(**dict.fromkeys(lacking, None)))
-        judgement = judge(Comparison(table, reference.frame, known, self.context))
-        if judgement.differences:
-            first, *others = map(str, judgement.differences)
-            more = f" and {len(others)} more" if others else ""
-            return line(Outcome.DIFFERS, first + more, first, *others)
-        columns = kept(table)
+        differences, compared = compare.judge(
+            compare.Comparison(table, reference.frame, known, self.context)
+        )
+        if differences:
+            more = f" and {len(differences) - 1} more" if differences[1:] else ""
+            return line(Outcome.DIFFERS, differences[0] + more, *differences)
+        columns = compare.kept(table)
         if new := sorted(lacking & set(columns)):
             return line(Outcome.NO_REFERENCE, f"column(s) {', '.join(new)}: run verify --update")
-        if all(map(names_row, columns.values())):
+        if all(map(compare.names_row, columns.values())):
             text = "its numbers are times or round-off; names and sizes agree"
             return line(Outcome.NOT_COMPARABLE, text)
-        return line(Outcome.REPRODUCED, str(judgement))
+        return line(Outcome.REPRODUCED, compared)
 
     def claims(self) -> list[Line]:
         """Lines with the outcomes of all claims."""
@@ -215,5 +244,5 @@ def _first_difference(found: pd.DataFrame, again: pd.DataFrame) -> str | None:
     if not len(places):
         return None
     row, column = places[0]
-    old, new = (in_words(frame.iloc[row, column]) for frame in (found, again))
+    old, new = (compare.in_words(frame.iloc[row, column]) for frame in (found, again))
     return f"as in row {row + 1} {found.columns[column]}: found {old}, they give {new}"

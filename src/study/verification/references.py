@@ -7,15 +7,16 @@ that the total size remains small.
 
 import io
 import lzma
-from dataclasses import dataclass
 from datetime import date
 from pathlib import Path
+from typing import NamedTuple
 
 import pandas as pd
 
 from pdrom.core.errors import StorageError
 from study.artifact.paths import RESULTS
 from study.pipeline.tracked import write_tracked
+from study.tables import declared
 from study.tables.kit.declaration import Table
 from study.verification.compare import kept
 
@@ -30,8 +31,7 @@ Written by `./reproduce verify --update --reason "..."`, newest last.
 """
 
 
-@dataclass(frozen=True)
-class Reference:
+class Reference(NamedTuple):
     """An expected table: ``frame`` has all declared columns, ``columns`` the stored ones."""
 
     frame: pd.DataFrame
@@ -44,22 +44,10 @@ def folder_of(results: str) -> Path:
     return root / "reference" / Path(results).relative_to(root) / "tables"
 
 
-def compact(table: Table, frame: pd.DataFrame) -> pd.DataFrame:
-    """Return the columns of ``frame`` that a reference of ``table`` stores, numbers rounded."""
-    columns = {name: frame[name] for name in kept(table)}
-    for name, column in kept(table).items():
-        if column.kind == "number":
-            texts = [f"{value:.{DIGITS}g}" for value in frame[name].to_numpy(dtype=float)]
-            columns[name] = pd.Series(map(float, texts), frame.index, dtype=float)
-    return pd.DataFrame(columns, index=frame.index)
-
-
 def write_reference(table: Table, frame: pd.DataFrame, folder: Path) -> None:
     """Write the reference of ``table``, from its content ``frame``, into ``folder``."""
-    plain = compact(table, frame).to_csv(
-        index=False, float_format=f"%.{DIGITS}g", lineterminator="\n"
-    )
-    content = plain.encode()
+    stored, form = frame[list(kept(table))], f"%.{DIGITS}g"
+    content = stored.to_csv(index=False, float_format=form, lineterminator="\n").encode()
     path, other = _paths(table.name, folder)
     if len(content) > PACKED_FROM:
         path, other, content = other, path, lzma.compress(content, preset=9)
@@ -87,6 +75,12 @@ def read_reference(table: Table, folder: Path) -> Reference | None:
         raise StorageError(f"{path}: cannot be read ({' '.join(str(error).split())})") from error
     whole = frame.reindex(columns=list(table.column_names))
     return Reference(table.checked(whole), tuple(frame.columns))
+
+
+def read_references(folder: Path) -> dict[str, Reference]:
+    """Return the existing references in ``folder`` by the table's name; errors as for one."""
+    read = {name: read_reference(table, folder) for name, table in declared().items()}
+    return {name: reference for name, reference in read.items() if reference is not None}
 
 
 def note(folder: Path, reason: str, day: date, code: str) -> None:

@@ -3,6 +3,7 @@
 The results belong to one configuration, by default that of the last run.
 """
 
+import argparse
 import shlex
 import sys
 from collections.abc import Callable, Sequence
@@ -58,6 +59,14 @@ class Subject:
         command = CommandLine(self.options)
         whole = merged(Path(DEFAULT), command.configfiles, command.settings)
         return load_plan(whole, command.configfiles, self.folders, quiet=True)
+
+
+def options_parser(command: str, about: str, epilog: str | None = None) -> argparse.ArgumentParser:
+    """Return a parser of the options after the word ``command`` that name the configuration."""
+    made = argparse.ArgumentParser(prog=f"./reproduce {command}", description=about, epilog=epilog)
+    made.add_argument("--configfile", nargs="+", default=[], metavar="FILE")
+    made.add_argument("--config", nargs="+", default=[], metavar="KEY=VALUE")
+    return made
 
 
 class Status(IntEnum):

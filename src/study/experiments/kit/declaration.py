@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from study.artifact.artifact import Artifact, declare, declared_in, normal
+from study.artifact.artifact import Artifact, declare, declared_in
 from study.artifact.paths import Place
 from study.artifact.reads import Read
 
@@ -15,7 +15,7 @@ class Experiment(Artifact):
 def experiment(
     title: str,
     *,
-    reads: Mapping[str, Read | Place],
+    reads: Mapping[str, Read],
     writes: Mapping[str, Place],
     alone: bool = False,
 ) -> Callable[[Callable[..., None]], Experiment]:
@@ -30,7 +30,7 @@ def experiment(
     """
 
     def decorate(function: Callable[..., Any]) -> Experiment:
-        made = Experiment(function.__name__, title, normal(reads), writes, function, alone)
+        made = Experiment(function.__name__, title, reads, writes, function, alone)
         return declare(made, *writes)
 
     return decorate

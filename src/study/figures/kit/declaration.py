@@ -52,17 +52,13 @@ class Declaration(Artifact):
 
     caption: str = ""
     number: int | None = None
+    rule_pattern = "figure_{}"
 
     @property
     def options(self) -> type[Options]:
         """Type of the figure's options, from the annotation of its function."""
         chosen: type[Options] = self.function.__annotations__["options"]
         return chosen
-
-    @property
-    def rule(self) -> str:
-        """Name of the workflow rule that draws the figure."""
-        return f"figure_{self.name}"
 
     def words(self, value: Callable[[str], Any]) -> tuple[str, str]:
         """Title and caption in mark-up; ``value`` returns the settings named in the caption.

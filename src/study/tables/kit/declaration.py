@@ -204,15 +204,11 @@ class Table(Artifact):
     columns: tuple[Column, ...] = ()
     timed_cells: TimedCells | None = None
     only_with_error: bool = False
+    rule_pattern = "{}_table"
 
     def __call__(self, *arguments: Any, **named: Any) -> pd.DataFrame:
         """Compute the table from its inputs and bring it to the declared columns, see `checked`."""
         return self.checked(self.function(*arguments, **named))
-
-    @property
-    def rule(self) -> str:
-        """Name of the workflow rule that computes the table."""
-        return f"{self.name}_table"
 
     def perform(
         self, settings: Mapping[str, Any], inputs: Mapping[str, Any], outputs: Mapping[str, str]

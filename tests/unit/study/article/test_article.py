@@ -7,11 +7,11 @@ import json
 import os
 import re
 import subprocess
-from collections.abc import Iterable, Mapping
-from dataclasses import asdict
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cache
-from html.parser import HTMLParser
+from html import unescape
 from pathlib import Path
+from typing import Any
 from urllib.parse import unquote
 
 import pandas as pd
@@ -29,18 +29,9 @@ from study.article.build import ASSETS, FOLDER, PAGES, article, write_verified
 from study.article.latex import linked_table, plain_columns
 from study.article.tables import FACTS
 from study.artifact.paths import File
-from study.paper.build import Facts
-from study.paper.macros import (
-    AGGREGATES,
-    MISSING,
-    captions,
-    format_number,
-    keys_of,
-    macros,
-    matching,
-    number_of,
-    provenance,
-)
+from study.paper import build, textables
+from study.paper.figure_numbers import figure_numbers
+from study.paper.macros import AGGREGATES, MISSING, format_number, matching
 from study.paper.source import documents
 from study.paper.tex import find_pdflatex, packages_of
 
@@ -58,11 +49,15 @@ On \scene{bar\_a} it is \val{payoff|method=pod|error_train}, at most \val{payoff
 $K = \val{payoff|scenes|max}$, named \val{payoff|method=pod|position_basis}; equation
 \eqref{eq:one}, figure~\ref{fig:ladder}, table~\ref{tab:payoff}, theorem~\ref{thm:s},
 section~\ref{sec:more} \cite{Page63}. C1 holds.
-\known{Shown, \val{payoff|method=pod|scenes}.} \known{Left out, $x$.}
+\known{Shown, \val{payoff|method=pod|scenes}.} \known{Left out, \val{payoff|method=x|scenes}.}
+\begin{tabular}{lr}
+\row{held & \val{payoff|method=pod|scenes} \\}
+\row{lacking & \val{payoff|method=x|scenes} \\}
+\end{tabular}
 \paragraph{Opening.} Words.
 \begin{equation}\label{eq:one} a = b \end{equation}
 \figureof{ladder}
-\longtableof{\small}{tab:payoff}{Caption.}{tab_payoff.tex}
+\longtableof{\small}{tab:payoff}{Caption.}{tab_ranks.tex}
 \end{document}
 """
 SUPPLEMENT = r"""
@@ -75,21 +70,6 @@ SUPPLEMENT = r"""
 \figureof{bar_runs}
 \begin{theorem}\label{thm:s} Let $x$ be \val{study|scenes}. \end{theorem}
 \end{document}
-"""
-TABLE = r"""\begin{longtable}{l>{\raggedright\arraybackslash}p{2cm}r}
-\captionrow
-\hline
-reduction & error & in \\
-\hline
-\endfirsthead
-\hline
-reduction & error & in \\
-\hline
-\endhead
-\texttt{pod} & \ensuremath{1.5\cdot 10^{-4}} & 3 \\
-\texttt{deim} & 0.25 & holds (4) \\
-\hline
-\end{longtable}
 """
 CLAIM = """
 sets: {own: [numpy]}
@@ -124,6 +104,23 @@ TABLES = {
 }
 
 
+def ranks(payoff: pd.DataFrame) -> Iterator[Any]:
+    """A TeX table of the manuscript, with a number among words."""
+    yield r"l>{\raggedright\arraybackslash}p{2cm}r", ["reduction", "error", "in"]
+    yield [r"\texttt{pod}", format_number(payoff.error_train[0]), "3"]
+    yield [r"\texttt{deim}", format_number(payoff.error_train[1]), "holds (4)"]
+
+
+INPUTS = (
+    "numbers.json",
+    "tab_ranks.tex",
+    "macros.tex",
+    "figures.tex",
+    "main.bbl",
+    "supplement.bbl",
+)
+
+
 def write_study(folder: Path) -> dict[str, object]:
     """A manuscript of two documents with what it reads; arguments of `article`."""
     for name, table in TABLES.items():
@@ -132,7 +129,7 @@ def write_study(folder: Path) -> dict[str, object]:
         "ladder": r"Steps. Errors of $r \le 6$ modes.", "spring_runs": "Springs.",
         "bar_runs": "Bars.",
     }  # fmt: skip
-    facts = Facts(
+    facts = build.Facts(
         captions=captions_of, part=None, full_study="config/default.yaml",
         tables={name: [{"scenes": 2}] for name in FACTS if name != "machine"},
     )  # fmt: skip
@@ -140,36 +137,25 @@ def write_study(folder: Path) -> dict[str, object]:
     preamble = (ROOT / "paper" / "preamble.tex").read_text(encoding="utf-8")
     for name, text in {**texts, "preamble": preamble}.items():
         write_text(text, folder / "paper" / f"{name}.tex")
-    data, whole = {**TABLES, "study": pd.DataFrame(facts.tables["study"])}, "".join(texts.values())
-    known = {"main": ["shown", "dropped"], "supplement": []}
-    origins = {
-        "known": known,
-        "numbers": {key: asdict(number_of(key, data)) for key in keys_of(whole)},
-        "tables": {"tab_payoff": ["payoff"]},
-    }
-    inputs = {
-        "numbers.json": json.dumps(origins),
-        "tab_payoff.tex": TABLE,
-        "macros.tex": macros(whole, data) + provenance(known, facts.part, facts.full_study),
-        "figures.tex": captions(facts.captions),
-    }
-    for name, text in inputs.items():
-        write_text(text, folder / "inputs" / name)
-    write_text(CLAIM, folder / "claims.yaml")
     write_text(machine().model_dump_json(), folder / "machine.json")
-    for name in facts.captions:
-        write_text("%PDF-1.4", folder / "figures" / f"{name}.pdf")
-        with atomic_path(folder / "figures" / f"{name}.png") as path:
-            Image.new("RGB", (40, 20), "white").save(path, "PNG")
-    return {
+    given = {
         "source": [folder / "paper" / "main.tex"],
         "references": ROOT / "paper" / "references.bib",
         "tables": named(folder / "tables", [f"{name}.csv" for name in TABLES]),
         "machine": File(str(folder / "machine.json"), {}),
-        "inputs": [File(str(folder / "inputs" / name), {"name": name}) for name in inputs],
+        "facts": facts,
+    }
+    inputs = {Path(name).stem: folder / "inputs" / name for name in INPUTS}
+    build.write_inputs(**given, outputs=inputs)
+    write_text(CLAIM, folder / "claims.yaml")
+    for name in facts.captions:
+        write_text("%PDF-1.4", folder / "figures" / f"{name}.pdf")
+        with atomic_path(folder / "figures" / f"{name}.png") as path:
+            Image.new("RGB", (40, 20), "white").save(path, "PNG")
+    return given | {
+        "inputs": [File(str(path), {"name": path.name}) for path in inputs.values()],
         "figures": named(folder / "figures", [f"{name}.pdf" for name in facts.captions]),
         "pictures": named(folder / "figures", [f"{name}.png" for name in facts.captions]),
-        "facts": facts,
         "claims": folder / "claims.yaml",
         "added": {"own": ["compiled"]},
         **{name: ROOT / FOLDER / file for name, file in ASSETS.items()},
@@ -188,6 +174,15 @@ def write_pages(given: dict[str, object], out: Path) -> Path:
     return out / "article"
 
 
+@pytest.fixture(scope="module", autouse=True)
+def one_table() -> Iterator[None]:
+    """The table that the manuscripts of these tests contain, in place of those of the study."""
+    with pytest.MonkeyPatch.context() as patch:
+        for module in (build, textables):
+            patch.setattr(module, "TEX_TABLES", {"tab_ranks": ranks})
+        yield
+
+
 @pytest.fixture(scope="module")
 def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The article of the small study; the page of models is another's."""
@@ -197,34 +192,31 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return pages
 
 
-class Links(HTMLParser):
-    """Identifiers of a page, and its links with their words."""
+TAG = re.compile(r"<[a-z]\w*[^>]*>")
+KEY = re.compile(r"""([\w-]+)=(?:"([^"]*)"|'([^']*)'|([^\s>"']+))""")
+
+
+class Links:
+    """Identifiers of a page, and its links: class, address, words."""
 
     def __init__(self, path: Path) -> None:
-        super().__init__()
-        self.names: list[str] = []
-        self.links: list[tuple[str, str, str]] = []  # class, address, words
-        self._open: list[str] | None = None
-        self.feed(path.read_text(encoding="utf-8"))
+        page = path.read_text(encoding="utf-8")
+        made = [(re.match(r"<\w+", tag)[0][1:], self.keys(tag)) for tag in TAG.findall(page)]
+        self.names = [keys["id"] for _, keys in made if "id" in keys]
+        self.links = [
+            (tag, keys.get("src") or keys.get("href") or "", "")
+            for tag, keys in made
+            if tag in ("img", "script", "link")
+        ]
+        for tag, words in re.findall(r"(<a [^>]*href=[^>]*>)(.*?)</a>", page, re.DOTALL):
+            keys = self.keys(tag)
+            # of a formula, its TeX
+            text = re.sub(r"<[^>]*>", "", re.sub(r"(?s)^.*<annotation[^>]*>", "", words))
+            self.links.append((keys.get("class", ""), keys["href"], unescape(text)))
 
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        found = dict(attrs)
-        self.names += [str(found["id"])] if "id" in found else []
-        if tag == "a" and "href" in found:
-            self._open = [found.get("class") or "", str(found["href"]), ""]
-        elif tag in ("img", "script", "link"):
-            self.links.append((tag, found.get("src") or found.get("href") or "", ""))
-        elif tag == "annotation" and self._open:
-            self._open[2] = ""  # what follows is the formula's TeX
-
-    def handle_data(self, data: str) -> None:
-        if self._open:
-            self._open[2] += data
-
-    def handle_endtag(self, tag: str) -> None:
-        if tag == "a" and self._open:
-            self.links.append((self._open[0], self._open[1], self._open[2]))
-            self._open = None
+    @staticmethod
+    def keys(tag: str) -> dict[str, str]:
+        return {name: unescape(a or b or c) for name, a, b, c in KEY.findall(tag)}
 
 
 @cache
@@ -266,7 +258,7 @@ def test_each_number_is_the_pdfs_and_leads_to_the_cells_that_it_was_rounded_from
             cells = table[number["column"]].iloc[number["rows"]]
             value = AGGREGATES[number["take"]](cells) if number["take"] else cells.iloc[0]
             assert format_number(value) == number["text"]
-    assert seen == set(origins["numbers"])
+    assert seen == {key for key, number in origins["numbers"].items() if number["rows"]}
 
 
 def test_a_made_table_leads_to_its_rows(small):
@@ -293,11 +285,8 @@ RUNS = frame("scene group error", ("a_b", "x_y", 0.0123), ("a_b", "z", 0.25), ("
     ],
 )
 def test_rows_agree_in_what_both_tables_have(cells, key):
-    text = rf"""\begin{{tabular}}{{llr}}
-scene & group & error \\
-{cells} \\
-\end{{tabular}}"""
-    made = linked_table(text, {"other": pd.DataFrame({"scene": ["c"]}), "runs": RUNS})
+    table = [("llr", ["scene", "group", "error"]), cells.split(" & ")]
+    made = linked_table(table, {"other": pd.DataFrame({"scene": ["c"]}), "runs": RUNS})
     number = cells.rpartition(" & ")[2]
     assert f"{key.encode().hex()}}}{{{number}}}" in made
 
@@ -313,7 +302,7 @@ scene & group & error \\
     ],
 )
 def test_a_number_among_words_is_a_link(cell, number):
-    made = linked_table(f"a & b \\\\\nnone & {cell} \\\\", {"runs": RUNS})
+    made = linked_table([("ll", ["a", "b"]), ["none", cell]], {"runs": RUNS})
     assert f"}}{{{number}}}" in made
     assert "{none}" not in made
 
@@ -377,6 +366,10 @@ def test_references_have_the_numbers_of_the_pdf(small, tmp_path):
         (folder := tmp_path / str(pages == small)).mkdir()
         numbers = numbers_of_tex(documents(paper), inputs, folder)
         links = [link for page in PAGES.values() for link in Links(pages / page).links]
+        placed = {address: n for address, n in numbers.items() if "#fig:" in address}
+        root = paper.parent if pages == small else ROOT
+        figures = {f"fig:{name}": n.manuscript for name, n in figure_numbers(root).items()}
+        assert placed == {address: figures[address.partition("#")[2]] for address in placed} != {}
         shown = {a: words.strip("()") for kind, a, words in links if a in numbers and not kind}
         assert shown == {address: numbers[address] for address in shown}
         kinds = {re.split("[#:]", address)[1] for address in shown}
@@ -399,8 +392,8 @@ def test_what_the_study_does_not_hold_is_left_out(small):
     )
     for words in ("Shown, ", "<strong>Opening.</strong> Words.", "Full.", "One? Two"):
         assert words in text
-    assert "Left out" not in text
-    assert "Not there" not in text
+    for words in ("Left out", "Not there", "lacking"):
+        assert words not in text
     assert "<strong>Theorem S1</strong>" in supplement
     rule = "(implementation: numpy, compiled)"
     for words in ("A &lt;b&gt; claim.", "First version of it.", rule):

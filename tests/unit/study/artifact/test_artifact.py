@@ -1,8 +1,7 @@
 """Artifacts: declarations are checked, settings typed, jobs run from plain data."""
 
-from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
 
 import pandas as pd
 import pytest
@@ -10,17 +9,9 @@ from pydantic import ValidationError
 
 from pdrom.core.store import checksum_path, read_table, write_table
 from pdrom.core.yamlfile import ConfigModel
-from study.artifact.artifact import Artifact, declare, declared_in, load, make, modules_in, normal
+from study.artifact import reads
+from study.artifact.artifact import Artifact, declare, declared_in, load, make, modules_in
 from study.artifact.paths import File, Place
-from study.artifact.reads import (
-    EachOf,
-    Every,
-    ProjectFile,
-    Setting,
-    Settings,
-    SourcesOf,
-    TableOf,
-)
 from study.experiments.kit.declaration import Experiment, experiment, experiments
 
 SCENE, GROUP = Place("a/{scene}.csv"), Place("b/{scene}/{group}.csv")
@@ -42,15 +33,10 @@ class Whole(Section):
 
     others: tuple[str, ...] = ("b",)
 
-    @property
-    def sources(self) -> list[str]:
-        """Files that people edit."""
-        return ["mesh.obj"]
-
 
 @experiment(
     "Rows of {scene} times a factor",
-    reads={"table": SCENE, "section": Setting("section")},
+    reads={"table": SCENE, "section": reads.Setting("section")},
     writes={"out": Place("c/{scene}.csv")},
 )
 def multiplied(table: File, section: Section, out: File) -> None:
@@ -58,29 +44,15 @@ def multiplied(table: File, section: Section, out: File) -> None:
     write_table(read_table(table.path) * section.factor, out.path)
 
 
-@dataclass
-class Sources:
-    """A study of two scenes."""
-
-    values: dict[str, Any] = field(default_factory=lambda: {"section": Whole(factor=2.0)})
-
-    def file(self, place, labels):
-        return place.at("r", **{name: labels[name] for name in place.labels})
-
-    def files(self, place, labels):
-        return [place.at("r", scene=scene) for scene in ("s", "t")]
-
-    def table(self, name):
-        return f"r/tables/{name}.csv"
-
-    def value(self, key, labels):
-        return self.values[key]
+# A study, as far as it is asked; the files of a real one: test_jobs.py.
+SETTINGS = {"section": Whole(factor=2.0), "factor": 3.0}
+STUDY = SimpleNamespace(value=lambda key, labels: SETTINGS[key])
 
 
 def test_a_job_runs_from_plain_data_and_says_what_made_it(tmp_path):
     source, out = str(tmp_path / "a" / "s.csv"), str(tmp_path / "c" / "s.csv")
     write_table(pd.DataFrame({"x": [1.0, 2.0]}), source)
-    settings = multiplied.settings(Sources(), {"scene": "s"})
+    settings = multiplied.settings(STUDY, {"scene": "s"})
     make(
         multiplied.address, multiplied.rule, settings=multiplied.plain(settings),
         labels={"scene": "s"}, code="c0de", inputs={"table": source}, outputs={"out": out},
@@ -90,7 +62,7 @@ def test_a_job_runs_from_plain_data_and_says_what_made_it(tmp_path):
 
 
 def test_a_job_depends_on_as_much_of_a_section_as_its_function_asks_for():
-    settings = multiplied.settings(Sources(), {"scene": "s"})
+    settings = multiplied.settings(STUDY, {"scene": "s"})
     assert multiplied.plain(settings) == {"section": {"factor": 2.0}}
     assert list(modules_in(settings)) == ["pdrom.model.effects.forces"]
 
@@ -103,30 +75,8 @@ def test_faulty_settings_are_refused(settings, tmp_path):
         multiplied.perform(settings, inputs, {"out": str(tmp_path / "c" / "s.csv")})
 
 
-@pytest.mark.parametrize(
-    ("read", "paths"),
-    [
-        (GROUP, "r/b/s/g.csv"),
-        (Every(SCENE), ["r/a/s.csv", "r/a/t.csv"]),
-        (TableOf("payoff"), "r/tables/payoff.csv"),
-        (ProjectFile("config/claims.yaml"), "config/claims.yaml"),
-        (SourcesOf("section"), ["mesh.obj"]),
-    ],
-)
-def test_files_are_asked_of_the_study(read, paths):
-    made = Artifact("a", "", normal({"x": read}), {"out": GROUP}, multiplied.function)
-    assert made.inputs(Sources(), {"scene": "s", "group": "g"}) == {"x": paths}
-
-
-def test_one_file_for_each_entry_of_a_setting():
-    entries = [File("", {"scene": scene}) for scene in "tst"]
-    read = EachOf(SCENE, "cases")
-    assert read.paths(Sources({"cases": entries}), {}) == ["r/a/t.csv", "r/a/s.csv", "r/a/t.csv"]
-
-
 def test_settings_that_go_together_are_one_model():
-    read = Settings(Section)
-    assert read.value(Sources({"factor": 3.0}), {}) == Section(factor=3.0)
+    assert reads.Settings(Section).value(STUDY, {}) == Section(factor=3.0)
 
 
 def test_labels_are_those_of_what_is_written():
@@ -135,7 +85,7 @@ def test_labels_are_those_of_what_is_written():
 
 
 def test_a_function_that_does_not_take_what_is_declared_is_refused():
-    made = Artifact("a", "", {"table": Every(SCENE)}, {"out": SCENE}, multiplied.function)
+    made = Artifact("a", "", {"table": reads.Every(SCENE)}, {"out": SCENE}, multiplied.function)
     with pytest.raises(TypeError, match="a: missing a required argument: 'section'"):
         declare(made, "out")
 

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from matplotlib.figure import Figure
+from study.pipeline.resolve import Job, Resolver
 
 from builders import frame
 from pdrom.core.store import write_hdf5, write_table
@@ -16,14 +17,14 @@ from pdrom.core.yamlfile import read_yaml
 from pdrom.model.effects import EFFECTS
 from pdrom.model.mesh.generators import bar, cloth
 from pdrom.model.mesh.types import Mesh, save_mesh
-from pdrom.reduction.method import load_methods
-from pdrom.reduction.sampling.deim import block_elements, deim_entries
+from pdrom.reduction.basis import Basis, save_basis
+from pdrom.reduction.method import MethodSpec, load_methods
+from pdrom.reduction.sampling import reductions
+from pdrom.reduction.snapshots import SPLITS, SnapshotSet, save_snapshots
 from places import CONFIG, ROOT
 from study.artifact import paths
 from study.artifact.reads import TableOf
 from study.figures.kit.declaration import declarations
-from study.pipeline.folders import Folders
-from study.pipeline.plan import Job, Plan
 from study.pipeline.study import Study
 from study.tables import declared
 
@@ -55,14 +56,14 @@ class Invented:
     def path(self, place: paths.Place, scene: str, group: str = "", method: str = "") -> str:
         """Path of a file with these labels."""
         labels = {"scene": scene, "group": group, "method": method}
-        return Plan(self.study, Folders(str(self.root))).file(place, labels)
+        return Resolver(self.study, str(self.root)).file(place, labels)
 
     def job(self, name: str, root: Path | None = None, **changes: object) -> Job:
         """Job of a figure whose options have ``changes``."""
         study = copy(self.study)
         options = study.figures[name].model_copy(update=changes)
         study.figures = {**study.figures, name: options}
-        return Plan(study, Folders(str(root or self.root))).job(declarations()[name], {})
+        return Resolver(study, str(root or self.root)).job(declarations()[name], {})
 
     def read(self, name: str, root: Path | None = None, **changes: object) -> dict[str, object]:
         """What the function of a figure gets."""
@@ -93,10 +94,9 @@ def make_results(results: Invented) -> None:
         for group in config.reduce:
             rank = 0 if scene in FLAT else 14
             count = len(EFFECTS.load(group).element_vertices(mesh))
-            bases = _write_bases(results, scene, group, count, rank, rng)
+            basis = _write_bases(results, scene, group, count, rank, rng)
             for method, spec in results.study.methods.items():
-                path = results.path(paths.SAMPLING, scene, group, method)
-                _write_sampling(path, bases, group, spec.rows)
+                _write_sampling(results.path(paths.SAMPLING, scene, group, method), basis, spec)
                 _write_reruns(results, scene, group, method, positions, rank, rng)
         if scene in FLAT:
             _write_noise_runs(results, scene)
@@ -114,38 +114,29 @@ def _trajectory(mesh: Mesh) -> np.ndarray:
     return q
 
 
-def _write_bases(results, scene, group, count, rank, rng) -> np.ndarray:
+def _write_bases(results, scene, group, count, rank, rng) -> Basis:
     rows = EFFECTS.load(group).rows_per_element
-    V = np.linalg.qr(rng.standard_normal((3 * rows * count, 14)))[0][:, :rank]
+    size = 3 * rows * count
+    V = np.linalg.qr(rng.standard_normal((size, 14)))[0][:, :rank]
+    numbers = rank, 1e-12, rows, False, (True,) * 3
+    basis = Basis(V, np.zeros(size), 0.5 ** np.arange(14), *numbers)
     for path in {results.path(paths.BASIS, scene, group, m) for m in results.study.methods}:
-        with write_hdf5(path) as file:
-            file["V"], file["mean"] = V, np.zeros(len(V))
-            file["singular_values"] = 0.5 ** np.arange(14)
-            own = {"separate_axes": False, "active_axes": [True] * 3}
-            file.attrs.update(rank=rank, roundoff=1e-12, rows_per_element=rows, **own)
-    with write_hdf5(results.path(paths.SNAPSHOTS, scene, group)) as file:
-        for split in ("train", "test", "heldout"):
-            file[split] = rng.standard_normal((10, rows * count, 3))
-            file[f"{split}_frames"] = np.arange(0, FRAMES, 2) + (split != "train")
-        file["row_mass"] = np.ones(rows * count)
-        file.attrs.update(rows_per_element=rows, elements=count, roundoff=1e-12)
-    return V
+        save_basis(basis, path)
+    found = {split: rng.standard_normal((10, rows * count, 3)) for split in SPLITS}
+    frames = {split: np.arange(0, FRAMES, 2) + (split != "train") for split in SPLITS}
+    made = SnapshotSet(**found, frames=frames, row_mass=np.ones(rows * count), elements=count,
+                       rows_per_element=rows, roundoff=1e-12)  # fmt: skip
+    save_snapshots(made, results.path(paths.SNAPSHOTS, scene, group))
+    return basis
 
 
-def _write_sampling(path: str, V: np.ndarray, group: str, rows: str) -> None:
-    size = 3 * EFFECTS.load(group).rows_per_element
+def _write_sampling(path: str, basis: Basis, spec: MethodSpec) -> None:
+    sizes = range(1, basis.rank + 1)
     with write_hdf5(path) as file:
-        for r in range(1, V.shape[1] + 1):
-            if rows == "scalar":
-                entries = deim_entries(V[:, :r])
-            elif rows == "joint":
-                entries = 3 * np.arange(r)
-            else:
-                elements = block_elements(V[:, :r], size)
-                entries = (size * elements[:, None] + np.arange(size)).ravel()
+        for r, reduction in reductions(basis, spec, sizes).items() if basis.rank else ():
             store = file.create_group(f"r{r:04d}")
-            store["entries"] = entries
-            store["elements"] = np.unique(entries // size)
+            store["entries"] = reduction.sampling.entries
+            store["elements"] = reduction.sampling.elements
 
 
 def _write_reruns(results, scene, group, method, positions, rank, rng) -> None:

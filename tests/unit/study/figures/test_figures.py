@@ -5,10 +5,7 @@ import os
 import subprocess
 import sys
 import warnings
-from collections.abc import Callable
-from functools import cache
 from pathlib import Path
-from typing import NamedTuple
 
 import h5py
 import numpy as np
@@ -45,52 +42,32 @@ def texts(figure: Figure) -> list[str]:
     return [text for text in found if text]
 
 
-class Drawn(NamedTuple):
-    """A figure, and its texts before it was written (which adds those of ticks)."""
-
-    figure: Figure
-    texts: list[str]
-
-
-@pytest.fixture(scope="module")
-def whole(study) -> Callable[[str], Drawn]:
-    """Each figure of the whole study, drawn once and without warnings."""
-
-    @cache
-    def drawn(name: str) -> Drawn:
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")
-            figure = study.draw(name)
-        return Drawn(figure, texts(figure))
-
-    return drawn
-
-
-def test_both_files_are_written_without_warnings(whole, figure_name, tmp_path):
+def test_every_figure_is_written_without_warnings_and_its_panels_hold_data(
+    study, figure_name, tmp_path
+):
+    """Positions have few digits: the last bits of the layout's solver differ between drawings."""
     pdf, png = tmp_path / "a.pdf", tmp_path / "a.png"
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        write_figure(whole(figure_name).figure, figure_name, pdf, png)
+        figure = study.draw(figure_name)
+        assert figure.axes
+        for ax in figure.axes:
+            assert ax.has_data() or ax.texts or ax.images, ax.get_title()
+        if figure_name not in PICTURES:
+            labels = {label for ax in figure.axes for label in (ax.get_xlabel(), ax.get_ylabel())}
+            assert len(labels - {""}) >= (1 if figure_name == "local_share" else 2)
+        unit = {"local_share": "(%)", "accuracy_cost": "(ms)"}.get(figure_name, "")
+        assert all(unit in ax.get_xlabel() for ax in figure.axes if ax.get_xlabel())
+        write_figure(figure, figure_name, pdf, png)
     assert pdf.read_bytes().startswith(b"%PDF")
     assert png.read_bytes().startswith(b"\x89PNG")
     assert pdf.stat().st_size < 1_500_000
     checksums = [checksum_path(pdf).name, checksum_path(png).name]
     assert sorted(path.name for path in tmp_path.iterdir()) == [*checksums, "a.pdf", "a.png"]
-
-
-def test_every_panel_holds_data_and_axes_are_labelled(whole, figure_name):
-    axes = whole(figure_name).figure.axes
-    assert axes
-    for ax in axes:
-        assert ax.has_data() or ax.texts or ax.images, ax.get_title()
-    if figure_name not in PICTURES:
-        labels = {label for ax in axes for label in (ax.get_xlabel(), ax.get_ylabel())} - {""}
-        assert len(labels) >= (1 if figure_name == "local_share" else 2)
-
-
-@pytest.mark.parametrize(("name", "unit"), [("local_share", "(%)"), ("accuracy_cost", "(ms)")])
-def test_units_stand_on_the_axes(whole, name, unit):
-    assert all(unit in ax.get_xlabel() for ax in whole(name).figure.axes if ax.get_xlabel())
+    figure.draw_without_rendering()
+    for ax in figure.axes if figure.get_layout_engine() is not None else ():
+        place = ax.get_position(original=True).extents
+        np.testing.assert_array_equal(place, place.round(6))
 
 
 DRAW_ALL = """
@@ -146,6 +123,9 @@ def test_a_failed_run_is_marked_and_never_drawn_with_nan(study):
     assert len(hatched) == 1
     # the last stored state is not finite: the one before it is drawn
     assert f"drawn: frame {BLOWUP_FRAME - 1}" in marked[0]
+    # a failure later than the drawn instant is none
+    early = study.draw("spring_runs", scenes=(scene,), frames=(0.1,))
+    assert not any("blew up" in text for text in texts(early))
 
 
 def test_a_run_that_ended_early_lies_on_the_rim(study):
@@ -174,11 +154,6 @@ def test_a_run_that_ended_early_lies_on_the_rim(study):
     assert [tick.get_text() for tick in right.get_xticklabels()] == ["$10^{1}$ to $10^{2}$"]
 
 
-def test_a_failure_later_than_the_drawn_instant_is_no_failure(study):
-    figure = study.draw("spring_runs", scenes=(BLOWN_UP[0],), frames=(0.1,))
-    assert not any("blew up" in text for text in texts(figure))
-
-
 def test_starts_that_fail_are_counted_below_runs_on_bases_of_round_off(study):
     """Kinds of starts with equal counts share a row; sizes beyond the rank are left out."""
     runs = [
@@ -202,6 +177,10 @@ def test_a_run_that_never_began_says_why(study):
     assert any("round-off" in t for t in texts(study.draw("strain_runs", scenes=("bend_fall",))))
     figure = study.draw("spring_runs", scenes=("spring_stretch",), ranks=(6, 20))
     assert any("exceeds" in text for text in texts(figure))
+    # sizes that ran are drawn once
+    for rank in (6, 14, "full"):
+        asked = {"methods": ("deim",), "ranks": (rank,)}
+        assert len(study.draw("spring_runs", scenes=("spring_stretch",), **asked).axes) == 2
 
 
 def test_a_run_out_of_view_is_drawn_to_a_stated_scale(small_study):
@@ -212,22 +191,6 @@ def test_a_run_out_of_view_is_drawn_to_a_stated_scale(small_study):
     write_block(Path(path))
     figure = study.draw("spring_runs", ranks=(6, 14))
     assert sum("scale 1 :" in text for text in texts(figure)) == 1
-
-
-@pytest.mark.parametrize("rank", [6, 14, "full"])
-def test_asked_sizes_are_drawn_once(study, rank):
-    figure = study.draw("spring_runs", scenes=("spring_stretch",), methods=("deim",), ranks=(rank,))
-    assert len(figure.axes) == 2
-
-
-def test_positions_have_few_digits(whole, figure_name):
-    """Of the layout's solver the last bits differ from one drawing to the next."""
-    figure = whole(figure_name).figure
-    figure.draw_without_rendering()
-    for ax in figure.axes:
-        if figure.get_layout_engine() is not None:
-            place = ax.get_position(original=True).extents
-            np.testing.assert_array_equal(place, place.round(6))
 
 
 def test_a_note_fits_its_figure():
@@ -320,11 +283,9 @@ def test_the_horizon_is_the_first_frame_above_the_threshold(study):
 
 @pytest.mark.parametrize("name", ["singular_values", "reconstruction_error"])
 def test_published_values_are_drawn_where_they_are_given(study, name):
-    def shown(**changes: object) -> bool:
-        return any("published code's output" in text for text in texts(study.draw(name, **changes)))
-
-    assert shown()
-    assert not shown(published={})
+    for changes, shown in (({}, True), ({"published": {}}, False)):
+        found = [text for text in texts(study.draw(name, **changes)) if "published code's" in text]
+        assert bool(found) is shown
 
 
 def test_a_mesh_that_does_not_fit_is_refused(small_study):

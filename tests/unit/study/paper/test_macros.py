@@ -7,18 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pdrom.core.errors import PaperError
-from study.paper.macros import (
-    MISSING,
-    decisions,
-    format_number,
-    is_held,
-    keys_of,
-    macros,
-    number_of,
-    provenance,
-    sentences,
-)
-from study.paper.tex import build_pdfs
+from study.paper import macros as tex
 
 TABLES = {
     "runs": pd.DataFrame(
@@ -39,14 +28,14 @@ TABLES = {
     [
         ("runs|scene=bar_a|method=deim|error", "0.12"),
         ("runs|scene=bar_a|method=pod|error", r"\ensuremath{4.6\cdot 10^{-7}}"),
-        ("runs|scene=b|r=20|error", MISSING),
+        ("runs|scene=b|r=20|error", tex.MISSING),
         ("runs|scene=b|method=pod|error", r"\ensuremath{\infty}"),
-        ("runs|scene=b|method=pod|r", MISSING),
+        ("runs|scene=b|method=pod|r", tex.MISSING),
         ("runs|scene=b|method=deim|r", "20"),
         ("runs|r=6.0|method=deim|scene", r"bar\_a"),
-        ("runs|scene=absent|error", MISSING),
-        ("runs|scene=absent|error|max", MISSING),
-        ("runs|scene=absent|error|count", MISSING),
+        ("runs|scene=absent|error", tex.MISSING),
+        ("runs|scene=absent|error|max", tex.MISSING),
+        ("runs|scene=absent|error|count", tex.MISSING),
         ("runs|scene=bar_a|error|max", "0.12"),
         ("runs|scene=bar_a|error|min", r"\ensuremath{4.6\cdot 10^{-7}}"),
         ("runs|r|median", "6"),
@@ -64,7 +53,7 @@ TABLES = {
     ],
 )
 def test_keys_by_hand(key, expected):
-    assert number_of(key, TABLES).text == expected
+    assert tex.number_of(key, TABLES).text == expected
 
 
 @pytest.mark.parametrize(
@@ -83,25 +72,21 @@ def test_keys_by_hand(key, expected):
 )
 def test_faulty_keys_name_themselves(key, message):
     with pytest.raises(PaperError, match=message) as caught:
-        number_of(key, TABLES)
+        tex.number_of(key, TABLES)
     assert rf"\val{{{key}}}" in str(caught.value)
 
 
 SOURCE = r"a \val{study|scenes} b \val{runs|r|count} \val{study|scenes} \value{x} \val {y}"
 
 
-def test_keys_in_order_of_first_use():
-    assert keys_of(SOURCE) == ["study|scenes", "runs|r|count"]
-    assert keys_of("no keys") == []
-
-
-def test_one_macro_a_key():
-    text = macros(SOURCE, TABLES)
+def test_one_macro_a_key_in_order_of_first_use():
+    assert tex.keys_of(SOURCE) == ["study|scenes", "runs|r|count"]
+    text = tex.macros(SOURCE, TABLES)
     assert text.count(r"\expandafter\def") == 2
     assert r"\expandafter\def\csname val@study|scenes\endcsname{14}" in text
     assert r"\expandafter\def\csname val@runs|r|count\endcsname{3}" in text
     assert text.index(r"\makeatletter") < text.index(r"\def") < text.index(r"\makeatother")
-    assert macros(SOURCE, TABLES) == text
+    assert tex.macros(SOURCE, TABLES) == text
 
 
 @pytest.mark.parametrize(
@@ -111,22 +96,21 @@ def test_one_macro_a_key():
         (1e6, r"\ensuremath{1.0\cdot 10^{6}}"), (12345.6, r"\ensuremath{1.2\cdot 10^{4}}"),
         (1234.5, "1234"), (99.6, "100"), (12.34, "12"), (9.96, "10"), (1.26, "1.3"),
         (0.126, "0.13"), (0.0126, "0.013"), (0.00126, r"\ensuremath{1.3\cdot 10^{-3}}"),
-        (-0.5, "-0.50"), (float("nan"), MISSING), (float("inf"), r"\ensuremath{\infty}"),
+        (-0.5, "-0.50"), (float("nan"), tex.MISSING), (float("inf"), r"\ensuremath{\infty}"),
         (float("-inf"), r"\ensuremath{-\infty}"), (True, "yes"), (False, "no"), ("a_b", r"a\_b"),
     ],
 )  # fmt: skip
 def test_numbers_as_text(value, expected):
-    assert format_number(value) == expected
+    assert tex.format_number(value) == expected
 
 
 @given(st.floats(1e-12, 1e12))
 def test_text_of_a_number_is_close_to_it(value):
-    text = format_number(value)
+    text = shown = tex.format_number(value)
     for old, new in ((r"\ensuremath{", ""), (r"\cdot 10^{", "e"), ("}", "")):
         text = text.replace(old, new)
     assert float(text) == pytest.approx(value, rel=0.051)
-    assert format_number(-value) in (f"-{format_number(value)}",
-                                     format_number(value).replace("{", "{-", 1))  # fmt: skip
+    assert tex.format_number(-value) in (f"-{shown}", shown.replace("{", "{-", 1))
 
 
 HELD = {
@@ -149,24 +133,17 @@ Next. \known{{Both: {BAR}, {CLOTH}.}}
 """
 
 
-def test_blocks_are_found_with_their_paragraphs():
-    found = sentences(BLOCKS)
-    assert [sentence.paragraph for sentence in found] == [0, 0, 0, 1, 2, 2]
-    assert [sentence.is_row for sentence in found] == [False] * 4 + [True] * 2
-    assert found[0].text == rf"The bar has {BAR} \emph{{so}}."
-
-
 @pytest.mark.parametrize(
     "source", [r"\known{open {x}", r"\known{a \known{b} c}", r"\known{\row{b} c}"]
 )
 def test_faulty_blocks_are_named(source):
     with pytest.raises(PaperError, match=r"another one|not closed"):
-        sentences(source)
+        tex.sentences(source)
 
 
 def test_a_sentence_needs_all_of_its_numbers_and_a_row_goes_without_a_note():
-    assert decisions(BLOCKS, HELD) == ["shown", "noted", "dropped", "noted", "shown", "dropped"]
-    assert decisions(rf"\row{{{CLOTH} \\}} \known{{{CLOTH}}}", HELD) == ["dropped", "noted"]
+    assert tex.decisions(BLOCKS, HELD) == ["shown", "noted", "dropped", "noted", "shown", "dropped"]
+    assert tex.decisions(rf"\row{{{CLOTH} \\}} \known{{{CLOTH}}}", HELD) == ["dropped", "noted"]
 
 
 @pytest.mark.parametrize(
@@ -181,32 +158,12 @@ def test_a_sentence_needs_all_of_its_numbers_and_a_row_goes_without_a_note():
     ],
 )
 def test_what_a_configuration_holds(key, held):
-    assert is_held(key, HELD) is held
-
-
-def pages(tmp_path, part):
-    """Length of the document that TeX makes of the source."""
-    known = provenance({"main": decisions(BLOCKS, HELD)}, part, "config/default.yaml")
-    document = "\n".join(
-        [r"\documentclass{article}", r"\usepackage[T1]{fontenc}\usepackage{lmodern,xcolor}",
-         r"\definecolor{okgrey}{gray}{0.4}",
-         macros(BLOCKS, HELD) + known, r"\begin{document}",
-         r"\ifpart PART \configuration\ of \fullstudy\fi", BLOCKS, r"\typeout{end}",
-         r"\end{document}"]
-    )  # fmt: skip
-    (tmp_path / "main.tex").write_text(document, encoding="utf-8")
-    build_pdfs({tmp_path / "main.tex": tmp_path / "main.pdf"}, [])
-    return (tmp_path / "main.pdf").stat().st_size
-
-
-def test_tex_accepts_what_is_left(tmp_path):
-    whole, part = pages(tmp_path, None), pages(tmp_path, "config/my_study.yaml")
-    assert 0 < whole < part
+    assert tex.is_held(key, HELD) is held
 
 
 def test_the_note_names_the_configuration_that_holds_the_numbers():
-    text = provenance({"main": ["noted"]}, "config/tiny.yaml", "config/default.yaml")
+    text = tex.provenance({"main": ["noted"]}, "config/tiny.yaml", "config/default.yaml")
     assert r"\parttrue" in text
     assert r"\newcommand{\configuration}{\texttt{config/tiny.yaml}}" in text
     assert r"[The full study (\texttt{config/default.yaml}) holds" in text
-    assert r"\partfalse" in provenance({}, None, "config/default.yaml")
+    assert r"\partfalse" in tex.provenance({}, None, "config/default.yaml")

@@ -11,7 +11,7 @@ from pdrom.core.errors import PdromError
 from pdrom.core.machine import Units, machine
 from pdrom.core.store import write_table
 from places import ROOT
-from study.artifact.usage import Usage
+from study.artifact.logs import Usage
 from study.experiments.kit.declaration import experiments
 from study.pipeline import run
 from study.pipeline.commandline import CommandLine

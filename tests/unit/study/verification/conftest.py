@@ -1,6 +1,7 @@
 """The tracked tables of the tiny study as a folder of results that agrees with its references."""
 
 import shutil
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import numpy as np
@@ -14,10 +15,9 @@ from study.artifact.reads import TableOf
 from study.tables import declared
 from study.verification.examine import Examination
 from study.verification.files import is_derived, made
-from study.verification.references import folder_of, read_reference, write_reference
+from study.verification.references import folder_of, read_references, write_reference
 from study.verification.subject import Subject
 
-REFERENCES = ROOT / "results" / "reference"
 RESULTS = "results/studies/tiny"
 
 
@@ -34,17 +34,8 @@ def subject():
 @pytest.fixture(scope="session")
 def tracked():
     """Expected tables of the tiny study as they are kept; a new one may have none yet."""
-    folder = REFERENCES / "studies" / "tiny" / "tables"
-    read = {name: read_reference(table, folder) for name, table in declared().items()}
-    return {name: reference.frame for name, reference in read.items() if reference is not None}
-
-
-def make(path):
-    """A small file with its checksum."""
-    if path.endswith(".h5"):
-        with write_hdf5(path):
-            return
-    write_text("there\n", path)
+    read = read_references(ROOT / folder_of(RESULTS))
+    return {name: reference.frame for name, reference in read.items()}
 
 
 def timed(table, frame):
@@ -75,21 +66,21 @@ def project(tracked, subject, tmp_path_factory):
             write_reference(table, frame, folder_of(RESULTS))
         figures = subject.plan.fixed["figures"]
         read = {path for job in figures for path in job.files if path.startswith("results/")}
-        for path in read | {path for job in figures for path in job.outputs.values()}:
-            if not Path(path).exists():
-                make(path)
+        read |= {path for job in figures for path in job.outputs.values()}
+        for path in (path for path in read if not Path(path).exists()):
+            if path.endswith(".h5"):
+                with write_hdf5(path):
+                    pass
+            else:
+                write_text("there\n", path)
     return folder
 
 
 def derived_tables():
     """Tables that are made from others, these first."""
-    names = [name for name in declared() if is_derived(name)]
-
-    def rank(name):
-        reads = declared()[name].reads.values()
-        return max([1 + rank(r.name) for r in reads if isinstance(r, TableOf)], default=0)
-
-    return sorted(names, key=rank)
+    reads = {name: table.reads.values() for name, table in declared().items()}
+    graph = {name: [r.name for r in own if isinstance(r, TableOf)] for name, own in reads.items()}
+    return filter(is_derived, TopologicalSorter(graph).static_order())
 
 
 @pytest.fixture

@@ -1,14 +1,14 @@
 """What an entry takes is the sum over the jobs that it needs; its command makes its files."""
 
 import shlex
-from dataclasses import dataclass
+from collections import namedtuple
 from pathlib import Path
 
 import snakemake.cli  # noqa: F401 : before the graph, which cannot be imported first
 from snakemake.dag import DAG
 
 from places import ROOT
-from study.artifact.usage import Usage
+from study.artifact.logs import Usage
 from study.figures.kit.declaration import declarations
 from study.pipeline.commandline import CommandLine
 from study.pipeline.front import completed
@@ -20,12 +20,7 @@ from study.verification.subject import Subject
 TINY = ["--configfile", "config/tiny.yaml"]
 
 
-@dataclass(frozen=True)
-class Job:
-    """A job of Snakemake, as far as it is asked."""
-
-    output: tuple[str, ...]
-    log: tuple[str, ...]
+Job = namedtuple("Job", "output log")  # a job of Snakemake, as far as it is asked
 
 
 class Dag:

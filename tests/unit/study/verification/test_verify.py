@@ -1,9 +1,7 @@
 """``./reproduce verify`` on a folder of results: outcomes, exit codes, the page."""
 
-import io
 import json
 import re
-from contextlib import redirect_stdout
 from pathlib import Path
 from subprocess import CompletedProcess
 from types import SimpleNamespace
@@ -16,9 +14,9 @@ from study.article.build import INDEX, VERIFIED
 from study.artifact.paths import ARTICLE, TABLE
 from study.figures.kit.declaration import declarations
 from study.tables import declared
-from study.verification.command import NOTHING, update, verify, verify_tables
+from study.verification.command import NOTHING, status_of, update, verify, verify_tables
+from study.verification.examine import Line, Outcome
 from study.verification.files import made
-from study.verification.lines import Line, Outcome, status_of
 from study.verification.references import LOG, folder_of
 from study.verification.subject import Status
 
@@ -26,16 +24,19 @@ RESULTS = "results/studies/tiny"
 CLAIMS = ("claims", "claims_tests", "claims_sensitivity")
 
 
-def verified(subject):
-    """Exit code and printed lines."""
-    printed = io.StringIO()
-    with redirect_stdout(printed):
+@pytest.fixture
+def verified(results, subject, capsys):
+    """Exit code and printed lines of the comparison when it is asked."""
+
+    def asked():
         status = verify_tables(subject)
-    return status, printed.getvalue().splitlines()
+        return status, capsys.readouterr().out.splitlines()
+
+    return asked
 
 
-def test_expected_results_hold(results, subject):
-    status, printed = verified(subject)
+def test_expected_results_hold_and_outcomes_reach_an_article(results, verified):
+    status, printed = verified()
     page = (results / RESULTS / "verification.md").read_text(encoding="utf-8")
     assert not any("differs" in line or "not there" in line for line in printed)
     assert status == Status.HOLDS
@@ -44,13 +45,10 @@ def test_expected_results_hold(results, subject):
     assert {"claim C1", "claim C12", "figure singular_values"} <= names
     assert any(re.match("table [a-z_]+: not comparable", line) for line in printed)
     assert "| C1 | reproduced |" in page
-    assert not Path(ARTICLE.at(RESULTS, name=VERIFIED)).exists()
-
-
-def test_outcomes_reach_the_article_where_it_was_made(results, subject):
     place = Path(ARTICLE.at(RESULTS, name=VERIFIED))
+    assert not place.exists()
     write_text("<!DOCTYPE html>", place.with_name(INDEX))
-    *lines, _, _ = verified(subject)[1]
+    *lines, _, _ = verified()[1]
     text = place.read_text(encoding="utf-8")
     found = json.loads(text.removeprefix("window.pdromVerified=").removesuffix(";\n"))
     assert found == dict(line.split(": ", 1) for line in lines)
@@ -86,12 +84,12 @@ def test_a_verdict_that_errors_have_changed_is_a_difference(examination):
     assert claims["C8"].outcome is tables[0].outcome is Outcome.DIFFERS
 
 
-def test_what_is_missing_has_its_own_code_and_names_its_command(results, subject):
+def test_what_is_missing_has_its_own_code_and_names_its_command(verified):
     reference = folder_of(RESULTS) / "winners.csv"
     kept = reference.read_bytes()
     for path in (TABLE.at(RESULTS, name="stability"), f"{RESULTS}/figures/ladder.png", reference):
         Path(path).unlink()
-    status, printed = verified(subject)
+    status, printed = verified()
     reference.write_bytes(kept)
     assert status == Status.MISSING
     assert "table winners: no reference, run verify --update" in printed
@@ -120,10 +118,9 @@ def test_a_configuration_without_references_and_options_that_clash_are_refused(r
     own.write_text("ranks: [6]\n")
     with pytest.raises(ConfigurationError, match="no expected tables of this configuration"):
         verify(["--configfile", str(own)])
-    with pytest.raises(SystemExit):
-        verify(["--no-such-option"])
-    with pytest.raises(SystemExit):
-        verify(["--update", "--files"])
+    for words in (["--no-such-option"], ["--update", "--files"]):
+        with pytest.raises(SystemExit):
+            verify(words)
 
 
 def plan_says(monkeypatch, code: int, words: str) -> None:

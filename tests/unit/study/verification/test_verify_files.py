@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import pandas as pd
 import pytest
+from study.pipeline.resolve import Job
 
 from pdrom.core.errors import StorageError
 from pdrom.core.provenance import made_by
@@ -14,14 +15,12 @@ from places import ROOT
 from study.article.build import article
 from study.artifact.artifact import Artifact
 from study.artifact.paths import TABLE, File, Place
-from study.artifact.reads import One
 from study.figures.kit.declaration import declarations
 from study.live.page import live_page
 from study.paper.build import paper_inputs
 from study.pipeline import manifest
 from study.pipeline.folders import Folders
 from study.pipeline.manifest import read_manifest, write_manifest
-from study.pipeline.plan import Job
 from study.tables import declared
 from study.verification import files
 from study.verification.files import differing, verify_files
@@ -46,7 +45,7 @@ def _pages(page: File, other: File) -> None:
         write_text(text, file.path)
 
 
-TABLES, PDF = {"table": One(TABLE)}, {"out": Place("main.pdf")}
+TABLES, PDF = {"table": TABLE}, {"out": Place("main.pdf")}
 MANUSCRIPT = Artifact("MANUSCRIPT", "", TABLES, PDF, _doubled)
 BROKEN = Artifact("BROKEN", "", TABLES, PDF, _broken)
 PLACES = {"page": Place("a.html"), "other": Place("tables/a.html")}
@@ -67,9 +66,9 @@ def study(tmp_path, monkeypatch):
             file["x"] = [1.0, 2.0]
         write_text("x\n3.0\n2.5\n", NAMES[2])
         write_text(r"\val", NAMES[3])
-    fixed = {"paper": [job_of(MANUSCRIPT)]}
-    plan = SimpleNamespace(fixed=fixed, own_files=set(NAMES), results="results")
+    plan = SimpleNamespace(fixed={"paper": [job_of(MANUSCRIPT)]})
     monkeypatch.setitem(vars(SUBJECT), "plan", plan)
+    monkeypatch.setattr(SUBJECT.plan, "own_files", set(NAMES))
     monkeypatch.setattr(files, "asked_for", lambda paths, *_: [])
     renew_checksum(monkeypatch)
 
@@ -78,7 +77,7 @@ def renew_checksum(monkeypatch):
     """Write the manifest of what is there, as a run does or somebody who hides an edit."""
     found = [name for name in NAMES if Path(name).is_file()]
     monkeypatch.setattr(manifest, "study_files", lambda *_: found)
-    write_manifest(SUBJECT.plan, OPTIONS)
+    write_manifest(None, Folders(), OPTIONS)
 
 
 def rewrite(change):
@@ -97,54 +96,94 @@ def test_an_entry_has_checksums_and_what_made_the_file_and_equal_results_have_eq
     environment = entries["paper/m.tex"].environment
     assert "numpy" in read_manifest("results").environments[environment]["library_versions"]
     before = Path("results/manifest.json").read_bytes()
-    write_manifest(SUBJECT.plan, OPTIONS)
+    write_manifest(None, Folders(), OPTIONS)
     assert Path("results/manifest.json").read_bytes() == before
 
 
-def test_intact_files_hold(capsys):
+def test_intact_files_hold_with_what_a_target_names_beside_the_study(monkeypatch, capsys):
     assert verify_files(SUBJECT) is Status.HOLDS
     assert "4 of 4 files" in capsys.readouterr().out
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_a_changed_digit_is_noticed_and_its_command_named(name, capsys):
-    path = Path(name)
-    content = bytearray(path.read_bytes())
-    content[len(content) // 2] ^= 1
-    path.write_bytes(bytes(content))
-    assert verify_files(SUBJECT) is Status.DIFFERS
-    said = capsys.readouterr().out
-    command = f"./reproduce --configfile 'my study.yaml' --force -- {name}"
-    assert f"{name}: damaged (its checksum differs); make it again by {command}\n" in said
-    assert "3 of 4 files" in said
-
-
-@pytest.mark.parametrize("content", ["x\n3.0\n2.6\n", "", "a picture"])
-def test_a_file_with_checksum_that_its_inputs_do_not_give_is_noticed(content, monkeypatch, capsys):
-    write_text(content, NAMES[2])
-    renew_checksum(monkeypatch)
-    assert verify_files(SUBJECT) is Status.DIFFERS
-    assert f"{NAMES[2]}: not what its inputs give; make it again by" in capsys.readouterr().out
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_an_entry_that_was_taken_out_is_noticed(name, capsys):
-    rewrite(lambda entries: entries.pop(f"../{name}".replace("../results/", "")))
-    assert verify_files(SUBJECT) is Status.DIFFERS
-    assert f"{name}: not in the manifest; make it again by" in capsys.readouterr().out
-
-
-@pytest.mark.parametrize("name", ["../../secret", "/etc/hostname", "../paper/main.tex", "notes.md"])
-def test_a_name_that_is_no_file_of_the_study_is_noticed(name, capsys):
-    rewrite(lambda entries: entries.update({name: entries["tables/a.csv"]}))
-    assert verify_files(SUBJECT) is Status.DIFFERS
-    assert ": no file of this study\n" in capsys.readouterr().out
-
-
-def test_what_a_target_names_beside_the_study_may_be_listed(monkeypatch):
     monkeypatch.setattr(SUBJECT.plan, "own_files", set(NAMES[1:]))
     monkeypatch.setattr(files, "asked_for", lambda paths, *_: [NAMES[0]])
     assert verify_files(SUBJECT) is Status.HOLDS
+
+
+def flipped(name, _):
+    """A file with another digit."""
+    content = bytearray(Path(name).read_bytes())
+    content[len(content) // 2] ^= 1
+    Path(name).write_bytes(bytes(content))
+
+
+def flipped_before_a_later_run(name, monkeypatch):
+    flipped(name, monkeypatch)
+    renew_checksum(monkeypatch)
+
+
+def forged(content, monkeypatch):
+    """Another file with its checksum and its entry."""
+    write_text(content, NAMES[2])
+    renew_checksum(monkeypatch)
+
+
+def taken_out(name, _):
+    rewrite(lambda entries: entries.pop(f"../{name}".replace("../results/", "")))
+
+
+def foreign(name, _):
+    rewrite(lambda entries: entries.update({name: entries["tables/a.csv"]}))
+
+
+def lost(name, _):
+    Path(name).unlink()
+
+
+def lost_and_unlisted(name, monkeypatch):
+    lost(name, monkeypatch)
+    renew_checksum(monkeypatch)
+    assert "paper/m.tex" not in read_manifest("results").files
+
+
+def broken_maker(_, monkeypatch):
+    """What made a file fails now."""
+    monkeypatch.setattr(SUBJECT.plan, "fixed", {"paper": [job_of(BROKEN)]})
+
+
+def no_manifest(content, _):
+    write_text(content, "results/manifest.json")
+    with pytest.raises(StorageError, match=r"manifest\.json: "):
+        read_manifest("results")
+
+
+STUDY = "./reproduce --configfile 'my study.yaml'"
+AGAIN = f"make it again by {STUDY} --force -- "
+RUN = f"; a run that succeeds writes it: {STUDY}\n"
+# Change, what it changes, what is said of it.
+FAULTS = (
+    (flipped, NAMES, f"NAME: damaged (its checksum differs); {AGAIN}NAME\n3 of 4 files"),
+    (flipped_before_a_later_run, NAMES[:1], "NAME: damaged"),
+    (forged, ("x\n3.0\n2.6\n", "", "a picture"), f"{NAMES[2]}: not what its inputs give; {AGAIN}"),
+    (taken_out, NAMES, f"NAME: not in the manifest; {AGAIN}NAME\n"),
+    (foreign, ("../../secret", "/etc/hostname", "../paper/main.tex", "notes.md"),
+     ": no file of this study\n"),
+    (lost, NAMES, f"NAME: not there; {AGAIN}NAME\n"),
+    (lost_and_unlisted, NAMES[3:], f"NAME: not there; {AGAIN}NAME\n"),
+    (lost, ("results/manifest.json",), f"NAME: not there{RUN}"),
+    (lost, ("results/paper/.m.tex.blake2b",), f"{NAMES[3]}: damaged"),
+    (broken_maker, NAMES[2:3], f"NAME: not what its inputs give; {AGAIN}NAME\n"),
+    (no_manifest, ("{", '{"format": 2}', '{"format": 1, "file": {}}'), RUN),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("change", "name", "said"), [(c, name, said) for c, names, said in FAULTS for name in names]
+)
+def test_a_fault_is_noticed_and_its_command_named(change, name, said, monkeypatch, capsys):
+    change(name, monkeypatch)
+    status = verify_files(SUBJECT)
+    found = capsys.readouterr().out
+    assert said.replace("NAME", name) in found
+    assert status is (Status.MISSING if ": not there" in found else Status.DIFFERS)
 
 
 def test_many_faults_are_counted(monkeypatch, capsys):
@@ -152,58 +191,8 @@ def test_many_faults_are_counted(monkeypatch, capsys):
     monkeypatch.setattr(SUBJECT.plan, "own_files", {*NAMES, *more})
     assert verify_files(SUBJECT) is Status.MISSING
     said = capsys.readouterr().out
-    assert "and 10 more; finish the study by ./reproduce --configfile 'my study.yaml'\n" in said
+    assert f"and 10 more; finish the study by {STUDY}\n" in said
     assert "4 of 34 files" in said
-
-
-@pytest.mark.parametrize("content", ["{", '{"format": 2}', '{"format": 1, "file": {}}'])
-def test_a_manifest_that_is_none_is_said(content, capsys):
-    write_text(content, "results/manifest.json")
-    with pytest.raises(StorageError, match=r"manifest\.json: "):
-        read_manifest("results")
-    assert verify_files(SUBJECT) is Status.DIFFERS
-    assert "a run that succeeds writes it: ./reproduce --configfile" in capsys.readouterr().out
-
-
-def broken_maker(monkeypatch):
-    """What made a file fails now."""
-    monkeypatch.setattr(SUBJECT.plan, "fixed", {"paper": [job_of(BROKEN)]})
-
-
-def lost_checksum(_):
-    Path(NAMES[3]).with_name(".m.tex.blake2b").unlink()
-
-
-def lost_and_unlisted(monkeypatch):
-    Path(NAMES[3]).unlink()
-    renew_checksum(monkeypatch)
-    assert "paper/m.tex" not in read_manifest("results").files
-
-
-def damaged_before_a_later_run(_):
-    Path(NAMES[0]).write_text("x\n1.5\n2.6\n")
-    write_manifest(SUBJECT.plan, OPTIONS)
-
-
-@pytest.mark.parametrize(
-    ("fault", "status"),
-    [
-        (broken_maker, Status.DIFFERS),
-        (lost_checksum, Status.DIFFERS),
-        (damaged_before_a_later_run, Status.DIFFERS),
-        (lost_and_unlisted, Status.MISSING),
-        (lambda _: Path("results/manifest.json").unlink(), Status.MISSING),
-    ],
-)
-def test_a_fault_is_noticed(fault, status, monkeypatch):
-    fault(monkeypatch)
-    assert verify_files(SUBJECT) is status
-
-
-def test_a_lost_file_is_named(capsys):
-    Path(NAMES[0]).unlink()
-    assert verify_files(SUBJECT) is Status.MISSING
-    assert f"{NAMES[0]}: not there; make it again by" in capsys.readouterr().out
 
 
 def test_outputs_of_one_name_stay_apart():
