@@ -13,14 +13,14 @@ import pytest
 from places import ROOT
 
 LIMITS = {
-    "lines of src": 37_710,
-    "modules of src": 245,
-    "lines of tests": 26_387,
+    "lines of src": 36_982,
+    "modules of src": 237,
+    "lines of tests": 24_987,
     "words of documentation": 24_578,
     "tables": 25,
     "figures": 23,
     "experiments": 19,
-    "percent of src in decorators, signatures and imports": 19.83,
+    "percent of src in decorators, signatures and imports": 19.61,
 }
 PAGES = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "config/README.md", "docs/**/*.md")
 

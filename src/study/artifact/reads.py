@@ -14,7 +14,7 @@ from study.artifact.paths import Place
 
 Labels = Mapping[str, str]
 Paths = str | list[str]
-# Finds the paths and settings of a study for a job's labels: `study.pipeline.resolve.Resolver`.
+# Finds the paths and settings of a study for a job's labels: `study.pipeline.plan.Plan`.
 Sources = Any
 
 

@@ -9,7 +9,6 @@ import numpy as np
 import pandas as pd
 import pytest
 from matplotlib.figure import Figure
-from study.pipeline.resolve import Job, Resolver
 
 from builders import frame
 from pdrom.core.store import write_hdf5, write_table
@@ -25,6 +24,8 @@ from places import CONFIG, ROOT
 from study.artifact import paths
 from study.artifact.reads import TableOf
 from study.figures.kit.declaration import declarations
+from study.pipeline.folders import Folders
+from study.pipeline.plan import Job, Plan
 from study.pipeline.study import Study
 from study.tables import declared
 
@@ -56,14 +57,14 @@ class Invented:
     def path(self, place: paths.Place, scene: str, group: str = "", method: str = "") -> str:
         """Path of a file with these labels."""
         labels = {"scene": scene, "group": group, "method": method}
-        return Resolver(self.study, str(self.root)).file(place, labels)
+        return Plan(self.study, Folders(str(self.root))).file(place, labels)
 
     def job(self, name: str, root: Path | None = None, **changes: object) -> Job:
         """Job of a figure whose options have ``changes``."""
         study = copy(self.study)
         options = study.figures[name].model_copy(update=changes)
         study.figures = {**study.figures, name: options}
-        return Resolver(study, str(root or self.root)).job(declarations()[name], {})
+        return Plan(study, Folders(str(root or self.root))).job(declarations()[name], {})
 
     def read(self, name: str, root: Path | None = None, **changes: object) -> dict[str, object]:
         """What the function of a figure gets."""

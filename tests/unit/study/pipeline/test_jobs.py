@@ -44,7 +44,7 @@ def test_inputs_are_files_of_the_study_in_its_order(made):
     assert made["sensitivity"].inputs == {
         "parts": ["out/sensitivity/spring_oop.csv", "out/sensitivity/strain_oop.csv"]
     }
-    assert made["payoff"].inputs == {"reruns": "out/tables/reduced_reruns.csv"}
+    assert made["winners"].inputs["rows"] == "out/tables/alternatives.csv"
     assert made["online"].inputs["parts"] == []
     assert made["claims"].inputs["rules"] == "config/claims.yaml"
 

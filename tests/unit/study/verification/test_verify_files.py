@@ -6,7 +6,6 @@ from types import SimpleNamespace
 
 import pandas as pd
 import pytest
-from study.pipeline.resolve import Job
 
 from pdrom.core.errors import StorageError
 from pdrom.core.provenance import made_by
@@ -21,6 +20,7 @@ from study.paper.build import paper_inputs
 from study.pipeline import manifest
 from study.pipeline.folders import Folders
 from study.pipeline.manifest import read_manifest, write_manifest
+from study.pipeline.plan import Job
 from study.tables import declared
 from study.verification import files
 from study.verification.files import differing, verify_files
@@ -66,9 +66,9 @@ def study(tmp_path, monkeypatch):
             file["x"] = [1.0, 2.0]
         write_text("x\n3.0\n2.5\n", NAMES[2])
         write_text(r"\val", NAMES[3])
-    plan = SimpleNamespace(fixed={"paper": [job_of(MANUSCRIPT)]})
+    fixed = {"paper": [job_of(MANUSCRIPT)]}
+    plan = SimpleNamespace(fixed=fixed, own_files=set(NAMES), results="results")
     monkeypatch.setitem(vars(SUBJECT), "plan", plan)
-    monkeypatch.setattr(SUBJECT.plan, "own_files", set(NAMES))
     monkeypatch.setattr(files, "asked_for", lambda paths, *_: [])
     renew_checksum(monkeypatch)
 
@@ -77,7 +77,7 @@ def renew_checksum(monkeypatch):
     """Write the manifest of what is there, as a run does or somebody who hides an edit."""
     found = [name for name in NAMES if Path(name).is_file()]
     monkeypatch.setattr(manifest, "study_files", lambda *_: found)
-    write_manifest(None, Folders(), OPTIONS)
+    write_manifest(SUBJECT.plan, OPTIONS)
 
 
 def rewrite(change):
@@ -96,7 +96,7 @@ def test_an_entry_has_checksums_and_what_made_the_file_and_equal_results_have_eq
     environment = entries["paper/m.tex"].environment
     assert "numpy" in read_manifest("results").environments[environment]["library_versions"]
     before = Path("results/manifest.json").read_bytes()
-    write_manifest(None, Folders(), OPTIONS)
+    write_manifest(SUBJECT.plan, OPTIONS)
     assert Path("results/manifest.json").read_bytes() == before
 
 
