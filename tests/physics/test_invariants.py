@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from builders import GRAVITY, GROUPS, TOP, make_scene, random_rotation, with_effects
+from builders import GRAVITY, GROUPS, make_scene, random_rotation, with_effects
 from pdrom.model.dynamics.stepper import State
 from pdrom.model.runs import simulate, trajectory
 
@@ -73,23 +73,6 @@ def test_objective_never_rises(group_scene, rng, spread):
         state, report = loop.step(state, frame)
         assert np.isfinite(state.positions).all()
         assert (np.diff(report.objective) <= 1e-12 * report.objective[0]).all()
-
-
-def test_objective_never_rises_with_all_groups_and_pins(rng):
-    scene = make_scene(
-        GRAVITY,
-        TOP,
-        {"effect": "bending", "weight": 1e-1},
-        {"effect": "spring", "weight": 1e6},
-        {"effect": "strain", "weight": 1e-2},
-        mesh={"kind": "cloth", "rows": 7, "columns": 6, "wave": 0.1},
-        iterations=30,
-    )
-    points = scene.mesh.points
-    state = State(points + 0.3 * rng.standard_normal(points.shape), np.zeros_like(points))
-    _, report = scene.stepper().step(state, 0)
-    assert (np.diff(report.objective) <= 1e-12 * report.objective[0]).all()
-    assert report.objective[-1] < 0.9 * report.objective[0]
 
 
 def test_rotation_and_translation_equivariance(group_scene, rng):

@@ -134,6 +134,12 @@ FAULTY = {
     "group not there": (lambda full, _: api.reduce(full, "strain"), "no group 'strain'"),
     "no snapshots": (lambda full, _: spring(replace(full, snapshots={})), "stored no snapshots"),
     "mesh not there": (lambda _, p: given({"kind": "file", "path": "x.obj"}, folder=p), r"x\.obj"),
+    "positions cut": (
+        lambda full, _: spring(replace(full, positions=full.positions[:-1])), "full: positions",
+    ),
+    "positions NaN": (
+        lambda full, _: spring(replace(full, positions=np.nan * full.positions)), "full: positions",
+    ),
     "mesh no pair": (lambda *_: given((1, 2, 3)), "mesh of 3 parts"),
     "r a fraction": (lambda full, _: spring(full, r=1.5), "r = 1.5: a whole number"),
     "r a text": (lambda full, _: spring(full, r="3"), "r = '3': a whole number"),
@@ -333,12 +339,3 @@ def test_a_run_from_elsewhere_reads_no_other_file(reduced, tmp_path):
         file["positions"] = h5py.ExternalLink(str(tmp_path / "one.h5"), "/full")
     with pytest.raises(StorageError, match="leads elsewhere"):
         api.load(path)
-
-
-@pytest.mark.parametrize("fault", ["cut", "nan"])
-def test_positions_that_are_not_whole_are_not_reduced(reduced, fault):
-    positions = np.array(reduced.full.positions)
-    positions[2, 1, 0] = np.nan
-    full = replace(reduced.full, positions=positions[:-1] if fault == "cut" else positions)
-    with pytest.raises(PdromError, match="full: positions"):
-        api.reduce(full, "spring", r=1)

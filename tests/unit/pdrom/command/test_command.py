@@ -255,37 +255,20 @@ def test_what_an_obstacle_moves_at_rest_is_said_once(folder, caplog):
 
 
 ASK = ["reduce", "small.yaml", "--error"]
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (["run", "none.yaml"], "none.yaml: no such configuration file"),
-        (["show", "none.h5"], "none.h5: no such file"),
-        (["reduce", "small.yaml", "--group", "sprin"], "no group 'sprin'"),
-        (["reduce", "small.yaml", "--group", "spring", "--method", "gapy"], "did you mean 'gappy'"),
-        (["reduce", "small.yaml", "--group", "spring", "--r", "99"], "r = 99"),
-        (["run", "small.yaml", "--out", "nowhere.d/../small.yaml/x.h5"], "cannot be written"),
-        (["new", "nowhere/x"], "No such file"),
-        (["show", "a" * 5000], "File name too long"),
-        (["show", "."], "is a folder"),
-        (["run", "."], "no such configuration file"),
-        (["reduce", "small.yaml"], "--group or --error: one is required"),
-        ([*ASK, "0"], "--error = '0': a number above 0 and below 1 is required"),
-        ([*ASK, "nan"], "--error = 'nan': a number above 0 and below 1"),
-        ([*ASK, "velocty=0.1"], "unknown quantity 'velocty' (allowed: position, velocity), did"),
-        ([*ASK, "0.1"], "--error: --run is required with it: a training run"),
-        ([*ASK, "0.1", "--plot", "a.png"], "--plot: only together with --group"),
-    ],
-)
-def test_faults_are_one_line_and_code_1(folder, arguments, words, capsys):
-    assert run(arguments) == Status.FAULTY
-    last = capsys.readouterr().err.splitlines()[-1]
-    assert last.startswith("pdrom: ")
-    assert words in last
-
-
-UNWRITABLE = [
+FAULTY = [
+    (["run", "none.yaml"], "none.yaml: no such configuration file"),
+    (["show", "none.h5"], "none.h5: no such file"),
+    (["reduce", "small.yaml", "--group", "sprin"], "no group 'sprin'"),
+    (["new", "nowhere/x"], "No such file"),
+    (["show", "a" * 5000], "File name too long"),
+    (["show", "."], "is a folder"),
+    (["run", "."], "no such configuration file"),
+    (["reduce", "small.yaml"], "--group or --error: one is required"),
+    ([*ASK, "0"], "--error = '0': a number above 0 and below 1 is required"),
+    ([*ASK, "nan"], "--error = 'nan': a number above 0 and below 1"),
+    ([*ASK, "velocty=0.1"], "unknown quantity 'velocty' (allowed: position, velocity), did"),
+    ([*ASK, "0.1"], "--error: --run is required with it: a training run"),
+    ([*ASK, "0.1", "--plot", "a.png"], "--plot: only together with --group"),
     ([*REDUCE, "--plot", "x.exe"], "--plot x.exe: no kind of picture 'exe' (allowed: pdf, png"),
     ([*REDUCE, "--plot", "x.pgn"], "did you mean 'png'?"),
     ([*REDUCE, "--plot", "."], "--plot .: no kind of picture ''"),
@@ -339,8 +322,8 @@ def test_a_deleted_working_folder_is_one_line(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
 
 
-@pytest.mark.parametrize(("arguments", "words"), UNWRITABLE)
-def test_what_cannot_be_written_is_found_before_anything_runs(
+@pytest.mark.parametrize(("arguments", "words"), FAULTY)
+def test_what_is_not_there_or_cannot_be_written_is_found_before_anything_runs(
     folder, arguments, words, monkeypatch, capsys
 ):
     def called(*_: object, **__: object) -> None:
@@ -388,6 +371,14 @@ def test_a_run_of_another_scene_is_not_reduced(folder, finished, capsys):
     shutil.copy(finished / "small.h5", folder)
     (folder / "small.yaml").write_text(SMALL.replace("1.0e+5", "2.0e+5"))
     assert "a run of another scene" in refusal(capsys, [*REDUCE, "--run", "small.h5"])
+
+
+def test_faults_that_a_run_meets_are_told(folder, finished, capsys):
+    assert run(["run", "small.yaml", "--out", "nowhere.d/../small.yaml/x.h5"]) == Status.FAULTY
+    assert "cannot be written" in capsys.readouterr().err.splitlines()[-1]
+    shutil.copy(finished / "small.h5", folder)
+    for more, words in (("--method=gapy", "did you mean 'gappy'"), ("--r=99", "r = 99")):
+        assert words in refusal(capsys, [*REDUCE, "--run", "small.h5", more])
 
 
 def test_a_blow_up_has_a_code_of_its_own(folder, monkeypatch, capsys):

@@ -10,14 +10,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from builders import call_kernel, random_rotation
+from builders import bound, call_kernel, projected, random_rotation
 from pdrom.model.constraints.bending import VertexBending
 from pdrom.model.constraints.lanes import LANES, pack
 from pdrom.model.constraints.spring import EdgeSpring
 from pdrom.model.effects import EFFECTS
 from pdrom.model.mesh.generators import cloth
 from pdrom.model.mesh.types import Mesh
-from simplices import bound, projected
 
 KINDS = ("strain", "tetrahedron_strain", "deformation_gradient", "volume", "area")
 

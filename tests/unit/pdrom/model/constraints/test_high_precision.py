@@ -12,11 +12,10 @@ import pytest
 from hypothesis import given, settings
 from mpmath import mp
 
-from builders import random_rotation
+from builders import bound, projected, random_rotation
 from pdrom.model.constraints.base import ConstraintGroup
 from pdrom.model.effects import EFFECTS
 from pdrom.model.mesh.generators import cloth
-from simplices import bound, projected
 from strategies import SEEDS
 
 # A backward stable projection is wrong by a few round-offs times the condition number.

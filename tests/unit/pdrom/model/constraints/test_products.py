@@ -5,10 +5,9 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from builders import random_rotation
+from builders import bound, projected, random_rotation
 from pdrom.model.constraints.products import reference_nearest
 from pdrom.model.effects import EFFECTS
-from simplices import bound, projected
 
 LOW, HIGH = 0.99, 1.01
 KINDS = {"volume": 3, "area": 2}

@@ -58,9 +58,7 @@ def test_nearest(point):
     five = chosen({"kind": "nearest", "point": near.tolist(), "count": 5})
     distance = np.linalg.norm(SHEET.points - near, axis=1)
     assert distance[five].max() <= np.delete(distance, five).min() + 1e-9
-
-
-def test_equally_near_vertices_are_taken_from_the_first():
+    # of equally near vertices the first
     square = cloth(3, 3, "xz")
     assert chosen({"kind": "nearest", "point": [0, 2, 0], "count": 2}, square) == [1, 4]
 
@@ -74,9 +72,6 @@ def test_boundary_loops_from_the_longest():
     assert [len(loop) for loop in loops] == [32, 8, 6]
     with pytest.raises(SceneError, match="index = 3, the mesh has 3"):
         chosen({"kind": "boundary_loop", "index": 3}, mesh)
-
-
-def test_a_closed_surface_has_no_loop():
     with pytest.raises(SceneError, match="boundary loop: index = 0, the mesh has 0"):
         chosen({"kind": "boundary_loop"}, bar(3, 3, 3))
 

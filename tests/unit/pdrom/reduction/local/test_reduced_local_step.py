@@ -50,12 +50,12 @@ class InventedGroup:
         return self.S.T @ (self.row_weights[:, None] * p)
 
 
-def reduction_of(spec: MethodSpec, seed: int = 1) -> tuple[np.ndarray, Reduction]:
-    """Snapshots (7, rows, 3) and the reduction of size R made from them."""
-    rng = np.random.default_rng(seed)
+def reduction_of(spec: MethodSpec) -> Reduction:
+    """Reduction of size R made from seven snapshots (rows, 3)."""
+    rng = np.random.default_rng(1)
     p = rng.standard_normal((7, ROWS, 3)) + 1.0
     basis = compute_basis(p, rng.uniform(0.5, 2.0, ROWS), 0.0, P, spec)
-    return p, Reduction(basis, select(basis, spec, R), spec, R)
+    return Reduction(basis, select(basis, spec, R), spec, R)
 
 
 def whole(group, p: np.ndarray, preset: str, r: int | None = None) -> Reduction:
@@ -90,8 +90,11 @@ def spec(request: pytest.FixtureRequest) -> MethodSpec:
 
 
 def test_adds_the_lifted_reconstruction(spec):
-    """S^T W of `Reduction.reconstruct`, for projections that are not in the space."""
-    _, reduction = reduction_of(spec)
+    """S^T W of `Reduction.reconstruct`, for projections that are not in the space.
+
+    It is added to what is there, and the energy is not known.
+    """
+    reduction = reduction_of(spec)
     other = np.random.default_rng(5).standard_normal((3, ROWS, 3))
     group = InventedGroup(other[0])
     step = ReducedLocalStep(group, reduction)
@@ -99,10 +102,14 @@ def test_adds_the_lifted_reconstruction(spec):
         group.projections = projections
         scale = np.abs(group.full(wanted)).max()
         np.testing.assert_allclose(added(step), group.full(wanted), atol=1e-11 * scale)
+        rhs = np.full((N, 3), 7.0)
+        assert np.isnan(step.accumulate(np.zeros((N, 3)), rhs))
+        np.testing.assert_allclose(rhs - 7.0, added(step), atol=1e-12 * np.abs(rhs).max())
+    assert step.name == "invented"
 
 
 def test_evaluates_sampled_elements_only(spec):
-    _, reduction = reduction_of(spec)
+    reduction = reduction_of(spec)
     group = InventedGroup(np.ones((ROWS, 3)))
     step = ReducedLocalStep(group, reduction)
     step.begin_frame(np.zeros((N, 3)))
@@ -157,15 +164,6 @@ def test_the_lift_is_timed_apart(group_scene, rng):
     assert step.lift_seconds == 0.0
 
 
-def test_adds_to_what_is_there_and_knows_no_energy(spec):
-    _, reduction = reduction_of(spec)
-    step = ReducedLocalStep(InventedGroup(np.ones((ROWS, 3))), reduction)
-    rhs = np.full((N, 3), 7.0)
-    assert np.isnan(step.accumulate(np.zeros((N, 3)), rhs))
-    np.testing.assert_allclose(rhs - 7.0, added(step), atol=1e-12 * np.abs(rhs).max())
-    assert step.name == "invented"
-
-
 @pytest.mark.parametrize("preset", [name for name in PRESETS if name != "published"])
 def test_real_groups_reproduce_their_full_local_step(group_scene, preset):
     """Snapshots of random positions; at one of them all modes give the group's own S^T W p."""
@@ -218,12 +216,8 @@ def test_basis_of_all_iterates_reruns_the_full_order_run(group):
     snapshots = np.stack(watched.seen)
     assert len(snapshots) == 12
     chosen = scene.group(group)
-    masses = np.ones(snapshots.shape[1])
     for method in ("pod", "qdeim", "block-qdeim"):
-        spec = PRESETS[method]
-        basis = compute_basis(snapshots, masses, 0.0, chosen.rows_per_element, spec)
-        r = basis.rank
-        reduction = Reduction(basis, select(basis, spec, r), spec, r)
+        reduction = whole(chosen, snapshots, method)
         steps = replace_group(scene, group, ReducedLocalStep(chosen, reduction))
         result = rerun(scene, scene.system, steps, reference, 10.0)
         assert result.blowup_frame is None

@@ -196,15 +196,9 @@ def test_skinning_weights_are_a_partition_of_unity(handles):
     np.testing.assert_allclose(weights.sum(axis=1), 1.0, rtol=1e-13)
     assert (weights.max(axis=0) > 0.0).all()
     assert np.linalg.matrix_rank(weights) == handles
-
-
-def test_skinning_weights_do_not_depend_on_place_and_size(rng):
-    points = rng.standard_normal((40, 3))
-    np.testing.assert_allclose(
-        spaces.skinning_weights(7.0 * points + 3.0, 5),
-        spaces.skinning_weights(points, 5),
-        atol=1e-12,
-    )
+    # whatever their place and size
+    again = spaces.skinning_weights(7.0 * points + 3.0, handles)
+    np.testing.assert_allclose(again, weights, atol=1e-12)
 
 
 @pytest.mark.parametrize("k", [1, 4, 9, 20])
@@ -216,13 +210,8 @@ def test_skinning_modes_are_mass_orthonormal_without_affine_part(moved, k):
     np.testing.assert_allclose(
         spaces.affine_columns(points).T @ (masses[:, None] * modes), 0.0, atol=1e-8
     )
-
-
-def test_skinning_ends_at_the_size_of_the_mesh(moved):
-    scene, _ = moved
-    modes = spaces.skinning_modes(scene.mesh.points, scene.masses, 500)
-    # everything but the three affine columns of a flat sheet
-    assert modes.shape[1] == scene.mesh.vertices - 3
+    # they end at the size of the mesh: all but the three affine columns of a flat sheet
+    assert spaces.skinning_modes(points, masses, 500).shape[1] == scene.mesh.vertices - 3
 
 
 NOTHING = np.empty(0, dtype=np.int64)
