@@ -12,18 +12,14 @@ import pandas as pd
 
 from pdrom.view.text import escape
 from study.paper.build import Facts
-from study.paper.macros import NOTED, SHOWN, closing, matching, note, sentences
+from study.paper.macros import NOTED, SHOWN, VAL, closing, matching, note, sentences
 from study.paper.source import COMMENT, FIGURE
 from study.paper.textables import Rows, tabular
 
 ORIGIN = "origin:"
-_VAL = re.compile(r"\\val\{([^{}]*)\}")
 _MATH = re.compile(r"(?<!\\)\$((?:[^$\\]|\\.)*)\$", re.DOTALL)
 _ENSURED = re.compile(r"\\ensuremath\{((?:[^{}]|\{[^{}]*\})*)\}")
-_CAPTION = re.compile(r"\\csname caption@(\w+)\\endcsname")
-_PART = re.compile(
-    r"\\ifpart(?![A-Za-z])(.*?)(?:\\else(?![A-Za-z])(.*?))?\\fi(?![A-Za-z])", re.DOTALL
-)
+_PART = re.compile(r"(?s)\\ifpart(?![A-Za-z])(.*?)(?:\\else(?![A-Za-z])(.*?))?\\fi(?![A-Za-z])")
 _DROPPED = re.compile(
     r"\\(?:tableofcontents|renewcommand\{.*)|(?:\{\\\w+\s*)?\\input\{\w+\.bbl\}\}?"
 )
@@ -33,10 +29,7 @@ _NUMBER = re.compile(
     r"(?:[^A-Za-z]|\bloses\b)*"
 )
 _TAIL = re.compile(r"(\(|, )(\d[\d/, ]*)([)}]?)$")  # last number, as in "holds (20/20)"
-_FIGURE = (
-    r"\\begin{figure}\\includegraphics{\1.pdf}"
-    r"\\caption{\\csname caption@\1\\endcsname}\\label{fig:\1}\\end{figure}"
-)
+_FIGURE = r"\begin{figure}\includegraphics{%s.pdf}\caption{%s}\label{fig:%s}\end{figure}"
 # Short definitions of the preamble, which pandoc reads; definitions of layout are replaced.
 _SHORT = re.compile(r"(?m)^\\(?:newcommand\{\\(?!longtableof|tablefile)\w+\}.*\}|newtheorem.*)$")
 REPLACED = r"""
@@ -54,14 +47,13 @@ def prepared(source: str, document: str, origins: Mapping[str, Any], facts: Fact
     preamble, begin, text = source.partition(r"\begin{document}")
     left_out = rf"\emph{{[{note(facts.part, facts.full_study)}]}}"
     text = COMMENT.sub("", _decided(text, origins["known"][document], left_out))
-    text = FIGURE.sub(_FIGURE, text)
-    text = _CAPTION.sub(lambda found: facts.captions[found[1]], text)
+    text = FIGURE.sub(lambda found: _FIGURE % (found[1], facts.captions[found[1]], found[1]), text)
     text = _PART.sub(lambda found: (found[1] if facts.part else found[2]) or "", text)
     full = facts.full_study
     for name, words in {"configuration": facts.part or full, "fullstudy": full}.items():
         shown = rf"\texttt{{{escape(words)}}}".replace("\\", r"\\")
         text = re.sub(rf"\\{name}(?![A-Za-z])(?:\{{\}})?", shown, text)
-    text = _VAL.sub(
+    text = VAL.sub(
         lambda found: _link(found[1], origins["numbers"][found[1]]["text"]), _MATH.sub(_apart, text)
     )
     text = _DROPPED.sub("", text.replace("{fittedtabular}", "{tabular}"))
@@ -89,7 +81,7 @@ def _decided(source: str, known: Sequence[str], left_out: str) -> str:
 
 def _apart(found: re.Match[str]) -> str:
     """Split a formula at its ``\\val`` numbers, since a link cannot stand inside a formula."""
-    if not _VAL.search(found[1]):
+    if not VAL.search(found[1]):
         return found[0]
     parts = re.split(r"(\\val\{[^{}]*\})", found[1])
     return "".join(p if p.startswith(r"\val") else f"${p.strip()}$ " for p in parts if p.strip())

@@ -113,9 +113,10 @@ class Artifact:
         ValidationError
             A setting does not have the type of the function's annotation.
         """
-        made = {name: place.file(str(outputs[name])) for name, place in self.writes.items()}
-        whole = "outputs" in inspect.signature(self.function).parameters
-        self.function(**self.read(settings, inputs), **({"outputs": outputs} if whole else made))
+        made: dict[str, Any] = {"outputs": outputs}
+        if "outputs" not in inspect.signature(self.function).parameters:
+            made = {name: place.file(str(outputs[name])) for name, place in self.writes.items()}
+        self.function(**self.read(settings, inputs), **made)
 
     def read(self, settings: Mapping[str, Any], inputs: Mapping[str, Any]) -> dict[str, Any]:
         """Return the function's arguments: content of the files ``inputs``, typed ``settings``."""

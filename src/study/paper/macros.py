@@ -24,7 +24,7 @@ import pandas as pd
 from pdrom.core.errors import PaperError
 from pdrom.view.text import escape
 
-_KEY = re.compile(r"\\val\{([^{}]*)\}")
+VAL = re.compile(r"\\val\{([^{}]*)\}")
 _FILTER = re.compile(r"(.*?)(!?=)(.*)")
 Filter = tuple[str, str, str]  # column, sign, value
 MISSING = "n/a"
@@ -42,7 +42,7 @@ AGGREGATES: dict[str, Callable[[pd.Series], Any]] = {
 
 def keys_of(source: str) -> list[str]:
     """Return the keys of ``\\val`` in a TeX source, in order of first use."""
-    return list(dict.fromkeys(_KEY.findall(source)))
+    return list(dict.fromkeys(VAL.findall(source)))
 
 
 def macros(source: str, tables: Mapping[str, pd.DataFrame]) -> str:

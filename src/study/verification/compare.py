@@ -5,7 +5,6 @@ Rounding errors decide some rows, such as chaotic or ill-conditioned runs (`Cont
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 
@@ -94,7 +93,6 @@ def _key(cell: object) -> str:
     return f"{cell:.6g}" if isinstance(cell, float) else str(cell)
 
 
-@dataclass(frozen=True)
 class Context:
     """Facts from other expected tables that show which rows rounding errors decide.
 
@@ -105,14 +103,10 @@ class Context:
         runs; some tables list only runs that have an error
     """
 
-    chaotic: frozenset[str] = frozenset()
-    modes: Mapping[tuple[str, str], int] = field(default_factory=dict)
-    gains: Mapping[tuple, float] = field(default_factory=dict)
-    ended: tuple[frozenset[tuple], frozenset[tuple]] = (frozenset(), frozenset())
-
-    @classmethod
-    def of(cls, tables: Mapping[str, pd.DataFrame], found: pd.DataFrame | None = None) -> "Context":
-        """Context from expected ``tables`` by name, and from the found table of runs."""
+    def __init__(
+        self, tables: Mapping[str, pd.DataFrame], found: pd.DataFrame | None = None
+    ) -> None:
+        """Context from expected ``tables`` by name, and from the ``found`` table of runs."""
         runs, spectra, errors = (
             tables[name] if name in tables else declared()[name].checked(pd.DataFrame())
             for name in (RUNS, SPECTRA, RECONSTRUCTION)
@@ -121,37 +115,31 @@ class Context:
         above = spectra[spectra.above_roundoff.fillna(False)]
         amplified = errors[errors.gain.notna()]
         ended = [trained(each) for each in (runs, runs[:0] if found is None else found)]
-        first, second = (frozenset(names(own[own[OF_RUN[0]].isna()], RUN)) for own in ended)
-        return cls(
-            chaotic=frozenset(frames.index[frames.horizon_frame < frames.frames]),
-            modes=above.groupby(["scene", "group"]).component.max().astype(int).to_dict(),
-            gains=dict(zip(names(amplified), amplified.gain, strict=True)),
-            ended=(first, second),
-        )
+        self.chaotic = set(frames.index[frames.horizon_frame < frames.frames])
+        self.modes = above.groupby(["scene", "group"]).component.max().astype(int).to_dict()
+        self.gains = dict(zip(names(amplified), amplified.gain, strict=True))
+        self.ended = [set(names(own[own[OF_RUN[0]].isna()], RUN)) for own in ended]
 
 
-@dataclass
 class Comparison:
     """Comparison of an expected and a found table, cell by cell.
 
     e, f : matching rows of the expected and of the found table, in equal order
     """
 
-    table: Table
-    expected: pd.DataFrame
-    found: pd.DataFrame
-    context: Context = field(default_factory=Context)
-
-    def __post_init__(self) -> None:
-        self.pairs = pairs(self.table, self.expected, self.found)
-        self.e = self.expected.iloc[[i for i, _ in self.pairs]].reset_index(drop=True)
-        self.f = self.found.iloc[[j for _, j in self.pairs]].reset_index(drop=True)
+    def __init__(
+        self, table: Table, expected: pd.DataFrame, found: pd.DataFrame, context: Context
+    ) -> None:
+        self.table, self.expected, self.found, self.context = table, expected, found, context
+        self.pairs = pairs(table, expected, found)
+        self.e = expected.iloc[[i for i, _ in self.pairs]].reset_index(drop=True)
+        self.f = found.iloc[[j for _, j in self.pairs]].reset_index(drop=True)
         self.loose = cache(self._loose)  # function of a column
         self._timed: Sequence = [()] * len(self.e)  # names of timed columns, for each row
-        if self.table.timed_cells is not None:
-            reads = self.table.reads.items()
+        if table.timed_cells is not None:
+            reads = table.reads.items()
             files = {name: Path(r.path) for name, r in reads if isinstance(r, ProjectFile)}
-            self._timed = self.table.timed_cells(self.e, **files)
+            self._timed = table.timed_cells(self.e, **files)
 
     def compared(self, column: Column) -> np.ndarray:
         """Boolean array (rows): True where the column's cell does not depend on timing."""

@@ -111,9 +111,9 @@ class Examination:
         """Context of the comparison, from the expected tables and the found table of runs."""
         tables = {name: reference.frame for name, reference in self.expected.items()}
         try:
-            return compare.Context.of(tables, self.found(compare.RUNS))
+            return compare.Context(tables, self.found(compare.RUNS))
         except StorageError:
-            return compare.Context.of(tables)
+            return compare.Context(tables)
 
     def _again(self, name: str) -> pd.DataFrame | None:
         """Return the table ``name`` made again from existing tables, if it reads tables only.

@@ -87,21 +87,19 @@ C1:
   beyond: [{what: others, metric: local_share, compare: "<=", threshold: 0.7}]
   changes: [{date: 2026-11-21, after_data: true, reason: "First version of it."}]
 """
-PAYOFF = frame(
-    "method position_basis scenes error_train", ("pod", "full", 3, 1.5e-4),
-    ("deim", 'a, "b"', 4, 0.2512),
-)  # fmt: skip
-CLAIMS_TESTS = frame(
-    "part claim what satisfied of least median most verdict",
-    *((part, "C1", "all rows", 3, 4, 0.5, 0.75, 1.0, "holds") for part in ("published", "beyond")),
-)
 TABLES = {
-    "payoff": PAYOFF,
-    "claims_tests": CLAIMS_TESTS,
+    "payoff": frame(
+        "method position_basis scenes error_train", ("pod", "full", 3, 1.5e-4),
+        ("deim", 'a, "b"', 4, 0.2512),
+    ),
+    "claims_tests": frame(
+        "part claim what satisfied of least median most verdict",
+        *((p, "C1", "all rows", 3, 4, 0.5, 0.75, 1.0, "holds") for p in ("published", "beyond")),
+    ),
     "local_share": frame("implementation local_share", ("numpy", 0.75)),
     "ladder": frame("gain", (2.0,)),
     "claims": frame("claim verdict verdict_beyond", ("C1", "holds", "depends")),
-}
+}  # fmt: skip
 
 
 def ranks(payoff: pd.DataFrame) -> Iterator[Any]:

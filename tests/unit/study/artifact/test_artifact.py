@@ -98,3 +98,10 @@ def test_artifacts_are_found_and_loaded_by_their_address():
         assert load(made.address) is made
         assert set(made.types) | set(made.files) == set(made.reads)
     assert declared_in("pdrom.core", Experiment) == {}
+
+
+def test_a_function_may_take_all_outputs_by_name():
+    found = []
+    made = Artifact("a", "", {}, {"out": SCENE}, lambda outputs: found.append(outputs))
+    made.perform({}, {}, {"out": "any path"})
+    assert found == [{"out": "any path"}]

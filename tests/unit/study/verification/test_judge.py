@@ -27,7 +27,7 @@ def studies():
     found = []
     for folder in FOLDERS:
         tables = {name: reference.frame for name, reference in read_references(folder).items()}
-        found.append((tables, Context.of(tables)))
+        found.append((tables, Context(tables)))
     return found
 
 
@@ -142,7 +142,7 @@ def test_a_run_on_amplified_samples_may_end_otherwise(tiny):
     same = np.array([key == names(runs, RUN)[row] for key in names(points, RUN)])
     assert same.any()
     assert differences(table, context, points, points[~same])
-    assert not differences(table, Context.of(tables, runs), points, points[~same])
+    assert not differences(table, Context(tables, runs), points, points[~same])
 
 
 def test_a_fit_may_leave_an_element_more_and_no_other_selection_may(tiny):
