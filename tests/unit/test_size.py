@@ -13,9 +13,9 @@ import pytest
 from places import ROOT
 
 LIMITS = {
-    "lines of src": 36_982,
+    "lines of src": 36_963,
     "modules of src": 237,
-    "lines of tests": 24_987,
+    "lines of tests": 24_869,
     "words of documentation": 24_578,
     "tables": 25,
     "figures": 23,
