@@ -19,7 +19,7 @@ from checkout import ROOT, copy_repository
 
 from machines.same_results import without_times
 from pdrom.core.store import check_file
-from study.artifact.paths import MANIFEST
+from study.artifact.paths import MACHINE, MANIFEST
 from study.tables import declared
 
 MICRO = {
@@ -136,7 +136,7 @@ def _cksum(content: bytes) -> str:
 
 def _timed(path: Path) -> bool:
     """Whether a file depends on timing, as the manifest does by the checksums in it."""
-    apart = "logs" in path.parts or path.name == MANIFEST.pattern
+    apart = "logs" in path.parts or path.name in (MANIFEST.pattern, MACHINE.pattern)
     return path.parts[-2] in TIMED_FOLDERS or path.stem in TIMED_FIGURES or apart
 
 

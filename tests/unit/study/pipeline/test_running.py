@@ -9,14 +9,7 @@ import time
 import pytest
 
 from pdrom.core.errors import INTERRUPTED
-from study.pipeline.running import (
-    LOCK,
-    SNAKEMAKE_LOCKS,
-    AtWorkError,
-    hold,
-    remove_stale_locks,
-    settle_dates,
-)
+from study.pipeline import running
 
 HOLDER = """
 import sys, time
@@ -47,49 +40,49 @@ def other():
 
 
 def snakemake_lock() -> None:
-    SNAKEMAKE_LOCKS.mkdir(parents=True)
-    (SNAKEMAKE_LOCKS / "0.output.lock").write_text("results/x\n")
+    running.SNAKEMAKE_LOCKS.mkdir(parents=True)
+    (running.SNAKEMAKE_LOCKS / "0.output.lock").write_text("results/x\n")
 
 
 def test_the_second_process_names_the_first(other):
-    with pytest.raises(AtWorkError, match=rf"process {other.pid} on .* is at work in this folder"):
-        hold()
-    assert LOCK.read_text().startswith(f"process {other.pid} ")
+    with pytest.raises(running.AtWorkError, match=rf"process {other.pid} on .* is at work"):
+        running.hold()
+    assert running.LOCK.read_text().startswith(f"process {other.pid} ")
 
 
 def test_a_lock_goes_with_its_process_however_it_ends(other):
     other.send_signal(signal.SIGKILL)
     other.wait()
     snakemake_lock()
-    descriptor = hold()
-    assert LOCK.read_text().startswith(f"process {os.getpid()} ")
-    assert not SNAKEMAKE_LOCKS.exists()
+    descriptor = running.hold()
+    assert running.LOCK.read_text().startswith(f"process {os.getpid()} ")
+    assert not running.SNAKEMAKE_LOCKS.exists()
     os.close(descriptor)
 
 
 def test_a_lock_is_not_inherited_by_jobs():
-    descriptor = hold()
+    descriptor = running.hold()
     with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) as job:
         os.close(descriptor)
-        os.close(hold())
+        os.close(running.hold())
         job.communicate(b"\n")
 
 
 def test_stale_locks_go_and_those_of_a_living_run_stay(other):
     snakemake_lock()
-    remove_stale_locks()
-    assert SNAKEMAKE_LOCKS.exists()
+    running.remove_stale_locks()
+    assert running.SNAKEMAKE_LOCKS.exists()
     other.kill()
     other.wait()
-    remove_stale_locks()
-    assert not SNAKEMAKE_LOCKS.exists()
-    os.close(hold())
+    running.remove_stale_locks()
+    assert not running.SNAKEMAKE_LOCKS.exists()
+    os.close(running.hold())
 
 
 def test_a_folder_that_cannot_be_written_is_named(folder):
     (folder / ".snakemake").write_text("a file where the folder should be")
-    with pytest.raises(AtWorkError, match=r"run\.lock: cannot be written"):
-        hold()
+    with pytest.raises(running.AtWorkError, match=r"run\.lock: cannot be written"):
+        running.hold()
 
 
 DAY = 86_400 * 10**9
@@ -103,12 +96,12 @@ def test_future_dates_come_before_now_in_their_order(tmp_path):
         path.parent.mkdir(exist_ok=True)
         path.write_text(name)
         os.utime(path, ns=(start, start + offset))
-    assert settle_dates([tmp_path, tmp_path / "none"]) == 4
+    assert running.settle_dates([tmp_path, tmp_path / "none"]) == 4
     dates = {name: (tmp_path / name).stat().st_mtime_ns for name in offsets}
     assert dates["old"] == start - DAY
     assert dates["old"] < dates["early"] == dates["twin"] < dates["late"] < dates["deep/later"]
     assert dates["deep/later"] <= time.time_ns()
-    assert settle_dates([tmp_path]) == 0
+    assert running.settle_dates([tmp_path]) == 0
 
 
 def test_dates_of_what_a_link_leads_to_are_left_alone(tmp_path):
@@ -120,7 +113,7 @@ def test_dates_of_what_a_link_leads_to_are_left_alone(tmp_path):
     link = folder / "link"
     link.symlink_to(elsewhere)
     os.utime(link, ns=(later, later), follow_symlinks=False)
-    assert settle_dates([folder]) == 1
+    assert running.settle_dates([folder]) == 1
     assert elsewhere.stat().st_mtime_ns == later
     assert link.lstat().st_mtime_ns <= time.time_ns()
 
