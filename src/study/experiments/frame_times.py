@@ -187,10 +187,9 @@ def frame_times(
     for case, file in zip(settings.subspace_cases, subspaces, strict=True):
         chosen[file.path].append((case.method, case.position_basis, case.k))
         scenes[case.scene].models[file.path] = chosen[file.path]
-    alone = [
-        TimedScene(named.scene, settings.solver, asked.frames, models={file.path: None})
-        for named, file in zip(settings.large_scenes, large, strict=True)
-    ]
-    table = pd.DataFrame(in_processes([*scenes.values(), *alone], asked), columns=COLUMNS)
+    for named, file in zip(settings.large_scenes, large, strict=True):  # may be among the others
+        scene = TimedScene(named.scene, settings.solver, asked.frames)
+        scenes.setdefault(named.scene.name, scene).models[file.path] = None
+    table = pd.DataFrame(in_processes([*scenes.values()], asked), columns=COLUMNS)
     write_table(table.astype({"k": "Int64", "r": "Int64"}), times.path)
     write_table(pd.DataFrame(rows, columns=SECONDS_COLUMNS), seconds.path)

@@ -10,10 +10,11 @@ from pdrom.core.store import read_table, write_table
 from pdrom.core.yamlfile import validate
 from pdrom.model.dynamics.system import DEFAULT_SOLVER
 from pdrom.model.held_out import MOTIONS
+from pdrom.model.mesh.types import save_mesh
 from pdrom.model.scene import SceneConfig
 from study.artifact.paths import File
+from study.experiments import frame_times as timing
 from study.experiments import subspaces as experiment
-from study.experiments.frame_times import COLUMNS as TIME_COLUMNS
 from study.experiments.frame_times import TimedScene
 from study.experiments.kit.measurement import Processes, in_processes
 from study.experiments.subspaces import (
@@ -32,7 +33,7 @@ EFFECTS = (
 )
 JUDGED = ("motion", "relative_error_within_horizon", "horizon_frame", "playback_error")
 NO_RERUNS = pd.DataFrame(columns=[*COLUMNS, *JUDGED])
-ONCE = Processes(repeats=1, processes=1)
+ONCE = Processes(frames=3, repeats=1, processes=1)
 CHANGES = {"reduce": {"spring": {"train": 5}}, "held_out": {"kick": 0.5}}
 
 
@@ -47,10 +48,15 @@ def written(tmp_path_factory):
     models = path.with_suffix(".h5")
     out, stored = File(str(path), {"scene": "test"}), File(str(models), {})
     experiment.online([], config, asked, blowup_extent=10.0, out=out, models=stored)
-    timed = TimedScene(config, DEFAULT_SOLVER, frames=3, models={str(models): None})
-    rows = pd.DataFrame(in_processes([timed], ONCE), columns=TIME_COLUMNS)
-    write_table(rows, path.with_name("times.csv"))
-    return scene, path, File(str(path.with_name("times.csv")), {})
+    mesh, *times = (File(str(path.with_name(n)), {}) for n in ("mesh.h5", "times.csv", "s.csv"))
+    save_mesh(scene.mesh, mesh.path)
+    named = (timing.NamedScene(scene=config),)  # as a scene of the study and as a large one
+    settings = timing.Options(
+        frame_times=ONCE, timed_scenes=named, large_scenes=named, subspace_cases=(),
+        projection_cases=(), projection_methods={}, solver=DEFAULT_SOLVER,
+    )  # fmt: skip
+    timing.frame_times([mesh], [], [], [], [], [stored], settings, *times)
+    return scene, path, times[0]
 
 
 def test_rows_of_a_scene(written):
