@@ -13,9 +13,9 @@ import pytest
 from places import ROOT
 
 LIMITS = {
-    "lines of src": 36_963,
+    "lines of src": 36_962,
     "modules of src": 237,
-    "lines of tests": 24_869,
+    "lines of tests": 24_868,
     "words of documentation": 24_576,
     "tables": 25,
     "figures": 23,
