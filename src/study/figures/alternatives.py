@@ -12,7 +12,7 @@ from study.figures.kit.declaration import figure
 from study.figures.kit.options import NothingToDraw, Options, Scenes
 
 LOW, HIGH = 1e-4, 1.0  # limits of the error axis; errors outside are drawn on them
-BESIDE = 4  # number of panels side by side
+BESIDE = 4  # panels side by side, at most
 TOLERANCES, TIMES, REACHED = (5e-3, 2e-1), (1e-2, 1e1), (1e-4, 1e0)
 # Colour of each outcome of a request, and a factor that shifts its dots along the tolerance axis.
 KINDS = {
@@ -45,7 +45,7 @@ def alternatives(options: Scenes, table: pd.DataFrame) -> Figure:
     cases = list(table.groupby(["scene", "vertices", "stiffness"]))
     if not cases:
         raise NothingToDraw("no alternatives")
-    beside = min(BESIDE, len(cases))
+    beside = -(-len(cases) // multiples.rows_of(len(cases), BESIDE))
     figure = style.new_figure(1.9 * multiples.rows_of(len(cases), beside) + 0.75)
     axes = multiples.panels(figure, len(cases), beside, sharey=True)
     for (labels, case), ax in zip(cases, axes, strict=True):
