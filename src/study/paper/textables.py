@@ -189,8 +189,8 @@ def break_even(breakeven: pd.DataFrame) -> Rows:
 
 def speedups(speedups: pd.DataFrame) -> Rows:
     """Speed-ups that the text cites, with intervals, errors and costs of training."""
-    yield "llrlrrrrr", [
-        "scene", "reduction", "full ms", "speed-up", "training", "held out", "run (s)",
+    yield "llrlrrrrrr", [
+        "scene", "reduction", "full ms", "speed-up", "training", "held out", "playback", "run (s)",
         "reduction (s)", "frames",
     ]  # fmt: skip
     for row in speedups.itertuples():
@@ -201,7 +201,8 @@ def speedups(speedups: pd.DataFrame) -> Rows:
             _name(f"{row.method}, {size}"),
             _known(row.full_ms),
             escape(row.shown) + (" (loses)" if row.loses else ""),
-            *map(_known, (row.error_train, row.error_heldout, row.training_s, row.reduction_s)),
+            *map(_known, (row.error_train, row.error_heldout, row.playback_error)),
+            *map(_known, (row.training_s, row.reduction_s)),
             "never" if pd.isna(frames) else _whole(float(f"{frames:.1e}")),
         ]
 
