@@ -83,11 +83,8 @@ def _panel(run: ViewedRun, frame: int) -> RunPanel:
     elif frame:
         remark = f"relative error {run.error[frame - 1]:.1g}"
     positions = run.positions[min(frame, last)].astype(float)
-    return RunPanel("", _colour(run.group), positions, failure, remark).seen_by(CAMERA)
-
-
-def _colour(group: str) -> tuple[float, float, float]:
-    """Colour of the constraint group by its index in `EFFECTS`; the first for unknown names."""
+    # the colour of a constraint group by its index in `EFFECTS`; the first for unknown names
     groups = [name for name in EFFECTS if issubclass(EFFECTS.load(name), ConstraintGroup)]
-    looks, place = style.GROUP_LOOKS, groups.index(group) if group in groups else 0
-    return style.surface_colour(looks[place % len(looks)][0])
+    looks, place = style.GROUP_LOOKS, groups.index(run.group) if run.group in groups else 0
+    colour = style.surface_colour(looks[place % len(looks)][0])
+    return RunPanel("", colour, positions, failure, remark).seen_by(CAMERA)
