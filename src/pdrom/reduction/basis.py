@@ -116,7 +116,12 @@ def compute_basis(
         scale = np.repeat(np.sqrt(row_mass), 3)
     mean, error, shown = np.zeros(len(matrix)), roundoff, matrix
     if spec.centring == "affine":
-        mean, error = matrix.mean(axis=1), max(roundoff, _mean_error(matrix))
+        # A sum of n terms is wrong by at most n eps/2 times the sum of their magnitudes (Higham
+        # 2002, section 4.2), the same in every column. Without this bound on the Frobenius norm,
+        # constant snapshots, whose centred matrix is that error and nothing else, would get a
+        # basis made of it. Subtracting the first snapshot makes no such error.
+        rounded = 0.5 * np.finfo(float).eps * matrix.shape[1] * float(np.linalg.norm(matrix))
+        mean, error = matrix.mean(axis=1), max(roundoff, rounded)
         # the mean contains a constant axis already; "mean-in-modes" adds it to the modes again
         shown = matrix - mean[:, None]
     elif spec.centring == "mean-in-modes":
@@ -190,17 +195,6 @@ def _check(
         if row_mass.min() <= 0.0:
             row = int(np.argmin(row_mass))
             raise SnapshotError(f"row_mass: row {row} has {row_mass[row]} kg, required: above 0")
-
-
-def _mean_error(matrix: np.ndarray) -> float:
-    """Bound the Frobenius norm of the centred matrix's error due to a rounded mean.
-
-    A sum of n terms is wrong by at most n eps/2 times the sum of their magnitudes (Higham 2002,
-    section 4.2), the same in every column. Without this bound constant snapshots, whose centred
-    matrix is that error and nothing else, would get a basis made of it. Subtracting the first
-    snapshot makes no such error.
-    """
-    return 0.5 * np.finfo(float).eps * matrix.shape[1] * float(np.linalg.norm(matrix))
 
 
 def _per_axis(centred: np.ndarray, noise: float) -> tuple[np.ndarray, np.ndarray, list[int]]:

@@ -157,19 +157,18 @@ def pack_scene(scene: ViewedScene) -> dict[str, Any]:
         "ms": scene.ms,
         "floor": _numbers(scene.floor),
         "horizon": scene.horizon,
-        "runs": [_pack_run(run, stride, used) for run in scene.runs],
-    }
-
-
-def _pack_run(run: ViewedRun, stride: int, used: np.ndarray) -> dict[str, Any]:
-    return {
-        "group": run.group,
-        "method": run.title,
-        "r": run.r,
-        "positions": pack_positions(run.positions[::stride, used]),
-        "error": _numbers(run.error),
-        "blowup": run.blowup_frame,
-        "ms": run.ms,
+        "runs": [
+            {
+                "group": run.group,
+                "method": run.title,
+                "r": run.r,
+                "positions": pack_positions(run.positions[::stride, used]),
+                "error": _numbers(run.error),
+                "blowup": run.blowup_frame,
+                "ms": run.ms,
+            }
+            for run in scene.runs
+        ],
     }
 
 

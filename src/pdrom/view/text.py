@@ -74,18 +74,16 @@ def _typeset(character: str) -> str | None:
     """TeX code of ``character``; None if it cannot be typeset."""
     if character in _SPECIAL:
         return _SPECIAL[character]
-    if " " <= character <= "~" or character in _PUNCTUATION or _is_latin(character):
+    if " " <= character <= "~" or character in _PUNCTUATION:
+        return character
+    # a letter that T1 fonts have: Latin-1, Latin Extended-A, or a Romanian letter
+    latin = "\u00c0" <= character <= "\u017e" or "\u0218" <= character <= "\u021b"
+    if latin and character.isalpha() and character not in _NO_LETTERS:
         return character
     if character == "\N{NO-BREAK SPACE}":
         return "~"
     command = _SIGNS.get(character) or _LATIN_CAPITALS.get(character) or _greek(character)
     return None if command is None else rf"\ensuremath{{{command}}}"
-
-
-def _is_latin(character: str) -> bool:
-    """Whether T1 fonts have the letter: Latin-1, Latin Extended-A, or a Romanian letter."""
-    inside = "\u00c0" <= character <= "\u017e" or "\u0218" <= character <= "\u021b"
-    return inside and character.isalpha() and character not in _NO_LETTERS
 
 
 def _greek(character: str) -> str | None:

@@ -66,14 +66,6 @@ def deim_entries(v: np.ndarray) -> np.ndarray:
     return order[: len(swaps)]
 
 
-class Greedy(Selection):
-    """DEIM by entries or elements; the samples for r modes begin those for more modes."""
-
-    def one_a_mode(self, v: np.ndarray, size: int, ranks: Sequence[int]) -> dict[int, np.ndarray]:
-        path = deim_entries(v) if size == 1 else block_elements(v, size)
-        return {r: path[:r] for r in ranks}
-
-
 def tie_weights(n: int) -> np.ndarray:
     """Factors (n,), falling from 1 to almost 1 - TIE, that break ties between n magnitudes.
 

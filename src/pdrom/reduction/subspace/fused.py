@@ -31,6 +31,7 @@ from pdrom.model.dynamics.acceleration import NO_HISTORY, Anderson, History, com
 from pdrom.model.dynamics.frames import BLOCK, Blocks
 from pdrom.model.dynamics.space import Solve
 from pdrom.model.dynamics.stepper import LocalStep, Observer, Stepper
+from pdrom.model.scene import Scene
 from pdrom.reduction.subspace.interpolation import SubspaceLocalStep
 from pdrom.reduction.subspace.space import DenseElimination, ReducedSpace
 
@@ -42,15 +43,10 @@ class FusedStepper(Stepper):
     `SubspaceLocalStep`, or with a group without a gradient kernel, iterates as the plain one does.
     """
 
-    def __init__(
-        self,
-        space: ReducedSpace,
-        time_step: float,
-        iterations: int,
-        local_steps: Sequence[LocalStep],
-        acceleration: Anderson | None = None,
-    ) -> None:
-        super().__init__(space, time_step, iterations, local_steps, False, acceleration)
+    def __init__(self, scene: Scene, space: ReducedSpace, local_steps: Sequence[LocalStep]) -> None:
+        config, acceleration = scene.config, scene.acceleration()
+        h, iterations = config.time_step, config.iterations
+        super().__init__(space, h, iterations, local_steps, False, acceleration)
         self._fused: _Fused | None = None
         steps = [step for step in local_steps if isinstance(step, SubspaceLocalStep)]
         kernels = [step.group.gradient_kernel for step in steps]
