@@ -1,13 +1,11 @@
 """Picture of four frames of a scene: a row for the full-order run, below it one per other run."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from pdrom.core.store import MARK, atomic_path
 from pdrom.model.constraints.base import ConstraintGroup
 from pdrom.model.effects import EFFECTS
-from pdrom.model.mesh.types import Mesh
 from pdrom.view import style
 from pdrom.view.artists import Figure
 from pdrom.view.camera import Camera, obstacles, rotation_to, up_of
@@ -29,29 +27,20 @@ def write_frames(scene: ViewedScene, png: Path) -> None:
         _draw(scene).savefig(temporary, format="png", dpi=150, metadata=metadata)
 
 
-def shown(sizes: Sequence[ViewedRun]) -> ViewedRun:
-    """Choose, from runs by ascending size r, the largest with r <= `SHOWN`, else the smallest."""
-    return ([run for run in sizes if run.r <= SHOWN] or sizes[:1])[-1]
-
-
 def shown_runs(scene: ViewedScene) -> list[ViewedRun]:
-    """One run per group and method of ``scene``, of the size that `shown` chooses."""
+    """One run per group and method of ``scene``: the largest with r <= `SHOWN`, or the smallest."""
     pairs = dict.fromkeys((run.group, run.method) for run in scene.runs)
-    return [shown(scene.sizes(*pair)) for pair in pairs]
-
-
-def _upright(scene: ViewedScene) -> tuple[ViewedScene, list[Mesh]]:
-    """Return ``scene`` turned so that y is up, and its turned obstacles, the largest first."""
-    turn = rotation_to(up_of(scene.effects))
-    runs = tuple(replace(run, positions=run.positions @ turn) for run in scene.runs)
-    turned = replace(scene, positions=scene.positions @ turn, runs=runs)
-    bodies = obstacles(scene.positions, scene.effects)
-    return turned, [replace(body, points=body.points @ turn) for body in bodies]
+    every = [scene.sizes(*pair) for pair in pairs]
+    return [([run for run in sizes if run.r <= SHOWN] or sizes[:1])[-1] for sizes in every]
 
 
 def _draw(scene: ViewedScene) -> Figure:
     """Draw one row per run; the grey outline in reduced rows is the full-order run."""
-    scene, bodies = _upright(scene)
+    # the scene and its obstacles, the largest first, are turned so that y is up
+    turn, found = rotation_to(up_of(scene.effects)), obstacles(scene.positions, scene.effects)
+    bodies = [replace(body, points=body.points @ turn) for body in found]
+    runs = tuple(replace(run, positions=run.positions @ turn) for run in scene.runs)
+    scene = replace(scene, positions=scene.positions @ turn, runs=runs)
     numbers = frame_numbers(INSTANTS, len(scene.positions) - 1)
     full = scene.positions[numbers].astype(float)
     reference = [

@@ -163,24 +163,20 @@ class Row:
     note: str | None = None
 
     @property
+    def _pictures(self) -> list[tuple[RunPanel, Window]]:
+        pairs = zip(self.panels, self.windows, strict=True)
+        return [(panel, window) for panel, window in pairs if panel.positions is not None]
+
+    @property
     def aspect(self) -> float:
         """Height over width of the tallest picture; flat for a row without any."""
-        heights = [
-            w.height / w.width
-            for panel, w in zip(self.panels, self.windows, strict=True)
-            if panel.positions is not None
-        ]
-        return max(heights, default=0.28)
+        return max((w.height / w.width for _, w in self._pictures), default=0.28)
 
     @property
     def lines(self) -> int:
         """Lines of text below the pictures."""
-        failed = [
-            bool(p.failure) + bool(p.remark) + (p.scale(w) > SLACK)
-            for p, w in zip(self.panels, self.windows, strict=True)
-            if p.positions is not None
-        ]
-        return max(failed, default=0)
+        lines = (bool(p.failure) + bool(p.remark) + (p.scale(w) > SLACK) for p, w in self._pictures)
+        return max(lines, default=0)
 
 
 def run_panel(

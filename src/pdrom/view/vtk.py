@@ -36,7 +36,15 @@ def vtk(scene: ViewedScene, collection: Path) -> None:
     for path in earlier:  # of a longer run
         if path.name not in names:
             path.unlink()
-    _write_collection(collection, names, scene.time_step)
+    root = ElementTree.Element("VTKFile", type="Collection", version="0.1")
+    series = ElementTree.SubElement(root, "Collection")
+    for frame, name in enumerate(names):
+        time = f"{frame * scene.time_step:.9g}"
+        ElementTree.SubElement(series, "DataSet", timestep=time, part="0", file=name)
+    ElementTree.indent(root)
+    with atomic_path(collection, with_checksum=False) as temporary:
+        ElementTree.ElementTree(root).write(temporary, encoding="utf-8", xml_declaration=True)
+        _mark(temporary)
 
 
 def point_data(scene: ViewedScene, frame: int) -> dict[str, np.ndarray]:
@@ -54,18 +62,6 @@ def point_data(scene: ViewedScene, frame: int) -> dict[str, np.ndarray]:
         apart = np.full_like(now, np.nan) if ended else run.positions[frame] - now
         data[f"{run.group} {run.method} r={run.r}"] = apart
     return {name: np.asarray(values, dtype=np.float32) for name, values in data.items()}
-
-
-def _write_collection(path: Path, names: list[str], time_step: float) -> None:
-    root = ElementTree.Element("VTKFile", type="Collection", version="0.1")
-    collection = ElementTree.SubElement(root, "Collection")
-    for frame, name in enumerate(names):
-        time = f"{frame * time_step:.9g}"
-        ElementTree.SubElement(collection, "DataSet", timestep=time, part="0", file=name)
-    ElementTree.indent(root)
-    with atomic_path(path, with_checksum=False) as temporary:
-        ElementTree.ElementTree(root).write(temporary, encoding="utf-8", xml_declaration=True)
-        _mark(temporary)
 
 
 def _mark(path: Path) -> None:
