@@ -166,14 +166,8 @@ def basis_of(
 
     ``train`` (n, e p, 3), if given, replaces these snapshots. ``signs``: see `compute_basis`.
     """
-    return compute_basis(
-        data.train if train is None else train,
-        data.row_mass,
-        data.roundoff,
-        rows_per_element=data.rows_per_element,
-        spec=spec,
-        signs=signs,
-    )
+    snapshots, p = data.train if train is None else train, data.rows_per_element
+    return compute_basis(snapshots, data.row_mass, data.roundoff, p, spec, signs)
 
 
 def _check(

@@ -1,9 +1,16 @@
-"""Picture of four frames of a scene: a row for the full-order run, below it one per other run."""
+"""Files that show a scene's runs: a picture of four frames, and files for ParaView.
+
+The picture has a row for the full-order run and below it one per other run. For ParaView there is a
+VTU file per frame, and a PVD file with the times.
+"""
 
 from dataclasses import replace
 from pathlib import Path
+from xml.etree import ElementTree
 
-from pdrom.core.store import MARK, atomic_path
+import numpy as np
+
+from pdrom.core.store import MARK, atomic_path, require_own
 from pdrom.model.constraints.base import ConstraintGroup
 from pdrom.model.effects import EFFECTS
 from pdrom.view import style
@@ -17,6 +24,7 @@ from pdrom.view.text import plain_words
 INSTANTS = (0.25, 0.5, 0.75, 1.0)  # fractions of the run
 CAMERA = Camera(30.0, 20.0)
 NO_LIMIT = 100.0  # inches, largest height of the picture
+NAME = "frame_{:05d}.vtu"
 SHOWN = 20  # largest number of modes r that a picture shows
 
 
@@ -47,9 +55,9 @@ def _draw(scene: ViewedScene) -> Figure:
         RunPanel(f"frame {frame}", style.FULL_ORDER, q, reference=True).seen_by(CAMERA)
         for frame, q in zip(numbers, full, strict=True)
     ]
-    labels = [f"{style.words(scene.name)}\n{scene.first}"]
+    labels, groups = [f"{style.words(scene.name)}\n{scene.first}"], {r.group for r in scene.runs}
     for run in shown_runs(scene):
-        group = f"{style.words(run.group)}\n" if len(scene.groups) > 1 else ""
+        group = f"{style.words(run.group)}\n" if len(groups) > 1 else ""
         labels.append(group + plain_words(run.title) + (f"\nr = {run.r}" if run.r else ""))
     every = [reference, *([_panel(run, f) for f in numbers] for run in shown_runs(scene))]
     windows = [
@@ -77,3 +85,62 @@ def _panel(run: ViewedRun, frame: int) -> RunPanel:
     looks, place = style.GROUP_LOOKS, groups.index(run.group) if run.group in groups else 0
     colour = style.surface_colour(looks[place % len(looks)][0])
     return RunPanel("", colour, positions, failure, remark).seen_by(CAMERA)
+
+
+def vtk(scene: ViewedScene, collection: Path) -> None:
+    """Write the frames of ``scene`` into the folder of the PVD file ``collection``, then that file.
+
+    Raises
+    ------
+    StorageError
+        A frame cannot be written, or would replace a file from outside pdrom.
+    """
+    import meshio
+
+    names = [NAME.format(frame) for frame in range(len(scene.positions))]
+    earlier = sorted(collection.parent.glob("frame_*.vtu"))
+    for path in (collection, *earlier):
+        require_own(path)
+    volume, mesh = len(scene.mesh.tetrahedra) > 0, scene.mesh
+    cells = [("tetra", mesh.tetrahedra) if volume else ("triangle", mesh.triangles)]
+    for frame, name in enumerate(names):
+        data = point_data(scene, frame)
+        with atomic_path(collection.with_name(name), with_checksum=False) as temporary:
+            written = meshio.Mesh(scene.positions[frame], cells, point_data=data)
+            written.write(temporary, file_format="vtu")
+            _mark(temporary)
+    for path in earlier:  # of a longer run
+        if path.name not in names:
+            path.unlink()
+    root = ElementTree.Element("VTKFile", type="Collection", version="0.1")
+    series = ElementTree.SubElement(root, "Collection")
+    for frame, name in enumerate(names):
+        time = f"{frame * scene.time_step:.9g}"
+        ElementTree.SubElement(series, "DataSet", timestep=time, part="0", file=name)
+    ElementTree.indent(root)
+    with atomic_path(collection, with_checksum=False) as temporary:
+        ElementTree.ElementTree(root).write(temporary, encoding="utf-8", xml_declaration=True)
+        _mark(temporary)
+
+
+def point_data(scene: ViewedScene, frame: int) -> dict[str, np.ndarray]:
+    """Data of each vertex of ``scene`` in a ``frame``, (N, 3) float32 each.
+
+    Velocity (m/s, where it was stored) and displacement from the start (m) of the full-order run;
+    for each reduced run the difference of its positions from the full order (m), by which ParaView
+    can warp the full-order mesh, NaN after the run's end.
+    """
+    now = scene.positions[frame]
+    data = {} if scene.velocities is None else {"velocity": scene.velocities[frame]}
+    data["displacement"] = now - scene.positions[0]
+    for run in shown_runs(scene):
+        ended = frame >= len(run.positions)
+        apart = np.full_like(now, np.nan) if ended else run.positions[frame] - now
+        data[f"{run.group} {run.method} r={run.r}"] = apart
+    return {name: np.asarray(values, dtype=np.float32) for name, values in data.items()}
+
+
+def _mark(path: Path) -> None:
+    """Append the comment by which `require_own` recognises the XML file ``path``."""
+    with open(path, "ab") as file:
+        file.write(b"\n<!-- " + MARK + b" -->\n")

@@ -69,11 +69,6 @@ class ViewedScene:
     velocities: np.ndarray | None = None
     first: str = "full order"
 
-    @property
-    def groups(self) -> list[str]:
-        """Names of the reduced groups."""
-        return list(dict.fromkeys(run.group for run in self.runs))
-
     def sizes(self, group: str, method: str) -> list[ViewedRun]:
         """Runs of a group and a method by ascending size."""
         return [run for run in self.runs if (run.group, run.method) == (group, method)]

@@ -29,7 +29,6 @@ _SIGNS = {
 }  # fmt: skip
 # Capital Greek letters that look like Latin ones have no command of their own.
 _LATIN_CAPITALS = dict(zip("ΑΒΕΖΗΙΚΜΝΟΡΤΧ", "ABEZHIKMNOPTX", strict=True))
-_GREEK_NAMES = {"lamda": "lambda"}  # Unicode's spelling -> TeX's
 
 
 def escape(text: str) -> str:
@@ -91,8 +90,7 @@ def _greek(character: str) -> str | None:
     words = unicodedata.name(character, "").split()
     if len(words) != 4 or words[0] != "GREEK" or words[2] != "LETTER":
         return None
-    name = words[3].lower()
-    name = _GREEK_NAMES.get(name, name)
+    name = words[3].lower().replace("lamda", "lambda")  # Unicode's spelling -> TeX's
     known = "alpha beta gamma delta zeta eta theta iota kappa lambda mu nu xi pi rho tau upsilon chi psi omega sigma phi"  # noqa: E501
     if name not in known.split():
         return None

@@ -128,20 +128,16 @@ class Reduction:
     Attributes
     ----------
     v : (3 e p, r) modes
+    elements : elements to evaluate, in the order of ``sampling.elements``
     blocks : sets of coefficients
     """
 
     def __init__(self, basis: Basis, sampling: Sampling, spec: MethodSpec, r: int) -> None:
         """Build the operator from r modes of ``basis`` at the ``sampling``, by method ``spec``."""
         self.basis, self.sampling, self.spec, self.r = basis, sampling, spec, r
-        self.v = basis.truncated(r)
+        self.v, self.elements = basis.truncated(r), sampling.elements
         axes = [int(a) for a in np.flatnonzero(basis.active_axes)] if spec.per_axis else [None]
         self.blocks = [self._block(axis) for axis in axes]
-
-    @property
-    def elements(self) -> np.ndarray:
-        """Elements to evaluate, in the order of ``sampling.elements``."""
-        return self.sampling.elements
 
     def _block(self, axis: int | None) -> Block:
         if self.spec.rows == "all":
