@@ -91,10 +91,13 @@ class Sampling:
     @classmethod
     def of_elements(cls, elements: np.ndarray, rows_per_element: int, total: int) -> "Sampling":
         """Sampling of all 3p entries of ``elements`` (m,) of ``total``, p ``rows_per_element``."""
-        elements = np.asarray(elements, dtype=np.int64)
-        size = 3 * rows_per_element
-        entries = (size * elements[:, None] + np.arange(size)).ravel()
+        entries = element_rows(np.asarray(elements, dtype=np.int64), 3 * rows_per_element)
         return cls.of_entries(entries, rows_per_element, total)
+
+
+def element_rows(elements: np.ndarray, size: int) -> np.ndarray:
+    """Rows (m size,) of ``elements`` (m,) with ``size`` rows each, in the order of the elements."""
+    return (elements[:, None] * size + np.arange(size)).ravel()
 
 
 @dataclass(frozen=True)

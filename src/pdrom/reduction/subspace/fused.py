@@ -92,15 +92,16 @@ class _Fused:
         own, sampled, free = self._of(elimination), self._sampled, elimination.free
         sampled.refresh()
         targets = vectors(len(elimination.fixed))
-        write(elimination.targets, targets)
+        targets[: elimination.targets.size] = elimination.targets.ravel()
         product(own.coupling, own.rows, len(elimination.fixed), own.nothing, targets, own.offset)
-        write(elimination.solved(base), own.constant)
-        write(s[free], own.z)
+        count = 3 * len(free)
+        own.constant[:count] = elimination.solved(base).ravel()
+        own.z[:count] = s[free].ravel()
         run_iterations(
             iterations, len(free), own.rows, own.iterated, sampled.arrays, self._history(free)
         )
         y = s.copy()
-        y[free] = own.z[: 3 * len(free)].reshape(-1, 3)
+        y[free] = own.z[:count].reshape(-1, 3)
         return y
 
     def _history(self, free: np.ndarray) -> History | None:
@@ -214,11 +215,6 @@ def blocks(matrix: np.ndarray) -> np.ndarray:
 def vectors(count: int) -> np.ndarray:
     """Zeros for ``count`` vectors, to be read and written by `product`."""
     return zeros(3 * (-(-count // TALL) * TALL) + WIDTH)
-
-
-def write(values: np.ndarray, to: np.ndarray) -> None:
-    """Copy vectors ``values`` (n, 3) ``to`` where `product` reads them."""
-    to[: values.size] = values.ravel()
 
 
 @compiled(nogil=True)
