@@ -10,20 +10,9 @@ from pdrom.api.records import FullRun, ReducedRun, RequestedRun
 from pdrom.api.runs import basis, reduce, run
 
 __all__ = [
-    "FullRun",
-    "ReducedRun",
-    "RequestedRun",
-    "basis",
-    "build_scene",
-    "load",
-    "load_scene",
-    "methods",
-    "plot",
-    "reduce",
-    "run",
-    "save",
-    "view",
-]
+    "FullRun", "ReducedRun", "RequestedRun", "basis", "build_scene", "load", "load_scene",
+    "methods", "plot", "reduce", "run", "save", "view",
+]  # fmt: skip
 
 
 def __dir__() -> list[str]:

@@ -8,8 +8,8 @@ from typing import Any, TypeVar
 import numpy as np
 
 from pdrom.api.records import FullRun
+from pdrom.core import config_file
 from pdrom.core.errors import ConfigurationError, SnapshotError, choices
-from pdrom.core.project import config_file
 from pdrom.core.store import require_finite
 from pdrom.core.yamlfile import shown
 from pdrom.model.constraints.base import ConstraintGroup

@@ -145,7 +145,13 @@ def load(path: str | os.PathLike[str], unchecked: bool = False) -> AnyRun:
     try:
         with store.open_hdf5(path, unchecked) as file:
             store.require_self_contained(file, path)
-            found = _run(file, path)
+            found: AnyRun | None = None
+            if "requested_error" in file.attrs:
+                found = _requested(_scene(file, path), file)
+            elif "positions" in file and "timings" in file:
+                found = full_run(_scene(file, path), file)
+            elif "reduced" in file and "full" in file:
+                found = _reduced(_scene(file, path), file)
         if found is not None:
             _require_sound(found)
     except StorageError:
@@ -156,16 +162,6 @@ def load(path: str | os.PathLike[str], unchecked: bool = False) -> AnyRun:
     if found is None:
         raise StorageError(f"{path}: holds no run that could be opened here (pdrom show says what)")
     return found
-
-
-def _run(file: h5py.File, path: Path) -> AnyRun | None:
-    if "requested_error" in file.attrs:
-        return _requested(_scene(file, path), file)
-    if "positions" in file and "timings" in file:
-        return full_run(_scene(file, path), file)
-    if "reduced" in file and "full" in file:
-        return _reduced(_scene(file, path), file)
-    return None
 
 
 def _require_sound(found: AnyRun) -> None:

@@ -133,25 +133,10 @@ def _viewed(runs: list[AnyRun]) -> ViewedScene:
 def _shown(run: AnyRun, positions: np.ndarray) -> ViewedRun:
     """A ``run`` with its distance to the first one's ``positions`` (F + 1, N, 3) m."""
     if isinstance(run, ReducedRun):
-        return ViewedRun(
-            group=run.group,
-            method=run.method,
-            title=run.method,
-            r=run.r,
-            positions=np.asarray(run.outcome.positions),
-            error=run.error,
-            blowup_frame=run.outcome.blowup_frame,
-            ms=run.ms if np.isfinite(run.ms) else None,
-        )
+        names, blowup = (run.group, run.method, run.method), run.outcome.blowup_frame
+        moved, ms = np.asarray(run.outcome.positions), run.ms if np.isfinite(run.ms) else None
+        return ViewedRun(*names, run.r, moved, run.error, blowup, ms)
     assert isinstance(run, RequestedRun)
     apart = np.linalg.norm(run.outcome.positions[1:] - positions[1:], axis=(1, 2))
-    return ViewedRun(
-        group="all groups",
-        method=run.title,
-        title=run.title,
-        r=0,
-        positions=run.outcome.positions,
-        error=apart / mean_motion(positions),
-        blowup_frame=None,
-        ms=float(np.median(run.ms)),
-    )
+    names, error = ("all groups", run.title, run.title), apart / mean_motion(positions)
+    return ViewedRun(*names, 0, run.outcome.positions, error, None, float(np.median(run.ms)))

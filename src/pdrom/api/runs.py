@@ -1,8 +1,8 @@
 """Full-order and reduced runs."""
 
 import os
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import perf_counter
@@ -17,7 +17,7 @@ from pdrom.core.provenance import made_by
 from pdrom.core.store import open_hdf5, require_own, require_place
 from pdrom.model.dynamics.stepper import FrameReport, State
 from pdrom.model.dynamics.system import DEFAULT_SOLVER
-from pdrom.model.runs import Advance, BoundedRun, frame_by_frame
+from pdrom.model.runs import BoundedRun, frame_by_frame
 from pdrom.model.runs import run as run_full_order
 from pdrom.model.scene import Scene
 from pdrom.reduction.basis import Basis, compute_basis
@@ -71,7 +71,10 @@ def run(
     }
     config = scene.config.model_dump(mode="json")
     reported = {"scene": config, "run": "train", "solver": DEFAULT_SOLVER}
-    with made_by("pdrom.api.run", reported), _place(out) as path:
+    with made_by("pdrom.api.run", reported), ExitStack() as kept:
+        # without a file to write, a temporary one that is deleted afterwards
+        folder = "" if out else kept.enter_context(TemporaryDirectory(prefix="pdrom-"))
+        path = Path(out or Path(folder, "run.h5"))
         run_full_order(scene, path, frames, with_mesh=True, on_frame=on_frame)
         with open_hdf5(path) as file:
             return full_run(scene, file)
@@ -189,9 +192,15 @@ def reduce(
     steps = replace_group(scene, group, ReducedLocalStep(chosen, reduction))
     loop = scene.stepper(scene.system, steps, track_objective=False)
     seconds: list[float] = []
+
+    def clocked(state: State, frame: int) -> tuple[State, FrameReport]:
+        started = perf_counter()
+        result = loop.step(state, frame)
+        seconds.append(perf_counter() - started)
+        return result
+
     start, frames, unit = scene.initial_state(), scene.config.frames, scene.mesh.extent
-    clocked = frame_by_frame(_clocked(loop.step, seconds))
-    run = BoundedRun(clocked, start, frames, BLOWUP_EXTENT, unit)
+    run = BoundedRun(frame_by_frame(clocked), start, frames, BLOWUP_EXTENT, unit)
     outcome = compare(run, full.positions)
     ms = 1e3 * float(np.median(seconds))
     name = method if isinstance(method, str) else method.title
@@ -217,25 +226,3 @@ def _within(full: FullRun, error: Wish, scene: Scene, on_frame: OnFrame) -> Requ
         errors = calibration.motions[0].errors(outcome.positions)
         reached = float(errors[outcome.frames - 1])
     return RequestedRun(scene, request, outcome, ms, offline, reached)
-
-
-def _clocked(advance: Advance, seconds: list[float]) -> Advance:
-    """Wrap ``advance`` so that it adds the time of every frame to ``seconds``."""
-
-    def step(state: State, frame: int) -> tuple[State, FrameReport]:
-        started = perf_counter()
-        result = advance(state, frame)
-        seconds.append(perf_counter() - started)
-        return result
-
-    return step
-
-
-@contextmanager
-def _place(out: str | os.PathLike[str] | None) -> Iterator[Path]:
-    """Yield the file to write a run to: ``out``, or a temporary one that is deleted afterwards."""
-    if out is not None:
-        yield Path(out)
-        return
-    with TemporaryDirectory(prefix="pdrom-") as folder:
-        yield Path(folder) / "run.h5"

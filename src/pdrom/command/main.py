@@ -13,9 +13,9 @@ from importlib import import_module
 
 from pdrom import __version__
 from pdrom.command.base import Command, Status
+from pdrom.core import checkout
 from pdrom.core.environment import settle
 from pdrom.core.errors import INTERRUPTED, PdromError, choices, reason
-from pdrom.core.project import checkout
 
 COMMANDS = ("new", "run", "reduce", "view", "show")
 CODES = """exit codes: 0 done; 1 faulty input, or a file that cannot be read or written;

@@ -74,23 +74,19 @@ def _check_outputs(arguments: argparse.Namespace, out: str, scene: "Scene") -> N
 def _told(reduced: "ReducedRun") -> str:
     import numpy as np
 
+    from pdrom.reduction.rerun import displacement_norms
+
     gain = f"gain {reduced.gain:.3g} (how much sampling may amplify what the basis misses)"
     if not reduced.outcome.finite:
         return f"{reduced.title}: blew up at frame {reduced.outcome.blowup_frame} ({gain})"
     speed = f"{reduced.ms:.2f} ms a frame (full order {np.median(reduced.full.ms):.2f})"
-    return f"{reduced.title}: {_error(reduced)}, {gain}, {speed}"
-
-
-def _error(reduced: "ReducedRun") -> str:
-    from pdrom.reduction.rerun import displacement_norms
-
     error = reduced.outcome.error(displacement_norms(reduced.full.positions))
     if error is None:
-        return "no error: nothing moves"
-    largest = float(reduced.error.max())
+        return f"{reduced.title}: no error: nothing moves, {gain}, {speed}"
+    largest, verdict = float(reduced.error.max()), "accurate" if error <= WRONG else "wrong"
     return (
-        f"relative error {error:.2g} of the full order's motion, over all frames (largest of one "
-        f"frame {largest:.2g}; {'accurate' if error <= WRONG else 'wrong'}: {WRONG:g} is the limit)"
+        f"{reduced.title}: relative error {error:.2g} of the full order's motion, over all frames "
+        f"(largest of one frame {largest:.2g}; {verdict}: {WRONG:g} is the limit), {gain}, {speed}"
     )
 
 

@@ -20,21 +20,17 @@ def perform(arguments: argparse.Namespace) -> Status:
     path = Path(arguments.file)
     condition, record = check_file(path), provenance_of(path)
     lines = [f"{path}: {path.stat().st_size:,} bytes, {condition.value}"]
-    lines += _content(path, arguments.configuration)
+    match path.suffix:
+        case ".h5" | ".hdf5":
+            lines += _hdf5(path, arguments.configuration)
+        case ".csv":
+            lines += _table(path)
+        case ".json":
+            lines += (f"  {line}" for line in path.read_text("utf-8").splitlines())
     lines.append("provenance:" if record else "provenance: unknown (no checksum says it)")
     lines += [f"  {name}: {record[name]}" for name in RECORD if name in record]
     sys.stdout.write("\n".join(lines) + "\n")
     return Status.DONE
-
-
-def _content(path: Path, whole: bool) -> Iterator[str]:
-    match path.suffix:
-        case ".h5" | ".hdf5":
-            yield from _hdf5(path, whole)
-        case ".csv":
-            yield from _table(path)
-        case ".json":
-            yield from (f"  {line}" for line in path.read_text("utf-8").splitlines())
 
 
 def _hdf5(path: Path, whole: bool) -> Iterator[str]:

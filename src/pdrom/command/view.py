@@ -34,7 +34,7 @@ def perform(arguments: argparse.Namespace) -> Status:
         write_frames(scenes[0], Path(arguments.png))
         sys.stdout.write(f"{arguments.png}: four frames of each run\n")
     if arguments.vtk:
-        from pdrom.view.vtk import vtk
+        from pdrom.view.frames import vtk
 
         vtk(scenes[0], Path(arguments.vtk, "run.pvd"))
         sys.stdout.write(f"{Path(arguments.vtk, 'run.pvd')}: opened by ParaView\n")

@@ -1,1 +1,21 @@
-"""Shared code of all packages: errors, storage of results, configuration, registries."""
+"""Shared code of all packages; here the project's folder, and the configuration that it reads.
+
+A wheel carries these files below ``pdrom/config`` (pyproject.toml says which), so that an installed
+package needs no checkout.
+"""
+
+from importlib.resources import files
+from pathlib import Path
+
+
+def checkout() -> Path | None:
+    """Folder of the checkout that contains this package; None for an installed package."""
+    source = Path(__file__).resolve().parents[2]
+    inside = source.name == "src" and (source.parent / "config").is_dir()
+    return source.parent if inside else None
+
+
+def config_file(name: str) -> Path:
+    """Path of the configuration file ``name``, in the checkout or else in the package."""
+    root = checkout() or Path(str(files("pdrom")))
+    return root / "config" / name

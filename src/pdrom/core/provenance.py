@@ -21,14 +21,9 @@ from pdrom import __version__
 LIBRARIES = ("numpy", "scipy", "numba", "h5py", "pandas", "matplotlib", "snakemake")
 # Keys of a record, in the order in which they are written.
 RECORD = (
-    "made_by",
-    "configuration_sha256",
-    "code_sha256",
-    "pdrom_version",
-    "python_version",
+    "made_by", "configuration_sha256", "code_sha256", "pdrom_version", "python_version",
     "library_versions",
-)
-
+)  # fmt: skip
 
 # Name and configuration hash of the running job, and its configuration as canonical JSON.
 _JOB: ContextVar[Mapping[str, str]] = ContextVar("job", default=MappingProxyType({}))

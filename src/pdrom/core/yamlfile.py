@@ -53,19 +53,17 @@ class _PlainLoader(yaml.CSafeLoader):
 
 def _require_plain(text: str) -> None:
     """Refuse deep nesting and aliases, since a few aliases can expand to billions of entries."""
-    depth = 0
+    depth, fault = 0, ""
     events: Iterator[Any] = yaml.parse(text, Loader=yaml.CSafeLoader)
     for event in events:
         if isinstance(event, yaml.AliasEvent):
-            raise _composer_error(event, f"alias '*{event.anchor}' is not allowed")
+            fault = f"alias '*{event.anchor}' is not allowed"
         depth += isinstance(event, yaml.CollectionStartEvent)
         depth -= isinstance(event, yaml.CollectionEndEvent)
         if depth > MAX_DEPTH:
-            raise _composer_error(event, f"nested more than {MAX_DEPTH} levels deep")
-
-
-def _composer_error(event: Any, fault: str) -> yaml.YAMLError:
-    return yaml.composer.ComposerError(None, None, fault, event.start_mark)
+            fault = f"nested more than {MAX_DEPTH} levels deep"
+        if fault:
+            raise yaml.composer.ComposerError(None, None, fault, event.start_mark)
 
 
 def read_yaml(path: Path) -> Any:

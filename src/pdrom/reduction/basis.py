@@ -116,7 +116,12 @@ def compute_basis(
         scale = np.repeat(np.sqrt(row_mass), 3)
     mean, error, shown = np.zeros(len(matrix)), roundoff, matrix
     if spec.centring == "affine":
-        mean, error = matrix.mean(axis=1), max(roundoff, _mean_error(matrix))
+        # A sum of n terms is wrong by at most n eps/2 times the sum of their magnitudes (Higham
+        # 2002, section 4.2), the same in every column. Without this bound on the Frobenius norm,
+        # constant snapshots, whose centred matrix is that error and nothing else, would get a
+        # basis made of it. Subtracting the first snapshot makes no such error.
+        rounded = 0.5 * np.finfo(float).eps * matrix.shape[1] * float(np.linalg.norm(matrix))
+        mean, error = matrix.mean(axis=1), max(roundoff, rounded)
         # the mean contains a constant axis already; "mean-in-modes" adds it to the modes again
         shown = matrix - mean[:, None]
     elif spec.centring == "mean-in-modes":
@@ -161,14 +166,8 @@ def basis_of(
 
     ``train`` (n, e p, 3), if given, replaces these snapshots. ``signs``: see `compute_basis`.
     """
-    return compute_basis(
-        data.train if train is None else train,
-        data.row_mass,
-        data.roundoff,
-        rows_per_element=data.rows_per_element,
-        spec=spec,
-        signs=signs,
-    )
+    snapshots, p = data.train if train is None else train, data.rows_per_element
+    return compute_basis(snapshots, data.row_mass, data.roundoff, p, spec, signs)
 
 
 def _check(
@@ -190,17 +189,6 @@ def _check(
         if row_mass.min() <= 0.0:
             row = int(np.argmin(row_mass))
             raise SnapshotError(f"row_mass: row {row} has {row_mass[row]} kg, required: above 0")
-
-
-def _mean_error(matrix: np.ndarray) -> float:
-    """Bound the Frobenius norm of the centred matrix's error due to a rounded mean.
-
-    A sum of n terms is wrong by at most n eps/2 times the sum of their magnitudes (Higham 2002,
-    section 4.2), the same in every column. Without this bound constant snapshots, whose centred
-    matrix is that error and nothing else, would get a basis made of it. Subtracting the first
-    snapshot makes no such error.
-    """
-    return 0.5 * np.finfo(float).eps * matrix.shape[1] * float(np.linalg.norm(matrix))
 
 
 def _per_axis(centred: np.ndarray, noise: float) -> tuple[np.ndarray, np.ndarray, list[int]]:

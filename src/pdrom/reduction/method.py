@@ -24,10 +24,6 @@ SELECTIONS = Registry(
 
 
 METHOD_NAME = "[a-z0-9][a-z0-9-]{0,63}"
-Weighting = Literal["none", "mass"]
-Centring = Literal["none", "affine", "mean-in-modes"]
-Layout = Literal["vectorised", "per-axis"]
-Rows = Literal["all", "scalar", "joint", "element"]
 Solve = Literal["square", "qr", "tikhonov"]
 
 
@@ -42,9 +38,9 @@ class BasisSpec(ConfigModel):
         "per-axis" has one basis for each axis
     """
 
-    weighting: Weighting = "none"
-    centring: Centring = "none"
-    layout: Layout = "vectorised"
+    weighting: Literal["none", "mass"] = "none"
+    centring: Literal["none", "affine", "mean-in-modes"] = "none"
+    layout: Literal["vectorised", "per-axis"] = "vectorised"
 
     @property
     def basis_id(self) -> str:
@@ -76,7 +72,7 @@ class MethodSpec(BasisSpec):
     """
 
     title: str
-    rows: Rows
+    rows: Literal["all", "scalar", "joint", "element"]
     selection: str = "greedy"
     solve: Solve = "qr"
     repeat_rows: bool = False

@@ -77,14 +77,8 @@ def compare(run: BoundedRun, reference: np.ndarray) -> Rerun:
         difference.append(float(np.linalg.norm(frame.positions - reference[frame.number + 1])))
         extents.append(frame.extent)
     stacked = np.stack(positions)
-    same = positions[0] is coordinates[0]
-    return Rerun(
-        stacked,
-        np.array(difference),
-        np.array(extents),
-        run.blowup_frame,
-        stacked if same else np.stack(coordinates),
-    )
+    unknowns = stacked if positions[0] is coordinates[0] else np.stack(coordinates)
+    return Rerun(stacked, np.array(difference), np.array(extents), run.blowup_frame, unknowns)
 
 
 def displacement_norms(reference: np.ndarray) -> np.ndarray:

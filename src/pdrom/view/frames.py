@@ -1,13 +1,18 @@
-"""Picture of four frames of a scene: a row for the full-order run, below it one per other run."""
+"""Files that show a scene's runs: a picture of four frames, and files for ParaView.
 
-from collections.abc import Sequence
+The picture has a row for the full-order run and below it one per other run. For ParaView there is a
+VTU file per frame, and a PVD file with the times.
+"""
+
 from dataclasses import replace
 from pathlib import Path
+from xml.etree import ElementTree
 
-from pdrom.core.store import MARK, atomic_path
+import numpy as np
+
+from pdrom.core.store import MARK, atomic_path, require_own
 from pdrom.model.constraints.base import ConstraintGroup
 from pdrom.model.effects import EFFECTS
-from pdrom.model.mesh.types import Mesh
 from pdrom.view import style
 from pdrom.view.artists import Figure
 from pdrom.view.camera import Camera, obstacles, rotation_to, up_of
@@ -19,6 +24,7 @@ from pdrom.view.text import plain_words
 INSTANTS = (0.25, 0.5, 0.75, 1.0)  # fractions of the run
 CAMERA = Camera(30.0, 20.0)
 NO_LIMIT = 100.0  # inches, largest height of the picture
+NAME = "frame_{:05d}.vtu"
 SHOWN = 20  # largest number of modes r that a picture shows
 
 
@@ -29,38 +35,29 @@ def write_frames(scene: ViewedScene, png: Path) -> None:
         _draw(scene).savefig(temporary, format="png", dpi=150, metadata=metadata)
 
 
-def shown(sizes: Sequence[ViewedRun]) -> ViewedRun:
-    """Choose, from runs by ascending size r, the largest with r <= `SHOWN`, else the smallest."""
-    return ([run for run in sizes if run.r <= SHOWN] or sizes[:1])[-1]
-
-
 def shown_runs(scene: ViewedScene) -> list[ViewedRun]:
-    """One run per group and method of ``scene``, of the size that `shown` chooses."""
+    """One run per group and method of ``scene``: the largest with r <= `SHOWN`, or the smallest."""
     pairs = dict.fromkeys((run.group, run.method) for run in scene.runs)
-    return [shown(scene.sizes(*pair)) for pair in pairs]
-
-
-def _upright(scene: ViewedScene) -> tuple[ViewedScene, list[Mesh]]:
-    """Return ``scene`` turned so that y is up, and its turned obstacles, the largest first."""
-    turn = rotation_to(up_of(scene.effects))
-    runs = tuple(replace(run, positions=run.positions @ turn) for run in scene.runs)
-    turned = replace(scene, positions=scene.positions @ turn, runs=runs)
-    bodies = obstacles(scene.positions, scene.effects)
-    return turned, [replace(body, points=body.points @ turn) for body in bodies]
+    every = [scene.sizes(*pair) for pair in pairs]
+    return [([run for run in sizes if run.r <= SHOWN] or sizes[:1])[-1] for sizes in every]
 
 
 def _draw(scene: ViewedScene) -> Figure:
     """Draw one row per run; the grey outline in reduced rows is the full-order run."""
-    scene, bodies = _upright(scene)
+    # the scene and its obstacles, the largest first, are turned so that y is up
+    turn, found = rotation_to(up_of(scene.effects)), obstacles(scene.positions, scene.effects)
+    bodies = [replace(body, points=body.points @ turn) for body in found]
+    runs = tuple(replace(run, positions=run.positions @ turn) for run in scene.runs)
+    scene = replace(scene, positions=scene.positions @ turn, runs=runs)
     numbers = frame_numbers(INSTANTS, len(scene.positions) - 1)
     full = scene.positions[numbers].astype(float)
     reference = [
         RunPanel(f"frame {frame}", style.FULL_ORDER, q, reference=True).seen_by(CAMERA)
         for frame, q in zip(numbers, full, strict=True)
     ]
-    labels = [f"{style.words(scene.name)}\n{scene.first}"]
+    labels, groups = [f"{style.words(scene.name)}\n{scene.first}"], {r.group for r in scene.runs}
     for run in shown_runs(scene):
-        group = f"{style.words(run.group)}\n" if len(scene.groups) > 1 else ""
+        group = f"{style.words(run.group)}\n" if len(groups) > 1 else ""
         labels.append(group + plain_words(run.title) + (f"\nr = {run.r}" if run.r else ""))
     every = [reference, *([_panel(run, f) for f in numbers] for run in shown_runs(scene))]
     windows = [
@@ -83,11 +80,67 @@ def _panel(run: ViewedRun, frame: int) -> RunPanel:
     elif frame:
         remark = f"relative error {run.error[frame - 1]:.1g}"
     positions = run.positions[min(frame, last)].astype(float)
-    return RunPanel("", _colour(run.group), positions, failure, remark).seen_by(CAMERA)
-
-
-def _colour(group: str) -> tuple[float, float, float]:
-    """Colour of the constraint group by its index in `EFFECTS`; the first for unknown names."""
+    # the colour of a constraint group by its index in `EFFECTS`; the first for unknown names
     groups = [name for name in EFFECTS if issubclass(EFFECTS.load(name), ConstraintGroup)]
-    looks, place = style.GROUP_LOOKS, groups.index(group) if group in groups else 0
-    return style.surface_colour(looks[place % len(looks)][0])
+    looks, place = style.GROUP_LOOKS, groups.index(run.group) if run.group in groups else 0
+    colour = style.surface_colour(looks[place % len(looks)][0])
+    return RunPanel("", colour, positions, failure, remark).seen_by(CAMERA)
+
+
+def vtk(scene: ViewedScene, collection: Path) -> None:
+    """Write the frames of ``scene`` into the folder of the PVD file ``collection``, then that file.
+
+    Raises
+    ------
+    StorageError
+        A frame cannot be written, or would replace a file from outside pdrom.
+    """
+    import meshio
+
+    names = [NAME.format(frame) for frame in range(len(scene.positions))]
+    earlier = sorted(collection.parent.glob("frame_*.vtu"))
+    for path in (collection, *earlier):
+        require_own(path)
+    volume, mesh = len(scene.mesh.tetrahedra) > 0, scene.mesh
+    cells = [("tetra", mesh.tetrahedra) if volume else ("triangle", mesh.triangles)]
+    for frame, name in enumerate(names):
+        data = point_data(scene, frame)
+        with atomic_path(collection.with_name(name), with_checksum=False) as temporary:
+            written = meshio.Mesh(scene.positions[frame], cells, point_data=data)
+            written.write(temporary, file_format="vtu")
+            _mark(temporary)
+    for path in earlier:  # of a longer run
+        if path.name not in names:
+            path.unlink()
+    root = ElementTree.Element("VTKFile", type="Collection", version="0.1")
+    series = ElementTree.SubElement(root, "Collection")
+    for frame, name in enumerate(names):
+        time = f"{frame * scene.time_step:.9g}"
+        ElementTree.SubElement(series, "DataSet", timestep=time, part="0", file=name)
+    ElementTree.indent(root)
+    with atomic_path(collection, with_checksum=False) as temporary:
+        ElementTree.ElementTree(root).write(temporary, encoding="utf-8", xml_declaration=True)
+        _mark(temporary)
+
+
+def point_data(scene: ViewedScene, frame: int) -> dict[str, np.ndarray]:
+    """Data of each vertex of ``scene`` in a ``frame``, (N, 3) float32 each.
+
+    Velocity (m/s, where it was stored) and displacement from the start (m) of the full-order run;
+    for each reduced run the difference of its positions from the full order (m), by which ParaView
+    can warp the full-order mesh, NaN after the run's end.
+    """
+    now = scene.positions[frame]
+    data = {} if scene.velocities is None else {"velocity": scene.velocities[frame]}
+    data["displacement"] = now - scene.positions[0]
+    for run in shown_runs(scene):
+        ended = frame >= len(run.positions)
+        apart = np.full_like(now, np.nan) if ended else run.positions[frame] - now
+        data[f"{run.group} {run.method} r={run.r}"] = apart
+    return {name: np.asarray(values, dtype=np.float32) for name, values in data.items()}
+
+
+def _mark(path: Path) -> None:
+    """Append the comment by which `require_own` recognises the XML file ``path``."""
+    with open(path, "ab") as file:
+        file.write(b"\n<!-- " + MARK + b" -->\n")

@@ -69,11 +69,6 @@ class ViewedScene:
     velocities: np.ndarray | None = None
     first: str = "full order"
 
-    @property
-    def groups(self) -> list[str]:
-        """Names of the reduced groups."""
-        return list(dict.fromkeys(run.group for run in self.runs))
-
     def sizes(self, group: str, method: str) -> list[ViewedRun]:
         """Runs of a group and a method by ascending size."""
         return [run for run in self.runs if (run.group, run.method) == (group, method)]
@@ -157,19 +152,18 @@ def pack_scene(scene: ViewedScene) -> dict[str, Any]:
         "ms": scene.ms,
         "floor": _numbers(scene.floor),
         "horizon": scene.horizon,
-        "runs": [_pack_run(run, stride, used) for run in scene.runs],
-    }
-
-
-def _pack_run(run: ViewedRun, stride: int, used: np.ndarray) -> dict[str, Any]:
-    return {
-        "group": run.group,
-        "method": run.title,
-        "r": run.r,
-        "positions": pack_positions(run.positions[::stride, used]),
-        "error": _numbers(run.error),
-        "blowup": run.blowup_frame,
-        "ms": run.ms,
+        "runs": [
+            {
+                "group": run.group,
+                "method": run.title,
+                "r": run.r,
+                "positions": pack_positions(run.positions[::stride, used]),
+                "error": _numbers(run.error),
+                "blowup": run.blowup_frame,
+                "ms": run.ms,
+            }
+            for run in scene.runs
+        ],
     }
 
 

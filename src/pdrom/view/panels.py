@@ -84,22 +84,12 @@ def fit_aspect(window: Window) -> Window:
     return window.resized(width, height)
 
 
-def draw_run(
-    ax: Axes,
-    mesh: Mesh,
-    panel: RunPanel,
-    camera: Camera,
-    window: Window,
-    ghost: np.ndarray | None = None,
-) -> None:
-    """Draw a run in ``window``; a run that left it is drawn smaller, with a remark.
+def draw_run(ax: Axes, row: "Row", i: int) -> None:
+    """Draw run ``i`` of a ``row`` in its window on ``ax``; one that left it smaller, with a remark.
 
-    Parameters
-    ----------
-    ax, camera : picture and its view
-    mesh, panel : mesh and panel of the run
-    ghost : (N, 3) m, positions whose outline is drawn for comparison
+    The outline of the row's ghost is drawn for comparison, unless the run is the reference.
     """
+    mesh, panel, camera, window = row.mesh, row.panels[i], row.camera, row.windows[i]
     ax.set_title(panel.title, pad=3)
     if panel.failure:
         look = {"facecolor": "#FBEDEB", "edgecolor": "#EBB9B4", "hatch": "////", "linewidth": 0.0}
@@ -115,7 +105,8 @@ def draw_run(
         mesh_render.draw_surface(ax, body.points, body, camera, **look).set_zorder(0.1)
     if panel.obstacles is None and not panel.failure:
         mesh_render.draw_floor(ax, panel.positions, mesh, camera, shown)
-    if ghost is not None:
+    if not panel.reference:
+        ghost = row.ghosts[i]
         edges = mesh_render.outline_edges(mesh.points, mesh.triangles)
         if not len(edges):  # a round body has no edges of its own
             edges = mesh_render.silhouette_edges(ghost, mesh.triangles, camera)
@@ -172,24 +163,20 @@ class Row:
     note: str | None = None
 
     @property
+    def _pictures(self) -> list[tuple[RunPanel, Window]]:
+        pairs = zip(self.panels, self.windows, strict=True)
+        return [(panel, window) for panel, window in pairs if panel.positions is not None]
+
+    @property
     def aspect(self) -> float:
         """Height over width of the tallest picture; flat for a row without any."""
-        heights = [
-            w.height / w.width
-            for panel, w in zip(self.panels, self.windows, strict=True)
-            if panel.positions is not None
-        ]
-        return max(heights, default=0.28)
+        return max((w.height / w.width for _, w in self._pictures), default=0.28)
 
     @property
     def lines(self) -> int:
         """Lines of text below the pictures."""
-        failed = [
-            bool(p.failure) + bool(p.remark) + (p.scale(w) > SLACK)
-            for p, w in zip(self.panels, self.windows, strict=True)
-            if p.positions is not None
-        ]
-        return max(failed, default=0)
+        lines = (bool(p.failure) + bool(p.remark) + (p.scale(w) > SLACK) for p, w in self._pictures)
+        return max(lines, default=0)
 
 
 def run_panel(
@@ -239,10 +226,9 @@ def _draw_row(figure: Figure, row: Row, columns: int, top: float, bottom: float)
     left = LEFT / style.WIDTH
     step = (1.0 - left) / columns
     drawn = [] if row.note and row.panels[0].positions is None else row.panels
-    for i, panel in enumerate(drawn):
+    for i in range(len(drawn)):
         ax = figure.add_axes((left + (i + 0.02) * step, low, 0.96 * step, high - low))
-        ghost = None if panel.reference else row.ghosts[i]
-        draw_run(ax, row.mesh, panel, camera=row.camera, window=row.windows[i], ghost=ghost)
+        draw_run(ax, row, i)
     if row.note:
         start = left + len(drawn) * step
         ax = figure.add_axes((start, low, 1.0 - start, high - low))

@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 
-import h5py
 import numpy as np
 
 from pdrom.core.errors import StorageError
@@ -64,26 +63,25 @@ class RerunInfo:
 def rerun_infos(path: str, inside: str = "") -> list[RerunInfo]:
     """Basis sizes in a file ``path`` of reduced runs, or in its group ``inside``, ascending."""
     with open_hdf5(path) as file:
-        sizes = [label for label in file[f"/{inside}"] if _is_size(label)]
-        infos = [_info(f"{inside}/{label}", file[f"{inside}/{label}"]) for label in sizes]
+        infos = []
+        for label, group in file[f"/{inside}"].items():
+            if not _is_size(label):
+                continue
+            attrs, marked = group.attrs, bool(group.attrs["marked"])
+            info = RerunInfo(
+                label=f"{inside}/{label}",
+                r=int(attrs["r"]),
+                full=bool(attrs.get("full", False)),
+                marked=marked,
+                blowup_frame=-1 if marked else int(attrs["blowup_frame"]),
+                entries=len(group["positions"]) if "positions" in group else 0,
+            )
+            infos.append(info)
     return sorted(infos, key=lambda info: (info.r, info.full))
 
 
 def _is_size(label: str) -> bool:
     return label.startswith("r") and label[1:].isdigit()
-
-
-def _info(label: str, group: h5py.Group) -> RerunInfo:
-    attrs = group.attrs
-    marked = bool(attrs["marked"])
-    return RerunInfo(
-        label=label,
-        r=int(attrs["r"]),
-        full=bool(attrs.get("full", False)),
-        marked=marked,
-        blowup_frame=-1 if marked else int(attrs["blowup_frame"]),
-        entries=len(group["positions"]) if "positions" in group else 0,
-    )
 
 
 def choose_ranks(infos: list[RerunInfo], asked: tuple[int | str, ...]) -> list[RerunInfo]:

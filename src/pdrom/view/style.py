@@ -5,9 +5,12 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any, Literal
 
+import numpy as np
+
 from pdrom.view.artists import Artist, Axes, Figure, Line2D, Patch
 
 WIDTH = 7.0  # inches, text width of the manuscript
+DIGITS = 6  # decimals of positions in a layout, which are fractions of the figure
 NOTE = 100  # characters per line in a figure that contains only text
 
 # Palette of Okabe and Ito (2008), distinguishable with every common colour deficiency.
@@ -126,11 +129,26 @@ def words(name: str) -> str:
 def new_figure(height: float, layout: Literal["constrained"] | None = "constrained") -> Figure:
     """An empty figure of the manuscript's width, ``height`` inches high, with a ``layout``."""
     from matplotlib.figure import Figure
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
+    from matplotlib.transforms import Bbox
 
-    from pdrom.view.layout import RoundedLayout
+    class RoundedLayout(ConstrainedLayoutEngine):
+        """Constrained layout whose positions are the same in every process: they are rounded.
 
-    engine = None if layout is None else RoundedLayout()
-    return Figure(figsize=(WIDTH, height), layout=engine)
+        The layout solver sums in the order of memory addresses, so that positions differ in their
+        last bits between drawings, which sometimes changes a digit in the file.
+        """
+
+        def execute(self, fig: Figure) -> Any:
+            grids = super().execute(fig)
+            for ax in fig.axes:
+                kept = ax.get_in_layout()
+                place = np.round(ax.get_position(original=True).extents, DIGITS)
+                ax.set_position(Bbox.from_extents(*place), which="original")
+                ax.set_in_layout(kept)  # `set_position` has reset it
+            return grids
+
+    return Figure(figsize=(WIDTH, height), layout=RoundedLayout() if layout else None)
 
 
 def handle(label: str, **look: Any) -> Line2D:

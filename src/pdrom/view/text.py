@@ -29,7 +29,6 @@ _SIGNS = {
 }  # fmt: skip
 # Capital Greek letters that look like Latin ones have no command of their own.
 _LATIN_CAPITALS = dict(zip("ΑΒΕΖΗΙΚΜΝΟΡΤΧ", "ABEZHIKMNOPTX", strict=True))
-_GREEK_NAMES = {"lamda": "lambda"}  # Unicode's spelling -> TeX's
 
 
 def escape(text: str) -> str:
@@ -74,7 +73,11 @@ def _typeset(character: str) -> str | None:
     """TeX code of ``character``; None if it cannot be typeset."""
     if character in _SPECIAL:
         return _SPECIAL[character]
-    if " " <= character <= "~" or character in _PUNCTUATION or _is_latin(character):
+    if " " <= character <= "~" or character in _PUNCTUATION:
+        return character
+    # a letter that T1 fonts have: Latin-1, Latin Extended-A, or a Romanian letter
+    latin = "\u00c0" <= character <= "\u017e" or "\u0218" <= character <= "\u021b"
+    if latin and character.isalpha() and character not in _NO_LETTERS:
         return character
     if character == "\N{NO-BREAK SPACE}":
         return "~"
@@ -82,19 +85,12 @@ def _typeset(character: str) -> str | None:
     return None if command is None else rf"\ensuremath{{{command}}}"
 
 
-def _is_latin(character: str) -> bool:
-    """Whether T1 fonts have the letter: Latin-1, Latin Extended-A, or a Romanian letter."""
-    inside = "\u00c0" <= character <= "\u017e" or "\u0218" <= character <= "\u021b"
-    return inside and character.isalpha() and character not in _NO_LETTERS
-
-
 def _greek(character: str) -> str | None:
     """TeX command of a Greek letter without accents; None for any other ``character``."""
     words = unicodedata.name(character, "").split()
     if len(words) != 4 or words[0] != "GREEK" or words[2] != "LETTER":
         return None
-    name = words[3].lower()
-    name = _GREEK_NAMES.get(name, name)
+    name = words[3].lower().replace("lamda", "lambda")  # Unicode's spelling -> TeX's
     known = "alpha beta gamma delta zeta eta theta iota kappa lambda mu nu xi pi rho tau upsilon chi psi omega sigma phi"  # noqa: E501
     if name not in known.split():
         return None

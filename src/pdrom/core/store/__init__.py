@@ -211,11 +211,9 @@ def read_text(path: str | os.PathLike[str]) -> str:
 FLOAT_FORMAT = "%.10g"
 
 
-def write_table(
-    table: "pd.DataFrame", path: str | os.PathLike[str], with_checksum: bool = True
-) -> None:
+def write_table(table: "pd.DataFrame", path: str | os.PathLike[str]) -> None:
     """Write a table as CSV to ``path``: fixed float format, an empty cell for no value."""
-    with atomic_path(path, with_checksum) as temporary:
+    with atomic_path(path) as temporary:
         table.to_csv(temporary, index=False, float_format=FLOAT_FORMAT, lineterminator="\n")
 
 

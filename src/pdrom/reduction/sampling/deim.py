@@ -131,17 +131,14 @@ def block_elements(v: np.ndarray, size: int) -> np.ndarray:
     return elements
 
 
-def joint_rows(
-    v: np.ndarray, active: tuple[bool, ...], repeat: bool, factors: np.ndarray | None = None
-) -> np.ndarray:
+def joint_rows(v: np.ndarray, active: tuple[bool, ...], repeat: bool) -> np.ndarray:
     """Greedy row indices (r,) for the basis ``v`` (3 rows, r), nested in r.
 
     For mode k each axis a has its own system (P^T V_a) c_a = P^T v_{k,a}; the row with the largest
     sum of squared residuals of the three axes (times `tie_weights`) is taken for all axes. A
     singular system is solved in the least-squares sense: the row was chosen for the joint norm and
     may be useless for one axis. With ``repeat`` a row may be picked again, as in the published
-    code; without it, the result has at most as many entries as the basis has rows. ``factors``
-    (rows,) replace `tie_weights`.
+    code; without it, the result has at most as many entries as the basis has rows.
 
     Parameters
     ----------
@@ -149,7 +146,7 @@ def joint_rows(
     """
     rows, r = len(v) // 3, v.shape[1]
     axes = [(np.asfortranarray(v[a::3]), GrowingFit(r)) for a in np.flatnonzero(active)]
-    weights = (tie_weights(rows) if factors is None else factors) ** 2
+    weights = tie_weights(rows) ** 2
     picked = np.empty(r if repeat else min(r, rows), dtype=np.int64)
     for k in range(len(picked)):
         norm = np.zeros(rows)

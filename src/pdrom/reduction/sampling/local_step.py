@@ -13,18 +13,9 @@ from pdrom.model.compiled import rows
 from pdrom.model.compiled.dots import dots
 from pdrom.model.compiled.functions import clock, compiled, now
 from pdrom.model.compiled.rows import WIDTH, as_vertices, at, flat, shares, unflat
+from pdrom.model.constraints import local_kernel as kernels
 from pdrom.model.constraints.base import ConstraintGroup
-from pdrom.model.constraints.local_kernel import (
-    FIRST,
-    OWN,
-    PARTS,
-    PREPARE,
-    VERTICES,
-    LocalKernel,
-    LocalPass,
-    call,
-    local_kernel,
-)
+from pdrom.model.constraints.local_kernel import OWN, LocalKernel, LocalPass
 from pdrom.model.dynamics.stepper import LocalStep
 from pdrom.model.dynamics.system import GlobalSystem
 from pdrom.model.runs import BoundedRun
@@ -149,16 +140,16 @@ def lift(values, axes, own_sets, lifted, offset, first, last, rhs):
             rhs[WIDTH * vertex + axis] += dots(flat, i, i, i, modes, own, (0.0, 0.0, 0.0))[0]
 
 
-@local_kernel
+@kernels.local_kernel
 def _accumulate(y, rhs_place, record, part):
     entries = rows.indices(record, SIZE)
     modes, sets, columns = entries[MODES], entries[SETS], entries[COLUMNS]
     values = rows.doubles(entries[COEFFICIENTS], sets * modes).reshape((sets, modes))
-    if part == PREPARE:
+    if part == kernels.PREPARE:
         starts = rows.indices(entries[STARTS], sets + 1)
         count = starts[sets]
         projections = entries[PROJECTIONS]
-        call(entries[SAMPLER], y, projections, entries[SAMPLER_RECORD], PARTS[0])
+        kernels.call(entries[SAMPLER], y, projections, entries[SAMPLER_RECORD], kernels.PARTS[0])
         coefficients(
             rows.doubles(projections, entries[SAMPLED]),
             starts,
@@ -169,7 +160,7 @@ def _accumulate(y, rhs_place, record, part):
             values,
         )
         return 0.0
-    vertices = entries[VERTICES]
+    vertices = entries[kernels.VERTICES]
     watch = rows.indices(entries[CLOCK] + 16 * part, 2)
     before = now(watch)
     lift(
@@ -180,8 +171,8 @@ def _accumulate(y, rhs_place, record, part):
             (columns, vertices, modes)
         ),
         rows.doubles(entries[OFFSET], WIDTH * vertices),
-        entries[FIRST + part],
-        entries[FIRST + part + 1],
+        entries[kernels.FIRST + part],
+        entries[kernels.FIRST + part + 1],
         rows.doubles(rhs_place, WIDTH * vertices),
     )
     rows.doubles(entries[SECONDS], 2)[part] += now(watch) - before

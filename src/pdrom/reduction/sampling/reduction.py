@@ -91,10 +91,13 @@ class Sampling:
     @classmethod
     def of_elements(cls, elements: np.ndarray, rows_per_element: int, total: int) -> "Sampling":
         """Sampling of all 3p entries of ``elements`` (m,) of ``total``, p ``rows_per_element``."""
-        elements = np.asarray(elements, dtype=np.int64)
-        size = 3 * rows_per_element
-        entries = (size * elements[:, None] + np.arange(size)).ravel()
+        entries = element_rows(np.asarray(elements, dtype=np.int64), 3 * rows_per_element)
         return cls.of_entries(entries, rows_per_element, total)
+
+
+def element_rows(elements: np.ndarray, size: int) -> np.ndarray:
+    """Rows (m size,) of ``elements`` (m,) with ``size`` rows each, in the order of the elements."""
+    return (elements[:, None] * size + np.arange(size)).ravel()
 
 
 @dataclass(frozen=True)
@@ -128,20 +131,16 @@ class Reduction:
     Attributes
     ----------
     v : (3 e p, r) modes
+    elements : elements to evaluate, in the order of ``sampling.elements``
     blocks : sets of coefficients
     """
 
     def __init__(self, basis: Basis, sampling: Sampling, spec: MethodSpec, r: int) -> None:
         """Build the operator from r modes of ``basis`` at the ``sampling``, by method ``spec``."""
         self.basis, self.sampling, self.spec, self.r = basis, sampling, spec, r
-        self.v = basis.truncated(r)
+        self.v, self.elements = basis.truncated(r), sampling.elements
         axes = [int(a) for a in np.flatnonzero(basis.active_axes)] if spec.per_axis else [None]
         self.blocks = [self._block(axis) for axis in axes]
-
-    @property
-    def elements(self) -> np.ndarray:
-        """Elements to evaluate, in the order of ``sampling.elements``."""
-        return self.sampling.elements
 
     def _block(self, axis: int | None) -> Block:
         if self.spec.rows == "all":

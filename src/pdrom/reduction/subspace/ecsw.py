@@ -60,6 +60,9 @@ class TrainingFrame:
     measure: np.ndarray
 
 
+Training = Sequence[TrainingFrame]
+
+
 def training_run(
     scene: Scene,
     columns: Columns,
@@ -142,10 +145,7 @@ SEED = 0
 
 
 def ecsw_elements(
-    group: ConstraintGroup,
-    columns: Columns,
-    training: Sequence[TrainingFrame],
-    tolerances: Sequence[float],
+    group: ConstraintGroup, columns: Columns, training: Training, tolerances: Sequence[float]
 ) -> list[tuple[np.ndarray, np.ndarray]]:
     """Select elements (m,) and their factors xi > 0 (m,) for each tolerance.
 
@@ -173,10 +173,7 @@ def ecsw_elements(
 
 
 def training_equations(
-    group: ConstraintGroup,
-    columns: Columns,
-    training: Sequence[TrainingFrame],
-    elements: np.ndarray,
+    group: ConstraintGroup, columns: Columns, training: Training, elements: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the equations of ``elements`` (m, len(elements)), Fortran order, and sums (m,).
 

@@ -116,22 +116,17 @@ def export_basis(scene: Scene, columns: Columns, needed: np.ndarray) -> dict[str
 
 def export_model(scene: Scene, model: SubspaceModel) -> dict[str, Any]:
     """Export the samples that ``model`` has for each group of ``scene``."""
-    return {
-        "evaluated": model.elements_evaluated(scene),
-        "groups": {
-            group.name: _export_samples(group, model.chosen(group)) for group in scene.groups
-        },
-    }
-
-
-def _export_samples(group: ConstraintGroup, chosen: Samples | Interpolation) -> dict[str, Any]:
-    if isinstance(chosen, Samples):
-        arrays = {"weights": group.weights[chosen.elements] * chosen.factors}
-    else:
-        names = ("operator", "modes", "offset", "stiffness")
-        arrays = {name: getattr(chosen, name) for name in names}
-    packed = {name: pack_array(array, "f8") for name, array in arrays.items()}
-    return {"stencil": pack_array(_stencil(group, chosen), "u4"), **packed}
+    groups = {}
+    for group in scene.groups:
+        chosen = model.chosen(group)
+        if isinstance(chosen, Samples):
+            arrays = {"weights": group.weights[chosen.elements] * chosen.factors}
+        else:
+            names = ("operator", "modes", "offset", "stiffness")
+            arrays = {name: getattr(chosen, name) for name in names}
+        packed = {name: pack_array(array, "f8") for name, array in arrays.items()}
+        groups[group.name] = {"stencil": pack_array(_stencil(group, chosen), "u4"), **packed}
+    return {"evaluated": model.elements_evaluated(scene), "groups": groups}
 
 
 def _stencil(group: ConstraintGroup, chosen: Samples | Interpolation) -> np.ndarray:

@@ -31,6 +31,7 @@ from pdrom.model.dynamics.acceleration import NO_HISTORY, Anderson, History, com
 from pdrom.model.dynamics.frames import BLOCK, Blocks
 from pdrom.model.dynamics.space import Solve
 from pdrom.model.dynamics.stepper import LocalStep, Observer, Stepper
+from pdrom.model.scene import Scene
 from pdrom.reduction.subspace.interpolation import SubspaceLocalStep
 from pdrom.reduction.subspace.space import DenseElimination, ReducedSpace
 
@@ -42,15 +43,10 @@ class FusedStepper(Stepper):
     `SubspaceLocalStep`, or with a group without a gradient kernel, iterates as the plain one does.
     """
 
-    def __init__(
-        self,
-        space: ReducedSpace,
-        time_step: float,
-        iterations: int,
-        local_steps: Sequence[LocalStep],
-        acceleration: Anderson | None = None,
-    ) -> None:
-        super().__init__(space, time_step, iterations, local_steps, False, acceleration)
+    def __init__(self, scene: Scene, space: ReducedSpace, local_steps: Sequence[LocalStep]) -> None:
+        config, acceleration = scene.config, scene.acceleration()
+        h, iterations = config.time_step, config.iterations
+        super().__init__(space, h, iterations, local_steps, False, acceleration)
         self._fused: _Fused | None = None
         steps = [step for step in local_steps if isinstance(step, SubspaceLocalStep)]
         kernels = [step.group.gradient_kernel for step in steps]
@@ -96,15 +92,16 @@ class _Fused:
         own, sampled, free = self._of(elimination), self._sampled, elimination.free
         sampled.refresh()
         targets = vectors(len(elimination.fixed))
-        write(elimination.targets, targets)
+        targets[: elimination.targets.size] = elimination.targets.ravel()
         product(own.coupling, own.rows, len(elimination.fixed), own.nothing, targets, own.offset)
-        write(elimination.solved(base), own.constant)
-        write(s[free], own.z)
+        count = 3 * len(free)
+        own.constant[:count] = elimination.solved(base).ravel()
+        own.z[:count] = s[free].ravel()
         run_iterations(
             iterations, len(free), own.rows, own.iterated, sampled.arrays, self._history(free)
         )
         y = s.copy()
-        y[free] = own.z[: 3 * len(free)].reshape(-1, 3)
+        y[free] = own.z[:count].reshape(-1, 3)
         return y
 
     def _history(self, free: np.ndarray) -> History | None:
@@ -218,11 +215,6 @@ def blocks(matrix: np.ndarray) -> np.ndarray:
 def vectors(count: int) -> np.ndarray:
     """Zeros for ``count`` vectors, to be read and written by `product`."""
     return zeros(3 * (-(-count // TALL) * TALL) + WIDTH)
-
-
-def write(values: np.ndarray, to: np.ndarray) -> None:
-    """Copy vectors ``values`` (n, 3) ``to`` where `product` reads them."""
-    to[: values.size] = values.ravel()
 
 
 @compiled(nogil=True)

@@ -20,10 +20,10 @@ from pdrom.core.yamlfile import ConfigModel
 from pdrom.model.constraints.base import ConstraintGroup
 from pdrom.model.mesh.selection import farthest_points
 from pdrom.reduction.basis import pod
-from pdrom.reduction.sampling.reduction import norm_and_condition, solution_operator
+from pdrom.reduction.sampling.reduction import element_rows, norm_and_condition, solution_operator
 from pdrom.reduction.snapshots import touched_vertices
 from pdrom.reduction.subspace.columns import DEPENDENT, Columns, orthonormal, skinning_weights
-from pdrom.reduction.subspace.interpolation import Interpolation, element_rows, reduced_strain
+from pdrom.reduction.subspace.interpolation import Interpolation, reduced_strain
 
 # Condition number of the sampled equations above which their solution counts as noise.
 SINGULAR = 1e8

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pdrom.model.constraints.base import ConstraintGroup
-from pdrom.reduction.sampling.reduction import Reduction
+from pdrom.reduction.sampling.reduction import Reduction, element_rows
 from pdrom.reduction.subspace.columns import Columns
 
 
@@ -72,11 +72,6 @@ def reduced_strain(group: ConstraintGroup, columns: Columns) -> tuple[np.ndarray
     """S B (e p, K) and the stiffness B^T S^T W S B (K, K) of ``group`` in ``columns``."""
     strain = group.S @ columns.B
     return strain, strain.T @ (group.row_weights[:, None] * strain)
-
-
-def element_rows(elements: np.ndarray, size: int) -> np.ndarray:
-    """Rows (m size,) of ``elements`` (m,) with ``size`` rows each, in the order of the elements."""
-    return (elements[:, None] * size + np.arange(size)).ravel()
 
 
 def interpolation_of(

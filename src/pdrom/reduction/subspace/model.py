@@ -15,20 +15,11 @@ from pdrom.model.dynamics.stepper import State, Stepper
 from pdrom.model.runs import BoundedRun
 from pdrom.model.scene import Scene
 from pdrom.reduction.rerun import Rerun, compare
-from pdrom.reduction.subspace.columns import (
-    Columns,
-    atoms,
-    build_columns,
-    displacement_modes,
-    skinning_modes,
-)
+from pdrom.reduction.subspace import columns as spaces
+from pdrom.reduction.subspace import interpolation
 from pdrom.reduction.subspace.ecsw import Norm, ecsw_elements, training_run
 from pdrom.reduction.subspace.fused import FusedStepper
-from pdrom.reduction.subspace.interpolation import (
-    InterpolatedLocalStep,
-    Interpolation,
-    SubspaceLocalStep,
-)
+from pdrom.reduction.subspace.interpolation import Interpolation
 from pdrom.reduction.subspace.space import ReducedSpace, reduced_state
 
 # Largest number of training frames whose iterates train the element sampling.
@@ -57,7 +48,7 @@ class SubspaceModel:
     """
 
     position_basis: str
-    columns: Columns
+    columns: spaces.Columns
     samples: Mapping[str, Samples | Interpolation] = field(default_factory=dict)
 
     def elements_evaluated(self, scene: Scene) -> int:
@@ -75,17 +66,16 @@ class SubspaceModel:
 
     def loop(self, scene: Scene) -> tuple[Stepper, State]:
         """Step loop of ``scene`` in the coordinates of the subspace, and the initial state."""
-        steps: list[SubspaceLocalStep | InterpolatedLocalStep] = []
+        steps: list[Any] = []
         for group in scene.groups:
             own = self.chosen(group)
             if isinstance(own, Interpolation):
-                steps.append(InterpolatedLocalStep(group, self.columns, own))
+                steps.append(interpolation.InterpolatedLocalStep(group, self.columns, own))
             else:
-                steps.append(SubspaceLocalStep(group, self.columns, own.elements, own.factors))
+                kept = own.elements, own.factors
+                steps.append(interpolation.SubspaceLocalStep(group, self.columns, *kept))
         space = ReducedSpace(scene, self.columns, [step.matrix for step in steps])
-        h, iterations = scene.config.time_step, scene.config.iterations
-        start = reduced_state(scene, self.columns)
-        return FusedStepper(space, h, iterations, steps, scene.acceleration()), start
+        return FusedStepper(scene, space, steps), reduced_state(scene, self.columns)
 
     def positions(self, z: np.ndarray) -> np.ndarray:
         """Vertex positions (N, 3) m of coordinates ``z`` (K, 3)."""
@@ -143,7 +133,7 @@ def _multiply(panels, z, sums, result):
             result[first + i, 0], result[first + i, 1], result[first + i, 2] = a[i], b[i], c[i]
 
 
-def make_columns(scene: Scene, training: np.ndarray, kind: str, k: int) -> Columns:
+def make_columns(scene: Scene, training: np.ndarray, kind: str, k: int) -> spaces.Columns:
     """Columns of a position subspace of ``kind`` with k modes, or all modes if fewer exist.
 
     Parameters
@@ -155,16 +145,16 @@ def make_columns(scene: Scene, training: np.ndarray, kind: str, k: int) -> Colum
     points, masses = scene.mesh.points, scene.masses
     parts = []
     if "pod" in kind:
-        parts.append(displacement_modes(training, points, masses, k))
+        parts.append(spaces.displacement_modes(training, points, masses, k))
     if "skinning" in kind:
-        parts.append(skinning_modes(points, masses, k))
-    modes = np.hstack(parts)
-    return build_columns(modes, points, masses, atoms(scene.boundaries, len(points)), training)
+        parts.append(spaces.skinning_modes(points, masses, k))
+    atoms = spaces.atoms(scene.boundaries, len(points))
+    return spaces.build_columns(np.hstack(parts), points, masses, atoms, training)
 
 
 def sample_elements(
     scene: Scene,
-    columns: Columns,
+    columns: spaces.Columns,
     frames: np.ndarray,
     tolerances: Sequence[float],
     start: State | None = None,
@@ -207,7 +197,7 @@ def rerun_model(
     return compare(run, reference)
 
 
-def store_columns(store: h5py.Group, columns: Columns) -> None:
+def store_columns(store: h5py.Group, columns: spaces.Columns) -> None:
     """Write the ``columns`` of a subspace into the HDF5 group ``store``."""
     store["B"], store["free"] = columns.B, columns.free
     store.attrs["modes"] = columns.modes
@@ -235,22 +225,19 @@ def load_models(path: str | os.PathLike[str]) -> list[tuple[dict[str, object], S
             base = str(store.attrs["base"])
             labels = {key: store.attrs[key] for key in ("method", "position_basis", "k")}
             labels["k"] = int(labels["k"])
-            samples = {name: _samples(kept) for name, kept in store.get("samples", {}).items()}
+            samples: dict[str, Samples | Interpolation] = {}
+            for name, kept in store.get("samples", {}).items():
+                arrays = {key: array[...] for key, array in kept.items()}
+                gain: dict[str, Any] = {key: float(value) for key, value in kept.attrs.items()}
+                samples[name] = Interpolation(**arrays, **gain) if gain else Samples(**arrays)
             model = SubspaceModel(str(labels["position_basis"]), columns[base], samples)
             models.append((labels, model))
     return models
 
 
-def _samples(store: h5py.Group) -> Samples | Interpolation:
-    arrays = {key: array[...] for key, array in store.items()}
-    if "gain" in store.attrs:
-        return Interpolation(**arrays, gain=float(store.attrs["gain"]))
-    return Samples(**arrays)
-
-
-def _columns(store: h5py.Group) -> Columns:
+def _columns(store: h5py.Group) -> spaces.Columns:
     atoms = list(store["atoms"].values()) if "atoms" in store else []
-    return Columns(
+    return spaces.Columns(
         B=store["B"][...],
         free=store["free"][...],
         atoms=[a["vertices"][...] for a in atoms],

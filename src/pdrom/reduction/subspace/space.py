@@ -16,14 +16,7 @@ from pdrom.core.errors import NotReducibleError, SolverError
 from pdrom.model.dynamics.space import Solve, Space
 from pdrom.model.dynamics.stepper import State
 from pdrom.model.dynamics.system import require_accurate
-from pdrom.model.effects.base import (
-    Boundary,
-    Contact,
-    Force,
-    held_path,
-    held_targets,
-    held_vertices,
-)
+from pdrom.model.effects import base
 from pdrom.model.scene import Scene
 from pdrom.reduction.subspace.columns import Columns
 
@@ -147,11 +140,11 @@ class ReducedSpace(Space):
         return first
 
     def fixed(self, frame: int, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        return held_targets(self._boundaries, frame, positions)
+        return base.held_targets(self._boundaries, frame, positions)
 
     def held_path(self, frames: range, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Coordinates (m,) held in the first ``frames`` after ``positions``, values (n, m, 3)."""
-        return held_path(self._boundaries, frames, positions)
+        return base.held_path(self._boundaries, frames, positions)
 
     def elimination(self, fixed: np.ndarray) -> DenseElimination:
         """System with the ``fixed`` coordinates (m,) eliminated; cached."""
@@ -174,7 +167,7 @@ class ReducedSpace(Space):
     def correct(self, y: np.ndarray, before: np.ndarray, frame: int) -> None:
         if not self._contacts:
             return
-        held = held_vertices([b.boundary for b in self._boundaries], frame)
+        held = base.held_vertices([b.boundary for b in self._boundaries], frame)
         for contact in self._contacts:
             contact.correct(y, before, held)
 
@@ -209,7 +202,7 @@ def reduced_state(scene: Scene, columns: Columns) -> State:
     )
 
 
-def _reduce_force(force: Force, columns: Columns, scene: Scene) -> tuple[np.ndarray, Any]:
+def _reduce_force(force: base.Force, columns: Columns, scene: Scene) -> tuple[np.ndarray, Any]:
     """Project a force on the subspace: return (constant (K, 3), rate) of a = constant + rate v.
 
     It has to be affine in the velocity, with one rate for all vertices (a number) or one for each
@@ -233,7 +226,7 @@ def _reduce_force(force: Force, columns: Columns, scene: Scene) -> tuple[np.ndar
 class _ReducedBoundary:
     """Dirichlet condition imposed exactly: each atom of held vertices has its own coordinates."""
 
-    def __init__(self, boundary: Boundary, columns: Columns) -> None:
+    def __init__(self, boundary: base.Boundary, columns: Columns) -> None:
         self.boundary = boundary
         self.active, self.takes_hold = boundary.active, boundary.takes_hold
         self._parts: dict[bytes, tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
@@ -270,7 +263,7 @@ def probe_vertices(n: int) -> np.ndarray:
 class _ReducedContact:
     """A contact that is detected at probe vertices and then resolved at all vertices."""
 
-    def __init__(self, contact: Contact, columns: Columns, scene: Scene) -> None:
+    def __init__(self, contact: base.Contact, columns: Columns, scene: Scene) -> None:
         self._contact, self.height = contact, contact.height
         self._vertices = probe_vertices(scene.mesh.vertices)
         self._probes = np.ascontiguousarray(columns.B[self._vertices])

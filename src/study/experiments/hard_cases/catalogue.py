@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from pdrom.core.project import config_file
+from pdrom.core import config_file
 from pdrom.model.mesh.files import read_mesh_file
 from pdrom.model.mesh.generators import bar, boundary, cloth
 from pdrom.model.mesh.types import Mesh

@@ -245,7 +245,7 @@ def test_a_group_without_a_gradient_kernel_iterates_plainly():
     step = interpolation.SubspaceLocalStep(scene.groups[0], columns)
     calls = {name: getattr(step, name) for name in ("name", "begin_frame", "accumulate")}
     loop, state = models.SubspaceModel("pod", columns).loop(scene)
-    plain = FusedStepper(loop.space, 0.016, 10, [SimpleNamespace(**calls)])
+    plain = FusedStepper(scene, loop.space, [SimpleNamespace(**calls)])
     np.testing.assert_allclose(
         loop.step(state, 0)[0].positions, plain.step(state, 0)[0].positions, rtol=1e-10, atol=1e-10
     )
