@@ -26,11 +26,9 @@ from pdrom.reduction.subspace.model import load_models
 from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import EachOf, Settings
+from study.experiments.kit.base import Modes, PositionBasis, Solver, experiment, load_reduction
 from study.experiments.kit.costs import variant
-from study.experiments.kit.declaration import experiment
 from study.experiments.kit.measurement import Case, Processes, Variant, in_processes
-from study.experiments.kit.reruns import load_reduction
-from study.experiments.kit.settings import Modes, PositionBasis, Solver
 
 FULL, CONTROL, REDUCED = "full", "control", "reduced"
 COLUMNS = [

@@ -17,21 +17,14 @@ from pdrom.reduction.basis import load_basis
 from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.rerun import mean_motion
 from pdrom.reduction.sampling import Reduction
-from pdrom.reduction.subspace.exported import (
-    export_basis,
-    export_model,
-    export_scene,
-    needed_vertices,
-)
+from pdrom.reduction.subspace import exported
 from pdrom.reduction.subspace.interpolation import interpolation_of
 from pdrom.reduction.subspace.model import SubspaceModel, ecsw_name, load_models
 from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import EachOf, Settings
-from study.experiments.kit.declaration import experiment
-from study.experiments.kit.reruns import load_reduction
-from study.experiments.kit.scenes import positions_of, scene_of
-from study.experiments.kit.settings import Modes, Tolerance
+from study.experiments.kit import base as kit
+from study.experiments.kit.base import experiment
 
 log = logging.getLogger(__name__)
 
@@ -46,9 +39,9 @@ class LiveModels(ConfigModel):
     """Models of the page: numbers of modes k, tolerances of the sampling, and the modes r of the
     joint rows; each as far as the study has it."""
 
-    sizes: tuple[Modes, ...] = (10, 20, 40)
-    tolerances: tuple[Tolerance, ...] = (3e-2, 1e-2, 1e-3)
-    joint_rows: Modes = 20
+    sizes: tuple[kit.Modes, ...] = (10, 20, 40)
+    tolerances: tuple[kit.Tolerance, ...] = (3e-2, 1e-2, 1e-3)
+    joint_rows: kit.Modes = 20
 
 
 class Live(LiveModels):
@@ -127,8 +120,8 @@ def live(
     StorageError
         The file would be larger than `LARGEST`.
     """
-    scene = scene_of(settings.scene, mesh)
-    reference = positions_of(train)
+    scene = kit.scene_of(settings.scene, mesh)
+    reference = kit.positions_of(train)
     asked = settings.live
     chosen: list[Labelled] = []
     tolerances = {ecsw_name(tolerance): tolerance for tolerance in asked.tolerances}
@@ -143,7 +136,7 @@ def live(
         basis = load_basis(file.path)
         # of the size asked for, or of the largest that exists
         size = min(asked.joint_rows, basis.rank)
-        reduction = load_reduction(basis, sampling.path, case.method, size)
+        reduction = kit.load_reduction(basis, sampling.path, case.method, size)
         chosen += list(_joint(scene, case.group, reduction, chosen))
     used, triangles = np.unique(scene.mesh.triangles, return_inverse=True)
     stride = max(1, ceil((len(reference) - 1) * len(used) / GHOST))
@@ -151,7 +144,7 @@ def live(
         "format": FORMAT,
         "scene": settings.scene.name,
         "title": settings.title,
-        **export_scene(scene),
+        **exported.export_scene(scene),
         **_models(scene, chosen),
         # the surface, and every so many frames of the full-order run at its vertices
         "shown": {
@@ -191,11 +184,11 @@ def _models(scene: Scene, chosen: list[Labelled]) -> dict[str, Any]:
     places = {key: place for place, key in enumerate(by_basis)}
     return {
         "bases": [
-            export_basis(scene, own[0].columns, needed_vertices(scene, own))
+            exported.export_basis(scene, own[0].columns, exported.needed_vertices(scene, own))
             for own in by_basis.values()
         ],
         "models": [
-            {**labels, "basis": places[id(model.columns)], **export_model(scene, model)}
+            {**labels, "basis": places[id(model.columns)], **exported.export_model(scene, model)}
             for labels, model in chosen
         ],
     }

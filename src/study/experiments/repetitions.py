@@ -20,26 +20,18 @@ from pdrom.core.store import write_hdf5, write_table
 from pdrom.core.yamlfile import ConfigModel, SceneName
 from pdrom.model.metrics import relative_errors
 from pdrom.model.scene import Scene, SceneConfig
+from pdrom.reduction import snapshots as sets
 from pdrom.reduction.basis import Basis, basis_of, compute_basis
 from pdrom.reduction.deviations import error_within
 from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.rerun import Rerun, displacement_norms
 from pdrom.reduction.sampling import Reduction, reductions
 from pdrom.reduction.sampling.local_step import rerun_reduced
-from pdrom.reduction.snapshots import (
-    SPLITS,
-    SnapshotSet,
-    load_snapshots,
-    row_masses,
-    training_frames,
-)
 from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Settings
-from study.experiments.kit.declaration import experiment
-from study.experiments.kit.reruns import store_end
-from study.experiments.kit.scenes import perturbation_field, positions_of, scene_of
-from study.experiments.kit.settings import BlowupExtent, Horizon, Modes, Tolerance
+from study.experiments.kit import base as kit
+from study.experiments.kit.base import experiment
 
 Varied = Literal["start", "training"]
 log = logging.getLogger(__name__)
@@ -69,7 +61,7 @@ class Repetitions(ConfigModel):
     """
 
     repetitions: Annotated[int, Field(ge=1, le=1000)] = 5
-    perturbation: Tolerance = 1e-10
+    perturbation: kit.Tolerance = 1e-10
 
 
 @dataclass(frozen=True)
@@ -84,7 +76,7 @@ class ReducedRuns:
 
     scene: Scene
     group: str
-    data: SnapshotSet
+    data: sets.SnapshotSet
     reference: np.ndarray
     end: int
     blowup_extent: float
@@ -135,7 +127,7 @@ class ReducedRuns:
             made = reductions(self.basis(method), method, sizes)
         for seed in range(1, asked.repetitions + 1):
             if varied == "start":
-                offset = perturbation_field(self.scene, asked.perturbation, seed)
+                offset = kit.perturbation_field(self.scene, asked.perturbation, seed)
             else:
                 made = reductions(self.basis(method, frames=seed), method, sizes)
             for r, reduction in made.items():
@@ -146,7 +138,7 @@ class ReducedRuns:
         return sorted(rows, key=lambda row: row["r"])
 
 
-def drawn(data: SnapshotSet, seed: int) -> np.ndarray:
+def drawn(data: sets.SnapshotSet, seed: int) -> np.ndarray:
     """Snapshots (n, e p, 3), as many as train in ``data``, drawn by ``seed`` from all, in order."""
     frames = np.concatenate([data.frames["train"], data.frames["test"]])
     chosen = np.random.default_rng(seed).choice(len(frames), len(data.train), replace=False)
@@ -160,7 +152,7 @@ class Cells(ConfigModel):
 
     scenes: Annotated[tuple[SceneName, ...], Field(min_length=1)]
     methods: Annotated[tuple[str, ...], Field(min_length=1)]
-    sizes: Annotated[tuple[Modes, ...], Field(min_length=1)]
+    sizes: Annotated[tuple[kit.Modes, ...], Field(min_length=1)]
     varied: tuple[Varied, ...] = ("start", "training")
 
 
@@ -175,7 +167,7 @@ class Repeated(ConfigModel):
 
     method: str
     spec: MethodSpec
-    sizes: tuple[Modes, ...]
+    sizes: tuple[kit.Modes, ...]
     varied: tuple[Varied, ...]
 
 
@@ -196,7 +188,7 @@ class Ladder(Repetitions):
     up: Rungs = ()
     down: Rungs = ()
     square: tuple[MethodSpec, ...] = ()
-    sizes: tuple[Modes, ...] = ()
+    sizes: tuple[kit.Modes, ...] = ()
 
     def rungs(self, p: int) -> list[tuple[str, MethodSpec, int | None, int]]:
         """(direction, method, seed of the signs, size) of all rows of a group, in order."""
@@ -227,7 +219,7 @@ class NoiseRuns(ConfigModel):
     perturbation : length by which they move a vertex, over the extent: a few units of round-off
     """
 
-    sizes: Annotated[tuple[Modes, ...], Field(min_length=1)] = (6, 10, 20)
+    sizes: Annotated[tuple[kit.Modes, ...], Field(min_length=1)] = (6, 10, 20)
     repetitions: Annotated[int, Field(ge=1, le=1000)] = 20
     perturbation: Annotated[float, Field(gt=0.0, le=1e-12)] = 1e-15
 
@@ -248,8 +240,8 @@ class Options(ConfigModel):
     own_ladder: Ladder | None
     own_noise: NoiseRuns | None
     noise_methods: dict[str, MethodSpec]
-    horizon: Horizon
-    blowup_extent: BlowupExtent
+    horizon: kit.Horizon
+    blowup_extent: kit.BlowupExtent
 
 
 @experiment(
@@ -285,10 +277,10 @@ def repetitions(
     """
     labels = out.labels
     runs = ReducedRuns(
-        scene_of(settings.scene, mesh),
+        kit.scene_of(settings.scene, mesh),
         labels["group"],
-        load_snapshots(snapshots.path),
-        reference=positions_of(fom),
+        sets.load_snapshots(snapshots.path),
+        reference=kit.positions_of(fom),
         end=settings.horizon.frames(sensitivity),
         blowup_extent=settings.blowup_extent,
     )
@@ -331,7 +323,7 @@ def _ladder(runs: ReducedRuns, short: ReducedRuns, ladder: Ladder) -> Iterator[d
             row["relative_error_within_horizon"] = runs.error(outcome)
             row["entries"] = sum(len(block.entries) for block in reduction.blocks)
             row |= {"condition": reduction.condition, "gain": reduction.gain}
-            for split in SPLITS:
+            for split in sets.SPLITS:
                 p = getattr(data, split)
                 found = relative_errors(p, reduction.reconstruct(p), data.roundoff)
                 row[f"error_{split}"] = found[0]
@@ -374,7 +366,7 @@ def noisy_runs(
             store = file.create_group(f"{axes}/{row['method']}/r{row['r']:04d}")
             store.attrs.update(r=row["r"], marked=outcome is None)
             if outcome is not None:
-                store_end(store, outcome)
+                kit.store_end(store, outcome)
         log.info("%s: %d starts", axes, asked.repetitions)
     return rows
 
@@ -402,7 +394,7 @@ def roundoff_field(scene: Scene, axes: str, size: float, seed: int) -> np.ndarra
 
     ``scene``, ``size`` and ``seed`` as in `perturbation_field`; the seed draws the vertex, too.
     """
-    field = perturbation_field(scene, size, seed)
+    field = kit.perturbation_field(scene, size, seed)
     if axes != ALL:
         still = np.ones(len(field), dtype=bool)
         if axes == VERTEX:
@@ -450,8 +442,8 @@ def _noisy(
         state, _ = loop.step(state, frame, lambda y: projections.append(group.project(y)))
         positions.append(state.positions)
     reference = np.stack(positions)
-    even = training_frames(frames, min(plan.train, (frames + 1) // 2))
-    trained_on, masses = np.stack(projections)[even], row_masses(group, scene.masses)
+    even = sets.training_frames(frames, min(plan.train, (frames + 1) // 2))
+    trained_on, masses = np.stack(projections)[even], sets.row_masses(group, scene.masses)
     displacement = displacement_norms(reference)
     for method, spec in methods.items():
         basis = noise_basis(trained_on, masses, group.rows_per_element, method=spec)

@@ -22,10 +22,8 @@ from pdrom.reduction.snapshots import SPLITS, SnapshotSet, load_snapshots
 from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, Settings
-from study.experiments.kit.declaration import experiment
-from study.experiments.kit.reruns import load_reduction, store_end
-from study.experiments.kit.scenes import TRAIN, positions_of, scene_of
-from study.experiments.kit.settings import BlowupExtent, Count, Rank, Solver, resolve_ranks
+from study.experiments.kit import base as kit
+from study.experiments.kit.base import experiment
 
 log = logging.getLogger(__name__)
 
@@ -44,8 +42,8 @@ MOTION = "motion"  # column of the held-out rows only
 class Sweep(ConfigModel):
     """Basis sizes of the reconstruction error: all up to ``dense_to``, then every ``step``-th."""
 
-    dense_to: Count = 10
-    step: Count = 10
+    dense_to: kit.Count = 10
+    step: kit.Count = 10
 
     def ranks(self, largest: int) -> list[int]:
         """Sizes 1 .. ``largest``, which is always among them."""
@@ -60,9 +58,9 @@ class Options(ConfigModel):
     scene: SceneConfig
     method: MethodSpec
     sweep: Sweep
-    ranks: tuple[Rank, ...]
-    blowup_extent: BlowupExtent
-    solver: Solver
+    ranks: tuple[kit.Rank, ...]
+    blowup_extent: kit.BlowupExtent
+    solver: kit.Solver
 
 
 @experiment(
@@ -106,15 +104,15 @@ def reruns(
     with write_hdf5(runs.path) as file:
         for run in motions:
             motion = run["run"]
-            yardstick = Yardstick(scene_of(settings.scene, mesh, motion), positions_of(run))
+            yardstick = Yardstick(kit.scene_of(settings.scene, mesh, motion), kit.positions_of(run))
             file.attrs.update(yardstick.units)
-            store = file if motion == TRAIN else file.create_group(motion)
+            store = file if motion == kit.TRAIN else file.create_group(motion)
             for name, values in yardstick.series.items():
                 store[name] = values
-            sizes = resolve_ranks(settings.ranks, space.rank)
+            sizes = kit.resolve_ranks(settings.ranks, space.rank)
             made = _runs(yardstick, sampling, space, sizes, settings, store)
             found[motion] = pd.DataFrame(made, columns=COLUMNS)
-    write_table(found.pop(TRAIN), out.path)
+    write_table(found.pop(kit.TRAIN), out.path)
     heldout = [table.assign(**{MOTION: motion}) for motion, table in found.items()]
     write_table(pd.concat(heldout, ignore_index=True), heldout_table.path)
 
@@ -141,7 +139,7 @@ def _runs(
             log.warning("r = %d exceeds the numerical rank %d: not run", r, basis.rank)
             yield {**labels, "r": r, "frames": 0}
             continue
-        reduction = load_reduction(basis, sampling.path, settings.method, r=r)
+        reduction = kit.load_reduction(basis, sampling.path, settings.method, r=r)
         outcome = rerun_reduced(
             scene,
             labels["group"],
@@ -154,7 +152,7 @@ def _runs(
         error = outcome.difference / np.sqrt(np.mean(yardstick.displacement**2))
         for name, values in {**apart, "error": error, "extent": outcome.extent}.items():
             store[name] = values
-        store_end(store, outcome, with_positions=file.name == "/")
+        kit.store_end(store, outcome, with_positions=file.name == "/")
         store.attrs["finite"] = outcome.finite
         measured = {"energy_ratio": largest(apart["energy"]), "gain": reduction.gain}
         yield {**labels, "r": r, **outcome.row(yardstick.displacement), **measured}
@@ -172,7 +170,7 @@ def _sample(
     sampling, errors : files to write; their labels are the first columns of the table
     """
     labels = sampling.labels
-    asked = resolve_ranks(settings.ranks, basis.rank)
+    asked = kit.resolve_ranks(settings.ranks, basis.rank)
     wanted = {*settings.sweep.ranks(basis.rank), *asked} if basis.rank else set()
     rows = []
     with write_hdf5(sampling.path) as file:

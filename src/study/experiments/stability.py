@@ -20,10 +20,8 @@ from pdrom.reduction.sampling.local_step import rerun, rerun_reduced
 from pdrom.reduction.subspace.model import SubspaceModel, load_models, rerun_model
 from study.artifact.paths import BASIS, MESH, SAMPLING, STABILITY, SUBSPACES, File
 from study.artifact.reads import Every, Setting
-from study.experiments.kit.declaration import experiment
-from study.experiments.kit.reruns import basis_of, load_reduction
-from study.experiments.kit.scenes import scene_of, varied
-from study.experiments.kit.settings import BlowupExtent, Rank, Solver, resolve_ranks
+from study.experiments.kit import base as kit
+from study.experiments.kit.base import experiment
 
 log = logging.getLogger(__name__)
 
@@ -44,7 +42,7 @@ class ShortRuns(ConfigModel):
     duration : seconds of simulated time, within ``min_frames`` and ``max_frames``
     """
 
-    ranks: tuple[Rank, ...] = ()
+    ranks: tuple[kit.Rank, ...] = ()
     time_steps: tuple[Annotated[float, Field(gt=0.0, le=10.0)], ...] = ()
     stiffness_ratios: tuple[Annotated[float, Field(gt=0.0, le=1e8)], ...] = ()
     duration: Annotated[float, Field(gt=0.0)] = 1.0
@@ -102,23 +100,23 @@ def stability(
     config: SceneConfig,
     methods: dict[str, MethodSpec],
     short: ShortRuns,
-    blowup_extent: BlowupExtent,
-    solver: Solver,
+    blowup_extent: kit.BlowupExtent,
+    solver: kit.Solver,
     out: File,
 ) -> None:
     """Run the full order, every local reduction and the largest subspaces at every setting.
 
     Bases and samplings are those of the scene's own setting: how far do they carry?
     """
-    scene = scene_of(config, mesh)
+    scene = kit.scene_of(config, mesh)
     local: list[tuple[dict[str, Any], Reduction | None]] = []
     for file in samplings:
         spec = methods[file["method"]]
-        basis = load_basis(basis_of(file, spec, bases).path)
-        for r in resolve_ranks(short.ranks, basis.rank):
+        basis = load_basis(kit.basis_of(file, spec, bases).path)
+        for r in kit.resolve_ranks(short.ranks, basis.rank):
             labels = {"group": file["group"], "method": file["method"], "r": r}
             known = r <= basis.rank
-            reduction = load_reduction(basis, file.path, spec, r=r) if known else None
+            reduction = kit.load_reduction(basis, file.path, spec, r=r) if known else None
             local.append((labels | {"position_basis": "full"}, reduction))
     models: list[tuple[dict[str, Any], SubspaceModel]] = []
     for file in subspaces:
@@ -131,7 +129,7 @@ def stability(
     grid = [(step, 1.0) for step in sorted({h, *short.time_steps})] + [(h, own) for own in ratios]
     rows = []
     for step, ratio in grid:
-        other = varied(scene.config, step, ratio, duration=short.duration, frames=limits)
+        other = kit.varied(scene.config, step, ratio, duration=short.duration, frames=limits)
         case = Scene.build(other, scene.mesh)
         own = {"scene": config.name, "h": step, "stiffness_ratio": ratio}
         rows += [own | row for row in _rows(case, local, models, solver, blowup_extent)]

@@ -22,29 +22,17 @@ from pdrom.model.runs import trajectory
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.deviations import Yardstick
 from pdrom.reduction.snapshots import training_frames
+from pdrom.reduction.subspace import model as subspace
 from pdrom.reduction.subspace.columns import Columns
 from pdrom.reduction.subspace.ecsw import Norm
 from pdrom.reduction.subspace.hrpd import HrpdSpec, SampledSpace, hrpd, sampled_space
 from pdrom.reduction.subspace.interpolation import Interpolation
-from pdrom.reduction.subspace.model import (
-    ECSW,
-    Samples,
-    SubspaceModel,
-    ecsw_name,
-    make_columns,
-    rerun_model,
-    sample_elements,
-    store_columns,
-    store_model,
-)
 from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, Setting, SourcesOf
-from study.experiments.kit.declaration import experiment
+from study.experiments.kit import base as kit
+from study.experiments.kit.base import experiment
 from study.experiments.kit.measurement import clocked
-from study.experiments.kit.reruns import run_error
-from study.experiments.kit.scenes import TRAIN, positions_of, scene_of
-from study.experiments.kit.settings import BlowupExtent, Modes, PositionBasis, Tolerance
 
 log = logging.getLogger(__name__)
 
@@ -60,13 +48,13 @@ LARGE_COLUMNS = [
 ]  # fmt: skip
 FULL, HRPD = "full", "hrpd"
 
-Sampled = Mapping[str, Samples | Interpolation]
+Sampled = Mapping[str, subspace.Samples | Interpolation]
 
 
 class Hrpd(HrpdSpec):
     """Sampled constraints with interpolation, and the numbers of modes k that have them."""
 
-    sizes: tuple[Modes, ...] = ()
+    sizes: tuple[kit.Modes, ...] = ()
 
 
 class SubspaceModels(ConfigModel):
@@ -75,9 +63,9 @@ class SubspaceModels(ConfigModel):
     ``hrpd`` adds models with interpolated projections; None leaves them out.
     """
 
-    bases: tuple[PositionBasis, ...] = ("pod", "skinning")
-    sizes: tuple[Modes, ...] = (10, 40)
-    tolerances: tuple[Tolerance, ...] = (3e-2, 1e-2)
+    bases: tuple[kit.PositionBasis, ...] = ("pod", "skinning")
+    sizes: tuple[kit.Modes, ...] = (10, 40)
+    tolerances: tuple[kit.Tolerance, ...] = (3e-2, 1e-2)
     norm: Norm = "energy"
     hrpd: Hrpd | None = None
 
@@ -87,7 +75,7 @@ class SubspaceModels(ConfigModel):
             return []
         tolerances = self.tolerances if kind == "pod" else ()
         interpolated = self.hrpd is not None and k in self.hrpd.sizes
-        return [FULL, *map(ecsw_name, tolerances), *([HRPD] if interpolated else [])]
+        return [FULL, *map(subspace.ecsw_name, tolerances), *([HRPD] if interpolated else [])]
 
 
 class Subspace(SubspaceModels):
@@ -99,9 +87,9 @@ class Subspace(SubspaceModels):
 class LargeModels(SubspaceModels):
     """Models of a large scene; none evaluates all projections, which takes too long."""
 
-    bases: tuple[PositionBasis, ...] = ("pod",)
-    sizes: tuple[Modes, ...] = (20,)
-    tolerances: tuple[Tolerance, ...] = (1e-2,)
+    bases: tuple[kit.PositionBasis, ...] = ("pod",)
+    sizes: tuple[kit.Modes, ...] = (20,)
+    tolerances: tuple[kit.Tolerance, ...] = (1e-2,)
 
     def methods(self, kind: str, k: int) -> list[str]:
         """Names of the models on a basis of ``kind`` with k modes."""
@@ -135,7 +123,7 @@ def subspaces(
     full_order: list[File],
     config: SceneConfig,
     asked: SubspaceModels,
-    blowup_extent: BlowupExtent,
+    blowup_extent: kit.BlowupExtent,
     out: File,
     train_table: File,
     heldout_table: File,
@@ -143,16 +131,16 @@ def subspaces(
 ) -> None:
     """Build every model (bases, sizes, tolerances) and run all motions with it."""
     motions = {
-        run["run"]: Yardstick(scene_of(config, mesh, run["run"]), positions_of(run))
+        run["run"]: Yardstick(kit.scene_of(config, mesh, run["run"]), kit.positions_of(run))
         for run in full_order
     }
     with write_hdf5(out.path) as file:
         for name, motion in motions.items():
             for series, values in motion.series.items():
                 file[f"{series}/{name}"] = values
-        file.attrs.update(motions[TRAIN].units)
+        file.attrs.update(motions[kit.TRAIN].units)
         rows = _runs(file, motions, asked, blowup_extent, compared=True)
-    train, heldout = rows[rows.motion == TRAIN], rows[rows.motion != TRAIN]
+    train, heldout = rows[rows.motion == kit.TRAIN], rows[rows.motion != kit.TRAIN]
     write_table(train[COLUMNS], train_table.path)
     write_table(heldout[[*COLUMNS, "motion"]], heldout_table.path)
     write_table(train[SECONDS_COLUMNS], seconds_table.path)
@@ -172,7 +160,7 @@ def online(
     sources: list[Path],
     config: SceneConfig,
     asked: LargeModels,
-    blowup_extent: BlowupExtent,
+    blowup_extent: kit.BlowupExtent,
     out: File,
     models: File,
 ) -> None:
@@ -181,7 +169,7 @@ def online(
     Its mesh is made of the ``sources``, its full-order runs are made here and not kept.
     """
     mesh = config.mesh.build(Path())
-    variants = {TRAIN: config} | {str(name): config.heldout_variant(name) for name in MOTIONS}
+    variants = {kit.TRAIN: config} | {str(name): config.heldout_variant(name) for name in MOTIONS}
     scenes = {name: Scene.build(variant, mesh) for name, variant in variants.items()}
     motions = {
         name: Yardstick(scene, trajectory(scene, track_objective=False))
@@ -191,9 +179,11 @@ def online(
     with write_hdf5(models.path) as file:
         rows = _runs(file, motions, asked, blowup_extent, compared=False)
     table = rows.assign(
-        tau=rows.method.map({ecsw_name(tolerance): tolerance for tolerance in asked.tolerances}),
+        tau=rows.method.map(
+            {subspace.ecsw_name(tolerance): tolerance for tolerance in asked.tolerances}
+        ),
         vertices=mesh.vertices,
-        elements=sum(group.elements for group in scenes[TRAIN].groups),
+        elements=sum(group.elements for group in scenes[kit.TRAIN].groups),
         iterations=config.iterations,
     )
     write_table(table[LARGE_COLUMNS], out.path)
@@ -217,23 +207,26 @@ def _runs(
     compared : whether the file receives coordinates and deviations of each run, too
     """
     rows: list[dict[str, Any]] = []
-    played = {name: run_error(motions[TRAIN].reference, m.reference) for name, m in motions.items()}
-    made = clocked(_subspaces(motions[TRAIN], settings))
+    played = {
+        name: kit.run_error(motions[kit.TRAIN].reference, m.reference)
+        for name, m in motions.items()
+    }
+    made = clocked(_subspaces(motions[kit.TRAIN], settings))
     for of_columns, (base, columns, kind, k, models) in made:
-        store_columns(file.create_group(f"columns/{base}"), columns)
+        subspace.store_columns(file.create_group(f"columns/{base}"), columns)
         spent: dict[str, float] = defaultdict(float)
         for of_model, (method, samples) in clocked(models):
             # one call samples for all tolerances: it is made at the first of them
-            family = ECSW if method.startswith(ECSW) else method
+            family = subspace.ECSW if method.startswith(subspace.ECSW) else method
             spent[family] += of_model
-            model = SubspaceModel(kind, columns, samples)
+            model = subspace.SubspaceModel(kind, columns, samples)
             labels: dict[str, Any] = {"method": method, "position_basis": kind, "k": k}
             store = file.create_group(f"models/{base}_{method}")
-            store_model(store, {**labels, "base": base}, samples)
+            subspace.store_model(store, {**labels, "base": base}, samples)
             labels |= {"group": "all", "reduction_s": of_columns + spent[family]}
             for name, motion in motions.items():
                 scene = motion.scene
-                outcome = rerun_model(scene, model, motion.reference, blowup_extent=limit)
+                outcome = subspace.rerun_model(scene, model, motion.reference, blowup_extent=limit)
                 row = outcome.row(motion.displacement) | labels | {"motion": name}
                 row["playback_error"] = played[name]
                 row |= {"scene": scene.config.name, "r": model.elements_evaluated(scene)}
@@ -264,7 +257,7 @@ def _subspaces(
         spaces = {g.name: sampled_space(g, points, settings.hrpd) for g in scene.groups}
     for kind in settings.bases:
         for k in settings.sizes:
-            columns = make_columns(scene, motion.reference[1:][frames], kind, k=k)
+            columns = subspace.make_columns(scene, motion.reference[1:][frames], kind, k=k)
             methods = settings.methods(kind, k)
             models = _samplings(scene, columns, settings, methods, frames=frames, spaces=spaces)
             yield f"{kind}_k{k:03d}", columns, kind, k, models
@@ -281,10 +274,12 @@ def _samplings(
     """(method, samples) pairs of the ``methods``; ``spaces`` of projections are those of hrpd."""
     if FULL in methods:
         yield FULL, {}
-    if any(method.startswith(ECSW) for method in methods):
+    if any(method.startswith(subspace.ECSW) for method in methods):
         tolerances = settings.tolerances
-        found = sample_elements(scene, columns, frames, tolerances=tolerances, norm=settings.norm)
+        found = subspace.sample_elements(
+            scene, columns, frames, tolerances=tolerances, norm=settings.norm
+        )
         for tolerance, samples in zip(tolerances, found, strict=True):
-            yield ecsw_name(tolerance), samples
+            yield subspace.ecsw_name(tolerance), samples
     if HRPD in methods:
         yield HRPD, {g.name: hrpd(g, columns, spaces[g.name]) for g in scene.groups}

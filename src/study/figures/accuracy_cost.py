@@ -10,9 +10,8 @@ from pdrom.view import style
 from pdrom.view.artists import Axes, Figure, Line2D
 from pdrom.view.multiples import clipped, label_counts, log_axis, time_axis
 from study.artifact.reads import TableOf
-from study.experiments.kit.settings import ANDERSON, FOM
-from study.figures.kit.declaration import figure
-from study.figures.kit.options import Drawn, Methods
+from study.experiments.kit.base import ANDERSON, FOM
+from study.figures.kit.declaration import Drawn, Methods, figure
 from study.tables.accuracy_cost import FEWER, pareto
 
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "*")

@@ -8,8 +8,7 @@ from pdrom.view import multiples, style
 from pdrom.view.artists import Axes, Figure
 from study.artifact.reads import TableOf
 from study.experiments.alternatives.settings import REDUCTIONS
-from study.figures.kit.declaration import figure
-from study.figures.kit.options import NothingToDraw, Options, Scenes
+from study.figures.kit.declaration import NothingToDraw, Options, Scenes, figure
 
 LOW, HIGH = 1e-4, 1.0  # limits of the error axis; errors outside are drawn on them
 BESIDE = 4  # number of panels side by side

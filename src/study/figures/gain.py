@@ -8,8 +8,7 @@ from pdrom.view.artists import Axes, Figure
 from pdrom.view.multiples import clipped, log_axes, rim_arrows
 from pdrom.view.text import plain_words
 from study.artifact.reads import TableOf
-from study.figures.kit.declaration import figure
-from study.figures.kit.options import Drawn, Methods, NothingToDraw, Scenes
+from study.figures.kit.declaration import Drawn, Methods, NothingToDraw, Scenes, figure
 from study.tables.kit.results import FAILED, judged_runs
 
 GAINS = (1.0, 1e5)  # limits of the gain axis; points outside are drawn on them

@@ -16,10 +16,9 @@ from pdrom.view.panels import NOTHING_RAN, Row, RunPanel
 from pdrom.view.read import RerunInfo, choose_ranks, positions_at, rerun_infos
 from study.artifact.paths import MESH, NOISE_RUNS, RERUNS, SUBSPACES, TRAIN, File
 from study.artifact.reads import EachOf, Every, Read, TableOf
-from study.experiments.kit.settings import Horizon
-from study.figures.kit.declaration import figure
+from study.experiments.kit.base import Horizon
+from study.figures.kit.declaration import Drawn, Experiment, NothingToDraw, ReducedRuns, figure
 from study.figures.kit.elements import magnitudes
-from study.figures.kit.options import Drawn, Experiment, NothingToDraw, ReducedRuns
 from study.figures.sensitivity_floor import FLOORS, Floors
 from study.tables.kit.results import trained
 

@@ -10,8 +10,7 @@ from pdrom.view import style
 from pdrom.view.artists import Axes, Figure
 from pdrom.view.multiples import clipped, label_outer, log_axis, small_multiples
 from study.artifact.reads import ProjectFile, TableOf
-from study.figures.kit.declaration import figure
-from study.figures.kit.options import Beside, Drawn, Experiment, Methods, NothingToDraw
+from study.figures.kit.declaration import Beside, Drawn, Experiment, Methods, NothingToDraw, figure
 
 VALUES = (1e-17, 3.0)
 ERRORS = (1e-7, 1e3)  # limits of the error axis; errors outside are drawn on them

@@ -17,7 +17,7 @@ import pandas as pd
 from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, Setting, TableOf
-from study.experiments.kit.settings import ANDERSON, FOM
+from study.experiments.kit.base import ANDERSON, FOM
 from study.tables.kit import results
 from study.tables.kit.declaration import flag, integer, number, shared, table, text, timed
 

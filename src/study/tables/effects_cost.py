@@ -6,7 +6,7 @@ import pandas as pd
 from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, Setting, TableOf
-from study.experiments.kit.settings import FOM, GLOBAL, REST, RIGHT, Horizon, floor_of, horizons
+from study.experiments.kit.base import FOM, GLOBAL, REST, RIGHT, Horizon, floor_of, horizons
 from study.experiments.sensitivity import without
 from study.tables.kit.declaration import flag, integer, number, shared, table, text, timed
 from study.tables.kit.results import in_one_time, joined, timings_in_one_time

@@ -30,15 +30,11 @@ from study.artifact.paths import ALTERNATIVE_TIMES, ALTERNATIVES, File
 from study.artifact.reads import Settings, SourcesOf
 from study.experiments.alternatives import settings as names
 from study.experiments.alternatives.settings import CONVERGED, TRAINING, TWO_LEVEL, Comparison
-from study.experiments.alternatives.solvers.explicit import continuous
-from study.experiments.alternatives.solvers.projective import WINDOW
+from study.experiments.alternatives.solvers.methods import WINDOW, TwoLevel, continuous
 from study.experiments.alternatives.solvers.substeps import METHODS
-from study.experiments.alternatives.solvers.two_level import TwoLevel
-from study.experiments.kit.converged import converged_run
-from study.experiments.kit.declaration import experiment
+from study.experiments.iterations import converged_run
+from study.experiments.kit.base import BlowupExtent, experiment, run_error
 from study.experiments.kit.measurement import Case, Variant, in_processes
-from study.experiments.kit.reruns import run_error
-from study.experiments.kit.settings import BlowupExtent
 
 TIME_COLUMNS = [
     "scene", "factor", "stiffness", *names.SETTING, "process", "ms_per_frame", "vertices_ms",

@@ -8,8 +8,8 @@ from pdrom.core.errors import choices
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.model.held_out import FIRST, MOTIONS, HeldOutMotion
 from study.experiments.alternatives.solvers.substeps import METHODS
+from study.experiments.kit.base import Count, Modes, Repeats, Sizes, Tolerance
 from study.experiments.kit.measurement import Processes
-from study.experiments.kit.settings import Count, Modes, Repeats, Sizes, Tolerance
 
 REDUCED, ACCELERATED = REDUCTIONS = "ecsw", "ecsw-anderson"  # the others are full-order ones
 TWO_LEVEL: Final = "two-level"  # full order, with a trained subspace for its coarse level

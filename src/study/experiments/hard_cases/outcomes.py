@@ -31,7 +31,7 @@ from study.artifact.reads import ProjectFiles, Setting
 from study.experiments.hard_cases.case import HardCase
 from study.experiments.hard_cases.catalogue import CASES, MESHES, reducible_cases
 from study.experiments.hard_cases.record import Record, Watched, full_order, momentum, reach, record
-from study.experiments.kit.declaration import experiment
+from study.experiments.kit.base import experiment
 
 HOLDS, NOTHING, NOT_TAKEN = "holds", "nothing to reduce", "not taken"
 FAILURES = ("refused", "singular", "blow-up", "distorted", "objective rises", "momentum changes")

@@ -23,8 +23,8 @@ from pdrom.model.dynamics.system import GlobalSystem
 from pdrom.model.effects.base import Effect
 from pdrom.model.scene import Scene
 from pdrom.reduction.sampling.local_step import ReducedLocalStep
+from study.experiments.kit.base import GLOBAL, REST, RIGHT
 from study.experiments.kit.measurement import Variant, measure, measure_calls, median_frames
-from study.experiments.kit.settings import GLOBAL, REST, RIGHT
 
 COLUMNS = [
     "scene", "group", "method", "vertices", "elements", "r", "local_ms", "full_ms", "solve_ms",

@@ -12,7 +12,7 @@ from pdrom.core.machine import Units, machine
 from pdrom.core.store import write_table
 from places import ROOT
 from study.artifact.logs import Usage
-from study.experiments.kit.declaration import experiments
+from study.experiments.kit.base import experiments
 from study.pipeline import run
 from study.pipeline.commandline import CommandLine
 from study.pipeline.failures import Failures

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from builders import frame
 from pdrom.core.store import write_table
 from study.artifact.paths import File
-from study.experiments.kit.settings import Horizon
+from study.experiments.kit.base import Horizon
 from study.tables.effects_cost import effects_cost
 from study.tables.kit.results import FAILED
 from study.tables.kit.results import KEYS as LABELS
