@@ -47,5 +47,6 @@ def write_models(
     mesh, train, models, out = (
         File(str(folder / name), {}) for name in ("mesh.h5", "train.h5", "models.h5", "test.js")
     )
-    live(mesh, train, [models], [], [], [], options, out)
+    files = {"subspaces": [models], "online": [], "bases": [], "samplings": []}
+    live(mesh, train, options, out, **files)
     return folder / "test.js", model

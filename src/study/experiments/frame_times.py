@@ -156,25 +156,15 @@ class TimedScene(Case):
     writes={"times": paths.FRAME_TIMES, "seconds": paths.PROJECTION_SECONDS},
     alone=True,
 )
-def frame_times(
-    meshes: list[File],
-    subspaces: list[File],
-    bases: list[File],
-    samplings: list[File],
-    snapshots: list[File],
-    large: list[File],
-    settings: Options,
-    times: File,
-    seconds: File,
-) -> None:
+def frame_times(settings: Options, times: File, seconds: File, **files: list[File]) -> None:
     """Start the processes one after the other, and join what they measured."""
     asked = settings.frame_times
     scenes: dict[str, TimedScene] = {}
-    for named, file in zip(settings.timed_scenes, meshes, strict=True):
+    for named, file in zip(settings.timed_scenes, files["meshes"], strict=True):
         scenes[named.scene.name] = TimedScene(named.scene, settings.solver, asked.frames, file.path)
     rows = []
-    cases = zip(settings.projection_cases, bases, samplings, snapshots, strict=True)
-    for own, basis, sampling, data in cases:
+    given = (files[name] for name in ("bases", "samplings", "snapshots"))
+    for own, basis, sampling, data in zip(settings.projection_cases, *given, strict=True):
         spec = settings.projection_methods[own.method]
         scenes[own.scene].projections.append((own, spec, basis.path, sampling.path))
         known = load_snapshots(data.path)
@@ -182,12 +172,12 @@ def frame_times(
         select(basis_of(known, spec), spec, own.r)
         rows.append((*own.model_dump().values(), process_time() - before))
     chosen: dict[str, list[tuple[str, str, int]]] = defaultdict(list)
-    for case, file in zip(settings.subspace_cases, subspaces, strict=True):
+    for case, file in zip(settings.subspace_cases, files["subspaces"], strict=True):
         chosen[file.path].append((case.method, case.position_basis, case.k))
         scenes[case.scene].models[file.path] = chosen[file.path]
     alone = [
         TimedScene(named.scene, settings.solver, asked.frames, models={file.path: None})
-        for named, file in zip(settings.large_scenes, large, strict=True)
+        for named, file in zip(settings.large_scenes, files["large"], strict=True)
     ]
     table = pd.DataFrame(in_processes([*scenes.values(), *alone], asked), columns=COLUMNS)
     write_table(table.astype({"k": "Int64", "r": "Int64"}), times.path)

@@ -99,16 +99,7 @@ class Options(ConfigModel):
     },
     writes={"out": paths.LIVE_MODEL},
 )
-def live(
-    mesh: File,
-    train: File,
-    subspaces: list[File],
-    online: list[File],
-    bases: list[File],
-    samplings: list[File],
-    settings: Options,
-    out: File,
-) -> None:
+def live(mesh: File, train: File, settings: Options, out: File, **files: list[File]) -> None:
     """Write the models with the recorded full-order run.
 
     Parameters
@@ -125,14 +116,15 @@ def live(
     asked = settings.live
     chosen: list[Labelled] = []
     tolerances = {ecsw_name(tolerance): tolerance for tolerance in asked.tolerances}
-    for file in (*subspaces, *online):
+    for file in (*files["subspaces"], *files["online"]):
         for own, model in load_models(file.path):
             method, kind, k = own["method"], own["position_basis"], own["k"]
             # models with sampled elements on snapshot bases
             if method in tolerances and kind == "pod" and k in asked.sizes:
                 labels = {"family": "elements", "k": k, "tau": tolerances[method]}
                 chosen.append((labels, model))
-    for case, file, sampling in zip(settings.joint_rows, bases, samplings, strict=True):
+    given = (settings.joint_rows, files["bases"], files["samplings"])
+    for case, file, sampling in zip(*given, strict=True):
         basis = load_basis(file.path)
         # of the size asked for, or of the largest that exists
         size = min(asked.joint_rows, basis.rank)

@@ -260,28 +260,18 @@ class Options(ConfigModel):
         "noise_runs": paths.NOISE_RUNS,
     },
 )
-def repetitions(
-    mesh: File,
-    fom: File,
-    snapshots: File,
-    sensitivity: File,
-    settings: Options,
-    out: File,
-    rungs: File,
-    noise: File,
-    noise_runs: File,
-) -> None:
+def repetitions(settings: Options, **files: File) -> None:
     """Repeat every listed run of the scene and group, climb the ladder, reduce the round-off.
 
     What the configuration does not ask of a scene has a table without rows.
     """
-    labels = out.labels
+    labels = files["out"].labels
     runs = ReducedRuns(
-        kit.scene_of(settings.scene, mesh),
+        kit.scene_of(settings.scene, files["mesh"]),
         labels["group"],
-        sets.load_snapshots(snapshots.path),
-        reference=kit.positions_of(fom),
-        end=settings.horizon.frames(sensitivity),
+        sets.load_snapshots(files["snapshots"].path),
+        reference=kit.positions_of(files["fom"]),
+        end=settings.horizon.frames(files["sensitivity"]),
         blowup_extent=settings.blowup_extent,
     )
     short = runs.until_the_end()
@@ -292,17 +282,17 @@ def repetitions(
             cell = {**labels, "method": own.method, "varied": varied}
             rows += [cell | row for row in found]
         log.info("%s", own.method)
-    write_table(pd.DataFrame(rows, columns=COLUMNS), out.path)
+    write_table(pd.DataFrame(rows, columns=COLUMNS), files["out"].path)
     climbed = [] if settings.own_ladder is None else _ladder(runs, short, settings.own_ladder)
     table = pd.DataFrame([{**labels, **row} for row in climbed], columns=LADDER_COLUMNS)
     whole = dict.fromkeys(("blowup_frame", "repetitions", "entries"), "Int64")
-    write_table(table.astype(whole), rungs.path)
+    write_table(table.astype(whole), files["rungs"].path)
     methods, limit, reduced = settings.noise_methods, settings.blowup_extent, []
-    with write_hdf5(noise_runs.path) as file:
+    with write_hdf5(files["noise_runs"].path) as file:
         if settings.own_noise is not None:
             reduced = noisy_runs(short.scene, runs.group, settings.own_noise, methods, limit, file)
     table = pd.DataFrame([{**labels, **row} for row in reduced], columns=NOISE_COLUMNS)
-    write_table(table.astype({"frames": "Int64", "blowup_frame": "Int64"}), noise.path)
+    write_table(table.astype({"frames": "Int64", "blowup_frame": "Int64"}), files["noise"].path)
 
 
 def _ladder(runs: ReducedRuns, short: ReducedRuns, ladder: Ladder) -> Iterator[dict[str, Any]]:

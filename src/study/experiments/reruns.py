@@ -81,40 +81,29 @@ class Options(ConfigModel):
         "heldout_table": paths.RERUNS_HELDOUT,
     },
 )
-def reruns(
-    mesh: File,
-    fom: File,
-    motions: list[File],
-    snapshots: File,
-    basis: File,
-    settings: Options,
-    sampling: File,
-    errors: File,
-    runs: File,
-    out: File,
-    heldout_table: File,
-) -> None:
+def reruns(motions: list[File], settings: Options, **files: File) -> None:
     """Sample the group, then rerun the scene for every r, as trained and as held out.
 
     One job does all: starting another process takes longer than the sampling.
     """
-    space, data = load_basis(basis.path), load_snapshots(snapshots.path)
-    _sample(space, data, settings, sampling, errors)
+    space, data = load_basis(files["basis"].path), load_snapshots(files["snapshots"].path)
+    _sample(space, data, settings, files["sampling"], files["errors"])
     found = {}
-    with write_hdf5(runs.path) as file:
+    with write_hdf5(files["runs"].path) as file:
         for run in motions:
             motion = run["run"]
-            yardstick = Yardstick(kit.scene_of(settings.scene, mesh, motion), kit.positions_of(run))
+            scene = kit.scene_of(settings.scene, files["mesh"], motion)
+            yardstick = Yardstick(scene, kit.positions_of(run))
             file.attrs.update(yardstick.units)
             store = file if motion == kit.TRAIN else file.create_group(motion)
             for name, values in yardstick.series.items():
                 store[name] = values
             sizes = kit.resolve_ranks(settings.ranks, space.rank)
-            made = _runs(yardstick, sampling, space, sizes, settings, store)
+            made = _runs(yardstick, files["sampling"], space, sizes, settings, store)
             found[motion] = pd.DataFrame(made, columns=COLUMNS)
-    write_table(found.pop(kit.TRAIN), out.path)
+    write_table(found.pop(kit.TRAIN), files["out"].path)
     heldout = [table.assign(**{MOTION: motion}) for motion, table in found.items()]
-    write_table(pd.concat(heldout, ignore_index=True), heldout_table.path)
+    write_table(pd.concat(heldout, ignore_index=True), files["heldout_table"].path)
 
 
 def _runs(

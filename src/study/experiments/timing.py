@@ -158,18 +158,7 @@ class Options(ConfigModel):
     },
     alone=True,
 )
-def timing(
-    mesh: File,
-    fom: File,
-    bases: list[File],
-    samplings: list[File],
-    subspaces: list[File],
-    settings: Options,
-    out: File,
-    breakeven: File,
-    effects: File,
-    without: File,
-) -> None:
+def timing(mesh: File, fom: File, settings: Options, **files: Any) -> None:
     """Measure frames (``out``), local steps alone, effects, and frames ``without`` each of them."""
     scene, asked = kit.scene_of(settings.scene, mesh), settings.timing
     system, name = scene.system_with(settings.solver), scene.config.name
@@ -178,9 +167,9 @@ def timing(
     slow, quick = _full_order(scene, system, frames, asked, common)
     quick += _other_counts(scene, system, frames, settings.iterations, common)
     alone: dict[tuple[str, str, int], ReducedLocalStep] = {}
-    for sampling in samplings:
+    for sampling in files["samplings"]:
         spec = settings.methods[sampling["method"]]
-        basis = load_basis(kit.basis_of(sampling, spec, bases).path)
+        basis = load_basis(kit.basis_of(sampling, spec, files["bases"]).path)
         with open_hdf5(sampling.path) as stored:  # sizes that the file holds
             held = {int(key[1:]) for key in stored if key.startswith("r")}
         timed = held.intersection(kit.resolve_ranks(settings.ranks, basis.rank))
@@ -197,25 +186,26 @@ def timing(
                 quick.append(variant(scene, system, steps, frames, labels))
             if r in sizes:
                 alone[group.name, sampling["method"], r] = step
-    for file in subspaces:
+    for file in files["subspaces"]:
         for own, model in load_models(file.path):
             labels = {**common, "iterations": None, "implementation": "compiled", "group": "all"}
             loop, start = model.loop(scene)
             quick.append(Variant({**labels, **own}, loop, start, frames, output=model.output()))
     log.info("%s: %d runs of %d frames", name, len(quick) + 1, frames)
     results = measure(quick, asked.warmup, asked.repeats) + measure([slow], 0, asked.repeats)
-    write_table(pd.DataFrame(results, columns=COLUMNS), out.path)
+    write_table(pd.DataFrame(results, columns=COLUMNS), files["out"].path)
     log.info("%s: %d reduced local steps alone", name, len(alone))
     often = {"warmup": asked.warmup, "repeats": asked.breakeven_repeats}
     with open_hdf5(fom.path) as file:  # states spread over the run
         positions = file["positions"]
         ends = [positions[i * (len(positions) - 1) // STATES] for i in range(STATES)]
     times = local_costs(scene, alone, np.stack(ends), **often)
-    write_table(times.assign(factor=1.0), breakeven.path)
+    write_table(times.assign(factor=1.0), files["breakeven"].path)
     log.info("%s: effects", name)
     often = {"warmup": asked.warmup, "repeats": asked.repeats}
-    write_table(costs := effect_costs(scene, system, frames, **often), effects.path)
-    write_table(left_out(scene, costs, frames, **often, solver=settings.solver), without.path)
+    write_table(costs := effect_costs(scene, system, frames, **often), files["effects"].path)
+    without = left_out(scene, costs, frames, **often, solver=settings.solver)
+    write_table(without, files["without"].path)
 
 
 def _full_order(

@@ -31,24 +31,18 @@ _KEYS = ["scene", "group", "method", "r"]
         "repetitions": TableOf("repetitions"),
     },
 )
-def error_against_gain(
-    options: Methods,
-    drawn: Drawn,
-    reruns: pd.DataFrame,
-    errors: pd.DataFrame,
-    repetitions: pd.DataFrame,
-) -> Figure:
+def error_against_gain(options: Methods, drawn: Drawn, **tables: pd.DataFrame) -> Figure:
     """Draw a dot per run, error within the horizon over gain, and failures by decade of gain.
 
     Runs that ended before their horizon lie on the upper limit of the axes, singular interpolations
     on the right limit.
     """
-    runs = drawn.rows(judged_runs(reruns, errors))
+    runs = drawn.rows(judged_runs(tables["reruns"], tables["errors"]))
     if runs.empty:
         raise NothingToDraw("no run with a gain")
     figure = style.new_figure(3.0)
     left, right = figure.subplots(1, 2, width_ratios=(2.2, 1.0))
-    repeated = repetitions[repetitions.varied == "training"]
+    repeated = tables["repetitions"].query("varied == 'training'")
     ranges = runs[[*_KEYS, "gain", "error"]].merge(repeated, on=_KEYS)
     methods = [m for m in drawn.methods if (runs.method == m).any()]
     styles = style.method_styles(methods)

@@ -331,28 +331,21 @@ class Snapshots(kit.View):
         "bases": EachOf(BASIS, "first_run"),
     },
 )
-def snapshots_and_modes(
-    options: Snapshots,
-    drawn: kit.Drawn,
-    meshes: list[File],
-    full_order: list[File],
-    sets: list[File],
-    bases: list[File],
-) -> Figure:
+def snapshots_and_modes(options: Snapshots, drawn: kit.Drawn, **files: list[File]) -> Figure:
     """Draw snapshots less their mean = modes x singular values x coefficients, as matrices.
 
     Below are columns of the snapshot matrix on the moving mesh, and modes on the mesh at rest. Each
     element has the colour of one of its entries, the entry that is largest on some element. Only
     the first experiment and method that exist are drawn.
     """
-    if not bases:
+    if not files["bases"]:
         raise kit.NothingToDraw(options.words())
-    experiment, path = drawn.experiments[0], bases[0].path
-    basis, snapshots = load_basis(path), load_snapshots(sets[0].path)
-    mesh = load_mesh(meshes[0].path)
+    experiment, path = drawn.experiments[0], files["bases"][0].path
+    basis, snapshots = load_basis(path), load_snapshots(files["sets"][0].path)
+    mesh = load_mesh(files["meshes"][0].path)
     elements = shapes.element_map(experiment.group, mesh, snapshots.elements, source=str(path))
     centred = snapshots.train.reshape(len(snapshots.train), -1).T - basis.mean[:, None]
-    frames, positions = positions_at(full_order[0].path, options.frames)
+    frames, positions = positions_at(files["full_order"][0].path, options.frames)
     camera = options.camera(experiment)
     taken = [int(np.argmin(np.abs(snapshots.frames["train"] - (f - 1)))) for f in frames]
     moving = [window_of(camera, [q], 0.04) for q in positions]

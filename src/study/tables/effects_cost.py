@@ -62,12 +62,7 @@ FEWEST = 3  # least number of meshes for the fit of an exponent
     },
 )
 def effects_cost(
-    parts: list[File],
-    left_out: list[File],
-    contributions: list[File],
-    frame_times: pd.DataFrame,
-    sensitivity: pd.DataFrame,
-    horizon: Horizon,
+    frame_times: pd.DataFrame, sensitivity: pd.DataFrame, horizon: Horizon, **files: list[File]
 ) -> pd.DataFrame:
     """One row per effect or phase of a scene, then one per set of effects left out together.
 
@@ -79,7 +74,7 @@ def effects_cost(
     sensitivity, horizon : arguments of `horizons`, the end of each scene's comparable frames;
         ``moved`` is empty for the only group of a scene, which cannot be left out
     """
-    costs, removed = joined(parts), joined(left_out)
+    costs, removed = joined(files["parts"]), joined(files["left_out"])
     if costs.empty:
         return costs
     own = costs.groupby("scene").ms_per_frame.sum()
@@ -94,7 +89,7 @@ def effects_cost(
         tables.append(several[_absent(several, costs)].assign(role=SEVERAL))
         single = ["groups", "without_ms", "saved_ms"]
         tables[0] = costs.merge(removed[[*KEYS, *single]], on=KEYS, how="left")
-    frames = joined(contributions)
+    frames = joined(files["contributions"])
     if len(frames):
         acting = _acting(frames, sensitivity, horizon)
         tables[0] = tables[0].merge(acting, on=KEYS, how="left")

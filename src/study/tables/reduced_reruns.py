@@ -46,17 +46,7 @@ from study.tables.kit.results import KEYS, TRAIN, timings_in_one_time
     },
 )
 def reduced_reruns(
-    full_order: list[File],
-    runs: list[File],
-    rows: list[File],
-    rows_heldout: list[File],
-    subspaces: list[File],
-    subspace_rows: list[File],
-    subspace_rows_heldout: list[File],
-    timings: list[File],
-    frame_times: pd.DataFrame,
-    sensitivity: pd.DataFrame,
-    horizon: Horizon,
+    frame_times: pd.DataFrame, sensitivity: pd.DataFrame, horizon: Horizon, **files: list[File]
 ) -> pd.DataFrame:
     """Reduced runs of the training motion with their times, then runs of each held-out motion.
 
@@ -77,21 +67,22 @@ def reduced_reruns(
     for motion in (TRAIN, *MOTIONS):
         label = horizon.perturbation if motion == TRAIN else motion
         ends = horizons(sensitivity, label, horizon.threshold)
-        tables = rows + subspace_rows if motion == TRAIN else rows_heldout + subspace_rows_heldout
-        files = zip(runs + subspaces, tables, strict=True)
-        parts = [_judged(run, row, ends[run["scene"]], motion) for run, row in files]
+        kind = "" if motion == TRAIN else "_heldout"
+        tables = files[f"rows{kind}"] + files[f"subspace_rows{kind}"]
+        both = zip(files["runs"] + files["subspaces"], tables, strict=True)
+        parts = [_judged(run, row, ends[run["scene"]], motion) for run, row in both]
         found = pd.concat(parts, ignore_index=True).assign(motion=motion)
         floors = {s: floor_of(sensitivity, s, label)[:end] for s, end in ends.items()}
         floor = {scene: float(drift.max(initial=0.0)) for scene, drift in floors.items()}
         found["horizon_frame"] = found.scene.map(ends)
         found["sensitivity_floor"] = found.scene.map(floor)
         if motion != TRAIN:
-            played = _played(full_order, ends, motion)
+            played = _played(files["full_order"], ends, motion)
             distance = played.set_index("scene").playback_error
             found["playback_error"] = found.scene.map(distance)
             found = pd.concat([found, played], ignore_index=True)
         judged.append(found)
-    judged[0] = _with_times(judged[0], timings_in_one_time(timings, frame_times))
+    judged[0] = _with_times(judged[0], timings_in_one_time(files["timings"], frame_times))
     return pd.concat(judged, ignore_index=True)
 
 

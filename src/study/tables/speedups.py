@@ -104,25 +104,18 @@ def frame_times(parts: list[File]) -> pd.DataFrame:
         "reruns": TableOf("reduced_reruns"),
     },
 )
-def speedups(
-    parts: list[File],
-    times: pd.DataFrame,
-    projections: list[File],
-    subspaces: list[File],
-    large: list[File],
-    reruns: pd.DataFrame,
-) -> pd.DataFrame:
+def speedups(times: pd.DataFrame, reruns: pd.DataFrame, **files: list[File]) -> pd.DataFrame:
     """One row per reduction timed in ``parts``; each speed-up is a ratio within one process."""
-    rows = results.joined(parts)
+    rows = results.joined(files["parts"])
     if rows.empty or not (rows.role == REDUCED).any():
         return pd.DataFrame()
     made = pd.DataFrame(list(timed_reductions(rows, times)))
     extra = [
-        results.joined(projections).reindex(columns=[*_REDUCTION, "reduction_s"]),
-        results.joined(subspaces).reindex(columns=[*_MODEL, "reduction_s"]),
+        results.joined(files["projections"]).reindex(columns=[*_REDUCTION, "reduction_s"]),
+        results.joined(files["subspaces"]).reindex(columns=[*_MODEL, "reduction_s"]),
     ]
     errors = [_errors(reruns, keys) for keys in (_REDUCTION, _MODEL)]
-    own = results.joined(large)
+    own = results.joined(files["large"])
     if len(own):
         extra.append(own[own.motion == results.TRAIN].reindex(columns=[*_MODEL, "reduction_s"]))
         errors.append(large_errors(own))
