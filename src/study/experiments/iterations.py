@@ -23,7 +23,6 @@ from pdrom.model.dynamics.system import GlobalSystem
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.subspace.model import load_models
 from study.artifact import paths
-from study.artifact.paths import File
 from study.artifact.reads import Every, Setting
 from study.experiments.kit import base as kit
 from study.experiments.kit.base import experiment
@@ -72,16 +71,16 @@ class IterationSweep(IterationCounts):
     writes={"out": paths.ITERATIONS, "models": paths.SUBSPACES_CONVERGED},
 )
 def iterations(
-    mesh: File,
-    fom: File,
-    sensitivity: File,
-    subspaces: list[File],
+    mesh: paths.File,
+    fom: paths.File,
+    sensitivity: paths.File,
+    subspaces: list[paths.File],
     config: SceneConfig,
     sweep: IterationSweep,
     horizon: kit.Horizon,
     solver: kit.Solver,
-    out: File,
-    models: File,
+    out: paths.File,
+    models: paths.File,
 ) -> None:
     """Run a scene with every K up to its horizon, and once to convergence.
 

@@ -28,7 +28,6 @@ from pdrom.reduction.rerun import Rerun, displacement_norms
 from pdrom.reduction.sampling import Reduction, reductions
 from pdrom.reduction.sampling.local_step import rerun_reduced
 from study.artifact import paths
-from study.artifact.paths import File
 from study.artifact.reads import Settings
 from study.experiments.kit import base as kit
 from study.experiments.kit.base import experiment
@@ -49,6 +48,7 @@ NOISE_COLUMNS = [
     "blowup_frame", "relative_error",
 ]  # fmt: skip
 ALL, PLANE, VERTEX = "all", "plane", "vertex"
+Methods = Mapping[str, MethodSpec]
 Runs = list[tuple[dict[str, Any], Rerun | None]]  # rows of one start, and its runs
 Rungs = Annotated[tuple[MethodSpec, ...], Field(min_length=1)]
 
@@ -260,7 +260,7 @@ class Options(ConfigModel):
         "noise_runs": paths.NOISE_RUNS,
     },
 )
-def repetitions(settings: Options, **files: File) -> None:
+def repetitions(settings: Options, **files: paths.File) -> None:
     """Repeat every listed run of the scene and group, climb the ladder, reduce the round-off.
 
     What the configuration does not ask of a scene has a table without rows.
@@ -330,25 +330,20 @@ def _ladder(runs: ReducedRuns, short: ReducedRuns, ladder: Ladder) -> Iterator[d
 
 
 def noisy_runs(
-    scene: Scene,
-    group: str,
-    asked: NoiseRuns,
-    methods: Mapping[str, MethodSpec],
-    blowup_extent: float,
-    file: h5py.File,
+    scene: Scene, group: str, asked: NoiseRuns, methods: Methods, limit: float, file: h5py.File
 ) -> list[dict[str, Any]]:
     """Perturb the start of ``scene``, run, make bases without a cutoff, rerun.
 
     Returned are the rows of all runs with the ``group`` reduced by each of ``methods``. The runs of
     one start of each kind go to ``file``, in the layout of `study.experiments.reruns`; marked where
-    r exceeds the rank.
+    r exceeds the rank; ``limit`` is the extent of a blow-up over that of the rest shape.
     """
     rows = []
     for axes in kinds(scene):
         kept: Runs = []
         for seed in range(1, asked.repetitions + 1):
             start = roundoff_field(scene, axes, asked.perturbation, seed=seed)
-            found = list(_noisy(scene, group, start, asked.sizes, methods, blowup_extent))
+            found = list(_noisy(scene, group, start, asked.sizes, methods, limit))
             rows += [{"noisy_axes": axes, "seed": seed, **row} for row, _ in found]
             if not kept or (irregular(found) and not irregular(kept)):
                 kept = found
@@ -414,12 +409,7 @@ def noise_basis(
 
 
 def _noisy(
-    scene: Scene,
-    name: str,
-    start: np.ndarray,
-    sizes: Sequence[int],
-    methods: Mapping[str, MethodSpec],
-    blowup_extent: float,
+    scene: Scene, name: str, start: np.ndarray, sizes: Sequence[int], methods: Methods, limit: float
 ) -> Iterator[tuple[dict[str, Any], Rerun | None]]:
     """Rows and runs from one ``start`` (N, 3) m, which is added to the initial positions.
 
@@ -442,6 +432,6 @@ def _noisy(
             row = {"method": method, "r": r, "rank": basis.rank, "frames": 0}
             outcome = None
             if r in made:
-                outcome = rerun_reduced(scene, name, made[r], reference, blowup_extent)
+                outcome = rerun_reduced(scene, name, made[r], reference, limit)
                 row |= {"gain": made[r].gain, **outcome.row(displacement)}
             yield row, outcome

@@ -20,7 +20,6 @@ from pdrom.reduction.sampling import reductions
 from pdrom.reduction.sampling.local_step import rerun_reduced
 from pdrom.reduction.snapshots import SPLITS, SnapshotSet, load_snapshots
 from study.artifact import paths
-from study.artifact.paths import File
 from study.artifact.reads import Every, Settings
 from study.experiments.kit import base as kit
 from study.experiments.kit.base import experiment
@@ -81,7 +80,7 @@ class Options(ConfigModel):
         "heldout_table": paths.RERUNS_HELDOUT,
     },
 )
-def reruns(motions: list[File], settings: Options, **files: File) -> None:
+def reruns(motions: list[paths.File], settings: Options, **files: paths.File) -> None:
     """Sample the group, then rerun the scene for every r, as trained and as held out.
 
     One job does all: starting another process takes longer than the sampling.
@@ -98,8 +97,7 @@ def reruns(motions: list[File], settings: Options, **files: File) -> None:
             store = file if motion == kit.TRAIN else file.create_group(motion)
             for name, values in yardstick.series.items():
                 store[name] = values
-            sizes = kit.resolve_ranks(settings.ranks, space.rank)
-            made = _runs(yardstick, files["sampling"], space, sizes, settings, store)
+            made = _runs(yardstick, files["sampling"], space, settings, store)
             found[motion] = pd.DataFrame(made, columns=COLUMNS)
     write_table(found.pop(kit.TRAIN), files["out"].path)
     heldout = [table.assign(**{MOTION: motion}) for motion, table in found.items()]
@@ -107,12 +105,7 @@ def reruns(motions: list[File], settings: Options, **files: File) -> None:
 
 
 def _runs(
-    yardstick: Yardstick,
-    sampling: File,
-    basis: Basis,
-    sizes: list[int],
-    settings: Options,
-    file: h5py.Group,
+    yardstick: Yardstick, sampling: paths.File, basis: Basis, settings: Options, file: h5py.Group
 ) -> Iterator[dict[str, Any]]:
     """Run a motion for every r and yield the rows; an r beyond the rank is a marked row.
 
@@ -121,7 +114,7 @@ def _runs(
     """
     labels, scene = sampling.labels, yardstick.scene
     system = scene.system_with(settings.solver)
-    for r in sizes:
+    for r in kit.resolve_ranks(settings.ranks, basis.rank):
         store = file.create_group(f"r{r:04d}")
         store.attrs.update(r=r, full=r == basis.rank, marked=r > basis.rank)
         if r > basis.rank:
@@ -130,12 +123,7 @@ def _runs(
             continue
         reduction = kit.load_reduction(basis, sampling.path, settings.method, r=r)
         outcome = rerun_reduced(
-            scene,
-            labels["group"],
-            reduction,
-            yardstick.reference,
-            settings.blowup_extent,
-            system,
+            scene, labels["group"], reduction, yardstick.reference, settings.blowup_extent, system
         )
         apart = yardstick.deviations(outcome)
         error = outcome.difference / np.sqrt(np.mean(yardstick.displacement**2))
@@ -149,7 +137,7 @@ def _runs(
 
 
 def _sample(
-    basis: Basis, data: SnapshotSet, settings: Options, sampling: File, errors: File
+    basis: Basis, data: SnapshotSet, settings: Options, sampling: paths.File, errors: paths.File
 ) -> None:
     """Select samples for every r of the sweep and of the reruns; write them and the error table.
 

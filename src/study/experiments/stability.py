@@ -29,6 +29,8 @@ COLUMNS = [
     "scene", "method", "r", "h", "stiffness_ratio", "finite", "blowup_frame", "max_extent",
     "energy_ratio", "gain", "group", "position_basis", "k", "frames", "relative_error",
 ]  # fmt: skip
+Local = list[tuple[dict[str, Any], Reduction | None]]  # labels, and the reduction
+Models = list[tuple[dict[str, Any], SubspaceModel]]
 
 
 class ShortRuns(ConfigModel):
@@ -109,7 +111,7 @@ def stability(
     Bases and samplings are those of the scene's own setting: how far do they carry?
     """
     scene = kit.scene_of(config, mesh)
-    local: list[tuple[dict[str, Any], Reduction | None]] = []
+    local: Local = []
     for file in samplings:
         spec = methods[file["method"]]
         basis = load_basis(kit.basis_of(file, spec, bases).path)
@@ -118,9 +120,9 @@ def stability(
             known = r <= basis.rank
             reduction = kit.load_reduction(basis, file.path, spec, r=r) if known else None
             local.append((labels | {"position_basis": "full"}, reduction))
-    models: list[tuple[dict[str, Any], SubspaceModel]] = []
+    models: Models = []
     for file in subspaces:
-        found: list[tuple[dict[str, Any], SubspaceModel]] = load_models(file.path)
+        found: Models = load_models(file.path)
         largest = max(labels["k"] for labels, _ in found)
         models += [(labels, model) for labels, model in found if labels["k"] == largest]
     # one of time step and stiffness at a time leaves the scene's own setting
@@ -140,11 +142,7 @@ def stability(
 
 
 def _rows(
-    scene: Scene,
-    local: list[tuple[dict[str, Any], Reduction | None]],
-    models: list[tuple[dict[str, Any], SubspaceModel]],
-    solver: str,
-    limit: float,
+    scene: Scene, local: Local, models: Models, solver: str, limit: float
 ) -> Iterator[dict[str, Any]]:
     """Rows of the full order of ``scene`` and, if that is finite, of everything else.
 

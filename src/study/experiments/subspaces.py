@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import h5py
-import numpy as np
 import pandas as pd
 
 from pdrom.core.store import write_hdf5, write_table
@@ -28,7 +27,6 @@ from pdrom.reduction.subspace.ecsw import Norm
 from pdrom.reduction.subspace.hrpd import HrpdSpec, SampledSpace, hrpd, sampled_space
 from pdrom.reduction.subspace.interpolation import Interpolation
 from study.artifact import paths
-from study.artifact.paths import File
 from study.artifact.reads import Every, Setting, SourcesOf
 from study.experiments.kit import base as kit
 from study.experiments.kit.base import experiment
@@ -119,15 +117,15 @@ class Online(LargeModels):
     },
 )
 def subspaces(
-    mesh: File,
-    full_order: list[File],
+    mesh: paths.File,
+    full_order: list[paths.File],
     config: SceneConfig,
     asked: SubspaceModels,
     blowup_extent: kit.BlowupExtent,
-    out: File,
-    train_table: File,
-    heldout_table: File,
-    seconds_table: File,
+    out: paths.File,
+    train_table: paths.File,
+    heldout_table: paths.File,
+    seconds_table: paths.File,
 ) -> None:
     """Build every model (bases, sizes, tolerances) and run all motions with it."""
     motions = {
@@ -161,8 +159,8 @@ def online(
     config: SceneConfig,
     asked: LargeModels,
     blowup_extent: kit.BlowupExtent,
-    out: File,
-    models: File,
+    out: paths.File,
+    models: paths.File,
 ) -> None:
     """Reduce a large scene by every model and run all motions with each.
 
@@ -255,31 +253,21 @@ def _subspaces(
     spaces: dict[str, SampledSpace | None] = {}
     if settings.hrpd is not None:
         spaces = {g.name: sampled_space(g, points, settings.hrpd) for g in scene.groups}
+
+    def samplings(columns: Columns, methods: list[str]) -> Iterator[tuple[str, Sampled]]:
+        """(method, samples) pairs of the ``methods``."""
+        if FULL in methods:
+            yield FULL, {}
+        if any(method.startswith(subspace.ECSW) for method in methods):
+            asked, norm = settings.tolerances, settings.norm
+            found = subspace.sample_elements(scene, columns, frames, asked, norm=norm)
+            for tolerance, samples in zip(asked, found, strict=True):
+                yield subspace.ecsw_name(tolerance), samples
+        if HRPD in methods:
+            yield HRPD, {g.name: hrpd(g, columns, spaces[g.name]) for g in scene.groups}
+
     for kind in settings.bases:
         for k in settings.sizes:
             columns = subspace.make_columns(scene, motion.reference[1:][frames], kind, k=k)
-            methods = settings.methods(kind, k)
-            models = _samplings(scene, columns, settings, methods, frames=frames, spaces=spaces)
+            models = samplings(columns, settings.methods(kind, k))
             yield f"{kind}_k{k:03d}", columns, kind, k, models
-
-
-def _samplings(
-    scene: Scene,
-    columns: Columns,
-    settings: SubspaceModels,
-    methods: list[str],
-    frames: np.ndarray,
-    spaces: Mapping[str, SampledSpace | None],
-) -> Iterator[tuple[str, Sampled]]:
-    """(method, samples) pairs of the ``methods``; ``spaces`` of projections are those of hrpd."""
-    if FULL in methods:
-        yield FULL, {}
-    if any(method.startswith(subspace.ECSW) for method in methods):
-        tolerances = settings.tolerances
-        found = subspace.sample_elements(
-            scene, columns, frames, tolerances=tolerances, norm=settings.norm
-        )
-        for tolerance, samples in zip(tolerances, found, strict=True):
-            yield subspace.ecsw_name(tolerance), samples
-    if HRPD in methods:
-        yield HRPD, {g.name: hrpd(g, columns, spaces[g.name]) for g in scene.groups}

@@ -225,11 +225,7 @@ def _full_order(
 
 
 def _other_counts(
-    scene: Scene,
-    system: GlobalSystem,
-    frames: int,
-    asked: IterationCounts,
-    common: dict[str, Any],
+    scene: Scene, system: GlobalSystem, frames: int, asked: IterationCounts, common: dict[str, Any]
 ) -> list[Variant]:
     """The compiled full-order run with other numbers of iterations, plain and accelerated."""
     variants = []

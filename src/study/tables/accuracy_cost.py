@@ -15,7 +15,6 @@ import numpy as np
 import pandas as pd
 
 from study.artifact import paths
-from study.artifact.paths import File
 from study.artifact.reads import Every, Setting, TableOf
 from study.experiments.kit.base import ANDERSON, FOM
 from study.tables.kit import results
@@ -56,10 +55,10 @@ CONVERGED, OWN = "converged", "own iterations"
 )
 def accuracy_cost(
     reruns: pd.DataFrame,
-    timings: list[File],
+    timings: list[paths.File],
     frame_times: pd.DataFrame,
-    sweeps: list[File],
-    models: list[File],
+    sweeps: list[paths.File],
+    models: list[paths.File],
     iterations: Mapping[str, int],
 ) -> pd.DataFrame:
     """Points of reduced runs with a known error within the horizon and time, and full-order runs.
@@ -162,7 +161,7 @@ def pareto(error: Sequence[float], cost: Sequence[float]) -> list[bool]:
     ),
     reads={"runs": Every(paths.REQUESTED_TOLERANCES)},
 )
-def requested_tolerances(runs: list[File]) -> pd.DataFrame:
+def requested_tolerances(runs: list[paths.File]) -> pd.DataFrame:
     """Rows of all scenes, one per run with a requested tolerance, from the files ``runs``."""
     rows = results.joined(runs)
     if rows.empty:

@@ -10,7 +10,6 @@ import pandas as pd
 
 from pdrom.model.held_out import MOTIONS, PLAYBACK
 from study.artifact import paths
-from study.artifact.paths import File
 from study.artifact.reads import Every, Setting, TableOf
 from study.experiments.alternatives import settings
 from study.experiments.alternatives.settings import REDUCTIONS
@@ -67,7 +66,7 @@ KNOWN = 3.0  # a motion counts for an error limit of at least this factor times 
     ),
     reads={"parts": Every(paths.ALTERNATIVES), "times": Every(paths.ALTERNATIVE_TIMES)},
 )
-def alternatives(parts: list[File], times: list[File]) -> pd.DataFrame:
+def alternatives(parts: list[paths.File], times: list[paths.File]) -> pd.DataFrame:
     """One row per candidate and held-out motion, in the order of the files ``parts``.
 
     ``times`` has the frame times measured in each process; the table gives their medians.
@@ -141,7 +140,7 @@ def beside(rows: pd.DataFrame, times: pd.DataFrame) -> tuple[pd.DataFrame, list[
         "limits": Setting("alternatives.errors"),
     },
 )
-def winners(rows: pd.DataFrame, times: list[File], limits: Sequence[float]) -> pd.DataFrame:
+def winners(rows: pd.DataFrame, times: list[paths.File], limits: Sequence[float]) -> pd.DataFrame:
     """One row per scene, mesh, stiffness, motion, reference and error limit.
 
     The method is empty where none reaches the limit. Limits below `KNOWN` times the error of the

@@ -6,7 +6,6 @@ import pandas as pd
 
 from pdrom.reduction.basis import load_basis
 from study.artifact import paths
-from study.artifact.paths import File
 from study.artifact.reads import EachOf, Every
 from study.tables.kit.declaration import flag, integer, number, shared, table, text
 from study.tables.kit.results import joined
@@ -27,7 +26,7 @@ _CELL = ["scene", "group", "method", "r", "varied"]
     # the basis without weights and centring; which other bases exist depends on the configuration
     reads={"bases": EachOf(paths.BASIS, "usual_bases")},
 )
-def singular_values(bases: list[File]) -> pd.DataFrame:
+def singular_values(bases: list[paths.File]) -> pd.DataFrame:
     """One row per mode of each of the ``bases``, in the order of the files."""
     parts = []
     for file in bases:
@@ -55,7 +54,7 @@ def singular_values(bases: list[File]) -> pd.DataFrame:
     ),
     reads={"parts": Every(paths.RECONSTRUCTION)},
 )
-def reconstruction_error(parts: list[File]) -> pd.DataFrame:
+def reconstruction_error(parts: list[paths.File]) -> pd.DataFrame:
     """Rows of the files ``parts`` of all methods, in order."""
     return joined(parts)
 
@@ -70,7 +69,7 @@ def reconstruction_error(parts: list[File]) -> pd.DataFrame:
     ),
     reads={"parts": Every(paths.SENSITIVITY)},
 )
-def sensitivity(parts: list[File]) -> pd.DataFrame:
+def sensitivity(parts: list[paths.File]) -> pd.DataFrame:
     """Largest difference in ``parts`` over the seeds, per scene, perturbation and frame."""
     keys = ["scene", "perturbation", "frame"]
     rows = joined(parts).groupby(keys, sort=False, as_index=False)
@@ -98,7 +97,7 @@ def sensitivity(parts: list[File]) -> pd.DataFrame:
     ),
     reads={"parts": Every(paths.NOISE)},
 )
-def noise(parts: list[File]) -> pd.DataFrame:
+def noise(parts: list[paths.File]) -> pd.DataFrame:
     """Rows of the files ``parts`` of all scenes, in order."""
     return joined(parts)
 
@@ -122,7 +121,7 @@ def noise(parts: list[File]) -> pd.DataFrame:
     ),
     reads={"parts": Every(paths.REPETITIONS)},
 )
-def repetitions(parts: list[File]) -> pd.DataFrame:
+def repetitions(parts: list[paths.File]) -> pd.DataFrame:
     """One row per scene, group, method, r and variation, with statistics over its repetitions.
 
     The median of a distribution lies outside the range of n independent draws with probability
@@ -173,6 +172,6 @@ def repetitions(parts: list[File]) -> pd.DataFrame:
     ),
     reads={"parts": Every(paths.LADDER)},
 )
-def ladder(parts: list[File]) -> pd.DataFrame:
+def ladder(parts: list[paths.File]) -> pd.DataFrame:
     """Rows of the files ``parts`` of all scenes, in order."""
     return joined(parts)

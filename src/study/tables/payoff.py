@@ -6,7 +6,6 @@ import numpy as np
 import pandas as pd
 
 from study.artifact import paths
-from study.artifact.paths import File
 from study.artifact.reads import Every, TableOf
 from study.tables.accuracy_cost import FEWER
 from study.tables.kit.declaration import count, integer, number, shared, table, timed
@@ -36,7 +35,7 @@ _ERROR = "relative_error_within_horizon"
     ),
     reads={"own": Every(paths.BREAK_EVEN), "sized": Every(paths.BREAK_EVEN_SIZED)},
 )
-def breakeven(own: list[File], sized: list[File]) -> pd.DataFrame:
+def breakeven(own: list[paths.File], sized: list[paths.File]) -> pd.DataFrame:
     """One row per size r of each curve (see `CURVE`), with local-step times and break-even size.
 
     Files ``own`` are for the configured mesh of each scene, ``sized`` for other mesh sizes.

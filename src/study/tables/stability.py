@@ -7,7 +7,6 @@ import pandas as pd
 
 from pdrom.core.store import open_hdf5
 from study.artifact import paths
-from study.artifact.paths import File
 from study.artifact.reads import Every, Setting, TableOf
 from study.tables.kit.declaration import flag, number, shared, table, text
 from study.tables.kit.results import KEYS, joined, trained
@@ -42,10 +41,10 @@ FRAGILE = 0.005
     },
 )
 def stability(
-    full_order: list[File],
-    reruns: list[File],
-    subspaces: list[File],
-    sweeps: list[File],
+    full_order: list[paths.File],
+    reruns: list[paths.File],
+    subspaces: list[paths.File],
+    sweeps: list[paths.File],
     reduced_reruns: pd.DataFrame,
     time_steps: Mapping[str, float],
     wrong: float,
@@ -84,7 +83,7 @@ def outcomes(runs: pd.DataFrame, wrong: float, departure: float) -> list[str]:
     return np.select(list(classes.values()), list(classes), "accurate").tolist()
 
 
-def _full_order_rows(files: list[File]) -> pd.DataFrame:
+def _full_order_rows(files: list[paths.File]) -> pd.DataFrame:
     """Rows of the full-order runs in ``files``; their energy ratio is 1, their error 0."""
     rows = []
     for run in files:
@@ -97,7 +96,7 @@ def _full_order_rows(files: list[File]) -> pd.DataFrame:
 
 
 def _rerun_rows(
-    reruns: list[File], subspaces: list[File], reduced_reruns: pd.DataFrame
+    reruns: list[paths.File], subspaces: list[paths.File], reduced_reruns: pd.DataFrame
 ) -> pd.DataFrame:
     """Reduced runs of the training motion, with their error within the horizon as the error."""
     local = joined(reruns).assign(position_basis="full", k=np.nan)
@@ -130,6 +129,6 @@ def _rerun_rows(
     ),
     reads={"parts": Every(paths.HARD_CASES)},
 )
-def hard_cases(parts: list[File]) -> pd.DataFrame:
+def hard_cases(parts: list[paths.File]) -> pd.DataFrame:
     """Rows of the files ``parts`` in the order of the cases and methods."""
     return joined(parts)

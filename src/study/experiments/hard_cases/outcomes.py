@@ -42,6 +42,7 @@ BASES = {"pod": ("full", "ecsw", "hrpd"), "skinning": ("full", "hrpd")}
 BLOWUP, DISTORTED = 100.0, 3.0
 # Bounded manifolds: the norm of any projection has a bound that is known before the run.
 BOUNDED = ("clamped", "length", "half sphere")
+Methods = Mapping[str, MethodSpec]
 log = logging.getLogger(__name__)
 COLUMNS = [
     "case", "method", "bounded_projections", "k", "r", "gain", "frames", "finite", "blowup_frame",
@@ -154,14 +155,12 @@ class ReducedRun:
         return HOLDS
 
 
-def names(methods: Mapping[str, MethodSpec]) -> list[str]:
+def names(methods: Methods) -> list[str]:
     """All reductions: the methods, then each position subspace with each way of sampling."""
     return [*methods, *(f"{basis}-{sampling}" for basis in BASES for sampling in BASES[basis])]
 
 
-def reduced_run(
-    training: Training, name: str, methods: Mapping[str, MethodSpec], limit: float
-) -> ReducedRun:
+def reduced_run(training: Training, name: str, methods: Methods, limit: float) -> ReducedRun:
     """Run the case of ``training`` again with the reduction ``name`` of ``methods``.
 
     ``limit`` is the extent of a blow-up, m.
@@ -209,10 +208,7 @@ def _subspace(training: Training, kind: str, sampling: str, limit: float) -> Red
 
 
 def row(
-    training: Training,
-    name: str,
-    methods: Mapping[str, MethodSpec],
-    expected: Mapping[str, Expectation],
+    training: Training, name: str, methods: Methods, expected: Mapping[str, Expectation]
 ) -> dict[str, Any]:
     """Row of the reduction ``name``: sizes, figures of the run, outcome, reason of a failure."""
     try:

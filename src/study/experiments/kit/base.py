@@ -40,11 +40,7 @@ class Experiment(Artifact):
 
 
 def experiment(
-    title: str,
-    *,
-    reads: Mapping[str, Read],
-    writes: Mapping[str, Place],
-    alone: bool = False,
+    title: str, *, reads: Mapping[str, Read], writes: Mapping[str, Place], alone: bool = False
 ) -> Callable[[Callable[..., None]], Experiment]:
     """Declare the function below as an experiment, see `Artifact`.
 
