@@ -28,9 +28,8 @@ from study.experiments.kit.base import BlowupExtent, Rank, Solver
 from study.experiments.live import Live
 from study.experiments.repetitions import LadderSection, Noise, RepetitionSection
 from study.experiments.requested_tolerances import RequestedTolerances
-from study.experiments.reruns import Sweep
+from study.experiments.reruns import Stability, Sweep
 from study.experiments.sensitivity import Sensitivity
-from study.experiments.stability import Stability
 from study.experiments.subspaces import Online, Subspace
 from study.experiments.timing import Scaling, Timing
 from study.figures.kit.declaration import Options, declarations, load_choices

@@ -22,7 +22,7 @@ from study.experiments.frame_times import NamedScene, ProjectionCase, SubspaceCa
 from study.experiments.kit.base import Horizon
 from study.experiments.live import JOINT, JointRows, OfScene
 from study.experiments.repetitions import Repeated
-from study.experiments.stability import Stability
+from study.experiments.reruns import Stability
 from study.figures.kit.declaration import Experiment, Options, Reduction, declarations
 from study.paper.build import PAGES, Facts
 from study.paper.source import source_files

@@ -26,7 +26,7 @@ from study.artifact.paths import File, Place
 from study.experiments.iterations import IterationSweep, iterations
 from study.experiments.kit.base import Experiment
 from study.experiments.repetitions import LadderSection, Options, repetitions
-from study.experiments.stability import ShortRuns, stability
+from study.experiments.reruns import ShortRuns, stability
 from study.pipeline.folders import Folders
 from study.pipeline.plan import Plan
 from study.pipeline.study import Study

@@ -12,10 +12,10 @@ from builders import frame
 from pdrom.core.store import write_table
 from study.artifact.paths import File
 from study.experiments.kit.base import Horizon
+from study.tables.accuracy_cost import breakeven, payoff
 from study.tables.effects_cost import effects_cost
 from study.tables.kit.results import FAILED
 from study.tables.kit.results import KEYS as LABELS
-from study.tables.payoff import breakeven, payoff
 
 HORIZON = Horizon(perturbation=1e-10, threshold=1e-3)
 NOT_TIMED = pd.DataFrame(columns=["scene", "ms_per_frame"])  # table frame_times without rows
