@@ -11,7 +11,7 @@ from pdrom.view import multiples, style
 from pdrom.view.artists import Axes, Figure, Line2D
 from pdrom.view.multiples import clipped, label_counts, log_axis, time_axis
 from study.artifact.reads import TableOf
-from study.experiments.alternatives.settings import REDUCTIONS
+from study.experiments.alternatives.experiment import REDUCTIONS
 from study.experiments.kit.base import ANDERSON, FOM
 from study.figures.kit.declaration import Drawn, Methods, NothingToDraw, Options, Scenes, figure
 from study.tables.accuracy_cost import FEWER, pareto

@@ -20,7 +20,7 @@ from pdrom.model.mesh.config import MeshConfig
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.method import BasisSpec, MethodSpec, load_methods
 from study.artifact import paths
-from study.experiments.alternatives.settings import Alternatives
+from study.experiments.alternatives.experiment import Alternatives
 from study.experiments.frame_times import FrameTimes
 from study.experiments.hard_cases.outcomes import HardCases
 from study.experiments.iterations import IterationSweep

@@ -11,8 +11,7 @@ import pandas as pd
 from pdrom.model.held_out import MOTIONS, PLAYBACK
 from study.artifact import paths
 from study.artifact.reads import Every, Setting, TableOf
-from study.experiments.alternatives import settings
-from study.experiments.alternatives.settings import REDUCTIONS
+from study.experiments.alternatives import experiment as settings
 from study.tables.kit.declaration import flag, integer, number, shared, table, text, timed
 from study.tables.kit.results import joined, median_interval
 
@@ -173,9 +172,11 @@ def _best(rows: pd.DataFrame, limit: float, processes: list[int]) -> dict[str, o
     A speed-up is the median ratio of two times measured in the same one of the ``processes``.
     """
     reaching = rows[rows.error <= limit].sort_values("ms_per_frame", kind="stable")
-    inside = reaching.method.isin(REDUCTIONS)
+    inside = reaching.method.isin(settings.REDUCTIONS)
     full, reduced = reaching[~inside], reaching[inside]
-    made: dict[str, object] = {"reduced_error": rows.error[rows.method.isin(REDUCTIONS)].min()}
+    made: dict[str, object] = {
+        "reduced_error": rows.error[rows.method.isin(settings.REDUCTIONS)].min()
+    }
     plain = reaching[(reaching.method == PLAIN) & (reaching.substeps == 1)]
     if len(plain):
         made["plain_ms"] = plain.ms_per_frame.iloc[0]

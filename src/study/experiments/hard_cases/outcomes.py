@@ -28,9 +28,16 @@ from pdrom.reduction.subspace.model import Samples, SubspaceModel, make_columns,
 from pdrom.reduction.subspace.space import coordinates
 from study.artifact.paths import HARD_CASES, File
 from study.artifact.reads import ProjectFiles, Setting
-from study.experiments.hard_cases.case import HardCase
 from study.experiments.hard_cases.catalogue import CASES, MESHES, reducible_cases
-from study.experiments.hard_cases.record import Record, Watched, full_order, momentum, reach, record
+from study.experiments.hard_cases.record import (
+    HardCase,
+    Record,
+    Watched,
+    full_order,
+    momentum,
+    reach,
+    record,
+)
 from study.experiments.kit.base import experiment
 
 HOLDS, NOTHING, NOT_TAKEN = "holds", "nothing to reduce", "not taken"

@@ -23,7 +23,7 @@ from study.experiments.subspaces import (
     LargeModels,
     Online,
 )
-from study.tables.speedups import frame_times, online, speedups
+from study.tables.effects_cost import frame_times, online, speedups
 
 EFFECTS = (
     {"effect": "spring", "weight": 1e5},

@@ -10,9 +10,9 @@ from scipy.stats import binom
 from pdrom.core.store import write_table
 from study.artifact.paths import File
 from study.experiments.frame_times import COLUMNS
+from study.tables.effects_cost import frame_times, speedups
 from study.tables.errors import repetitions
 from study.tables.kit.results import in_words, median_interval
-from study.tables.speedups import frame_times, speedups
 
 VALUES = st.lists(st.floats(0.1, 10.0), min_size=1, max_size=12)
 
