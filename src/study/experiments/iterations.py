@@ -71,16 +71,12 @@ class IterationSweep(IterationCounts):
     writes={"out": paths.ITERATIONS, "models": paths.SUBSPACES_CONVERGED},
 )
 def iterations(
-    mesh: paths.File,
-    fom: paths.File,
-    sensitivity: paths.File,
     subspaces: list[paths.File],
     config: SceneConfig,
     sweep: IterationSweep,
     horizon: kit.Horizon,
     solver: kit.Solver,
-    out: paths.File,
-    models: paths.File,
+    **files: paths.File,
 ) -> None:
     """Run a scene with every K up to its horizon, and once to convergence.
 
@@ -91,11 +87,11 @@ def iterations(
     and the errors against it are empty. The runs in position subspaces, whose iterations and
     training frames are those of the scene, have their error against it, too.
     """
-    scene = kit.scene_of(config, mesh)
+    scene = kit.scene_of(config, files["mesh"])
     system = scene.system_with(solver)
     name = scene.config.name
-    frames = max(1, horizon.frames(sensitivity))
-    own = kit.positions_of(fom, frames)
+    frames = max(1, horizon.frames(files["sensitivity"]))
+    own = kit.positions_of(files["fom"], frames)
     best = ConvergedStepper(scene, system, sweep.tolerance, limit=sweep.limit)
     limit = kit.followed(best, scene.initial_state(), frames)
     if not best.converged:
@@ -114,7 +110,7 @@ def iterations(
     converged = 0.0 if best.converged else None
     rows.append((name, None, None, frames, converged, kit.run_error(limit, own), residual))
     table = pd.DataFrame(rows, columns=COLUMNS).astype({"iterations": "Int64", "window": "Int64"})
-    write_table(table, out.path)
+    write_table(table, files["out"].path)
     inside = []
     for source in subspaces:
         with open_hdf5(source.path) as file:
@@ -125,7 +121,7 @@ def iterations(
                 if best.converged and len(run) == len(limit):
                     error = kit.run_error(np.stack([model.positions(z) for z in run]), limit)
                 inside.append((name, basis, k, method, error))
-    write_table(pd.DataFrame(inside, columns=MODELS), models.path)
+    write_table(pd.DataFrame(inside, columns=MODELS), files["models"].path)
 
 
 def accelerated(counts: list[int], window: int) -> list[tuple[int, int]]:

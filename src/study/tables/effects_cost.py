@@ -13,7 +13,6 @@ from study.experiments.kit.base import FOM, GLOBAL, REST, RIGHT, Horizon, floor_
 from study.experiments.sensitivity import without
 from study.tables.kit import results
 from study.tables.kit.declaration import flag, integer, number, shared, table, text, timed
-from study.tables.kit.results import in_one_time, joined, timings_in_one_time
 
 KEYS = ["scene", "effect"]
 NOTHING = "nothing"  # value of the column effect for the whole scene, with no effect left out
@@ -78,22 +77,22 @@ def effects_cost(
     sensitivity, horizon : arguments of `horizons`, the end of each scene's comparable frames;
         ``moved`` is empty for the only group of a scene, which cannot be left out
     """
-    costs, removed = joined(files["parts"]), joined(files["left_out"])
+    costs, removed = results.joined(files["parts"]), results.joined(files["left_out"])
     if costs.empty:
         return costs
     own = costs.groupby("scene").ms_per_frame.sum()
-    costs = in_one_time(costs, own, frame_times, columns=["ms_per_frame"])
+    costs = results.in_one_time(costs, own, frame_times, columns=["ms_per_frame"])
     tables = [costs]
     if len(removed):
         whole = removed[removed.left_out == NOTHING].set_index("scene").ms_per_frame
         times = ["ms_per_frame", "saved_ms", "own_ms"]
-        removed = in_one_time(removed, whole, frame_times, columns=times)
+        removed = results.in_one_time(removed, whole, frame_times, columns=times)
         removed = removed.rename(columns={"left_out": "effect", "ms_per_frame": "without_ms"})
         several = removed.rename(columns={"own_ms": "ms_per_frame"})
         tables.append(several[_absent(several, costs)].assign(role=SEVERAL))
         single = ["groups", "without_ms", "saved_ms"]
         tables[0] = costs.merge(removed[[*KEYS, *single]], on=KEYS, how="left")
-    frames = joined(files["contributions"])
+    frames = results.joined(files["contributions"])
     if len(frames):
         acting = _acting(frames, sensitivity, horizon)
         tables[0] = tables[0].merge(acting, on=KEYS, how="left")
@@ -152,7 +151,7 @@ def local_share(timings: list[File], frame_times: pd.DataFrame) -> pd.DataFrame:
 
     Assembly is added to the local step, as compiled kernels project and scatter in one pass.
     """
-    times = timings_in_one_time(timings, frame_times)
+    times = results.timings_in_one_time(timings, frame_times)
     full = times[times.method.isna()].copy()
     full["local_share"] = (full.local_ms + full.assembly_ms) / (
         full.local_ms + full.assembly_ms + full.global_ms
@@ -193,7 +192,7 @@ def scaling(parts: list[File]) -> pd.DataFrame:
     each of these rows. An exponent is empty if fewer than three meshes have a measurable time, as
     any two points lie on a power law.
     """
-    rows = joined(parts)
+    rows = results.joined(parts)
     if rows.empty:
         return rows
     own = rows[rows.method == FOM].set_index(["scene", "vertices"])

@@ -20,9 +20,8 @@ from study.pipeline.run import RUN_TIMES, Run, expected_seconds, say_compilation
 from study.pipeline.scenes import Coarsen
 from study.pipeline.summary import minutes
 from study.pipeline.tracked import COLUMNS, COSTS, main, measured_costs, recorded_verdicts
-from study.tables.claims.claims import claims
+from study.tables.claims.claims import MEASURED, RECORDED, RULES, claims, replication
 from study.tables.claims.rules import load_claims
-from study.tables.claims.verdicts import MEASURED, RECORDED, RULES, replication
 
 TABLE = pd.read_csv(ROOT / COSTS).set_index("kind")
 PROFILE = yaml.safe_load((ROOT / "workflow/profiles/slurm/config.yaml").read_text("utf-8"))
