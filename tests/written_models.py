@@ -11,7 +11,7 @@ from pdrom.model.scene import Scene
 from pdrom.reduction.subspace import model as subspaces
 from places import ROOT
 from study.artifact.paths import File
-from study.experiments.live import LiveModels, Options, live
+from study.experiments.subspaces import LiveModels, Options, live
 from study.live.page import live_page
 
 

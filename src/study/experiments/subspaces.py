@@ -1,33 +1,45 @@
 """Position subspaces with full projections, with sampled elements and with those of hrpd.
 
 The models of a large scene are made and run in one job with its full-order runs, which no other job
-reads; `study.experiments.frame_times` times them.
+reads; `study.experiments.frame_times` times them. A file of a scene's models and of joint rows is
+what a page loads, to run them in the reader's browser (`live`).
 """
 
+import json
 import logging
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
+from math import ceil
 from pathlib import Path
 from typing import Any
 
 import h5py
+import numpy as np
 import pandas as pd
 
-from pdrom.core.store import write_hdf5, write_table
+from pdrom.core.errors import StorageError
+from pdrom.core.packed import pack_array, pack_positions
+from pdrom.core.store import write_hdf5, write_table, write_text
 from pdrom.core.yamlfile import ConfigModel, SceneName
 from pdrom.model.energy import largest
 from pdrom.model.held_out import MOTIONS
 from pdrom.model.runs import trajectory
 from pdrom.model.scene import Scene, SceneConfig
+from pdrom.reduction.basis import load_basis
 from pdrom.reduction.deviations import Yardstick
+from pdrom.reduction.method import MethodSpec
+from pdrom.reduction.rerun import mean_motion
+from pdrom.reduction.sampling import Reduction
 from pdrom.reduction.snapshots import training_frames
+from pdrom.reduction.subspace import exported
 from pdrom.reduction.subspace import model as subspace
 from pdrom.reduction.subspace.columns import Columns
 from pdrom.reduction.subspace.ecsw import Norm
 from pdrom.reduction.subspace.hrpd import HrpdSpec, SampledSpace, hrpd, sampled_space
-from pdrom.reduction.subspace.interpolation import Interpolation
+from pdrom.reduction.subspace.interpolation import Interpolation, interpolation_of
 from study.artifact import paths
-from study.artifact.reads import Every, Setting, SourcesOf
+from study.artifact.paths import File
+from study.artifact.reads import EachOf, Every, Setting, Settings, SourcesOf
 from study.experiments.kit import base as kit
 from study.experiments.kit.base import experiment
 from study.experiments.kit.measurement import clocked
@@ -271,3 +283,161 @@ def _subspaces(
             columns = subspace.make_columns(scene, motion.reference[1:][frames], kind, k=k)
             models = samplings(columns, settings.methods(kind, k))
             yield f"{kind}_k{k:03d}", columns, kind, k, models
+
+
+LARGEST = 3_000_000  # bytes of a file
+GHOST = 250_000  # positions of the full-order run that a file holds, about
+JOINT = "deim-joint"
+FORMAT = 1
+Labelled = tuple[dict[str, Any], subspace.SubspaceModel]
+
+
+class LiveModels(ConfigModel):
+    """Models of the page: numbers of modes k, tolerances of the sampling, and the modes r of the
+    joint rows; each as far as the study has it."""
+
+    sizes: tuple[kit.Modes, ...] = (10, 20, 40)
+    tolerances: tuple[kit.Tolerance, ...] = (3e-2, 1e-2, 1e-3)
+    joint_rows: kit.Modes = 20
+
+
+class Live(LiveModels):
+    """Section ``live``: the models of the page, and the ``scenes`` that a reader chooses from.
+
+    Shown are those that the study has models of: position subspaces, or ``online.scenes``.
+    """
+
+    scenes: tuple[SceneName, ...] = ()
+
+
+class OfScene(ConfigModel):
+    """Names a file of a scene."""
+
+    scene: str
+
+    @property
+    def labels(self) -> dict[str, str]:
+        """Labels of the file."""
+        return {"scene": self.scene}
+
+
+class JointRows(ConfigModel):
+    """Joint rows of a group, which the study has samples of."""
+
+    scene: str
+    group: str
+    method: MethodSpec
+
+    @property
+    def labels(self) -> dict[str, str]:
+        """Labels of the files of this case."""
+        return {"scene": self.scene, "group": self.group, "method": JOINT}
+
+
+class Options(ConfigModel):
+    """Settings of the models of a scene."""
+
+    scene: SceneConfig
+    title: str
+    live: LiveModels
+    joint_rows: tuple[JointRows, ...]
+
+
+@experiment(
+    "Models of {scene} for the page",
+    reads={
+        "mesh": paths.MESH,
+        "train": paths.TRAIN,
+        "subspaces": EachOf(paths.SUBSPACES, "with_subspaces"),
+        "online": EachOf(paths.ONLINE_MODELS, "with_online_models"),
+        "bases": EachOf(paths.BASIS, "joint_rows"),
+        "samplings": EachOf(paths.SAMPLING, "joint_rows"),
+        "settings": Settings(Options),
+    },
+    writes={"out": paths.LIVE_MODEL},
+)
+def live(mesh: File, train: File, settings: Options, out: File, **files: list[File]) -> None:
+    """Write the models with the recorded full-order run.
+
+    Parameters
+    ----------
+    bases, samplings : of the joint rows, in the order of the settings
+
+    Raises
+    ------
+    StorageError
+        The file would be larger than `LARGEST`.
+    """
+    scene = kit.scene_of(settings.scene, mesh)
+    reference = kit.positions_of(train)
+    asked = settings.live
+    chosen: list[Labelled] = []
+    tolerances = {subspace.ecsw_name(tolerance): tolerance for tolerance in asked.tolerances}
+    for file in (*files["subspaces"], *files["online"]):
+        for own, model in subspace.load_models(file.path):
+            method, kind, k = own["method"], own["position_basis"], own["k"]
+            # models with sampled elements on snapshot bases
+            if method in tolerances and kind == "pod" and k in asked.sizes:
+                labels = {"family": "elements", "k": k, "tau": tolerances[method]}
+                chosen.append((labels, model))
+    given = (settings.joint_rows, files["bases"], files["samplings"])
+    for case, file, sampling in zip(*given, strict=True):
+        basis = load_basis(file.path)
+        # of the size asked for, or of the largest that exists
+        size = min(asked.joint_rows, basis.rank)
+        reduction = kit.load_reduction(basis, sampling.path, case.method, size)
+        chosen += list(_joint(scene, case.group, reduction, chosen))
+    used, triangles = np.unique(scene.mesh.triangles, return_inverse=True)
+    stride = max(1, ceil((len(reference) - 1) * len(used) / GHOST))
+    content = {
+        "format": FORMAT,
+        "scene": settings.scene.name,
+        "title": settings.title,
+        **exported.export_scene(scene),
+        **_models(scene, chosen),
+        # the surface, and every so many frames of the full-order run at its vertices
+        "shown": {
+            "vertices": pack_array(used, "u4"),
+            "triangles": pack_array(triangles.reshape(-1, 3), "u4"),
+            "stride": stride,
+            "full": pack_positions(reference[::stride, used]),
+        },
+        "motion": mean_motion(reference),
+    }
+    text = f"pdromLive({json.dumps(content, separators=(',', ':'), allow_nan=False)});\n"
+    if len(text) > LARGEST:
+        raise StorageError(
+            f"{out.path}: {len(text) / 1e6:.1f} MB, allowed are {LARGEST / 1e6:.1f}: choose fewer "
+            "sizes or tolerances (keys live.sizes, live.tolerances)"
+        )
+    write_text(text, out.path)
+    log.info("%s: %d models, %.1f MB", settings.scene.name, len(chosen), len(text) / 1e6)
+
+
+def _joint(
+    scene: Scene, group: str, reduction: Reduction, beside: list[Labelled]
+) -> Iterator[Labelled]:
+    """Joint rows of a group for each subspace of the models ``beside``; others as sampled there."""
+    for model in {id(model.columns): model for _, model in beside}.values():
+        joint = interpolation_of(scene.group(group), model.columns, reduction)
+        labels = {"family": "joint", "k": model.columns.modes, "r": reduction.r}
+        samples = {**model.samples, group: joint}
+        yield labels, subspace.SubspaceModel(model.position_basis, model.columns, samples)
+
+
+def _models(scene: Scene, chosen: list[Labelled]) -> dict[str, Any]:
+    """Bases and models; a model knows the place of its basis."""
+    by_basis: dict[int, list[subspace.SubspaceModel]] = {}
+    for _, model in chosen:
+        by_basis.setdefault(id(model.columns), []).append(model)
+    places = {key: place for place, key in enumerate(by_basis)}
+    return {
+        "bases": [
+            exported.export_basis(scene, own[0].columns, exported.needed_vertices(scene, own))
+            for own in by_basis.values()
+        ],
+        "models": [
+            {**labels, "basis": places[id(model.columns)], **exported.export_model(scene, model)}
+            for labels, model in chosen
+        ],
+    }

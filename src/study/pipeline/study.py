@@ -25,12 +25,11 @@ from study.experiments.frame_times import FrameTimes
 from study.experiments.hard_cases.outcomes import HardCases
 from study.experiments.iterations import IterationSweep
 from study.experiments.kit.base import BlowupExtent, Rank, Solver
-from study.experiments.live import Live
 from study.experiments.repetitions import LadderSection, Noise, RepetitionSection
 from study.experiments.requested_tolerances import RequestedTolerances
 from study.experiments.reruns import Stability, Sweep
 from study.experiments.sensitivity import Sensitivity
-from study.experiments.subspaces import Online, Subspace
+from study.experiments.subspaces import Live, Online, Subspace
 from study.experiments.timing import Scaling, Timing
 from study.figures.kit.declaration import Options, declarations, load_choices
 from study.paper.build import FILES

@@ -20,9 +20,9 @@ from study.artifact.markup import to_tex
 from study.artifact.reads import Labels
 from study.experiments.frame_times import NamedScene, ProjectionCase, SubspaceCase
 from study.experiments.kit.base import Horizon
-from study.experiments.live import JOINT, JointRows, OfScene
 from study.experiments.repetitions import Repeated
 from study.experiments.reruns import Stability
+from study.experiments.subspaces import JOINT, JointRows, OfScene
 from study.figures.kit.declaration import Experiment, Options, Reduction, declarations
 from study.paper.build import PAGES, Facts
 from study.paper.source import source_files

@@ -12,7 +12,7 @@ from pdrom.model.scene import Scene
 from pdrom.reduction.subspace import exported
 from pdrom.reduction.subspace.exported import export_scene
 from pdrom.reduction.subspace.model import SubspaceModel
-from study.experiments import live as module
+from study.experiments import subspaces as module
 from study.experiments.kit.base import followed
 from written_models import write_models
 
