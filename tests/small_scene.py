@@ -5,7 +5,7 @@ from pathlib import Path
 
 from bad_input.project import SMALL_SCENE, make_project
 from pdrom.core.yamlfile import read_yaml
-from study.experiments.kit.declaration import experiments
+from study.experiments.kit.base import experiments
 from study.pipeline.folders import Folders
 from study.pipeline.plan import Plan
 from study.pipeline.study import Study, labels_of

@@ -11,7 +11,7 @@ from pdrom.model.scene import Scene
 from pdrom.reduction.subspace import model as subspaces
 from places import ROOT
 from study.artifact.paths import File
-from study.experiments.live import LiveModels, Options, live
+from study.experiments.subspaces import LiveModels, Options, live
 from study.live.page import live_page
 
 
@@ -47,5 +47,6 @@ def write_models(
     mesh, train, models, out = (
         File(str(folder / name), {}) for name in ("mesh.h5", "train.h5", "models.h5", "test.js")
     )
-    live(mesh, train, [models], [], [], [], options, out)
+    files = {"subspaces": [models], "online": [], "bases": [], "samplings": []}
+    live(mesh, train, options, out, **files)
     return folder / "test.js", model

@@ -4,7 +4,7 @@ import pytest
 
 from pdrom.model.runs import trajectory
 from places import ROOT
-from study.experiments.kit.scenes import perturbation_field
+from study.experiments.kit.base import perturbation_field
 from study.experiments.sensitivity import relative_difference
 from study.pipeline.scenes import load_bound_scene
 

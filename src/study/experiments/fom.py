@@ -1,5 +1,6 @@
-"""The mesh of a scene, checked, and its full-order runs with the snapshots for reductions."""
+"""The mesh of a scene, checked, its full-order runs, their snapshots of a group, and its basis."""
 
+import logging
 from pathlib import Path
 
 from pdrom.model.mesh.checks import check_mesh
@@ -7,12 +8,12 @@ from pdrom.model.mesh.config import MeshConfig
 from pdrom.model.mesh.types import save_mesh
 from pdrom.model.runs import run
 from pdrom.model.scene import SceneConfig
-from pdrom.reduction.snapshots import stored_frames, test_frames
-from study.artifact.paths import HELDOUT, KICK, MESH, STIFFNESS, TRAIN, File
+from pdrom.reduction import snapshots as sets
+from pdrom.reduction.basis import basis_of, save_basis
+from pdrom.reduction.method import BasisSpec
+from study.artifact.paths import BASIS, HELDOUT, KICK, MESH, SNAPSHOTS, STIFFNESS, TRAIN, File
 from study.artifact.reads import Setting, SourcesOf
-from study.experiments.kit.declaration import experiment
-from study.experiments.kit.scenes import scene_of
-from study.experiments.kit.settings import Solver
+from study.experiments.kit.base import Solver, experiment, scene_of
 
 
 @experiment(
@@ -42,8 +43,38 @@ def fom(mesh: File, config: SceneConfig, solver: Solver, **runs: File) -> None:
     """
     frames, plans = config.frames, config.reduce
     wanted = {
-        "train": {group: stored_frames(frames, plan.train) for group, plan in plans.items()},
-        "heldout": dict.fromkeys(plans, test_frames(frames)),
+        "train": {group: sets.stored_frames(frames, plan.train) for group, plan in plans.items()},
+        "heldout": dict.fromkeys(plans, sets.test_frames(frames)),
     }
     for motion, file in runs.items():
         run(scene_of(config, mesh, motion), file.path, wanted.get(motion, {}), solver)
+
+
+log = logging.getLogger(__name__)
+
+
+@experiment(
+    "Snapshots of {group} in {scene}",
+    reads={"mesh": MESH, "train": TRAIN, "heldout": HELDOUT, "config": Setting("scene")},
+    writes={"out": SNAPSHOTS},
+)
+def snapshots(mesh: File, train: File, heldout: File, config: SceneConfig, out: File) -> None:
+    """Split the projections of a group that two runs stored and save them to ``out``."""
+    group = out["group"]
+    scene = scene_of(config, mesh)
+    frames = sets.training_frames(scene.config.frames, scene.config.reduce[group].train)
+    found = sets.collect(train.path, heldout.path, scene.group(group), scene.masses, frames)
+    sets.save_snapshots(found, out.path)
+
+
+@experiment(
+    "POD of {group} in {scene} ({basis})",
+    reads={"snapshots": SNAPSHOTS, "spec": Setting("basis")},
+    writes={"out": BASIS},
+)
+def pod(snapshots: File, spec: BasisSpec, out: File) -> None:
+    """Compute a basis ``spec`` of the training ``snapshots`` and save it to ``out``."""
+    data = sets.load_snapshots(snapshots.path)
+    basis = basis_of(data, spec)
+    log.info("numerical rank %d of %d snapshots", basis.rank, len(data.train))
+    save_basis(basis, out.path)

@@ -26,11 +26,9 @@ from pdrom.reduction.subspace.model import load_models
 from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import EachOf, Settings
+from study.experiments.kit.base import Modes, PositionBasis, Solver, experiment, load_reduction
 from study.experiments.kit.costs import variant
-from study.experiments.kit.declaration import experiment
 from study.experiments.kit.measurement import Case, Processes, Variant, in_processes
-from study.experiments.kit.reruns import load_reduction
-from study.experiments.kit.settings import Modes, PositionBasis, Solver
 
 FULL, CONTROL, REDUCED = "full", "control", "reduced"
 COLUMNS = [
@@ -158,25 +156,15 @@ class TimedScene(Case):
     writes={"times": paths.FRAME_TIMES, "seconds": paths.PROJECTION_SECONDS},
     alone=True,
 )
-def frame_times(
-    meshes: list[File],
-    subspaces: list[File],
-    bases: list[File],
-    samplings: list[File],
-    snapshots: list[File],
-    large: list[File],
-    settings: Options,
-    times: File,
-    seconds: File,
-) -> None:
+def frame_times(settings: Options, times: File, seconds: File, **files: list[File]) -> None:
     """Start the processes one after the other, and join what they measured."""
     asked = settings.frame_times
     scenes: dict[str, TimedScene] = {}
-    for named, file in zip(settings.timed_scenes, meshes, strict=True):
+    for named, file in zip(settings.timed_scenes, files["meshes"], strict=True):
         scenes[named.scene.name] = TimedScene(named.scene, settings.solver, asked.frames, file.path)
     rows = []
-    cases = zip(settings.projection_cases, bases, samplings, snapshots, strict=True)
-    for own, basis, sampling, data in cases:
+    given = (files[name] for name in ("bases", "samplings", "snapshots"))
+    for own, basis, sampling, data in zip(settings.projection_cases, *given, strict=True):
         spec = settings.projection_methods[own.method]
         scenes[own.scene].projections.append((own, spec, basis.path, sampling.path))
         known = load_snapshots(data.path)
@@ -184,10 +172,12 @@ def frame_times(
         select(basis_of(known, spec), spec, own.r)
         rows.append((*own.model_dump().values(), process_time() - before))
     chosen: dict[str, list[tuple[str, str, int]]] = defaultdict(list)
-    for case, file in zip(settings.subspace_cases, subspaces, strict=True):
+    for case, file in zip(settings.subspace_cases, files["subspaces"], strict=True):
         chosen[file.path].append((case.method, case.position_basis, case.k))
         scenes[case.scene].models[file.path] = chosen[file.path]
-    for named, file in zip(settings.large_scenes, large, strict=True):  # may be among the others
+    for named, file in zip(
+        settings.large_scenes, files["large"], strict=True
+    ):  # may be among the others
         scene = TimedScene(named.scene, settings.solver, asked.frames)
         scenes.setdefault(named.scene.name, scene).models[file.path] = None
     table = pd.DataFrame(in_processes([*scenes.values()], asked), columns=COLUMNS)

@@ -19,7 +19,7 @@ from pdrom.model.compiled.arithmetic import add, add_product, constant, total
 from pdrom.model.compiled.functions import compiled
 from pdrom.model.compiled.rows import WIDTH, load
 from study.artifact.paths import MACHINE, File
-from study.experiments.kit.declaration import experiment
+from study.experiments.kit.base import experiment
 
 AT_ONCE = 8  # independent vectors, enough to hide the latency of what is measured
 SCALAR_STEPS, VECTOR_TIMES = 10**7, 10**6

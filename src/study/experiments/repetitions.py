@@ -20,26 +20,17 @@ from pdrom.core.store import write_hdf5, write_table
 from pdrom.core.yamlfile import ConfigModel, SceneName
 from pdrom.model.metrics import relative_errors
 from pdrom.model.scene import Scene, SceneConfig
+from pdrom.reduction import snapshots as sets
 from pdrom.reduction.basis import Basis, basis_of, compute_basis
 from pdrom.reduction.deviations import error_within
 from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.rerun import Rerun, displacement_norms
 from pdrom.reduction.sampling import Reduction, reductions
 from pdrom.reduction.sampling.local_step import rerun_reduced
-from pdrom.reduction.snapshots import (
-    SPLITS,
-    SnapshotSet,
-    load_snapshots,
-    row_masses,
-    training_frames,
-)
 from study.artifact import paths
-from study.artifact.paths import File
 from study.artifact.reads import Settings
-from study.experiments.kit.declaration import experiment
-from study.experiments.kit.reruns import store_end
-from study.experiments.kit.scenes import perturbation_field, positions_of, scene_of
-from study.experiments.kit.settings import BlowupExtent, Horizon, Modes, Tolerance
+from study.experiments.kit import base as kit
+from study.experiments.kit.base import experiment
 
 Varied = Literal["start", "training"]
 log = logging.getLogger(__name__)
@@ -57,6 +48,7 @@ NOISE_COLUMNS = [
     "blowup_frame", "relative_error",
 ]  # fmt: skip
 ALL, PLANE, VERTEX = "all", "plane", "vertex"
+Methods = Mapping[str, MethodSpec]
 Runs = list[tuple[dict[str, Any], Rerun | None]]  # rows of one start, and its runs
 Rungs = Annotated[tuple[MethodSpec, ...], Field(min_length=1)]
 
@@ -69,7 +61,7 @@ class Repetitions(ConfigModel):
     """
 
     repetitions: Annotated[int, Field(ge=1, le=1000)] = 5
-    perturbation: Tolerance = 1e-10
+    perturbation: kit.Tolerance = 1e-10
 
 
 @dataclass(frozen=True)
@@ -84,7 +76,7 @@ class ReducedRuns:
 
     scene: Scene
     group: str
-    data: SnapshotSet
+    data: sets.SnapshotSet
     reference: np.ndarray
     end: int
     blowup_extent: float
@@ -135,7 +127,7 @@ class ReducedRuns:
             made = reductions(self.basis(method), method, sizes)
         for seed in range(1, asked.repetitions + 1):
             if varied == "start":
-                offset = perturbation_field(self.scene, asked.perturbation, seed)
+                offset = kit.perturbation_field(self.scene, asked.perturbation, seed)
             else:
                 made = reductions(self.basis(method, frames=seed), method, sizes)
             for r, reduction in made.items():
@@ -146,7 +138,7 @@ class ReducedRuns:
         return sorted(rows, key=lambda row: row["r"])
 
 
-def drawn(data: SnapshotSet, seed: int) -> np.ndarray:
+def drawn(data: sets.SnapshotSet, seed: int) -> np.ndarray:
     """Snapshots (n, e p, 3), as many as train in ``data``, drawn by ``seed`` from all, in order."""
     frames = np.concatenate([data.frames["train"], data.frames["test"]])
     chosen = np.random.default_rng(seed).choice(len(frames), len(data.train), replace=False)
@@ -160,7 +152,7 @@ class Cells(ConfigModel):
 
     scenes: Annotated[tuple[SceneName, ...], Field(min_length=1)]
     methods: Annotated[tuple[str, ...], Field(min_length=1)]
-    sizes: Annotated[tuple[Modes, ...], Field(min_length=1)]
+    sizes: Annotated[tuple[kit.Modes, ...], Field(min_length=1)]
     varied: tuple[Varied, ...] = ("start", "training")
 
 
@@ -175,7 +167,7 @@ class Repeated(ConfigModel):
 
     method: str
     spec: MethodSpec
-    sizes: tuple[Modes, ...]
+    sizes: tuple[kit.Modes, ...]
     varied: tuple[Varied, ...]
 
 
@@ -196,7 +188,7 @@ class Ladder(Repetitions):
     up: Rungs = ()
     down: Rungs = ()
     square: tuple[MethodSpec, ...] = ()
-    sizes: tuple[Modes, ...] = ()
+    sizes: tuple[kit.Modes, ...] = ()
 
     def rungs(self, p: int) -> list[tuple[str, MethodSpec, int | None, int]]:
         """(direction, method, seed of the signs, size) of all rows of a group, in order."""
@@ -227,7 +219,7 @@ class NoiseRuns(ConfigModel):
     perturbation : length by which they move a vertex, over the extent: a few units of round-off
     """
 
-    sizes: Annotated[tuple[Modes, ...], Field(min_length=1)] = (6, 10, 20)
+    sizes: Annotated[tuple[kit.Modes, ...], Field(min_length=1)] = (6, 10, 20)
     repetitions: Annotated[int, Field(ge=1, le=1000)] = 20
     perturbation: Annotated[float, Field(gt=0.0, le=1e-12)] = 1e-15
 
@@ -248,8 +240,8 @@ class Options(ConfigModel):
     own_ladder: Ladder | None
     own_noise: NoiseRuns | None
     noise_methods: dict[str, MethodSpec]
-    horizon: Horizon
-    blowup_extent: BlowupExtent
+    horizon: kit.Horizon
+    blowup_extent: kit.BlowupExtent
 
 
 @experiment(
@@ -268,28 +260,18 @@ class Options(ConfigModel):
         "noise_runs": paths.NOISE_RUNS,
     },
 )
-def repetitions(
-    mesh: File,
-    fom: File,
-    snapshots: File,
-    sensitivity: File,
-    settings: Options,
-    out: File,
-    rungs: File,
-    noise: File,
-    noise_runs: File,
-) -> None:
+def repetitions(settings: Options, **files: paths.File) -> None:
     """Repeat every listed run of the scene and group, climb the ladder, reduce the round-off.
 
     What the configuration does not ask of a scene has a table without rows.
     """
-    labels = out.labels
+    labels = files["out"].labels
     runs = ReducedRuns(
-        scene_of(settings.scene, mesh),
+        kit.scene_of(settings.scene, files["mesh"]),
         labels["group"],
-        load_snapshots(snapshots.path),
-        reference=positions_of(fom),
-        end=settings.horizon.frames(sensitivity),
+        sets.load_snapshots(files["snapshots"].path),
+        reference=kit.positions_of(files["fom"]),
+        end=settings.horizon.frames(files["sensitivity"]),
         blowup_extent=settings.blowup_extent,
     )
     short = runs.until_the_end()
@@ -300,17 +282,17 @@ def repetitions(
             cell = {**labels, "method": own.method, "varied": varied}
             rows += [cell | row for row in found]
         log.info("%s", own.method)
-    write_table(pd.DataFrame(rows, columns=COLUMNS), out.path)
+    write_table(pd.DataFrame(rows, columns=COLUMNS), files["out"].path)
     climbed = [] if settings.own_ladder is None else _ladder(runs, short, settings.own_ladder)
     table = pd.DataFrame([{**labels, **row} for row in climbed], columns=LADDER_COLUMNS)
     whole = dict.fromkeys(("blowup_frame", "repetitions", "entries"), "Int64")
-    write_table(table.astype(whole), rungs.path)
+    write_table(table.astype(whole), files["rungs"].path)
     methods, limit, reduced = settings.noise_methods, settings.blowup_extent, []
-    with write_hdf5(noise_runs.path) as file:
+    with write_hdf5(files["noise_runs"].path) as file:
         if settings.own_noise is not None:
             reduced = noisy_runs(short.scene, runs.group, settings.own_noise, methods, limit, file)
     table = pd.DataFrame([{**labels, **row} for row in reduced], columns=NOISE_COLUMNS)
-    write_table(table.astype({"frames": "Int64", "blowup_frame": "Int64"}), noise.path)
+    write_table(table.astype({"frames": "Int64", "blowup_frame": "Int64"}), files["noise"].path)
 
 
 def _ladder(runs: ReducedRuns, short: ReducedRuns, ladder: Ladder) -> Iterator[dict[str, Any]]:
@@ -331,7 +313,7 @@ def _ladder(runs: ReducedRuns, short: ReducedRuns, ladder: Ladder) -> Iterator[d
             row["relative_error_within_horizon"] = runs.error(outcome)
             row["entries"] = sum(len(block.entries) for block in reduction.blocks)
             row |= {"condition": reduction.condition, "gain": reduction.gain}
-            for split in SPLITS:
+            for split in sets.SPLITS:
                 p = getattr(data, split)
                 found = relative_errors(p, reduction.reconstruct(p), data.roundoff)
                 row[f"error_{split}"] = found[0]
@@ -348,25 +330,20 @@ def _ladder(runs: ReducedRuns, short: ReducedRuns, ladder: Ladder) -> Iterator[d
 
 
 def noisy_runs(
-    scene: Scene,
-    group: str,
-    asked: NoiseRuns,
-    methods: Mapping[str, MethodSpec],
-    blowup_extent: float,
-    file: h5py.File,
+    scene: Scene, group: str, asked: NoiseRuns, methods: Methods, limit: float, file: h5py.File
 ) -> list[dict[str, Any]]:
     """Perturb the start of ``scene``, run, make bases without a cutoff, rerun.
 
     Returned are the rows of all runs with the ``group`` reduced by each of ``methods``. The runs of
     one start of each kind go to ``file``, in the layout of `study.experiments.reruns`; marked where
-    r exceeds the rank.
+    r exceeds the rank; ``limit`` is the extent of a blow-up over that of the rest shape.
     """
     rows = []
     for axes in kinds(scene):
         kept: Runs = []
         for seed in range(1, asked.repetitions + 1):
             start = roundoff_field(scene, axes, asked.perturbation, seed=seed)
-            found = list(_noisy(scene, group, start, asked.sizes, methods, blowup_extent))
+            found = list(_noisy(scene, group, start, asked.sizes, methods, limit))
             rows += [{"noisy_axes": axes, "seed": seed, **row} for row, _ in found]
             if not kept or (irregular(found) and not irregular(kept)):
                 kept = found
@@ -374,7 +351,7 @@ def noisy_runs(
             store = file.create_group(f"{axes}/{row['method']}/r{row['r']:04d}")
             store.attrs.update(r=row["r"], marked=outcome is None)
             if outcome is not None:
-                store_end(store, outcome)
+                kit.store_end(store, outcome)
         log.info("%s: %d starts", axes, asked.repetitions)
     return rows
 
@@ -402,7 +379,7 @@ def roundoff_field(scene: Scene, axes: str, size: float, seed: int) -> np.ndarra
 
     ``scene``, ``size`` and ``seed`` as in `perturbation_field`; the seed draws the vertex, too.
     """
-    field = perturbation_field(scene, size, seed)
+    field = kit.perturbation_field(scene, size, seed)
     if axes != ALL:
         still = np.ones(len(field), dtype=bool)
         if axes == VERTEX:
@@ -432,12 +409,7 @@ def noise_basis(
 
 
 def _noisy(
-    scene: Scene,
-    name: str,
-    start: np.ndarray,
-    sizes: Sequence[int],
-    methods: Mapping[str, MethodSpec],
-    blowup_extent: float,
+    scene: Scene, name: str, start: np.ndarray, sizes: Sequence[int], methods: Methods, limit: float
 ) -> Iterator[tuple[dict[str, Any], Rerun | None]]:
     """Rows and runs from one ``start`` (N, 3) m, which is added to the initial positions.
 
@@ -450,8 +422,8 @@ def _noisy(
         state, _ = loop.step(state, frame, lambda y: projections.append(group.project(y)))
         positions.append(state.positions)
     reference = np.stack(positions)
-    even = training_frames(frames, min(plan.train, (frames + 1) // 2))
-    trained_on, masses = np.stack(projections)[even], row_masses(group, scene.masses)
+    even = sets.training_frames(frames, min(plan.train, (frames + 1) // 2))
+    trained_on, masses = np.stack(projections)[even], sets.row_masses(group, scene.masses)
     displacement = displacement_norms(reference)
     for method, spec in methods.items():
         basis = noise_basis(trained_on, masses, group.rows_per_element, method=spec)
@@ -460,6 +432,6 @@ def _noisy(
             row = {"method": method, "r": r, "rank": basis.rank, "frames": 0}
             outcome = None
             if r in made:
-                outcome = rerun_reduced(scene, name, made[r], reference, blowup_extent)
+                outcome = rerun_reduced(scene, name, made[r], reference, limit)
                 row |= {"gain": made[r].gain, **outcome.row(displacement)}
             yield row, outcome

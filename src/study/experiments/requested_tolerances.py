@@ -17,8 +17,7 @@ from pdrom.reduction.requested import levels, run
 from pdrom.reduction.requested.levels import Level, Motion, Quantity, Trajectory
 from study.artifact.paths import REQUESTED_TOLERANCES, File
 from study.artifact.reads import Setting, SourcesOf
-from study.experiments.kit.declaration import experiment
-from study.experiments.kit.settings import Tolerance
+from study.experiments.kit.base import Tolerance, experiment
 
 log = logging.getLogger(__name__)
 

@@ -1,31 +1,35 @@
-"""Sampling of a group by one method, then the scene again with the group reduced, for every r."""
+"""Sampling of a group by one method, then the scene again with the group reduced, for every r.
+
+And one scene over the time step and over the stiffness, by every method (`stability`).
+"""
 
 import logging
 from collections.abc import Iterator
-from typing import Any
+from typing import Annotated, Any, Self
 
 import h5py
 import numpy as np
 import pandas as pd
+from pydantic import Field, model_validator
 
 from pdrom.core.store import write_hdf5, write_table
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.model.energy import largest
 from pdrom.model.metrics import relative_errors
-from pdrom.model.scene import SceneConfig
+from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.basis import Basis, load_basis
 from pdrom.reduction.deviations import Yardstick
 from pdrom.reduction.method import MethodSpec
-from pdrom.reduction.sampling import reductions
-from pdrom.reduction.sampling.local_step import rerun_reduced
+from pdrom.reduction.rerun import Rerun
+from pdrom.reduction.sampling import Reduction, reductions
+from pdrom.reduction.sampling.local_step import rerun, rerun_reduced
 from pdrom.reduction.snapshots import SPLITS, SnapshotSet, load_snapshots
+from pdrom.reduction.subspace.model import SubspaceModel, load_models, rerun_model
 from study.artifact import paths
 from study.artifact.paths import File
-from study.artifact.reads import Every, Settings
-from study.experiments.kit.declaration import experiment
-from study.experiments.kit.reruns import load_reduction, store_end
-from study.experiments.kit.scenes import TRAIN, positions_of, scene_of
-from study.experiments.kit.settings import BlowupExtent, Count, Rank, Solver, resolve_ranks
+from study.artifact.reads import Every, Setting, Settings
+from study.experiments.kit import base as kit
+from study.experiments.kit.base import experiment
 
 log = logging.getLogger(__name__)
 
@@ -44,8 +48,8 @@ MOTION = "motion"  # column of the held-out rows only
 class Sweep(ConfigModel):
     """Basis sizes of the reconstruction error: all up to ``dense_to``, then every ``step``-th."""
 
-    dense_to: Count = 10
-    step: Count = 10
+    dense_to: kit.Count = 10
+    step: kit.Count = 10
 
     def ranks(self, largest: int) -> list[int]:
         """Sizes 1 .. ``largest``, which is always among them."""
@@ -60,9 +64,9 @@ class Options(ConfigModel):
     scene: SceneConfig
     method: MethodSpec
     sweep: Sweep
-    ranks: tuple[Rank, ...]
-    blowup_extent: BlowupExtent
-    solver: Solver
+    ranks: tuple[kit.Rank, ...]
+    blowup_extent: kit.BlowupExtent
+    solver: kit.Solver
 
 
 @experiment(
@@ -83,49 +87,32 @@ class Options(ConfigModel):
         "heldout_table": paths.RERUNS_HELDOUT,
     },
 )
-def reruns(
-    mesh: File,
-    fom: File,
-    motions: list[File],
-    snapshots: File,
-    basis: File,
-    settings: Options,
-    sampling: File,
-    errors: File,
-    runs: File,
-    out: File,
-    heldout_table: File,
-) -> None:
+def reruns(motions: list[File], settings: Options, **files: File) -> None:
     """Sample the group, then rerun the scene for every r, as trained and as held out.
 
     One job does all: starting another process takes longer than the sampling.
     """
-    space, data = load_basis(basis.path), load_snapshots(snapshots.path)
-    _sample(space, data, settings, sampling, errors)
+    space, data = load_basis(files["basis"].path), load_snapshots(files["snapshots"].path)
+    _sample(space, data, settings, files["sampling"], files["errors"])
     found = {}
-    with write_hdf5(runs.path) as file:
+    with write_hdf5(files["runs"].path) as file:
         for run in motions:
             motion = run["run"]
-            yardstick = Yardstick(scene_of(settings.scene, mesh, motion), positions_of(run))
+            scene = kit.scene_of(settings.scene, files["mesh"], motion)
+            yardstick = Yardstick(scene, kit.positions_of(run))
             file.attrs.update(yardstick.units)
-            store = file if motion == TRAIN else file.create_group(motion)
+            store = file if motion == kit.TRAIN else file.create_group(motion)
             for name, values in yardstick.series.items():
                 store[name] = values
-            sizes = resolve_ranks(settings.ranks, space.rank)
-            made = _runs(yardstick, sampling, space, sizes, settings, store)
+            made = _runs(yardstick, files["sampling"], space, settings, store)
             found[motion] = pd.DataFrame(made, columns=COLUMNS)
-    write_table(found.pop(TRAIN), out.path)
+    write_table(found.pop(kit.TRAIN), files["out"].path)
     heldout = [table.assign(**{MOTION: motion}) for motion, table in found.items()]
-    write_table(pd.concat(heldout, ignore_index=True), heldout_table.path)
+    write_table(pd.concat(heldout, ignore_index=True), files["heldout_table"].path)
 
 
 def _runs(
-    yardstick: Yardstick,
-    sampling: File,
-    basis: Basis,
-    sizes: list[int],
-    settings: Options,
-    file: h5py.Group,
+    yardstick: Yardstick, sampling: File, basis: Basis, settings: Options, file: h5py.Group
 ) -> Iterator[dict[str, Any]]:
     """Run a motion for every r and yield the rows; an r beyond the rank is a marked row.
 
@@ -134,27 +121,22 @@ def _runs(
     """
     labels, scene = sampling.labels, yardstick.scene
     system = scene.system_with(settings.solver)
-    for r in sizes:
+    for r in kit.resolve_ranks(settings.ranks, basis.rank):
         store = file.create_group(f"r{r:04d}")
         store.attrs.update(r=r, full=r == basis.rank, marked=r > basis.rank)
         if r > basis.rank:
             log.warning("r = %d exceeds the numerical rank %d: not run", r, basis.rank)
             yield {**labels, "r": r, "frames": 0}
             continue
-        reduction = load_reduction(basis, sampling.path, settings.method, r=r)
+        reduction = kit.load_reduction(basis, sampling.path, settings.method, r=r)
         outcome = rerun_reduced(
-            scene,
-            labels["group"],
-            reduction,
-            yardstick.reference,
-            settings.blowup_extent,
-            system,
+            scene, labels["group"], reduction, yardstick.reference, settings.blowup_extent, system
         )
         apart = yardstick.deviations(outcome)
         error = outcome.difference / np.sqrt(np.mean(yardstick.displacement**2))
         for name, values in {**apart, "error": error, "extent": outcome.extent}.items():
             store[name] = values
-        store_end(store, outcome, with_positions=file.name == "/")
+        kit.store_end(store, outcome, with_positions=file.name == "/")
         store.attrs["finite"] = outcome.finite
         measured = {"energy_ratio": largest(apart["energy"]), "gain": reduction.gain}
         yield {**labels, "r": r, **outcome.row(yardstick.displacement), **measured}
@@ -172,7 +154,7 @@ def _sample(
     sampling, errors : files to write; their labels are the first columns of the table
     """
     labels = sampling.labels
-    asked = resolve_ranks(settings.ranks, basis.rank)
+    asked = kit.resolve_ranks(settings.ranks, basis.rank)
     wanted = {*settings.sweep.ranks(basis.rank), *asked} if basis.rank else set()
     rows = []
     with write_hdf5(sampling.path) as file:
@@ -193,3 +175,153 @@ def _sample(
     if beyond:
         log.warning("r = %s exceeds the numerical rank %d: marked rows", beyond, basis.rank)
     write_table(pd.DataFrame(rows, columns=ERROR_COLUMNS), errors.path)
+
+
+SHORT_COLUMNS = [
+    "scene", "method", "r", "h", "stiffness_ratio", "finite", "blowup_frame", "max_extent",
+    "energy_ratio", "gain", "group", "position_basis", "k", "frames", "relative_error",
+]  # fmt: skip
+Local = list[tuple[dict[str, Any], Reduction | None]]  # labels, and the reduction
+Models = list[tuple[dict[str, Any], SubspaceModel]]
+
+
+class ShortRuns(ConfigModel):
+    """Short runs over the time step and over the stiffness of the reduced groups.
+
+    The bases and samplings are those of the scene's own setting.
+
+    ranks : basis sizes, as far as the study holds them; position subspaces run at their largest
+    time_steps : h in seconds, in addition to the scene's own
+    stiffness_ratios : factors on the weights of the reduced groups, in addition to 1
+    duration : seconds of simulated time, within ``min_frames`` and ``max_frames``
+    """
+
+    ranks: tuple[kit.Rank, ...] = ()
+    time_steps: tuple[Annotated[float, Field(gt=0.0, le=10.0)], ...] = ()
+    stiffness_ratios: tuple[Annotated[float, Field(gt=0.0, le=1e8)], ...] = ()
+    duration: Annotated[float, Field(gt=0.0)] = 1.0
+    min_frames: Annotated[int, Field(ge=2)] = 30
+    max_frames: Annotated[int, Field(ge=2)] = 120
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        if self.max_frames < self.min_frames:
+            raise ValueError(
+                f"max_frames = {self.max_frames}: at least min_frames = {self.min_frames}"
+            )
+        return self
+
+
+class Stability(ShortRuns):
+    """Section ``stability``: the short runs, and how they are judged.
+
+    scenes : where, as far as the study holds them
+    wrong : relative error above which a run is finite but wrong
+    departure : multiple of the full-order run's largest extent above which a run has left the
+        scene; the key is ``left``
+    """
+
+    scenes: tuple[str, ...] = ()
+    wrong: Annotated[float, Field(gt=0.0)] = 0.1
+    departure: Annotated[float, Field(gt=1.0, alias="left")] = 2.0
+
+    @property
+    def left(self) -> float:
+        """`departure`, by its key."""
+        return self.departure
+
+
+@experiment(
+    "Time step and stiffness of {scene}",
+    reads={
+        "mesh": paths.MESH,
+        "bases": Every(paths.BASIS),
+        "samplings": Every(paths.SAMPLING),
+        "subspaces": Every(paths.SUBSPACES),
+        "config": Setting("scene"),
+        "methods": Setting("methods"),
+        "short": Setting("stability"),
+        "blowup_extent": Setting("blowup_extent"),
+        "solver": Setting("solver"),
+    },
+    writes={"out": paths.STABILITY},
+)
+def stability(
+    mesh: File,
+    bases: list[File],
+    samplings: list[File],
+    subspaces: list[File],
+    config: SceneConfig,
+    methods: dict[str, MethodSpec],
+    short: ShortRuns,
+    blowup_extent: kit.BlowupExtent,
+    solver: kit.Solver,
+    out: File,
+) -> None:
+    """Run the full order, every local reduction and the largest subspaces at every setting.
+
+    Bases and samplings are those of the scene's own setting: how far do they carry?
+    """
+    scene = kit.scene_of(config, mesh)
+    local: Local = []
+    for file in samplings:
+        spec = methods[file["method"]]
+        basis = load_basis(kit.basis_of(file, spec, bases).path)
+        for r in kit.resolve_ranks(short.ranks, basis.rank):
+            labels = {"group": file["group"], "method": file["method"], "r": r}
+            known = r <= basis.rank
+            reduction = kit.load_reduction(basis, file.path, spec, r=r) if known else None
+            local.append((labels | {"position_basis": "full"}, reduction))
+    models: Models = []
+    for file in subspaces:
+        found: Models = load_models(file.path)
+        largest = max(labels["k"] for labels, _ in found)
+        models += [(labels, model) for labels, model in found if labels["k"] == largest]
+    # one of time step and stiffness at a time leaves the scene's own setting
+    h, limits = scene.config.time_step, (short.min_frames, short.max_frames)
+    ratios = sorted({1.0, *short.stiffness_ratios} - {1.0})
+    grid = [(step, 1.0) for step in sorted({h, *short.time_steps})] + [(h, own) for own in ratios]
+    rows = []
+    for step, ratio in grid:
+        other = kit.varied(scene.config, step, ratio, duration=short.duration, frames=limits)
+        case = Scene.build(other, scene.mesh)
+        own = {"scene": config.name, "h": step, "stiffness_ratio": ratio}
+        rows += [own | row for row in _rows(case, local, models, solver, blowup_extent)]
+        log.info("h = %g s, stiffness times %g: %d frames", step, ratio, other.frames)
+    table = pd.DataFrame(rows, columns=SHORT_COLUMNS)
+    whole = ["r", "blowup_frame", "k", "frames"]
+    write_table(table.astype(dict.fromkeys(whole, "Int64")), out.path)
+
+
+def _rows(
+    scene: Scene, local: Local, models: Models, solver: str, limit: float
+) -> Iterator[dict[str, Any]]:
+    """Rows of the full order of ``scene`` and, if that is finite, of everything else.
+
+    ``limit`` is the extent of a blow-up over that of the rest shape; a reduction is None where the
+    basis has fewer modes.
+    """
+    system = scene.system_with(solver)
+    nothing = np.zeros((scene.config.frames + 1, *scene.mesh.points.shape))
+    full = rerun(scene, system, scene.groups, reference=nothing, blowup_extent=limit)
+    own = Yardstick(scene, full.positions)
+
+    def row(labels: dict[str, Any], outcome: Rerun) -> dict[str, Any]:
+        energy = {"energy_ratio": own.scale.ratio(outcome.positions)}
+        return {**labels, **outcome.row(own.displacement), **energy}
+
+    whole = row({"method": "full", "position_basis": "full"}, full)
+    if not full.finite:
+        log.warning("the full-order run blew up: nothing to compare with")
+        yield whole
+        return
+    yield {**whole, "relative_error": 0.0}
+    for labels, reduction in local:
+        if reduction is None:
+            yield {**labels, "frames": 0}
+            continue
+        outcome = rerun_reduced(scene, labels["group"], reduction, own.reference, limit, system)
+        yield row({**labels, "gain": reduction.gain}, outcome)
+    for labels, model in models:
+        outcome = rerun_model(scene, model, own.reference, blowup_extent=limit)
+        yield row({"group": "all", **labels}, outcome)

@@ -25,8 +25,7 @@ from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.rerun import mean_motion
 from study.artifact.paths import CONTRIBUTIONS, MESH, SENSITIVITY, File
 from study.artifact.reads import Setting
-from study.experiments.kit.declaration import experiment
-from study.experiments.kit.scenes import perturbation_field, scene_of
+from study.experiments.kit.base import experiment, perturbation_field, scene_of
 
 Perturbation = Annotated[float, Field(gt=0.0, lt=1.0)]
 EFFECTS = ["scene", "effect", "role", "frame", "force", "energy"]

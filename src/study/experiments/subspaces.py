@@ -1,12 +1,15 @@
 """Position subspaces with full projections, with sampled elements and with those of hrpd.
 
 The models of a large scene are made and run in one job with its full-order runs, which no other job
-reads; `study.experiments.frame_times` times them.
+reads; `study.experiments.frame_times` times them. A file of a scene's models and of joint rows is
+what a page loads, to run them in the reader's browser (`live`).
 """
 
+import json
 import logging
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
+from math import ceil
 from pathlib import Path
 from typing import Any
 
@@ -14,37 +17,32 @@ import h5py
 import numpy as np
 import pandas as pd
 
-from pdrom.core.store import write_hdf5, write_table
+from pdrom.core.errors import StorageError
+from pdrom.core.packed import pack_array, pack_positions
+from pdrom.core.store import write_hdf5, write_table, write_text
 from pdrom.core.yamlfile import ConfigModel, SceneName
 from pdrom.model.energy import largest
 from pdrom.model.held_out import MOTIONS
 from pdrom.model.runs import trajectory
 from pdrom.model.scene import Scene, SceneConfig
+from pdrom.reduction.basis import load_basis
 from pdrom.reduction.deviations import Yardstick
+from pdrom.reduction.method import MethodSpec
+from pdrom.reduction.rerun import mean_motion
+from pdrom.reduction.sampling import Reduction
 from pdrom.reduction.snapshots import training_frames
+from pdrom.reduction.subspace import exported
+from pdrom.reduction.subspace import model as subspace
 from pdrom.reduction.subspace.columns import Columns
 from pdrom.reduction.subspace.ecsw import Norm
 from pdrom.reduction.subspace.hrpd import HrpdSpec, SampledSpace, hrpd, sampled_space
-from pdrom.reduction.subspace.interpolation import Interpolation
-from pdrom.reduction.subspace.model import (
-    ECSW,
-    Samples,
-    SubspaceModel,
-    ecsw_name,
-    make_columns,
-    rerun_model,
-    sample_elements,
-    store_columns,
-    store_model,
-)
+from pdrom.reduction.subspace.interpolation import Interpolation, interpolation_of
 from study.artifact import paths
 from study.artifact.paths import File
-from study.artifact.reads import Every, Setting, SourcesOf
-from study.experiments.kit.declaration import experiment
+from study.artifact.reads import EachOf, Every, Setting, Settings, SourcesOf
+from study.experiments.kit import base as kit
+from study.experiments.kit.base import experiment
 from study.experiments.kit.measurement import clocked
-from study.experiments.kit.reruns import run_error
-from study.experiments.kit.scenes import TRAIN, positions_of, scene_of
-from study.experiments.kit.settings import BlowupExtent, Modes, PositionBasis, Tolerance
 
 log = logging.getLogger(__name__)
 
@@ -60,13 +58,13 @@ LARGE_COLUMNS = [
 ]  # fmt: skip
 FULL, HRPD = "full", "hrpd"
 
-Sampled = Mapping[str, Samples | Interpolation]
+Sampled = Mapping[str, subspace.Samples | Interpolation]
 
 
 class Hrpd(HrpdSpec):
     """Sampled constraints with interpolation, and the numbers of modes k that have them."""
 
-    sizes: tuple[Modes, ...] = ()
+    sizes: tuple[kit.Modes, ...] = ()
 
 
 class SubspaceModels(ConfigModel):
@@ -75,9 +73,9 @@ class SubspaceModels(ConfigModel):
     ``hrpd`` adds models with interpolated projections; None leaves them out.
     """
 
-    bases: tuple[PositionBasis, ...] = ("pod", "skinning")
-    sizes: tuple[Modes, ...] = (10, 40)
-    tolerances: tuple[Tolerance, ...] = (3e-2, 1e-2)
+    bases: tuple[kit.PositionBasis, ...] = ("pod", "skinning")
+    sizes: tuple[kit.Modes, ...] = (10, 40)
+    tolerances: tuple[kit.Tolerance, ...] = (3e-2, 1e-2)
     norm: Norm = "energy"
     hrpd: Hrpd | None = None
 
@@ -87,7 +85,7 @@ class SubspaceModels(ConfigModel):
             return []
         tolerances = self.tolerances if kind == "pod" else ()
         interpolated = self.hrpd is not None and k in self.hrpd.sizes
-        return [FULL, *map(ecsw_name, tolerances), *([HRPD] if interpolated else [])]
+        return [FULL, *map(subspace.ecsw_name, tolerances), *([HRPD] if interpolated else [])]
 
 
 class Subspace(SubspaceModels):
@@ -99,9 +97,9 @@ class Subspace(SubspaceModels):
 class LargeModels(SubspaceModels):
     """Models of a large scene; none evaluates all projections, which takes too long."""
 
-    bases: tuple[PositionBasis, ...] = ("pod",)
-    sizes: tuple[Modes, ...] = (20,)
-    tolerances: tuple[Tolerance, ...] = (1e-2,)
+    bases: tuple[kit.PositionBasis, ...] = ("pod",)
+    sizes: tuple[kit.Modes, ...] = (20,)
+    tolerances: tuple[kit.Tolerance, ...] = (1e-2,)
 
     def methods(self, kind: str, k: int) -> list[str]:
         """Names of the models on a basis of ``kind`` with k modes."""
@@ -131,28 +129,28 @@ class Online(LargeModels):
     },
 )
 def subspaces(
-    mesh: File,
-    full_order: list[File],
+    mesh: paths.File,
+    full_order: list[paths.File],
     config: SceneConfig,
     asked: SubspaceModels,
-    blowup_extent: BlowupExtent,
-    out: File,
-    train_table: File,
-    heldout_table: File,
-    seconds_table: File,
+    blowup_extent: kit.BlowupExtent,
+    out: paths.File,
+    train_table: paths.File,
+    heldout_table: paths.File,
+    seconds_table: paths.File,
 ) -> None:
     """Build every model (bases, sizes, tolerances) and run all motions with it."""
     motions = {
-        run["run"]: Yardstick(scene_of(config, mesh, run["run"]), positions_of(run))
+        run["run"]: Yardstick(kit.scene_of(config, mesh, run["run"]), kit.positions_of(run))
         for run in full_order
     }
     with write_hdf5(out.path) as file:
         for name, motion in motions.items():
             for series, values in motion.series.items():
                 file[f"{series}/{name}"] = values
-        file.attrs.update(motions[TRAIN].units)
+        file.attrs.update(motions[kit.TRAIN].units)
         rows = _runs(file, motions, asked, blowup_extent, compared=True)
-    train, heldout = rows[rows.motion == TRAIN], rows[rows.motion != TRAIN]
+    train, heldout = rows[rows.motion == kit.TRAIN], rows[rows.motion != kit.TRAIN]
     write_table(train[COLUMNS], train_table.path)
     write_table(heldout[[*COLUMNS, "motion"]], heldout_table.path)
     write_table(train[SECONDS_COLUMNS], seconds_table.path)
@@ -172,16 +170,16 @@ def online(
     sources: list[Path],
     config: SceneConfig,
     asked: LargeModels,
-    blowup_extent: BlowupExtent,
-    out: File,
-    models: File,
+    blowup_extent: kit.BlowupExtent,
+    out: paths.File,
+    models: paths.File,
 ) -> None:
     """Reduce a large scene by every model and run all motions with each.
 
     Its mesh is made of the ``sources``, its full-order runs are made here and not kept.
     """
     mesh = config.mesh.build(Path())
-    variants = {TRAIN: config} | {str(name): config.heldout_variant(name) for name in MOTIONS}
+    variants = {kit.TRAIN: config} | {str(name): config.heldout_variant(name) for name in MOTIONS}
     scenes = {name: Scene.build(variant, mesh) for name, variant in variants.items()}
     motions = {
         name: Yardstick(scene, trajectory(scene, track_objective=False))
@@ -191,9 +189,11 @@ def online(
     with write_hdf5(models.path) as file:
         rows = _runs(file, motions, asked, blowup_extent, compared=False)
     table = rows.assign(
-        tau=rows.method.map({ecsw_name(tolerance): tolerance for tolerance in asked.tolerances}),
+        tau=rows.method.map(
+            {subspace.ecsw_name(tolerance): tolerance for tolerance in asked.tolerances}
+        ),
         vertices=mesh.vertices,
-        elements=sum(group.elements for group in scenes[TRAIN].groups),
+        elements=sum(group.elements for group in scenes[kit.TRAIN].groups),
         iterations=config.iterations,
     )
     write_table(table[LARGE_COLUMNS], out.path)
@@ -217,23 +217,26 @@ def _runs(
     compared : whether the file receives coordinates and deviations of each run, too
     """
     rows: list[dict[str, Any]] = []
-    played = {name: run_error(motions[TRAIN].reference, m.reference) for name, m in motions.items()}
-    made = clocked(_subspaces(motions[TRAIN], settings))
+    played = {
+        name: kit.run_error(motions[kit.TRAIN].reference, m.reference)
+        for name, m in motions.items()
+    }
+    made = clocked(_subspaces(motions[kit.TRAIN], settings))
     for of_columns, (base, columns, kind, k, models) in made:
-        store_columns(file.create_group(f"columns/{base}"), columns)
+        subspace.store_columns(file.create_group(f"columns/{base}"), columns)
         spent: dict[str, float] = defaultdict(float)
         for of_model, (method, samples) in clocked(models):
             # one call samples for all tolerances: it is made at the first of them
-            family = ECSW if method.startswith(ECSW) else method
+            family = subspace.ECSW if method.startswith(subspace.ECSW) else method
             spent[family] += of_model
-            model = SubspaceModel(kind, columns, samples)
+            model = subspace.SubspaceModel(kind, columns, samples)
             labels: dict[str, Any] = {"method": method, "position_basis": kind, "k": k}
             store = file.create_group(f"models/{base}_{method}")
-            store_model(store, {**labels, "base": base}, samples)
+            subspace.store_model(store, {**labels, "base": base}, samples)
             labels |= {"group": "all", "reduction_s": of_columns + spent[family]}
             for name, motion in motions.items():
                 scene = motion.scene
-                outcome = rerun_model(scene, model, motion.reference, blowup_extent=limit)
+                outcome = subspace.rerun_model(scene, model, motion.reference, blowup_extent=limit)
                 row = outcome.row(motion.displacement) | labels | {"motion": name}
                 row["playback_error"] = played[name]
                 row |= {"scene": scene.config.name, "r": model.elements_evaluated(scene)}
@@ -262,29 +265,179 @@ def _subspaces(
     spaces: dict[str, SampledSpace | None] = {}
     if settings.hrpd is not None:
         spaces = {g.name: sampled_space(g, points, settings.hrpd) for g in scene.groups}
+
+    def samplings(columns: Columns, methods: list[str]) -> Iterator[tuple[str, Sampled]]:
+        """(method, samples) pairs of the ``methods``."""
+        if FULL in methods:
+            yield FULL, {}
+        if any(method.startswith(subspace.ECSW) for method in methods):
+            asked, norm = settings.tolerances, settings.norm
+            found = subspace.sample_elements(scene, columns, frames, asked, norm=norm)
+            for tolerance, samples in zip(asked, found, strict=True):
+                yield subspace.ecsw_name(tolerance), samples
+        if HRPD in methods:
+            yield HRPD, {g.name: hrpd(g, columns, spaces[g.name]) for g in scene.groups}
+
     for kind in settings.bases:
         for k in settings.sizes:
-            columns = make_columns(scene, motion.reference[1:][frames], kind, k=k)
-            methods = settings.methods(kind, k)
-            models = _samplings(scene, columns, settings, methods, frames=frames, spaces=spaces)
+            columns = subspace.make_columns(scene, motion.reference[1:][frames], kind, k=k)
+            models = samplings(columns, settings.methods(kind, k))
             yield f"{kind}_k{k:03d}", columns, kind, k, models
 
 
-def _samplings(
-    scene: Scene,
-    columns: Columns,
-    settings: SubspaceModels,
-    methods: list[str],
-    frames: np.ndarray,
-    spaces: Mapping[str, SampledSpace | None],
-) -> Iterator[tuple[str, Sampled]]:
-    """(method, samples) pairs of the ``methods``; ``spaces`` of projections are those of hrpd."""
-    if FULL in methods:
-        yield FULL, {}
-    if any(method.startswith(ECSW) for method in methods):
-        tolerances = settings.tolerances
-        found = sample_elements(scene, columns, frames, tolerances=tolerances, norm=settings.norm)
-        for tolerance, samples in zip(tolerances, found, strict=True):
-            yield ecsw_name(tolerance), samples
-    if HRPD in methods:
-        yield HRPD, {g.name: hrpd(g, columns, spaces[g.name]) for g in scene.groups}
+LARGEST = 3_000_000  # bytes of a file
+GHOST = 250_000  # positions of the full-order run that a file holds, about
+JOINT = "deim-joint"
+FORMAT = 1
+Labelled = tuple[dict[str, Any], subspace.SubspaceModel]
+
+
+class LiveModels(ConfigModel):
+    """Models of the page: numbers of modes k, tolerances of the sampling, and the modes r of the
+    joint rows; each as far as the study has it."""
+
+    sizes: tuple[kit.Modes, ...] = (10, 20, 40)
+    tolerances: tuple[kit.Tolerance, ...] = (3e-2, 1e-2, 1e-3)
+    joint_rows: kit.Modes = 20
+
+
+class Live(LiveModels):
+    """Section ``live``: the models of the page, and the ``scenes`` that a reader chooses from.
+
+    Shown are those that the study has models of: position subspaces, or ``online.scenes``.
+    """
+
+    scenes: tuple[SceneName, ...] = ()
+
+
+class OfScene(ConfigModel):
+    """Names a file of a scene."""
+
+    scene: str
+
+    @property
+    def labels(self) -> dict[str, str]:
+        """Labels of the file."""
+        return {"scene": self.scene}
+
+
+class JointRows(ConfigModel):
+    """Joint rows of a group, which the study has samples of."""
+
+    scene: str
+    group: str
+    method: MethodSpec
+
+    @property
+    def labels(self) -> dict[str, str]:
+        """Labels of the files of this case."""
+        return {"scene": self.scene, "group": self.group, "method": JOINT}
+
+
+class Options(ConfigModel):
+    """Settings of the models of a scene."""
+
+    scene: SceneConfig
+    title: str
+    live: LiveModels
+    joint_rows: tuple[JointRows, ...]
+
+
+@experiment(
+    "Models of {scene} for the page",
+    reads={
+        "mesh": paths.MESH,
+        "train": paths.TRAIN,
+        "subspaces": EachOf(paths.SUBSPACES, "with_subspaces"),
+        "online": EachOf(paths.ONLINE_MODELS, "with_online_models"),
+        "bases": EachOf(paths.BASIS, "joint_rows"),
+        "samplings": EachOf(paths.SAMPLING, "joint_rows"),
+        "settings": Settings(Options),
+    },
+    writes={"out": paths.LIVE_MODEL},
+)
+def live(mesh: File, train: File, settings: Options, out: File, **files: list[File]) -> None:
+    """Write the models with the recorded full-order run.
+
+    Parameters
+    ----------
+    bases, samplings : of the joint rows, in the order of the settings
+
+    Raises
+    ------
+    StorageError
+        The file would be larger than `LARGEST`.
+    """
+    scene = kit.scene_of(settings.scene, mesh)
+    reference = kit.positions_of(train)
+    asked = settings.live
+    chosen: list[Labelled] = []
+    tolerances = {subspace.ecsw_name(tolerance): tolerance for tolerance in asked.tolerances}
+    for file in (*files["subspaces"], *files["online"]):
+        for own, model in subspace.load_models(file.path):
+            method, kind, k = own["method"], own["position_basis"], own["k"]
+            # models with sampled elements on snapshot bases
+            if method in tolerances and kind == "pod" and k in asked.sizes:
+                labels = {"family": "elements", "k": k, "tau": tolerances[method]}
+                chosen.append((labels, model))
+    given = (settings.joint_rows, files["bases"], files["samplings"])
+    for case, file, sampling in zip(*given, strict=True):
+        basis = load_basis(file.path)
+        # of the size asked for, or of the largest that exists
+        size = min(asked.joint_rows, basis.rank)
+        reduction = kit.load_reduction(basis, sampling.path, case.method, size)
+        chosen += list(_joint(scene, case.group, reduction, chosen))
+    used, triangles = np.unique(scene.mesh.triangles, return_inverse=True)
+    stride = max(1, ceil((len(reference) - 1) * len(used) / GHOST))
+    content = {
+        "format": FORMAT,
+        "scene": settings.scene.name,
+        "title": settings.title,
+        **exported.export_scene(scene),
+        **_models(scene, chosen),
+        # the surface, and every so many frames of the full-order run at its vertices
+        "shown": {
+            "vertices": pack_array(used, "u4"),
+            "triangles": pack_array(triangles.reshape(-1, 3), "u4"),
+            "stride": stride,
+            "full": pack_positions(reference[::stride, used]),
+        },
+        "motion": mean_motion(reference),
+    }
+    text = f"pdromLive({json.dumps(content, separators=(',', ':'), allow_nan=False)});\n"
+    if len(text) > LARGEST:
+        raise StorageError(
+            f"{out.path}: {len(text) / 1e6:.1f} MB, allowed are {LARGEST / 1e6:.1f}: choose fewer "
+            "sizes or tolerances (keys live.sizes, live.tolerances)"
+        )
+    write_text(text, out.path)
+    log.info("%s: %d models, %.1f MB", settings.scene.name, len(chosen), len(text) / 1e6)
+
+
+def _joint(
+    scene: Scene, group: str, reduction: Reduction, beside: list[Labelled]
+) -> Iterator[Labelled]:
+    """Joint rows of a group for each subspace of the models ``beside``; others as sampled there."""
+    for model in {id(model.columns): model for _, model in beside}.values():
+        joint = interpolation_of(scene.group(group), model.columns, reduction)
+        labels = {"family": "joint", "k": model.columns.modes, "r": reduction.r}
+        samples = {**model.samples, group: joint}
+        yield labels, subspace.SubspaceModel(model.position_basis, model.columns, samples)
+
+
+def _models(scene: Scene, chosen: list[Labelled]) -> dict[str, Any]:
+    """Bases and models; a model knows the place of its basis."""
+    by_basis: dict[int, list[subspace.SubspaceModel]] = {}
+    for _, model in chosen:
+        by_basis.setdefault(id(model.columns), []).append(model)
+    places = {key: place for place, key in enumerate(by_basis)}
+    return {
+        "bases": [
+            exported.export_basis(scene, own[0].columns, exported.needed_vertices(scene, own))
+            for own in by_basis.values()
+        ],
+        "models": [
+            {**labels, "basis": places[id(model.columns)], **exported.export_model(scene, model)}
+            for labels, model in chosen
+        ],
+    }

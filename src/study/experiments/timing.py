@@ -34,23 +34,10 @@ from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, Settings, SourcesOf
 from study.experiments.iterations import IterationCounts, accelerated, stepper_of
+from study.experiments.kit import base as kit
+from study.experiments.kit.base import experiment
 from study.experiments.kit.costs import effect_costs, left_out, local_costs, variant
-from study.experiments.kit.declaration import experiment
 from study.experiments.kit.measurement import Protocol, Variant, measure
-from study.experiments.kit.reruns import basis_of, load_reduction
-from study.experiments.kit.scenes import scene_of
-from study.experiments.kit.settings import (
-    ANDERSON,
-    FOM,
-    Count,
-    Modes,
-    Rank,
-    Repeats,
-    Sizes,
-    Solver,
-    Tolerance,
-    resolve_ranks,
-)
 
 
 class NumpyLocalStep:
@@ -135,10 +122,10 @@ class Timing(Protocol):
     timed alone, in ``breakeven_repeats`` short repeats.
     """
 
-    numpy_frames: Count = 4
-    interpreted_frames: Count = 1
+    numpy_frames: kit.Count = 4
+    interpreted_frames: kit.Count = 1
     interpreted_iterations: Annotated[int, Field(ge=1)] = 2
-    breakeven: tuple[Rank, ...] = (5, 10, 20, 40, 60, 80, "full")
+    breakeven: tuple[kit.Rank, ...] = (5, 10, 20, 40, 60, 80, "full")
     breakeven_repeats: Annotated[int, Field(ge=5)] = 20
 
 
@@ -147,10 +134,10 @@ class Options(ConfigModel):
 
     scene: SceneConfig
     methods: dict[str, MethodSpec]
-    ranks: tuple[Rank, ...]
+    ranks: tuple[kit.Rank, ...]
     iterations: IterationCounts
     timing: Timing
-    solver: Solver
+    solver: kit.Solver
 
 
 @experiment(
@@ -171,37 +158,26 @@ class Options(ConfigModel):
     },
     alone=True,
 )
-def timing(
-    mesh: File,
-    fom: File,
-    bases: list[File],
-    samplings: list[File],
-    subspaces: list[File],
-    settings: Options,
-    out: File,
-    breakeven: File,
-    effects: File,
-    without: File,
-) -> None:
+def timing(mesh: File, fom: File, settings: Options, **files: Any) -> None:
     """Measure frames (``out``), local steps alone, effects, and frames ``without`` each of them."""
-    scene, asked = scene_of(settings.scene, mesh), settings.timing
+    scene, asked = kit.scene_of(settings.scene, mesh), settings.timing
     system, name = scene.system_with(settings.solver), scene.config.name
     frames = min(asked.frames, scene.config.frames)
     common = {"scene": name, "vertices": scene.mesh.vertices, "iterations": scene.config.iterations}
     slow, quick = _full_order(scene, system, frames, asked, common)
     quick += _other_counts(scene, system, frames, settings.iterations, common)
     alone: dict[tuple[str, str, int], ReducedLocalStep] = {}
-    for sampling in samplings:
+    for sampling in files["samplings"]:
         spec = settings.methods[sampling["method"]]
-        basis = load_basis(basis_of(sampling, spec, bases).path)
+        basis = load_basis(kit.basis_of(sampling, spec, files["bases"]).path)
         with open_hdf5(sampling.path) as stored:  # sizes that the file holds
             held = {int(key[1:]) for key in stored if key.startswith("r")}
-        timed = held.intersection(resolve_ranks(settings.ranks, basis.rank))
-        sizes = held.intersection(resolve_ranks(asked.breakeven, basis.rank))
+        timed = held.intersection(kit.resolve_ranks(settings.ranks, basis.rank))
+        sizes = held.intersection(kit.resolve_ranks(asked.breakeven, basis.rank))
         sizes = set() if spec.rows == "all" else sizes
         group = scene.group(sampling["group"])
         for r in sorted(timed | sizes):
-            reduction = load_reduction(basis, sampling.path, spec, r=r)
+            reduction = kit.load_reduction(basis, sampling.path, spec, r=r)
             step = ReducedLocalStep(group, reduction)
             if r in timed:
                 own = {"group": group.name, "method": sampling["method"], "r": r}
@@ -210,25 +186,26 @@ def timing(
                 quick.append(variant(scene, system, steps, frames, labels))
             if r in sizes:
                 alone[group.name, sampling["method"], r] = step
-    for file in subspaces:
+    for file in files["subspaces"]:
         for own, model in load_models(file.path):
             labels = {**common, "iterations": None, "implementation": "compiled", "group": "all"}
             loop, start = model.loop(scene)
             quick.append(Variant({**labels, **own}, loop, start, frames, output=model.output()))
     log.info("%s: %d runs of %d frames", name, len(quick) + 1, frames)
     results = measure(quick, asked.warmup, asked.repeats) + measure([slow], 0, asked.repeats)
-    write_table(pd.DataFrame(results, columns=COLUMNS), out.path)
+    write_table(pd.DataFrame(results, columns=COLUMNS), files["out"].path)
     log.info("%s: %d reduced local steps alone", name, len(alone))
     often = {"warmup": asked.warmup, "repeats": asked.breakeven_repeats}
     with open_hdf5(fom.path) as file:  # states spread over the run
         positions = file["positions"]
         ends = [positions[i * (len(positions) - 1) // STATES] for i in range(STATES)]
     times = local_costs(scene, alone, np.stack(ends), **often)
-    write_table(times.assign(factor=1.0), breakeven.path)
+    write_table(times.assign(factor=1.0), files["breakeven"].path)
     log.info("%s: effects", name)
     often = {"warmup": asked.warmup, "repeats": asked.repeats}
-    write_table(costs := effect_costs(scene, system, frames, **often), effects.path)
-    write_table(left_out(scene, costs, frames, **often, solver=settings.solver), without.path)
+    write_table(costs := effect_costs(scene, system, frames, **often), files["effects"].path)
+    without = left_out(scene, costs, frames, **often, solver=settings.solver)
+    write_table(without, files["without"].path)
 
 
 def _full_order(
@@ -248,11 +225,7 @@ def _full_order(
 
 
 def _other_counts(
-    scene: Scene,
-    system: GlobalSystem,
-    frames: int,
-    asked: IterationCounts,
-    common: dict[str, Any],
+    scene: Scene, system: GlobalSystem, frames: int, asked: IterationCounts, common: dict[str, Any]
 ) -> list[Variant]:
     """The compiled full-order run with other numbers of iterations, plain and accelerated."""
     variants = []
@@ -261,7 +234,7 @@ def _other_counts(
     for count, size in accelerated(counts, asked.anderson_window):
         if (count, size) != own:
             loop = stepper_of(scene, system, count, window=size)
-            method = ANDERSON if size else FOM
+            method = kit.ANDERSON if size else kit.FOM
             labels = {"method": method, "iterations": count, "implementation": "compiled"}
             variants.append(Variant({**common, **labels}, loop, scene.initial_state(), frames))
     return variants
@@ -274,9 +247,9 @@ class SizedBreakEven(ConfigModel):
     """
 
     methods: tuple[str, ...] = ("deim-joint", "block-deim")
-    sizes: tuple[Modes, ...] = (5, 10, 20, 40, 80)
+    sizes: tuple[kit.Modes, ...] = (5, 10, 20, 40, 80)
     training_frames: TrainingFrames = 84
-    repeats: Repeats = 20
+    repeats: kit.Repeats = 20
 
 
 class Sized(Protocol):
@@ -287,18 +260,18 @@ class Sized(Protocol):
     """
 
     method: str = "block-deim"
-    r: Modes = 10
-    k: Modes = 20
-    tolerance: Tolerance = 1e-2
+    r: kit.Modes = 10
+    k: kit.Modes = 20
+    tolerance: kit.Tolerance = 1e-2
     training_frames: TrainingFrames = 16
-    repeats: Repeats = 9
+    repeats: kit.Repeats = 9
     breakeven: SizedBreakEven = SizedBreakEven()
 
 
 class Scaling(Sized):
     """Section ``scaling``: factors on the vertices along a side for each of ``scenes``."""
 
-    scenes: Sizes = Field(default_factory=dict)
+    scenes: kit.Sizes = Field(default_factory=dict)
 
 
 class SizedOptions(ConfigModel):
@@ -307,7 +280,7 @@ class SizedOptions(ConfigModel):
     scene: SceneConfig
     scaled_methods: dict[str, MethodSpec]
     scaling: Sized
-    solver: Solver
+    solver: kit.Solver
 
 
 @experiment(
@@ -341,7 +314,7 @@ def scaling(sources: list[Path], settings: SizedOptions, iterations: File, break
     sampled = {"r": reduction.r, "elements_sampled": len(reduction.elements)}
     steps = replace_group(scene, group.name, ReducedLocalStep(group, reduction))
     variants = [
-        variant(scene, system, scene.groups, sized.frames, {"method": FOM, **measured}),
+        variant(scene, system, scene.groups, sized.frames, {"method": kit.FOM, **measured}),
         variant(scene, system, steps, sized.frames, {"method": sized.method, **sampled}),
         Variant(
             {"method": "ecsw", **inside}, *model.loop(scene), sized.frames, output=model.output()

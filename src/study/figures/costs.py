@@ -11,9 +11,8 @@ from pdrom.view.artists import Artist, Axes, Figure
 from pdrom.view.multiples import label_outer, plain_ticks, small_multiples
 from study.artifact.paths import CONTRIBUTIONS, File
 from study.artifact.reads import EachOf, TableOf
-from study.experiments.kit.settings import GLOBAL, REST, RIGHT
-from study.figures.kit.declaration import figure
-from study.figures.kit.options import Columns, Drawn, Methods, NothingToDraw, Scenes
+from study.experiments.kit.base import GLOBAL, REST, RIGHT
+from study.figures.kit.declaration import Columns, Drawn, Methods, NothingToDraw, Scenes, figure
 from study.tables.effects_cost import NOTHING
 
 # the first two phases are the local step, drawn in shades of orange; its share is printed

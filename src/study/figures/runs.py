@@ -16,10 +16,9 @@ from pdrom.view.panels import NOTHING_RAN, Row, RunPanel
 from pdrom.view.read import RerunInfo, choose_ranks, positions_at, rerun_infos
 from study.artifact.paths import MESH, NOISE_RUNS, RERUNS, SUBSPACES, TRAIN, File
 from study.artifact.reads import EachOf, Every, Read, TableOf
-from study.experiments.kit.settings import Horizon
-from study.figures.kit.declaration import figure
+from study.experiments.kit.base import Horizon
+from study.figures.kit.declaration import Drawn, Experiment, NothingToDraw, ReducedRuns, figure
 from study.figures.kit.elements import magnitudes
-from study.figures.kit.options import Drawn, Experiment, NothingToDraw, ReducedRuns
 from study.figures.sensitivity_floor import FLOORS, Floors
 from study.tables.kit.results import trained
 
@@ -207,14 +206,10 @@ def strain_runs(options: ReducedRuns, drawn: Drawn, horizon: Horizon, **files: F
     reads={**RUNS, "noise": TableOf("noise"), "noise_runs": Every(NOISE_RUNS)},
 )
 def bending_runs(
-    options: ReducedRuns,
-    drawn: Drawn,
-    horizon: Horizon,
-    noise: pd.DataFrame,
-    noise_runs: Files,
-    **files: Files,
+    options: ReducedRuns, drawn: Drawn, horizon: Horizon, noise: pd.DataFrame, **files: Files
 ) -> Figure:
     """Draw reduced runs; if all projections are round-off, runs on bases of round-off, if any."""
+    noise_runs = files.pop("noise_runs")
     runs, rows = Runs(options, drawn, horizon, **files), []
     for each in drawn.experiments:
         found, path = runs.rows(each), each.find(noise_runs)
@@ -361,14 +356,10 @@ def _colours() -> ScalarMappable:
     },
 )
 def teaser(
-    options: ReducedRuns,
-    drawn: Drawn,
-    horizon: Horizon,
-    subspaces: Files,
-    errors: pd.DataFrame,
-    **files: Files,
+    options: ReducedRuns, drawn: Drawn, horizon: Horizon, errors: pd.DataFrame, **files: Files
 ) -> Figure:
     """Draw a row per experiment: the full order, a panel per method, a sampled subspace."""
+    subspaces = files.pop("subspaces")
     runs, errors = Runs(options, drawn, horizon, **files), trained(errors)
     return view.draw_rows(
         [_teaser_row(runs, each, errors, each.find(subspaces)) for each in drawn.experiments]

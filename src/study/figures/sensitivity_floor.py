@@ -11,9 +11,8 @@ from pdrom.view.artists import Figure
 from pdrom.view.multiples import clipped, label_outer, log_axis, small_multiples
 from study.artifact.paths import SENSITIVITY, File
 from study.artifact.reads import EachOf, Read, Setting
-from study.experiments.kit.settings import Horizon, floor_of, horizon
-from study.figures.kit.declaration import figure
-from study.figures.kit.options import Columns, Drawn, NothingToDraw, Scenes
+from study.experiments.kit.base import Horizon, floor_of, horizon
+from study.figures.kit.declaration import Columns, Drawn, NothingToDraw, Scenes, figure
 from study.tables.kit.results import TWIN
 
 # Inputs of a figure that needs sensitivity floors.

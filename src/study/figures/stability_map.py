@@ -8,8 +8,7 @@ import pandas as pd
 from pdrom.view import style
 from pdrom.view.artists import Axes, Figure
 from study.artifact.reads import TableOf
-from study.figures.kit.declaration import figure
-from study.figures.kit.options import Drawn, Methods, NothingToDraw, Ranks
+from study.figures.kit.declaration import Drawn, Methods, NothingToDraw, Ranks, figure
 
 CELLS = 48  # largest width of a strip in cells; further blocks go to another strip
 ROW = 0.145  # height of a row of cells, inches

@@ -9,7 +9,7 @@ import pandas as pd
 
 from pdrom.model.held_out import PLAYBACK
 from pdrom.view.text import escape
-from study.experiments.alternatives.settings import ACCELERATED
+from study.experiments.alternatives.experiment import ACCELERATED
 from study.figures.kit.declaration import declarations
 from study.paper.macros import format_number
 from study.tables.alternatives import CASE, CURVE

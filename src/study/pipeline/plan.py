@@ -20,8 +20,8 @@ from study.artifact.artifact import Artifact, make, modules_in
 from study.artifact.logs import planning_log
 from study.artifact.paths import LIVE_MODEL, TABLE, Place
 from study.artifact.reads import EditedFiles, Labels, Paths
-from study.experiments.kit.declaration import experiments
-from study.experiments.live import LARGEST
+from study.experiments.kit.base import experiments
+from study.experiments.subspaces import LARGEST
 from study.figures.kit.declaration import declarations
 from study.live.page import live_page
 from study.paper.build import paper, paper_inputs

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from study.artifact.markup import to_plain, to_rst
-from study.experiments.kit.declaration import Experiment
+from study.experiments.kit.base import Experiment
 from study.figures.kit.declaration import Declaration
 from study.paper.figure_numbers import Numbers, figure_numbers
 from study.pipeline.plan import Job, Plan

@@ -17,7 +17,7 @@ from pdrom.model.effects import EFFECTS
 from pdrom.model.effects.base import Seed, effect_config
 from pdrom.model.mesh.config import MeshFile
 from pdrom.model.scene import Scene, SceneConfig
-from study.experiments.kit.scenes import varied
+from study.experiments.kit.base import varied
 
 Fraction = Annotated[float, Field(gt=0.0, le=1.0)]
 Positive = Annotated[float, Field(gt=0.0, le=1e12, allow_inf_nan=False)]

@@ -20,21 +20,18 @@ from pdrom.model.mesh.config import MeshConfig
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.method import BasisSpec, MethodSpec, load_methods
 from study.artifact import paths
-from study.experiments.alternatives.settings import Alternatives
+from study.experiments.alternatives.experiment import Alternatives
 from study.experiments.frame_times import FrameTimes
 from study.experiments.hard_cases.outcomes import HardCases
 from study.experiments.iterations import IterationSweep
-from study.experiments.kit.settings import BlowupExtent, Rank, Solver
-from study.experiments.live import Live
+from study.experiments.kit.base import BlowupExtent, Rank, Solver
 from study.experiments.repetitions import LadderSection, Noise, RepetitionSection
 from study.experiments.requested_tolerances import RequestedTolerances
-from study.experiments.reruns import Sweep
+from study.experiments.reruns import Stability, Sweep
 from study.experiments.sensitivity import Sensitivity
-from study.experiments.stability import Stability
-from study.experiments.subspaces import Online, Subspace
+from study.experiments.subspaces import Live, Online, Subspace
 from study.experiments.timing import Scaling, Timing
-from study.figures.kit.declaration import declarations, load_choices
-from study.figures.kit.options import Options
+from study.figures.kit.declaration import Options, declarations, load_choices
 from study.paper.build import FILES
 from study.pipeline.folders import DEFAULT
 from study.pipeline.scenes import (

@@ -22,9 +22,9 @@ from pdrom.core.store import atomic_path, read_table
 from study.artifact.logs import usage_of
 from study.artifact.paths import TABLE
 from study.pipeline.folders import folders
+from study.tables.claims.claims import MEASURED, RULES
+from study.tables.claims.claims import RECORDED as REPLICATED
 from study.tables.claims.rules import load_claims
-from study.tables.claims.verdicts import MEASURED, RULES
-from study.tables.claims.verdicts import RECORDED as REPLICATED
 
 COSTS = Path("config/reference/job_costs.csv")
 COLUMNS = ["kind", "seconds", "coarse_seconds", "longest_s", "memory_mb"]

@@ -19,12 +19,11 @@ from study.artifact import paths
 from study.artifact.markup import to_tex
 from study.artifact.reads import Labels
 from study.experiments.frame_times import NamedScene, ProjectionCase, SubspaceCase
-from study.experiments.kit.settings import Horizon
-from study.experiments.live import JOINT, JointRows, OfScene
+from study.experiments.kit.base import Horizon
 from study.experiments.repetitions import Repeated
-from study.experiments.stability import Stability
-from study.figures.kit.declaration import declarations
-from study.figures.kit.options import Experiment, Options, Reduction
+from study.experiments.reruns import Stability
+from study.experiments.subspaces import JOINT, JointRows, OfScene
+from study.figures.kit.declaration import Experiment, Options, Reduction, declarations
 from study.paper.build import PAGES, Facts
 from study.paper.source import source_files
 from study.pipeline.folders import DEFAULT

@@ -10,10 +10,8 @@ import pandas as pd
 
 from pdrom.model.held_out import MOTIONS, PLAYBACK
 from study.artifact import paths
-from study.artifact.paths import File
 from study.artifact.reads import Every, Setting, TableOf
-from study.experiments.alternatives import settings
-from study.experiments.alternatives.settings import REDUCTIONS
+from study.experiments.alternatives import experiment as settings
 from study.tables.kit.declaration import flag, integer, number, shared, table, text, timed
 from study.tables.kit.results import joined, median_interval
 
@@ -67,7 +65,7 @@ KNOWN = 3.0  # a motion counts for an error limit of at least this factor times 
     ),
     reads={"parts": Every(paths.ALTERNATIVES), "times": Every(paths.ALTERNATIVE_TIMES)},
 )
-def alternatives(parts: list[File], times: list[File]) -> pd.DataFrame:
+def alternatives(parts: list[paths.File], times: list[paths.File]) -> pd.DataFrame:
     """One row per candidate and held-out motion, in the order of the files ``parts``.
 
     ``times`` has the frame times measured in each process; the table gives their medians.
@@ -141,7 +139,7 @@ def beside(rows: pd.DataFrame, times: pd.DataFrame) -> tuple[pd.DataFrame, list[
         "limits": Setting("alternatives.errors"),
     },
 )
-def winners(rows: pd.DataFrame, times: list[File], limits: Sequence[float]) -> pd.DataFrame:
+def winners(rows: pd.DataFrame, times: list[paths.File], limits: Sequence[float]) -> pd.DataFrame:
     """One row per scene, mesh, stiffness, motion, reference and error limit.
 
     The method is empty where none reaches the limit. Limits below `KNOWN` times the error of the
@@ -174,9 +172,11 @@ def _best(rows: pd.DataFrame, limit: float, processes: list[int]) -> dict[str, o
     A speed-up is the median ratio of two times measured in the same one of the ``processes``.
     """
     reaching = rows[rows.error <= limit].sort_values("ms_per_frame", kind="stable")
-    inside = reaching.method.isin(REDUCTIONS)
+    inside = reaching.method.isin(settings.REDUCTIONS)
     full, reduced = reaching[~inside], reaching[inside]
-    made: dict[str, object] = {"reduced_error": rows.error[rows.method.isin(REDUCTIONS)].min()}
+    made: dict[str, object] = {
+        "reduced_error": rows.error[rows.method.isin(settings.REDUCTIONS)].min()
+    }
     plain = reaching[(reaching.method == PLAIN) & (reaching.substeps == 1)]
     if len(plain):
         made["plain_ms"] = plain.ms_per_frame.iloc[0]

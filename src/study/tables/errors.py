@@ -1,15 +1,26 @@
-"""Tables of errors: of reconstructions, perturbed runs, and single choices of the method."""
+"""Tables of errors: of reconstructions, perturbed runs, and single choices of the method.
 
+Table gain_interventions: does the error of a run fall if only the gain is lowered? A correlation of
+gain and error over methods may come from anything in which the methods differ. The methods compared
+there have the same basis and size. They differ in the sampling, or in whether the axes share
+coefficients (four combinations, from table ladder). If separate coefficients did harm only by their
+gain, a lower gain would also lower the error for coefficients of one kind: the last two steps
+compare all such pairs of runs, ordered by gain.
+"""
+
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from functools import partial
+from itertools import combinations
 
+import numpy as np
 import pandas as pd
 
 from pdrom.reduction.basis import load_basis
 from study.artifact import paths
-from study.artifact.paths import File
-from study.artifact.reads import EachOf, Every
-from study.tables.kit.declaration import flag, integer, number, shared, table, text
-from study.tables.kit.results import joined
+from study.artifact.reads import EachOf, Every, TableOf
+from study.tables.kit.declaration import count, flag, integer, number, shared, table, text
+from study.tables.kit.results import FAILED, RESAMPLES, SEED, families, joined, judged_runs
 
 _SMALL = "empty at round-off level"
 _CELL = ["scene", "group", "method", "r", "varied"]
@@ -27,7 +38,7 @@ _CELL = ["scene", "group", "method", "r", "varied"]
     # the basis without weights and centring; which other bases exist depends on the configuration
     reads={"bases": EachOf(paths.BASIS, "usual_bases")},
 )
-def singular_values(bases: list[File]) -> pd.DataFrame:
+def singular_values(bases: list[paths.File]) -> pd.DataFrame:
     """One row per mode of each of the ``bases``, in the order of the files."""
     parts = []
     for file in bases:
@@ -55,7 +66,7 @@ def singular_values(bases: list[File]) -> pd.DataFrame:
     ),
     reads={"parts": Every(paths.RECONSTRUCTION)},
 )
-def reconstruction_error(parts: list[File]) -> pd.DataFrame:
+def reconstruction_error(parts: list[paths.File]) -> pd.DataFrame:
     """Rows of the files ``parts`` of all methods, in order."""
     return joined(parts)
 
@@ -70,7 +81,7 @@ def reconstruction_error(parts: list[File]) -> pd.DataFrame:
     ),
     reads={"parts": Every(paths.SENSITIVITY)},
 )
-def sensitivity(parts: list[File]) -> pd.DataFrame:
+def sensitivity(parts: list[paths.File]) -> pd.DataFrame:
     """Largest difference in ``parts`` over the seeds, per scene, perturbation and frame."""
     keys = ["scene", "perturbation", "frame"]
     rows = joined(parts).groupby(keys, sort=False, as_index=False)
@@ -98,7 +109,7 @@ def sensitivity(parts: list[File]) -> pd.DataFrame:
     ),
     reads={"parts": Every(paths.NOISE)},
 )
-def noise(parts: list[File]) -> pd.DataFrame:
+def noise(parts: list[paths.File]) -> pd.DataFrame:
     """Rows of the files ``parts`` of all scenes, in order."""
     return joined(parts)
 
@@ -122,7 +133,7 @@ def noise(parts: list[File]) -> pd.DataFrame:
     ),
     reads={"parts": Every(paths.REPETITIONS)},
 )
-def repetitions(parts: list[File]) -> pd.DataFrame:
+def repetitions(parts: list[paths.File]) -> pd.DataFrame:
     """One row per scene, group, method, r and variation, with statistics over its repetitions.
 
     The median of a distribution lies outside the range of n independent draws with probability
@@ -173,6 +184,156 @@ def repetitions(parts: list[File]) -> pd.DataFrame:
     ),
     reads={"parts": Every(paths.LADDER)},
 )
-def ladder(parts: list[File]) -> pd.DataFrame:
+def ladder(parts: list[paths.File]) -> pd.DataFrame:
     """Rows of the files ``parts`` of all scenes, in order."""
     return joined(parts)
+
+
+STEPS = {
+    "whole elements for single entries": ("deim", "block-deim"),
+    "three elements a mode for one": ("block-deim", "gappy"),
+}
+# Steps between the four combinations of coefficients and samples in table ladder. Steps from single
+# rows to whole elements are compared only if an element has more than one row.
+SQUARE = {
+    "shared coefficients, single rows": ("single rows, separate", "single rows, shared"),
+    "shared coefficients, whole elements": ("whole elements, separate", "whole elements, shared"),
+    "whole elements, separate coefficients": ("single rows, separate", "whole elements, separate"),
+    "whole elements, shared coefficients": ("single rows, shared", "whole elements, shared"),
+}
+# Methods by kind of coefficients; their runs are compared in pairs, ordered by gain.
+KINDS = {
+    "lower gain, shared coefficients": ("deim", "block-deim", "gappy"),
+    "lower gain, separate coefficients": ("deim-joint", "published"),
+}
+_PLACE = ["scene", "group", "r"]
+VOLUMES = ("deformation_gradient", "tetrahedron_strain", "volume")  # groups of tetrahedra
+MESHES = ALL, SHEETS, BARS = "all", "sheets", "bars"
+# Constructor of columns that say something about many runs.
+share = partial(number, compared="share")
+
+
+@table(
+    title="What the error does when the gain is lowered and the basis stays",
+    columns=(
+        text("step", f"one of: {', '.join([*STEPS, *SQUARE, *KINDS])}"),
+        text("mesh", f"meshes of the pairs: {', '.join(MESHES)}"),
+        text("method_before", "method before the step"),
+        text("method_after", "method after it, on the same basis"),
+        count("pairs", "scenes, groups and sizes at which both methods ran"),
+        count("scenes", "scenes among them"),
+        count("failing", "pairs whose error before exceeds a tenth"),
+        count("rescued", "pairs among these whose error after does not"),
+        share("gain_ratio", "median of the gain after over that before"),
+        share("error_ratio", "median of the error of the run after over that before"),
+        share(
+            "error_ratio_low",
+            "2.5 % quantile of this median, families of scenes resampled (bootstrap)",
+        ),
+        share("error_ratio_high", "97.5 % quantile"),
+        share("fallen_share", "pairs whose error falls"),
+        count("scenes_fallen", "scenes whose median error ratio is below one"),
+        share("p_value", "two-sided sign test over all families, for which a tie is no fall"),
+        count("families", "families among the scenes: a scene and its twin"),
+        count("families_fallen", "those whose median error ratio is below one"),
+        share("rank_correlation", "of the two ratios over the pairs (Spearman)"),
+        share("unexplained_share", "pairs of which one falls, the other not"),
+    ),
+    reads={
+        "reruns": TableOf("reduced_reruns"),
+        "reconstruction": TableOf("reconstruction_error"),
+        "ladder": TableOf("ladder"),
+    },
+)
+def gain_interventions(
+    reruns: pd.DataFrame, reconstruction: pd.DataFrame, ladder: pd.DataFrame
+) -> pd.DataFrame:
+    """Rows of each step and kind of mesh, from runs by `judged_runs` and the table ``ladder``.
+
+    Results of one family (a scene and its variant, "twin") are dependent: the bootstrap
+    resamples families and the sign test counts families. Errors below the sensitivity floor are
+    raised to it. A run that ended early has an infinite error; a pair of two such runs is left out.
+    """
+    runs = judged_runs(reruns, reconstruction)
+    rows = []
+    for name, before, after, pairs in _steps(runs, _square(ladder, runs)):
+        volumes = pairs.group.isin(VOLUMES)
+        for mesh, own in zip(MESHES, (pairs, pairs[~volumes], pairs[volumes]), strict=True):
+            if len(own):
+                labels = {"step": name, "mesh": mesh, "method_before": before}
+                rows.append({**labels, "method_after": after, **_summary(own)})
+    return pd.DataFrame(rows)
+
+
+def _steps(
+    runs: pd.DataFrame, square: pd.DataFrame
+) -> Iterator[tuple[str, str, str, pd.DataFrame]]:
+    """Name of each step, method before, method after, and table of the compared pairs."""
+    for name, methods in STEPS.items():
+        yield name, *methods, _pairs(runs, *methods)
+    for name, (before, after) in SQUARE.items():
+        rows = name.startswith("whole elements")
+        chosen = square[square.rows_per_element > 1] if rows else square
+        yield name, before, after, _pairs(chosen, before, after)
+    for name, kind in KINDS.items():
+        pairs = pd.concat([_pairs(runs, *two) for two in combinations(kind, 2)])
+        rising = pairs.gain > 1.0
+        falling = pairs.assign(
+            gain=pairs.gain.where(~rising, 1.0 / pairs.gain),
+            error=pairs.error.where(~rising, 1.0 / pairs.error),
+        )
+        yield name, "the larger gain", "the smaller gain", falling[falling.gain < 1.0]
+
+
+def _square(ladder: pd.DataFrame, runs: pd.DataFrame) -> pd.DataFrame:
+    """Ladder runs of the four combinations, at the scenes, groups and sizes in ``runs``."""
+    chosen = ladder[(ladder.direction == "square") & ladder.gain.notna()]
+    chosen = chosen.rename(columns={"rung": "method"})
+    error = chosen.relative_error_within_horizon.astype(float).fillna(np.inf)
+    places = runs[[*_PLACE, "sensitivity_floor"]].drop_duplicates(_PLACE)
+    return chosen.assign(error=error).merge(places, on=_PLACE)
+
+
+def _pairs(runs: pd.DataFrame, before: str, after: str) -> pd.DataFrame:
+    """Scene, group, errors, and ratios of gain and error (after over before) of pairs of runs."""
+    error = np.maximum(runs.error, runs.sensitivity_floor)
+    runs = runs[[*_PLACE, "method", "gain"]].assign(error=error)
+    one, other = (runs[runs.method == m].drop(columns="method") for m in (before, after))
+    both = one.merge(other, on=_PLACE, suffixes=("_before", "_after"))
+    both = both[np.isfinite(both.error_before) | np.isfinite(both.error_after)]
+    return both[["scene", "group", "error_before", "error_after"]].assign(
+        gain=both.gain_after / both.gain_before, error=both.error_after / both.error_before
+    )
+
+
+def _summary(pairs: pd.DataFrame) -> Mapping[str, float]:
+    # imported here because it takes a second, which planning the workflow does not need
+    from scipy.stats import binomtest
+
+    by_scene = pairs.groupby("scene").error
+    by_family = pairs.groupby(families(pairs.scene)).error
+    fallen = int((by_family.median() < 1.0).sum())
+    values = [own.to_numpy(float) for _, own in by_family]
+    # bootstrap of the median over all values, drawing whole families with replacement
+    drawn = np.random.default_rng(SEED).integers(len(values), size=(RESAMPLES, len(values)))
+    medians = [np.median(np.concatenate([values[i] for i in row])) for row in drawn]
+    low, high = np.percentile(medians, [2.5, 97.5], method="inverted_cdf")
+    failing = pairs.error_before > FAILED
+    known = len(pairs) > 2 and pairs.gain.nunique() > 1 and pairs.error.nunique() > 1
+    return {
+        "pairs": len(pairs),
+        "scenes": by_scene.ngroups,
+        "failing": int(failing.sum()),
+        "rescued": int((failing & (pairs.error_after <= FAILED)).sum()),
+        "gain_ratio": float(pairs.gain.median()),
+        "error_ratio": float(pairs.error.median()),
+        "error_ratio_low": float(low),
+        "error_ratio_high": float(high),
+        "fallen_share": float((pairs.error < 1.0).mean()),
+        "scenes_fallen": int((by_scene.median() < 1.0).sum()),
+        "p_value": float(binomtest(fallen, by_family.ngroups).pvalue),
+        "families": by_family.ngroups,
+        "families_fallen": fallen,
+        "rank_correlation": float(pairs.gain.rank().corr(pairs.error.rank())) if known else np.nan,
+        "unexplained_share": float(((pairs.gain < 1.0) != (pairs.error < 1.0)).mean()),
+    }

@@ -1,9 +1,10 @@
-"""Table reduced_reruns: errors of reduced runs of all motions, times in the training motion."""
+"""Tables of reduced runs: their errors and times, and where each method fails."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import h5py
+import numpy as np
 import pandas as pd
 
 from pdrom.core.store import open_hdf5, read_table
@@ -12,11 +13,9 @@ from pdrom.reduction.deviations import DEVIATIONS, ERRORS, REFERENCE, Series, er
 from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, Setting, TableOf
-from study.experiments.kit.reruns import run_error
-from study.experiments.kit.scenes import positions_of
-from study.experiments.kit.settings import Horizon, floor_of, horizons
-from study.tables.kit.declaration import shared, table, text
-from study.tables.kit.results import KEYS, TRAIN, timings_in_one_time
+from study.experiments.kit.base import Horizon, floor_of, horizons, positions_of, run_error
+from study.tables.kit.declaration import flag, number, shared, table, text
+from study.tables.kit.results import KEYS, TRAIN, joined, timings_in_one_time, trained
 
 
 @table(
@@ -48,17 +47,7 @@ from study.tables.kit.results import KEYS, TRAIN, timings_in_one_time
     },
 )
 def reduced_reruns(
-    full_order: list[File],
-    runs: list[File],
-    rows: list[File],
-    rows_heldout: list[File],
-    subspaces: list[File],
-    subspace_rows: list[File],
-    subspace_rows_heldout: list[File],
-    timings: list[File],
-    frame_times: pd.DataFrame,
-    sensitivity: pd.DataFrame,
-    horizon: Horizon,
+    frame_times: pd.DataFrame, sensitivity: pd.DataFrame, horizon: Horizon, **files: list[File]
 ) -> pd.DataFrame:
     """Reduced runs of the training motion with their times, then runs of each held-out motion.
 
@@ -79,21 +68,22 @@ def reduced_reruns(
     for motion in (TRAIN, *MOTIONS):
         label = horizon.perturbation if motion == TRAIN else motion
         ends = horizons(sensitivity, label, horizon.threshold)
-        tables = rows + subspace_rows if motion == TRAIN else rows_heldout + subspace_rows_heldout
-        files = zip(runs + subspaces, tables, strict=True)
-        parts = [_judged(run, row, ends[run["scene"]], motion) for run, row in files]
+        kind = "" if motion == TRAIN else "_heldout"
+        tables = files[f"rows{kind}"] + files[f"subspace_rows{kind}"]
+        both = zip(files["runs"] + files["subspaces"], tables, strict=True)
+        parts = [_judged(run, row, ends[run["scene"]], motion) for run, row in both]
         found = pd.concat(parts, ignore_index=True).assign(motion=motion)
         floors = {s: floor_of(sensitivity, s, label)[:end] for s, end in ends.items()}
         floor = {scene: float(drift.max(initial=0.0)) for scene, drift in floors.items()}
         found["horizon_frame"] = found.scene.map(ends)
         found["sensitivity_floor"] = found.scene.map(floor)
         if motion != TRAIN:
-            played = _played(full_order, ends, motion)
+            played = _played(files["full_order"], ends, motion)
             distance = played.set_index("scene").playback_error
             found["playback_error"] = found.scene.map(distance)
             found = pd.concat([found, played], ignore_index=True)
         judged.append(found)
-    judged[0] = _with_times(judged[0], timings_in_one_time(timings, frame_times))
+    judged[0] = _with_times(judged[0], timings_in_one_time(files["timings"], frame_times))
     return pd.concat(judged, ignore_index=True)
 
 
@@ -168,3 +158,126 @@ def _with_times(runs: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
     times_inside = reduced.loc[inside, keys + measured].astype({"k": "int64"})
     subspace = subspace.astype({"k": "int64"}).merge(times_inside, on=keys, how="left")
     return pd.concat([local, subspace], ignore_index=True)
+
+
+# only after the first outcome are further results of a run used
+OUTCOMES = ("accurate", "wrong", "left the scene", "blow-up", "not run", "not judged")
+SETTING = ["experiment", "scene", "h", "stiffness_ratio"]  # columns that identify a full-order run
+# Share of the runs on degenerate meshes whose outcome may differ between machines by rounding.
+FRAGILE = 0.005
+
+
+@table(
+    title="Where each method can be trusted",
+    columns=(
+        *shared("scene method r"),
+        number("h", "time step", "s", compared="exact"),
+        number("stiffness_ratio", "factor on the weights of the reduced groups", compared="exact"),
+        *shared("finite blowup_frame max_extent energy_ratio gain group position_basis k"),
+        text("experiment", "rerun (of the study) or sweep (a short run)"),
+        *shared("relative_error"),
+        text("outcome", f"one of: {', '.join(OUTCOMES)}", compared="error"),
+    ),
+    reads={
+        "full_order": Every(paths.TRAIN),
+        "reruns": Every(paths.RERUNS_TRAIN),
+        "subspaces": Every(paths.SUBSPACES_TRAIN),
+        "sweeps": Every(paths.STABILITY),
+        "reduced_reruns": TableOf("reduced_reruns"),
+        "time_steps": Setting("scene_time_steps"),
+        "wrong": Setting("stability.wrong"),
+        "departure": Setting("stability.left"),
+    },
+)
+def stability(
+    full_order: list[paths.File],
+    reruns: list[paths.File],
+    subspaces: list[paths.File],
+    sweeps: list[paths.File],
+    reduced_reruns: pd.DataFrame,
+    time_steps: Mapping[str, float],
+    wrong: float,
+    departure: float,
+) -> pd.DataFrame:
+    """Rows of the study's reduced runs (experiment "rerun"), then of short runs ("sweep").
+
+    Method "full" with position basis "full" is the full-order run. The error of a "rerun" row is
+    taken within the horizon, the error of a "sweep" row over the whole run.
+
+    Parameters
+    ----------
+    time_steps : scene -> time step h in seconds
+    """
+    runs = pd.concat(
+        [_full_order_rows(full_order), _rerun_rows(reruns, subspaces, reduced_reruns)],
+        ignore_index=True,
+    )
+    runs = runs.assign(h=runs.scene.map(time_steps), stiffness_ratio=1.0, experiment="rerun")
+    rows = pd.concat([runs, joined(sweeps).assign(experiment="sweep")], ignore_index=True)
+    return rows.assign(outcome=outcomes(rows, wrong, departure))
+
+
+def outcomes(runs: pd.DataFrame, wrong: float, departure: float) -> list[str]:
+    """Outcome of each of ``runs``: ``wrong`` limits the error, ``departure`` relative extent."""
+    full = runs[(runs.method == "full") & (runs.position_basis == "full")]
+    extents = full.set_index(SETTING).max_extent.rename("full_extent")
+    error = runs.relative_error.astype(float)
+    classes = {
+        "not run": runs.finite.isna(),
+        "blow-up": runs.finite.astype(float) == 0.0,
+        "left the scene": runs.max_extent > departure * runs.join(extents, on=SETTING).full_extent,
+        "not judged": error.isna(),
+        "wrong": error > wrong,
+    }
+    return np.select(list(classes.values()), list(classes), "accurate").tolist()
+
+
+def _full_order_rows(files: list[paths.File]) -> pd.DataFrame:
+    """Rows of the full-order runs in ``files``; their energy ratio is 1, their error 0."""
+    rows = []
+    for run in files:
+        with open_hdf5(run.path) as file:
+            extents = np.ptp(file["positions"][...], axis=1).max(axis=1)
+        finite = bool(np.isfinite(extents).all())
+        rows.append((run["scene"], finite, float(extents[1:].max() / extents[0])))
+    made = pd.DataFrame(rows, columns=["scene", "finite", "max_extent"])
+    return made.assign(method="full", position_basis="full", energy_ratio=1.0, relative_error=0.0)
+
+
+def _rerun_rows(
+    reruns: list[paths.File], subspaces: list[paths.File], reduced_reruns: pd.DataFrame
+) -> pd.DataFrame:
+    """Reduced runs of the training motion, with their error within the horizon as the error."""
+    local = joined(reruns).assign(position_basis="full", k=np.nan)
+    runs = pd.concat([local, joined(subspaces)], ignore_index=True)
+    runs = runs.drop(columns="relative_error")
+    errors = trained(reduced_reruns)[[*KEYS, "relative_error_within_horizon"]]
+    errors = errors.rename(columns={"relative_error_within_horizon": "relative_error"})
+    return runs.merge(errors, on=KEYS, how="left", validate="one_to_one")
+
+
+@table(
+    title="Every reduction in every hard case",
+    columns=(
+        text("case", "name of the hard case"),
+        *shared("method"),
+        flag("bounded_projections", "no state makes projections of the reduced group large"),
+        *shared("k r gain frames"),
+        flag("finite", "no frame blew up", compared="error", tolerance=FRAGILE),
+        *shared("blowup_frame"),
+        number(
+            "max_extent", "largest extent over the scale of the full-order run", compared="error"
+        ),
+        number(
+            "objective_rise",
+            "largest in one iteration, over the first value of its frame",
+            compared="skipped",
+        ),
+        text("outcome", "how the reduction fared", compared="error", tolerance=FRAGILE),
+        text("why", "reason of a refusal or of an expected failure", compared="error"),
+    ),
+    reads={"parts": Every(paths.HARD_CASES)},
+)
+def hard_cases(parts: list[paths.File]) -> pd.DataFrame:
+    """Rows of the files ``parts`` in the order of the cases and methods."""
+    return joined(parts)

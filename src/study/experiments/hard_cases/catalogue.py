@@ -9,7 +9,7 @@ from pdrom.core import config_file
 from pdrom.model.mesh.files import read_mesh_file
 from pdrom.model.mesh.generators import bar, boundary, cloth
 from pdrom.model.mesh.types import Mesh
-from study.experiments.hard_cases.case import (
+from study.experiments.hard_cases.record import (
     HardCase,
     Shape,
     falling,

@@ -28,10 +28,17 @@ from pdrom.reduction.subspace.model import Samples, SubspaceModel, make_columns,
 from pdrom.reduction.subspace.space import coordinates
 from study.artifact.paths import HARD_CASES, File
 from study.artifact.reads import ProjectFiles, Setting
-from study.experiments.hard_cases.case import HardCase
 from study.experiments.hard_cases.catalogue import CASES, MESHES, reducible_cases
-from study.experiments.hard_cases.record import Record, Watched, full_order, momentum, reach, record
-from study.experiments.kit.declaration import experiment
+from study.experiments.hard_cases.record import (
+    HardCase,
+    Record,
+    Watched,
+    full_order,
+    momentum,
+    reach,
+    record,
+)
+from study.experiments.kit.base import experiment
 
 HOLDS, NOTHING, NOT_TAKEN = "holds", "nothing to reduce", "not taken"
 FAILURES = ("refused", "singular", "blow-up", "distorted", "objective rises", "momentum changes")
@@ -42,6 +49,7 @@ BASES = {"pod": ("full", "ecsw", "hrpd"), "skinning": ("full", "hrpd")}
 BLOWUP, DISTORTED = 100.0, 3.0
 # Bounded manifolds: the norm of any projection has a bound that is known before the run.
 BOUNDED = ("clamped", "length", "half sphere")
+Methods = Mapping[str, MethodSpec]
 log = logging.getLogger(__name__)
 COLUMNS = [
     "case", "method", "bounded_projections", "k", "r", "gain", "frames", "finite", "blowup_frame",
@@ -154,14 +162,12 @@ class ReducedRun:
         return HOLDS
 
 
-def names(methods: Mapping[str, MethodSpec]) -> list[str]:
+def names(methods: Methods) -> list[str]:
     """All reductions: the methods, then each position subspace with each way of sampling."""
     return [*methods, *(f"{basis}-{sampling}" for basis in BASES for sampling in BASES[basis])]
 
 
-def reduced_run(
-    training: Training, name: str, methods: Mapping[str, MethodSpec], limit: float
-) -> ReducedRun:
+def reduced_run(training: Training, name: str, methods: Methods, limit: float) -> ReducedRun:
     """Run the case of ``training`` again with the reduction ``name`` of ``methods``.
 
     ``limit`` is the extent of a blow-up, m.
@@ -209,10 +215,7 @@ def _subspace(training: Training, kind: str, sampling: str, limit: float) -> Red
 
 
 def row(
-    training: Training,
-    name: str,
-    methods: Mapping[str, MethodSpec],
-    expected: Mapping[str, Expectation],
+    training: Training, name: str, methods: Methods, expected: Mapping[str, Expectation]
 ) -> dict[str, Any]:
     """Row of the reduction ``name``: sizes, figures of the run, outcome, reason of a failure."""
     try:

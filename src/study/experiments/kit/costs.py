@@ -23,8 +23,8 @@ from pdrom.model.dynamics.system import GlobalSystem
 from pdrom.model.effects.base import Effect
 from pdrom.model.scene import Scene
 from pdrom.reduction.sampling.local_step import ReducedLocalStep
+from study.experiments.kit.base import GLOBAL, REST, RIGHT
 from study.experiments.kit.measurement import Variant, measure, measure_calls, median_frames
-from study.experiments.kit.settings import GLOBAL, REST, RIGHT
 
 COLUMNS = [
     "scene", "group", "method", "vertices", "elements", "r", "local_ms", "full_ms", "solve_ms",
@@ -43,11 +43,7 @@ KERNEL, RECORD, SECONDS, CLOCKS, SIZE = range(OWN, OWN + 5)
 
 
 def variant(
-    scene: Scene,
-    system: GlobalSystem,
-    steps: Sequence[LocalStep],
-    frames: int,
-    labels: dict[str, object],
+    scene: Scene, system: GlobalSystem, steps: Sequence[LocalStep], frames: int, labels: dict
 ) -> Variant:
     """Loop of a ``scene`` with these local ``steps`` and no objective, from its own start."""
     loop = scene.stepper(system, steps, track_objective=False)
@@ -55,11 +51,7 @@ def variant(
 
 
 def local_costs(
-    scene: Scene,
-    reduced: Mapping[tuple[str, str, int], ReducedLocalStep],
-    states: np.ndarray,
-    warmup: int,
-    repeats: int,
+    scene: Scene, reduced: Mapping[tuple, ReducedLocalStep], states: np.ndarray, **often: int
 ) -> pd.DataFrame:
     """Milliseconds of one local step, mean over some states.
 
@@ -70,7 +62,7 @@ def local_costs(
 
     Parameters
     ----------
-    warmup, repeats : evaluations before the clock starts, and measured ones
+    often : ``warmup``, ``repeats``: evaluations before the clock starts, and measured ones
     reduced : local steps by group, method and r, bound to the groups of ``scene``
     states : (n, N, 3) positions in m; frame-lagged data are those of the first
     """
@@ -85,7 +77,7 @@ def local_costs(
         calls["solve", key] = _each(own.solve, [(own.sample(y),) for y in states])
         calls["lift", key] = _each(own.lift, [(rhs,) for _ in states])
     with np.errstate(over="ignore", invalid="ignore"):
-        times = measure_calls(calls, warmup, repeats)
+        times = measure_calls(calls, **often)
     rows = []
     for key in reduced:
         name, method, r = key

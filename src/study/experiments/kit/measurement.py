@@ -26,7 +26,7 @@ from pdrom.core.errors import PdromError
 from pdrom.core.store.checksum import damaged_set_aside
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.model.dynamics.stepper import State, Stepper
-from study.experiments.kit.settings import Count, Repeats
+from study.experiments.kit.base import Count, Repeats
 
 T = TypeVar("T")
 log = logging.getLogger(__name__)

@@ -32,7 +32,7 @@ SUPPORTED = sys.platform == "linux"
 # modules that every job imports first, and the most frequent experiment.
 LIBRARIES = (
     "h5py", "matplotlib.backends.backend_agg", "matplotlib.backends.backend_pdf", "numba", "numpy",
-    "pandas", "study.artifact.logs", "pdrom.core.provenance", "study.experiments.kit.declaration",
+    "pandas", "study.artifact.logs", "pdrom.core.provenance", "study.experiments.kit.base",
     "study.experiments.reruns", "pydantic", "scipy.linalg", "scipy.sparse.linalg",
     "snakemake.iocontainers", "snakemake.script", "threadpoolctl", "yaml",
 )  # fmt: skip

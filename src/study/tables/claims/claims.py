@@ -1,10 +1,12 @@
 """Tables about the preprint's claims, by the rules of config/claims.yaml.
 
-Table claims has the verdicts, claims_tests the result of every test, claims_sensitivity the
-verdicts under changed rules.
+Verdicts: evaluation of the tests of a claim and combination of their results. Table claims has
+the verdicts, claims_tests the result of every test, claims_sensitivity the verdicts under changed
+rules.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -12,17 +14,173 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from study.tables.claims import verdicts
-from study.tables.claims.metrics import VALUE, Tables
+from study.artifact.reads import ProjectFile, TableOf
+from study.tables.claims.metrics import METRICS, VALUE, Tables, filtered
 from study.tables.claims.rules import PARTS, READS, Added, ClaimRule, TestRule, load_claims
-from study.tables.kit.declaration import Column, flag, number, table, text, timed
+from study.tables.kit.declaration import Column, TimedCells, flag, number, table, text, timed
 from study.tables.kit.declaration import table as declare
+
+VERDICTS = HOLDS, FAILS, DEPENDS, MACHINE, UNDECIDED, UNTESTED = (
+    "holds", "does not hold", "depends", "depends on the machine", "cannot be decided",
+    "not tested",
+)  # fmt: skip
+RULES = "config/claims.yaml"
+RECORDED = "config/reference/replication/claims.csv"
+MEASURED = [f"{name}{suffix}" for suffix in PARTS.values() for name in ("verdict", "measured")]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Result of one test.
+
+    verdict : one of `VERDICTS`; "cannot be decided" if nothing can be compared, "depends on the
+        machine" if ratios of times close to the threshold decide
+    measured : range of the values, in words
+    sentence : number of rows that satisfy the comparison, in words
+    condition : if the verdict depends, that number for each value of the column ``by`` of the test
+    """
+
+    verdict: str
+    measured: str
+    sentence: str
+    condition: str = ""
+
+
+def values_of(test: TestRule, tables: Tables) -> pd.DataFrame:
+    """Labels and a value for each row of ``tables`` that ``test`` compares."""
+    return METRICS[test.metric].values(tables, dict(test.where), test.accuracy)
+
+
+def satisfied(test: TestRule, values: np.ndarray) -> np.ndarray:
+    """Boolean array: whether each of ``values`` satisfies the comparison of ``test``."""
+    return values >= test.threshold if test.compare == ">=" else values <= test.threshold
+
+
+def close(test: TestRule, values: np.ndarray) -> np.ndarray:
+    """Boolean array: whether each value is a ratio of times within the margin of the threshold."""
+    ratio = METRICS[test.metric].ratio
+    apart = ratio(values) / ratio(np.array(test.threshold))
+    return (apart > 1.0 / test.factor) & (apart < test.factor)
+
+
+def answer(share: float, good: int, total: int) -> str:
+    """Verdict if ``good`` of ``total`` rows satisfy a test and a fraction ``share`` must agree."""
+    if total == 0:
+        return UNDECIDED
+    if good >= share * total:
+        return HOLDS
+    return FAILS if total - good >= share * total else DEPENDS
+
+
+def answer_of(test: TestRule, values: np.ndarray) -> str:
+    """Verdict of ``test``; `MACHINE` if it depends on the values close to the threshold."""
+    near = close(test, values)
+    sure, total = int((satisfied(test, values) & ~near).sum()), len(values)
+    answers = {answer(test.share, sure + more, total) for more in range(int(near.sum()) + 1)}
+    return answers.pop() if len(answers) == 1 else MACHINE
+
+
+def evaluate(test: TestRule, tables: Tables) -> Outcome:
+    """Compare the rows of ``tables`` that ``test`` selects with its threshold."""
+    rows = values_of(test, tables)
+    values = rows[VALUE].to_numpy(float)
+    if len(values) == 0:
+        why = "nothing to compare in this configuration"
+        where = {k: v for k, v in test.where.items() if k != "r"}
+        if test.metric == "rerun_error" and len(filtered(tables["reduced_reruns"], where)):
+            why = "no size can run, the numerical rank allows none"
+        return Outcome(UNDECIDED, "no data", f"{test.what}: {why}")
+    passed = satisfied(test, values)
+    good, total = int(passed.sum()), len(values)
+    spread = _range(values)
+    sign = "at least" if test.compare == ">=" else "at most"
+    sentence = f"{test.what}: {good} of {total} {sign} {test.threshold:g} (measured {spread})"
+    near = int(close(test, values).sum())
+    beside = f"{near} of {total} within a factor {test.factor:g} of it" if near else ""
+    sentence += f", {beside}" if beside else ""
+    verdict = answer_of(test, values)
+    condition = ""
+    if verdict in (DEPENDS, MACHINE):
+        condition = f"{test.what}, {sign} {test.threshold:g}: {_broken_down(test, rows, passed)}"
+    if verdict == MACHINE:
+        condition += f" (measured {spread}; {beside}, which decides nothing)"
+    return Outcome(verdict, spread, sentence, condition)
+
+
+def _broken_down(test: TestRule, rows: pd.DataFrame, passed: np.ndarray) -> str:
+    """Text with the number of rows that satisfy the test for each value of its column ``by``."""
+    if test.by is None or test.by not in rows:
+        return f"{int(passed.sum())} of {len(passed)}"
+    counts = pd.Series(passed).groupby(rows[test.by].to_numpy(), sort=False)
+    parts = [f"{value} {int(part.sum())} of {len(part)}" for value, part in counts]
+    return ", ".join(parts).replace("_", " ")
+
+
+def _range(values: np.ndarray) -> str:
+    """Text with the smallest and largest value, and the median of three or more values."""
+    low, high = _text(values.min()), _text(values.max())
+    if low == high:
+        return low
+    middle = f", median {_text(float(np.median(values)))}" if len(values) > 2 else ""
+    return f"{low} to {high}{middle}"
+
+
+def _text(value: float) -> str:
+    if np.isinf(value):
+        return "blow-up"
+    if 100.0 <= abs(value) < 1e5:
+        return f"{float(f'{value:.2g}'):.0f}"
+    return f"{value:.2g}"
+
+
+def combined(verdicts: Sequence[str]) -> str:
+    """Verdict of a claim whose tests have ``verdicts``: it holds if all of them hold.
+
+    Without a test that decides it is not tested.
+    """
+    if not verdicts:
+        return UNTESTED
+    for verdict in (UNDECIDED, FAILS, MACHINE, DEPENDS):
+        if verdict in verdicts:
+            return verdict
+    return HOLDS
+
+
+def timed_columns(rule: ClaimRule) -> set[str]:
+    """Columns in the row of a claim that depend on measured times, by its ``rule``."""
+    found: set[str] = set()
+    for part, suffix in PARTS.items():
+        timed = [test for test in getattr(rule, part) if test.timed]
+        if timed:
+            found.add(f"why{suffix}")
+        if any(test.decides for test in timed):
+            found |= {f"{name}{suffix}" for name in ("measured", "verdict", "condition")}
+            found.add("answer")
+    return found
+
+
+def by_rules(timed: Callable[[ClaimRule, Any], set[str]]) -> TimedCells:
+    """Function for `Table.timed_cells` that calls ``timed`` with each row and its claim's rule."""
+
+    def timed_cells(table: pd.DataFrame, **files: Path) -> list[set[str]]:
+        rules = load_claims(files["rules"])
+        return [timed(rules[row.claim], row) for row in table.itertuples()]
+
+    return timed_cells
+
+
+def timed_parts(*cells: str) -> TimedCells:
+    """Function that marks ``cells`` as timed columns in rows whose verdict depends on timing."""
+    return by_rules(
+        lambda rule, row: {*cells} if f"verdict{PARTS[row.part]}" in timed_columns(rule) else set()
+    )
+
 
 # Fields of a claim's rule that are columns of the table claims.
 WORDS = {"source", "paper", "figure_or_table", "section", "shown", "text", "qualifiers"}
 SAID = {"what", "metric", "decides", "compare", "threshold", "share"}
 FOUND = ("satisfied", "of", "close", "least", "median", "most", "verdict")
-ONE_OF = f"one of: {', '.join(verdicts.VERDICTS)}"
+ONE_OF = f"one of: {', '.join(VERDICTS)}"
 # Constructor of columns that depend on timing and are not compared.
 skipped = partial(Column, timed=True, compared="skipped")
 FACTORS = (0.5, 0.8, 1.25, 2.0)  # on thresholds
@@ -61,7 +219,7 @@ _Variation = tuple[str, str, Sequence[TestRule], _Rows]  # what varies, how, the
         text("history", "when and why the rules became what they are"),
     ),
     reads=READS,
-    timed_cells=verdicts.by_rules(lambda rule, row: verdicts.timed_columns(rule)),
+    timed_cells=by_rules(lambda rule, row: timed_columns(rule)),
 )
 def claims(rules: Path, added: Added, **tables: pd.DataFrame) -> pd.DataFrame:
     """One row per claim, in the order of the file ``rules``; ``added`` is as in `load_claims`."""
@@ -86,11 +244,11 @@ def _row(name: str, rule: ClaimRule, tables: Tables) -> dict[str, Any]:
 
 
 def _decided(tests: Sequence[TestRule], tables: Tables) -> dict[str, str]:
-    outcomes = [(test, verdicts.evaluate(test, tables)) for test in tests]
+    outcomes = [(test, evaluate(test, tables)) for test in tests]
     deciding = [o for test, o in outcomes if test.decides]
     return {
         "measured": "; ".join(o.measured for o in deciding),
-        "verdict": verdicts.combined([o.verdict for o in deciding]),
+        "verdict": combined([o.verdict for o in deciding]),
         "condition": "; ".join(o.condition for o in deciding if o.condition),
         "why": "; ".join(o.sentence for _, o in outcomes) + ".",
     }
@@ -122,7 +280,7 @@ def _timed_of_test(rule: ClaimRule, row: Any) -> set[str]:
         timed(text("verdict", f"of this test, {ONE_OF}", compared="exact")),
     ),
     reads=READS,
-    timed_cells=verdicts.by_rules(_timed_of_test),
+    timed_cells=by_rules(_timed_of_test),
 )
 def claims_tests(rules: Path, added: Added, **tables: pd.DataFrame) -> pd.DataFrame:
     """One row per claim, part and test, in the order of the file ``rules``; see `claims`."""
@@ -137,10 +295,10 @@ def claims_tests(rules: Path, added: Added, **tables: pd.DataFrame) -> pd.DataFr
 
 def _found(test: TestRule, tables: Tables) -> dict[str, Any]:
     """Margin, counts, verdict and range of the values (None where there are no values)."""
-    values = verdicts.values_of(test, tables)[VALUE].to_numpy(float)
-    good, total = int(verdicts.satisfied(test, values).sum()), len(values)
+    values = values_of(test, tables)[VALUE].to_numpy(float)
+    good, total = int(satisfied(test, values).sum()), len(values)
     spread = (values.min(), np.median(values), values.max()) if total else (None, None, None)
-    near, answer = int(verdicts.close(test, values).sum()), verdicts.answer_of(test, values)
+    near, answer = int(close(test, values).sum()), answer_of(test, values)
     found = zip(FOUND, (good, total, near, *spread, answer), strict=True)
     return {"margin": test.factor if test.timed else None, **dict(found)}
 
@@ -157,7 +315,7 @@ def _found(test: TestRule, tables: Tables) -> dict[str, Any]:
         timed(flag("same", "the two agree", compared="exact", tolerance=FRAGILE)),
     ),
     reads=READS,
-    timed_cells=verdicts.timed_parts("verdict", "verdict_of_rules", "same"),
+    timed_cells=timed_parts("verdict", "verdict_of_rules", "same"),
 )
 def claims_sensitivity(rules: Path, added: Added, **tables: pd.DataFrame) -> pd.DataFrame:
     """One row per claim of the file ``rules``, part and variation; see `claims`."""
@@ -175,7 +333,7 @@ def sensitivity_rows(rules: Mapping[str, ClaimRule], tables: Tables) -> pd.DataF
             tests = [test for test in getattr(rule, part) if test.decides]
             if not tests:
                 continue
-            rows = [verdicts.values_of(test, tables) for test in tests]
+            rows = [values_of(test, tables) for test in tests]
             base = _verdict(tests, rows)
             for varied, variation, changed, kept in _variations(tests, rows, tables):
                 if all(len(values) for values in (*rows, *kept)):
@@ -187,7 +345,7 @@ def sensitivity_rows(rules: Mapping[str, ClaimRule], tables: Tables) -> pd.DataF
 
 def _verdict(tests: Sequence[TestRule], rows: _Rows) -> str:
     values = [found[VALUE].to_numpy(float) for found in rows]
-    return verdicts.combined(list(map(verdicts.answer_of, tests, values)))
+    return combined(list(map(answer_of, tests, values)))
 
 
 def _with(test: TestRule, **changes: Any) -> TestRule:
@@ -212,7 +370,7 @@ def _variations(tests: Sequence[TestRule], rows: _Rows, tables: Tables) -> Itera
             for test in tests
         ]
         if changed != list(tests):
-            yield "splits", split, changed, [verdicts.values_of(test, tables) for test in changed]
+            yield "splits", split, changed, [values_of(test, tables) for test in changed]
     scenes = dict.fromkeys(s for values in rows if "scene" in values for s in values.scene)
     others = {f"without {s}": lambda values, s=s: values != s for s in scenes}
     yield from _kept(tests, rows, "scenes", "scene", others)
@@ -226,3 +384,42 @@ def _kept(
         kept = [values[keep(values[column])] if column in values else values for values in rows]
         if sum(map(len, kept)) < sum(map(len, rows)):
             yield varied, name, tests, kept
+
+
+@table(
+    title="Verdicts on another sample of the scenes, by the same rules",
+    columns=(
+        text("claim", "its identifier in config/claims.yaml"),
+        text("part", f"which verdict: {', '.join(PARTS)}"),
+        timed(text("verdict", f"of this study, one of: {', '.join(VERDICTS)}", compared="exact")),
+        text("verdict_replication", "of config/replication.yaml, recorded"),
+        timed(flag("same", "the two agree", compared="exact")),
+        timed(text("measured", "range of the tests that decide", compared="skipped")),
+        text("measured_replication", "the same range there"),
+        flag("rules_unchanged", "the rules are those by which the record was decided"),
+        text("date", "day of the record"),
+    ),
+    reads={
+        "claims": TableOf("claims"),
+        "rules": ProjectFile(RULES),
+        "recorded": ProjectFile(RECORDED),
+    },
+    timed_cells=timed_parts("verdict", "same", "measured"),
+)
+def replication(claims: pd.DataFrame, rules: Path, recorded: Path) -> pd.DataFrame:
+    """One row per claim in both ``claims`` and the file ``recorded``, and part of the claim."""
+    loaded = load_claims(rules)
+    both = claims.merge(pd.read_csv(recorded), on="claim", suffixes=("", "_replication"))
+    unchanged = [
+        loaded[claim].fingerprint == rule
+        for claim, rule in zip(both.claim, both.rules, strict=True)
+    ]
+    both["rules_unchanged"] = unchanged
+    rows = []
+    for part, suffix in PARTS.items():
+        own = both[["claim", "rules_unchanged", "date"]].assign(part=part)
+        for name in ("verdict", "measured"):
+            own[name] = both[f"{name}{suffix}"]
+            own[f"{name}_replication"] = both[f"{name}{suffix}_replication"]
+        rows.append(own.assign(same=own.verdict == own.verdict_replication))
+    return pd.concat(rows, ignore_index=True)

@@ -7,8 +7,8 @@ from functools import partial
 import numpy as np
 import pandas as pd
 
+from study.tables.accuracy_cost import CURVE
 from study.tables.kit.results import KEYS, MEDIAN, families, trained, with_held_out
-from study.tables.payoff import CURVE
 
 Tables = Mapping[str, pd.DataFrame]
 Value = str | int | float

@@ -12,7 +12,7 @@ from pdrom.core.store import open_hdf5
 from pdrom.model.dynamics.stepper import State
 from pdrom.model.runs import run, trajectory
 from places import ROOT
-from study.experiments.kit.scenes import varied
+from study.experiments.kit.base import varied
 from study.pipeline.scenes import Coarsen, load_bound_scene, read_scene
 
 SPRING = {"effect": "spring", "weight": 1e5}

@@ -12,7 +12,7 @@ from pdrom.core.yamlfile import ConfigModel
 from study.artifact import reads
 from study.artifact.artifact import Artifact, declare, declared_in, load, make, modules_in
 from study.artifact.paths import File, Place
-from study.experiments.kit.declaration import Experiment, experiment, experiments
+from study.experiments.kit.base import Experiment, experiment, experiments
 
 SCENE, GROUP = Place("a/{scene}.csv"), Place("b/{scene}/{group}.csv")
 

@@ -10,7 +10,7 @@ from pdrom.core.store import read_table, write_table
 from pdrom.core.yamlfile import validate
 from study.artifact.paths import File
 from study.experiments.alternatives import experiment
-from study.experiments.alternatives.settings import Alternatives, Comparison
+from study.experiments.alternatives.experiment import Alternatives, Comparison
 from study.tables.alternatives import _pays, alternatives, winners
 
 EFFECTS = (

@@ -12,8 +12,8 @@ from pdrom.model.scene import Scene
 from pdrom.reduction.subspace import exported
 from pdrom.reduction.subspace.exported import export_scene
 from pdrom.reduction.subspace.model import SubspaceModel
-from study.experiments import live as module
-from study.experiments.kit.scenes import followed
+from study.experiments import subspaces as module
+from study.experiments.kit.base import followed
 from written_models import write_models
 
 FRAMES = 24

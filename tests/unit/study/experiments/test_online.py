@@ -24,7 +24,7 @@ from study.experiments.subspaces import (
     LargeModels,
     Online,
 )
-from study.tables.speedups import frame_times, online, speedups
+from study.tables.effects_cost import frame_times, online, speedups
 
 EFFECTS = (
     {"effect": "spring", "weight": 1e5},
@@ -95,7 +95,8 @@ def test_a_fresh_process_times_every_model(written):
     assert table.fom_ms_per_frame.nunique() == 1
     # the files hold the same models
     assert table.ms_per_frame.tolist() == rows.ms_per_frame[2:].tolist()
-    quoted = speedups([times], frame_times([times]), [], [], [File(str(path), {})], NO_RERUNS)
+    files = {"parts": [times], "large": [File(str(path), {})], "projections": [], "subspaces": []}
+    quoted = speedups(frame_times([times]), NO_RERUNS, **files)
     for column, own in (("error_train", "train"), ("error_heldout_high", "heldout_high")):
         assert quoted[column].tolist() == table[f"relative_error_{own}"].tolist()
     assert (quoted.reduction_s > 0.0).all()

@@ -13,8 +13,7 @@ from builders import TOP as PINS
 from pdrom.core.store import read_table, write_table
 from pdrom.model.runs import trajectory
 from pdrom.reduction.deviations import error_within
-from study.experiments.kit.scenes import perturbation_field
-from study.experiments.kit.settings import floor_of, horizon, horizons
+from study.experiments.kit.base import floor_of, horizon, horizons, perturbation_field
 from study.experiments.sensitivity import (
     COLUMNS,
     EFFECTS,

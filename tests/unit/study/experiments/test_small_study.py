@@ -24,9 +24,9 @@ from small_scene import run_jobs
 from study.artifact import paths
 from study.artifact.paths import File, Place
 from study.experiments.iterations import IterationSweep, iterations
-from study.experiments.kit.declaration import Experiment
+from study.experiments.kit.base import Experiment
 from study.experiments.repetitions import LadderSection, Options, repetitions
-from study.experiments.stability import ShortRuns, stability
+from study.experiments.reruns import ShortRuns, stability
 from study.pipeline.folders import Folders
 from study.pipeline.plan import Plan
 from study.pipeline.study import Study

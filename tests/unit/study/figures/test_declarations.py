@@ -8,8 +8,7 @@ import pytest
 
 from pdrom.core.errors import ConfigurationError
 from study.artifact.paths import MESH, RERUNS
-from study.figures.kit.declaration import declarations, load_choices
-from study.figures.kit.options import Scenes
+from study.figures.kit.declaration import Scenes, declarations, load_choices
 
 ENTRY = "singular_values:\n  columns: 2\n"
 

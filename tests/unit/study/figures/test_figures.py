@@ -28,9 +28,8 @@ from pdrom.view.style import new_figure, note
 from places import CONFIG
 from study.artifact.paths import MESH, RERUNS, SUBSPACES
 from study.figures import accuracy_cost as view
-from study.figures.alternatives import dots
-from study.figures.kit.declaration import declarations, write_figure
-from study.figures.kit.options import Drawn, Reduction
+from study.figures.accuracy_cost import dots
+from study.figures.kit.declaration import Drawn, Reduction, declarations, write_figure
 from study.figures.runs import obstacles_of
 from study.pipeline.study import Study
 

@@ -12,7 +12,7 @@ from pdrom.core.machine import Units, machine
 from pdrom.core.store import write_table
 from places import ROOT
 from study.artifact.logs import Usage
-from study.experiments.kit.declaration import experiments
+from study.experiments.kit.base import experiments
 from study.pipeline import run
 from study.pipeline.commandline import CommandLine
 from study.pipeline.failures import Failures
@@ -20,9 +20,8 @@ from study.pipeline.run import RUN_TIMES, Run, expected_seconds, say_compilation
 from study.pipeline.scenes import Coarsen
 from study.pipeline.summary import minutes
 from study.pipeline.tracked import COLUMNS, COSTS, main, measured_costs, recorded_verdicts
-from study.tables.claims.claims import claims
+from study.tables.claims.claims import MEASURED, RECORDED, RULES, claims, replication
 from study.tables.claims.rules import load_claims
-from study.tables.claims.verdicts import MEASURED, RECORDED, RULES, replication
 
 TABLE = pd.read_csv(ROOT / COSTS).set_index("kind")
 PROFILE = yaml.safe_load((ROOT / "workflow/profiles/slurm/config.yaml").read_text("utf-8"))

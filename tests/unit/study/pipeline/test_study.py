@@ -15,8 +15,8 @@ from pdrom.model.scene import Scene, SceneConfig
 from places import CONFIG, ROOT
 from study.artifact import paths
 from study.artifact.paths import LABELS
-from study.experiments.kit.declaration import experiments
-from study.experiments.stability import stability
+from study.experiments.kit.base import experiments
+from study.experiments.reruns import stability
 from study.pipeline.plan import Plan, check_live, check_subspaces
 from study.pipeline.scenes import Replicate, Variants, read_scene
 from study.pipeline.study import Study, StudySettings, labels_of

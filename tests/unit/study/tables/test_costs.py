@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 from builders import frame
 from pdrom.core.store import write_table
 from study.artifact.paths import File
-from study.experiments.kit.settings import Horizon
+from study.experiments.kit.base import Horizon
+from study.tables.accuracy_cost import breakeven, payoff
 from study.tables.effects_cost import effects_cost
 from study.tables.kit.results import FAILED
 from study.tables.kit.results import KEYS as LABELS
-from study.tables.payoff import breakeven, payoff
 
 HORIZON = Horizon(perturbation=1e-10, threshold=1e-3)
 NOT_TIMED = pd.DataFrame(columns=["scene", "ms_per_frame"])  # table frame_times without rows
@@ -161,12 +161,13 @@ def test_effects_are_joined_in_one_time(tmp_path):
         write_table(costs.assign(scene=name, share=0.5), tmp_path / f"{name}.csv")
     files = [File(str(tmp_path / f"{name}.csv"), {}) for name in "ab"]
     times = pd.DataFrame({"scene": ["b"], "ms_per_frame": [3.0]})
-    table = effects_cost(files, [], [], times, NO_RUNS, HORIZON)
+    nothing = dict.fromkeys(("parts", "left_out", "contributions"), ())
+    table = effects_cost(times, NO_RUNS, HORIZON, **nothing | {"parts": files})
     assert table.scene.tolist() == ["a", "a", "b", "b"]
     assert table.elements.tolist() == [3] * 4
     # in scene b the effects add up to its one time; a was not timed in several processes
     assert table.ms_per_frame.tolist() == [2.0, 6.0, 0.75, 2.25]
-    assert effects_cost([], [], [], times, NO_RUNS, HORIZON).empty
+    assert effects_cost(times, NO_RUNS, HORIZON, **nothing).empty
 
 
 def test_contributions_are_judged_before_the_horizon_and_bring_their_times(tmp_path):
@@ -210,8 +211,9 @@ def test_contributions_are_judged_before_the_horizon_and_bring_their_times(tmp_p
     )
     write_table(costs, tmp_path / "costs.csv")
     write_table(removed, tmp_path / "removed.csv")
-    files = [[File(str(tmp_path / f"{n}.csv"), {})] for n in ("costs", "removed", "all")]
-    made = effects_cost(*files, NOT_TIMED, sensitivity, HORIZON)
+    named = {"parts": "costs", "left_out": "removed", "contributions": "all"}
+    files = {key: [File(str(tmp_path / f"{n}.csv"), {})] for key, n in named.items()}
+    made = effects_cost(NOT_TIMED, sensitivity, HORIZON, **files)
     assert made.effect.tolist() == [
         "bending", "global solve", "nothing", "bending + spring", "spring", "strain", "kick",
     ]  # fmt: skip

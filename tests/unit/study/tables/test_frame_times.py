@@ -10,9 +10,9 @@ from scipy.stats import binom
 from pdrom.core.store import write_table
 from study.artifact.paths import File
 from study.experiments.frame_times import COLUMNS
+from study.tables.effects_cost import frame_times, speedups
 from study.tables.errors import repetitions
 from study.tables.kit.results import in_words, median_interval
-from study.tables.speedups import frame_times, speedups
 
 VALUES = st.lists(st.floats(0.1, 10.0), min_size=1, max_size=12)
 
@@ -87,8 +87,9 @@ def test_a_speedup_stands_beside_its_costs_and_errors(measured, tmp_path):
     runs = pd.concat([runs.assign(motion="train"), unseen])
     runs = runs.assign(frames=9, blowup_frame=None, horizon_frame=9, playback_error=0.5)
     table = speedups(
-        measured, frame_times(measured), [File(str(tmp_path / "projections.csv"), {})],
-        [File(str(tmp_path / "seconds.csv"), {})], [], runs,
+        frame_times(measured), runs, parts=measured, large=[],
+        projections=[File(str(tmp_path / "projections.csv"), {})],
+        subspaces=[File(str(tmp_path / "seconds.csv"), {})],
     ).set_index("method")  # fmt: skip
     assert table.speedup.to_dict() == {"ecsw": pytest.approx(4.0), "deim": pytest.approx(0.5)}
     assert table.shown.to_dict() == {"ecsw": "4.0 (4.0 to 4.0)", "deim": "0.50 (0.50 to 0.50)"}
@@ -105,7 +106,7 @@ def test_a_speedup_stands_beside_its_costs_and_errors(measured, tmp_path):
 
 def test_no_process_leaves_empty_tables():
     assert len(frame_times([])) == 0
-    empty = speedups([], frame_times([]), [], [], [], pd.DataFrame())
+    empty = speedups(frame_times([]), pd.DataFrame(), parts=[])
     assert tuple(empty.columns) == speedups.column_names
 
 

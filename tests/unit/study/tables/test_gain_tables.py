@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from study.tables.gain_interventions import gain_interventions
+from study.tables.errors import gain_interventions
 from study.tables.kit.results import KEYS, TRAIN, judged_runs, over_motions, trained, with_held_out
 
 # scene, method, r, error within the horizon (None: ended before), gain, elements, frames

@@ -11,8 +11,8 @@ from study.artifact.paths import File
 from study.experiments.timing import ITERATIONS, Sized, SizedBreakEven, SizedOptions
 from study.experiments.timing import scaling as experiment
 from study.pipeline.scenes import read_scene
+from study.tables.accuracy_cost import CURVE, breakeven
 from study.tables.effects_cost import EXPONENTS, scaling
-from study.tables.payoff import CURVE, breakeven
 
 SPEC = MethodSpec(title="block DEIM", centring="affine", rows="element")
 JOINT = MethodSpec(title="joint DEIM", centring="affine", rows="joint")

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from pdrom.core.store import write_hdf5, write_table
 from study.artifact import paths
 from study.artifact.paths import File
-from study.tables.stability import OUTCOMES, outcomes, stability
+from study.tables.reduced_reruns import OUTCOMES, outcomes, stability
 
 RERUN = {"scene": "a", "group": "spring", "frames": 9, "finite": True, "blowup_frame": None,
          "max_extent": 1.1, "relative_error": 7.0, "energy_ratio": 1.0, "gain": 2.0}  # fmt: skip

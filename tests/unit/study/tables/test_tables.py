@@ -15,7 +15,7 @@ from pdrom.model.held_out import MOTIONS, PLAYBACK
 from pdrom.reduction.basis import Basis, save_basis
 from study.artifact import paths
 from study.artifact.paths import REQUESTED_TOLERANCES, File, Place
-from study.experiments.kit.settings import Horizon
+from study.experiments.kit.base import Horizon
 from study.experiments.requested_tolerances import COLUMNS
 from study.tables.accuracy_cost import accuracy_cost, pareto, reference_of, requested_tolerances
 from study.tables.effects_cost import local_share

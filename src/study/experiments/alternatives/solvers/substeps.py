@@ -27,10 +27,10 @@ from pdrom.model.scene import Scene
 METHODS = Registry(
     "method",
     {
-        "projective": "study.experiments.alternatives.solvers.projective:SmallSteps",
-        "anderson": "study.experiments.alternatives.solvers.projective:Accelerated",
-        "chebyshev": "study.experiments.alternatives.solvers.projective:Chebyshev",
-        "explicit": "study.experiments.alternatives.solvers.explicit:Explicit",
+        "projective": "study.experiments.alternatives.solvers.methods:SmallSteps",
+        "anderson": "study.experiments.alternatives.solvers.methods:Accelerated",
+        "chebyshev": "study.experiments.alternatives.solvers.methods:Chebyshev",
+        "explicit": "study.experiments.alternatives.solvers.methods:Explicit",
     },
 )
 

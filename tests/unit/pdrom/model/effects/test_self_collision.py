@@ -13,7 +13,7 @@ from pdrom.model.runs import trajectory
 from pdrom.reduction.subspace.model import make_columns
 from pdrom.reduction.subspace.space import ReducedSpace
 from strategies import SEEDS
-from study.experiments.hard_cases.case import folded, noisy, scales, scrambled
+from study.experiments.hard_cases.record import folded, noisy, scales, scrambled
 
 GROUPS = ({"effect": "spring", "weight": 1e4}, {"effect": "strain", "weight": 1e3})
 SHEET = {"kind": "cloth", "rows": 12, "columns": 12, "plane": "xz", "lift": 0.1}

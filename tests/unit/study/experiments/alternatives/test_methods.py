@@ -11,11 +11,10 @@ from builders import GRAVITY, GROUPS, LEFT, make_scene
 from pdrom.core.errors import ConfigurationError, SceneError
 from pdrom.model.dynamics.stepper import State
 from pdrom.reduction.subspace.model import Samples, SubspaceModel, make_columns
-from study.experiments.alternatives.solvers.explicit import continuous
+from study.experiments.alternatives.solvers.methods import TwoLevel, continuous
 from study.experiments.alternatives.solvers.substeps import METHODS
-from study.experiments.alternatives.solvers.two_level import TwoLevel
-from study.experiments.kit.converged import ConvergedStepper, converged_run
-from study.experiments.kit.scenes import followed
+from study.experiments.iterations import ConvergedStepper, converged_run
+from study.experiments.kit.base import followed
 
 SHEET = {"kind": "cloth", "rows": 6, "columns": 5, "plane": "xz"}
 HELD = (GRAVITY, LEFT)

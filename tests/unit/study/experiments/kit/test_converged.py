@@ -6,7 +6,7 @@ from scipy import optimize, sparse
 
 from builders import make_scene
 from pdrom.model.dynamics.stepper import Stepper
-from study.experiments.kit.converged import ConvergedStepper, minimise
+from study.experiments.iterations import ConvergedStepper, minimise
 
 SHEET = {"kind": "cloth", "rows": 6, "columns": 5, "plane": "xz"}
 EFFECTS = ({"effect": "gravity"}, {"effect": "floor"}, {"effect": "pins", "select": "left"})

@@ -5,6 +5,7 @@ import pytest
 
 from builders import make_scene
 from pdrom.model.constraints.local_kernel import LocalPass
+from study.experiments.kit.base import GLOBAL, REST, RIGHT
 from study.experiments.kit.costs import (
     COSTS,
     LEFT_OUT,
@@ -13,7 +14,6 @@ from study.experiments.kit.costs import (
     left_out,
     left_out_sets,
 )
-from study.experiments.kit.settings import GLOBAL, REST, RIGHT
 
 EFFECTS = (
     {"effect": "gravity"},

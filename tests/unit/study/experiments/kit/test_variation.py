@@ -6,8 +6,7 @@ import pytest
 from builders import make_scene
 from pdrom.model.runs import trajectory
 from pdrom.model.scene import Scene
-from study.experiments.kit.scenes import varied
-from study.experiments.kit.settings import resolve_ranks
+from study.experiments.kit.base import resolve_ranks, varied
 
 EFFECTS = (
     {"effect": "gravity"},

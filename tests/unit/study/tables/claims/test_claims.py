@@ -13,7 +13,7 @@ from pdrom.core.errors import ConfigurationError
 from pdrom.core.yamlfile import validate
 from places import ROOT
 from study.tables import declared
-from study.tables.claims import verdicts
+from study.tables.claims import claims as verdicts
 from study.tables.claims.claims import claims, claims_sensitivity, claims_tests
 from study.tables.claims.metrics import METRICS
 from study.tables.claims.rules import MARGIN, ClaimRule, TestRule, load_claims

@@ -6,9 +6,15 @@ import pytest
 from pdrom.core.yamlfile import validate
 from places import ROOT
 from study.tables import declared
-from study.tables.claims.claims import claims, claims_tests, sensitivity_rows
+from study.tables.claims.claims import (
+    MACHINE,
+    UNDECIDED,
+    claims,
+    claims_tests,
+    combined,
+    sensitivity_rows,
+)
 from study.tables.claims.rules import PARTS, ClaimRule, TestRule, load_claims
-from study.tables.claims.verdicts import MACHINE, UNDECIDED, combined
 
 PATH = ROOT / "config" / "claims.yaml"
 ERRORS = pd.DataFrame(
