@@ -1,6 +1,5 @@
-"""The mesh of a scene, checked, its full-order runs, their snapshots of a group, and its basis."""
+"""The mesh of a scene, checked, its full-order runs, and their snapshots of a group."""
 
-import logging
 from pathlib import Path
 
 from pdrom.model.mesh.checks import check_mesh
@@ -9,9 +8,7 @@ from pdrom.model.mesh.types import save_mesh
 from pdrom.model.runs import run
 from pdrom.model.scene import SceneConfig
 from pdrom.reduction import snapshots as sets
-from pdrom.reduction.basis import basis_of, save_basis
-from pdrom.reduction.method import BasisSpec
-from study.artifact.paths import BASIS, HELDOUT, KICK, MESH, SNAPSHOTS, STIFFNESS, TRAIN, File
+from study.artifact.paths import HELDOUT, KICK, MESH, SNAPSHOTS, STIFFNESS, TRAIN, File
 from study.artifact.reads import Setting, SourcesOf
 from study.experiments.kit.base import Solver, experiment, scene_of
 
@@ -50,9 +47,6 @@ def fom(mesh: File, config: SceneConfig, solver: Solver, **runs: File) -> None:
         run(scene_of(config, mesh, motion), file.path, wanted.get(motion, {}), solver)
 
 
-log = logging.getLogger(__name__)
-
-
 @experiment(
     "Snapshots of {group} in {scene}",
     reads={"mesh": MESH, "train": TRAIN, "heldout": HELDOUT, "config": Setting("scene")},
@@ -65,16 +59,3 @@ def snapshots(mesh: File, train: File, heldout: File, config: SceneConfig, out: 
     frames = sets.training_frames(scene.config.frames, scene.config.reduce[group].train)
     found = sets.collect(train.path, heldout.path, scene.group(group), scene.masses, frames)
     sets.save_snapshots(found, out.path)
-
-
-@experiment(
-    "POD of {group} in {scene} ({basis})",
-    reads={"snapshots": SNAPSHOTS, "spec": Setting("basis")},
-    writes={"out": BASIS},
-)
-def pod(snapshots: File, spec: BasisSpec, out: File) -> None:
-    """Compute a basis ``spec`` of the training ``snapshots`` and save it to ``out``."""
-    data = sets.load_snapshots(snapshots.path)
-    basis = basis_of(data, spec)
-    log.info("numerical rank %d of %d snapshots", basis.rank, len(data.train))
-    save_basis(basis, out.path)

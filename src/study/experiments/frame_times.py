@@ -26,9 +26,10 @@ from pdrom.reduction.subspace.model import load_models
 from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import EachOf, Settings
-from study.experiments.kit.base import Modes, PositionBasis, Solver, experiment, load_reduction
+from study.experiments.kit.base import Modes, PositionBasis, Solver, experiment
 from study.experiments.kit.costs import variant
 from study.experiments.kit.measurement import Case, Processes, Variant, in_processes
+from study.experiments.kit.runfiles import load_reduction
 
 FULL, CONTROL, REDUCED = "full", "control", "reduced"
 COLUMNS = [

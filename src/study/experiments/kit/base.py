@@ -1,4 +1,4 @@
-"""Declaration of an experiment, settings that several share, scenes and reductions from files.
+"""Declaration of an experiment, settings that several share and scenes from files.
 
 An experiment is a question that the study asks, with files as the answer.
 
@@ -7,16 +7,13 @@ and over all seeds (`study.experiments.sensitivity`). From the horizon on the fl
 threshold, and a difference between two runs says nothing about their methods.
 """
 
-import os
 from collections.abc import Callable, Mapping, Sequence
 from typing import Annotated, Any, Literal, cast
 
-import h5py
 import numpy as np
 import pandas as pd
 from pydantic import AfterValidator, Field
 
-from pdrom.core.errors import StorageError
 from pdrom.core.store import open_hdf5, read_table
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.model.constraints.base import GroupConfig
@@ -24,12 +21,7 @@ from pdrom.model.dynamics.solvers import SOLVERS
 from pdrom.model.dynamics.stepper import State, Stepper
 from pdrom.model.held_out import HeldOutMotion
 from pdrom.model.mesh.types import load_mesh
-from pdrom.model.metrics import trajectory_error
 from pdrom.model.scene import Scene, SceneConfig
-from pdrom.reduction.basis import Basis
-from pdrom.reduction.method import MethodSpec
-from pdrom.reduction.rerun import Rerun, displacement_norms
-from pdrom.reduction.sampling.reduction import Reduction, Sampling
 from study.artifact.artifact import Artifact, declare, declared_in
 from study.artifact.paths import File, Place
 from study.artifact.reads import Read
@@ -191,36 +183,3 @@ def varied(
     # the experiments, with their numbers of training snapshots, belong to the original run
     changes = {"time_step": time_step, "frames": count, "effects": tuple(effects)}
     return config.model_copy(update=changes)
-
-
-def load_reduction(
-    basis: Basis, sampling: str | os.PathLike[str], method: MethodSpec, r: int
-) -> Reduction:
-    """Reduction of size r by ``method``, ``basis`` and the file ``sampling``, or StorageError."""
-    with open_hdf5(sampling) as file:
-        store = file[f"r{r:04d}"]
-        stored = Sampling(store["entries"][...], store["elements"][...])
-    return Reduction(basis, stored, method, r=r)
-
-
-def basis_of(sampling: File, method: MethodSpec, bases: Sequence[File]) -> File:
-    """Basis among ``bases`` that ``method`` needs for the file ``sampling``; else StorageError."""
-    wanted = {"scene": sampling["scene"], "group": sampling["group"], "basis": method.basis_id}
-    for basis in bases:
-        if basis.labels == wanted:
-            return basis
-    raise StorageError(f"{sampling.path}: its basis {method.basis_id} is not among the files read")
-
-
-def run_error(run: np.ndarray, reference: np.ndarray) -> float | None:
-    """Relative error of a ``run`` against a ``reference``, positions (F + 1, N, 3) m of both."""
-    difference = np.linalg.norm((run - reference)[1:].reshape(len(run) - 1, -1), axis=1)
-    return trajectory_error(difference, displacement_norms(reference))
-
-
-def store_end(store: h5py.Group, outcome: Rerun, with_positions: bool = True) -> None:
-    """Store where a run ended, and in single precision what is drawn of it."""
-    blowup = -1 if outcome.blowup_frame is None else outcome.blowup_frame
-    store.attrs.update(blowup_frame=blowup, max_extent=outcome.max_extent)
-    if with_positions:
-        store["positions"] = outcome.positions.astype(np.float32)

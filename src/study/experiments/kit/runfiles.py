@@ -1,0 +1,49 @@
+"""Reductions and bases from their files, errors of runs, and what is stored of them."""
+
+import os
+from collections.abc import Sequence
+
+import h5py
+import numpy as np
+
+from pdrom.core.errors import StorageError
+from pdrom.core.store import open_hdf5
+from pdrom.model.metrics import trajectory_error
+from pdrom.reduction.basis import Basis
+from pdrom.reduction.method import MethodSpec
+from pdrom.reduction.rerun import Rerun, displacement_norms
+from pdrom.reduction.sampling.reduction import Reduction, Sampling
+from study.artifact.paths import File
+
+
+def load_reduction(
+    basis: Basis, sampling: str | os.PathLike[str], method: MethodSpec, r: int
+) -> Reduction:
+    """Reduction of size r by ``method``, ``basis`` and the file ``sampling``, or StorageError."""
+    with open_hdf5(sampling) as file:
+        store = file[f"r{r:04d}"]
+        stored = Sampling(store["entries"][...], store["elements"][...])
+    return Reduction(basis, stored, method, r=r)
+
+
+def basis_of(sampling: File, method: MethodSpec, bases: Sequence[File]) -> File:
+    """Basis among ``bases`` that ``method`` needs for the file ``sampling``; else StorageError."""
+    wanted = {"scene": sampling["scene"], "group": sampling["group"], "basis": method.basis_id}
+    for basis in bases:
+        if basis.labels == wanted:
+            return basis
+    raise StorageError(f"{sampling.path}: its basis {method.basis_id} is not among the files read")
+
+
+def run_error(run: np.ndarray, reference: np.ndarray) -> float | None:
+    """Relative error of a ``run`` against a ``reference``, positions (F + 1, N, 3) m of both."""
+    difference = np.linalg.norm((run - reference)[1:].reshape(len(run) - 1, -1), axis=1)
+    return trajectory_error(difference, displacement_norms(reference))
+
+
+def store_end(store: h5py.Group, outcome: Rerun, with_positions: bool = True) -> None:
+    """Store where a run ended, and in single precision what is drawn of it."""
+    blowup = -1 if outcome.blowup_frame is None else outcome.blowup_frame
+    store.attrs.update(blowup_frame=blowup, max_extent=outcome.max_extent)
+    if with_positions:
+        store["positions"] = outcome.positions.astype(np.float32)
