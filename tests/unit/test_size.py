@@ -13,14 +13,14 @@ import pytest
 from places import ROOT
 
 LIMITS = {
-    "lines of src": 36_318,
-    "modules of src": 214,
+    "lines of src": 36_392,
+    "modules of src": 216,
     "lines of tests": 24_868,
     "words of documentation": 24_566,
     "tables": 25,
     "figures": 23,
-    "experiments": 18,
-    "percent of src in decorators, signatures and imports": 18.70,
+    "experiments": 19,
+    "percent of src in decorators, signatures and imports": 18.74,
 }
 PAGES = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "config/README.md", "docs/**/*.md")
 
