@@ -41,10 +41,7 @@ TABLES = {
     ),
     "alternatives": frame(
         "method iterations k training_motions error_implicit span_error offline_s",
-        ("converged", None, None, None, 0.0, None, None),
         ("playback", None, None, None, 0.75, None, None),
-        ("anderson", 20, None, None, 0.001, None, None),
-        ("ecsw", 40, 8, 1, 0.5, 0.25, 4.0),
         ("ecsw-anderson", 5, 8, 1, 0.5, 0.25, 4.0),
         ("ecsw-anderson", 20, 8, 1, 0.25, 0.125, 4.0),
         ("ecsw-anderson", 20, 4, 4, 0.5, 0.5, 8.0),

@@ -234,18 +234,15 @@ def test_contributions_are_judged_before_the_horizon_and_bring_their_times(tmp_p
     assert pd.isna(by.ms_per_frame[("b", "kick")])
 
 
-def test_the_full_order_with_fewer_iterations_is_the_first_opponent():
+def test_fewer_iterations_are_the_first_opponent_and_groups_without_force_do_not_count():
     early = [("a", "full", "full", 0.0, 6.0), ("b", "full", "full", 0.0, 4.0)]
     early += [
         ("a", "fewer-iterations", "full", error, ms) for error, ms in ((0.2, 1.0), (0.05, 2.0))
     ]
     early += [("b", "fewer-iterations", "full", 0.3, 1.0)]
-    first, _ = paid(tables([("a", "deim", 0.01, 2.0, None)]), *early).itertuples()
+    reruns = tables([("a", "deim", 0.01, 2.0, None), ("b", "deim", 0.01, 2.0, None)])
+    shares = [("a", "spring", 1e-3), ("b", "spring", 2e-3)]  # the former counts for nothing
+    first, own = paid(reruns, *early, shares=shares).itertuples()
     assert (first.method, first.scenes, first.accurate) == ("fewer-iterations", 2, 1)
     assert (first.pays, first.best_speedup, first.heldout) == (1, 3.0, 0)
-
-
-def test_groups_without_force_do_not_count():
-    reruns = tables([("a", "deim", 0.01, 2.0, None), ("b", "deim", 0.01, 2.0, None)])
-    (row,) = paid(reruns, shares=[("a", "spring", 1e-3), ("b", "spring", 2e-3)]).itertuples()
-    assert row.scenes == 1
+    assert own.scenes == 1
