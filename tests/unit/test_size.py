@@ -15,7 +15,7 @@ from places import ROOT
 LIMITS = {
     "lines of src": 36_392,
     "modules of src": 216,
-    "lines of tests": 24_868,
+    "lines of tests": 24_863,
     "words of documentation": 24_566,
     "tables": 25,
     "figures": 23,

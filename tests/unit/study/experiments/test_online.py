@@ -17,13 +17,7 @@ from study.experiments import frame_times as timing
 from study.experiments import subspaces as experiment
 from study.experiments.frame_times import TimedScene
 from study.experiments.kit.measurement import Processes, in_processes
-from study.experiments.subspaces import (
-    COLUMNS,
-    LARGE_COLUMNS,
-    Hrpd,
-    LargeModels,
-    Online,
-)
+from study.experiments.subspaces import COLUMNS, LARGE_COLUMNS, Hrpd, LargeModels, Online
 from study.tables.effects_cost import frame_times, online, speedups
 
 EFFECTS = (
@@ -55,7 +49,8 @@ def written(tmp_path_factory):
         frame_times=ONCE, timed_scenes=named, large_scenes=named, subspace_cases=(),
         projection_cases=(), projection_methods={}, solver=DEFAULT_SOLVER,
     )  # fmt: skip
-    timing.frame_times([mesh], [], [], [], [], [stored], settings, *times)
+    none = dict.fromkeys(("subspaces", "bases", "samplings", "snapshots"), [])
+    timing.frame_times(settings, *times, meshes=[mesh], large=[stored], **none)
     return scene, path, times[0]
 
 
