@@ -49,7 +49,7 @@ def written(tmp_path_factory):
         frame_times=ONCE, timed_scenes=named, large_scenes=named, subspace_cases=(),
         projection_cases=(), projection_methods={}, solver=DEFAULT_SOLVER,
     )  # fmt: skip
-    none = dict.fromkeys(("subspaces", "bases", "samplings", "snapshots"), [])
+    none = {key: [] for key in ("subspaces", "bases", "samplings", "snapshots")}
     timing.frame_times(settings, *times, meshes=[mesh], large=[stored], **none)
     return scene, path, times[0]
 
