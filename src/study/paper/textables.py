@@ -253,7 +253,7 @@ def training(alternatives: pd.DataFrame) -> Rows:
     reduced = reduced[reduced.iterations == reduced.iterations.max()]
     played = alternatives[alternatives.method == PLAYBACK].set_index(CASE).error_implicit
     counts = sorted(reduced.training_motions.unique())
-    header = ["scene", "vertices", "motion", "playback", *map(str, counts)]
+    header = ["scene", "vertices", "motion", "playback", *map(_whole, counts)]
     header += ["nearest: least", "most", "training (s): least", "most"]
     yield "lrl" + "r" * (5 + len(counts)), header
     for case, own in reduced.groupby(CASE, sort=False):
