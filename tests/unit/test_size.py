@@ -13,7 +13,7 @@ import pytest
 from places import ROOT
 
 LIMITS = {
-    "lines of src": 36_392,
+    "lines of src": 36_385,
     "modules of src": 216,
     "lines of tests": 24_863,
     "words of documentation": 24_564,

@@ -113,7 +113,9 @@ def digest_of_code(tree: ast.Module, module: str = "") -> str:
     """
     for node in _statements(tree):
         if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef)):
-            node.body = [s for s in node.body if not _is_text(s)] or [ast.Pass()]
+            texts = [s for s in node.body if isinstance(getattr(s, "value", None), ast.Constant)]
+            texts = [s for s in texts if isinstance(s, ast.Expr)]  # docstrings, without effect
+            node.body = [s for s in node.body if s not in texts] or [ast.Pass()]
         elif isinstance(node, ast.Assign):
             match node.value:
                 case ast.Call(ast.Name(Registry.__name__), [_, ast.Dict(keys, values) as entries]):
@@ -122,11 +124,6 @@ def digest_of_code(tree: ast.Module, module: str = "") -> str:
                     entries.keys = [*compress(keys, own)]
                     entries.values = [*compress(values, own)]
     return hashlib.sha256(ast.dump(tree).encode()).hexdigest()
-
-
-def _is_text(node: ast.stmt) -> bool:
-    """Return whether a statement is a constant, such as a docstring, and so has no effect."""
-    return isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
 
 
 def digest(root: Path, *names: str) -> str:

@@ -19,7 +19,7 @@ from study.artifact.reads import Every, Setting, TableOf
 from study.experiments.kit.base import ANDERSON, FOM
 from study.tables.kit import results
 from study.tables.kit.declaration import count, flag, integer, number, shared, table, text, timed
-from study.tables.kit.results import FAILED, HIGH, LOW, MEDIAN, joined, trained, with_held_out
+from study.tables.kit.results import FAILED, joined, trained, with_held_out
 
 FEWER = "fewer-iterations"
 _MODEL = ["scene", "position_basis", "k", "method"]
@@ -323,5 +323,4 @@ def _fewer(points: pd.DataFrame) -> pd.DataFrame:
     full = points[(points.method == "full") & (points.position_basis == "full")]
     fewer = points[points.method == FEWER]
     speedup = fewer.scene.map(full.set_index("scene").ms_per_frame) / fewer.ms_per_frame
-    unseen = dict.fromkeys((MEDIAN, LOW, HIGH), np.nan)
-    return fewer.assign(group="all", speedup=speedup, **unseen)
+    return fewer.assign(group="all", speedup=speedup)

@@ -120,7 +120,7 @@ class Comparison(Processes):
     new processes times ``frames`` spread over the first motion. The reduction has each of ``modes``
     and samples elements to ``tau``; it is trained on each number of ``training_motions``, the first
     of which is that of the scene. The coarse level of two-level samples to ``coarse_tau`` and is
-    trained on this one. ``work`` bounds vertices x substeps x iterations of a frame of a method,
+    trained on the fewest. ``work`` bounds vertices x substeps x iterations of a frame of a method,
     and vertices x motions of the ``training``; what is beyond it is left out.
     """
 
@@ -240,8 +240,7 @@ def candidates(
     start, reduced = scene.initial_state(), []
     for method in settings.steps:
         for substeps, iterations in settings.pairs(method, scene.mesh.vertices):
-            labels: dict[str, object] = {"method": method}
-            labels |= {"substeps": substeps, "iterations": iterations}
+            labels = {"method": method, "substeps": substeps, "iterations": iterations}
             if method in TRAINED:
                 reduced.append((method, substeps, iterations, labels))
                 continue
@@ -251,9 +250,8 @@ def candidates(
             loop = METHODS.load(method)(scene, substeps, iterations, systems[substeps])
             yield Candidate(labels, loop, start)
     for own in models:
-        sizes: dict[str, object] = {"training_motions": own.motions, "offline_s": own.seconds}
-        sizes |= {"k": own.model.columns.modes}
-        sizes["elements_sampled"] = own.model.elements_evaluated(scene)
+        sizes: dict[str, object] = {"training_motions": own.motions, "k": own.model.columns.modes}
+        sizes |= {"offline_s": own.seconds, "elements_sampled": own.model.elements_evaluated(scene)}
         for method, substeps, iterations, labels in reduced:
             if substeps != own.substeps or own.coarse != (method == TWO_LEVEL):
                 continue
@@ -275,7 +273,7 @@ def trained(training: Scene, settings: Comparison) -> Iterator[Trained]:
     These are the motion of ``training`` and further ones that the scene draws by seeds. The columns
     are modes of nearly converged frames, of n motions every n-th one. The samples are trained on
     iterates of these motions in these columns, for every number of substeps that a reduction takes.
-    The first motion also gives a coarse level.
+    The fewest motions also give a coarse level.
     """
     vertices, own = training.mesh.vertices, settings.implicit
     taken, coarse = (
@@ -288,8 +286,8 @@ def trained(training: Scene, settings: Comparison) -> Iterator[Trained]:
             continue
         started = process_time()
         while len(scenes) < count:
-            variant = training.config.training_variant(len(scenes))
-            scenes.append(Scene.build(variant, training.mesh))
+            further = training.config.training_variant(len(scenes))
+            scenes.append(Scene.build(further, training.mesh))
         for scene in scenes[len(runs) :]:
             run = converged_run(scene, own.training_tolerance, own.limit)
             if run is None:
@@ -299,12 +297,11 @@ def trained(training: Scene, settings: Comparison) -> Iterator[Trained]:
         spent += process_time() - started
         for k in settings.modes:
             started = process_time()
-            frames = np.concatenate([run[::count] for run in runs])
-            columns = make_columns(training, frames, "pod", k=k)
+            columns = make_columns(training, np.concatenate([r[::count] for r in runs]), "pod", k=k)
             in_columns = process_time() - started
             for substeps in sorted({*taken, *coarse}):
                 started = process_time()
-                level = count == 1 and substeps in coarse
+                level = count == min(settings.training_motions) and substeps in coarse
                 tolerances = [settings.tau, *([settings.coarse_tau] if level else [])]
                 scene, *others = (substepped(s, substeps, s.config.iterations) for s in scenes)
                 ends = np.arange(substeps - 1, scene.config.frames, substeps)
