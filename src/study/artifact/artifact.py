@@ -25,7 +25,7 @@ from pydantic import BaseModel, TypeAdapter
 
 from pdrom.core.provenance import made_by
 from study.artifact.paths import Place
-from study.artifact.reads import FileRead, Labels, Paths, Read, SettingRead, Sources
+from study.artifact.reads import FileRead, Labels, Read, SettingRead, Sources
 
 A = TypeVar("A", bound="Artifact")
 
@@ -58,14 +58,9 @@ class Artifact:
         return self.rule_pattern.format(self.name)
 
     @property
-    def module(self) -> str:
-        """Name of the module that declares the artifact."""
-        return self.function.__module__
-
-    @property
     def address(self) -> str:
         """Address ``module:name``, from which `load` imports the artifact."""
-        return f"{self.module}:{self.name}"
+        return f"{self.function.__module__}:{self.name}"
 
     @property
     def labels(self) -> list[str]:
@@ -73,7 +68,7 @@ class Artifact:
         return list(dict.fromkeys(name for place in self.writes.values() for name in place.labels))
 
     @property
-    def files(self) -> dict[str, FileRead | Place]:
+    def files(self) -> dict[str, FileRead]:
         """Reads that are files, by parameter name."""
         reads = self.reads.items()
         return {name: read for name, read in reads if not isinstance(read, SettingRead)}
@@ -88,10 +83,6 @@ class Artifact:
     def __call__(self, *arguments: Any, **named: Any) -> Any:
         """Call the artifact's function with these arguments and return its result."""
         return self.function(*arguments, **named)
-
-    def inputs(self, sources: Sources, labels: Labels) -> dict[str, Paths]:
-        """Input paths of a job with these ``labels``, by parameter name; ``sources`` finds them."""
-        return {name: read.paths(sources, labels) for name, read in self.files.items()}
 
     def settings(self, sources: Sources, labels: Labels) -> dict[str, Any]:
         """Typed settings of a job by parameter name; ConfigurationError if a key is unknown."""
@@ -166,7 +157,7 @@ def declared_in(package: str, kind: type[A]) -> dict[str, A]:
         name = ".".join((package, *path.relative_to(root).with_suffix("").parts))
         module = import_module(name.removesuffix(".__init__"))
         for value in vars(module).values():
-            if isinstance(value, kind) and value.module == module.__name__:
+            if isinstance(value, kind) and value.function.__module__ == module.__name__:
                 found[value.name] = value
     return dict(sorted(found.items()))
 

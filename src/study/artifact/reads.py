@@ -1,7 +1,8 @@
 """Reads of an artifact: declarations of the files and settings that it needs.
 
-A read contains no path: it names a kind of file, a table or a key of the configuration. The
-pipeline finds paths and values (`Sources`); the artifact's function gets the content by name.
+A read contains no path: it names a kind of file, a table or a key of the configuration. For the
+labels of a job, `Sources` find the path or the list of paths of a `FileRead`, of which the
+artifact's function gets the ``content`` by name, and the ``value`` of a `SettingRead`.
 """
 
 from collections.abc import Mapping
@@ -18,31 +19,8 @@ Paths = str | list[str]
 Sources = Any
 
 
-class FileRead:
-    """Base class of reads from files."""
-
-    def paths(self, sources: Sources, labels: Labels) -> Paths:
-        """Return the path, or a list of paths, that ``sources`` finds for these ``labels``."""
-        raise NotImplementedError
-
-    def content(self, paths: Any) -> Any:
-        """Return the argument of the artifact's function that is read from ``paths``."""
-        raise NotImplementedError
-
-
-class SettingRead:
-    """Base class of reads from the configuration."""
-
-    def value(self, sources: Sources, labels: Labels) -> Any:
-        """Return the value that ``sources`` has for a job with these ``labels``."""
-        raise NotImplementedError
-
-
-Read = FileRead | SettingRead | Place  # a `Place` is the job's own file of its kind
-
-
 @dataclass(frozen=True)
-class Every(FileRead):
+class Every:
     """All files of the kind ``place`` in the configuration whose labels agree with the job's."""
 
     place: Place
@@ -66,7 +44,7 @@ class EachOf(Every):
 
 
 @dataclass(frozen=True)
-class TableOf(FileRead):
+class TableOf:
     """The study's table ``name``, read as a data frame."""
 
     name: str
@@ -78,7 +56,7 @@ class TableOf(FileRead):
         return read_table(str(paths))
 
 
-class EditedFiles(FileRead):
+class EditedFiles:
     """Base class of reads of hand-edited files; jobs rerun for new content, not for new dates."""
 
     def content(self, paths: Any) -> Any:
@@ -116,7 +94,7 @@ class SourcesOf(EditedFiles):
 
 
 @dataclass(frozen=True)
-class Setting(SettingRead):
+class Setting:
     """The configuration value of ``key``; dots in the key separate section and entry."""
 
     key: str
@@ -126,7 +104,7 @@ class Setting(SettingRead):
 
 
 @dataclass(frozen=True)
-class Settings(SettingRead):
+class Settings:
     """Several settings as one Pydantic ``model``; the name of each field is the setting's key."""
 
     model: type[Any]
@@ -134,3 +112,9 @@ class Settings(SettingRead):
     def value(self, sources: Sources, labels: Labels) -> Any:
         fields = self.model.model_fields
         return self.model.model_validate({key: sources.value(key, labels) for key in fields})
+
+
+# a `Place` is the job's own file of its kind
+FileRead = Every | TableOf | ProjectFile | ProjectFiles | SourcesOf | Place
+SettingRead = Setting | Settings
+Read = FileRead | SettingRead

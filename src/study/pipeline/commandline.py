@@ -11,7 +11,6 @@ import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 from pdrom.core.errors import ConfigurationError, PdromError
 from pdrom.core.yamlfile import read_yaml, shown
@@ -117,33 +116,6 @@ def check_files(paths: Iterable[str | Path]) -> None:
             raise ConfigurationError(f"{path}: a mapping of keys is required, found {found}")
         if TEMPLATE_KEY in content:
             raise ConfigurationError(f"{path}: {TEMPLATE_KEY}: templates are not allowed")
-
-
-def merged(default: Path, configfiles: Iterable[str], settings: Iterable[str]) -> dict[str, Any]:
-    """Return the whole configuration, merged as Snakemake merges it.
-
-    Parameters
-    ----------
-    default : file of the full study
-    configfiles : files of ``--configfile``, in order
-    settings : ``key=value`` pairs of ``--config``
-
-    Raises
-    ------
-    ConfigurationError
-        A file is missing or is not a mapping.
-    """
-    # imported late: Snakemake's jobs import this module and do not need these functions
-    from snakemake.cli import parse_config
-    from snakemake.settings.types import ConfigSettings
-    from snakemake.utils import update_config
-
-    files = list(map(Path, configfiles))
-    check_files([default, *files])
-    whole = dict(read_yaml(default))
-    given = ConfigSettings(config=parse_config(tuple(settings)), configfiles=files)
-    update_config(whole, given.overwrite_config)
-    return whole
 
 
 @contextmanager

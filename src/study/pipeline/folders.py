@@ -4,7 +4,6 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from pdrom.core.errors import ConfigurationError
 from pdrom.core.yamlfile import read_yaml
@@ -63,9 +62,3 @@ def folders(configfiles: Iterable[str | Path], settings: Iterable[str]) -> Folde
         )
     results = f"{RESULTS}/studies/{name}"
     return Folders(results, f"{results}/paper/main.pdf")
-
-
-def folders_of(workflow: Any) -> Folders:
-    """Return the `folders` of the configuration of Snakemake's ``workflow``."""
-    settings = [f"{key}={value}" for key, value in workflow.config_settings.config.items()]
-    return folders(workflow.overwrite_configfiles, settings)

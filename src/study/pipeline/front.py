@@ -53,21 +53,16 @@ def completed(arguments: Sequence[str]) -> list[str]:
     cores = () if command.cores else ("--cores", "all")
     replaced = command.plans or not command.looks_only
     lines = LINES if replaced and not command.own_output else ()
-    return command.rewritten([*cores, *lines, *OPTIONS], _made(command))
+    own, made = folders(command.configfiles, command.settings), {}
+    if command.targets:
+        from study.pipeline.targets import described, files  # late: it imports the whole package
 
-
-def _made(command: CommandLine) -> dict[str, list[str]]:
-    """Return the files of each target of ``command``; print them if the target is only a name."""
-    own = folders(command.configfiles, command.settings)
-    if not command.targets:
-        return {}
-    from study.pipeline.targets import described, files  # late: it imports the whole package
-
-    made = {target: files(target, own) for target in command.targets}
-    for target, found in made.items():
-        if found != [target]:
-            sys.stderr.write(f"reproduce: {described(target)}: {', '.join(found)}\n")
-    return made
+        made = {target: files(target, own) for target in command.targets}
+        # the files of a target that is only a name are printed
+        for target, found in made.items():
+            if found != [target]:
+                sys.stderr.write(f"reproduce: {described(target)}: {', '.join(found)}\n")
+    return command.rewritten([*cores, *lines, *OPTIONS], made)
 
 
 def _start(command: Sequence[str]) -> NoReturn:

@@ -232,7 +232,8 @@ class Plan:
         key = (artifact.rule, *own.values())
         if key not in self._jobs:
             known = {**own, "figure": artifact.name}  # options of a figure are found by its name
-            settings, inputs = artifact.settings(self, known), artifact.inputs(self, known)
+            settings = artifact.settings(self, known)
+            inputs = {k: read.paths(self, known) for k, read in artifact.files.items()}
             edited = [k for k, read in artifact.files.items() if isinstance(read, EditedFiles)]
             content = [path for name in edited for path in listed(inputs[name])]
             self._jobs[key] = Job(
@@ -242,7 +243,7 @@ class Plan:
                 {k: place.at(self.results, **own) for k, place in artifact.writes.items()},
                 artifact.plain(settings),
                 digest(self.study.root, *content) if content else "",
-                fingerprint(artifact.module, *sorted(set(modules_in(settings)))),
+                fingerprint(artifact.function.__module__, *sorted(set(modules_in(settings)))),
             )
         return self._jobs[key]
 

@@ -131,7 +131,7 @@ def _section(table: Table) -> str:
     lines = [
         f"## {table.name}",
         "",
-        f"{table.title}.\nMade by `{table.module}` from {', '.join(sources)}.",
+        f"{table.title}.\nMade by `{table.function.__module__}` from {', '.join(sources)}.",
         "",
         "| column | type | unit | timed | compared as | meaning |",
         "|---|---|---|---|---|---|",

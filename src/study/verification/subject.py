@@ -13,7 +13,8 @@ from functools import cached_property
 from pathlib import Path
 
 from pdrom.core.errors import INTERRUPTED, PdromError
-from study.pipeline.commandline import CommandLine, check_files, merged, recall
+from pdrom.core.yamlfile import read_yaml
+from study.pipeline.commandline import CommandLine, check_files, recall
 from study.pipeline.folders import DEFAULT, Folders, folders
 from study.pipeline.plan import Plan, load_plan
 
@@ -56,9 +57,17 @@ class Subject:
     @cached_property
     def plan(self) -> Plan:
         """Plan of the configuration, merged from its files and settings as by Snakemake."""
+        # imported late: ``--help`` and faults of the arguments need no Snakemake
+        from snakemake.cli import parse_config
+        from snakemake.settings.types import ConfigSettings
+        from snakemake.utils import update_config
+
         command = CommandLine(self.options)
-        whole = merged(Path(DEFAULT), command.configfiles, command.settings)
-        return load_plan(whole, command.configfiles, self.folders, quiet=True)
+        files = list(map(Path, command.configfiles))
+        given = ConfigSettings(config=parse_config(command.settings), configfiles=files)
+        whole = dict(read_yaml(Path(DEFAULT)))
+        update_config(whole, given.overwrite_config)
+        return load_plan(whole, files, self.folders, quiet=True)
 
 
 def options_parser(command: str, about: str, epilog: str | None = None) -> argparse.ArgumentParser:

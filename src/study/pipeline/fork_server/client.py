@@ -99,7 +99,7 @@ def receive(connection: socket.socket) -> bytes:
 
 
 def forward(job: int, number: int) -> None:
-    """Send signal ``number`` to the process group ``job``, which has a session of its own."""
+    """Send signal ``number`` to the process group of a job, which what it started belongs to."""
     with suppress(ProcessLookupError):
         os.killpg(job, number)
 

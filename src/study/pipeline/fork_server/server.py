@@ -20,16 +20,10 @@ import threading
 from contextlib import suppress
 from typing import Any, NoReturn
 
-from study.pipeline.fork_server.client import of_this_user
+from study.pipeline.fork_server.client import forward, of_this_user
 
 NUMBER = b"%20d"
 _DIES_WITH_PARENT = 1  # constant PR_SET_PDEATHSIG of <sys/prctl.h>
-
-
-def kill(process: int) -> None:
-    """Kill the process group of a job, which includes the processes that the job started."""
-    with suppress(ProcessLookupError):
-        os.killpg(process, signal.SIGKILL)
 
 
 class Server:
@@ -66,7 +60,7 @@ class Server:
             ready = select.select([*waiting, *self.silent, *self.jobs.values()], [], [])[0]
             if self.owner in ready:
                 for process in self.jobs:
-                    kill(process)
+                    forward(process, signal.SIGKILL)
                 return None
             if self.wake in ready:
                 os.read(self.wake, 4096)
@@ -75,7 +69,7 @@ class Server:
                 # a client sends nothing after its request: readable data mean that its connection
                 # is closed, so that its job is killed
                 if client in ready:
-                    kill(process)
+                    forward(process, signal.SIGKILL)
             for client in [client for client in self.silent if client in ready]:
                 if script := self._answer(client):
                     return script
@@ -119,7 +113,7 @@ class Server:
         try:
             client.sendall(NUMBER % process)
         except OSError:
-            kill(process)
+            forward(process, signal.SIGKILL)
         return None
 
     def _become_job(self, client: socket.socket, streams: list[int]) -> str:
