@@ -72,27 +72,6 @@ def test_code_counts_and_text_about_it_does_not(edit):
     assert (edited != digest_of_source(SOURCE)) == (edit in CODE)
 
 
-def test_closure_follows_imports():
-    found = closure("pdrom.core.registry")
-    assert found == ["pdrom.core", "pdrom.core.errors", "pdrom.core.registry"]
-    assert {"pdrom.core.store", "pdrom.model.constraints.base"} < set(
-        closure("pdrom.model.dynamics.system")
-    )
-    assert "pdrom.reduction.basis" in closure("pdrom.reduction.subspace.model")
-
-
-def test_effects_are_in_no_closure_that_does_not_list_them():
-    """The mesh does not depend on a spring; a scene that lists springs does."""
-    kernels = {
-        "pdrom.model.constraints.spring",
-        "pdrom.model.constraints.bending",
-        "pdrom.model.effects.poke",
-    }
-    assert not kernels & set(closure("study.experiments.fom"))
-    with_spring = closure("study.experiments.fom", "pdrom.model.constraints.spring")
-    assert kernels & set(with_spring) == {"pdrom.model.constraints.spring"}
-
-
 REGISTRY = """
 from pdrom.core.registry import Registry
 
@@ -183,6 +162,8 @@ def taken() -> tuple[str, str]:
         ("model/constraints/bending.py", "\nADDED = 1\n", (False, False)),
         ("model/mesh/generators.py", "\nADDED = 1\n", (True, True)),
         ("core/store/__init__.py", "\nADDED = 1\n", (True, True)),
+        ("model/constraints/__init__.py", "\nADDED = 1\n", (True, True)),
+        ("reduction/basis.py", "\nADDED = 1\n", (False, False)),
     ],
 )
 def test_an_edit_changes_what_uses_the_module(copy, name, text, changed):

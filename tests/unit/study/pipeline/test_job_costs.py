@@ -13,10 +13,7 @@ from pdrom.core.store import write_table
 from places import ROOT
 from study.artifact.logs import Usage
 from study.experiments.kit.base import experiments
-from study.pipeline import run
-from study.pipeline.commandline import CommandLine
-from study.pipeline.failures import Failures
-from study.pipeline.run import RUN_TIMES, Run, expected_seconds, say_compilation, units_of
+from study.pipeline.run import RUN_TIMES, expected_seconds, say_compilation, units_of
 from study.pipeline.scenes import Coarsen
 from study.pipeline.summary import minutes
 from study.pipeline.tracked import COLUMNS, COSTS, main, measured_costs, recorded_verdicts
@@ -108,12 +105,9 @@ def test_costs_are_read_from_the_logs_of_two_runs(tmp_path):
     ]
 
 
-def test_what_git_does_not_keep_is_not_written():
+def test_what_git_does_not_keep_or_no_run_has_measured_is_not_written(tmp_path):
     with pytest.raises(PdromError, match=r"'cost': unknown .*did you mean 'costs'"):
         main(["cost"])
-
-
-def test_without_a_run_it_says_so(tmp_path):
     with pytest.raises(PdromError, match="run the study first"):
         measured_costs(str(tmp_path), str(tmp_path))
 
@@ -159,15 +153,3 @@ def test_kernels_are_compiled_once(tmp_path, capsys):
     (tmp_path / "dynamics_1" / "loop.iterate_0-1.py312.nbi").touch()
     say_compilation(str(tmp_path))
     assert capsys.readouterr().err == ""
-
-
-def test_choices_among_jobs_start_no_timers(monkeypatch):
-    """Snakemake's scheduler starts one after every choice where it limits the rate of jobs."""
-    monkeypatch.setattr(run.running, "stop_at_sigterm", lambda _: None)
-    for name in ("say_compilation", "tell_expectation"):
-        monkeypatch.setattr(run, name, lambda *_: None)
-    scheduler = SimpleNamespace(job_rate_limiter="1000 jobs in 20 seconds")
-    workflow = SimpleNamespace(scheduler=scheduler, local_exec=False)
-    begun = Run(CommandLine(["--executor", "touch"]), Failures())
-    begun.start(workflow, plan=None)
-    assert scheduler.job_rate_limiter is None

@@ -5,6 +5,7 @@ import re
 from collections.abc import Iterable
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 from snakemake.logging import LoggerManager
@@ -91,26 +92,22 @@ def quotients(name: str, slower: float) -> tuple[list[float], float]:
     return found, silent
 
 
-@pytest.mark.parametrize("slower", [1.0, 3.0, 9.0])
-def test_on_a_machine_of_any_speed_the_promise_is_kept(slower):
-    """Never more than 1.5 times what follows, nor less than 0.6; silent for a tenth of the run."""
-    found, silent = quotients("quiet", slower)
-    assert min(found) > 0.6
-    assert max(found) < 1.5
-    assert silent < 0.1
-    assert len(found) > 200
-
-
-# Bounds of nearly all that is said while other programs come and go, which nobody can know before:
-# in `first` the load of two cores rose from 2 to 25, and kernels were compiled; in `busy` it fell.
 @pytest.mark.parametrize(
-    ("name", "least", "most"), [("first", 0.6, 1.5), ("busy", 0.6, 1.9)], ids=["first", "busy"]
+    ("name", "slower", "most", "share", "silence"),
+    [
+        *(("quiet", slower, 1.5, 1.0, 0.1) for slower in (1.0, 3.0, 9.0)),
+        # Other programs come and go, which nobody can know before: in `first` the load of two cores
+        # rose from 2 to 25, and kernels were compiled; in `busy` it fell.
+        ("first", 1.0, 1.5, 0.95, 0.25),
+        ("busy", 1.0, 1.9, 0.95, 0.25),
+    ],
 )
-def test_recorded_runs_beside_others(name, least, most):
-    found, silent = quotients(name, 1.0)
-    kept = [least < quotient < most for quotient in found]
-    assert sum(kept) > 0.95 * len(kept)
-    assert silent < 0.25
+def test_on_a_machine_of_any_speed_the_promise_is_kept(name, slower, most, share, silence):
+    """Never more than 1.5 times what follows, nor less than 0.6; silent for a tenth of the run."""
+    found, silent = quotients(name, slower)
+    assert np.mean([0.6 < quotient < most for quotient in found]) >= share
+    assert silent < silence
+    assert len(found) > 190
 
 
 @pytest.mark.parametrize(

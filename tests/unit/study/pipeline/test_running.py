@@ -44,15 +44,17 @@ def snakemake_lock() -> None:
     (running.SNAKEMAKE_LOCKS / "0.output.lock").write_text("results/x\n")
 
 
-def test_the_second_process_names_the_first(other):
+def test_the_second_process_names_the_first_whose_locks_go_with_it(other):
+    snakemake_lock()
     with pytest.raises(running.AtWorkError, match=rf"process {other.pid} on .* is at work"):
         running.hold()
     assert running.LOCK.read_text().startswith(f"process {other.pid} ")
-
-
-def test_a_lock_goes_with_its_process_however_it_ends(other):
-    other.send_signal(signal.SIGKILL)
+    running.remove_stale_locks()
+    assert running.SNAKEMAKE_LOCKS.exists()
+    other.kill()
     other.wait()
+    running.remove_stale_locks()
+    assert not running.SNAKEMAKE_LOCKS.exists()
     snakemake_lock()
     descriptor = running.hold()
     assert running.LOCK.read_text().startswith(f"process {os.getpid()} ")
@@ -68,17 +70,6 @@ def test_a_lock_is_not_inherited_by_jobs():
         job.communicate(b"\n")
 
 
-def test_stale_locks_go_and_those_of_a_living_run_stay(other):
-    snakemake_lock()
-    running.remove_stale_locks()
-    assert running.SNAKEMAKE_LOCKS.exists()
-    other.kill()
-    other.wait()
-    running.remove_stale_locks()
-    assert not running.SNAKEMAKE_LOCKS.exists()
-    os.close(running.hold())
-
-
 def test_a_folder_that_cannot_be_written_is_named(folder):
     (folder / ".snakemake").write_text("a file where the folder should be")
     with pytest.raises(running.AtWorkError, match=r"run\.lock: cannot be written"):
@@ -88,34 +79,23 @@ def test_a_folder_that_cannot_be_written_is_named(folder):
 DAY = 86_400 * 10**9
 
 
-def test_future_dates_come_before_now_in_their_order(tmp_path):
+def test_future_dates_come_before_now_in_their_order_but_not_behind_a_link(tmp_path):
     start = time.time_ns()
     offsets = {"old": -DAY, "late": 3 * DAY, "early": DAY, "twin": DAY, "deep/later": 4 * DAY}
+    offsets |= {"link": 5 * DAY, "../elsewhere": 6 * DAY}  # a link to a file of no folder
+    (folder := tmp_path / "results").mkdir()
     for name, offset in offsets.items():
-        path = tmp_path / name
+        path = folder / name
         path.parent.mkdir(exist_ok=True)
-        path.write_text(name)
-        os.utime(path, ns=(start, start + offset))
-    assert running.settle_dates([tmp_path, tmp_path / "none"]) == 4
-    dates = {name: (tmp_path / name).stat().st_mtime_ns for name in offsets}
+        path.symlink_to(folder / "../elsewhere") if name == "link" else path.write_text(name)
+        os.utime(path, ns=(start, start + offset), follow_symlinks=False)
+    assert running.settle_dates([folder, tmp_path / "none"]) == 5
+    dates = {name: (folder / name).lstat().st_mtime_ns for name in offsets}
     assert dates["old"] == start - DAY
     assert dates["old"] < dates["early"] == dates["twin"] < dates["late"] < dates["deep/later"]
-    assert dates["deep/later"] <= time.time_ns()
-    assert running.settle_dates([tmp_path]) == 0
-
-
-def test_dates_of_what_a_link_leads_to_are_left_alone(tmp_path):
-    folder, elsewhere = tmp_path / "results", tmp_path / "elsewhere"
-    folder.mkdir()
-    elsewhere.write_text("not of this study")
-    later = time.time_ns() + DAY
-    os.utime(elsewhere, ns=(later, later))
-    link = folder / "link"
-    link.symlink_to(elsewhere)
-    os.utime(link, ns=(later, later), follow_symlinks=False)
-    assert running.settle_dates([folder]) == 1
-    assert elsewhere.stat().st_mtime_ns == later
-    assert link.lstat().st_mtime_ns <= time.time_ns()
+    assert dates["deep/later"] < dates["link"] <= time.time_ns()
+    assert dates["../elsewhere"] == start + 6 * DAY
+    assert running.settle_dates([folder]) == 0
 
 
 PLANS = """

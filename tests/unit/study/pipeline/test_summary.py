@@ -131,6 +131,8 @@ END = logging.makeLogRecord({"msg": "This was a dry-run (flag -n). The order of 
 def test_jobs_are_counted_by_rule_and_their_times_added():
     seconds = {"fom/a.log": 600.0, "fom/b.log": 1800.0, "timing.log": 1200.0}
     preview = Preview(seconds.__getitem__, cores=2)
+    preview.emit(logging.makeLogRecord({"msg": "Nothing to be done"}))
+    assert preview.text() == ""
     preview.emit(job("fom", "Missing output files: a", "fom/a.log"))
     preview.emit(job("fom", "Params have changed since last execution: {}", "fom/b.log"))
     preview.emit(job("timing", "Missing output files: a", "timing.log", threads=8))
@@ -143,9 +145,3 @@ def test_jobs_are_counted_by_rule_and_their_times_added():
         "    1 all     input is made again",
         "pdrom: 4 jobs, about 40 min on 2 cores, about 60 min of processor time",
     ]
-
-
-def test_what_has_nothing_to_do_says_no_more():
-    preview = Preview(lambda log: 1.0, cores=1)
-    preview.emit(logging.makeLogRecord({"msg": "Nothing to be done"}))
-    assert preview.text() == ""
