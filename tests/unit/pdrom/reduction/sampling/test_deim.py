@@ -110,15 +110,6 @@ def test_follows_the_definition(size):
         np.testing.assert_array_equal(joint_rows(v[:, :r], ALL, False), rows[:r])
 
 
-def test_round_off_axis_has_no_say(rng):
-    v = modes((30, 8, 1))
-    v[2::3] = 1e-16 * rng.standard_normal((30, 8))
-    flat = v.copy()
-    flat[2::3] = 0.0
-    active = (True, True, False)
-    np.testing.assert_array_equal(joint_rows(v, active, False), joint_rows(flat, active, False))
-
-
 @pytest.mark.parametrize("repeat", [False, True])
 def test_singular_axis_system_raises_nothing_and_is_deterministic(repeat):
     """The z part of every mode is zero although the axis counts: a 0 x 0 information system."""

@@ -217,15 +217,6 @@ def test_poorer_axis_of_a_basis_per_axis_fails_beyond_its_rank_only():
     np.testing.assert_allclose(full.reconstruct(p), p, atol=1e-11)
 
 
-def test_shared_coefficients_give_zero_in_a_flat_axis():
-    p, mass = data(17)
-    p[:, :, 2] = 0.0
-    result = reduction_of(p, mass, PRESETS["block-deim"], 5).reconstruct(
-        p + np.array([0.0, 0.0, 1.0])
-    )
-    assert np.abs(result[:, :, 2]).max() < 1e-13
-
-
 # Selection ----------------------------------------------------------------------------------
 
 

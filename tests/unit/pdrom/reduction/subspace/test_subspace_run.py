@@ -1,7 +1,6 @@
 """Runs in a position subspace: exact where nothing is lost, and independent of the mesh."""
 
 from functools import partial
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -22,6 +21,7 @@ SPRING = {"effect": "spring", "weight": 1e5}
 STRAIN = {"effect": "strain", "weight": 1e5}
 GRAVITY = {"effect": "gravity", "acceleration": [0.0, 0.0, -9.81]}
 HANDLES = (TOP, {"effect": "rotate", "select": "bottom", "axis": "y", "degrees": 30.0, "over": 6})
+BOTTOM = {"effect": "pins", "select": "bottom"}
 DAMPING = {"effect": "damping", "rate": 2.0}
 DRAG = {"effect": "drag", "coefficient": 5.0}
 BENDING = {"effect": "bending", "weight": 10.0}
@@ -35,6 +35,7 @@ SCENES = {
     "free": partial(make_scene, SPRING, STRAIN, GRAVITY, frames=6),
     "pins": partial(make_scene, SPRING, GRAVITY, TOP, frames=6),
     "handles": partial(make_scene, SPRING, STRAIN, GRAVITY, *HANDLES, frames=8),
+    "released": partial(make_scene, SPRING, GRAVITY, TOP, {**BOTTOM, "until": 3}, frames=8),
     "damped": partial(make_scene, SPRING, GRAVITY, DAMPING, TOP, frames=6),
     "dragged": partial(make_scene, SPRING, GRAVITY, DAMPING, DRAG, TOP, frames=6),
     "bending": partial(make_scene, BENDING, GRAVITY, TOP, mesh=GROUPS["bending"], frames=6),
@@ -91,7 +92,7 @@ def test_the_whole_space_repeats_the_full_order_run(name):
 
 @pytest.mark.parametrize("made", [lambda *_: {}, hrpd_of], ids=["all", "hrpd"])
 @pytest.mark.parametrize("kind", ["pod", "skinning"])
-@pytest.mark.parametrize("name", ["pins", "handles", "poke", "bar"])
+@pytest.mark.parametrize("name", ["pins", "handles", "released", "poke", "bar"])
 def test_pins_and_handles_are_met_exactly(name, kind, made):
     scene = SCENES[name]()
     reference = trajectory(scene)
@@ -120,21 +121,6 @@ def test_output_in_single_precision_is_the_product(vertices, columns):
     rng = np.random.default_rng(1)
     B, z = rng.standard_normal((vertices, columns)), rng.standard_normal((columns, 3))
     np.testing.assert_allclose(models.Output(B)(z), B @ z, rtol=0.0, atol=1e-5)
-
-
-def test_released_pins_move_again():
-    scene = make_scene(
-        SPRING, GRAVITY, TOP, {"effect": "pins", "select": "bottom", "until": 3}, frames=8
-    )
-    reference = trajectory(scene)
-    bottom = scene.boundaries[1].vertices
-    result = run_model(
-        scene, models.SubspaceModel("pod", models.make_columns(scene, reference[1:], "pod", 10))
-    )
-    np.testing.assert_allclose(result[3, bottom], reference[0, bottom], atol=1e-12)
-    assert np.linalg.norm(result[-1, bottom] - reference[0, bottom]) > 1e-2
-    error = np.linalg.norm(result[-1] - reference[-1])
-    assert error < 0.05 * np.linalg.norm(reference[-1] - reference[0])
 
 
 def test_restricted_group_is_the_full_group_on_its_elements(group_scene, rng):
@@ -218,7 +204,9 @@ def test_arrays_of_a_step_have_the_size_of_the_sample():
     assert sizes[0] == sizes[1]
 
 
-@pytest.mark.parametrize("name", ["free", "handles", "poke", "damped", "dragged", "bending", "bar"])
+@pytest.mark.parametrize(
+    "name", ["free", "handles", "released", "poke", "damped", "dragged", "bending", "bar"]
+)
 def test_fused_iterations_are_the_plain_ones(name):
     """The compiled loop against the step loop with projections and solve one after the other."""
     scene = SCENES[name]()
@@ -237,18 +225,6 @@ def test_fused_iterations_are_the_plain_ones(name):
         np.testing.assert_allclose(state.positions, other.positions, rtol=1e-8, atol=1e-8)
     moved = other.positions - coordinates(columns, scene.masses, scene.mesh.points)
     assert np.linalg.norm(moved) > 1e-3
-
-
-def test_a_group_without_a_gradient_kernel_iterates_plainly():
-    scene = SCENES["pins"]()
-    columns = models.make_columns(scene, trajectory(scene)[1:], "pod", 4)
-    step = interpolation.SubspaceLocalStep(scene.groups[0], columns)
-    calls = {name: getattr(step, name) for name in ("name", "begin_frame", "accumulate")}
-    loop, state = models.SubspaceModel("pod", columns).loop(scene)
-    plain = FusedStepper(scene, loop.space, [SimpleNamespace(**calls)])
-    np.testing.assert_allclose(
-        loop.step(state, 0)[0].positions, plain.step(state, 0)[0].positions, rtol=1e-10, atol=1e-10
-    )
 
 
 def test_forces_that_cannot_be_reduced_are_refused():
@@ -278,14 +254,9 @@ def test_models_survive_a_file(tmp_path):
     ]
     for labels, model in loaded:
         chosen = written[labels["method"]]
-        for name, own in chosen.items():
+        assert model.samples.keys() == chosen.keys()
+        pairs = [(columns, model.columns), *((chosen[n], model.samples[n]) for n in chosen)]
+        for own, read in pairs:
+            assert type(read) is type(own)
             for key, value in vars(own).items():
-                np.testing.assert_array_equal(getattr(model.samples[name], key), value)
-        np.testing.assert_array_equal(model.columns.B, columns.B)
-        # round-off of an interpolation depends on the order in which memory holds its arrays
-        one, two = (
-            run_model(scene, model),
-            run_model(scene, models.SubspaceModel("pod", columns, chosen)),
-        )
-        allowed = 1e-13 if labels["method"] == "hrpd" else 0.0
-        np.testing.assert_allclose(one, two, rtol=0.0, atol=allowed)
+                np.testing.assert_equal(getattr(read, key), value)
