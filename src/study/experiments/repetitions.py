@@ -1,8 +1,9 @@
 """Reduced runs repeated, the ladder from the published choices to sound ones, bases of round-off.
 
 A run is one draw of what nobody means to choose: which frames train, and the last digits of the
-start. Where an error of the run decides something, its repetitions say how much of it is that. A
-group whose projections are round-off is reduced on bases of that noise.
+start. Where an error of the run decides something, its repetitions say how much of it is that.
+Held-out motions are repetitions, too, of a run that is trained on several motions. A group whose
+projections are round-off is reduced on bases of that noise.
 """
 
 import logging
@@ -18,7 +19,9 @@ from pydantic import Field
 
 from pdrom.core.store import write_hdf5, write_table
 from pdrom.core.yamlfile import ConfigModel, SceneName
+from pdrom.model.held_out import MOTIONS
 from pdrom.model.metrics import relative_errors
+from pdrom.model.runs import trajectory
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction import snapshots as sets
 from pdrom.reduction.basis import Basis, basis_of, compute_basis
@@ -33,7 +36,7 @@ from study.experiments.kit import base as kit
 from study.experiments.kit import runfiles
 from study.experiments.kit.base import experiment
 
-Varied = Literal["start", "training"]
+Varied = Literal["start", "training", "motions"]
 log = logging.getLogger(__name__)
 COLUMNS = [
     "scene", "group", "method", "r", "varied", "seed", "gain", "finite", "error",
@@ -138,6 +141,49 @@ class ReducedRuns:
                 rows.append({**row, "error": np.inf if error is None else error})
         return sorted(rows, key=lambda row: row["r"])
 
+    def on_motions(
+        self, method: MethodSpec, sizes: Sequence[int], counts: Sequence[int]
+    ) -> Iterator[dict[str, Any]]:
+        """Runs of held-out motions, with a basis of each number of training motions in ``counts``.
+
+        The first of these is the scene's training motion, the others are drawn by seeds. Of n
+        motions every n-th training snapshot is taken.
+        """
+        config, mesh = self.scene.config, self.scene.mesh
+        frames = self.data.frames["train"]
+        found = [self.data.train]
+        for seed in range(1, max(counts)):
+            scene = Scene.build(config.training_variant(seed), mesh)
+            found.append(recorded(scene, self.group)[1][frames])
+        tests = [Scene.build(config.heldout_variant(motion), mesh) for motion in MOTIONS]
+        runs = [replace(self, scene=s, reference=trajectory(s)) for s in tests]
+        for count in counts:
+            train = np.concatenate([p[::count] for p in found[:count]])
+            made = reductions(basis_of(self.data, method, train), method, sizes)
+            for r, reduction in made.items():
+                row = {"r": r, "varied": f"held out, {count} trained", "gain": reduction.gain}
+                for number, own in enumerate(runs, 1):
+                    outcome = own.run(reduction)
+                    error = own.error(outcome)
+                    row |= {"seed": number, "finite": outcome.finite}
+                    yield {**row, "error": np.inf if error is None else error}
+
+
+def recorded(
+    scene: Scene, group: str, start: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Positions (F + 1, N, 3) m of the full-order run, and projections (F, e p, 3) of ``group``.
+
+    ``start`` (N, 3) m is added to the initial positions.
+    """
+    own, projections = scene.group(group), list[np.ndarray]()
+    loop, state = scene.stepper(), scene.initial_state(start)
+    positions = [state.positions]
+    for frame in range(scene.config.frames):
+        state, _ = loop.step(state, frame, lambda y: projections.append(own.project(y)))
+        positions.append(state.positions)
+    return np.stack(positions), np.stack(projections)
+
 
 def drawn(data: sets.SnapshotSet, seed: int) -> np.ndarray:
     """Snapshots (n, e p, 3), as many as train in ``data``, drawn by ``seed`` from all, in order."""
@@ -148,13 +194,22 @@ def drawn(data: sets.SnapshotSet, seed: int) -> np.ndarray:
     return np.stack([data.train[i] if i < count else data.test[i - count] for i in chosen])
 
 
-class Cells(ConfigModel):
+class Cell(ConfigModel):
+    """Runs that are repeated, at each of ``sizes``.
+
+    training_motions : numbers of motions on which runs of held-out motions are trained
+    """
+
+    sizes: Annotated[tuple[kit.Modes, ...], Field(min_length=1)]
+    varied: tuple[Varied, ...] = ("start", "training")
+    training_motions: Annotated[tuple[kit.Count, ...], Field(min_length=1)] = (1, 2, 4, 8)
+
+
+class Cells(Cell):
     """Runs that are repeated: every method at every size in every scene (all groups of it)."""
 
     scenes: Annotated[tuple[SceneName, ...], Field(min_length=1)]
     methods: Annotated[tuple[str, ...], Field(min_length=1)]
-    sizes: Annotated[tuple[kit.Modes, ...], Field(min_length=1)]
-    varied: tuple[Varied, ...] = ("start", "training")
 
 
 class RepetitionSection(Repetitions):
@@ -163,13 +218,11 @@ class RepetitionSection(Repetitions):
     cells: tuple[Cells, ...] = ()
 
 
-class Repeated(ConfigModel):
+class Repeated(Cell):
     """A method of the job's scene and group, with what it depends on."""
 
     method: str
     spec: MethodSpec
-    sizes: tuple[kit.Modes, ...]
-    varied: tuple[Varied, ...]
 
 
 class Ladder(Repetitions):
@@ -279,8 +332,11 @@ def repetitions(settings: Options, **files: paths.File) -> None:
     rows = []
     for own in settings.repeated:
         for varied in own.varied:
-            found = short.repeat(own.spec, own.sizes, varied, settings.repetitions)
             cell = {**labels, "method": own.method, "varied": varied}
+            if varied == "motions":
+                found = list(runs.on_motions(own.spec, own.sizes, own.training_motions))
+            else:
+                found = short.repeat(own.spec, own.sizes, varied, settings.repetitions)
             rows += [cell | row for row in found]
         log.info("%s", own.method)
     write_table(pd.DataFrame(rows, columns=COLUMNS), files["out"].path)
@@ -417,14 +473,9 @@ def _noisy(
     The reductions are trained on its full-order run.
     """
     group, plan, frames = scene.group(name), scene.config.reduce[name], scene.config.frames
-    loop, state = scene.stepper(), scene.initial_state(start)
-    positions, projections = [state.positions], []
-    for frame in range(frames):
-        state, _ = loop.step(state, frame, lambda y: projections.append(group.project(y)))
-        positions.append(state.positions)
-    reference = np.stack(positions)
+    reference, projections = recorded(scene, name, start)
     even = sets.training_frames(frames, min(plan.train, (frames + 1) // 2))
-    trained_on, masses = np.stack(projections)[even], sets.row_masses(group, scene.masses)
+    trained_on, masses = projections[even], sets.row_masses(group, scene.masses)
     displacement = displacement_norms(reference)
     for method, spec in methods.items():
         basis = noise_basis(trained_on, masses, group.rows_per_element, method=spec)

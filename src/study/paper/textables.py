@@ -209,17 +209,18 @@ def speedups(speedups: pd.DataFrame) -> Rows:
 
 def payoff(payoff: pd.DataFrame) -> Rows:
     """Reductions with the numbers of scenes in which each is accurate, pays off, or is slower."""
-    yield "lrrrrrrrrrrr", [
+    yield "lrrrrrrrrrrrr", [
         "reduction", "runs in", "accurate in", "pays in", "loses in", "least", "median", "most",
-        "training", "held out (of)", "accurate", "pays",
+        "training", "held out (of)", "playback", "accurate", "pays",
     ]  # fmt: skip
     for row in payoff.itertuples():
         basis = "" if row.position_basis == FULL else f", {row.position_basis}"
-        errors = _known(row.error_train), f"{_known(row.error_heldout)} ({row.heldout})"
+        unseen = f"{_known(row.error_heldout)} ({row.heldout})"
+        errors = _known(row.error_train), unseen, _known(row.playback_error)
         gains = map(_known, (row.least_speedup, row.best_speedup, row.most_speedup))
         counts = map(str, (row.scenes, row.accurate, row.pays, row.loses))
-        unseen = map(str, (row.accurate_heldout, row.pays_heldout))
-        yield [_name(f"{row.method}{basis}"), *counts, *gains, *errors, *unseen]
+        scored = map(str, (row.accurate_heldout, row.pays_heldout))
+        yield [_name(f"{row.method}{basis}"), *counts, *gains, *errors, *scored]
 
 
 def pays(winners: pd.DataFrame) -> Rows:

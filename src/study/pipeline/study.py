@@ -263,7 +263,7 @@ def labels_of(study: Study, place: paths.Place) -> list[Labels]:
             for name, method in study.methods.items()
         )
     elif "factor" in names and isinstance(scenes, Mapping):
-        held = [scene for scene in scenes if scene in study.scenes]
+        held = [scene for scene in scenes if scene in study.scenes or scene in study.online]
         known = ({"scene": name, "factor": f"{x:g}"} for name in held for x in scenes[name])
     elif "scene" in names:
         known = ({"scene": name, "run": run} for name in scenes for run in ("train", *MOTIONS))

@@ -20,7 +20,7 @@ from study.artifact.markup import to_tex
 from study.artifact.reads import Labels
 from study.experiments.frame_times import NamedScene, ProjectionCase, SubspaceCase
 from study.experiments.kit.base import Horizon
-from study.experiments.repetitions import Repeated
+from study.experiments.repetitions import Cell, Repeated
 from study.experiments.reruns import Stability
 from study.experiments.subspaces import JOINT, JointRows, OfScene
 from study.figures.kit.declaration import Experiment, Options, Reduction, declarations
@@ -107,7 +107,7 @@ def _repeated(study: Study, labels: Labels) -> tuple[Repeated, ...]:
     """Repetitions of a scene, one per cell and method; methods may be outside the study."""
     cells = [c for c in study.settings.repetitions.cells if labels["scene"] in c.scenes]
     return tuple(
-        Repeated(method=name, spec=spec, sizes=cell.sizes, varied=cell.varied)
+        Repeated(method=name, spec=spec, **cell.model_dump(include={*Cell.model_fields}))
         for cell in cells
         for name, spec in study.named_methods(cell.methods, "repetitions.cells").items()
     )
@@ -207,6 +207,7 @@ def _numbers(study: Study) -> dict[str, Any]:
         "repeats": settings.timing.repeats,
         "timed_frames": settings.timing.frames,
         "processes": settings.frame_times.processes,
+        "process_frames": settings.frame_times.frames,
         "blowup_extent": settings.blowup_extent,
         "ranks": ", ".join(str(r) for r in settings.ranks),
         "wrong": settings.stability.wrong,

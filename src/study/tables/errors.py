@@ -118,7 +118,7 @@ def noise(parts: list[paths.File]) -> pd.DataFrame:
     title="Repeated runs: other training frames, moved starts",
     columns=(
         *shared("scene group method r"),
-        text("varied", "what differs: training (frames), start"),
+        text("varied", "training (frames), start; held-out motions, with the number trained on"),
         integer("repetitions", "runs; their range encloses the median of all but by 2^(1 - n)"),
         integer(
             "ended", "runs that ended before the horizon, with an infinite error", compared="error"

@@ -1,10 +1,13 @@
 """Repetitions of reduced runs with other starts and training frames; methods of the ladder."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from builders import make_scene
 from pdrom.core.yamlfile import read_yaml
+from pdrom.model.held_out import MOTIONS
 from pdrom.model.runs import trajectory
 from pdrom.model.scene import Scene
 from pdrom.reduction.basis import compute_basis
@@ -12,7 +15,7 @@ from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.sampling import Reduction, reductions, select
 from pdrom.reduction.snapshots import SnapshotSet
 from places import ROOT
-from study.experiments.repetitions import LadderSection, ReducedRuns, Repetitions, drawn
+from study.experiments.repetitions import LadderSection, ReducedRuns, Repetitions, drawn, recorded
 
 BLOCK = MethodSpec(title="elements", centring="affine", rows="element", solve="qr")
 END = 9
@@ -76,6 +79,25 @@ def test_the_error_is_that_of_the_frames_before_the_end(sheet, short):
     moved = np.linalg.norm(reference[1 : END + 1] - reference[0])
     expected = np.linalg.norm(one.positions[1 : END + 1] - reference[1 : END + 1]) / moved
     assert whole.error(one) == pytest.approx(expected, rel=1e-9)
+
+
+def test_bases_of_several_motions_are_run_on_the_held_out_ones(sheet):
+    scene, reference, data = sheet
+    runs = ReducedRuns(scene, "spring", data, reference, END, 100.0)
+    rows = list(runs.on_motions(BLOCK, [3], [1, 2]))
+    trained = [f"held out, {count} trained" for count in (1, 2)]
+    assert [row["varied"] for row in rows] == np.repeat(trained, len(MOTIONS)).tolist()
+    other = Scene.build(scene.config.heldout_variant(MOTIONS[1]), scene.mesh)
+    held = replace(runs, scene=other, reference=trajectory(other))
+    (reduction,) = reductions(runs.basis(BLOCK), BLOCK, [3]).values()
+    assert rows[1]["error"] == held.error(held.run(reduction))
+    assert rows[0]["gain"] == reduction.gain != rows[-1]["gain"]
+    positions, projections = recorded(other, "spring")
+    np.testing.assert_array_equal(positions, held.reference)
+    # the projections are those of the last local step, before the last global one
+    np.testing.assert_allclose(
+        projections[4], other.group("spring").project(positions[5]), atol=1e-5
+    )
 
 
 def test_signs_are_drawn_by_a_seed(short):

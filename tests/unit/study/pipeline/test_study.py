@@ -58,6 +58,13 @@ def test_short_runs_are_planned_where_the_study_holds_them():
     assert labels_of(study(), paths.STABILITY) == []
 
 
+def test_other_methods_run_on_small_and_on_large_scenes_of_the_study():
+    scenes = {"bar_release": [1], "strain_oop": [1, 2], "torus_release": [1]}
+    made = study(alternatives={"scenes": scenes}, online={"scenes": ["torus_release"]})
+    asked = [(run["scene"], run["factor"]) for run in labels_of(made, paths.ALTERNATIVES)]
+    assert asked == [("strain_oop", "1"), ("strain_oop", "2"), ("torus_release", "1")]
+
+
 @pytest.mark.parametrize("name", ["default", "tiny"])
 def test_the_configurations_hold_what_they_ask_for(name):
     """Nothing in these two files is left out without a word."""
