@@ -145,7 +145,7 @@ def test_mutated_scenes(project: Path, text: str, data: st.DataObject) -> None:
     accepted_or_named(project)
 
 
-@pytest.mark.parametrize("text", [RICH_SCENE, BAR_SCENE, FILE_SCENE], ids=["rich", "bar", "file"])
+@pytest.mark.parametrize("text", [small.SMALL_SCENE, RICH_SCENE, BAR_SCENE, FILE_SCENE])
 def test_the_scenes_are_valid_before_they_are_mutated(project: Path, text: str) -> None:
     (project / small.SCENE).write_text(text, encoding="utf-8")
     assert small.load_project(project).study.bound["small"].mesh.vertices > 0
