@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from bad_input.project import MESH, SCENE, SQUARE, STUDY, Replace, load_project, make_project
+from bad_input.project import MESH, SCENE, SQUARE, STUDY, load_project, make_project, with_mesh
 from pdrom.core.errors import ConfigurationError
 from places import ROOT
 from study.artifact import paths
@@ -122,7 +122,7 @@ def test_an_edit_plans_what_reads_or_prints_it(tmp_path):
     assert "mesh" not in found
 
 
-USED = Replace("{kind: cloth, rows: 5, columns: 4, plane: xz}", f"{{kind: file, path: {MESH}}}")
+USED = with_mesh(f"{{kind: file, path: {MESH}}}")
 
 
 @pytest.mark.parametrize("experiment", [mesh, online, scaling], ids=lambda e: e.name)
