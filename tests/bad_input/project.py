@@ -98,6 +98,6 @@ def load_project(root: Path, overrides: Mapping[str, Any] | None = None) -> Plan
     """What the workflow does before its first job; ``overrides`` stand for ``--config``."""
     check_files([root / STUDY])
     config = {**read_yaml(root / STUDY), **(overrides or {})}
-    plan = Plan(Study.load(config, root))
+    plan = Plan(Study(config, root))
     plan.check()
     return plan

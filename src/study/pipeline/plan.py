@@ -157,7 +157,7 @@ def load_plan(
     source = f"configuration ({', '.join(sorted(set(names)))})"
     others = ", ".join(sorted({*names} - {DEFAULT})) or "the command line"
     with planning_log(quiet):
-        plan = Plan(Study.load(config, ".", source, others), folders)
+        plan = Plan(Study(config, Path(), source, others), folders)
         plan.check()
     return plan
 

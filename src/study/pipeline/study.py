@@ -82,33 +82,14 @@ class StudySettings(scene_kit.GivenOnce):
 class Study:
     """A study: its checked settings with the scenes and methods that they name."""
 
-    def __init__(self, settings: StudySettings, root: Path, configuration: str = DEFAULT) -> None:
-        """Build all scenes of ``settings``; ``configuration`` names the files of the settings."""
-        self.settings = settings
-        self.root = root
-        self.configuration = configuration
-        self.titles: dict[str, str] = {}  # titles of scenes, for tables and figures
-        self.vertices: dict[str, int] = {}
-        changes = settings.changes
-        self.bound: dict[str, Scene] = {
-            name: scene_kit.load_bound_scene(root, name, *changes) for name in settings.scenes
-        }
-        for config in settings.variants.of(lambda name: scene_kit.read_scene(root, name, *changes)):
-            self.bound[config.name] = scene_kit.bind(root, config, "variants")
-        self.scenes = {name: self._physics(s) for name, s in self.bound.items()}
-        self.online = {name: self._loaded(name) for name in settings.online.scenes}
-        self._others: dict[str, SceneConfig] = {}
-        self.methods: dict[str, MethodSpec] = self.named_methods(settings.methods, "methods")
-
-    @classmethod
-    def load(
-        cls,
+    def __init__(
+        self,
         config: dict[str, Any],
-        root: Path | str = ".",
+        root: Path,
         source: str = f"configuration ({DEFAULT})",
         configuration: str = DEFAULT,
-    ) -> "Study":
-        """Return the study of a merged ``config`` below ``root``.
+    ) -> None:
+        """Build all scenes of a merged ``config`` below ``root``.
 
         ``source`` begins error messages; ``configuration`` is the name shown in the manuscript.
 
@@ -117,8 +98,20 @@ class Study:
         ConfigurationError
             The message names file, key, value and the allowed values; nothing is computed before.
         """
-        settings = validate(StudySettings, config, source)
-        return cls(settings, Path(root), configuration)
+        self.root, self.configuration = root, configuration
+        self.settings = settings = validate(StudySettings, config, source)
+        self.titles: dict[str, str] = {}  # titles of scenes, for tables and figures
+        self.vertices: dict[str, int] = {}
+        changes = settings.changes
+        self.bound: dict[str, Scene] = {
+            name: scene_kit.load_bound_scene(root, name, *changes) for name in settings.scenes
+        }
+        for scene in settings.variants.of(lambda name: scene_kit.read_scene(root, name, *changes)):
+            self.bound[scene.name] = scene_kit.bind(root, scene, "variants")
+        self.scenes = {name: self._physics(s) for name, s in self.bound.items()}
+        self.online = {name: self._loaded(name) for name in settings.online.scenes}
+        self._others: dict[str, SceneConfig] = {}
+        self.methods: dict[str, MethodSpec] = self.named_methods(settings.methods, "methods")
 
     @cached_property
     def figures(self) -> dict[str, Options]:

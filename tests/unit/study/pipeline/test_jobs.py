@@ -23,7 +23,7 @@ CONFIG = {"scenes": ["spring_oop", "strain_oop"], "methods": ["deim", "block-dei
 
 
 def plan(**changes) -> Plan:
-    return Plan(Study.load(CONFIG | changes, ROOT), Folders("out"))
+    return Plan(Study(CONFIG | changes, ROOT), Folders("out"))
 
 
 @pytest.fixture(scope="module")
@@ -142,7 +142,7 @@ def test_an_edited_mesh_has_another_checksum(tmp_path: Path, experiment) -> None
 
 
 def test_files_of_the_study_and_what_was_asked_for_beside_them(tmp_path, monkeypatch):
-    smallest = Plan(Study.load(CONFIG | {"scenes": ["bend_fall"]}, ROOT))
+    smallest = Plan(Study(CONFIG | {"scenes": ["bend_fall"]}, ROOT))
     monkeypatch.chdir(tmp_path)
     own = [
         paths.TABLE.at("results", name="claims"),
