@@ -15,7 +15,7 @@ from study.experiments.subspaces import online
 from study.experiments.timing import scaling
 from study.pipeline.folders import Folders
 from study.pipeline.manifest import study_files
-from study.pipeline.plan import Job, Plan
+from study.pipeline.plan import Plan
 from study.pipeline.study import Study, labels_of
 from study.tables import declared
 
@@ -26,21 +26,11 @@ def plan(**changes) -> Plan:
     return Plan(Study(CONFIG | changes, ROOT), Folders("out"))
 
 
-@pytest.fixture(scope="module")
-def made() -> dict[str, Job]:
-    """Jobs of the tables by name."""
-    return {job.artifact.name: job for job in plan().fixed["tables"]}
-
-
-@pytest.mark.parametrize("name", declared())
-def test_every_table_finds_what_it_reads(name, made):
-    job = made[name]
-    assert job.inputs.keys() | job.settings.keys() == declared()[name].reads.keys()
-    assert not job.inputs.keys() & job.settings.keys()
-    assert job.outputs == {"table": f"out/tables/{name}.csv"}
-
-
-def test_inputs_are_files_of_the_study_in_its_order(made):
+def test_every_table_finds_what_it_reads_in_the_order_of_the_study():
+    made = {job.artifact.name: job for job in plan().fixed["tables"]}
+    for name, table in declared().items():
+        assert made[name].inputs.keys() | made[name].settings.keys() == table.reads.keys()
+        assert made[name].outputs == {"table": f"out/tables/{name}.csv"}
     assert made["sensitivity"].inputs == {
         "parts": ["out/sensitivity/spring_oop.csv", "out/sensitivity/strain_oop.csv"]
     }
