@@ -180,15 +180,6 @@ def test_the_second_run_at_once_says_so_and_ends(undisturbed, fresh):
 
 
 @slow
-def test_snakemake_itself_heals_after_a_kill(undisturbed, fresh):
-    kill_all(_caught_writing(fresh, "fom"))
-    assert list(fresh.path(".snakemake/locks").iterdir())
-    status, output = fresh.snakemake("--rerun-incomplete", TABLE)
-    assert status == 0, output
-    assert fresh.results() == undisturbed.results()
-
-
-@slow
 def test_a_blank_and_a_letter_beyond_ascii_in_the_path(tmp_path):
     """The interpreter, too, lies in the folder, as it does in ``.venv``."""
     folder = tmp_path / "Étude du projet"

@@ -73,11 +73,6 @@ class StudySettings(scene_kit.GivenOnce):
     variants: scene_kit.Variants = scene_kit.Variants()
     study: str | None = None
 
-    @property
-    def changes(self) -> tuple[scene_kit.Change, ...]:
-        """Changes that the study makes to every scene of config/scenes, in their order."""
-        return (self.replicate, self.coarsen)
-
 
 class Study:
     """A study: its checked settings with the scenes and methods that they name."""
@@ -102,7 +97,8 @@ class Study:
         self.settings = settings = validate(StudySettings, config, source)
         self.titles: dict[str, str] = {}  # titles of scenes, for tables and figures
         self.vertices: dict[str, int] = {}
-        changes = settings.changes
+        # changes to every scene of config/scenes, in their order
+        self._changes = changes = (settings.replicate, settings.coarsen)
         self.bound: dict[str, Scene] = {
             name: scene_kit.load_bound_scene(root, name, *changes) for name in settings.scenes
         }
@@ -138,7 +134,7 @@ class Study:
 
     def _loaded(self, name: str) -> SceneConfig:
         """Checked configuration of a scene whose built form the study does not store."""
-        return self._physics(scene_kit.load_bound_scene(self.root, name, *self.settings.changes))
+        return self._physics(scene_kit.load_bound_scene(self.root, name, *self._changes))
 
     def _physics(self, scene: Scene) -> SceneConfig:
         """Scene configuration with its title replaced by its name: jobs do not depend on titles."""
@@ -198,8 +194,8 @@ class Study:
     @cached_property
     def every_mesh(self) -> dict[str, MeshConfig]:
         """Mesh configurations of all scenes in config/scenes and of the study, by identifier."""
-        changes, names = self.settings.changes, scene_kit.scene_names(self.root)
-        meshes = [scene_kit.read_scene(self.root, name, *changes).mesh for name in names]
+        names = scene_kit.scene_names(self.root)
+        meshes = [scene_kit.read_scene(self.root, name, *self._changes).mesh for name in names]
         return {mesh.identifier: mesh for mesh in meshes} | self.meshes
 
     def basis(self, identifier: str) -> BasisSpec:
