@@ -26,7 +26,7 @@ def small_study(root: Path) -> Study:
     own = SMALL_SCENE.replace("name: small", f"name: {SCENE}")
     (root / "config" / "scenes" / f"{SCENE}.yaml").write_text(own, encoding="utf-8")
     config = read_yaml(root / "config" / "default.yaml")
-    return Study.load({**config, **CHANGES}, root)
+    return Study({**config, **CHANGES}, root)
 
 
 def run_jobs(study: Study, results: str, names: Iterable[str], scene: str) -> None:

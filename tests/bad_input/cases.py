@@ -6,6 +6,7 @@ from typing import Any
 
 import yaml
 
+from bad_input import project
 from bad_input.project import MESH, SCENE, SMALL_SCENE, SMALL_STUDY, STUDY, Content, LinkTo, Replace
 from pdrom.core.yamlfile import read_yaml
 from pdrom.model.mesh.selection import KINDS
@@ -62,14 +63,13 @@ def select(name: str, selection: str, *parts: str) -> Case:
 
 def mesh(name: str, content: Content, *parts: str, path: str = MESH) -> Case:
     """A mesh file with broken content."""
-    use = Replace("{kind: cloth, rows: 5, columns: 4, plane: xz}", f"{{kind: file, path: {path}}}")
+    use = project.with_mesh(f"{{kind: file, path: {path}}}")
     return Case(name, {SCENE: use, f"config/scenes/{path}": content}, (SCENE, path, *parts))
 
 
 def mesh_path(name: str, path: str, *parts: str, **changes: Content) -> Case:
     """A mesh path that must not be followed."""
-    new = f'{{kind: file, path: "{path}"}}'
-    use = Replace("{kind: cloth, rows: 5, columns: 4, plane: xz}", new)
+    use = project.with_mesh(f'{{kind: file, path: "{path}"}}')
     return Case(name, {SCENE: use, **changes}, (SCENE, *parts))
 
 

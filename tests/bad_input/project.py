@@ -2,11 +2,8 @@
 
 import shutil
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
-
-import yaml
+from typing import Any, NamedTuple
 
 from pdrom.core.yamlfile import read_yaml
 from places import CONFIG, ROOT
@@ -47,16 +44,14 @@ f 1 3 4
 """
 
 
-@dataclass(frozen=True)
-class Replace:
+class Replace(NamedTuple):
     """One text of a file in place of another."""
 
     old: str
     new: str
 
 
-@dataclass(frozen=True)
-class LinkTo:
+class LinkTo(NamedTuple):
     """A symbolic link in place of a file."""
 
     target: str
@@ -64,6 +59,11 @@ class LinkTo:
 
 Content = str | bytes | Replace | LinkTo | None
 """New content of a file; None removes it."""
+
+
+def with_mesh(entry: str) -> Replace:
+    """Another mesh of the scene, as YAML."""
+    return Replace("{kind: cloth, rows: 5, columns: 4, plane: xz}", entry)
 
 
 def make_project(folder: Path, changes: Mapping[str, Content]) -> Path:
@@ -98,11 +98,6 @@ def load_project(root: Path, overrides: Mapping[str, Any] | None = None) -> Plan
     """What the workflow does before its first job; ``overrides`` stand for ``--config``."""
     check_files([root / STUDY])
     config = {**read_yaml(root / STUDY), **(overrides or {})}
-    plan = Plan(Study.load(config, root))
+    plan = Plan(Study(config, root))
     plan.check()
     return plan
-
-
-def small_study() -> dict[str, Any]:
-    """The valid study as plain data."""
-    return yaml.safe_load(SMALL_STUDY)

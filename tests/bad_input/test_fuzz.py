@@ -6,7 +6,6 @@ Every example runs with little memory to spare, so that a needless allocation sh
 
 import copy
 import resource
-import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -47,14 +46,15 @@ reduce:
   strain: {train: 3}
 held_out: {frames_factor: 1.25, carry: 0.1, kick: 0.5, kick_axes: [x], seed: 2}
 """
-BAR_SCENE = small.SMALL_SCENE.replace(
-    "{kind: cloth, rows: 5, columns: 4, plane: xz}", "{kind: bar, nx: 4, ny: 3, nz: 3, extent: 1.0}"
-).replace("effect: spring, weight", "effect: tetrahedron_strain, minimum: 0.9, weight")
-BAR_SCENE = BAR_SCENE.replace("  spring:", "  tetrahedron_strain:")
-FILE_SCENE = small.SMALL_SCENE.replace(
-    "{kind: cloth, rows: 5, columns: 4, plane: xz}",
-    f"{{kind: file, path: {small.MESH}, scale: 1.0}}",
+BAR = small.with_mesh("{kind: bar, nx: 4, ny: 3, nz: 3, extent: 1.0}")
+BAR_SCENE = (
+    small.SMALL_SCENE.replace(*BAR)
+    .replace("effect: spring, weight", "effect: tetrahedron_strain, minimum: 0.9, weight")
+    .replace("  spring:", "  tetrahedron_strain:")
 )
+FILE = small.with_mesh(f"{{kind: file, path: {small.MESH}, scale: 1.0}}")
+FILE_SCENE = small.SMALL_SCENE.replace(*FILE)
+VALID = small.SMALL_SCENE.encode()
 
 EXTREME = st.sampled_from(
     [None, True, False, 0, 1, -1, 2, 1999, 2**31, 2**64, -(2**64), 10**400, 0.0, -0.0, 0.5, 1e-320,
@@ -108,7 +108,7 @@ def _mutate(draw: Callable, owner: Any, key: Any) -> None:
 
 @pytest.fixture(scope="module")
 def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A project whose files each example overwrites."""
+    """A project of whose files each example overwrites one."""
     return small.make_project(tmp_path_factory.mktemp("fuzz"), {})
 
 
@@ -122,33 +122,38 @@ def little_memory() -> Iterator[None]:
     resource.setrlimit(resource.RLIMIT_AS, before)
 
 
-def accepted_or_named(root: Path, overrides: dict | None = None) -> None:
-    """Load the project; the only failure is a named error on one short line."""
-    message = ""
+def accepted_or_named(
+    root: Path, path: str = small.SCENE, content: Any = VALID, overrides: dict | None = None
+) -> None:
+    """Load the project with other content of one file; its only failure is a named error."""
+    original, message = (root / path).read_bytes(), ""
     try:
+        text = content if isinstance(content, bytes) else yaml.safe_dump(content).encode()
+        (root / path).write_bytes(text)
         small.load_project(root, overrides)
     except PdromError as error:
         message = str(error)
+    finally:
+        (root / path).write_bytes(original)
     assert "\n" not in message
     assert len(message) < 2500
 
 
 FUZZ = settings(suppress_health_check=list(HealthCheck))
+SCENES = [RICH_SCENE, BAR_SCENE, FILE_SCENE]
 
 
 @FUZZ
 @given(data=st.data())
-@pytest.mark.parametrize("text", [RICH_SCENE, BAR_SCENE, FILE_SCENE], ids=["rich", "bar", "file"])
+@pytest.mark.parametrize("text", SCENES, ids=["rich", "bar", "file"])
 def test_mutated_scenes(project: Path, text: str, data: st.DataObject) -> None:
-    scene = data.draw(mutated(yaml.safe_load(text)))
-    (project / small.SCENE).write_text(yaml.safe_dump(scene), encoding="utf-8")
-    accepted_or_named(project)
+    accepted_or_named(project, small.SCENE, data.draw(mutated(yaml.safe_load(text))))
 
 
-@pytest.mark.parametrize("text", [RICH_SCENE, BAR_SCENE, FILE_SCENE], ids=["rich", "bar", "file"])
-def test_the_scenes_are_valid_before_they_are_mutated(project: Path, text: str) -> None:
-    (project / small.SCENE).write_text(text, encoding="utf-8")
-    assert small.load_project(project).study.bound["small"].mesh.vertices > 0
+@pytest.mark.parametrize("text", [small.SMALL_SCENE, *SCENES])
+def test_the_scenes_are_valid_before_they_are_mutated(tmp_path: Path, text: str) -> None:
+    plan = small.load_project(small.make_project(tmp_path, {small.SCENE: text}))
+    assert plan.study.bound["small"].mesh.vertices > 0
 
 
 @FUZZ
@@ -156,33 +161,24 @@ def test_the_scenes_are_valid_before_they_are_mutated(project: Path, text: str) 
 @pytest.mark.parametrize("section", [None, "ladder", "hard_cases"])
 def test_mutated_studies(project: Path, section: str | None, data: st.DataObject) -> None:
     full = yaml.safe_load((small.CONFIG / "default.yaml").read_text(encoding="utf-8"))
-    base = {**full, **small.small_study(), "subspace": {**full["subspace"], "scenes": ["small"]}}
-    (project / small.SCENE).write_text(small.SMALL_SCENE, encoding="utf-8")
-    accepted_or_named(project, data.draw(mutated({section: base[section]} if section else base)))
+    own = yaml.safe_load(small.SMALL_STUDY) | {
+        "subspace": {**full["subspace"], "scenes": ["small"]}
+    }
+    base = {section: full[section]} if section else full | own
+    accepted_or_named(project, overrides=data.draw(mutated(base)))
 
 
 @FUZZ
 @given(data=st.data())
 @pytest.mark.parametrize("name", FILES)
 def test_mutated_files(project: Path, name: str, data: st.DataObject) -> None:
-    (project / small.SCENE).write_text(small.SMALL_SCENE, encoding="utf-8")
-    original = small.CONFIG / f"{name}.yaml"
-    broken = data.draw(mutated(yaml.safe_load(original.read_text(encoding="utf-8"))))
-    target = project / "config" / original.name
-    try:
-        target.write_text(yaml.safe_dump(broken), encoding="utf-8")
-        accepted_or_named(project)
-    finally:
-        shutil.copyfile(original, target)
+    path = f"config/{name}.yaml"
+    content = yaml.safe_load((project / path).read_text(encoding="utf-8"))
+    accepted_or_named(project, path, data.draw(mutated(content)))
 
 
 @FUZZ
 @given(content=st.binary(max_size=200) | st.text(max_size=60).map(str.encode))
 @pytest.mark.parametrize("path", [small.STUDY, small.SCENE])
 def test_any_bytes_as_a_file(project: Path, path: str, content: bytes) -> None:
-    original = (project / path).read_bytes()
-    try:
-        (project / path).write_bytes(content)
-        accepted_or_named(project)
-    finally:
-        (project / path).write_bytes(original)
+    accepted_or_named(project, path, content)

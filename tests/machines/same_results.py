@@ -43,25 +43,33 @@ def table_digests(folder: Path) -> dict[str, str]:
     for name, table in declared().items():
         path = folder / "tables" / f"{name}.csv"
         if path.is_file():
-            kept = without_times(table, pd.read_csv(path, dtype=str), ROOT)
-            found[f"tables/{name}.csv"] = hashlib.sha256(kept.to_csv().encode()).hexdigest()
+            found[f"tables/{name}.csv"] = table_digest(table, path, ROOT)
     return found
+
+
+def table_digest(made: Table, path: Path, root: Path) -> str:
+    """Digest of a table without its timed cells; ``root`` as in `without_times`."""
+    kept = without_times(made, pd.read_csv(path, dtype=str), root)
+    return hashlib.sha256(kept.to_csv().encode()).hexdigest()
 
 
 def run_digests(folder: Path) -> dict[str, str]:
     """Digest of the datasets of each HDF5 file, by path."""
-    found = {}
-    for path in sorted(folder.rglob("[!.]*.h5")):
-        found[str(path.relative_to(folder))] = _digest(path)
-    return found
+    paths = sorted(folder.rglob("[!.]*.h5"))
+    return {str(path.relative_to(folder)): run_digest(path) for path in paths}
 
 
-def _digest(path: Path) -> str:
+def run_digest(path: Path, attributes: bool = False) -> str:
+    """Digest of the datasets of an HDF5 file, and of the ``attributes`` of all that is in it."""
     content = hashlib.sha256()
 
     def add(name: str, item: h5py.Dataset | h5py.Group) -> None:
-        if isinstance(item, h5py.Dataset) and name.rpartition("/")[2] != "timings":
-            content.update(name.encode())
+        if name.rpartition("/")[2] == "timings":
+            return
+        content.update(name.encode())
+        if attributes:
+            content.update(repr(sorted(item.attrs.items())).encode())
+        if isinstance(item, h5py.Dataset):
             content.update(np.ascontiguousarray(item[()]).tobytes())
 
     with h5py.File(path) as file:

@@ -7,6 +7,9 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
+import meshio
+
+from pdrom.model.mesh.generators import cloth
 from places import ROOT
 
 # Snakemake without the tenth of a second that it sleeps before each file that it touches.
@@ -106,6 +109,12 @@ def only_line(output: str) -> str:
     (line,) = [line for line in output.splitlines() if line.startswith("pdrom: ")]
     assert output.strip().splitlines()[-1] == line
     return line
+
+
+def write_sheet(path: Path, wave: float = 0.0) -> None:
+    """A mesh file of a horizontal sheet with waves of this height, m."""
+    mesh = cloth(6, 6, "xz", wave=wave)
+    meshio.write(path, meshio.Mesh(mesh.points, [("triangle", mesh.triangles)]))
 
 
 def copy_repository(folder: Path) -> Checkout:

@@ -12,12 +12,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-import h5py
-import pandas as pd
 import yaml
 from checkout import ROOT, copy_repository
 
-from machines.same_results import without_times
+from machines.same_results import run_digest, table_digest
 from pdrom.core.store import check_file
 from study.artifact.paths import MACHINE, MANIFEST
 from study.tables import declared
@@ -141,27 +139,11 @@ def _timed(path: Path) -> bool:
 
 
 def _digest(path: Path, root: Path) -> str:
-    content = hashlib.sha256()
     if path.suffix == ".h5":
-        with h5py.File(path) as file:
-            file.visititems(lambda name, item: _update(content, name, item))
-    elif path.parent.name == "tables" and path.suffix == ".csv":
-        table = pd.read_csv(path, dtype=str)
-        kept = without_times(declared()[path.stem], table, root)
-        content.update(kept.to_csv().encode())
-    else:
-        content.update(path.read_bytes())
-    return content.hexdigest()
-
-
-def _update(content, name: str, item: h5py.Dataset | h5py.Group) -> None:
-    if name == "timings":
-        return
-    content.update(name.encode())
-    for key in sorted(item.attrs):
-        content.update(f"{key}={item.attrs[key]!r}".encode())
-    if isinstance(item, h5py.Dataset):
-        content.update(item[()].tobytes())
+        return run_digest(path, attributes=True)
+    if path.parent.name == "tables" and path.suffix == ".csv":
+        return table_digest(declared()[path.stem], path, root)
+    return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def wait_for(condition: Callable[[], bool], process: subprocess.Popen[str]) -> None:

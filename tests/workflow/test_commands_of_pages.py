@@ -6,13 +6,11 @@ import shutil
 import subprocess
 from pathlib import Path
 
-import meshio
 import pytest
 import yaml
-from checkout import Checkout, copy_repository
+from checkout import Checkout, copy_repository, write_sheet
 
 from pdrom.core.store import write_text
-from pdrom.model.mesh.generators import cloth
 from places import ROOT
 
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "config" / "README.md"]
@@ -69,15 +67,9 @@ def checkout(tmp_path_factory: pytest.TempPathFactory) -> Checkout:
         (config / "scenes" / f"{name}.yaml").write_text(own, encoding="utf-8")
     mesh = config / "scenes" / yaml.safe_load(scene)["mesh"]["path"]
     mesh.parent.mkdir(exist_ok=True)
-    sheet(mesh)
+    write_sheet(mesh)
     shutil.copy(ROOT / "CITATION.cff", made.folder)
     return made
-
-
-def sheet(path: Path) -> None:
-    """A mesh file."""
-    mesh = cloth(6, 6, "xz", 1.0, 2.0, 0.0)
-    meshio.write(path, meshio.Mesh(mesh.points, [("triangle", mesh.triangles)]))
 
 
 def run(checkout: Checkout, module: str, *words: str, cwd: Path | None = None) -> None:
@@ -100,7 +92,7 @@ def test_a_run_is_planned(command, checkout):
 
 @pytest.mark.slow
 def test_the_command_line_works_in_the_order_of_its_page(tmp_path, checkout):
-    sheet(tmp_path / "sheet.obj")
+    write_sheet(tmp_path / "sheet.obj")
     shown = commands("pdrom ")
     assert len(shown) > 4
     for command in shown:

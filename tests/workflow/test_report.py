@@ -37,11 +37,6 @@ def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
         yield page
 
 
-def test_the_first_page_names_the_configuration(opened):
-    opened.reload()
-    opened.get_by_text(f"{MICRO_FILE} (of coarse meshes").wait_for()
-
-
 def go_to(page: Page, entry: str) -> None:
     """Open a category, from whatever is open."""
     page.reload()
@@ -72,17 +67,14 @@ def test_every_figure_opens_and_has_its_caption(opened, category):
         opened.get_by_role("link", name=category, exact=True).click()
 
 
-def test_every_table_is_listed_with_its_title(opened):
+def test_the_other_pages_are_shown_nothing_is_asked_of_a_network_and_nothing_fails(opened):
+    """The first page names the configuration, tables have their titles, statistics are drawn."""
+    opened.reload()
+    opened.get_by_text(f"{MICRO_FILE} (of coarse meshes").wait_for()
     go_to(opened, "Tables")
     text = opened.inner_text("body")
     assert [t.name for t in declared().values() if t.title not in text] == []
-
-
-def test_the_statistics_of_the_run_are_drawn(opened):
     go_to(opened, "Statistics")
     opened.locator("svg, canvas").last.wait_for()
-
-
-def test_nothing_is_asked_of_a_network_and_nothing_fails(opened):
     assert [url for url in opened.asked if not url.startswith(("file:", "data:", "blob:"))] == []
     assert opened.said == []

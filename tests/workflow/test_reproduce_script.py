@@ -255,14 +255,10 @@ def test_packages_that_another_program_changed_are_noticed(change, folder):
 
 def test_the_executor_for_clusters_may_be_added(folder):
     folder.run()
-    for name in _locked("requirements-cluster.lock"):
+    lines = (ROOT / "requirements-cluster.lock").read_text("utf-8").splitlines()
+    for name in [line.partition("==")[0] for line in lines if "==" in line]:
         (folder.path / ".venv" / PACKAGES / f"{name.replace('-', '_')}-1.0.dist-info").mkdir()
     assert folder.run()[1] == ["reproduce: planning"]
-
-
-def _locked(name: str) -> list[str]:
-    lines = (ROOT / name).read_text("utf-8").splitlines()
-    return [line.partition("==")[0] for line in lines if "==" in line]
 
 
 def test_arguments_are_handed_on(folder):

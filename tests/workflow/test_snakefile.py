@@ -34,6 +34,7 @@ SHARED = (
     "tables", "figures", "paper", "article", "hard_cases", "frame_times",
 )  # fmt: skip
 MICRO_FILE = "micro.yaml"
+KINDS = ("pdf", "png")  # of a figure, for pages and for the report
 EDITED = ("workflow", "config", "paper", "src", "Snakefile", MICRO_FILE)
 DAY_NS = 86_400 * 10**9
 MICRO_ARGUMENTS = ("--configfile", MICRO_FILE)
@@ -127,13 +128,8 @@ def test_a_fresh_clone_plans_the_whole_study_beside_a_run(clean, at_work):
     missing = re.findall(r"Missing output files: ([^;\n]*)", log)
     made = {path for files in missing for path in files.split(", ")}
     wanted = {f"results/tables/{name}.csv" for name in declared()}
-    wanted |= {f"results/figures/{name}.pdf" for name in declarations()}
+    wanted |= {f"results/figures/{name}.{kind}" for name in declarations() for kind in KINDS}
     assert wanted | {"paper/main.pdf", "paper/supplement.pdf"} <= made
-
-
-def test_every_figure_is_made_for_pages_and_for_the_report(plan):
-    figures = [f"{MICRO_RESULTS}/figures/{name}" for name in declarations()]
-    assert {f"{path}.{kind}" for path in figures for kind in ("pdf", "png")} <= set(plan)
 
 
 def test_another_snakemake_is_told_where_the_package_is(clean, tmp_path):
@@ -174,10 +170,39 @@ def test_a_scene_outside_the_study_is_run_for_its_own_file(plan):
     [
         (("-n", "figure_scalign"), "did you mean 'figure_scaling'?"),
         (("--report", "report.html"), "report: this configuration has no paper/main.pdf"),
+        (("--config", 'scenes=["../x"]'), "configuration (config/default.yaml): scenes.0 = '../x'"),
     ],
 )
 def test_what_nobody_makes_is_refused(arguments, words, clean):
     assert words in only_line(clean.snakemake(*arguments).stderr)
+    assert not (clean.folder / "results").exists()
+
+
+TEMPLATE = "__use_yte__: templates are not allowed"
+
+
+@pytest.mark.parametrize(
+    ("path", "own", "words"),
+    [
+        ("config/default.yaml", False, f"config/default.yaml: {TEMPLATE}"),
+        ("config/scenes/bar_twist.yaml", False, "config/scenes/bar_twist.yaml: unknown key '__use"),
+        ("own.yaml", True, f"own.yaml: {TEMPLATE}"),
+        ("none.yaml", True, "none.yaml: no such configuration file"),
+    ],
+)
+def test_a_broken_file_ends_the_command_with_one_line(finished, path, own, words):
+    """A file that Snakemake reads, one that the plan reads, those that ``./reproduce`` checks.
+
+    All other faults: `bad_input.test_bad_input`, without a process.
+    """
+    if path != "none.yaml":
+        with open(finished.folder / path, "a", encoding="utf-8") as file:
+            file.write("\n__use_yte__: true\n")
+    program, asked = ("study.pipeline.front", ("--configfile", path)) if own else ("snakemake", ())
+    done = finished.snakemake(*asked, program=("-m", program))
+    (finished.folder / "own.yaml").unlink(missing_ok=True)
+    assert done.returncode != 0
+    assert only_line(done.stdout + done.stderr).startswith(f"pdrom: {words}")
 
 
 def test_one_run_at_a_time(clean, at_work):
@@ -247,7 +272,7 @@ MAP = "src/study/figures/stability_map.py"
         ),
         (
             (MAP, 'Where each method can be trusted"', 'What can be trusted"'),
-            {f"figures/stability_map.{kind}" for kind in ("pdf", "png")},
+            {f"figures/stability_map.{kind}" for kind in KINDS},
         ),
     ],
     ids=["threshold of a claim", "caption"],
@@ -295,18 +320,6 @@ def test_registering_a_selection_reruns_the_methods_that_use_it(finished):
     assert {p for p in planned if _stage(p) == "reruns"}
     assert {Path(p).stem for p in planned if _stage(p) == "sampling"} == {"block-deim"}
     assert not {p for p in planned if _stage(p) in ("fom", "pod", "sensitivity")}
-
-
-@pytest.mark.parametrize(
-    ("name", "methods"), [("qdeim", set()), ("greedy", {"deim", "block-deim"})]
-)
-def test_a_selection_reruns_the_methods_that_use_it(finished, name, methods):
-    """The full order and other methods do not depend on it."""
-    module = f"src/pdrom/reduction/sampling/{name}.py"
-    planned = replanned(finished, module, "for r in ranks}", "for r in sorted(ranks)}")
-    assert {Path(p).stem for p in planned if _stage(p) == "sampling"} == methods
-    assert bool({p for p in planned if _stage(p) == "reruns"}) == bool(methods)
-    assert not {p for p in planned if _stage(p) in ("fom", "pod")}
 
 
 def _below(path: str) -> list[str]:

@@ -4,7 +4,6 @@ from study.artifact.logs import job_log
 with job_log(snakemake.log[0]):
     make(
         snakemake.params.artifact,
-        snakemake.rule,
         settings=snakemake.params.settings,
         labels=dict(snakemake.wildcards.items()),
         code=snakemake.params.code,

@@ -115,17 +115,17 @@ class Artifact:
         return content | {k: t.validate_python(settings[k]) for k, t in self.types.items()}
 
 
-def make(address: str, rule: str, code: str, labels: Labels, **job: Mapping[str, Any]) -> None:
+def make(address: str, code: str, labels: Labels, **job: Mapping[str, Any]) -> None:
     """Run a job of the artifact at ``address``; its outputs record rule, settings and code.
 
     Parameters
     ----------
-    rule : name of the workflow's rule
     code : fingerprint of the code that the job runs
     job : plain ``settings``, and paths ``inputs`` and ``outputs``, by parameter name
     """
-    with made_by(rule, {**job["settings"], "labels": dict(labels)}, code):
-        load(address).perform(**job)
+    made = load(address)
+    with made_by(made.rule, {**job["settings"], "labels": dict(labels)}, code):
+        made.perform(**job)
 
 
 def declare(made: A, *parameters: str) -> A:

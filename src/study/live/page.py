@@ -42,21 +42,17 @@ def _listed(file: File) -> dict[str, str] | None:
     return {"scene": scene, "title": title, "file": f"{MODELS}/{Path(file.path).name}"}
 
 
-def _asset(name: str, folder: str = "study/live") -> ProjectFile:
-    return ProjectFile(f"src/{folder}/{name}")
-
-
 live_page = Artifact(
     "live_page",
     "Page on which models run",
     {
         "models": Every(LIVE_MODEL),
-        "html": _asset("live.html"),
-        "style": _asset("live.css"),
-        "packed": _asset("packed.js", "pdrom/view"),
-        "engine": _asset("engine.js"),
-        "drawing": _asset("drawing.js", "pdrom/view"),
-        "script": _asset("live.js"),
+        "html": ProjectFile("src/study/live/live.html"),
+        "style": ProjectFile("src/study/live/live.css"),
+        "packed": ProjectFile("src/pdrom/view/packed.js"),
+        "engine": ProjectFile("src/study/live/engine.js"),
+        "drawing": ProjectFile("src/pdrom/view/drawing.js"),
+        "script": ProjectFile("src/study/live/live.js"),
     },
     {"out": LIVE_PAGE},
     _write,

@@ -70,15 +70,6 @@ class CommandLine:
         self.own_output = any(found[name] is not None and found[name] for name in OWN_OUTPUT)
         self.cores = found["cores"] is not None or found["jobs"] is not None
         self.executor: str | None = found["executor"]
-        self._check_values()
-
-    @property
-    def configuration(self) -> list[str]:
-        """Options that name the configuration; an empty list for the default configuration."""
-        files = ["--configfile", *self.configfiles] if self.configfiles else []
-        return [*files, *(["--config", *self.settings] if self.settings else [])]
-
-    def _check_values(self) -> None:
         swallowed = {
             "--config": [s for s in self.settings if "=" not in s],
             "--configfile": [f for f in self.configfiles[1:] if Path(f).suffix not in YAML],
@@ -91,6 +82,12 @@ class CommandLine:
                     f"{option} takes every value that follows it, '{names[0]}' too; write two "
                     f"hyphens before the targets: {shlex.join([*options, '--', *targets])}"
                 )
+
+    @property
+    def configuration(self) -> list[str]:
+        """Options that name the configuration; an empty list for the default configuration."""
+        files = ["--configfile", *self.configfiles] if self.configfiles else []
+        return [*files, *(["--config", *self.settings] if self.settings else [])]
 
     def rewritten(self, more: Sequence[str], made: Mapping[str, Sequence[str]]) -> list[str]:
         """Return the arguments with the options ``more`` and the files ``made`` for each target."""

@@ -57,28 +57,25 @@ def check_subspaces(study: Study) -> None:
 
 def check_live(study: Study) -> None:
     """Raise ConfigurationError for a scene whose models the live page cannot represent or load."""
+    settings = study.settings
     for name in (labels["scene"] for labels in labels_of(study, LIVE_MODEL)):
         try:
             require_known(study.scene(name))
         except SceneError as error:
             raise ConfigurationError(f"live.scenes: {error}") from error
-        size = _live_bytes(study, name)
+        # the least size: vertices, masses and bases (modes and four affine columns) in base 64
+        vertices = study.vertices[name]
+        section = settings.subspace if name in study.scenes else settings.online
+        sizes = [k for k in settings.live.sizes if k in section.sizes and "pod" in section.bases]
+        entries = [vertices * (k + 4) for k in sizes]
+        bases = sum(count * (8 if count <= DOUBLES else 4) for count in entries)
+        size = (vertices * 32 + bases) * 4 / 3
         if size > LARGEST:
             raise ConfigurationError(
                 f"live.scenes: scene '{name}' takes at least {size / 1e6:.1f} MB of models on "
-                f"{study.vertices[name]} vertices, allowed are {LARGEST / 1e6:.1f}: choose fewer "
-                f"modes (live.sizes = {list(study.settings.live.sizes)})"
+                f"{vertices} vertices, allowed are {LARGEST / 1e6:.1f}: choose fewer modes "
+                f"(live.sizes = {list(settings.live.sizes)})"
             )
-
-
-def _live_bytes(study: Study, name: str) -> float:
-    """Least size in bytes of a scene's model file: its vertices, masses and bases in base 64."""
-    settings, vertices = study.settings, study.vertices[name]
-    section = settings.subspace if name in study.scenes else settings.online
-    sizes = [k for k in settings.live.sizes if k in section.sizes and "pod" in section.bases]
-    entries = [vertices * (k + 4) for k in sizes]  # modes and four affine columns
-    bases = sum(count * (8 if count <= DOUBLES else 4) for count in entries)
-    return (vertices * 32 + bases) * 4 / 3  # written in base 64
 
 
 def check_texts(study: Study) -> None:
@@ -122,7 +119,6 @@ class Job:
         """Run the job in this process; ``outputs`` are the paths of the files to write, by name."""
         make(
             self.artifact.address,
-            self.artifact.rule,
             settings=self.settings,
             labels=self.labels,
             code=self.code,
@@ -161,7 +157,7 @@ def load_plan(
     source = f"configuration ({', '.join(sorted(set(names)))})"
     others = ", ".join(sorted({*names} - {DEFAULT})) or "the command line"
     with planning_log(quiet):
-        plan = Plan(Study.load(config, ".", source, others), folders)
+        plan = Plan(Study(config, Path(), source, others), folders)
         plan.check()
     return plan
 

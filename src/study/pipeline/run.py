@@ -5,7 +5,6 @@ import logging
 import os
 import sys
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -87,31 +86,25 @@ DATED = ("results", "paper", "config", "workflow")
 JOBSTEP = "slurm-jobstep"
 
 
-@dataclass(frozen=True)
 class Run:
     """The run of this process: locks its folder, starts the jobs' server, reports the outcome."""
 
-    command: CommandLine
-    failures: Failures
-
-    @classmethod
-    def begin(cls) -> "Run":
-        """Lock the working directory and return the run, or end the process with one line.
+    def __init__(self) -> None:
+        """Lock the working directory, or end the process with one line.
 
         A command that runs no job, such as a dry run, takes no lock and works during another run.
         """
         running.end_at_sigterm()
         with one_line():
-            command = CommandLine(sys.argv[1:])
-            if command.looks_only:
+            self.command = CommandLine(sys.argv[1:])
+            if self.command.looks_only:
                 running.remove_stale_locks()
             else:
                 running.hold()
                 running.settle_dates(DATED)
-                remember(command)
-        failures = Failures()
-        logging.getLogger("snakemake.logging").addHandler(failures)
-        return cls(command, failures)
+                remember(self.command)
+        self.failures = Failures()
+        logging.getLogger("snakemake.logging").addHandler(self.failures)
 
     def check(self, plan: Plan, rules: Iterable[Any], cores: int) -> None:
         """Check targets and report; print the jobs of a dry run on ``cores`` at its end.

@@ -33,23 +33,12 @@ from study.experiments.subspaces import Live, Online, Subspace
 from study.experiments.timing import Scaling, Timing
 from study.figures.kit.declaration import Options, declarations, load_choices
 from study.paper.build import FILES
+from study.pipeline import scenes as scene_kit
 from study.pipeline.folders import DEFAULT
-from study.pipeline.scenes import (
-    Change,
-    Coarsen,
-    GivenOnce,
-    Replicate,
-    Variants,
-    bind,
-    load_bound_scene,
-    not_taken,
-    read_scene,
-    scene_names,
-)
 from study.tables import declared
 
 
-class StudySettings(GivenOnce):
+class StudySettings(scene_kit.GivenOnce):
     """Content of config/default.yaml, possibly overridden by --configfile.
 
     A section is declared by the experiment whose settings it holds; a default stands there, or here
@@ -63,8 +52,8 @@ class StudySettings(GivenOnce):
     sweep: Sweep = Sweep()
     solver: Solver = DEFAULT_SOLVER
     blowup_extent: BlowupExtent = 100.0
-    coarsen: Coarsen = Coarsen()
-    replicate: Replicate = Replicate()
+    coarsen: scene_kit.Coarsen = scene_kit.Coarsen()
+    replicate: scene_kit.Replicate = scene_kit.Replicate()
     claim_sets: dict[str, tuple[SceneName, ...]] = Field(default_factory=dict)
     sensitivity: Sensitivity = Sensitivity()
     iterations: IterationSweep = IterationSweep()
@@ -81,44 +70,21 @@ class StudySettings(GivenOnce):
     live: Live = Live()
     alternatives: Alternatives = Alternatives()
     requested_tolerances: RequestedTolerances = RequestedTolerances()
-    variants: Variants = Variants()
+    variants: scene_kit.Variants = scene_kit.Variants()
     study: str | None = None
-
-    @property
-    def changes(self) -> tuple[Change, ...]:
-        """Changes that the study makes to every scene of config/scenes, in their order."""
-        return (self.replicate, self.coarsen)
 
 
 class Study:
     """A study: its checked settings with the scenes and methods that they name."""
 
-    def __init__(self, settings: StudySettings, root: Path, configuration: str = DEFAULT) -> None:
-        """Build all scenes of ``settings``; ``configuration`` names the files of the settings."""
-        self.settings = settings
-        self.root = root
-        self.configuration = configuration
-        self.titles: dict[str, str] = {}  # titles of scenes, for tables and figures
-        self.vertices: dict[str, int] = {}
-        self.bound: dict[str, Scene] = {
-            name: load_bound_scene(root, name, *settings.changes) for name in settings.scenes
-        }
-        for config in settings.variants.of(lambda name: read_scene(root, name, *settings.changes)):
-            self.bound[config.name] = bind(root, config, "variants")
-        self.scenes = {name: self._physics(s) for name, s in self.bound.items()}
-        self.online = {name: self._loaded(name) for name in settings.online.scenes}
-        self._others: dict[str, SceneConfig] = {}
-        self.methods: dict[str, MethodSpec] = self.named_methods(settings.methods, "methods")
-
-    @classmethod
-    def load(
-        cls,
+    def __init__(
+        self,
         config: dict[str, Any],
-        root: Path | str = ".",
+        root: Path,
         source: str = f"configuration ({DEFAULT})",
         configuration: str = DEFAULT,
-    ) -> "Study":
-        """Return the study of a merged ``config`` below ``root``.
+    ) -> None:
+        """Build all scenes of a merged ``config`` below ``root``.
 
         ``source`` begins error messages; ``configuration`` is the name shown in the manuscript.
 
@@ -127,13 +93,26 @@ class Study:
         ConfigurationError
             The message names file, key, value and the allowed values; nothing is computed before.
         """
-        settings = validate(StudySettings, config, source)
-        return cls(settings, Path(root), configuration)
+        self.root, self.configuration = root, configuration
+        self.settings = settings = validate(StudySettings, config, source)
+        self.titles: dict[str, str] = {}  # titles of scenes, for tables and figures
+        self.vertices: dict[str, int] = {}
+        # changes to every scene of config/scenes, in their order
+        self._changes = changes = (settings.replicate, settings.coarsen)
+        self.bound: dict[str, Scene] = {
+            name: scene_kit.load_bound_scene(root, name, *changes) for name in settings.scenes
+        }
+        for scene in settings.variants.of(lambda name: scene_kit.read_scene(root, name, *changes)):
+            self.bound[scene.name] = scene_kit.bind(root, scene, "variants")
+        self.scenes = {name: self._physics(s) for name, s in self.bound.items()}
+        self.online = {name: self._loaded(name) for name in settings.online.scenes}
+        self._others: dict[str, SceneConfig] = {}
+        self.methods: dict[str, MethodSpec] = self.named_methods(settings.methods, "methods")
 
     @cached_property
     def figures(self) -> dict[str, Options]:
         """Options of every figure, by its name, from config/figures.yaml."""
-        known = {"methods": self.every_method, "scenes": scene_names(self.root)}
+        known = {"methods": self.every_method, "scenes": scene_kit.scene_names(self.root)}
         return load_choices(self.root / "config" / "figures.yaml", known)
 
     def value(self, key: str) -> Any:
@@ -155,7 +134,7 @@ class Study:
 
     def _loaded(self, name: str) -> SceneConfig:
         """Checked configuration of a scene whose built form the study does not store."""
-        return self._physics(load_bound_scene(self.root, name, *self.settings.changes))
+        return self._physics(scene_kit.load_bound_scene(self.root, name, *self._changes))
 
     def _physics(self, scene: Scene) -> SceneConfig:
         """Scene configuration with its title replaced by its name: jobs do not depend on titles."""
@@ -215,8 +194,8 @@ class Study:
     @cached_property
     def every_mesh(self) -> dict[str, MeshConfig]:
         """Mesh configurations of all scenes in config/scenes and of the study, by identifier."""
-        changes, names = self.settings.changes, scene_names(self.root)
-        meshes = [read_scene(self.root, name, *changes).mesh for name in names]
+        names = scene_kit.scene_names(self.root)
+        meshes = [scene_kit.read_scene(self.root, name, *self._changes).mesh for name in names]
         return {mesh.identifier: mesh for mesh in meshes} | self.meshes
 
     def basis(self, identifier: str) -> BasisSpec:
@@ -281,7 +260,7 @@ def _with_subspaces(study: Study) -> list[str]:
     section = study.settings.subspace
     if not (section.bases and section.sizes):
         return []
-    takes = [name for name, scene in study.scenes.items() if not not_taken(scene)]
+    takes = [name for name, scene in study.scenes.items() if not scene_kit.not_taken(scene)]
     return _held(study, section.scenes or takes)
 
 

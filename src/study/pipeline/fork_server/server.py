@@ -64,7 +64,12 @@ class Server:
                 return None
             if self.wake in ready:
                 os.read(self.wake, 4096)
-            self._collect()
+            # exit statuses of ended jobs go to their clients, which may be gone
+            for process in list(self.jobs):
+                done, status = os.waitpid(process, os.WNOHANG)
+                if done:
+                    with self.jobs.pop(process) as client, suppress(OSError):
+                        client.sendall(NUMBER % status)
             for process, client in self.jobs.items():
                 # a client sends nothing after its request: readable data mean that its connection
                 # is closed, so that its job is killed
@@ -79,14 +84,6 @@ class Server:
                     self.silent.append(client)
                 else:
                     client.close()
-
-    def _collect(self) -> None:
-        """Send the exit statuses of ended jobs to their clients; ignore clients that are gone."""
-        for process in list(self.jobs):
-            done, status = os.waitpid(process, os.WNOHANG)
-            if done:
-                with self.jobs.pop(process) as client, suppress(OSError):
-                    client.sendall(NUMBER % status)
 
     def _answer(self, client: socket.socket) -> str | None:
         """Fork a job if the client's message is a request; return the script in the fork.

@@ -25,9 +25,8 @@ from pdrom.core.errors import PaperError
 from pdrom.core.machine import machine
 from pdrom.core.store import atomic_path, write_table, write_text
 from places import ROOT
-from study.article.build import ASSETS, FOLDER, PAGES, article, write_verified
+from study.article.build import ASSETS, FACTS, FOLDER, PAGES, article, write_verified
 from study.article.latex import linked_table, plain_columns
-from study.article.tables import FACTS
 from study.artifact.paths import File
 from study.paper import build, textables
 from study.paper.figure_numbers import figure_numbers

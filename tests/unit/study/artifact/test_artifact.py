@@ -54,8 +54,8 @@ def test_a_job_runs_from_plain_data_and_says_what_made_it(tmp_path):
     write_table(pd.DataFrame({"x": [1.0, 2.0]}), source)
     settings = multiplied.settings(STUDY, {"scene": "s"})
     make(
-        multiplied.address, multiplied.rule, settings=multiplied.plain(settings),
-        labels={"scene": "s"}, code="c0de", inputs={"table": source}, outputs={"out": out},
+        multiplied.address, settings=multiplied.plain(settings), labels={"scene": "s"},
+        code="c0de", inputs={"table": source}, outputs={"out": out},
     )  # fmt: skip
     assert read_table(out).x.tolist() == [2.0, 4.0]
     assert "multiplied" in checksum_path(Path(out)).read_text()

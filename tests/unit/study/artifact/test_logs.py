@@ -52,7 +52,7 @@ def test_messages_of_the_package_are_in_the_log_of_the_last_job(path):
     assert "pdrom: used " in last
 
 
-def test_libraries_have_one_thread_in_a_job(path):
+def test_in_a_job_alone_libraries_have_one_thread_and_damaged_results_are_set_aside(path):
     """Snakemake sets as many as the job claims, and timing jobs claim every core."""
 
     def threads() -> set[int]:
@@ -60,16 +60,12 @@ def test_libraries_have_one_thread_in_a_job(path):
 
     with threadpool_limits(limits=2):
         assert threads() == {2}
-        with job_log(str(path)):
+        with pytest.raises(SystemExit), job_log(str(path)):
             assert threads() == {1}
+            assert sets_aside()
+            raise MeshError("x")
         assert threads() == {2}
-
-
-def test_damaged_results_are_set_aside_in_a_job_and_nowhere_else(path):
-    with pytest.raises(SystemExit), job_log(str(path)):
-        assert sets_aside()
-        raise MeshError("x")
-    assert not sets_aside()
+        assert not sets_aside()
 
 
 @pytest.mark.parametrize(

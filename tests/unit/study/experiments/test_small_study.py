@@ -55,7 +55,7 @@ PathOf = Callable[[Place], str]
 @pytest.fixture(scope="module")
 def study(tmp_path_factory: pytest.TempPathFactory) -> Study:
     root = make_project(tmp_path_factory.mktemp("study"), {})
-    return Study.load({**read_yaml(root / "config" / "default.yaml"), **ASKED}, root)
+    return Study({**read_yaml(root / "config" / "default.yaml"), **ASKED}, root)
 
 
 @pytest.fixture(scope="module")

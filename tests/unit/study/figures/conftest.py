@@ -51,7 +51,7 @@ class Invented:
     def __init__(self, root: Path, scenes: Sequence[str], methods: Sequence[str]) -> None:
         self.root = root
         self.settings = SETTINGS | {"scenes": list(scenes), "methods": list(methods)}
-        self.study = Study.load(self.settings, ROOT)
+        self.study = Study(self.settings, ROOT)
         make_results(self)
 
     def path(self, place: paths.Place, scene: str, group: str = "", method: str = "") -> str:

@@ -82,7 +82,7 @@ from study.pipeline.plan import Plan
 from study.pipeline.study import Study
 
 settings, project, root, out = sys.argv[1:]
-plan = Plan(Study.load(json.loads(settings), project), Folders(root))
+plan = Plan(Study(json.loads(settings), Path(project)), Folders(root))
 for name, figure in declarations().items():
     job = plan.job(figure, {})
     figure.perform(job.settings, job.inputs, {kind: f"{out}/{name}.{kind}" for kind in job.outputs})
@@ -249,7 +249,7 @@ def test_the_teaser_shows_a_sampled_subspace_as_far_as_it_ran(small_study, k, ra
     study = small_study(["bar_release"], ["pod"])
     assert not any("ecsw" in text for text in texts(study.draw("teaser", methods=("pod",))))
     points = mesh_of("bar_release").points
-    study.study = Study.load(study.settings | {"subspace": {}}, ROOT)
+    study.study = Study(study.settings | {"subspace": {}}, ROOT)
     with write_hdf5(study.path(SUBSPACES, "bar_release")) as file:
         file[f"columns/pod_k{k:03d}/B"] = np.eye(len(points))
         model = file.create_group(f"models/pod_k{k:03d}_ecsw-1e-02")

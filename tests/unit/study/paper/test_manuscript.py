@@ -78,12 +78,12 @@ def test_the_text_of_other_scenes_speaks_of_what_it_shows_and_of_no_claim():
 def test_a_study_of_other_scenes_has_its_own_text():
     settings = read_yaml(ROOT / "config" / "default.yaml")
     changes = {"scenes": ["ball_shell"], "noise": {"cases": {}}}
-    study = Study.load({**settings, **changes}, ROOT, configuration="config/mine.yaml")
+    study = Study({**settings, **changes}, ROOT, configuration="config/mine.yaml")
     made = Plan(study).job(paper)
     facts = made.settings["facts"]
     assert (facts["part"], facts["full_study"], facts["pages"]) == (None, "config/mine.yaml", {})
     assert made.inputs["source"][:2] == ["paper/own/main.tex", "paper/own/supplement.tex"]
-    of_default = Plan(Study.load(settings, ROOT)).job(paper)
+    of_default = Plan(Study(settings, ROOT)).job(paper)
     assert of_default.inputs["source"][:2] == ["paper/main.tex", "paper/supplement.tex"]
 
 
@@ -107,7 +107,7 @@ def test_only_packages_of_both_tex_systems():
 
 
 def test_every_key_names_a_column_of_a_table():
-    study = Study.load(read_yaml(ROOT / "config" / "default.yaml"), ROOT)
+    study = Study(read_yaml(ROOT / "config" / "default.yaml"), ROOT)
     facts = Plan(study).job(paper).settings["facts"]["tables"]
     tables = {name: table.checked(pd.DataFrame()) for name, table in declared().items()}
     tables |= {name: pd.DataFrame(rows)[:0] for name, rows in facts.items()}

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from bad_input.project import MESH, SCENE, SQUARE, STUDY, Replace, load_project, make_project
+from bad_input.project import MESH, SCENE, SQUARE, STUDY, load_project, make_project, with_mesh
 from pdrom.core.errors import ConfigurationError
 from places import ROOT
 from study.artifact import paths
@@ -15,7 +15,7 @@ from study.experiments.subspaces import online
 from study.experiments.timing import scaling
 from study.pipeline.folders import Folders
 from study.pipeline.manifest import study_files
-from study.pipeline.plan import Job, Plan
+from study.pipeline.plan import Plan
 from study.pipeline.study import Study, labels_of
 from study.tables import declared
 
@@ -23,24 +23,14 @@ CONFIG = {"scenes": ["spring_oop", "strain_oop"], "methods": ["deim", "block-dei
 
 
 def plan(**changes) -> Plan:
-    return Plan(Study.load(CONFIG | changes, ROOT), Folders("out"))
+    return Plan(Study(CONFIG | changes, ROOT), Folders("out"))
 
 
-@pytest.fixture(scope="module")
-def made() -> dict[str, Job]:
-    """Jobs of the tables by name."""
-    return {job.artifact.name: job for job in plan().fixed["tables"]}
-
-
-@pytest.mark.parametrize("name", declared())
-def test_every_table_finds_what_it_reads(name, made):
-    job = made[name]
-    assert job.inputs.keys() | job.settings.keys() == declared()[name].reads.keys()
-    assert not job.inputs.keys() & job.settings.keys()
-    assert job.outputs == {"table": f"out/tables/{name}.csv"}
-
-
-def test_inputs_are_files_of_the_study_in_its_order(made):
+def test_every_table_finds_what_it_reads_in_the_order_of_the_study():
+    made = {job.artifact.name: job for job in plan().fixed["tables"]}
+    for name, table in declared().items():
+        assert made[name].inputs.keys() | made[name].settings.keys() == table.reads.keys()
+        assert made[name].outputs == {"table": f"out/tables/{name}.csv"}
     assert made["sensitivity"].inputs == {
         "parts": ["out/sensitivity/spring_oop.csv", "out/sensitivity/strain_oop.csv"]
     }
@@ -122,7 +112,7 @@ def test_an_edit_plans_what_reads_or_prints_it(tmp_path):
     assert "mesh" not in found
 
 
-USED = Replace("{kind: cloth, rows: 5, columns: 4, plane: xz}", f"{{kind: file, path: {MESH}}}")
+USED = with_mesh(f"{{kind: file, path: {MESH}}}")
 
 
 @pytest.mark.parametrize("experiment", [mesh, online, scaling], ids=lambda e: e.name)
@@ -142,7 +132,7 @@ def test_an_edited_mesh_has_another_checksum(tmp_path: Path, experiment) -> None
 
 
 def test_files_of_the_study_and_what_was_asked_for_beside_them(tmp_path, monkeypatch):
-    smallest = Plan(Study.load(CONFIG | {"scenes": ["bend_fall"]}, ROOT))
+    smallest = Plan(Study(CONFIG | {"scenes": ["bend_fall"]}, ROOT))
     monkeypatch.chdir(tmp_path)
     own = [
         paths.TABLE.at("results", name="claims"),

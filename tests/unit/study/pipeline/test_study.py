@@ -25,7 +25,7 @@ STUDY = {"scenes": ["spring_oop", "strain_oop"], "methods": ["deim", "gappy"], "
 
 
 def study(**sections) -> Study:
-    return Study.load(STUDY | sections, ROOT)
+    return Study(STUDY | sections, ROOT)
 
 
 @pytest.mark.parametrize(
@@ -127,7 +127,7 @@ def test_a_variant_of_each_combination_differs_in_mesh_weight_and_start_alone() 
 
 def test_a_study_holds_its_variants_beside_its_scenes() -> None:
     config = {"scenes": ["strain_oop"], "methods": ["deim"], "variants": SECTION.model_dump()}
-    study = Study.load({**config, "coarsen": {"resolution": 0.3, "frames": 0.1}}, ROOT)
+    study = Study({**config, "coarsen": {"resolution": 0.3, "frames": 0.1}}, ROOT)
     assert len(study.scenes) == 1 + 8
     fine, coarse = (study.bound[f"spring_oop_m{m}_w1_s1"].mesh for m in ("1p5", "0p5"))
     assert fine.vertices > coarse.vertices
@@ -165,7 +165,7 @@ def root(tmp_path):
 
 def windy(root, **sections) -> Study:
     base = {"scenes": ["spring_oop", "windy"], "methods": ["deim"], "ranks": [6]}
-    return Study.load(base | sections, root)
+    return Study(base | sections, root)
 
 
 def test_what_no_subspace_takes_has_all_but_what_is_of_a_subspace(root):

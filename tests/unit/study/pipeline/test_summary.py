@@ -81,7 +81,7 @@ def test_verdicts_of_another_study_are_told_from_those_of_the_full_one():
     ],
 )
 def test_a_study_says_how_it_differs_from_the_full_one(config, words):
-    found = Study.load({**read_yaml(ROOT / "config" / "default.yaml"), **config}, ROOT).apart
+    found = Study({**read_yaml(ROOT / "config" / "default.yaml"), **config}, ROOT).apart
     assert found.startswith(words)
     assert bool(found) == bool(words)
 

@@ -60,7 +60,7 @@ def plan():
         "scenes": ["strain_oop"], "methods": ["deim"], "variants": {"scenes": ["spring_oop"]},
         "coarsen": {"resolution": 0.3, "frames": 0.1},
     }  # fmt: skip
-    return Plan(Study.load(config, ROOT))
+    return Plan(Study(config, ROOT))
 
 
 def test_what_a_rule_makes_is_a_target(plan):

@@ -97,11 +97,11 @@ def test_an_unknown_refused_or_slow_case_is_named(name):
     """Only what a reduction can repeat, and in short, may be asked for."""
     config = read_yaml(ROOT / "config" / "tiny.yaml") | {"hard_cases": {"cases": [name]}}
     with pytest.raises(ConfigurationError, match=f"unknown case '{name}' .allowed: bar_plane"):
-        Study.load(config, ROOT)
+        Study(config, ROOT)
 
 
 def test_every_method_takes_part_not_only_those_of_the_study():
-    study = Study.load(read_yaml(ROOT / "config" / "tiny.yaml"), ROOT)
+    study = Study(read_yaml(ROOT / "config" / "tiny.yaml"), ROOT)
     asked = Plan(study).job(hard_cases, {}).settings["every_method"]
     assert set(asked) == set(read_yaml(ROOT / "config" / "methods.yaml"))
     assert set(asked) > set(study.methods)
