@@ -3,11 +3,10 @@
 docs/library.md has a worked example.
 """
 
-from pdrom.api.arguments import methods
 from pdrom.api.files import build_scene, load, load_scene, save
 from pdrom.api.pictures import plot, view
 from pdrom.api.records import FullRun, ReducedRun, RequestedRun
-from pdrom.api.runs import basis, reduce, run
+from pdrom.api.runs import basis, methods, reduce, run
 
 __all__ = [
     "FullRun", "ReducedRun", "RequestedRun", "basis", "build_scene", "load", "load_scene",

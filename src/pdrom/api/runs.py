@@ -3,25 +3,29 @@
 import os
 from collections.abc import Callable
 from contextlib import ExitStack
+from numbers import Integral
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import perf_counter
-from typing import overload
+from typing import Any, overload
 
 import numpy as np
 
 from pdrom.api import arguments
 from pdrom.api.records import FullRun, ReducedRun, RequestedRun, full_run
-from pdrom.core.errors import ConfigurationError, SnapshotError
+from pdrom.core import config_file
+from pdrom.core.errors import ConfigurationError, SnapshotError, choices
 from pdrom.core.provenance import made_by
-from pdrom.core.store import open_hdf5, require_own, require_place
+from pdrom.core.store import open_hdf5, require_finite, require_own, require_place
+from pdrom.core.yamlfile import shown
+from pdrom.model.constraints.base import ConstraintGroup
 from pdrom.model.dynamics.stepper import FrameReport, State
 from pdrom.model.dynamics.system import DEFAULT_SOLVER
 from pdrom.model.runs import BoundedRun, frame_by_frame
 from pdrom.model.runs import run as run_full_order
 from pdrom.model.scene import Scene
 from pdrom.reduction.basis import Basis, compute_basis
-from pdrom.reduction.method import MethodSpec
+from pdrom.reduction.method import MethodSpec, load_methods
 from pdrom.reduction.requested import run as requested
 from pdrom.reduction.requested.levels import OnFrame, silent
 from pdrom.reduction.rerun import compare
@@ -103,7 +107,7 @@ def basis(full: FullRun, group: str, method: str | MethodSpec = "pod") -> Basis:
     """
     arguments.require(FullRun, full, "full", source=FULL_RUN)
     chosen = full.scene.group(arguments.require(str, group, "group", source=GROUP))
-    spec = arguments.method_spec(method)
+    spec = _method_spec(method)
     if group not in full.snapshots:
         raise SnapshotError(f"group '{group}': the run stored no snapshots of it")
     data, masses = full.snapshots[group], row_masses(chosen, full.scene.masses)
@@ -111,6 +115,11 @@ def basis(full: FullRun, group: str, method: str | MethodSpec = "pod") -> Basis:
     return compute_basis(
         data.p, masses, roundoff, rows_per_element=chosen.rows_per_element, spec=spec
     )
+
+
+def methods() -> dict[str, MethodSpec]:
+    """Reduction methods of config/methods.yaml by name; an installed package has its own copy."""
+    return load_methods(config_file("methods.yaml"))
 
 
 Wish = float | str | requested.Request
@@ -181,13 +190,19 @@ def reduce(
     if scene is not None:
         raise ConfigurationError("scene: only together with an error")
     group = arguments.require(str, group, "group", source=GROUP)
-    scene, spec = full.scene, arguments.method_spec(method)
-    r, chosen = arguments.modes(r), scene.group(group)
-    arguments.require_positions(full)
+    scene, spec = full.scene, _method_spec(method)
+    size: Any = r  # its range is checked with the basis
+    if isinstance(size, bool) or not isinstance(size, Integral):
+        raise ConfigurationError(f"r = {shown(r, 60)}: a whole number of modes is required")
+    r, chosen = int(size), scene.group(group)
+    found, required = np.shape(full.positions), (scene.config.frames + 1, scene.mesh.vertices, 3)
+    if found != required:
+        raise SnapshotError(f"full: positions of shape {found}, required: {required}")
+    require_finite("full: positions", full.positions, SnapshotError)
     if basis_of_group is None:
         made = basis(full, group, spec)
     else:
-        made = arguments.fitting_basis(basis_of_group, chosen, spec)
+        made = _fitting_basis(basis_of_group, chosen, spec)
     reduction = Reduction(made, select(made, spec, r), spec, r=r)
     steps = replace_group(scene, group, ReducedLocalStep(chosen, reduction))
     loop = scene.stepper(scene.system, steps, track_objective=False)
@@ -205,6 +220,37 @@ def reduce(
     ms = 1e3 * float(np.median(seconds))
     name = method if isinstance(method, str) else method.title
     return ReducedRun(full, group, name, r, float(reduction.gain), outcome, ms)
+
+
+def _method_spec(method: str | MethodSpec) -> MethodSpec:
+    """Return the method of that name in config/methods.yaml; a specification as it is."""
+    if isinstance(method, MethodSpec):
+        return method
+    known = methods()
+    if not isinstance(method, str) or method not in known:
+        raise ConfigurationError(f"unknown method {shown(method, 60)}{choices(method, known)}")
+    return known[method]
+
+
+def _fitting_basis(made: Any, group: ConstraintGroup, spec: MethodSpec) -> Basis:
+    """Return ``made`` if the method ``spec`` can use it as a basis of the group, else raise."""
+    known = arguments.require(Basis, made, "basis_of_group", source="pdrom.api.basis makes one")
+    found, needed = ((each.elements, each.rows_per_element) for each in (known, group))
+    if found != needed:
+        raise ConfigurationError(
+            f"basis_of_group: of {found[0]} elements with {found[1]} rows each, group "
+            f"'{group.name}' of this scene has {needed[0]} with {needed[1]}: another scene's?"
+        )
+    if known.V.shape != (len(known.mean), known.rank):
+        raise ConfigurationError(
+            f"basis_of_group: V of shape {known.V.shape}, required: {(len(known.mean), known.rank)}"
+        )
+    if known.separate_axes != spec.separate_axes:
+        raise ConfigurationError(
+            f"basis_of_group: made for another method than '{spec.title}' (axes "
+            f"{'apart' if known.separate_axes else 'together'})"
+        )
+    return known
 
 
 def _within(full: FullRun, error: Wish, scene: Scene, on_frame: OnFrame) -> RequestedRun:

@@ -56,20 +56,12 @@ class Progress(_Line):
         # estimated by the later half: kernels are compiled in the first frames and between them
         half = done // 2
         left = (now - self._ends[half]) / (done - half) * (self._frames - done)
-        ms = 1e3 * float(report.seconds.sum())
-        self._show(line(self._name, done, self._frames, ms, left), now)
+        full, ms = WIDTH * done // self._frames, 1e3 * float(report.seconds.sum())
+        bar = "#" * full + "." * (WIDTH - full)
+        text = f"frame {done} of {self._frames}, {ms:.2f} ms a frame, {left:.0f} s left"
+        self._show(f"{self._name} [{bar}] {text}", now)
         if done == self._frames:
             self._end()
-
-
-def line(name: str, done: int, frames: int, ms: float, left: float) -> str:
-    """Text of the progress line of the run ``name`` after ``done`` of ``frames`` frames.
-
-    ``ms`` are the last frame's milliseconds, ``left`` the seconds to its end.
-    """
-    full = WIDTH * done // frames
-    bar = "#" * full + "." * (WIDTH - full)
-    return f"{name} [{bar}] frame {done} of {frames}, {ms:.2f} ms a frame, {left:.0f} s left"
 
 
 class LevelProgress(_Line):

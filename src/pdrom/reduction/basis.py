@@ -254,8 +254,6 @@ def fix_signs(u: np.ndarray) -> np.ndarray:
     Magnitudes are compared after rounding to single precision, so that entries which are equal up
     to round-off tie and the first of them decides.
     """
-    if u.shape[1] == 0:
-        return u
     largest = [np.argmax(np.abs(mode).astype(np.float32)) for mode in u.T]
     signs = np.sign(u[largest, np.arange(u.shape[1])])
     return u * np.where(signs == 0.0, 1.0, signs)

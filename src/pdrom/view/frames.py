@@ -52,7 +52,7 @@ def _draw(scene: ViewedScene) -> Figure:
     numbers = frame_numbers(INSTANTS, len(scene.positions) - 1)
     full = scene.positions[numbers].astype(float)
     reference = [
-        RunPanel(f"frame {frame}", style.FULL_ORDER, q, reference=True).seen_by(CAMERA)
+        RunPanel(f"frame {frame}", style.FULL_ORDER, q, reference=True)
         for frame, q in zip(numbers, full, strict=True)
     ]
     labels, groups = [f"{style.words(scene.name)}\n{scene.first}"], {r.group for r in scene.runs}
@@ -84,7 +84,7 @@ def _panel(run: ViewedRun, frame: int) -> RunPanel:
     groups = [name for name in EFFECTS if issubclass(EFFECTS.load(name), ConstraintGroup)]
     looks, place = style.GROUP_LOOKS, groups.index(run.group) if run.group in groups else 0
     colour = style.surface_colour(looks[place % len(looks)][0])
-    return RunPanel("", colour, positions, failure, remark).seen_by(CAMERA)
+    return RunPanel("", colour, positions, failure, remark)
 
 
 def vtk(scene: ViewedScene, collection: Path) -> None:

@@ -53,14 +53,6 @@ def shade(normals: np.ndarray, camera: Camera) -> np.ndarray:
     return AMBIENT + (1.0 - AMBIENT) * np.clip(lit, 0.0, 1.0)
 
 
-def depth_order(points: np.ndarray, triangles: np.ndarray, camera: Camera) -> np.ndarray:
-    """Faces (T,) of ``triangles`` (T, 3) from far to near by ``camera``; ties keep order.
-
-    ``points`` (N, 3) m are their vertices.
-    """
-    return np.argsort(camera.depth(points)[triangles].mean(axis=1), kind="stable")
-
-
 def draw_surface(
     ax: Axes,
     points: np.ndarray,
@@ -94,7 +86,7 @@ def draw_surface(
         base = np.where(back[:, None], BACK * base + (1.0 - BACK) * 0.55, base)
     faces = np.clip(base * brightness[:, None], 0.0, 1.0)
     edges = (1.0 - wire) * faces + wire * 0.08
-    order = depth_order(points, triangles, camera)
+    order = np.argsort(camera.depth(points)[triangles].mean(axis=1), kind="stable")
     collection = PolyCollection(
         camera.project(points)[triangles[order]],
         facecolors=faces[order],
@@ -171,18 +163,6 @@ def _edges_between(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.nd
     order = np.argsort(inverse.ravel(), kind="stable")
     start = np.concatenate([[0], np.cumsum(count)[:-1]])
     return edges, owner[order[start]], owner[order[start + np.minimum(count - 1, 1)]]
-
-
-def draw_outline(ax: Axes, points: np.ndarray, edges: np.ndarray, camera: Camera) -> None:
-    """Draw the thin outline of a reference shape on ``ax``.
-
-    ``points`` (N, 3) m are joined by ``edges`` (n, 2), as ``camera`` sees them.
-    """
-    from matplotlib.collections import LineCollection
-
-    lines = LineCollection(camera.project(points)[edges], colors=GHOST, linewidths=0.6)
-    lines.set_zorder(0.5)
-    ax.add_collection(lines)
 
 
 def draw_lines(ax: Axes, segments: np.ndarray, camera: Camera, colours: np.ndarray) -> None:

@@ -2,7 +2,7 @@
 
 import textwrap
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
@@ -29,7 +29,6 @@ class RunPanel:
     failure : reason of the failure, drawn in red; None for a run without failure
     remark : one line below the picture
     reference : whether this is the run that others are compared with
-    flat : (N, 2) m, the positions in the picture plane (see `seen_by`)
     obstacles : surfaces of the obstacles; None draws the floor y = 0
     """
 
@@ -39,26 +38,17 @@ class RunPanel:
     failure: str | None = None
     remark: str | None = None
     reference: bool = False
-    flat: np.ndarray | None = None
     obstacles: Sequence[Mesh] | None = None
 
-    def seen_by(self, camera: Camera) -> "RunPanel":
-        """The panel with its positions in the picture plane of ``camera``."""
+    def zoomed(self, window: Window, camera: Camera) -> Window:
+        """``window`` of ``camera``, enlarged in the same aspect ratio if the run leaves it."""
         flat = None if self.positions is None else camera.project(self.positions)
-        return replace(self, flat=flat)
-
-    def zoomed(self, window: Window) -> Window:
-        """``window``, enlarged with the same aspect ratio if the run does not fit into it."""
-        if self.flat is None or window.contains(self.flat).all():
+        if flat is None or window.contains(flat).all():
             return window
         corners = [(window.left, window.bottom), (window.right, window.top)]
-        both = bounds(np.concatenate([self.flat, corners]), 0.03)
+        both = bounds(np.concatenate([flat, corners]), 0.03)
         factor = max(both.width / window.width, both.height / window.height)
         return both.resized(factor * window.width, factor * window.height)
-
-    def scale(self, window: Window) -> float:
-        """Factor, at least 1, by which the run is drawn smaller than in ``window``."""
-        return self.zoomed(window).width / window.width
 
 
 def shared_window(
@@ -89,6 +79,8 @@ def draw_run(ax: Axes, row: "Row", i: int) -> None:
 
     The outline of the row's ghost is drawn for comparison, unless the run is the reference.
     """
+    from matplotlib.collections import LineCollection
+
     mesh, panel, camera, window = row.mesh, row.panels[i], row.camera, row.windows[i]
     ax.set_title(panel.title, pad=3)
     if panel.failure:
@@ -99,7 +91,8 @@ def draw_run(ax: Axes, row: "Row", i: int) -> None:
         note = panel.failure or panel.remark or ""
         centre_note(ax, note, FAILED if panel.failure else "#666666")
         return
-    shown, zoom = panel.zoomed(window), panel.scale(window)
+    shown = panel.zoomed(window, camera)
+    zoom = shown.width / window.width  # the run is drawn smaller by this factor
     for body in panel.obstacles or ():
         look = {"colour": mesh_render.FLOOR, "wire": 0.05}
         mesh_render.draw_surface(ax, body.points, body, camera, **look).set_zorder(0.1)
@@ -110,18 +103,20 @@ def draw_run(ax: Axes, row: "Row", i: int) -> None:
         edges = mesh_render.outline_edges(mesh.points, mesh.triangles)
         if not len(edges):  # a round body has no edges of its own
             edges = mesh_render.silhouette_edges(ghost, mesh.triangles, camera)
-        mesh_render.draw_outline(ax, ghost, edges, camera=camera)
+        flat = camera.project(ghost)[edges]
+        lines = LineCollection(flat, colors=mesh_render.GHOST, linewidths=0.6, zorder=0.5)
+        ax.add_collection(lines)
     contrast = 0.5 if isinstance(panel.colour, np.ndarray) else 1.0
     mesh_render.draw_surface(ax, panel.positions, mesh, camera, panel.colour, contrast=contrast)
     mesh_render.set_window(ax, shown)
-    lines = [text for text in (panel.failure, panel.remark) if text]
+    texts = [text for text in (panel.failure, panel.remark) if text]
     if zoom > SLACK:
-        lines.append(f"scale 1 : {zoom:.{1 if zoom < 10.0 else 0}f}")
+        texts.append(f"scale 1 : {zoom:.{1 if zoom < 10.0 else 0}f}")
         # a red frame: this picture has another scale than its neighbours
         _cover(ax, zorder=8, facecolor="none", edgecolor=FAILED, linewidth=0.6)
-    if lines:
+    if texts:
         colour = FAILED if panel.failure or zoom > SLACK else "#555555"
-        ax.set_xlabel("\n".join(lines), color=colour, fontsize=7.5, labelpad=2)
+        ax.set_xlabel("\n".join(texts), color=colour, fontsize=7.5, labelpad=2)
 
 
 def _cover(ax: Axes, **look: Any) -> None:
@@ -175,8 +170,11 @@ class Row:
     @property
     def lines(self) -> int:
         """Lines of text below the pictures."""
-        lines = (bool(p.failure) + bool(p.remark) + (p.scale(w) > SLACK) for p, w in self._pictures)
-        return max(lines, default=0)
+        counts = [0]
+        for panel, window in self._pictures:
+            smaller = panel.zoomed(window, self.camera).width / window.width > SLACK
+            counts.append(bool(panel.failure) + bool(panel.remark) + smaller)
+        return max(counts)
 
 
 def run_panel(

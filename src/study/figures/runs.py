@@ -60,8 +60,7 @@ class Shown:
 
     def panel(self, path: str, info: RerunInfo) -> RunPanel:
         """Panel of the reduced run ``info`` in the file ``path``."""
-        panel = view.run_panel(path, info, self.frame, colour=self.colour, title=info.title)
-        return replace(panel, obstacles=self.bodies).seen_by(self.camera)
+        return view.run_panel(path, info, self.frame, colour=self.colour, title=info.title)
 
     def window(self, panels: list[RunPanel]) -> Window:
         """Window of the camera that contains the full-order run and ``panels``."""
@@ -76,7 +75,7 @@ class Shown:
         return Row(
             f"{self.experiment.title}\n{label}",
             self.mesh,
-            [panel.seen_by(self.camera) for panel in panels],
+            panels,
             [window] * len(panels),
             np.repeat(self.full, len(panels), axis=0),
             self.camera,
@@ -289,8 +288,7 @@ def cloth_all_grid(options: ReducedRuns, drawn: Drawn, horizon: Horizon, **files
     ghosts = np.concatenate([full] * len(drawn.methods))
 
     def row(label: str, panels: list[RunPanel], note: str | None) -> Row:
-        seen = [panel.seen_by(camera) for panel in panels]
-        return Row(label, mesh, seen, windows, ghosts, camera, note)
+        return Row(label, mesh, panels, windows, ghosts, camera, note)
 
     rows = [row("full order", first * len(drawn.methods), None)]
     for each in drawn.of(one.scene):

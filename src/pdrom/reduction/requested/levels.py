@@ -18,6 +18,7 @@ import numpy as np
 from pdrom.model.dynamics.frames import WholeFrames
 from pdrom.model.dynamics.stepper import State, Stepper
 from pdrom.model.scene import Scene
+from pdrom.reduction.rerun import mean_motion
 from pdrom.reduction.subspace.model import SubspaceModel
 from pdrom.reduction.subspace.space import projector
 
@@ -216,6 +217,7 @@ class Motion:
     iterations : iterations of each frame of the reference
     unconverged : errors (F,) of a run with half the iterations
     sensitivity : relative differences (F,) of a run whose start is perturbed, see `MOVED`
+    unit : root mean square displacement of a frame, m
     """
 
     def __init__(
@@ -238,9 +240,7 @@ class Motion:
             self.reference = run(count)
             self.unconverged = self.errors(half)
         self.iterations = count
-        moved = np.linalg.norm(self.reference[1:] - self.reference[0], axis=(1, 2))
-        self.unit = float(np.sqrt(np.mean(moved**2)))
-        """Root mean square displacement of a frame, m."""
+        self.unit = mean_motion(self.reference)
 
     def errors(self, positions: np.ndarray) -> np.ndarray:
         """Errors (F',) of a run with ``positions`` (F' + 1, N, 3) m, see `relative_errors`."""

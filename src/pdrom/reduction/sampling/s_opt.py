@@ -38,7 +38,7 @@ def s_opt_path(v: np.ndarray, size: int) -> np.ndarray:
     """
     state = _Sampled(v, size)
     for mode in range(min(v.shape[1], state.total)):
-        state.add(state.best_with(mode), mode)
+        state.add(state.best(mode), mode)
     return np.array(state.picked, dtype=np.int64)
 
 
@@ -94,24 +94,30 @@ class _Sampled:
             self._modes = v.shape[1]
             self._products = self._blocks @ self._inverse() @ self._blocks.transpose(0, 2, 1)
 
-    def best(self) -> int:
-        """Element that gives the largest S-measure of the modes that have been added."""
-        norms = np.log(self._column_norms(self._modes)).sum(axis=1)
-        return self._argmax(self._log_determinants() - norms)
+    def best(self, mode: int | None = None) -> int:
+        """Element that gives the largest S-measure of the columns, after ``mode`` is added to them.
 
-    def best_with(self, mode: int) -> int:
-        """Element that gives the largest S-measure after ``mode`` is added to the columns."""
-        if not self.picked:
+        The first of the largest is taken. SamplingError if no element makes the modes independent.
+        """
+        if not self.picked and mode is not None:
             return int(np.argmax(self._squares[:, mode]))
-        z, q = self._residual()
-        solved = np.linalg.solve(self._shifted(), z[:, :, None])[:, :, 0]
-        residual = q + np.maximum(np.einsum("es,es->e", z, solved), 0.0)
+        shifted = self._products + np.eye(self._products.shape[1])  # I + M, see the class
+        modes, residual = self._modes, np.ones(self.total)
+        if mode is not None:
+            z, q = self._residual()
+            solved = np.linalg.solve(shifted, z[:, :, None])[:, :, 0]
+            modes, residual = mode + 1, q + np.maximum(np.einsum("es,es->e", z, solved), 0.0)
         possible = residual > DEPENDENT**2
+        # a determinant is at least 1, smaller ones are round-off
+        determinants = np.maximum(np.linalg.slogdet(shifted)[1], 0.0)
+        columns = self._squares[self.picked, :modes].sum(axis=0) + self._squares[:, :modes]
         measure = np.full(self.total, -np.inf)
         measure[possible] = np.log(residual[possible])
-        norms = np.log(self._column_norms(mode + 1)[possible]).sum(axis=1)
-        measure[possible] += self._log_determinants()[possible] - norms
-        return self._argmax(measure)
+        measure[possible] += determinants[possible] - np.log(columns[possible]).sum(axis=1)
+        measure[self.picked] = -np.inf
+        if np.isneginf(measure).all():
+            raise SamplingError("S-OPT: no element makes the sampled modes independent")
+        return int(np.argmax(measure))
 
     def add(self, element: int, mode: int | None = None) -> None:
         """Sample ``element`` and, if given, add ``mode`` to the columns."""
@@ -149,22 +155,3 @@ class _Sampled:
             )
         half = linalg.solve_triangular(factor, np.eye(self._modes), check_finite=False)
         return half @ half.T
-
-    def _shifted(self) -> np.ndarray:
-        """Matrix I + M of every element, see the class."""
-        return self._products + np.eye(self._products.shape[1])
-
-    def _log_determinants(self) -> np.ndarray:
-        """log det(I + M) of all elements, at least 0 (smaller values are round-off)."""
-        return np.maximum(np.linalg.slogdet(self._shifted())[1], 0.0)
-
-    def _column_norms(self, modes: int) -> np.ndarray:
-        """Squared norms (e, modes) of the sampled columns with each element added."""
-        return self._squares[self.picked, :modes].sum(axis=0) + self._squares[:, :modes]
-
-    def _argmax(self, measure: np.ndarray) -> int:
-        """First element with the largest measure among those that are not sampled."""
-        measure[self.picked] = -np.inf
-        if np.isneginf(measure).all():
-            raise SamplingError("S-OPT: no element makes the sampled modes independent")
-        return int(np.argmax(measure))

@@ -220,14 +220,6 @@ def test_rows_without_mass_are_named(mass):
 # Type and file ------------------------------------------------------------------------------
 
 
-def test_truncation_names_the_rank():
-    basis = basis_of(snapshots(37)[0], BasisSpec())
-    np.testing.assert_array_equal(basis.truncated(3), basis.V[:, :3])
-    for r in (0, -1, 8):
-        with pytest.raises(RankError, match=rf"r = {r}, .* rank 7 .* allowed are 1 to 7"):
-            basis.truncated(r)
-
-
 @every_spec
 def test_file_round_trip(spec, tmp_path):
     path = tmp_path / "scene" / "group" / f"{spec.basis_id}.h5"

@@ -10,15 +10,14 @@ from pdrom.model.scene import Scene
 from pdrom.reduction.requested import run as requested
 from pdrom.reduction.requested.levels import Level, Trajectory, last_within, relative_errors
 
-EFFECTS = (GRAVITY, LEFT, {"effect": "spring", "weight": 1e5})
 SHEET = {"kind": "cloth", "rows": 7, "columns": 7, "plane": "xz"}
 SETTINGS = requested.ToleranceSettings(modes=(8,), tolerances=(1e-2,), iterations=(10,), factor=2.0)
 FRAMES, KICK = 24, {"effect": "kick", "speed": 0.4, "seed": 7}
 
 
 def sheet(*more, weight: float = 1e5, **keys) -> Scene:
-    effects = (*EFFECTS[:2], {"effect": "spring", "weight": weight}, *more)
-    return make_scene(*effects, mesh=SHEET, **{"frames": FRAMES, **keys})
+    effects = {"effect": "spring", "weight": weight}, *more
+    return make_scene(GRAVITY, LEFT, *effects, mesh=SHEET, **{"frames": FRAMES, **keys})
 
 
 @pytest.fixture(scope="module")
@@ -56,14 +55,13 @@ def test_what_a_calibration_rests_on_may_differ_when_it_is_made_again(changes, e
     assert not done.met or error_of(scene, done.positions, done.frames) <= error
 
 
-def test_other_cells_or_groups_are_refused():
+@pytest.mark.parametrize(("group", "rows"), [("spring", 6), ("strain", 7)])
+def test_other_cells_or_groups_are_refused(group, rows):
+    other = make_scene(
+        GRAVITY, LEFT, {"effect": group, "weight": 1e5}, mesh={**SHEET, "rows": rows}
+    )
     with pytest.raises(ConfigurationError, match="another mesh or other constraint groups"):
-        requested.transferred(
-            sheet(), make_scene(*EFFECTS, mesh={**SHEET, "rows": 6}, frames=FRAMES)
-        )
-    strained = make_scene(*EFFECTS[:2], {"effect": "strain", "weight": 1e5}, mesh=SHEET)
-    with pytest.raises(ConfigurationError, match="another mesh or other constraint groups"):
-        requested.transferred(sheet(), strained)
+        requested.transferred(sheet(), other)
 
 
 def test_a_tolerance_below_the_reference_s_own_error_is_refused(own):
