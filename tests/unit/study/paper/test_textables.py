@@ -101,7 +101,8 @@ TABLES = {
     ),
     "payoff": frame(
         "position_basis method scenes accurate pays loses least_speedup best_speedup "
-        "most_speedup error_train error_heldout heldout playback_error accurate_heldout pays_heldout",
+        "most_speedup error_train error_heldout heldout playback_error accurate_heldout "
+        "pays_heldout",
         ("full", "deim_x", 3, 0, 0, 0, *3 * [None], float("inf"), None, 0, None, 0, 0),
         ("pod", "ecsw", 3, 2, 1, 1, *5 * [0.5], 2, 0.9, 2, 1),
     ),
