@@ -43,7 +43,7 @@ CONVERGED, OWN = "converged", "own iterations"
         ),
         *results.COLUMNS,
         timed(flag("pareto_heldout", "the same by the error held out; full order as it is")),
-        *shared("velocity_error relative_shape_error energy_drift contact_delay"),
+        *shared("velocity_error relative_shape_error energy_drift"),
     ),
     reads={
         "reruns": TableOf("reduced_reruns"),

@@ -42,10 +42,8 @@ FEWEST = 3  # least number of meshes for the fit of an exponent
         timed(number("share", "of the frame; those of a scene add up to one")),
         integer("groups", "constraint groups of the scene that is built without it"),
         timed(number("without_ms", "time of a frame of the scene that is built without it", "ms")),
-        timed(number("saved_ms", "time of the whole scene less that", "ms")),
         number("force", "root mean square over the frames of the norm of its force", "N"),
         number("force_share", "of the sum over the effects of the scene"),
-        integer("acting_frames", "frames in which it exerts a force at all", compared="error"),
         number("energy", "range of the energy that it holds, where it has one", "J"),
         number(
             "moved",
@@ -85,13 +83,13 @@ def effects_cost(
     tables = [costs]
     if len(removed):
         whole = removed[removed.left_out == NOTHING].set_index("scene").ms_per_frame
-        times = ["ms_per_frame", "saved_ms", "own_ms"]
+        times = ["ms_per_frame", "own_ms"]
         removed = results.in_one_time(removed, whole, frame_times, columns=times)
         removed = removed.rename(columns={"left_out": "effect", "ms_per_frame": "without_ms"})
         several = removed.rename(columns={"own_ms": "ms_per_frame"})
         tables.append(several[_absent(several, costs)].assign(role=SEVERAL))
-        single = ["groups", "without_ms", "saved_ms"]
-        tables[0] = costs.merge(removed[[*KEYS, *single]], on=KEYS, how="left")
+        single = removed[[*KEYS, "groups", "without_ms"]]
+        tables[0] = costs.merge(single, on=KEYS, how="left")
     frames = results.joined(files["contributions"])
     if len(frames):
         acting = _acting(frames, sensitivity, horizon)
@@ -113,7 +111,6 @@ def _acting(frames: pd.DataFrame, sensitivity: pd.DataFrame, horizon: Horizon) -
     """Force and energy of each effect in ``frames``, and drift of the run without this effect."""
     made = frames.groupby([*KEYS, "role"], sort=False, as_index=False).agg(
         force=("force", lambda force: float(np.sqrt(np.mean(np.square(force))))),
-        acting_frames=("force", lambda force: int((force > 0.0).sum())),
         energy=("energy", lambda of: float(of.max() - of.min() if len(of) > 1 else of.iloc[0])),
     )
     length = frames.groupby("scene").frame.max() + 1
@@ -170,13 +167,10 @@ def local_share(timings: list[File], frame_times: pd.DataFrame) -> pd.DataFrame:
         *shared("vertices"),
         integer("elements", "elements of all groups"),
         *shared("r k elements_sampled"),
-        timed(number("factorisation_ms", "assembly and factorisation of the system", "ms")),
-        timed(number("memory_mb", "memory that both took", "MB")),
         timed(number("ms_per_iteration", "time of an iteration", "ms")),
         timed(number("local_ms", "time of the local step in an iteration", "ms")),
         timed(number("global_ms", "time of the global solve in an iteration", "ms")),
         *shared("vertices_ms local_share speedup"),
-        timed(number("local_speedup", "the same of the local step alone")),
         integer("meshes", "sizes of the mesh of the curve"),
         timed(number("exponent", "of the time of an iteration in the number of vertices")),
         timed(number("local_exponent", "of the time of the local step")),
@@ -187,7 +181,7 @@ def local_share(timings: list[File], frame_times: pd.DataFrame) -> pd.DataFrame:
 def scaling(parts: list[File]) -> pd.DataFrame:
     """One row per scene, mesh size and method, from the files ``parts`` of all scenes.
 
-    Speed-ups of an iteration and of its local step are relative to the full-order run. Exponents
+    Speed-ups of an iteration are relative to the full-order run. Exponents
     belong to power laws, fitted in logarithms over all meshes of a scene and method and repeated in
     each of these rows. An exponent is empty if fewer than three meshes have a measurable time, as
     any two points lie on a power law.
@@ -197,8 +191,7 @@ def scaling(parts: list[File]) -> pd.DataFrame:
         return rows
     own = rows[rows.method == FOM].set_index(["scene", "vertices"])
     mesh = pd.MultiIndex.from_frame(rows[["scene", "vertices"]])
-    for name, column in (("speedup", "ms_per_iteration"), ("local_speedup", "local_ms")):
-        rows[name] = own[column].loc[mesh].to_numpy() / rows[column]
+    rows["speedup"] = own.ms_per_iteration.loc[mesh].to_numpy() / rows.ms_per_iteration
     curves = rows.groupby(["scene", "method"], sort=False)
     rows["meshes"] = curves.vertices.transform("nunique")
     for quantity, name in EXPONENTS.items():
