@@ -11,7 +11,7 @@ from pdrom.model.effects import EFFECTS
 from pdrom.model.mesh.selection import KINDS
 from pdrom.model.scene import SceneConfig
 from pdrom.reduction.method import MethodSpec
-from places import ROOT
+from places import CONFIG, ROOT
 from study.artifact.paths import RESULTS
 from study.figures.stability_map import LOOKS
 from study.pipeline.front import completed
@@ -68,20 +68,16 @@ def test_a_line_of_prose_holds_one_sentence() -> None:
     assert [line for line in lines if two.search(line)] == []
 
 
-def test_every_page_is_listed() -> None:
-    listed = LINK.findall((ROOT / "README.md").read_text("utf-8"))
+def test_every_page_is_listed_in_the_readme_which_is_short() -> None:
+    text = (ROOT / "README.md").read_text("utf-8")
     pages = {f"docs/{page.name}" for page in (ROOT / "docs").glob("*.md")}
-    assert pages <= set(listed)
+    assert pages <= set(LINK.findall(text))
+    assert len(text.splitlines()) <= 110
 
 
 def commands() -> list[str]:
     """Arguments of ./reproduce on pages and in comments of the configuration."""
-    files = [
-        *PAGES,
-        ROOT / "CONTRIBUTING.md",
-        ROOT / "reproduce",
-        *(ROOT / "config").glob("*.yaml"),
-    ]
+    files = [*PAGES, ROOT / "CONTRIBUTING.md", ROOT / "reproduce", *CONFIG.glob("*.yaml")]
     texts = [path.read_text("utf-8").replace("\\\n", " ") for path in files]
     found = {line.split("  ")[0].strip() for text in texts for line in COMMAND.findall(text)}
     # names in capitals stand for others; a plugin of the executor need not be installed
@@ -110,8 +106,8 @@ def test_the_scene_the_study_and_the_method_that_are_added_are_valid() -> None:
     assert [MethodSpec.model_validate(method).rows for method in methods.values()] == ["scalar"]
 
 
-def test_the_effects_of_the_registry_are_listed_with_their_keys_and_what_a_subspace_takes() -> None:
-    page = (ROOT / "config" / "README.md").read_text("utf-8")
+def test_effects_and_selections_are_listed_with_their_keys_and_what_a_subspace_takes() -> None:
+    page = (CONFIG / "README.md").read_text("utf-8")
     rows = re.findall(r"^\| `(\w+)` \| (.*) \| (yes|no)[,:]?.* \|$", page, re.MULTILINE)
     assert sorted(name for name, _, _ in rows) == sorted(EFFECTS)
     for name, keys, taken in rows:
@@ -120,16 +116,12 @@ def test_the_effects_of_the_registry_are_listed_with_their_keys_and_what_a_subsp
         assert set(effect.Config.model_fields) - {"effect"} <= set(re.findall(r"`(\w+)`", keys)), (
             name
         )
-
-
-def test_the_effects_of_the_registry_are_listed_for_who_adds_a_scene() -> None:
+    kinds = re.findall(r"`\{kind: (\w+), (?:of|\w+)", page.split("### Selections")[1])
+    assert sorted(kinds) == sorted(KINDS)
+    # for who adds a scene, too
     text = ADDING.read_text("utf-8")
     (sentence,) = re.findall(r"^Effects: (.*?)\.\n", text, re.MULTILINE | re.DOTALL)
     assert sorted(re.findall(r"`(\w+)`", sentence)) == sorted(EFFECTS)
-
-
-def test_the_readme_is_short() -> None:
-    assert len((ROOT / "README.md").read_text("utf-8").splitlines()) <= 110
 
 
 def test_the_classes_of_runs_are_explained() -> None:
@@ -150,13 +142,6 @@ def test_the_messages_that_are_explained_exist() -> None:
     assert len(messages) > 10
     fixed = [part.strip() for text in messages for part in re.split(r"\.\.\.|\b[A-Z]+\b", text)]
     assert [part for part in fixed if part not in sources] == []
-
-
-def test_every_kind_of_selection_is_listed() -> None:
-    page = (ROOT / "config" / "README.md").read_text("utf-8")
-    assert sorted(
-        re.findall(r"`\{kind: (\w+), (?:of|\w+)", page.split("### Selections")[1])
-    ) == sorted(KINDS)
 
 
 def test_the_verdicts_of_the_readme_are_the_expected_ones() -> None:

@@ -211,8 +211,11 @@ def test_one_run_at_a_time(clean, at_work):
     assert f"another run (process {os.getpid()} on " in line
 
 
+ENTRY = '    {\n        "fall": "pdrom.model.effects.forces:Gravity",\n'
+
+
 def test_no_text_and_no_date_reruns_anything(finished):
-    """Nor does another number of cores, a new effect, or one that no scene lists.
+    """Nor does another number of cores, a new name of an effect, or one that no scene lists.
 
     All sources are younger than the results, then all results are younger than now.
     """
@@ -221,7 +224,7 @@ def test_no_text_and_no_date_reruns_anything(finished):
     finished.edit(SCRIPT, "    make(", "    # the job\n    make(")
     poke = "src/pdrom/model/effects/poke.py"
     finished.edit(poke, "self._order[turn : ", "self._order[0 + turn : ")
-    finished.register(*EFFECT)
+    finished.edit("src/pdrom/model/effects/__init__.py", "    {\n", ENTRY)
     finished.register(*SELECTION)
     for late in (EDITED, ("results",)):
         for path in finished.files(*late):
@@ -297,17 +300,6 @@ from pdrom.reduction.sampling.deim import Selection
 class First(Selection):
     def one_a_mode(self, v, size, ranks):
         return {r: np.arange(min(r, len(v) // size)) for r in ranks}
-''',
-)  # fmt: skip
-EFFECT = (
-    "src/pdrom/model/effects/__init__.py", "nothing:Nothing", "pdrom.model.effects.nothing",
-    '''"""Nothing at all."""
-
-from pdrom.model.effects.forces import Gravity
-
-
-class Nothing(Gravity):
-    pass
 ''',
 )  # fmt: skip
 

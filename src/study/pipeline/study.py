@@ -97,6 +97,7 @@ class Study:
         self.settings = settings = validate(StudySettings, config, source)
         self.titles: dict[str, str] = {}  # titles of scenes, for tables and figures
         self.vertices: dict[str, int] = {}
+        self._known: dict[str, SceneConfig] = {}
         # changes to every scene of config/scenes, in their order
         self._changes = changes = (settings.replicate, settings.coarsen)
         self.bound: dict[str, Scene] = {
@@ -105,8 +106,10 @@ class Study:
         for scene in settings.variants.of(lambda name: scene_kit.read_scene(root, name, *changes)):
             self.bound[scene.name] = scene_kit.bind(root, scene, "variants")
         self.scenes = {name: self._physics(s) for name, s in self.bound.items()}
-        self.online = {name: self._loaded(name) for name in settings.online.scenes}
-        self._others: dict[str, SceneConfig] = {}
+        self.online = {
+            name: self._physics(scene_kit.load_bound_scene(root, name, *changes))
+            for name in settings.online.scenes
+        }
         self.methods: dict[str, MethodSpec] = self.named_methods(settings.methods, "methods")
 
     @cached_property
@@ -126,21 +129,16 @@ class Study:
 
     def scene(self, name: str) -> SceneConfig:
         """Return any scene by ``name``; ConfigurationError if its file is missing or faulty."""
-        for held in (self.scenes, self.online, self._others):
-            if name in held:
-                return held[name]
-        self._others[name] = self._loaded(name)
-        return self._others[name]
-
-    def _loaded(self, name: str) -> SceneConfig:
-        """Checked configuration of a scene whose built form the study does not store."""
-        return self._physics(scene_kit.load_bound_scene(self.root, name, *self._changes))
+        if name not in self._known:  # checked, but its built form is not stored
+            self._physics(scene_kit.load_bound_scene(self.root, name, *self._changes))
+        return self._known[name]
 
     def _physics(self, scene: Scene) -> SceneConfig:
         """Scene configuration with its title replaced by its name: jobs do not depend on titles."""
         config = scene.config
         self.titles[config.name], self.vertices[config.name] = config.title, scene.mesh.vertices
-        return config.model_copy(update={"title": config.name})
+        self._known[config.name] = config.model_copy(update={"title": config.name})
+        return self._known[config.name]
 
     def only(self, scene: str) -> "Study":
         """Return a copy of the study with ``scene`` alone, which may be outside the study."""
