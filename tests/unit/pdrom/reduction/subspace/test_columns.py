@@ -1,6 +1,7 @@
 """Position subspaces: atoms, columns, modes."""
 
 import warnings
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,17 +15,6 @@ from pdrom.reduction.subspace import columns as spaces
 from pdrom.reduction.subspace.model import make_columns
 from pdrom.reduction.subspace.space import DenseElimination, coordinates
 
-
-class Units:
-    """A boundary of which only the units are asked."""
-
-    def __init__(self, *units) -> None:
-        self._units = [np.array(sorted(unit)) for unit in units]
-
-    def units(self):
-        return self._units
-
-
 SETS = st.lists(
     st.lists(st.sets(st.integers(0, 19), min_size=1, max_size=8), min_size=1, max_size=3),
     max_size=4,
@@ -33,7 +23,8 @@ SETS = st.lists(
 
 @given(SETS)
 def test_atoms_partition_what_is_held(boundaries):
-    found = spaces.atoms([Units(*units) for units in boundaries], 20)
+    asked = [SimpleNamespace(units=lambda own=own: [[*unit] for unit in own]) for own in boundaries]
+    found = spaces.atoms(asked, 20)
     units = [unit for boundary in boundaries for unit in boundary]
     members = np.concatenate(found) if found else np.array([], dtype=int)
     assert len(members) == len(set(members.tolist()))
