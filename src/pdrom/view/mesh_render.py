@@ -132,37 +132,30 @@ def draw_floor(ax: Axes, points: np.ndarray, mesh: Mesh, camera: Camera, window:
     ax.add_collection(shadow)
 
 
-def outline_edges(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Edges (n, 2) on the boundary of the surface, or between faces that meet sharply.
+def outline_edges(
+    rest: np.ndarray, points: np.ndarray, triangles: np.ndarray, camera: Camera
+) -> np.ndarray:
+    """Edges (n, 2) on the boundary of the surface, or between faces that meet sharply at rest.
 
-    ``points`` are (N, 3) m, ``triangles`` (T, 3).
+    A round body has none of its own: then those between a face that ``camera`` sees from the front
+    and one from behind. ``rest`` and ``points`` are (N, 3) m, ``triangles`` (T, 3).
     """
-    edges, first, second = _edges_between(triangles)
-    normals = face_normals(points, triangles)
+    pairs = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    owner = np.repeat(np.arange(len(triangles)), 3)
+    edges, inverse, count = np.unique(pairs, axis=0, return_inverse=True, return_counts=True)
+    owner = owner[np.argsort(inverse.ravel(), kind="stable")]
+    start = np.concatenate([[0], np.cumsum(count)[:-1]])
+    # the two triangles of each edge; a boundary edge has the same one twice
+    first, second = owner[start], owner[start + np.minimum(count - 1, 1)]
+    normals = face_normals(rest, triangles)
     turn = np.einsum("ij,ij->i", normals[first], normals[second])
-    return edges[(first == second) | (turn < SHARP)]
-
-
-def silhouette_edges(points: np.ndarray, triangles: np.ndarray, camera: Camera) -> np.ndarray:
-    """Edges (n, 2) between a face that ``camera`` sees from the front and one from behind.
-
-    ``points`` are (N, 3) m, ``triangles`` (T, 3).
-    """
-    edges, first, second = _edges_between(triangles)
+    own = edges[(first == second) | (turn < SHARP)]
+    if len(own):
+        return own
     a, b, c = np.moveaxis(camera.project(points)[triangles], 1, 0)
     (ux, uy), (vx, vy) = (b - a).T, (c - a).T
     front = ux * vy > uy * vx
     return edges[front[first] != front[second]]
-
-
-def _edges_between(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Edges (n, 2) and their two triangles (n,) each; a boundary edge has the same one twice."""
-    pairs = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    owner = np.repeat(np.arange(len(triangles)), 3)
-    edges, inverse, count = np.unique(pairs, axis=0, return_inverse=True, return_counts=True)
-    order = np.argsort(inverse.ravel(), kind="stable")
-    start = np.concatenate([[0], np.cumsum(count)[:-1]])
-    return edges, owner[order[start]], owner[order[start + np.minimum(count - 1, 1)]]
 
 
 def draw_lines(ax: Axes, segments: np.ndarray, camera: Camera, colours: np.ndarray) -> None:

@@ -100,9 +100,7 @@ def draw_run(ax: Axes, row: "Row", i: int) -> None:
         mesh_render.draw_floor(ax, panel.positions, mesh, camera, shown)
     if not panel.reference:
         ghost = row.ghosts[i]
-        edges = mesh_render.outline_edges(mesh.points, mesh.triangles)
-        if not len(edges):  # a round body has no edges of its own
-            edges = mesh_render.silhouette_edges(ghost, mesh.triangles, camera)
+        edges = mesh_render.outline_edges(mesh.points, ghost, mesh.triangles, camera)
         flat = camera.project(ghost)[edges]
         lines = LineCollection(flat, colors=mesh_render.GHOST, linewidths=0.6, zorder=0.5)
         ax.add_collection(lines)

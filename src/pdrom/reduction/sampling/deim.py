@@ -117,18 +117,8 @@ def block_elements(v: np.ndarray, size: int) -> np.ndarray:
     squares, more equations than unknowns); the element with the largest residual norm (times
     `tie_weights`) follows.
     """
-    modes, total = np.asfortranarray(v), len(v) // size
-    fit, weights = GrowingFit(v.shape[1]), tie_weights(total) ** 2
-    elements = np.empty(min(v.shape[1], total), dtype=np.int64)
-    for k in range(len(elements)):
-        residual = modes[:, k]
-        if k:
-            residual = residual - modes[:, :k] @ fit.coefficients(k)
-        norm = weights * np.square(residual).reshape(total, size).sum(axis=1)
-        norm[elements[:k]] = -1.0
-        elements[k] = element = int(np.argmax(norm))
-        fit.add(v[size * element : size * (element + 1)])
-    return elements
+    total = len(v) // size
+    return _greedy([v], total, min(total, v.shape[1]), repeat=False)
 
 
 def joint_rows(v: np.ndarray, active: tuple[bool, ...], repeat: bool) -> np.ndarray:
@@ -145,18 +135,28 @@ def joint_rows(v: np.ndarray, active: tuple[bool, ...], repeat: bool) -> np.ndar
     active : for each of the three axes, whether the basis has modes on it
     """
     rows, r = len(v) // 3, v.shape[1]
-    axes = [(np.asfortranarray(v[a::3]), GrowingFit(r)) for a in np.flatnonzero(active)]
-    weights = tie_weights(rows) ** 2
-    picked = np.empty(r if repeat else min(r, rows), dtype=np.int64)
-    for k in range(len(picked)):
-        norm = np.zeros(rows)
-        for modes, fit in axes:
+    axes = [v[a::3] for a in np.flatnonzero(active)]
+    return _greedy(axes, rows, r if repeat else min(rows, r), repeat)
+
+
+def _greedy(parts: Sequence[np.ndarray], total: int, count: int, repeat: bool) -> np.ndarray:
+    """Pick ``count`` of ``total`` blocks of rows by the residuals of ``parts`` of the modes.
+
+    Each part has as many rows in a block, and coefficients of its own.
+    """
+    fits = [(np.asfortranarray(part), GrowingFit(part.shape[1])) for part in parts]
+    weights = tie_weights(total) ** 2
+    picked = np.empty(count, dtype=np.int64)
+    for k in range(count):
+        norm = np.zeros(total)
+        for modes, fit in fits:
             residual = modes[:, k] - modes[:, :k] @ fit.coefficients(k) if k else modes[:, k]
-            norm += residual**2
+            norm += np.square(residual).reshape(total, -1).sum(axis=1)
         norm *= weights
         if not repeat:
             norm[picked[:k]] = -1.0
-        picked[k] = row = int(np.argmax(norm))
-        for modes, fit in axes:
-            fit.add(modes[row : row + 1])
+        picked[k] = block = int(np.argmax(norm))
+        for modes, fit in fits:
+            size = len(modes) // total
+            fit.add(modes[size * block : size * (block + 1)])
     return picked

@@ -57,12 +57,11 @@ def reduction_of(spec: MethodSpec) -> Reduction:
     return Reduction(basis, select(basis, spec, R), spec, R)
 
 
-def whole(group, p: np.ndarray, preset: str, r: int | None = None) -> Reduction:
-    """Reduction of a group's snapshots by a preset, with all modes unless ``r`` is given."""
+def whole(group, p: np.ndarray, preset: str) -> Reduction:
+    """Reduction of a group's snapshots by a preset, with all modes."""
     spec = PRESETS[preset]
     basis = compute_basis(p, np.ones(p.shape[1]), 0.0, group.rows_per_element, spec)
-    r = basis.rank if r is None else r
-    return Reduction(basis, select(basis, spec, r), spec, r)
+    return Reduction(basis, select(basis, spec, basis.rank), spec, basis.rank)
 
 
 def added(step: ReducedLocalStep) -> np.ndarray:
@@ -154,7 +153,7 @@ def test_the_local_kernel_adds_what_python_code_adds(preset, group_scene, rng, m
 def test_the_lift_is_timed_apart(group_scene, rng):
     group, q = group_scene.groups[0], group_scene.mesh.points
     p = np.stack([group.project(q + 0.05 * rng.standard_normal(q.shape)) for _ in range(5)])
-    step = ReducedLocalStep(group, whole(group, p, "block-deim", 2))
+    step = ReducedLocalStep(group, whole(group, p, "block-deim"))
     assert step.lift_seconds == 0.0
     for _ in range(1000):
         step.accumulate(q, np.zeros_like(q))

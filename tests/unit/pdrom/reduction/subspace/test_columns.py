@@ -1,6 +1,7 @@
 """Position subspaces: atoms, columns, modes."""
 
 import warnings
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,17 +15,6 @@ from pdrom.reduction.subspace import columns as spaces
 from pdrom.reduction.subspace.model import make_columns
 from pdrom.reduction.subspace.space import DenseElimination, coordinates
 
-
-class Units:
-    """A boundary of which only the units are asked."""
-
-    def __init__(self, *units) -> None:
-        self._units = [np.array(sorted(unit)) for unit in units]
-
-    def units(self):
-        return self._units
-
-
 SETS = st.lists(
     st.lists(st.sets(st.integers(0, 19), min_size=1, max_size=8), min_size=1, max_size=3),
     max_size=4,
@@ -33,7 +23,8 @@ SETS = st.lists(
 
 @given(SETS)
 def test_atoms_partition_what_is_held(boundaries):
-    found = spaces.atoms([Units(*units) for units in boundaries], 20)
+    asked = [SimpleNamespace(units=lambda own=own: [[*unit] for unit in own]) for own in boundaries]
+    found = spaces.atoms(asked, 20)
     units = [unit for boundary in boundaries for unit in boundary]
     members = np.concatenate(found) if found else np.array([], dtype=int)
     assert len(members) == len(set(members.tolist()))
@@ -88,7 +79,7 @@ def space(request, moved):
     return scene, run, make_columns(scene, run[1:], *request.param), request.param
 
 
-def test_free_block_is_mass_orthonormal(space):
+def test_free_columns_are_mass_orthonormal_and_those_of_an_atom_live_on_it_only(space):
     scene, _, columns, (_, k) = space
     block = columns.B[:, columns.free]
     np.testing.assert_allclose(
@@ -97,10 +88,6 @@ def test_free_block_is_mass_orthonormal(space):
     assert columns.modes == k
     # the affine columns of a flat sheet are three
     assert len(columns.free) == k + 3
-
-
-def test_columns_of_atoms_live_on_their_atoms_only(space):
-    scene, _, columns, _ = space
     held = np.concatenate(columns.atoms)
     assert (columns.B[np.ix_(held, columns.free)] == 0.0).all()
     for atom, own in zip(columns.atoms, columns.atom_columns, strict=True):
@@ -113,7 +100,7 @@ def test_columns_of_atoms_live_on_their_atoms_only(space):
     assert np.linalg.matrix_rank(columns.B) == columns.B.shape[1]
 
 
-def test_rest_shape_and_affine_motions_are_in_the_space(space, rng):
+def test_affine_motions_are_in_the_space_and_coordinates_the_best_in_the_mass_norm(space, rng):
     scene, _, columns, _ = space
     points = scene.mesh.points
     fields = [
@@ -124,11 +111,7 @@ def test_rest_shape_and_affine_motions_are_in_the_space(space, rng):
     for field in fields:
         z = coordinates(columns, scene.masses, field)
         np.testing.assert_allclose(columns.B @ z, field, atol=1e-11)
-
-
-def test_coordinates_are_the_best_in_the_mass_norm(space, rng):
-    scene, _, columns, _ = space
-    field = rng.standard_normal(scene.mesh.points.shape)
+    field = rng.standard_normal(points.shape)
     left = field - columns.B @ coordinates(columns, scene.masses, field)
     np.testing.assert_allclose(columns.B.T @ (scene.masses[:, None] * left), 0.0, atol=1e-11)
 
@@ -210,19 +193,18 @@ def test_skinning_modes_are_mass_orthonormal_without_affine_part(moved, k):
     assert spaces.skinning_modes(points, masses, 500).shape[1] == scene.mesh.vertices - 3
 
 
-NOTHING = np.empty(0, dtype=np.int64)
-
-
-def test_an_indefinite_system_is_a_named_error():
-    with pytest.raises(SolverError, match="reduced system of size 2"):
-        DenseElimination(np.diag([1.0, -1.0]), NOTHING)
-
-
-def test_a_system_without_enough_digits_is_a_named_error():
-    """A stiffness of 1 between six coordinates, and 1e-12 of it for all of them together."""
-    matrix = np.eye(6) - np.full((6, 6), 1.0 / 6.0) + 1e-12 * np.eye(6)
-    with pytest.raises(SolverError, match="a solve is wrong by"):
-        DenseElimination(matrix, NOTHING)
+@pytest.mark.parametrize(
+    ("matrix", "words"),
+    [
+        (np.diag([1.0, -1.0]), "reduced system of size 2"),
+        # a stiffness of 1 between six coordinates, and 1e-12 of it for all of them together
+        (np.eye(6) - np.full((6, 6), 1.0 / 6.0) + 1e-12 * np.eye(6), "a solve is wrong by"),
+    ],
+    ids=["indefinite", "without enough digits"],
+)
+def test_a_system_that_cannot_be_solved_is_a_named_error(matrix, words):
+    with pytest.raises(SolverError, match=words):
+        DenseElimination(matrix, np.empty(0, dtype=np.int64))
 
 
 @pytest.mark.parametrize("mass", [1e-100, 1e-6, 1.0, 1e100])

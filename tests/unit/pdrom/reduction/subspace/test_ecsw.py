@@ -69,15 +69,11 @@ def pulled():
     return scene, run, make_columns(scene, run[1:], "pod", 4)
 
 
-def everything(group) -> np.ndarray:
-    return np.arange(group.elements)
-
-
 def test_sampled_equations_meet_the_tolerance(pulled):
     scene, _, columns = pulled
     training = ecsw.training_run(scene, columns, np.arange(0, 12, 3))
     for group in scene.groups:
-        rows, total = ecsw.training_equations(group, columns, training, everything(group))
+        rows, total = ecsw.training_equations(group, columns, training, np.arange(group.elements))
         np.testing.assert_allclose(rows.sum(axis=1), total, atol=1e-9)
         counts = []
         tolerances = [0.3, 1e-2, 1e-3]
@@ -100,7 +96,7 @@ def test_a_part_of_a_group_stands_for_all_and_grows_where_it_misses(
     scene, _, columns = pulled
     group = scene.groups[number]
     training = ecsw.training_run(scene, columns, [2, 8])
-    rows, total = ecsw.training_equations(group, columns, training, everything(group))
+    rows, total = ecsw.training_equations(group, columns, training, np.arange(group.elements))
     candidates = group.elements // 2 if number else 3
     monkeypatch.setattr(ecsw, "CANDIDATES", candidates)
     ((elements, factors),) = ecsw.ecsw_elements(group, columns, training, [tolerance])
