@@ -3,10 +3,7 @@
 On the mesh of a scene (`timing`), and by iteration on growing meshes (`scaling`).
 """
 
-import ctypes
-import gc
 import logging
-import os
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -15,7 +12,6 @@ from typing import Annotated, Any
 
 import numpy as np
 import pandas as pd
-import psutil
 from pydantic import Field
 from scipy import sparse
 
@@ -108,8 +104,7 @@ COLUMNS = [
 ]  # fmt: skip
 ITERATIONS = [
     "scene", "method", "vertices", "elements", "r", "k", "elements_sampled",
-    "factorisation_ms", "memory_mb", "ms_per_iteration", "local_ms", "global_ms", "vertices_ms",
-    "local_share",
+    "ms_per_iteration", "local_ms", "global_ms", "vertices_ms", "local_share",
 ]  # fmt: skip
 STATES, SIZED_STATES = 5, 4  # states of a run at which local steps are timed alone
 TrainingFrames = Annotated[int, Field(ge=3, le=1000)]
@@ -292,16 +287,12 @@ class SizedOptions(ConfigModel):
 )
 def scaling(sources: list[Path], settings: SizedOptions, iterations: File, breakeven: File) -> None:
     """Measure a scene on one mesh: ``factor`` times the vertices along each side."""
-    config, solver, sized = settings.scene, settings.solver, settings.scaling
+    config, sized = settings.scene, settings.scaling
     specs, alone = settings.scaled_methods, settings.scaling.breakeven
     factor = float(iterations["factor"])
-    # libraries and kernels are loaded before anything is measured
-    _factorised(Scene.build(config, config.mesh.build(Path())), solver)
     config = config.coarsened(factor, 1.0)
     scene = Scene.build(config, config.mesh.build(Path()))
-    idle = _memory()
-    system, seconds = _factorised(scene, solver)
-    measured = {"factorisation_ms": 1e3 * seconds, "memory_mb": _memory() - idle}
+    system = scene.system_with(settings.solver)
     group, few = scene.groups[0], sized.training_frames
     positions, projections, roundoff = _training(scene, system, max(few, alone.training_frames))
     columns = make_columns(scene, positions[:few], "pod", k=sized.k)
@@ -315,7 +306,7 @@ def scaling(sources: list[Path], settings: SizedOptions, iterations: File, break
     sampled = {"r": reduction.r, "elements_sampled": len(reduction.elements)}
     steps = replace_group(scene, group.name, ReducedLocalStep(group, reduction))
     variants = [
-        variant(scene, system, scene.groups, sized.frames, {"method": kit.FOM, **measured}),
+        variant(scene, system, scene.groups, sized.frames, {"method": kit.FOM}),
         variant(scene, system, steps, sized.frames, {"method": sized.method, **sampled}),
         Variant(
             {"method": "ecsw", **inside}, *model.loop(scene), sized.frames, output=model.output()
@@ -342,16 +333,6 @@ def scaling(sources: list[Path], settings: SizedOptions, iterations: File, break
     costs = local_costs(scene, reduced, states, warmup=sized.warmup, repeats=alone.repeats)
     write_table(costs.assign(factor=factor), breakeven.path)
     log.info("%s: %d vertices done", config.name, scene.mesh.vertices)
-
-
-def _factorised(scene: Scene, solver: str) -> tuple[GlobalSystem, float]:
-    """Global system, and the seconds that its assembly and first factorisation take."""
-    state = scene.initial_state()
-    started = perf_counter()
-    system = scene.system_with(solver)
-    fixed, _ = scene.space(system).fixed(0, state.positions)
-    system.eliminate(fixed)
-    return system, perf_counter() - started
 
 
 def _training(scene: Scene, system: GlobalSystem, frames: int) -> tuple[np.ndarray, ...]:
@@ -392,12 +373,3 @@ def _reductions(
     )
     sizes = sorted({min(r, basis.rank) for r in asked})
     return list(reductions(basis, spec, sizes).values())
-
-
-def _memory() -> float:
-    """Resident memory of this process, in MB, after what is free went back to the system."""
-    gc.collect()
-    trim = getattr(ctypes.CDLL(None), "malloc_trim", None) if os.name == "posix" else None
-    if trim is not None:  # glibc; elsewhere small sizes may fit into free memory
-        trim(0)
-    return psutil.Process().memory_info().rss / 1e6

@@ -105,8 +105,7 @@ def _draw_bars(ax: Axes, rows: pd.DataFrame, scenes: list[str]) -> None:
     caption="""Time of one local/global iteration against the number of vertices: the full-order
     run, the same with only the local step reduced, and the hyper-reduced run in a position
     subspace, with the positions of all vertices as a line of its own. Beside the ends of curves
-    stands the exponent of a fitted power law, where there are three sizes of the mesh or more.
-    Assembly and factorisation before the first frame are in the table `scaling`.""",
+    stands the exponent of a fitted power law, where there are three sizes of the mesh or more.""",
     reads={"table": TableOf("scaling")},
 )
 def scaling(options: Scenes, drawn: Drawn, table: pd.DataFrame) -> Figure:

@@ -18,8 +18,6 @@ KEYS = ["scene", "effect"]
 NOTHING = "nothing"  # value of the column effect for the whole scene, with no effect left out
 PHASE, SEVERAL = "phase", "several"
 IMPLEMENTATIONS = ("interpreted", "numpy", "compiled")
-EXPONENTS = {"ms_per_iteration": "exponent", "local_ms": "local_exponent",
-             "global_ms": "global_exponent"}  # fmt: skip
 FEWEST = 3  # least number of meshes for the fit of an exponent
 
 
@@ -42,10 +40,8 @@ FEWEST = 3  # least number of meshes for the fit of an exponent
         timed(number("share", "of the frame; those of a scene add up to one")),
         integer("groups", "constraint groups of the scene that is built without it"),
         timed(number("without_ms", "time of a frame of the scene that is built without it", "ms")),
-        timed(number("saved_ms", "time of the whole scene less that", "ms")),
         number("force", "root mean square over the frames of the norm of its force", "N"),
         number("force_share", "of the sum over the effects of the scene"),
-        integer("acting_frames", "frames in which it exerts a force at all", compared="error"),
         number("energy", "range of the energy that it holds, where it has one", "J"),
         number(
             "moved",
@@ -85,13 +81,13 @@ def effects_cost(
     tables = [costs]
     if len(removed):
         whole = removed[removed.left_out == NOTHING].set_index("scene").ms_per_frame
-        times = ["ms_per_frame", "saved_ms", "own_ms"]
+        times = ["ms_per_frame", "own_ms"]
         removed = results.in_one_time(removed, whole, frame_times, columns=times)
         removed = removed.rename(columns={"left_out": "effect", "ms_per_frame": "without_ms"})
         several = removed.rename(columns={"own_ms": "ms_per_frame"})
         tables.append(several[_absent(several, costs)].assign(role=SEVERAL))
-        single = ["groups", "without_ms", "saved_ms"]
-        tables[0] = costs.merge(removed[[*KEYS, *single]], on=KEYS, how="left")
+        single = removed[[*KEYS, "groups", "without_ms"]]
+        tables[0] = costs.merge(single, on=KEYS, how="left")
     frames = results.joined(files["contributions"])
     if len(frames):
         acting = _acting(frames, sensitivity, horizon)
@@ -113,7 +109,6 @@ def _acting(frames: pd.DataFrame, sensitivity: pd.DataFrame, horizon: Horizon) -
     """Force and energy of each effect in ``frames``, and drift of the run without this effect."""
     made = frames.groupby([*KEYS, "role"], sort=False, as_index=False).agg(
         force=("force", lambda force: float(np.sqrt(np.mean(np.square(force))))),
-        acting_frames=("force", lambda force: int((force > 0.0).sum())),
         energy=("energy", lambda of: float(of.max() - of.min() if len(of) > 1 else of.iloc[0])),
     )
     length = frames.groupby("scene").frame.max() + 1
@@ -170,44 +165,35 @@ def local_share(timings: list[File], frame_times: pd.DataFrame) -> pd.DataFrame:
         *shared("vertices"),
         integer("elements", "elements of all groups"),
         *shared("r k elements_sampled"),
-        timed(number("factorisation_ms", "assembly and factorisation of the system", "ms")),
-        timed(number("memory_mb", "memory that both took", "MB")),
         timed(number("ms_per_iteration", "time of an iteration", "ms")),
         timed(number("local_ms", "time of the local step in an iteration", "ms")),
         timed(number("global_ms", "time of the global solve in an iteration", "ms")),
         *shared("vertices_ms local_share speedup"),
-        timed(number("local_speedup", "the same of the local step alone")),
         integer("meshes", "sizes of the mesh of the curve"),
         timed(number("exponent", "of the time of an iteration in the number of vertices")),
-        timed(number("local_exponent", "of the time of the local step")),
-        timed(number("global_exponent", "of the time of the global solve")),
     ),
     reads={"parts": Every(paths.SCALING)},
 )
 def scaling(parts: list[File]) -> pd.DataFrame:
     """One row per scene, mesh size and method, from the files ``parts`` of all scenes.
 
-    Speed-ups of an iteration and of its local step are relative to the full-order run. Exponents
-    belong to power laws, fitted in logarithms over all meshes of a scene and method and repeated in
-    each of these rows. An exponent is empty if fewer than three meshes have a measurable time, as
-    any two points lie on a power law.
+    Speed-ups of an iteration are relative to the full-order run. Exponents belong to power laws,
+    fitted in logarithms over all meshes of a scene and method and repeated in each of these rows.
+    An exponent is empty if there are fewer than three meshes, as any two points lie on a power law.
     """
     rows = results.joined(parts)
     if rows.empty:
         return rows
     own = rows[rows.method == FOM].set_index(["scene", "vertices"])
     mesh = pd.MultiIndex.from_frame(rows[["scene", "vertices"]])
-    for name, column in (("speedup", "ms_per_iteration"), ("local_speedup", "local_ms")):
-        rows[name] = own[column].loc[mesh].to_numpy() / rows[column]
+    rows["speedup"] = own.ms_per_iteration.loc[mesh].to_numpy() / rows.ms_per_iteration
     curves = rows.groupby(["scene", "method"], sort=False)
     rows["meshes"] = curves.vertices.transform("nunique")
-    for quantity, name in EXPONENTS.items():
-        rows[name] = np.nan
-        for _, curve in curves:
-            measured = curve[curve[quantity] > 0.0]
-            if measured.vertices.nunique() >= FEWEST:
-                x, y = np.log(measured[["vertices", quantity]].to_numpy(float)).T
-                rows.loc[curve.index, name] = float(np.polyfit(x, y, 1)[0])
+    rows["exponent"] = np.nan
+    for _, curve in curves:
+        if curve.vertices.nunique() >= FEWEST:
+            x, y = np.log(curve[["vertices", "ms_per_iteration"]].to_numpy(float)).T
+            rows.loc[curve.index, "exponent"] = float(np.polyfit(x, y, 1)[0])
     return rows
 
 
@@ -221,11 +207,9 @@ CONFIRMED = 1.5
 UNCONFIRMED = "not confirmed by its control"
 _ERRORS = {
     "error_train": "relative_error_train", results.MEDIAN: "relative_error_heldout",
-    results.LOW: "relative_error_heldout_low", results.HIGH: "relative_error_heldout_high",
+    results.HIGH: "relative_error_heldout_high",
 }  # fmt: skip
-_TIMES = [
-    "ms_per_frame", "vertices_ms", "fom_ms_per_frame", "speedup", "speedup_low", "speedup_high",
-]  # fmt: skip
+_TIMES = ["ms_per_frame", "vertices_ms", "speedup", "speedup_low", "speedup_high"]
 
 
 @table(
@@ -243,7 +227,6 @@ _TIMES = [
         timed(number("twin_ratio", "time of the scene's twin, the same frames, over this one")),
         timed(number("twin_low", "2.5 % quantile of this median")),
         timed(number("twin_high", "97.5 % quantile")),
-        timed(flag("confirmed", "the quantiles lie within a half of one: speed-ups are given")),
     ),
     reads={"parts": Every(paths.FRAME_TIMES)},
 )
@@ -270,7 +253,6 @@ def frame_times(parts: list[File]) -> pd.DataFrame:
         for names, measured in values.items():
             row |= zip(names, results.median_interval(measured.to_numpy(float)), strict=True)
         low, high = row["control_low"], row["control_high"]
-        row["confirmed"] = low >= 1.0 / CONFIRMED and high <= CONFIRMED
         row["control_agrees"] = low <= 1.0 <= high
         made.append(row)
     return pd.DataFrame(made).reindex(columns=frame_times.column_names)
@@ -337,7 +319,8 @@ def timed_reductions(rows: pd.DataFrame, times: pd.DataFrame) -> Iterator[dict]:
     times : table frame_times
     """
     full = rows[rows.role == FULL].set_index(["scene", "process"]).ms_per_frame
-    trusted = times.set_index("scene").confirmed
+    control = times.set_index("scene")
+    trusted = (control.control_low >= 1.0 / CONFIRMED) & (control.control_high <= CONFIRMED)
     reduced = rows[rows.role == REDUCED]
     for labels, own in reduced.groupby(_LABELS, sort=False, dropna=False):
         own = own.set_index(["scene", "process"])
@@ -396,12 +379,10 @@ def _first_known(made: pd.DataFrame, sources: list[pd.DataFrame], column: str) -
         *shared("elements_sampled"),
         number("relative_error_train", "error of the positions in the training motion"),
         number("relative_error_heldout", "the same in held-out motions: their median"),
-        number("relative_error_heldout_low", "the least of them"),
         number("relative_error_heldout_high", "the largest"),
         *results.COLUMNS[3:],
         *shared("ms_per_frame vertices_ms"),
         timed(number("ms_per_iteration", "time of an iteration", "ms")),
-        timed(number("fom_ms_per_frame", "time of a frame of the full-order run", "ms")),
         *shared("speedup speedup_low speedup_high"),
     ),
     reads={
@@ -416,7 +397,6 @@ def online(parts: list[File], measured: list[File], times: pd.DataFrame) -> pd.D
     if rows.empty:
         return rows
     found = pd.DataFrame(list(timed_reductions(results.joined(measured), times)))
-    found = found.rename(columns={"full_ms": "fom_ms_per_frame"})
     made = rows[rows.motion == results.TRAIN].rename(columns={"r": "elements_sampled"})
     made = made.drop(columns="playback_error")  # of the training motion itself
     made = made.merge(large_errors(rows).rename(columns=_ERRORS), on=_MODEL, how="left")

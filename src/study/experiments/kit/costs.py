@@ -31,7 +31,7 @@ COLUMNS = [
     "lift_ms",
 ]  # fmt: skip
 COSTS = ["scene", "effect", "elements", "ms_per_frame", "share"]
-LEFT_OUT = ["scene", "left_out", "groups", "elements", "ms_per_frame", "saved_ms", "own_ms"]
+LEFT_OUT = ["scene", "left_out", "groups", "elements", "ms_per_frame", "own_ms"]
 # Questions that the step loop asks an effect of each role, see `_roles`.
 _QUESTIONS = (
     ("begin_frame", "accumulate"), ("acceleration",), ("active", "held", "takes_hold", "path"),
@@ -222,9 +222,8 @@ def left_out(
 ) -> pd.DataFrame:
     """Table of `LEFT_OUT`: time of the scene without some of its effects, built without them.
 
-    ``saved_ms`` is the time of the whole scene minus that of the row, ``own_ms`` what the effects
-    cost inside the whole scene (``costs``, see `effect_costs`). ``frames``, ``warmup`` and
-    ``repeats`` as there, ``solver`` is the name of the linear solver.
+    ``own_ms`` is what the effects cost inside the whole scene (``costs``, see `effect_costs`).
+    ``frames``, ``warmup`` and ``repeats`` as there, ``solver`` is the name of the linear solver.
     """
     sets = left_out_sets(scene)
     if not sets:
@@ -241,9 +240,7 @@ def left_out(
             "own_ms": float(own.ms_per_frame.sum()),
         }
         variants.append(variant(part, part.system_with(solver), part.groups, frames, labels))
-    table = pd.DataFrame(measure(variants, warmup, repeats))
-    table["saved_ms"] = table.ms_per_frame.iloc[0] - table.ms_per_frame
-    return table[LEFT_OUT]
+    return pd.DataFrame(measure(variants, warmup, repeats))[LEFT_OUT]
 
 
 @local_kernel
