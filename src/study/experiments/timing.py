@@ -104,8 +104,7 @@ COLUMNS = [
 ]  # fmt: skip
 ITERATIONS = [
     "scene", "method", "vertices", "elements", "r", "k", "elements_sampled",
-    "ms_per_iteration", "local_ms", "global_ms", "vertices_ms",
-    "local_share",
+    "ms_per_iteration", "local_ms", "global_ms", "vertices_ms", "local_share",
 ]  # fmt: skip
 STATES, SIZED_STATES = 5, 4  # states of a run at which local steps are timed alone
 TrainingFrames = Annotated[int, Field(ge=3, le=1000)]
@@ -288,12 +287,12 @@ class SizedOptions(ConfigModel):
 )
 def scaling(sources: list[Path], settings: SizedOptions, iterations: File, breakeven: File) -> None:
     """Measure a scene on one mesh: ``factor`` times the vertices along each side."""
-    config, solver, sized = settings.scene, settings.solver, settings.scaling
+    config, sized = settings.scene, settings.scaling
     specs, alone = settings.scaled_methods, settings.scaling.breakeven
     factor = float(iterations["factor"])
     config = config.coarsened(factor, 1.0)
     scene = Scene.build(config, config.mesh.build(Path()))
-    system = scene.system_with(solver)
+    system = scene.system_with(settings.solver)
     group, few = scene.groups[0], sized.training_frames
     positions, projections, roundoff = _training(scene, system, max(few, alone.training_frames))
     columns = make_columns(scene, positions[:few], "pod", k=sized.k)

@@ -42,7 +42,6 @@ CONVERGED, OWN = "converged", "own iterations"
             tolerance=0.05,
         ),
         *results.COLUMNS,
-        timed(flag("pareto_heldout", "the same by the error held out; full order as it is")),
         *shared("velocity_error relative_shape_error energy_drift"),
     ),
     reads={
@@ -84,17 +83,8 @@ def accuracy_cost(
     full["error_converged"] = [own.get((scene, iterations[scene]), np.nan) for scene in full.scene]
     parts = [full.assign(iterations=full.scene.map(iterations)), points, sweep]
     points = pd.concat([part for part in parts if len(part)], ignore_index=True)
-    # "full" is also the method name of models that reduce the positions but not the projections
-    unreduced = (points.method == "full") & (points.position_basis == "full")
-    reduced = points.method.isin(reruns.method) & ~unreduced
-    unseen = points[results.MEDIAN].where(reduced, points.relative_error_within_horizon)
-    errors = {"pareto": points.relative_error_within_horizon, "pareto_heldout": unseen}
-    for name, error in errors.items():
-        points[name] = False
-        known = points[error.notna()]
-        for _, rows in known.groupby(["scene", reference_of(known)], sort=False):
-            own = error[rows.index].to_numpy(float)
-            points.loc[rows.index, name] = pareto(own, rows.ms_per_frame.to_numpy(float))
+    for _, rows in points.groupby(["scene", reference_of(points)], sort=False):
+        points.loc[rows.index, "pareto"] = pareto(*rows[_POINT].to_numpy(float).T)
     order = points.scene.map({scene: i for i, scene in enumerate(iterations)})
     return points.iloc[np.argsort(order, kind="stable")]
 
@@ -193,8 +183,6 @@ _ERROR = "relative_error_within_horizon"
         timed(number("full_ms", "time of the full local step of the group", "ms")),
         timed(number("ratio", "the first over the second")),
         timed(integer("breakeven_r", "size from which the reduction costs more, of the curve")),
-        timed(number("solve_ms", "of it, the solve of size r for the coefficients", "ms")),
-        timed(number("lift_ms", "of it, the reconstruction from the coefficients", "ms")),
         timed(number("solve_ratio", "the solve alone over the full local step")),
         timed(number("lift_ratio", "the reconstruction alone over the full local step")),
     ),

@@ -18,8 +18,6 @@ KEYS = ["scene", "effect"]
 NOTHING = "nothing"  # value of the column effect for the whole scene, with no effect left out
 PHASE, SEVERAL = "phase", "several"
 IMPLEMENTATIONS = ("interpreted", "numpy", "compiled")
-EXPONENTS = {"ms_per_iteration": "exponent", "local_ms": "local_exponent",
-             "global_ms": "global_exponent"}  # fmt: skip
 FEWEST = 3  # least number of meshes for the fit of an exponent
 
 
@@ -173,18 +171,15 @@ def local_share(timings: list[File], frame_times: pd.DataFrame) -> pd.DataFrame:
         *shared("vertices_ms local_share speedup"),
         integer("meshes", "sizes of the mesh of the curve"),
         timed(number("exponent", "of the time of an iteration in the number of vertices")),
-        timed(number("local_exponent", "of the time of the local step")),
-        timed(number("global_exponent", "of the time of the global solve")),
     ),
     reads={"parts": Every(paths.SCALING)},
 )
 def scaling(parts: list[File]) -> pd.DataFrame:
     """One row per scene, mesh size and method, from the files ``parts`` of all scenes.
 
-    Speed-ups of an iteration are relative to the full-order run. Exponents
-    belong to power laws, fitted in logarithms over all meshes of a scene and method and repeated in
-    each of these rows. An exponent is empty if fewer than three meshes have a measurable time, as
-    any two points lie on a power law.
+    Speed-ups of an iteration are relative to the full-order run. Exponents belong to power laws,
+    fitted in logarithms over all meshes of a scene and method and repeated in each of these rows.
+    An exponent is empty if there are fewer than three meshes, as any two points lie on a power law.
     """
     rows = results.joined(parts)
     if rows.empty:
@@ -194,13 +189,11 @@ def scaling(parts: list[File]) -> pd.DataFrame:
     rows["speedup"] = own.ms_per_iteration.loc[mesh].to_numpy() / rows.ms_per_iteration
     curves = rows.groupby(["scene", "method"], sort=False)
     rows["meshes"] = curves.vertices.transform("nunique")
-    for quantity, name in EXPONENTS.items():
-        rows[name] = np.nan
-        for _, curve in curves:
-            measured = curve[curve[quantity] > 0.0]
-            if measured.vertices.nunique() >= FEWEST:
-                x, y = np.log(measured[["vertices", quantity]].to_numpy(float)).T
-                rows.loc[curve.index, name] = float(np.polyfit(x, y, 1)[0])
+    rows["exponent"] = np.nan
+    for _, curve in curves:
+        if curve.vertices.nunique() >= FEWEST:
+            x, y = np.log(curve[["vertices", "ms_per_iteration"]].to_numpy(float)).T
+            rows.loc[curve.index, "exponent"] = float(np.polyfit(x, y, 1)[0])
     return rows
 
 
@@ -214,11 +207,9 @@ CONFIRMED = 1.5
 UNCONFIRMED = "not confirmed by its control"
 _ERRORS = {
     "error_train": "relative_error_train", results.MEDIAN: "relative_error_heldout",
-    results.LOW: "relative_error_heldout_low", results.HIGH: "relative_error_heldout_high",
+    results.HIGH: "relative_error_heldout_high",
 }  # fmt: skip
-_TIMES = [
-    "ms_per_frame", "vertices_ms", "fom_ms_per_frame", "speedup", "speedup_low", "speedup_high",
-]  # fmt: skip
+_TIMES = ["ms_per_frame", "vertices_ms", "speedup", "speedup_low", "speedup_high"]
 
 
 @table(
@@ -236,7 +227,6 @@ _TIMES = [
         timed(number("twin_ratio", "time of the scene's twin, the same frames, over this one")),
         timed(number("twin_low", "2.5 % quantile of this median")),
         timed(number("twin_high", "97.5 % quantile")),
-        timed(flag("confirmed", "the quantiles lie within a half of one: speed-ups are given")),
     ),
     reads={"parts": Every(paths.FRAME_TIMES)},
 )
@@ -263,7 +253,6 @@ def frame_times(parts: list[File]) -> pd.DataFrame:
         for names, measured in values.items():
             row |= zip(names, results.median_interval(measured.to_numpy(float)), strict=True)
         low, high = row["control_low"], row["control_high"]
-        row["confirmed"] = low >= 1.0 / CONFIRMED and high <= CONFIRMED
         row["control_agrees"] = low <= 1.0 <= high
         made.append(row)
     return pd.DataFrame(made).reindex(columns=frame_times.column_names)
@@ -330,7 +319,8 @@ def timed_reductions(rows: pd.DataFrame, times: pd.DataFrame) -> Iterator[dict]:
     times : table frame_times
     """
     full = rows[rows.role == FULL].set_index(["scene", "process"]).ms_per_frame
-    trusted = times.set_index("scene").confirmed
+    control = times.set_index("scene")
+    trusted = (control.control_low >= 1.0 / CONFIRMED) & (control.control_high <= CONFIRMED)
     reduced = rows[rows.role == REDUCED]
     for labels, own in reduced.groupby(_LABELS, sort=False, dropna=False):
         own = own.set_index(["scene", "process"])
@@ -389,12 +379,10 @@ def _first_known(made: pd.DataFrame, sources: list[pd.DataFrame], column: str) -
         *shared("elements_sampled"),
         number("relative_error_train", "error of the positions in the training motion"),
         number("relative_error_heldout", "the same in held-out motions: their median"),
-        number("relative_error_heldout_low", "the least of them"),
         number("relative_error_heldout_high", "the largest"),
         *results.COLUMNS[3:],
         *shared("ms_per_frame vertices_ms"),
         timed(number("ms_per_iteration", "time of an iteration", "ms")),
-        timed(number("fom_ms_per_frame", "time of a frame of the full-order run", "ms")),
         *shared("speedup speedup_low speedup_high"),
     ),
     reads={
@@ -409,7 +397,6 @@ def online(parts: list[File], measured: list[File], times: pd.DataFrame) -> pd.D
     if rows.empty:
         return rows
     found = pd.DataFrame(list(timed_reductions(results.joined(measured), times)))
-    found = found.rename(columns={"full_ms": "fom_ms_per_frame"})
     made = rows[rows.motion == results.TRAIN].rename(columns={"r": "elements_sampled"})
     made = made.drop(columns="playback_error")  # of the training motion itself
     made = made.merge(large_errors(rows).rename(columns=_ERRORS), on=_MODEL, how="left")

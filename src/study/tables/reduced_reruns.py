@@ -27,7 +27,7 @@ from study.tables.kit.results import KEYS, TRAIN, joined, timings_in_one_time, t
         *shared("horizon_frame sensitivity_floor"),
         *shared("ms_per_frame vertices_ms local_ms global_ms speedup"),
         *shared("error_over_extent shape_error"),
-        *shared("velocity_error relative_shape_error energy_drift contact_delay"),
+        *shared("velocity_error relative_shape_error energy_drift"),
         text(
             "motion",
             f"{TRAIN}, or how the motion differs from the training one: {', '.join(MOTIONS)}",
@@ -268,11 +268,6 @@ def _rerun_rows(
         *shared("blowup_frame"),
         number(
             "max_extent", "largest extent over the scale of the full-order run", compared="error"
-        ),
-        number(
-            "objective_rise",
-            "largest in one iteration, over the first value of its frame",
-            compared="skipped",
         ),
         text("outcome", "how the reduction fared", compared="error", tolerance=FRAGILE),
         text("why", "reason of a refusal or of an expected failure", compared="error"),

@@ -53,7 +53,7 @@ Methods = Mapping[str, MethodSpec]
 log = logging.getLogger(__name__)
 COLUMNS = [
     "case", "method", "bounded_projections", "k", "r", "gain", "frames", "finite", "blowup_frame",
-    "max_extent", "objective_rise", "outcome", "why",
+    "max_extent", "outcome", "why",
 ]  # fmt: skip
 
 
@@ -234,7 +234,6 @@ def row(
         "finite": run.blowup_frame is None,
         "blowup_frame": run.blowup_frame,
         "max_extent": run.extent / training.extent,
-        "objective_rise": float(run.rise.max(initial=0.0)),
         "why": entry.why if entry and outcome in FAILURES else "",
     }
 

@@ -160,14 +160,6 @@ _SHARED = (
         "full-order run",
         compared="error",
     ),
-    number(
-        "contact_delay",
-        "by how much the first contact with an obstacle before the horizon is late; inf if it is "
-        "missed, -inf if the full order has none, empty if neither has",
-        "s",
-        compared="share",
-        tolerance=0.02,  # s, chosen to allow a difference of one frame
-    ),
     integer("horizon_frame", "first frame that cannot be judged: the scene's horizon"),
     number(
         "sensitivity_floor", "largest drift of perturbed runs before the horizon", compared="error"

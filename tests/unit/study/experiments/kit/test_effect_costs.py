@@ -92,7 +92,7 @@ def test_a_scene_without_an_effect_does_not_ask_it(monkeypatch):
     assert row.own_ms == costs.set_index("effect").ms_per_frame["strain"]
 
 
-def test_every_lasting_effect_is_left_out():
+def test_every_effect_of_a_frame_and_every_group_is_left_out():
     # a kick is over before the first frame
     scene = make_scene({"effect": "kick", "speed": 0.1, "seed": 1}, *EFFECTS)
     costs = effect_costs(scene, scene.system, 2, 0, 1)
