@@ -5,7 +5,6 @@ import re
 import shutil
 import signal
 import time
-from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -122,10 +121,11 @@ class Failures(logging.Handler):
         event = getattr(record, "event", None)
         text = record.getMessage()
         if event == LogEvent.GROUP_ERROR:
-            self.batches.append((record.groupid, _first(record.aux_logs)))
+            self.batches.append((record.groupid, next(iter(record.aux_logs), "")))
         elif event == LogEvent.JOB_ERROR:
             said = self._said.pop(record.thread, "") or getattr(record, "rule_msg", None) or ""
-            log, output = (_first(getattr(record, name, ())) for name in ("log", "output"))
+            files = (getattr(record, name, ()) for name in ("log", "output"))
+            log, output = (next(iter(names), "") for names in files)
             failure = Failure(record.rule_name, log, output or "its result", said)
             # Snakemake reports every job of a failed batch, also those that never started
             if not getattr(record, "indent", False) or _ERROR.search(failure.written(self._begun)):
@@ -161,10 +161,6 @@ class Failures(logging.Handler):
             lines.append(f"pdrom: {self.stopped}")
         text = "\n".join([*dict.fromkeys([*lines, *self.other]), ADVICE]) + "\n"
         return text, INTERRUPTED if self.stopped else 1
-
-
-def _first(names: Iterable[str]) -> str:
-    return next(iter(names), "")
 
 
 def _content(path: str) -> str:

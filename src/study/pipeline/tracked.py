@@ -21,6 +21,7 @@ from pdrom.core.errors import ConfigurationError, PdromError, choices
 from pdrom.core.store import atomic_path, read_table
 from study.artifact.logs import usage_of
 from study.artifact.paths import TABLE
+from study.pipeline.commandline import one_line
 from study.pipeline.folders import folders
 from study.tables.claims.claims import MEASURED, RULES
 from study.tables.claims.claims import RECORDED as REPLICATED
@@ -112,7 +113,5 @@ def main(words: Sequence[str]) -> None:
 
 
 if __name__ == "__main__":
-    try:
+    with one_line():
         main(sys.argv[1:])
-    except PdromError as error:
-        sys.exit(f"pdrom: {error}")

@@ -18,7 +18,7 @@ import socket
 import sys
 import threading
 from contextlib import suppress
-from typing import Any, NoReturn
+from typing import Any
 
 from study.pipeline.fork_server.client import forward, of_this_user
 
@@ -157,16 +157,9 @@ def main() -> None:
     gc.collect()
     gc.freeze()
     script = Server(listener, owner).serve()
-    if script is not None:
-        run(script)
-
-
-def run(script: str) -> NoReturn:
-    """Run a script as the main module; an exception ends the process as in a plain interpreter.
-
-    After a successful script the process exits by ``os._exit``, as in `multiprocessing`: to free
-    the memory of the libraries would take longer than the fork.
-    """
+    if script is None:
+        return
+    # an exception ends the process as in a plain interpreter
     runpy.run_path(script, run_name="__main__")
     for thread in threading.enumerate():
         if thread is not threading.current_thread() and not thread.daemon:
@@ -174,6 +167,7 @@ def run(script: str) -> NoReturn:
     atexit._run_exitfuncs()
     sys.stdout.flush()
     sys.stderr.flush()
+    # as in `multiprocessing`: to free the memory of the libraries would take longer than the fork
     os._exit(0)
 
 
