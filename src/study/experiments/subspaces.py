@@ -311,28 +311,12 @@ class Live(LiveModels):
     scenes: tuple[SceneName, ...] = ()
 
 
-class OfScene(ConfigModel):
-    """Names a file of a scene."""
-
-    scene: str
-
-    @property
-    def labels(self) -> dict[str, str]:
-        """Labels of the file."""
-        return {"scene": self.scene}
-
-
-class JointRows(ConfigModel):
+class JointRows(kit.OfScene):
     """Joint rows of a group, which the study has samples of."""
 
-    scene: str
     group: str
-    method: MethodSpec
-
-    @property
-    def labels(self) -> dict[str, str]:
-        """Labels of the files of this case."""
-        return {"scene": self.scene, "group": self.group, "method": JOINT}
+    method: str = JOINT
+    spec: MethodSpec
 
 
 class Options(ConfigModel):
@@ -386,7 +370,7 @@ def live(mesh: File, train: File, settings: Options, out: File, **files: list[Fi
         basis = load_basis(file.path)
         # of the size asked for, or of the largest that exists
         size = min(asked.joint_rows, basis.rank)
-        reduction = runfiles.load_reduction(basis, sampling.path, case.method, size)
+        reduction = runfiles.load_reduction(basis, sampling.path, case.spec, size)
         chosen += list(_joint(scene, case.group, reduction, chosen))
     used, triangles = np.unique(scene.mesh.triangles, return_inverse=True)
     stride = max(1, ceil((len(reference) - 1) * len(used) / GHOST))
