@@ -126,7 +126,8 @@ def noise(parts: list[paths.File]) -> pd.DataFrame:
         number("error_median", "median of the errors of the positions before the horizon"),
         number("error_low", "the least of them"),
         number("error_high", "the largest"),
-        number("gain_low", "the least of their gains"),
+        number("gain_median", "median of the gains"),
+        number("gain_low", "the least of them"),
         number("gain_high", "the largest"),
         number("spread", "largest error over least", compared="error"),
     ),
@@ -147,6 +148,7 @@ def repetitions(parts: list[paths.File]) -> pd.DataFrame:
         error_median=("error", "median"),
         error_low=("error", "min"),
         error_high=("error", "max"),
+        gain_median=("gain", "median"),
         gain_low=("gain", "min"),
         gain_high=("gain", "max"),
     )

@@ -14,7 +14,6 @@ from study.experiments.repetitions import (
     VERTEX,
     NoiseRuns,
     kinds,
-    noise_basis,
     noisy_runs,
     roundoff_field,
 )
@@ -39,13 +38,6 @@ def test_a_flat_mesh_may_keep_its_plane(fall):
     assert not plane[:, 2].any()
     assert np.count_nonzero(vertex[:, 2]) == 1
     assert every[:, 2].all()
-
-
-def test_a_basis_of_noise_keeps_every_axis(rng):
-    p = 1e-13 * rng.standard_normal((6, 10, 3)) * [1.0, 1.0, 0.0]
-    basis = noise_basis(p, np.ones(10), 1, METHODS["deim-joint"])
-    assert basis.rank == 6
-    assert basis.active_axes == (True, True, True)
 
 
 def test_the_joint_selection_fails_where_an_axis_carries_nothing(fall, tmp_path):

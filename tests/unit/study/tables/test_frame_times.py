@@ -119,5 +119,5 @@ def test_repetitions_are_told_by_median_and_range(tmp_path):
     (row,) = repetitions([File(str(tmp_path / "a.csv"), {})]).itertuples()
     assert (row.repetitions, row.ended) == (3, 1)
     assert (row.error_low, row.error_median, row.error_high) == (0.1, 0.2, np.inf)
-    assert (row.gain_low, row.gain_high) == (3.0, 5.0)
+    assert (row.gain_low, row.gain_median, row.gain_high) == (3.0, 4.0, 5.0)
     assert len(repetitions([])) == 0
