@@ -130,31 +130,29 @@ class Online(LargeModels):
     },
 )
 def subspaces(
-    mesh: paths.File,
-    full_order: list[paths.File],
+    full_order: list[File],
     config: SceneConfig,
     asked: SubspaceModels,
     blowup_extent: kit.BlowupExtent,
-    out: paths.File,
-    train_table: paths.File,
-    heldout_table: paths.File,
-    seconds_table: paths.File,
+    **files: File,
 ) -> None:
     """Build every model (bases, sizes, tolerances) and run all motions with it."""
     motions = {
-        run["run"]: Yardstick(kit.scene_of(config, mesh, run["run"]), kit.positions_of(run))
+        run["run"]: Yardstick(
+            kit.scene_of(config, files["mesh"], run["run"]), kit.positions_of(run)
+        )
         for run in full_order
     }
-    with write_hdf5(out.path) as file:
+    with write_hdf5(files["out"].path) as file:
         for name, motion in motions.items():
             for series, values in motion.series.items():
                 file[f"{series}/{name}"] = values
         file.attrs.update(motions[kit.TRAIN].units)
         rows = _runs(file, motions, asked, blowup_extent, compared=True)
     train, heldout = rows[rows.motion == kit.TRAIN], rows[rows.motion != kit.TRAIN]
-    write_table(train[COLUMNS], train_table.path)
-    write_table(heldout[[*COLUMNS, "motion"]], heldout_table.path)
-    write_table(train[SECONDS_COLUMNS], seconds_table.path)
+    write_table(train[COLUMNS], files["train_table"].path)
+    write_table(heldout[[*COLUMNS, "motion"]], files["heldout_table"].path)
+    write_table(train[SECONDS_COLUMNS], files["seconds_table"].path)
 
 
 @experiment(
@@ -172,8 +170,8 @@ def online(
     config: SceneConfig,
     asked: LargeModels,
     blowup_extent: kit.BlowupExtent,
-    out: paths.File,
-    models: paths.File,
+    out: File,
+    models: File,
 ) -> None:
     """Reduce a large scene by every model and run all motions with each.
 
