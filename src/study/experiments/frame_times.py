@@ -14,7 +14,7 @@ from typing import Any
 import pandas as pd
 
 from pdrom.core.store import write_table
-from pdrom.core.yamlfile import ConfigModel, SceneName
+from pdrom.core.yamlfile import ConfigModel
 from pdrom.model.mesh.types import load_mesh
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.basis import basis_of, load_basis
@@ -26,9 +26,9 @@ from pdrom.reduction.subspace.model import load_models
 from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import EachOf, Settings
-from study.experiments.kit.base import Modes, PositionBasis, Solver, experiment
+from study.experiments.kit.base import Modes, OfScene, PositionBasis, Solver, experiment
 from study.experiments.kit.costs import variant
-from study.experiments.kit.measurement import Case, Processes, Variant, in_processes
+from study.experiments.kit.measurement import Processes, Variant, in_processes
 from study.experiments.kit.runfiles import load_reduction
 
 FULL, CONTROL, REDUCED = "full", "control", "reduced"
@@ -39,32 +39,20 @@ COLUMNS = [
 SECONDS_COLUMNS = ["scene", "group", "method", "r", "reduction_s"]
 
 
-class SubspaceCase(ConfigModel):
+class SubspaceCase(OfScene):
     """A model of a position subspace whose speed-up is quoted."""
 
-    scene: SceneName
     method: str
     position_basis: PositionBasis = "pod"
     k: Modes
 
-    @property
-    def labels(self) -> dict[str, str]:
-        """Labels of the file that holds it."""
-        return {"scene": self.scene}
 
-
-class ProjectionCase(ConfigModel):
+class ProjectionCase(OfScene):
     """Reduced projections, positions unreduced, whose speed-up is quoted."""
 
-    scene: SceneName
     group: str
     method: str
     r: Modes
-
-    @property
-    def labels(self) -> dict[str, str]:
-        """Labels of its files."""
-        return {"scene": self.scene, "group": self.group, "method": self.method}
 
 
 class FrameTimes(Processes):
@@ -77,15 +65,10 @@ class FrameTimes(Processes):
     projections: tuple[ProjectionCase, ...] = ()
 
 
-class NamedScene(ConfigModel):
-    """A scene with the label of its files."""
+class NamedScene(OfScene):
+    """A scene by its name, the label of its files."""
 
-    scene: SceneConfig
-
-    @property
-    def labels(self) -> dict[str, str]:
-        """Labels of its files."""
-        return {"scene": self.scene.name}
+    config: SceneConfig
 
 
 class Options(ConfigModel):
@@ -101,7 +84,7 @@ class Options(ConfigModel):
 
 
 @dataclass(frozen=True)
-class TimedScene(Case):
+class TimedScene:
     """A scene, timed in full order, once more as a control, and with its reductions.
 
     mesh : file of the mesh; it is made if there is none
@@ -162,7 +145,7 @@ def frame_times(settings: Options, times: File, seconds: File, **files: list[Fil
     asked = settings.frame_times
     scenes: dict[str, TimedScene] = {}
     for named, file in zip(settings.timed_scenes, files["meshes"], strict=True):
-        scenes[named.scene.name] = TimedScene(named.scene, settings.solver, asked.frames, file.path)
+        scenes[named.scene] = TimedScene(named.config, settings.solver, asked.frames, file.path)
     rows = []
     given = (files[name] for name in ("bases", "samplings", "snapshots"))
     for own, basis, sampling, data in zip(settings.projection_cases, *given, strict=True):
@@ -176,11 +159,11 @@ def frame_times(settings: Options, times: File, seconds: File, **files: list[Fil
     for case, file in zip(settings.subspace_cases, files["subspaces"], strict=True):
         chosen[file.path].append((case.method, case.position_basis, case.k))
         scenes[case.scene].models[file.path] = chosen[file.path]
-    for named, file in zip(
-        settings.large_scenes, files["large"], strict=True
-    ):  # may be among the others
-        scene = TimedScene(named.scene, settings.solver, asked.frames)
-        scenes.setdefault(named.scene.name, scene).models[file.path] = None
-    table = pd.DataFrame(in_processes([*scenes.values()], asked), columns=COLUMNS)
+    # these may be among the others
+    for named, file in zip(settings.large_scenes, files["large"], strict=True):
+        scene = TimedScene(named.config, settings.solver, asked.frames)
+        scenes.setdefault(named.scene, scene).models[file.path] = None
+    timed = [scene.variants for scene in scenes.values()]
+    table = pd.DataFrame(in_processes(timed, asked), columns=COLUMNS)
     write_table(table.astype({"k": "Int64", "r": "Int64"}), times.path)
     write_table(pd.DataFrame(rows, columns=SECONDS_COLUMNS), seconds.path)

@@ -445,31 +445,14 @@ def roundoff_field(scene: Scene, axes: str, size: float, seed: int) -> np.ndarra
     return field
 
 
-def noise_basis(
-    projections: np.ndarray, row_mass: np.ndarray, rows_per_element: int, method: MethodSpec
-) -> Basis:
-    """Basis of all that is stored, be it round-off: no cutoff, and no axis is left out.
-
-    A method with separate systems then has one for an axis in which nothing moves, as its text
-    says; elsewhere in this study such an axis has none.
-
-    Parameters
-    ----------
-    projections : (n, e p, 3) snapshots
-    row_mass, rows_per_element : see `compute_basis`
-    """
-    basis = compute_basis(
-        projections, row_mass, 0.0, rows_per_element=rows_per_element, spec=method
-    )
-    return replace(basis, active_axes=(True, True, True))
-
-
 def _noisy(
     scene: Scene, name: str, start: np.ndarray, sizes: Sequence[int], methods: Methods, limit: float
 ) -> Iterator[tuple[dict[str, Any], Rerun | None]]:
     """Rows and runs from one ``start`` (N, 3) m, which is added to the initial positions.
 
-    The reductions are trained on its full-order run.
+    The reductions are trained on its full-order run, on all that is stored, be it round-off: there
+    is no cutoff, and no axis is left out. A method with separate systems then has one for an axis
+    in which nothing moves, as its text says; elsewhere in this study such an axis has none.
     """
     group, plan, frames = scene.group(name), scene.config.reduce[name], scene.config.frames
     reference, projections = recorded(scene, name, start)
@@ -477,7 +460,8 @@ def _noisy(
     trained_on, masses = projections[even], sets.row_masses(group, scene.masses)
     displacement = displacement_norms(reference)
     for method, spec in methods.items():
-        basis = noise_basis(trained_on, masses, group.rows_per_element, method=spec)
+        basis = compute_basis(trained_on, masses, 0.0, group.rows_per_element, spec)
+        basis = replace(basis, active_axes=(True, True, True))
         made = reductions(basis, spec, sizes)
         for r in sizes:
             row = {"method": method, "r": r, "rank": basis.rank, "frames": 0}

@@ -130,31 +130,29 @@ class Online(LargeModels):
     },
 )
 def subspaces(
-    mesh: paths.File,
-    full_order: list[paths.File],
+    full_order: list[File],
     config: SceneConfig,
     asked: SubspaceModels,
     blowup_extent: kit.BlowupExtent,
-    out: paths.File,
-    train_table: paths.File,
-    heldout_table: paths.File,
-    seconds_table: paths.File,
+    **files: File,
 ) -> None:
     """Build every model (bases, sizes, tolerances) and run all motions with it."""
     motions = {
-        run["run"]: Yardstick(kit.scene_of(config, mesh, run["run"]), kit.positions_of(run))
+        run["run"]: Yardstick(
+            kit.scene_of(config, files["mesh"], run["run"]), kit.positions_of(run)
+        )
         for run in full_order
     }
-    with write_hdf5(out.path) as file:
+    with write_hdf5(files["out"].path) as file:
         for name, motion in motions.items():
             for series, values in motion.series.items():
                 file[f"{series}/{name}"] = values
         file.attrs.update(motions[kit.TRAIN].units)
         rows = _runs(file, motions, asked, blowup_extent, compared=True)
     train, heldout = rows[rows.motion == kit.TRAIN], rows[rows.motion != kit.TRAIN]
-    write_table(train[COLUMNS], train_table.path)
-    write_table(heldout[[*COLUMNS, "motion"]], heldout_table.path)
-    write_table(train[SECONDS_COLUMNS], seconds_table.path)
+    write_table(train[COLUMNS], files["train_table"].path)
+    write_table(heldout[[*COLUMNS, "motion"]], files["heldout_table"].path)
+    write_table(train[SECONDS_COLUMNS], files["seconds_table"].path)
 
 
 @experiment(
@@ -172,8 +170,8 @@ def online(
     config: SceneConfig,
     asked: LargeModels,
     blowup_extent: kit.BlowupExtent,
-    out: paths.File,
-    models: paths.File,
+    out: File,
+    models: File,
 ) -> None:
     """Reduce a large scene by every model and run all motions with each.
 
@@ -311,28 +309,12 @@ class Live(LiveModels):
     scenes: tuple[SceneName, ...] = ()
 
 
-class OfScene(ConfigModel):
-    """Names a file of a scene."""
-
-    scene: str
-
-    @property
-    def labels(self) -> dict[str, str]:
-        """Labels of the file."""
-        return {"scene": self.scene}
-
-
-class JointRows(ConfigModel):
+class JointRows(kit.OfScene):
     """Joint rows of a group, which the study has samples of."""
 
-    scene: str
     group: str
-    method: MethodSpec
-
-    @property
-    def labels(self) -> dict[str, str]:
-        """Labels of the files of this case."""
-        return {"scene": self.scene, "group": self.group, "method": JOINT}
+    method: str = JOINT
+    spec: MethodSpec
 
 
 class Options(ConfigModel):
@@ -386,7 +368,7 @@ def live(mesh: File, train: File, settings: Options, out: File, **files: list[Fi
         basis = load_basis(file.path)
         # of the size asked for, or of the largest that exists
         size = min(asked.joint_rows, basis.rank)
-        reduction = runfiles.load_reduction(basis, sampling.path, case.method, size)
+        reduction = runfiles.load_reduction(basis, sampling.path, case.spec, size)
         chosen += list(_joint(scene, case.group, reduction, chosen))
     used, triangles = np.unique(scene.mesh.triangles, return_inverse=True)
     stride = max(1, ceil((len(reference) - 1) * len(used) / GHOST))

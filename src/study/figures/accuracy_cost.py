@@ -143,8 +143,7 @@ def draw_panel(ax: Axes, found: TradeOffs, scene: str, size: float = 3.0) -> Non
             hollow = own.position_basis == "skinning"
             _points(ax, own[~hollow], size, colour, marker=marker)
             _points(ax, own[hollow], size, colour, marker=marker, fillstyle="none")
-        unbeaten = np.array(pareto(part[ERROR].to_list(), part[TIME].to_list()), dtype=bool)
-        front = part[unbeaten].sort_values(TIME)
+        front = best_points(part, ERROR)
         heights = clipped(front[ERROR].to_numpy(float), LOW, HIGH)
         steps = {"linewidth": 1.3, "drawstyle": "steps-post", "zorder": 1.5}
         ax.plot(front[TIME], heights, color=colour, **steps)
@@ -340,7 +339,7 @@ def _draw_case(ax: Axes, labels: tuple[str, int, float], case: pd.DataFrame) -> 
 
 
 def _draw_best(ax: Axes, rows: pd.DataFrame, colour: str, line: str) -> None:
-    points = best_points(rows)
+    points = best_points(rows, "error")
     errors = multiples.clipped(points.error.to_numpy(float), LEAST, MOST)
     marker = "o" if line == "-" else None
     ax.plot(
@@ -349,11 +348,10 @@ def _draw_best(ax: Axes, rows: pd.DataFrame, colour: str, line: str) -> None:
     )  # fmt: skip
 
 
-def best_points(rows: pd.DataFrame) -> pd.DataFrame:
-    """Pareto-optimal ``rows`` in time and error, sorted from the fastest to the most accurate."""
-    ordered = rows.sort_values(["ms_per_frame", "error"], kind="stable")
-    before = ordered.error.cummin().shift(fill_value=np.inf)
-    return ordered[ordered.error < before]
+def best_points(rows: pd.DataFrame, error: str) -> pd.DataFrame:
+    """Pareto-optimal ``rows`` in time and the column ``error``, the fastest first."""
+    best = pareto(rows[error].to_list(), rows[TIME].to_list())
+    return rows[np.array(best, dtype=bool)].sort_values(TIME)
 
 
 @figure(

@@ -6,7 +6,7 @@ of its section, it has the fields of the base class only, so that a job depends 
 The label of a figure's job is the name of the figure. Its options choose what the figure draws.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from types import SimpleNamespace
 from typing import Any
 
@@ -14,15 +14,16 @@ from pdrom.model import constraints
 from pdrom.model.constraints.base import GroupConfig
 from pdrom.model.effects import EFFECTS
 from pdrom.model.held_out import HeldOut
+from pdrom.model.scene import SceneConfig
 from pdrom.reduction.method import MethodSpec
 from study.artifact import paths
 from study.artifact.markup import to_tex
 from study.artifact.reads import Labels
 from study.experiments.frame_times import NamedScene, ProjectionCase, SubspaceCase
-from study.experiments.kit.base import Horizon
+from study.experiments.kit.base import Horizon, OfScene
 from study.experiments.repetitions import Cell, Repeated
 from study.experiments.reruns import Stability
-from study.experiments.subspaces import JOINT, JointRows, OfScene
+from study.experiments.subspaces import JOINT, JointRows
 from study.figures.kit.declaration import Experiment, Options, Reduction, declarations
 from study.paper.build import PAGES, Facts
 from study.paper.source import source_files
@@ -66,10 +67,14 @@ def _joint_rows(study: Study, labels: Labels) -> tuple[JointRows, ...]:
     scene = labels["scene"]
     if JOINT not in study.methods or scene not in study.scenes:
         return ()
-    method = study.methods[JOINT]
+    spec = study.methods[JOINT]
     return tuple(
-        JointRows(scene=scene, group=group, method=method) for group in study.scenes[scene].reduce
+        JointRows(scene=scene, group=group, spec=spec) for group in study.scenes[scene].reduce
     )
+
+
+def _named(scenes: Mapping[str, SceneConfig]) -> list[NamedScene]:
+    return [NamedScene(scene=name, config=config) for name, config in scenes.items()]
 
 
 def _subspace_cases(study: Study, labels: Labels) -> tuple[SubspaceCase, ...]:
@@ -266,8 +271,8 @@ DERIVED: dict[str, Callable[[Study, Labels], Any]] = {
     "with_subspaces": lambda study, labels: _of_scene(study, paths.SUBSPACES, labels),
     "with_online_models": lambda study, labels: _of_scene(study, paths.ONLINE_MODELS, labels),
     "joint_rows": _joint_rows,
-    "timed_scenes": lambda study, _: [NamedScene(scene=each) for each in study.scenes.values()],
-    "large_scenes": lambda study, _: [NamedScene(scene=each) for each in study.online.values()],
+    "timed_scenes": lambda study, _: _named(study.scenes),
+    "large_scenes": lambda study, _: _named(study.online),
     "subspace_cases": _subspace_cases,
     "projection_cases": _projection_cases,
     "projection_methods": lambda study, labels: {

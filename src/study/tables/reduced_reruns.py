@@ -191,14 +191,11 @@ FRAGILE = 0.005
     },
 )
 def stability(
-    full_order: list[paths.File],
-    reruns: list[paths.File],
-    subspaces: list[paths.File],
-    sweeps: list[paths.File],
     reduced_reruns: pd.DataFrame,
     time_steps: Mapping[str, float],
     wrong: float,
     departure: float,
+    **files: list[File],
 ) -> pd.DataFrame:
     """Rows of the study's reduced runs (experiment "rerun"), then of short runs ("sweep").
 
@@ -209,12 +206,10 @@ def stability(
     ----------
     time_steps : scene -> time step h in seconds
     """
-    runs = pd.concat(
-        [_full_order_rows(full_order), _rerun_rows(reruns, subspaces, reduced_reruns)],
-        ignore_index=True,
-    )
+    reruns = _rerun_rows(files["reruns"], files["subspaces"], reduced_reruns)
+    runs = pd.concat([_full_order_rows(files["full_order"]), reruns], ignore_index=True)
     runs = runs.assign(h=runs.scene.map(time_steps), stiffness_ratio=1.0, experiment="rerun")
-    rows = pd.concat([runs, joined(sweeps).assign(experiment="sweep")], ignore_index=True)
+    rows = pd.concat([runs, joined(files["sweeps"]).assign(experiment="sweep")], ignore_index=True)
     return rows.assign(outcome=outcomes(rows, wrong, departure))
 
 
@@ -233,7 +228,7 @@ def outcomes(runs: pd.DataFrame, wrong: float, departure: float) -> list[str]:
     return np.select(list(classes.values()), list(classes), "accurate").tolist()
 
 
-def _full_order_rows(files: list[paths.File]) -> pd.DataFrame:
+def _full_order_rows(files: list[File]) -> pd.DataFrame:
     """Rows of the full-order runs in ``files``; their energy ratio is 1, their error 0."""
     rows = []
     for run in files:
@@ -246,7 +241,7 @@ def _full_order_rows(files: list[paths.File]) -> pd.DataFrame:
 
 
 def _rerun_rows(
-    reruns: list[paths.File], subspaces: list[paths.File], reduced_reruns: pd.DataFrame
+    reruns: list[File], subspaces: list[File], reduced_reruns: pd.DataFrame
 ) -> pd.DataFrame:
     """Reduced runs of the training motion, with their error within the horizon as the error."""
     local = joined(reruns).assign(position_basis="full", k=np.nan)
@@ -274,6 +269,6 @@ def _rerun_rows(
     ),
     reads={"parts": Every(paths.HARD_CASES)},
 )
-def hard_cases(parts: list[paths.File]) -> pd.DataFrame:
+def hard_cases(parts: list[File]) -> pd.DataFrame:
     """Rows of the files ``parts`` in the order of the cases and methods."""
     return joined(parts)

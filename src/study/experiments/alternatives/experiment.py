@@ -36,7 +36,7 @@ from study.experiments.iterations import converged_run
 from study.experiments.kit import base as kit
 from study.experiments.kit import runfiles
 from study.experiments.kit.base import experiment
-from study.experiments.kit.measurement import Case, Processes, Variant, in_processes
+from study.experiments.kit.measurement import Processes, Variant, in_processes
 
 REDUCED, ACCELERATED = REDUCTIONS = "ecsw", "ecsw-anderson"  # the others are full-order ones
 TWO_LEVEL: Final = "two-level"  # full order, with a trained subspace for its coarse level
@@ -331,7 +331,7 @@ def substepped(scene: Scene, substeps: int, iterations: int, window: int = 0) ->
 
 
 @dataclass(frozen=True)
-class Timed(Case):
+class Timed:
     """A scene in the motion that is timed, with the labels of its rows and its reductions."""
 
     labels: dict[str, object]
@@ -393,7 +393,7 @@ def alternatives(sources: list[Path], settings: Options, out: File, times: File)
             for row in _rows(scene, recorded, models, settings):
                 rows.append({**own, "motion": motion, **row})
             if motion == FIRST:
-                cases.append(Timed(own, scene, models, section))
+                cases.append(Timed(own, scene, models, section).variants)
         log.info("%s: stiffness %g done", settings.scene.name, stiffness)
     write_table(pd.DataFrame(rows, columns=COLUMNS), out.path)
     measured = pd.DataFrame(in_processes(cases, section))

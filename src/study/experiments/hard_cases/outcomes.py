@@ -28,16 +28,8 @@ from pdrom.reduction.subspace.model import Samples, SubspaceModel, make_columns,
 from pdrom.reduction.subspace.space import coordinates
 from study.artifact.paths import HARD_CASES, File
 from study.artifact.reads import ProjectFiles, Setting
+from study.experiments.hard_cases import record
 from study.experiments.hard_cases.catalogue import CASES, MESHES, reducible_cases
-from study.experiments.hard_cases.record import (
-    HardCase,
-    Record,
-    Watched,
-    full_order,
-    momentum,
-    reach,
-    record,
-)
 from study.experiments.kit.base import experiment
 
 HOLDS, NOTHING, NOT_TAKEN = "holds", "nothing to reduce", "not taken"
@@ -98,16 +90,16 @@ def surprise(outcome: str, case: str, expected: Expectation | None) -> str:
 class Training:
     """The full-order run of a case with the snapshots of its first group (the reduced one)."""
 
-    def __init__(self, case: HardCase) -> None:
+    def __init__(self, case: record.HardCase) -> None:
         self.case = case
         self.scene = case.scene()
         self.group: ConstraintGroup = self.scene.groups[0]
         self._snapshots: list[np.ndarray] = []
         self._roundoff: list[float] = []
-        self.run = full_order(case, self.scene, self._observe)
+        self.run = record.full_order(case, self.scene, self._observe)
         self._bases: dict[str, Basis] = {}
         # largest extent in m of the run, the rest shape, the start and the fixed vertices
-        self.extent = max(self.run.extent, reach(self.scene, self.run))
+        self.extent = max(self.run.extent, record.reach(self.scene, self.run))
 
     def _observe(self, frame: int, y: np.ndarray) -> None:
         if frame % 2 == 0 or self.scene.config.frames == 1:
@@ -136,7 +128,7 @@ class ReducedRun:
     gain : gain of the interpolation, None without interpolation
     """
 
-    run: Record | None
+    run: record.Record | None
     r: int
     k: int | None = None
     gain: float | None = None
@@ -157,7 +149,8 @@ class ReducedRun:
         if self.k is not None and run.excess.max() > 0.0:
             return "objective rises"
         # S^T W p sums to zero whatever p is
-        if "momentum" in training.case.holds and momentum(training.case, training.scene, run):
+        case = training.case
+        if "momentum" in case.holds and record.momentum(case, training.scene, run):
             return "momentum changes"
         return HOLDS
 
@@ -186,9 +179,9 @@ def reduced_run(training: Training, name: str, methods: Methods, limit: float) -
     if r == 0:
         return ReducedRun(None, 0)
     reduction = Reduction(basis, select(basis, spec, r), spec, r=r)
-    step = Watched(ReducedLocalStep(group, reduction), group)
+    step = record.Watched(ReducedLocalStep(group, reduction), group)
     loop = scene.stepper(local_steps=replace_group(scene, group.name, step))
-    run = record(scene, loop, training.case.start(scene), limit=limit)
+    run = record.record(scene, loop, training.case.start(scene), limit=limit)
     return ReducedRun(run, r, gain=reduction.gain)
 
 
@@ -210,7 +203,7 @@ def _subspace(training: Training, kind: str, sampling: str, limit: float) -> Red
     untracked, _ = model.loop(scene)
     h, iterations = untracked.time_step, untracked.iterations
     loop = Stepper(untracked.space, h, iterations, local_steps=untracked.local_steps)
-    run = record(scene, loop, state, model, limit)
+    run = record.record(scene, loop, state, model, limit)
     return ReducedRun(run, model.elements_evaluated(scene), k=columns.B.shape[1])
 
 

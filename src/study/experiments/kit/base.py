@@ -15,7 +15,7 @@ import pandas as pd
 from pydantic import AfterValidator, Field
 
 from pdrom.core.store import open_hdf5, read_table
-from pdrom.core.yamlfile import ConfigModel
+from pdrom.core.yamlfile import ConfigModel, SceneName
 from pdrom.model.constraints.base import GroupConfig
 from pdrom.model.dynamics.solvers import SOLVERS
 from pdrom.model.dynamics.stepper import State, Stepper
@@ -71,6 +71,17 @@ Tolerance = Annotated[float, Field(gt=0.0, lt=1.0)]
 Sizes = dict[str, tuple[Annotated[float, Field(gt=0.0, le=100.0)], ...]]
 PositionBasis = Literal["pod", "skinning"]
 Rank = Annotated[int, Field(ge=1, le=100_000)] | Literal["full"]
+
+
+class OfScene(ConfigModel):
+    """Names files of a scene."""
+
+    scene: SceneName
+
+    @property
+    def labels(self) -> dict[str, str]:
+        """Labels of the files: every text in these settings."""
+        return {name: text for name, text in self if isinstance(text, str)}
 
 
 def floor_of(table: pd.DataFrame, scene: str, perturbation: float | str) -> np.ndarray:

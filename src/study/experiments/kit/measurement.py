@@ -164,18 +164,13 @@ def median_frames(samples: np.ndarray) -> np.ndarray:
     return samples[order, np.arange(samples.shape[1])].mean(axis=0)
 
 
-class Case:
-    """Something whose loops new processes time; it is pickled for them."""
-
-    def variants(self) -> Iterator[Variant]:
-        """Loops of this case, with all labels."""
-        raise NotImplementedError
-
-
-def in_processes(cases: Sequence[Case], asked: Processes) -> list[dict[str, Any]]:
+def in_processes(
+    cases: Sequence[Callable[[], Iterable[Variant]]], asked: Processes
+) -> list[dict[str, Any]]:
     """Labels of all variants of ``cases`` with their times in each of the new processes, in order.
 
-    One process after the other times all of them, in a random order of its own.
+    One process after the other times all of them, in a random order of its own. A case makes its
+    variants there, with all labels; it is pickled for that.
 
     Raises
     ------
@@ -205,7 +200,7 @@ def _in_this_process(given: str, answer: str, process: str) -> None:
     """Time the cases of the file ``given`` and write the rows to ``answer``."""
     with damaged_set_aside():  # the process is part of a job
         cases, asked = pickle.loads(Path(given).read_bytes())
-        variants = [variant for case in cases for variant in case.variants()]
+        variants = [variant for case in cases for variant in case()]
         order = np.random.default_rng(int(process)).permutation(len(variants))
         measured = measure([variants[i] for i in order], asked.warmup, asked.repeats)
     rows = [{**measured[i], "process": int(process)} for i in np.argsort(order)]

@@ -13,6 +13,7 @@ from study.tables.kit.results import KEYS, MEDIAN, families, trained, with_held_
 Tables = Mapping[str, pd.DataFrame]
 Value = str | int | float
 Where = Mapping[str, tuple[Value, ...]]
+Values = Callable[[pd.DataFrame, float], pd.DataFrame | pd.Series]
 VALUE = "value"
 LABELS = (
     "scene", "group", "method", "position_basis", "k", "r", "split", "axis", "noisy_axes", "seed",
@@ -65,29 +66,18 @@ def held_out(
     return choose(runs[runs[MEDIAN].notna()].assign(**{_ERROR: runs[MEDIAN]}), where)
 
 
-def labelled(rows: pd.DataFrame, values: pd.Series) -> pd.DataFrame:
-    """Table of the columns of ``rows`` that are in `LABELS`, and ``values`` as column `VALUE`."""
-    return rows[[label for label in LABELS if label in rows]].assign(**{VALUE: values})
-
-
-def local_share(rows: pd.DataFrame, accuracy: float) -> pd.DataFrame:
-    """Share of the local step in the time of a frame, for each row."""
-    return labelled(rows, rows.local_share)
-
-
-def decay(rows: pd.DataFrame, accuracy: float) -> pd.DataFrame:
+def decay(rows: pd.DataFrame, accuracy: float) -> pd.Series:
     """Singular values over the largest one, for groups with any singular value above round-off."""
     rows = rows[rows.groupby(["scene", "group"]).above_roundoff.transform("any")]
-    return labelled(rows, rows.relative)
+    return rows.relative
 
 
-def reconstruction(rows: pd.DataFrame, accuracy: float) -> pd.DataFrame:
+def reconstruction(rows: pd.DataFrame, accuracy: float) -> pd.Series:
     """Reconstruction error of each row; a singular interpolation has an infinite error."""
-    rows = rows[rows.gain.notna()]
-    return labelled(rows, rows.relative_error.fillna(np.inf))
+    return rows[rows.gain.notna()].relative_error.fillna(np.inf)
 
 
-def axis_reconstruction(rows: pd.DataFrame, accuracy: float) -> pd.DataFrame:
+def axis_reconstruction(rows: pd.DataFrame, accuracy: float) -> pd.Series:
     """Reconstruction error of each row and axis, see `reconstruction`.
 
     An axis is left out if its projections are round-off at every size, where no error is defined.
@@ -98,38 +88,31 @@ def axis_reconstruction(rows: pd.DataFrame, accuracy: float) -> pd.DataFrame:
     return reconstruction(rows[real.astype(bool)], accuracy)
 
 
-def elements_per_entry(rows: pd.DataFrame, accuracy: float) -> pd.DataFrame:
+def elements_per_entry(rows: pd.DataFrame, accuracy: float) -> pd.Series:
     """Number of evaluated elements divided by the number of modes r, for each row."""
     rows = rows[rows.elements_sampled.notna()]
-    return labelled(rows, rows.elements_sampled.astype(float) / rows.r)
+    return rows.elements_sampled.astype(float) / rows.r
 
 
-def local_ratio(name: str, rows: pd.DataFrame, accuracy: float) -> pd.DataFrame:
+def local_ratio(name: str, rows: pd.DataFrame, accuracy: float) -> pd.Series:
     """Time of a reduced local step, or a part of it, over that of the full compiled local step.
 
     The value is column ``name`` at the largest size of each scene, group, method and mesh: if the
     dense solve becomes too expensive at some size, the largest size shows it.
     """
     rows = rows.dropna(subset=[name]).sort_values("r")
-    largest = rows.groupby(CURVE, sort=False).tail(1).sort_index()
-    return labelled(largest, largest[name])
+    return rows.groupby(CURVE, sort=False).tail(1).sort_index()[name]
 
 
-def rerun_error(rows: pd.DataFrame, accuracy: float) -> pd.DataFrame:
-    """Error within the horizon of each run, infinite for a blow-up before the horizon."""
-    return labelled(rows, rows[_ERROR].fillna(np.inf))
-
-
-def useful_speedup(rows: pd.DataFrame, accuracy: float) -> pd.DataFrame:
+def useful_speedup(rows: pd.DataFrame, accuracy: float) -> pd.Series:
     """Speed-up over the full-order run; 0 for a run whose error exceeds ``accuracy``."""
-    useful = rows.speedup.where(rows[_ERROR] <= accuracy, 0.0)
-    return labelled(rows, useful).dropna(subset=[VALUE])
+    return rows.speedup.where(rows[_ERROR] <= accuracy, 0.0).dropna()
 
 
 def best_useful_speedup(rows: pd.DataFrame, accuracy: float) -> pd.DataFrame:
     """Largest value of `useful_speedup` over sizes and methods, per scene and group."""
-    runs = useful_speedup(rows, accuracy)
-    return runs.groupby(["scene", "group"], sort=False)[VALUE].max().reset_index()
+    useful = useful_speedup(rows, accuracy).rename(VALUE)
+    return useful.groupby([rows.scene, rows.group], sort=False).max().reset_index()
 
 
 def error_trend(rows: pd.DataFrame, accuracy: float) -> pd.DataFrame:
@@ -172,10 +155,9 @@ def trend_p_value(name: str, rows: pd.DataFrame, accuracy: float) -> pd.DataFram
     return pd.DataFrame({VALUE: [float(page_trend_test(blocks, ranked=True).pvalue)]})
 
 
-def noise_error(rows: pd.DataFrame, accuracy: float) -> pd.DataFrame:
+def noise_error(rows: pd.DataFrame, accuracy: float) -> pd.Series:
     """Error of runs on bases of round-off; infinite where a run ends early or cannot start."""
-    rows = rows[rows.r <= rows["rank"]]
-    return labelled(rows, rows.relative_error.fillna(np.inf))
+    return rows[rows.r <= rows["rank"]].relative_error.fillna(np.inf)
 
 
 def position_basis_ratio(rows: pd.DataFrame, accuracy: float) -> pd.DataFrame:
@@ -200,13 +182,14 @@ def over_the_rest(share: np.ndarray) -> np.ndarray:
 class Metric:
     """Metric of a test, computed from columns of one table.
 
-    of : function of the chosen rows and ``accuracy``; returns labels and a `VALUE` for each row
+    of : function of the chosen rows and ``accuracy``; returns values of some of these rows, or a
+        table of labels and a `VALUE` for each row
     choose : function of the table and ``where`` (column -> allowed values) that selects the rows
     labels : columns allowed in ``where`` in addition to the columns of the table
     ratio : function that converts a value to a ratio of two times, for metrics based on times
     """
 
-    of: Callable[[pd.DataFrame, float], pd.DataFrame]
+    of: Values
     table: str
     columns: tuple[str, ...]
     choose: Callable[[pd.DataFrame, Where], pd.DataFrame] = filtered
@@ -220,17 +203,26 @@ class Metric:
         ----------
         accuracy : largest error of a run that counts as accurate
         """
-        return self.of(self.choose(tables[self.table], where), accuracy)
+        rows = self.choose(tables[self.table], where)
+        found = self.of(rows, accuracy)
+        if isinstance(found, pd.DataFrame):
+            return found
+        labels = [label for label in LABELS if label in rows]
+        return rows.loc[found.index, labels].assign(**{VALUE: found})
 
 
-def _of_reruns(of: Callable[[pd.DataFrame, float], pd.DataFrame], *more: str) -> Metric:
+def _of_reruns(of: Values, *more: str) -> Metric:
     return Metric(of, "reduced_reruns", (*_RERUN, *more), reruns)
 
 
 _RECONSTRUCTION = "reconstruction_error"
 METRICS = {
-    "local_share": Metric(local_share, "local_share", ("local_share",), ratio=over_the_rest),
-    "rerun_error": _of_reruns(rerun_error),
+    # of the local step in the time of a frame
+    "local_share": Metric(
+        lambda rows, _: rows.local_share, "local_share", ("local_share",), ratio=over_the_rest
+    ),
+    # within the horizon, infinite for a blow-up before it
+    "rerun_error": _of_reruns(lambda rows, _: rows[_ERROR].fillna(np.inf)),
     "useful_speedup": _of_reruns(useful_speedup, "speedup"),
     "best_useful_speedup": _of_reruns(best_useful_speedup, "speedup"),
     "error_trend": _of_reruns(error_trend),

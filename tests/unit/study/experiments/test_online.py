@@ -44,7 +44,8 @@ def written(tmp_path_factory):
     experiment.online([], config, asked, blowup_extent=10.0, out=out, models=stored)
     mesh, *times = (File(str(path.with_name(n)), {}) for n in ("mesh.h5", "times.csv", "s.csv"))
     save_mesh(scene.mesh, mesh.path)
-    named = (timing.NamedScene(scene=config),)  # as a scene of the study and as a large one
+    # as a scene of the study and as a large one
+    named = (timing.NamedScene(scene=config.name, config=config),)
     settings = timing.Options(
         frame_times=ONCE, timed_scenes=named, large_scenes=named, subspace_cases=(),
         projection_cases=(), projection_methods={}, solver=DEFAULT_SOLVER,
@@ -99,7 +100,7 @@ def test_a_process_that_fails_is_told(written, tmp_path):
     file = str(tmp_path / "none.h5")
     missing = TimedScene(written[0].config, DEFAULT_SOLVER, frames=1, models={file: None})
     with pytest.raises(PdromError, match=r"none\.h5"):
-        in_processes([missing], ONCE)
+        in_processes([missing.variants], ONCE)
 
 
 def test_a_motion_that_blows_up_has_an_infinite_error(written, tmp_path):

@@ -13,17 +13,8 @@ from builders import TOP as PINS
 from pdrom.core.store import read_table, write_table
 from pdrom.model.runs import trajectory
 from pdrom.reduction.deviations import error_within
+from study.experiments import sensitivity as module
 from study.experiments.kit.base import floor_of, horizon, horizons, perturbation_field
-from study.experiments.sensitivity import (
-    COLUMNS,
-    EFFECTS,
-    contributions,
-    perturbed,
-    relative_difference,
-    removable,
-    sensitivities,
-    without,
-)
 
 SPRING = {"effect": "spring", "weight": 1e5}
 # a sheet that is compressed in its own plane buckles, and neither side is preferred
@@ -46,7 +37,7 @@ HORIZONTAL = partial(
 
 def floor(scene, size=1e-10) -> np.ndarray:
     base = trajectory(scene)
-    return relative_difference(trajectory(scene, perturbation_field(scene, size, 1)), base)
+    return module.relative_difference(trajectory(scene, perturbation_field(scene, size, 1)), base)
 
 
 def test_chaos_is_detected():
@@ -68,8 +59,8 @@ def test_perturbation_has_its_size_and_its_seed():
 
 def test_table_has_every_perturbation_seed_variant_and_frame():
     scene = make_scene(SPRING, GRAVITY, PINS, frames=4)
-    table = sensitivities(scene, (1e-10, 1e-6), (1, 2))
-    assert list(table.columns) == COLUMNS
+    table = module.sensitivities(scene, (1e-10, 1e-6), (1, 2))
+    assert list(table.columns) == module.COLUMNS
     labels = table.groupby(["perturbation", "seed"], sort=False).frame.agg(list)
     assert list(labels.index) == [
         ("1e-10", 1), ("1e-10", 2), ("1e-06", 1), ("1e-06", 2),
@@ -81,7 +72,7 @@ def test_table_has_every_perturbation_seed_variant_and_frame():
     assert largest["solver"] < 1e-9 < largest["iterations x4"]
     assert 1e-5 < largest["h/2"] < 1.0
     assert np.isfinite(table.relative_difference).all()
-    labelled = pd.concat(perturbed(scene, trajectory(scene), 1e-10, (1, 2, 3), "kick"))
+    labelled = pd.concat(module.perturbed(scene, trajectory(scene), 1e-10, (1, 2, 3), "kick"))
     assert set(labelled.perturbation) == {"kick"}
     assert labelled.seed.tolist() == [1] * 4 + [2] * 4 + [3] * 4
     own = table[(table.perturbation == "1e-10") & (table.seed == 2)].relative_difference
@@ -159,7 +150,7 @@ SOFT = {"effect": "spring", "weight": 1e3}
 
 def contributed(*effects, **settings):
     scene = make_scene(*effects, **settings)
-    return scene, contributions(scene)
+    return scene, module.contributions(scene)
 
 
 def test_what_hangs_still_is_carried_by_its_pins():
@@ -168,7 +159,7 @@ def test_what_hangs_still_is_carried_by_its_pins():
     damping = {"effect": "damping", "rate": 5.0}
     longer = {"mesh": mesh, "frames": 400, "iterations": 200}
     scene, made = contributed(SOFT, GRAVITY, PINS, damping, **longer)
-    assert made.columns.tolist() == EFFECTS
+    assert made.columns.tolist() == module.EFFECTS
     last = made[made.frame == 399].set_index("effect")
     hanging = np.full(2, 9.81 * scene.masses[0])
     assert last.force["spring"] == pytest.approx(np.linalg.norm(hanging), rel=1e-3)
@@ -204,9 +195,9 @@ def test_every_effect_but_the_only_group_is_left_out_in_turn():
     bending = {"effect": "bending", "weight": 1e-12}
     mesh = {"kind": "cloth", "rows": 5, "columns": 5, "wave": 0.1}
     scene = make_scene(SOFT, bending, GRAVITY, PINS, mesh=mesh, frames=8)
-    assert removable(scene.config) == ["spring", "bending", "gravity", "pins"]
-    assert removable(make_scene(SOFT, GRAVITY).config) == ["gravity"]
-    made = sensitivities(scene, (1e-10,), (1,))
+    assert module.removable(scene.config) == ["spring", "bending", "gravity", "pins"]
+    assert module.removable(make_scene(SOFT, GRAVITY).config) == ["gravity"]
+    made = module.sensitivities(scene, (1e-10,), (1,))
     drift = made.groupby("perturbation").relative_difference.max()
-    assert drift[without("bending")] < 1e-8 < 1e-2 < drift[without("gravity")]
-    assert drift[without("spring")] > 1e-3
+    assert drift[module.without("bending")] < 1e-8 < 1e-2 < drift[module.without("gravity")]
+    assert drift[module.without("spring")] > 1e-3

@@ -84,7 +84,8 @@ def array(at: PathOf) -> Callable[[Place, str], np.ndarray]:
     return read
 
 
-def again_at(study: Study, at: PathOf, folder: Path) -> Callable[..., dict[str, pd.DataFrame]]:
+@pytest.fixture
+def again(study: Study, at: PathOf, tmp_path: Path) -> Callable[..., dict[str, pd.DataFrame]]:
     """Make an experiment once more, with other arguments; its tables."""
 
     def made(experiment: Experiment, **changes: object) -> dict[str, pd.DataFrame]:
@@ -94,17 +95,12 @@ def again_at(study: Study, at: PathOf, folder: Path) -> Callable[..., dict[str, 
         given = {name: read.content(job.inputs[name]) for name, read in experiment.files.items()}
         asked = {k: t for k, t in experiment.types.items() if k not in changes}
         given |= {k: t.validate_python(job.settings[k]) for k, t in asked.items()} | changes
-        files = {name: File(str(folder / f"{name}.csv"), labels) for name in job.outputs}
+        files = {name: File(str(tmp_path / f"{name}.csv"), labels) for name in job.outputs}
         experiment.function(**given, **files)
         tables = [n for n, place in experiment.writes.items() if place.pattern.endswith(".csv")]
         return {name: read_table(files[name].path) for name in tables}
 
     return made
-
-
-@pytest.fixture
-def again(study, at, tmp_path):
-    return again_at(study, at, tmp_path)
 
 
 @pytest.fixture
@@ -270,18 +266,13 @@ def test_the_sweep_ends_at_the_horizon_and_with_runs_that_end(again, at, table, 
     assert unfinished["out"].error_scene.notna().all()
 
 
-@pytest.fixture(scope="module")
-def short_runs(study: Study, at: PathOf, tmp_path_factory) -> pd.DataFrame:
-    """Runs at another time step and another stiffness."""
+def test_every_setting_holds_every_model_once(again):
+    """(h, ratio): own, other h, other ratio; full order, two methods at two sizes, two models."""
     asked = ShortRuns(
         time_steps=(0.1,), stiffness_ratios=(0.01,), ranks=(2, 30), duration=0.08, min_frames=4,
         max_frames=6,
     )  # fmt: skip
-    return again_at(study, at, tmp_path_factory.mktemp("short"))(stability, short=asked)["out"]
-
-
-def test_every_setting_holds_every_model_once(short_runs):
-    """(h, ratio): own, other h, other ratio; full order, two methods at two sizes, two models."""
+    short_runs = again(stability, short=asked)["out"]
     keys = ["h", "stiffness_ratio", "method", "position_basis", "r"]
     assert len(short_runs) == 3 * (1 + 2 * 2 + 2)
     assert not short_runs.duplicated(keys).any()
@@ -303,17 +294,13 @@ def test_every_setting_holds_every_model_once(short_runs):
     assert own.gain["pod"] == 1.0 < own.gain[METHOD]
 
 
-def test_the_subspaces_know_their_energy(table):
-    for place in (paths.SUBSPACES_TRAIN, paths.SUBSPACES_HELDOUT):
-        assert table(place).energy_ratio.between(0.5, 1.5, inclusive="neither").all()
-
-
 @pytest.mark.parametrize("split", ["train", *MOTIONS])
 def test_runs_in_subspaces_are_their_coordinates(array, table, split):
     reference = array(paths.FULL_ORDER.where(run=split), "positions")
     moved = norms(reference[1:] - reference[0])
     heldout = table(paths.SUBSPACES_HELDOUT).query("motion == @split")
     rows = table(paths.SUBSPACES_TRAIN) if split == "train" else heldout
+    assert rows.energy_ratio.between(0.5, 1.5, inclusive="neither").all()
     rows = rows.set_index(["k", "method"])
     for k, method in rows.index:
         columns = array(paths.SUBSPACES, f"columns/pod_k{k:03d}/B")

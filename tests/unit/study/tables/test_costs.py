@@ -24,47 +24,30 @@ NOT_TIMED = pd.DataFrame(columns=["scene", "ms_per_frame"])  # table frame_times
 # Break-even ---------------------------------------------------------------------------------------
 
 
-def curve(folder, scene: str, offset: float, slope: float, full: float, sizes, shuffle=0) -> File:
-    """A local step that costs offset + slope r, as a file."""
-    r = np.array(sizes)
+def curve(folder, scene: str, offset: float, slope: float, full: float) -> File:
+    """A local step that costs offset + slope r at five sizes in no order, as a file."""
+    r = np.array([5, 10, 20, 40, 100])
     table = pd.DataFrame({"r": r, "local_ms": offset + slope * r}).assign(
         scene=scene, group="spring", method="block-deim", factor=1.0, vertices=9, elements=20,
         full_ms=full, solve_ms=0.5 * offset, lift_ms=slope * r,
     )  # fmt: skip
-    write_table(table.sample(frac=1.0, random_state=shuffle), folder / f"{scene}.csv")
+    write_table(table.sample(frac=1.0, random_state=0), folder / f"{scene}.csv")
     return File(str(folder / f"{scene}.csv"), {})
 
 
-@pytest.mark.parametrize(
-    ("offset", "slope", "full", "expected"),
-    [
-        (1.0, 0.1, 4.0, 30),  # 1 + 0.1 r = 4
-        (1.0, 0.1, 4.05, 31),  # r = 30.5
-        (1.0, 0.1, 100.0, None),
-        (5.0, 0.1, 4.0, 5),  # it never pays
-        (1.0, 0.03, 4.0, 100),  # exactly at the last size
-    ],
-)
-def test_break_even_of_a_line(tmp_path, offset, slope, full, expected):
-    path = curve(tmp_path, "a", offset, slope, full, [5, 10, 20, 40, 100])
-    table = breakeven([path], [])
+def test_every_line_has_its_own_break_even(tmp_path):
+    lines = {
+        "a": (1.0, 0.1, 4.0), "b": (1.0, 0.1, 4.05), "c": (1.0, 0.1, 100.0), "d": (5.0, 0.1, 4.0),
+        "e": (1.0, 0.03, 4.0),
+    }  # fmt: skip
+    table = breakeven([curve(tmp_path, s, *line) for s, line in lines.items()], [])
+    offset, slope, full = np.array([lines[scene] for scene in table.scene]).T
     np.testing.assert_allclose(table.ratio, (offset + slope * table.r) / full)
     np.testing.assert_allclose(
         table.solve_ratio + table.lift_ratio, table.ratio - 0.5 * offset / full
     )
-    if expected is None:
-        assert table.breakeven_r.isna().all()
-    else:
-        assert table.breakeven_r.tolist() == [expected] * 5
-
-
-def test_every_curve_has_its_own_break_even(tmp_path):
-    paths = [
-        curve(tmp_path, "a", 1.0, 0.1, 4.0, [5, 20, 40]),
-        curve(tmp_path, "b", 1.0, 0.1, 2.0, [5, 20, 40]),
-    ]
-    table = breakeven(paths, [])
-    assert table.groupby("scene").breakeven_r.unique().map(list).to_dict() == {"a": [30], "b": [10]}
+    # 1 + 0.1 r = 4; r = 30.5; never; it never pays; exactly at the last size
+    assert table.breakeven_r.fillna(-1).tolist() == [*np.repeat([30, 31, -1, 5, 100], 5)]
 
 
 # Runs that pay -----------------------------------------------------------------------------------

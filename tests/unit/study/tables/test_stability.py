@@ -20,7 +20,7 @@ FULL = {
 
 
 @pytest.fixture
-def files(tmp_path):
+def read(tmp_path):
     """One scene with three sizes of one method, two subspace runs, and a sweep of two rows."""
     positions = np.zeros((4, 2, 3))
     positions[:, 1, 0] = [1.0, 1.1, 1.2, 0.9]
@@ -43,18 +43,19 @@ def files(tmp_path):
     sweep = pd.DataFrame(rows).drop(columns="experiment")
     sweep = sweep.assign(blowup_frame=None, energy_ratio=1.0, gain=None, k=None)
     written = {}
-    for name, table in (("reruns", local), ("subspaces", inside), ("sweep", sweep)):
+    for name, table in (("reruns", local), ("subspaces", inside), ("sweeps", sweep)):
         written[name] = [File(str(tmp_path / name / "a.csv"), {"scene": "a"})]
         write_table(table, written[name][0].path)
     judged = pd.concat([local.assign(position_basis="full", k=np.nan), inside])
     errors = [0.05, None, None, 0.01, 0.5]
     judged = judged.assign(relative_error_within_horizon=errors, motion="train")
-    runs = paths.TRAIN.files([str(fom)])
-    return runs, written["reruns"], written["subspaces"], written["sweep"], judged
+    limits = {"time_steps": {"a": 0.016}, "wrong": 0.1, "departure": 2.0}
+    full_order = paths.TRAIN.files([str(fom)])
+    return {**written, **limits, "full_order": full_order, "reduced_reruns": judged}
 
 
-def test_every_run_has_its_row_and_outcome(files):
-    table = stability(*files, {"a": 0.016}, 0.1, 2.0)
+def test_every_run_has_its_row_and_outcome(read):
+    table = stability(**read)
     assert table.outcome.tolist() == [
         "accurate", "accurate", "blow-up", "not run", "accurate", "wrong", "accurate", "wrong",
     ]  # fmt: skip
@@ -71,12 +72,8 @@ def test_every_run_has_its_row_and_outcome(files):
     assert rerun.relative_error.tolist()[0] == 0.05
     assert rerun.relative_error.isna().tolist() == [False, True, True]
 
-
-def test_without_sweeps_and_subspaces(files):
-    fom, reruns, _, _, judged = files
-    table = stability(
-        fom, reruns, [], [], judged[judged.position_basis == "full"], {"a": 1.0}, 0.1, 2.0
-    )
+    judged = read["reduced_reruns"].query("position_basis == 'full'")
+    table = stability(**{**read, "subspaces": [], "sweeps": [], "reduced_reruns": judged})
     assert table.outcome.tolist() == ["accurate", "accurate", "blow-up", "not run"]
 
 

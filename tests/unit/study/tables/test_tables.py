@@ -222,7 +222,7 @@ def files(tmp_path) -> Files:
     return Files(full_order, reruns, subspaces, timings, sensitivity(sensitivity_files(tmp_path)))
 
 
-def test_errors_in_units_of_the_extent(files):
+def test_what_users_look_at_before_the_horizon(files):
     """Root mean squares before the horizon, which is 2 for scene a, over the norm of the extent."""
     table = files.trained()
     assert table.error_over_extent[0] == pytest.approx(np.sqrt(0.025) / 2.0)
@@ -233,11 +233,7 @@ def test_errors_in_units_of_the_extent(files):
     np.testing.assert_allclose(table.velocity_error, 6.0 * table.relative_error_within_horizon)
     shape = table.relative_shape_error
     np.testing.assert_allclose(shape, table.relative_error_within_horizon / 10.0)
-
-
-def test_energy_before_the_horizon(files):
-    """Scene a ends before the second sample of the energy."""
-    table = files.trained()
+    # scene a ends before the second sample of the energy
     assert table.energy_drift.isna().tolist() == [True, True, True, False, True, False, False]
     assert table.energy_drift[[3, 5, 6]].tolist() == pytest.approx([0.2] * 3)
 
@@ -246,7 +242,7 @@ def error(difference, end) -> float:
     return np.linalg.norm(difference[:end]) / np.linalg.norm(DISPLACEMENT[:end])
 
 
-def test_errors_within_the_horizon(files):
+def test_errors_within_the_horizon_and_times(files):
     table = files.trained()
     within = table.relative_error_within_horizon
     assert table.scene.tolist() == ["a", "a", "a", "b", "b", "b", "b"]
@@ -262,10 +258,7 @@ def test_errors_within_the_horizon(files):
     assert table.k.isna().tolist() == [True] * 5 + [False] * 2
     assert table.blowup_frame.isna().tolist() == [True, False, True, True, False, True, True]
     assert table.finite.isna().tolist() == [False, False, True, False, False, False, False]
-
-
-def test_times_go_to_their_runs(files):
-    table = files.trained()
+    # times go to their runs
     expected = [4.0, 5.0, np.nan, 2.0, np.nan, 1.0, 0.5]
     np.testing.assert_array_equal(table.ms_per_frame, expected)
     np.testing.assert_allclose(table.speedup, [2.0, 1.6, np.nan, 5.0, np.nan, 10.0, 20.0])

@@ -11,14 +11,7 @@ from pdrom.core.yamlfile import read_yaml, validate
 from pdrom.reduction.method import load_methods
 from places import ROOT
 from study.artifact.paths import File
-from study.experiments.hard_cases.outcomes import (
-    COLUMNS,
-    FAILURES,
-    Expectation,
-    HardCases,
-    hard_cases,
-    surprise,
-)
+from study.experiments.hard_cases import outcomes as module
 from study.pipeline.plan import Plan
 from study.pipeline.study import Study
 
@@ -34,14 +27,14 @@ EXPECTED = read_yaml(ROOT / "config" / "default.yaml")["hard_cases"]["expected"]
 
 def made(folder, expected):
     path = folder / "hard_cases.csv"
-    asked = HardCases(cases=("one_triangle", "flat_bending"), expected=expected)
-    hard_cases(meshes=[], every_method=METHODS, asked=asked, cases=File(str(path), {}))
+    asked = module.HardCases(cases=("one_triangle", "flat_bending"), expected=expected)
+    module.hard_cases(meshes=[], every_method=METHODS, asked=asked, cases=File(str(path), {}))
     return pd.read_csv(path)
 
 
 def test_a_failure_is_listed_with_its_reason(tmp_path):
     table = made(tmp_path, EXPECTED)
-    assert table.columns.tolist() == COLUMNS
+    assert table.columns.tolist() == module.COLUMNS
     table = table.set_index(["case", "method"])
     joint = table.loc["one_triangle", "deim-joint"]
     assert (joint.outcome, joint.finite, joint.blowup_frame) == ("singular", False, 0)
@@ -58,7 +51,9 @@ def test_a_failure_that_nothing_expects_is_logged(tmp_path, caplog):
     assert "one_triangle, deim-joint: singular, but no entry expects a failure" in caplog.text
 
 
-ENTRY = Expectation(why="because of something long enough", fails=("torn",), may_fail=("wire",))
+ENTRY = module.Expectation(
+    why="because of something long enough", fails=("torn",), may_fail=("wire",)
+)
 
 
 @pytest.mark.parametrize(
@@ -68,11 +63,12 @@ ENTRY = Expectation(why="because of something long enough", fails=("torn",), may
         ("nothing to reduce", "torn", ENTRY, True),
         ("singular", "wire", ENTRY, False), ("holds", "wire", ENTRY, False),
         ("distorted", "storm", ENTRY, True), ("holds", "storm", ENTRY, False),
-        *((failure, "storm", None, True) for failure in FAILURES), ("holds", "storm", None, False),
+        *((failure, "storm", None, True) for failure in module.FAILURES),
+        ("holds", "storm", None, False),
     ],
 )  # fmt: skip
 def test_what_contradicts_an_entry_or_that_there_is_none(outcome, case, entry, contradicts):
-    assert bool(surprise(outcome, case, entry)) == contradicts
+    assert bool(module.surprise(outcome, case, entry)) == contradicts
 
 
 @pytest.mark.parametrize(
@@ -89,7 +85,7 @@ def test_what_contradicts_an_entry_or_that_there_is_none(outcome, case, entry, c
 def test_a_faulty_entry_is_named(text, message):
     config = {"expected": yaml.safe_load(text)}
     with pytest.raises(ConfigurationError, match=rf"^a\.yaml: .*{message}"):
-        validate(HardCases, config, "a.yaml")
+        validate(module.HardCases, config, "a.yaml")
 
 
 @pytest.mark.parametrize("name", ["no_such_case", "contradiction", "long_run"])
@@ -102,6 +98,6 @@ def test_an_unknown_refused_or_slow_case_is_named(name):
 
 def test_every_method_takes_part_not_only_those_of_the_study():
     study = Study(read_yaml(ROOT / "config" / "tiny.yaml"), ROOT)
-    asked = Plan(study).job(hard_cases, {}).settings["every_method"]
+    asked = Plan(study).job(module.hard_cases, {}).settings["every_method"]
     assert set(asked) == set(read_yaml(ROOT / "config" / "methods.yaml"))
     assert set(asked) > set(study.methods)

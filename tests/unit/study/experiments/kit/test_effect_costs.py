@@ -5,15 +5,8 @@ import pytest
 
 from builders import make_scene
 from pdrom.model.constraints.local_kernel import LocalPass
+from study.experiments.kit import costs as module
 from study.experiments.kit.base import GLOBAL, REST, RIGHT
-from study.experiments.kit.costs import (
-    COSTS,
-    LEFT_OUT,
-    Timed,
-    effect_costs,
-    left_out,
-    left_out_sets,
-)
 
 EFFECTS = (
     {"effect": "gravity"},
@@ -27,8 +20,8 @@ EFFECTS = (
 
 def test_every_effect_has_a_row_and_the_shares_are_whole():
     scene = make_scene(*EFFECTS)
-    table = effect_costs(scene, scene.system, 3, 1, 3)
-    assert list(table.columns) == COSTS
+    table = module.effect_costs(scene, scene.system, 3, 1, 3)
+    assert list(table.columns) == module.COSTS
     expected = {
         "spring": scene.group("spring").elements, "strain": scene.group("strain").elements,
         "gravity": 30, "pins": 2 * 5, "floor": 30, RIGHT: 30, GLOBAL: 30, REST: 30,
@@ -45,9 +38,9 @@ def test_a_stand_in_and_its_kernel_answer_as_the_effect_does(rng):
     y = scene.mesh.points + 0.01 * rng.standard_normal(scene.mesh.points.shape)
     own = np.zeros_like(y)
     energy = group.accumulate(y, own)
-    stand = Timed(group, ("begin_frame", "accumulate"))
+    stand = module.Timed(group, ("begin_frame", "accumulate"))
     stand.begin_frame(y)
-    kernel = LocalPass([Timed(group, ("begin_frame",)).local_kernel])
+    kernel = LocalPass([module.Timed(group, ("begin_frame",)).local_kernel])
     for asked, times in ((stand, 1), (kernel, 1000)):
         for _ in range(times):
             found = np.zeros_like(y)
@@ -57,17 +50,17 @@ def test_a_stand_in_and_its_kernel_answer_as_the_effect_does(rng):
     stand.reset()
     assert stand.seconds == 0.0
     space = scene.space(scene.system)
-    assert space.compiled([Timed(g, ("begin_frame",)) for g in scene.groups])[0] is not None
+    assert space.compiled([module.Timed(g, ("begin_frame",)) for g in scene.groups])[0] is not None
 
 
 def test_effects_are_left_out_alone_and_groups_together():
     effects = (*EFFECTS, {"effect": "bending", "weight": 1.0})
-    sets = left_out_sets(make_scene(*effects))
+    sets = module.left_out_sets(make_scene(*effects))
     assert sets == [
         (), ("gravity",), ("floor",), ("pins",), ("spring",), ("strain",), ("bending",),
         ("spring", "strain"), ("spring", "bending"), ("strain", "bending"),
     ]  # fmt: skip
-    assert left_out_sets(make_scene({"effect": "spring", "weight": 1.0})) == []
+    assert module.left_out_sets(make_scene({"effect": "spring", "weight": 1.0})) == []
 
 
 def test_a_scene_without_an_effect_does_not_ask_it(monkeypatch):
@@ -75,17 +68,17 @@ def test_a_scene_without_an_effect_does_not_ask_it(monkeypatch):
     from pdrom.model.constraints.triangle_strain import TriangleStrain
 
     scene = make_scene(*EFFECTS)
-    costs = effect_costs(scene, scene.system, 2, 0, 1)
+    costs = module.effect_costs(scene, scene.system, 2, 0, 1)
 
     def refuse(*_):
         raise AssertionError("strain was asked")
 
     monkeypatch.setattr(TriangleStrain, "accumulate", refuse)
     with pytest.raises(AssertionError, match="strain was asked"):
-        left_out(scene, costs, 2, 0, 1, "splu")
+        module.left_out(scene, costs, 2, 0, 1, "splu")
     monkeypatch.setattr("study.experiments.kit.costs.left_out_sets", lambda _: [("strain",)])
-    table = left_out(scene, costs, 2, 0, 1, "splu")
-    assert list(table.columns) == LEFT_OUT
+    table = module.left_out(scene, costs, 2, 0, 1, "splu")
+    assert list(table.columns) == module.LEFT_OUT
     row = table.iloc[0]
     assert (row.left_out, row.groups) == ("strain", 1)
     assert row.elements == scene.group("strain").elements
@@ -95,10 +88,10 @@ def test_a_scene_without_an_effect_does_not_ask_it(monkeypatch):
 def test_every_effect_of_a_frame_and_every_group_is_left_out():
     # a kick is over before the first frame
     scene = make_scene({"effect": "kick", "speed": 0.1, "seed": 1}, *EFFECTS)
-    costs = effect_costs(scene, scene.system, 2, 0, 1)
-    table = left_out(scene, costs, 2, 0, 3, "splu")
+    costs = module.effect_costs(scene, scene.system, 2, 0, 1)
+    table = module.left_out(scene, costs, 2, 0, 3, "splu")
     assert table.left_out.tolist() == ["nothing", "gravity", "floor", "pins", "spring", "strain"]
     assert table.groups.tolist() == [2, 2, 2, 2, 1, 1]
     single = make_scene({"effect": "spring", "weight": 1.0})
-    costs = effect_costs(single, single.system, 1, 0, 1)
-    assert len(left_out(single, costs, 1, 0, 1, "splu")) == 0
+    costs = module.effect_costs(single, single.system, 1, 0, 1)
+    assert len(module.left_out(single, costs, 1, 0, 1, "splu")) == 0

@@ -6,14 +6,7 @@ import pytest
 from pdrom.core.yamlfile import validate
 from places import ROOT
 from study.tables import declared
-from study.tables.claims.claims import (
-    MACHINE,
-    UNDECIDED,
-    claims,
-    claims_tests,
-    combined,
-    sensitivity_rows,
-)
+from study.tables.claims import claims as module
 from study.tables.claims.rules import PARTS, ClaimRule, TestRule, load_claims
 
 PATH = ROOT / "config" / "claims.yaml"
@@ -42,7 +35,7 @@ def rows_of(test: dict, tables: dict[str, pd.DataFrame]) -> pd.DataFrame:
     """Variations of a claim with this test, published and beyond, and these tables."""
     tests = (validate(TestRule, test, "test"),)
     rules = {"C1": ClaimRule.model_construct(published=tests, beyond=tests)}
-    rows = sensitivity_rows(rules, tables)
+    rows = module.sensitivity_rows(rules, tables)
     assert set(rows.part) == set(PARTS)
     return rows[rows.part == "published"]
 
@@ -72,7 +65,8 @@ def test_margins_vary_where_times_are_compared():
     test = {"what": "w", "metric": "local_share", "compare": ">=", "threshold": 0.35}
     rows = rows_of(test, {"local_share": shares})
     assert verdicts(rows, "margin") == {
-        "1": "holds", "1.25": "holds", "1.5": "holds", "2": MACHINE, "3": MACHINE, "5": MACHINE,
+        "1": "holds", "1.25": "holds", "1.5": "holds",
+        **dict.fromkeys(("2", "3", "5"), module.MACHINE),
     }  # fmt: skip
     assert set(rows.verdict_of_rules) == {"holds"}
 
@@ -93,7 +87,7 @@ def test_splits_vary_where_a_test_names_one():
 
 def test_a_claim_without_data_has_no_variations():
     empty = {name: table.checked(pd.DataFrame()) for name, table in declared().items()}
-    assert sensitivity_rows(load_claims(PATH), empty).empty
+    assert module.sensitivity_rows(load_claims(PATH), empty).empty
 
 
 # Every test ---------------------------------------------------------------------------------------
@@ -111,29 +105,29 @@ def tables() -> dict[str, pd.DataFrame]:
 
 @pytest.fixture(scope="module")
 def outcomes(tables: dict[str, pd.DataFrame]) -> pd.DataFrame:
-    return claims_tests(PATH, {}, **tables)
+    return module.claims_tests(PATH, {}, **tables)
 
 
 def test_what_a_test_found(outcomes):
     found = outcomes[(outcomes.claim == "C1") & (outcomes.part == "beyond")]
     one = found.iloc[0]
-    assert (one.satisfied, one.of, one.close, one.verdict) == (2, 3, 2, MACHINE)
+    assert (one.satisfied, one.of, one.close, one.verdict) == (2, 3, 2, module.MACHINE)
     assert one.margin == 4.0
     assert (one.least, one["median"], one.most) == (0.2, 0.8, 0.9)
 
 
 def test_a_test_without_rows_is_undecided(outcomes):
     nothing = outcomes[outcomes.of == 0]
-    assert (nothing.verdict == UNDECIDED).all()
+    assert (nothing.verdict == module.UNDECIDED).all()
     assert nothing[["least", "median", "most"]].isna().all(axis=None)
 
 
 def test_the_tests_that_decide_give_the_verdicts(tables, outcomes):
-    for row in claims(PATH, {}, **tables).itertuples():
+    for row in module.claims(PATH, {}, **tables).itertuples():
         for part, verdict in (("published", row.verdict), ("beyond", row.verdict_beyond)):
             mine = outcomes[(outcomes.claim == row.claim) & (outcomes.part == part)]
             mine = mine[mine.decides]
-            assert combined(list(mine.verdict)) == verdict
+            assert module.combined(list(mine.verdict)) == verdict
 
 
 def test_words_tell_the_tests_of_a_part_apart(outcomes):
