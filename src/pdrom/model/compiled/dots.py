@@ -4,15 +4,8 @@ Products of three matrix rows with a vector read the vector only once, and the p
 three rows. The order of summation does not depend on the processor: sixteen partial sums are added
 to four, these to one, and the remaining terms one by one."""
 
-from pdrom.model.compiled.arithmetic import (
-    add,
-    add_product,
-    constant,
-    first_three,
-    of_three,
-    total,
-    transposed,
-)
+from pdrom.model.compiled import arithmetic
+from pdrom.model.compiled.arithmetic import add, add_product, constant, of_three
 from pdrom.model.compiled.functions import compiled
 from pdrom.model.compiled.rows import WIDTH, at, load
 
@@ -20,8 +13,8 @@ from pdrom.model.compiled.rows import WIDTH, at, load
 @compiled(forceinline=True)
 def _summed(a, b, c):
     """Return the sums of the components of three SIMD vectors as three numbers."""
-    first, second, third, fourth = transposed(a, b, c, c)
-    return first_three(add(add(first, third), add(second, fourth)))
+    first, second, third, fourth = arithmetic.transposed(a, b, c, c)
+    return arithmetic.first_three(add(add(first, third), add(second, fourth)))
 
 
 @compiled(forceinline=True)
@@ -80,7 +73,7 @@ def dot(a, b):
     for k in range(0, whole, 2 * WIDTH):
         first = add_product(first, load(a, k), load(b, k))
         second = add_product(second, load(a, k + WIDTH), load(b, k + WIDTH))
-    result = total(add(first, second))
+    result = arithmetic.total(add(first, second))
     for k in range(whole, len(a)):
         result += a[k] * b[k]
     return result

@@ -77,12 +77,9 @@ class Callback:
         self.function, self.signature = function, signature
 
     @cached_property
-    def _compiled(self):
-        return cfunc(self.signature, cache=True, error_model="numpy")(self.function)
-
-    @property
     def address(self):
-        """Address of the compiled function."""
+        """Address of the compiled function, which lives as long as the object."""
+        self._compiled = cfunc(self.signature, cache=True, error_model="numpy")(self.function)
         return self._compiled.address
 
 

@@ -12,15 +12,9 @@ from pdrom.core.errors import SceneError
 from pdrom.model.compiled import arithmetic, rows
 from pdrom.model.compiled.rows import WIDTH, at
 from pdrom.model.constraints import lanes
+from pdrom.model.constraints import local_kernel as kernels
 from pdrom.model.constraints.base import ConstraintGroup, GroupConfig, directions, require_cells
-from pdrom.model.constraints.local_kernel import (
-    FIRST,
-    OWN,
-    VERTICES,
-    LocalKernel,
-    gradient_kernel,
-    local_kernel,
-)
+from pdrom.model.constraints.local_kernel import FIRST, OWN, VERTICES, LocalKernel
 from pdrom.model.mesh.types import Mesh, barycentric_areas, boundary_edges
 
 # A direction to the rim (equator) with a smaller norm consists of round-off.
@@ -127,7 +121,7 @@ def _spheres(record, part):
     )
 
 
-@local_kernel
+@kernels.local_kernel
 def project_vertices(y_place, p_place, record, part):
     """Write the projections p (m, 3) of the sampled elements of the record; return 0.
 
@@ -154,7 +148,7 @@ def project_vertices(y_place, p_place, record, part):
     return 0.0
 
 
-@local_kernel
+@kernels.local_kernel
 def accumulate_vertices(y_place, rhs_place, record, part):
     """Add S^T W p of the blocks of a ``part`` to the right-hand side; return their energy in J.
 
@@ -192,7 +186,7 @@ def accumulate_vertices(y_place, rhs_place, record, part):
     return 0.5 * energy
 
 
-@gradient_kernel
+@kernels.gradient_kernel
 def project_gradients(d_pointer, manifold_pointer, p_pointer, m):
     """Write the projections p (m, 3) of the curvature vectors S q (m, 3) onto the half spheres.
 

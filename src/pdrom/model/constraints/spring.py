@@ -6,19 +6,7 @@ import numpy as np
 from numba import carray
 
 from pdrom.model.compiled import arithmetic, rows
-from pdrom.model.compiled.arithmetic import (
-    add,
-    add_product,
-    all_within,
-    choose_within,
-    constant,
-    divide,
-    magnitude,
-    multiply,
-    square_root,
-    subtract,
-    transposed,
-)
+from pdrom.model.compiled.arithmetic import add, choose_within, divide, multiply, subtract
 from pdrom.model.compiled.rows import WIDTH
 from pdrom.model.constraints import simplex
 from pdrom.model.constraints.base import GroupConfig, directions
@@ -37,22 +25,22 @@ LOW, HIGH = 1e-280, 1e280
 
 @lane_function
 def _squares(x, y, z):
-    return add_product(add_product(multiply(x, x), y, y), z, z)
+    return arithmetic.add_product(arithmetic.add_product(multiply(x, x), y, y), z, z)
 
 
 @lane_function
 def _rest_lengths(x, y, z, length, rest, place):
     """Return four edges, scaled to their rest ``length``; zero edges become ``rest[place:]``."""
     square = _squares(x, y, z)
-    factor = divide(length, square_root(square))
+    factor = divide(length, arithmetic.square_root(square))
     px, py, pz = multiply(factor, x), multiply(factor, y), multiply(factor, z)
-    if all_within(square, LOW, HIGH):
+    if arithmetic.all_within(square, LOW, HIGH):
         return px, py, pz
     # scale so that squares neither overflow nor underflow; edges that are not finite stay so
-    scale = add(add(magnitude(x), magnitude(y)), magnitude(z))
-    inverse = divide(constant(1.0), add(scale, constant(SMALLEST)))
+    scale = add(add(arithmetic.magnitude(x), arithmetic.magnitude(y)), arithmetic.magnitude(z))
+    inverse = divide(arithmetic.constant(1.0), add(scale, arithmetic.constant(SMALLEST)))
     ux, uy, uz = multiply(inverse, x), multiply(inverse, y), multiply(inverse, z)
-    factor = divide(length, square_root(_squares(ux, uy, uz)))
+    factor = divide(length, arithmetic.square_root(_squares(ux, uy, uz)))
     sx = choose_within(scale, 0.0, 0.0, rows.load(rest, place), multiply(factor, ux))
     sy = choose_within(scale, 0.0, 0.0, rows.load(rest, place + LANES), multiply(factor, uy))
     sz = choose_within(scale, 0.0, 0.0, rows.load(rest, place + 2 * LANES), multiply(factor, uz))
@@ -107,7 +95,7 @@ def _accumulate(y_place, rhs_place, record, part):
         y_place, rhs_place, record, part, 2, GEOMETRY
     )
     rest = rows.doubles(rows.indices(record, REST_EDGES + 1)[REST_EDGES], last * REST * LANES)
-    none = constant(0.0)
+    none = arithmetic.constant(0.0)
     energies = none
     for block in range(first, last):
         numbers = block * GEOMETRY * LANES
@@ -121,8 +109,8 @@ def _accumulate(y_place, rhs_place, record, part):
             px, py, pz = _rest_lengths(dx, dy, dz, length, rest, place)
             w = rows.load(geometry, numbers + simplex.WEIGHT * LANES + lane)
             square = _squares(subtract(dx, px), subtract(dy, py), subtract(dz, pz))
-            energies = add_product(energies, w, square)
-            forces = transposed(multiply(w, px), multiply(w, py), multiply(w, pz), none)
+            energies = arithmetic.add_product(energies, w, square)
+            forces = arithmetic.transposed(multiply(w, px), multiply(w, py), multiply(w, pz), none)
             simplex.add_to(rhs, corners, b, forces)
             simplex.take_from(rhs, corners, a, forces)
     return 0.5 * arithmetic.total(energies)

@@ -8,25 +8,8 @@ S q = F^T: vector k of a matrix is column k of F. See module `lanes` for the lay
 
 import numpy as np
 
-from pdrom.model.constraints import simplex
-from pdrom.model.constraints.lanes import (
-    LANES,
-    SMALLEST,
-    absolute_sum,
-    choose,
-    cross,
-    dot,
-    lane_function,
-    load,
-    load_matrix,
-    mix,
-    mix3,
-    perpendicular,
-    save,
-    save_matrix,
-    scaled,
-    unmarked,
-)
+from pdrom.model.constraints import lanes, simplex
+from pdrom.model.constraints.lanes import LANES, absolute_sum, choose, dot, load, mix, save, scaled
 
 SWEEPS = 12
 # two columns with a smaller cosine count as orthogonal
@@ -42,7 +25,7 @@ RANK = 1e-15
 B, V, SCALE, DONE, SIGMA, FOUND, SIZE = np.add(simplex.SIZE, [0, 9, 18, 19, 20, 23, 24]).tolist()
 
 
-@lane_function
+@lanes.lane_function
 def jacobi_rotation(a, b, done):
     """Return cosine, sine and |tangent| of the rotation that makes columns a and b orthogonal.
 
@@ -58,12 +41,12 @@ def jacobi_rotation(a, b, done):
     return cosine, -sine if half < 0.0 else sine, abs(tangent)
 
 
-@lane_function
+@lanes.lane_function
 def _sweep(work):
     """Rotate each pair of columns once; return how many lanes are not yet orthogonal."""
     for lane in range(LANES):
-        b0, b1, b2 = load_matrix(work, B, lane)
-        v0, v1, v2 = load_matrix(work, V, lane)
+        b0, b1, b2 = lanes.load_matrix(work, B, lane)
+        v0, v1, v2 = lanes.load_matrix(work, V, lane)
         done = work[DONE * LANES + lane] != 0.0
         c, s, t01 = jacobi_rotation(b0, b1, done)
         b0, b1 = mix(c, b0, -s, b1), mix(s, b0, c, b1)
@@ -74,14 +57,14 @@ def _sweep(work):
         c, s, t12 = jacobi_rotation(b1, b2, done)
         b1, b2 = mix(c, b1, -s, b2), mix(s, b1, c, b2)
         v1, v2 = mix(c, v1, -s, v2), mix(s, v1, c, v2)
-        save_matrix(work, B, lane, (b0, b1, b2))
-        save_matrix(work, V, lane, (v0, v1, v2))
+        lanes.save_matrix(work, B, lane, (b0, b1, b2))
+        lanes.save_matrix(work, V, lane, (v0, v1, v2))
         more = 1.0 if t01 > LAST_TANGENT or t02 > LAST_TANGENT or t12 > LAST_TANGENT else 0.0
         work[DONE * LANES + lane] = 1.0 - more
-    return unmarked(work, DONE)
+    return lanes.unmarked(work, DONE)
 
 
-@lane_function
+@lanes.lane_function
 def _larger_first(a, v, b, w):
     """Return columns a, b with right singular vectors v, w as (a, v, b, w), longer column first.
 
@@ -96,7 +79,7 @@ def _larger_first(a, v, b, w):
     )
 
 
-@lane_function
+@lanes.lane_function
 def orthonormal_pair(b0, b1):
     """Return directions and norms (u0, u1, s0, s1) of orthogonal columns ``b0``, ``b1``.
 
@@ -107,11 +90,11 @@ def orthonormal_pair(b0, b1):
     # remove the round-off component along the large column, which would tilt the small one
     b1 = mix(1.0, b1, -dot(u0, b1), u0)
     s1 = np.sqrt(dot(b1, b1))
-    u1 = choose(s1 > RANK * s0, scaled(1.0 / s1, b1), perpendicular(u0))
+    u1 = choose(s1 > RANK * s0, scaled(1.0 / s1, b1), lanes.perpendicular(u0))
     return u0, u1, s0, s1
 
 
-@lane_function
+@lanes.lane_function
 def rotated_pair(f0, f1, sign):
     """Decompose two columns into singular values and vectors by one rotation, without F^T F.
 
@@ -119,7 +102,7 @@ def rotated_pair(f0, f1, sign):
     and the directions and norms (divided by the scale), longer column first. If they are swapped,
     the first column is multiplied by ``sign``.
     """
-    scale = absolute_sum(f0) + absolute_sum(f1) + SMALLEST
+    scale = absolute_sum(f0) + absolute_sum(f1) + lanes.SMALLEST
     f0, f1 = scaled(1.0 / scale, f0), scaled(1.0 / scale, f1)
     c, s, _ = jacobi_rotation(f0, f1, False)
     a, b = mix(c, f0, -s, f1), mix(s, f0, c, f1)
@@ -128,45 +111,45 @@ def rotated_pair(f0, f1, sign):
     return scale, c, s, swapped, pair
 
 
-@lane_function
+@lanes.lane_function
 def factor_block(work):
     """Write U to `B`, V to `V` and the signed singular values of F, largest first, to `SIGMA`.
 
     The results are meaningless in lanes that are marked `FOUND`.
     """
     for lane in range(LANES):
-        f0, f1, f2 = load_matrix(work, simplex.F, lane)
-        scale = absolute_sum(f0) + absolute_sum(f1) + absolute_sum(f2) + SMALLEST
+        f0, f1, f2 = lanes.load_matrix(work, simplex.F, lane)
+        scale = absolute_sum(f0) + absolute_sum(f1) + absolute_sum(f2) + lanes.SMALLEST
         b = scaled(1.0 / scale, f0), scaled(1.0 / scale, f1), scaled(1.0 / scale, f2)
-        save_matrix(work, B, lane, b)
-        save_matrix(work, V, lane, ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))
+        lanes.save_matrix(work, B, lane, b)
+        lanes.save_matrix(work, V, lane, ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))
         work[SCALE * LANES + lane] = scale
         work[DONE * LANES + lane] = work[FOUND * LANES + lane]
     for _ in range(SWEEPS):
         if _sweep(work) == 0.0:
             break
     for lane in range(LANES):
-        b0, b1, b2 = load_matrix(work, B, lane)
-        v0, v1, v2 = load_matrix(work, V, lane)
+        b0, b1, b2 = lanes.load_matrix(work, B, lane)
+        v0, v1, v2 = lanes.load_matrix(work, V, lane)
         b0, v0, b1, v1 = _larger_first(b0, v0, b1, v1)
         b1, v1, b2, v2 = _larger_first(b1, v1, b2, v2)
         b0, v0, b1, v1 = _larger_first(b0, v0, b1, v1)
         u0, u1, s0, s1 = orthonormal_pair(b0, b1)
         # U has det +1, so that the last singular value takes the sign of det F (Irving et al. 2004)
-        u2 = cross(u0, u1)
-        save_matrix(work, B, lane, (u0, u1, u2))
-        save_matrix(work, V, lane, (v0, v1, v2))
+        u2 = lanes.cross(u0, u1)
+        lanes.save_matrix(work, B, lane, (u0, u1, u2))
+        lanes.save_matrix(work, V, lane, (v0, v1, v2))
         save(work, SIGMA, lane, scaled(work[SCALE * LANES + lane], (s0, s1, dot(u2, b2))))
 
 
-@lane_function
+@lanes.lane_function
 def compose_block(work):
     """Write U diag(sigma) V^T of `factor_block` to P, except in lanes that are marked `FOUND`."""
     for lane in range(LANES):
-        u, v = load_matrix(work, B, lane), load_matrix(work, V, lane)
+        u, v = lanes.load_matrix(work, B, lane), lanes.load_matrix(work, V, lane)
         sigma, found = load(work, SIGMA, lane), work[FOUND * LANES + lane] != 0.0
         u0, u1, u2 = scaled(sigma[0], u[0]), scaled(sigma[1], u[1]), scaled(sigma[2], u[2])
         for i in range(3):
             place = simplex.P + 3 * i
-            column = mix3(v[0][i], u0, v[1][i], u1, v[2][i], u2)
+            column = lanes.mix3(v[0][i], u0, v[1][i], u1, v[2][i], u2)
             save(work, place, lane, choose(found, load(work, place, lane), column))

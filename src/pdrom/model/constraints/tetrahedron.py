@@ -10,26 +10,9 @@ from typing import Literal
 import numpy as np
 
 from pdrom.model.compiled.rows import at
-from pdrom.model.constraints import singular_values, svd3
+from pdrom.model.constraints import lanes, singular_values, svd3
 from pdrom.model.constraints.base import GroupConfig, require_cells
-from pdrom.model.constraints.lanes import (
-    LANES,
-    SMALLEST,
-    choose,
-    clamp,
-    cross,
-    dot,
-    lane_function,
-    load,
-    load_matrix,
-    mix,
-    mix3,
-    save,
-    save_matrix,
-    scaled,
-    square_distance,
-    unmarked,
-)
+from pdrom.model.constraints.lanes import LANES, choose, cross, dot, mix, scaled, square_distance
 from pdrom.model.constraints.local_kernel import gradient_kernel, local_kernel
 from pdrom.model.constraints.simplex import EDGE, ENERGY, FORCE, OPERATOR, WEIGHT, F, P
 from pdrom.model.constraints.svd3 import FOUND
@@ -45,25 +28,25 @@ LAST_STEP = 1e-18
 _OPEN, _FOUND, _UNSUITED = 0.0, 1.0, 2.0
 
 
-@lane_function
+@lanes.lane_function
 def _start(work):
     for lane in range(LANES):
-        f0, f1, f2 = load_matrix(work, F, lane)
+        f0, f1, f2 = lanes.load_matrix(work, F, lane)
         square = (dot(f0, f0) + dot(f1, f1) + dot(f2, f2)) / 3.0
         inverse = 1.0 / np.sqrt(square)
         # scale before the determinant, whose products could overflow; if the mean square overflows
         # or vanishes, F does not suit the iteration
         x0, x1, x2 = scaled(inverse, f0), scaled(inverse, f1), scaled(inverse, f2)
-        suited = square > SMALLEST and dot(x0, cross(x1, x2)) > WELL_CONDITIONED
-        save_matrix(work, P, lane, (x0, x1, x2))
+        suited = square > lanes.SMALLEST and dot(x0, cross(x1, x2)) > WELL_CONDITIONED
+        lanes.save_matrix(work, P, lane, (x0, x1, x2))
         work[FOUND * LANES + lane] = _OPEN if suited else _UNSUITED
 
 
-@lane_function
+@lanes.lane_function
 def _advance(work):
     """Do one Newton step in the lanes that still iterate; the other lanes do not change."""
     for lane in range(LANES):
-        x0, x1, x2 = load_matrix(work, P, lane)
+        x0, x1, x2 = lanes.load_matrix(work, P, lane)
         c0, c1, c2 = cross(x1, x2), cross(x2, x0), cross(x0, x1)
         inverse = 0.5 / dot(x0, c0)
         n0, n1, n2 = mix(0.5, x0, inverse, c0), mix(0.5, x1, inverse, c1), mix(0.5, x2, inverse, c2)
@@ -71,24 +54,24 @@ def _advance(work):
         mark = work[FOUND * LANES + lane]
         is_open = mark == _OPEN
         new = choose(is_open, n0, x0), choose(is_open, n1, x1), choose(is_open, n2, x2)
-        save_matrix(work, P, lane, new)
+        lanes.save_matrix(work, P, lane, new)
         work[FOUND * LANES + lane] = _FOUND if is_open and step < LAST_STEP else mark
 
 
-@lane_function
+@lanes.lane_function
 def _rotations(work):
     """Write the nearest rotations of well-conditioned F to P; set FOUND to 1 there, else to 0."""
     _start(work)
     for _ in range(STEPS):
         _advance(work)
-        if unmarked(work, FOUND) == 0.0:
+        if lanes.unmarked(work, FOUND) == 0.0:
             break
     for lane in range(LANES):
         mark = work[FOUND * LANES + lane]
         work[FOUND * LANES + lane] = 1.0 if mark == _FOUND else 0.0
 
 
-@lane_function
+@lanes.lane_function
 def _within_range(work, low, high):
     """Copy F to P; set FOUND to 1 where the singular values are proven to lie in [low, high].
 
@@ -97,12 +80,12 @@ def _within_range(work, low, high):
     """
     slack = min(1.0 - low * low, high * high - 1.0)
     for lane in range(LANES):
-        f0, f1, f2 = load_matrix(work, F, lane)
+        f0, f1, f2 = lanes.load_matrix(work, F, lane)
         g0, g1, g2 = dot(f0, f0) - 1.0, dot(f1, f1) - 1.0, dot(f2, f2) - 1.0
         h0, h1, h2 = dot(f1, f2), dot(f2, f0), dot(f0, f1)
         distance = g0 * g0 + g1 * g1 + g2 * g2 + 2.0 * (h0 * h0 + h1 * h1 + h2 * h2)
         inside = distance < slack * slack and dot(f0, cross(f1, f2)) > 0.0
-        save_matrix(work, P, lane, (f0, f1, f2))
+        lanes.save_matrix(work, P, lane, (f0, f1, f2))
         work[FOUND * LANES + lane] = 1.0 if inside else 0.0
 
 
@@ -110,18 +93,18 @@ def _within_range(work, low, high):
 GEOMETRY = 10
 
 
-@lane_function
+@lanes.lane_function
 def gradients(work, geometry, block):
     """Write S q = F^T of a ``block`` to ``work``, from its edges and the packed ``geometry``."""
     start = block * GEOMETRY + OPERATOR
     for lane in range(LANES):
-        e0, e1, e2 = load_matrix(work, EDGE, lane)
+        e0, e1, e2 = lanes.load_matrix(work, EDGE, lane)
         for i in range(3):
-            row = load(geometry, start + 3 * i, lane)
-            save(work, F + 3 * i, lane, mix3(row[0], e0, row[1], e1, row[2], e2))
+            row = lanes.load(geometry, start + 3 * i, lane)
+            lanes.save(work, F + 3 * i, lane, lanes.mix3(row[0], e0, row[1], e1, row[2], e2))
 
 
-@lane_function
+@lanes.lane_function
 def _nearest(work, low, high):
     """Write the projections of a block: cheap cases first, the SVD if any lane remains.
 
@@ -131,17 +114,17 @@ def _nearest(work, low, high):
         _rotations(work)
     else:
         _within_range(work, low, high)
-    if unmarked(work, FOUND) > 0.0:
+    if lanes.unmarked(work, FOUND) > 0.0:
         svd3.factor_block(work)
         for lane in range(LANES):
-            s, scale = load(work, svd3.SIGMA, lane), work[svd3.SCALE * LANES + lane]
-            first = clamp(s[0], low, high) + 0.0 * scale
-            sigma = first, clamp(s[1], low, high), clamp(s[2], low, high)
-            save(work, svd3.SIGMA, lane, sigma)
+            s, scale = lanes.load(work, svd3.SIGMA, lane), work[svd3.SCALE * LANES + lane]
+            first = lanes.clamp(s[0], low, high) + 0.0 * scale
+            sigma = first, lanes.clamp(s[1], low, high), lanes.clamp(s[2], low, high)
+            lanes.save(work, svd3.SIGMA, lane, sigma)
         svd3.compose_block(work)
 
 
-@lane_function
+@lanes.lane_function
 def forces(work, geometry, block):
     """Write the forces S^T W p on the corners to ``work`` and add w |S q - p|^2 to its energy.
 
@@ -149,13 +132,13 @@ def forces(work, geometry, block):
     """
     weight, start = block * GEOMETRY + WEIGHT, block * GEOMETRY + OPERATOR
     for lane in range(LANES):
-        f0, f1, f2 = load_matrix(work, F, lane)
-        p0, p1, p2 = load_matrix(work, P, lane)
-        r0, r1, r2 = load_matrix(geometry, start, lane)
+        f0, f1, f2 = lanes.load_matrix(work, F, lane)
+        p0, p1, p2 = lanes.load_matrix(work, P, lane)
+        r0, r1, r2 = lanes.load_matrix(geometry, start, lane)
         w = at(geometry, weight * LANES + lane)
         for corner in range(3):
-            force = mix3(r0[corner], p0, r1[corner], p1, r2[corner], p2)
-            save(work, FORCE + 3 * corner, lane, scaled(w, force))
+            force = lanes.mix3(r0[corner], p0, r1[corner], p1, r2[corner], p2)
+            lanes.save(work, FORCE + 3 * corner, lane, scaled(w, force))
         work[ENERGY * LANES + lane] += w * (
             square_distance(f0, p0) + square_distance(f1, p1) + square_distance(f2, p2)
         )

@@ -16,22 +16,9 @@ from typing import Literal
 import numpy as np
 
 from pdrom.model.compiled.rows import at
-from pdrom.model.constraints import singular_values
+from pdrom.model.constraints import lanes, singular_values
 from pdrom.model.constraints.base import require_cells
-from pdrom.model.constraints.lanes import (
-    LANES,
-    choose,
-    clamp,
-    cross,
-    dot,
-    lane_function,
-    load,
-    mix,
-    save,
-    scaled,
-    square_distance,
-    unmarked,
-)
+from pdrom.model.constraints.lanes import LANES, choose, clamp, dot, load, mix, save, scaled
 from pdrom.model.constraints.local_kernel import gradient_kernel, local_kernel
 from pdrom.model.constraints.simplex import EDGE, ENERGY, FORCE, OPERATOR, SIZE, WEIGHT, F, P
 from pdrom.model.constraints.svd3 import rotated_pair
@@ -45,13 +32,13 @@ LOW, HIGH = 1e-60, 1e60
 EQUAL = 1e-17
 
 
-@lane_function
+@lanes.lane_function
 def _closed_form(f0, f1, low, high):
     """Return the columns of the nearest matrix, and whether the closed form is accurate for F."""
     a, b, off = dot(f0, f0), dot(f1, f1), dot(f0, f1)
     mean, half = 0.5 * (a + b), 0.5 * (a - b)
     h = np.sqrt(half * half + off * off) + EQUAL * mean
-    normal = cross(f0, f1)
+    normal = lanes.cross(f0, f1)
     product = np.sqrt(dot(normal, normal))
     large = np.sqrt(mean + h)
     # compute three reciprocals with one division
@@ -70,7 +57,7 @@ def _closed_form(f0, f1, low, high):
     return p0, p1, suited
 
 
-@lane_function
+@lanes.lane_function
 def _rotated(f0, f1, low, high):
     """Return the columns of the nearest matrix, by a rotation that makes the columns orthogonal."""
     scale, c, s, swapped, pair = rotated_pair(f0, f1, 1.0)
@@ -88,7 +75,7 @@ GEOMETRY = 5
 FOUND, WORK = SIZE, SIZE + 1
 
 
-@lane_function
+@lanes.lane_function
 def gradients(work, geometry, block):
     """Write S q = F^T of a ``block`` to ``work``, from its edges and the packed ``geometry``."""
     first = (block * GEOMETRY + OPERATOR) * LANES
@@ -100,7 +87,7 @@ def gradients(work, geometry, block):
         save(work, F + 3, lane, mix(at(geometry, place), e0, at(geometry, place + LANES), e1))
 
 
-@lane_function
+@lanes.lane_function
 def forces(work, geometry, block):
     """Write the forces S^T W p on the corners to ``work`` and add w |S q - p|^2 to its energy.
 
@@ -116,11 +103,12 @@ def forces(work, geometry, block):
         save(work, FORCE, lane, scaled(w, mix(r00, p0, r10, p1)))
         save(work, FORCE + 3, lane, scaled(w, mix(r01, p0, r11, p1)))
         work[ENERGY * LANES + lane] += w * (
-            square_distance(load(work, F, lane), p0) + square_distance(load(work, F + 3, lane), p1)
+            lanes.square_distance(load(work, F, lane), p0)
+            + lanes.square_distance(load(work, F + 3, lane), p1)
         )
 
 
-@lane_function
+@lanes.lane_function
 def _nearest(work, low, high):
     """Write the projections of a block to ``work``; nan for a matrix that is not finite."""
     for lane in range(LANES):
@@ -128,7 +116,7 @@ def _nearest(work, low, high):
         save(work, P, lane, p0)
         save(work, P + 3, lane, p1)
         work[FOUND * LANES + lane] = 1.0 if suited else 0.0
-    if unmarked(work, FOUND) > 0.0:
+    if lanes.unmarked(work, FOUND) > 0.0:
         for lane in range(LANES):
             found = work[FOUND * LANES + lane] != 0.0
             p0, p1 = _rotated(load(work, F, lane), load(work, F + 3, lane), low, high)

@@ -16,8 +16,8 @@ from pdrom.model.compiled.rows import flat, write
 # Relative Tikhonov term of the small least-squares problem: keeps the weights bounded if residual
 # differences are nearly parallel (close to convergence).
 REGULARISATION = 1e-14
-# Indices into the counters of a history: stored differences (-1: no iterate yet), refused iterates.
-DIFFERENCES, REFUSED = 0, 1
+# Index into the counters of a history: the number of stored differences (-1: no iterate yet).
+DIFFERENCES = 0
 
 
 @inner
@@ -68,7 +68,6 @@ def refuse(history, y, objective, plain=1):
     if numbers[DIFFERENCES] >= plain and objective > last[0]:
         write(image, y)
         numbers[DIFFERENCES] = -1
-        numbers[REFUSED] += 1
         return True
     last[0] = objective
     write(y, start)
@@ -111,11 +110,11 @@ def _history(window: int, n: int) -> History:
 
     They are: the accepted iterate, residual and image of the last iterate (n,); ``window``
     differences of residuals and of images (window, n); Gram matrix of the residual differences; the
-    counters `DIFFERENCES` and `REFUSED` (2,); the objective of the accepted iterate (1,).
+    number of `DIFFERENCES` (1,); the objective of the accepted iterate (1,).
     """
     vectors = [np.empty(n) for _ in range(3)]
     differences = [np.empty((window, n)) for _ in range(2)]
-    return (*vectors, *differences, np.empty((window, window)), np.zeros(2, np.int64), np.empty(1))
+    return (*vectors, *differences, np.empty((window, window)), np.zeros(1, np.int64), np.empty(1))
 
 
 # The history of iterations without acceleration. Compiled loops distinguish it by its type, so that
@@ -139,17 +138,11 @@ class Anderson:
         self._window = window
         self.history = _history(window, 0)
 
-    @property
-    def refused(self) -> int:
-        """Number of rejected iterates since the object was made."""
-        return int(self.history[6][REFUSED])
-
     def begin_frame(self, y: np.ndarray) -> None:
         """Delete the iterates of the last frame; ``y`` (n, 3) is the first one of a new frame."""
-        n, refused = _numbers(y).size, self.refused
+        n = _numbers(y).size
         if n != len(self.history[0]):
             self.history = _history(self._window, n)
-            self.history[6][REFUSED] = refused
         forget(self.history)
 
     def refuse(self, y: np.ndarray, objective: float) -> bool:

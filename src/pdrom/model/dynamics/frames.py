@@ -82,28 +82,24 @@ class CompiledIterations:
     local_steps : objects with an attribute ``local_kernel``
     inertia : (N,) M / h^2
     acceleration : the step loop calls its ``begin_frame`` in each frame
+
+    Attributes
+    ----------
+    compiled_arguments : arguments of `all_iterations` that are the same for all frames
     """
 
     def __init__(
         self, local_steps: Sequence[Any], inertia: np.ndarray, acceleration: Anderson | None = None
     ) -> None:
         local = self._pass = LocalPass([step.local_kernel for step in local_steps])
-        self._inertia = inertia
         self._acceleration = acceleration
-        # arguments that are the same in every call of compiled code
-        touched = local.touched
-        self._tables = (local.first, local.preparing, local.second)
-        self._second = (local.other, touched.start, touched.stop)
-        self._clock = clock()
+        tables = (local.first, local.preparing, local.second)
+        second = (local.other, local.touched.start, local.touched.stop)
+        self.compiled_arguments = inertia, tables, second, clock()
 
     def takes(self, elimination: object) -> TypeGuard[Elimination]:
         """Return whether compiled code can solve the system of an ``elimination``."""
         return isinstance(elimination, Elimination) and elimination.factor is not None
-
-    @property
-    def compiled_arguments(self) -> tuple[Any, ...]:
-        """Arguments of `all_iterations` that are the same for all frames."""
-        return self._inertia, self._tables, self._second, self._clock
 
     def run(
         self,
@@ -131,10 +127,10 @@ class CompiledIterations:
         right = rows.empty(WIDTH * len(y))
         iterate, start = rows.flat(y), rows.flat(base)
         prediction = rows.flat(s) if tracked else start
+        inertia, tables, second, watch = self.compiled_arguments
         all_iterations(
             (which.start, which.stop, iterations), iterate, prediction, start, right,
-            self._inertia, self._tables, self._second, elimination.factor, history, objective,
-            seconds, self._clock,
+            inertia, tables, second, elimination.factor, history, objective, seconds, watch,
         )  # fmt: skip
 
 

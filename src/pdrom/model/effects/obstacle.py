@@ -169,7 +169,10 @@ class Box(Obstacle):
         _ordered = model_validator(mode="after")(require_ordered)
 
         def body(self, low: np.ndarray, high: np.ndarray) -> Mesh:
-            return cuboid(np.array(self.lower), np.array(self.upper))
+            lower, upper = np.array(self.lower), np.array(self.upper)
+            upwards = np.array([[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
+            triangles = [[f[0], *pair] for f in FACES for pair in (f[1:3], f[2:4])]
+            return Mesh(lower + upwards * (upper - lower), np.array(triangles, dtype=np.int32))
 
     def depths(self, points: np.ndarray) -> np.ndarray:
         return self._to_faces(points).min(axis=1)
@@ -214,6 +217,8 @@ def _axis_vectors(axes: np.ndarray, signs: np.ndarray) -> np.ndarray:
 
 
 RINGS = 24  # intervals of a drawn sphere from pole to pole; it has twice as many around
+# Corners of the faces of a drawn box; bits of a corner's number are 1 on its upper sides x, y, z.
+FACES = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
 
 
 def square(point: np.ndarray, normal: np.ndarray, low: np.ndarray, high: np.ndarray) -> Mesh:
@@ -254,14 +259,6 @@ def ball(centre: np.ndarray, radius: float) -> Mesh:
     last = (RINGS - 2) * around
     faces.append(np.column_stack([np.full(around, bottom), last + here, last + after]))
     return Mesh(centre + radius * unit, np.concatenate(faces).astype(np.int32))
-
-
-def cuboid(lower: np.ndarray, upper: np.ndarray) -> Mesh:
-    """Return the surface of an axis-parallel box with corners ``lower`` and ``upper`` (3,) m."""
-    upwards = np.array([[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
-    faces = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
-    triangles = [[f[0], *pair] for f in faces for pair in (f[1:3], f[2:4])]
-    return Mesh(lower + upwards * (upper - lower), np.array(triangles, dtype=np.int32))
 
 
 class Floor(Contact):

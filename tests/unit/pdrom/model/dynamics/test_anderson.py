@@ -74,7 +74,6 @@ def test_a_risen_objective_brings_back_the_plain_image():
     y += 5.0
     assert acceleration.refuse(y, 3.0)
     assert np.array_equal(y, plain)
-    assert acceleration.refused == 1
 
 
 def test_window_zero_is_the_plain_iteration(group_scene):
