@@ -88,13 +88,14 @@ def test_rotation_and_translation_equivariance(group_scene, rng):
     assert np.abs(other.positions - expected).max() < 1e-9
 
 
-def test_handles_reach_their_target():
+@pytest.mark.parametrize("window", [0, 4])
+def test_handles_reach_their_target(window):
     scene = make_scene(
         {"effect": "translate", "select": "top", "offset": [0.1, 0.2, -0.3], "over": 5},
         {"effect": "rotate", "select": "bottom", "axis": "y", "degrees": 90.0, "over": 8},
         {"effect": "spring", "weight": 1e5},
-        frames=12,
-    )
+        frames=12, anderson_window=window,
+    )  # fmt: skip
     points, final = scene.mesh.points, trajectory(scene)[-1]
     top = points[:, 1] > points[:, 1].max() - 1e-9
     bottom = points[:, 1] < points[:, 1].min() + 1e-9

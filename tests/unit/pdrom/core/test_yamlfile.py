@@ -6,7 +6,7 @@ import pytest
 from pydantic import BaseModel, ConfigDict, Field
 
 from pdrom.core.errors import ConfigurationError
-from pdrom.core.yamlfile import MAX_BYTES, keys_of, read_yaml, validate
+from pdrom.core.yamlfile import MAX_BYTES, read_yaml, validate
 
 
 class Inner(BaseModel):
@@ -97,18 +97,16 @@ def test_tags_that_run_code_are_refused(tmp_path, tag):
     assert not (tmp_path / "made").exists()
 
 
-def test_valid_data_become_the_model():
-    result = validate(Outer, {**GOOD, "many": {"k": {"size": 2, "kind": "b"}}}, "source")
-    assert result.many["k"] == Inner(size=2, kind="b")
-
-
 INNER = r"\(allowed: size, kind\)"
 
 
 @pytest.mark.parametrize(
     ("data", "message"),
     [
-        ({**GOOD, "nam": 1}, r"unknown key 'nam' \(allowed: name, inner, .*another\)"),
+        (
+            {**GOOD, "nam": 1},
+            r"unknown key 'nam' \(allowed: name, inner, optional, many, row, another\)",
+        ),
         ({**GOOD, "inner": {"size": 1, "sise": 2}}, rf"unknown key 'inner\.sise' {INNER}"),
         ({**GOOD, "optional": {"size": 1, "x": 2}}, rf"unknown key 'optional\.x' {INNER}"),
         ({**GOOD, "many": {"k": {"size": 1, "x": 2}}}, rf"unknown key 'many\.k\.x' {INNER}"),
@@ -130,10 +128,6 @@ def test_long_values_are_cut():
     with pytest.raises(ConfigurationError) as caught:
         validate(Outer, {**GOOD, "inner": "x" * 5000}, "source")
     assert len(str(caught.value)) < 300
-
-
-def test_keys_use_their_alias():
-    assert keys_of(Outer) == ["name", "inner", "optional", "many", "row", "another"]
 
 
 def test_line_breaks_and_signals_of_terminals_in_a_message_are_escaped():

@@ -110,40 +110,23 @@ write_text("new", path)
 @pytest.mark.parametrize("existed", [False, True])
 @pytest.mark.parametrize("count", [0, 1])
 def test_a_kill_between_the_checksum_and_the_file_is_healed(tmp_path, existed, count):
-    """The old file is intact, or noticed as damaged; a file without a checksum is never left."""
-    path = tmp_path / "result.txt"
+    """The old file is intact, or noticed as damaged; a file without a checksum is never left.
+
+    What the killed process left goes with the next write, and nothing else.
+    """
+    path, other = tmp_path / "result.txt", tmp_path / ".results.0123456789ab.txt"
+    other.write_text("of another file")
     if existed:
         store.write_text("old", path)
     command = [sys.executable, "-c", KILLED_AT_A_NAME, path, str(count)]
     assert subprocess.run(command, check=False).returncode == -signal.SIGKILL
+    assert list(tmp_path.glob(".result.*.txt"))
     assert path.exists() == existed
     if existed:
         assert store.check_file(path) == ("damaged" if count else "intact")
     store.write_text("new", path)
     assert store.read_text(path) == "new"
-    assert sorted(tmp_path.iterdir()) == sorted([path, store.checksum_path(path)])
-
-
-KILLED = """
-import os, signal, sys
-import numpy as np
-from pdrom.core.store import write_hdf5
-with write_hdf5(sys.argv[1]) as file:
-    file["x"] = np.arange(1000.0)
-    file.flush()
-    os.kill(os.getpid(), signal.SIGKILL)
-"""
-
-
-def test_what_a_killed_process_left_goes_with_the_next_write(tmp_path):
-    path = tmp_path / "result.h5"
-    other = tmp_path / ".results.0123456789ab.h5"
-    other.write_text("of another file")
-    subprocess.run([sys.executable, "-c", KILLED, path], check=False)
-    (left,) = [p for p in tmp_path.iterdir() if p != other]
-    assert left.name.startswith(".result.")
-    write_result(path)
-    assert sorted(tmp_path.iterdir()) == sorted([path, other])
+    assert sorted(tmp_path.iterdir()) == sorted([path, store.checksum_path(path), other])
 
 
 def occupied(folder, kind):
@@ -260,6 +243,7 @@ def test_table_round_trip(tmp_path):
         (b"a,b\n1,2\n1,2,3\n", "not a readable table"),
         (b"a,b\n\xff\xfe,2\n", "not a readable table"),
         (b"a,b\n1,2\n", r"lacks the column\(s\) c, d"),
+        (b"a,b\n1,2\n3,", "the end of its last line is missing"),
     ],
 )
 def test_faulty_tables_are_named(tmp_path, content, message):
@@ -268,16 +252,7 @@ def test_faulty_tables_are_named(tmp_path, content, message):
         path.write_bytes(content)
     with pytest.raises(StorageError, match=rf"t\.csv.*{message}"):
         store.read_table(path, ["a", "c", "d"], result=False)
-
-
-def test_a_table_that_no_run_makes_needs_no_checksum_and_stays(tmp_path):
-    path = tmp_path / "reference.csv"
-    path.write_text("a,b\n1,2\n")
-    assert len(store.read_table(path, result=False)) == 1
-    path.write_text("a,b\n1,2\n3,")
-    with pytest.raises(StorageError, match="end of its last line is missing"):
-        store.read_table(path, result=False)
-    assert list(tmp_path.iterdir()) == [path]
+    assert path.exists() == (content is not None)
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])

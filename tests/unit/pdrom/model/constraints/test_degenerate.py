@@ -13,10 +13,8 @@ from hypothesis import strategies as st
 from builders import bound, call_kernel, projected, random_rotation
 from pdrom.model.constraints.bending import VertexBending
 from pdrom.model.constraints.lanes import LANES, pack
-from pdrom.model.constraints.spring import EdgeSpring
 from pdrom.model.effects import EFFECTS
 from pdrom.model.mesh.generators import cloth
-from pdrom.model.mesh.types import Mesh
 
 KINDS = ("strain", "tetrahedron_strain", "deformation_gradient", "volume", "area")
 
@@ -49,16 +47,6 @@ def test_an_element_has_the_same_bits_in_any_company(kind, rng):
     together = projected(group_of(kind, count), f)
     for i in range(count):
         assert np.array_equal(projected(alone, f[i : i + 1])[0], together[i])
-
-
-def test_a_spring_without_length_takes_its_rest_edge():
-    corners = np.array([[0.0, 0.0, 0.0], [3.0, 0.0, 4.0], [1.0, 0.0, 0.0]])
-    mesh = Mesh(corners, np.array([[0, 1, 2]]))
-    group = EdgeSpring(EdgeSpring.Config(weight=1.0), mesh, np.ones(3))
-    p = group.project(np.ones((3, 3)))
-    assert np.array_equal(p, group.rest)
-    tiny = np.array([[0.0, 0.0, 0.0], [5e-324, 0.0, 0.0], [0.0, 0.0, 0.0]])
-    assert group.project(tiny)[0] == pytest.approx([5.0, 0.0, 0.0], rel=1e-12)
 
 
 MESH = cloth(7, 6, wave=0.1)

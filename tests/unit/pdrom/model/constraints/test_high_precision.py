@@ -239,7 +239,7 @@ def test_projections_of_matrices_are_backward_stable(effect, ends, seed):
             assert (unique and not clamped) or outside(group, found) <= STABLE, name
 
 
-@pytest.mark.parametrize("size", [1.0, 1e300, 1e-300, 0.0])
+@pytest.mark.parametrize("size", [1.0, 1e300, 1e-300, 1e-322, 0.0])
 def test_springs(size, rng):
     group = bound(KINDS["spring"], 1, 1)
     for _ in range(20):

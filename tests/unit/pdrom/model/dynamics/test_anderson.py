@@ -74,15 +74,3 @@ def test_a_risen_objective_brings_back_the_plain_image():
     y += 5.0
     assert acceleration.refuse(y, 3.0)
     assert np.array_equal(y, plain)
-
-
-def test_window_zero_is_the_plain_iteration(group_scene):
-    assert group_scene.acceleration() is None
-
-
-def test_pinned_vertices_stay_exactly_in_place():
-    scene = make_scene(
-        {"effect": "spring", "weight": 1e5}, GRAVITY, LEFT, frames=5, anderson_window=4
-    )
-    held = scene.boundaries[0].vertices
-    assert np.array_equal(trajectory(scene)[-1][held], scene.mesh.points[held])

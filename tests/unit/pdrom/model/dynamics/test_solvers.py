@@ -71,22 +71,6 @@ def test_elimination_is_the_dense_block_solve(name, fixed, rng):
     np.testing.assert_allclose(y[free], expected, rtol=1e-9, atol=1e-9)
 
 
-def test_factored_once_per_set(monkeypatch):
-    system = SCENE.system_with("splu")
-    one = system.eliminate(np.array([1, 2]))
-    assert system.eliminate(np.array([1, 2], dtype=np.int32)) is one
-    assert system.eliminate(np.array([1, 3])) is not one
-    assert system.factorisations == 2
-
-
-def test_system_is_symmetric_positive_definite():
-    dense = SCENE.system_with("splu").matrix.toarray()
-    np.testing.assert_allclose(dense, dense.T, rtol=1e-14, atol=1e-9)
-    smallest = np.linalg.eigvalsh(dense)[0]
-    # rigid translations are free of strain: what remains is the inertia
-    assert smallest == pytest.approx(10.0 / 0.016**2, rel=1e-8)
-
-
 def test_numbers_that_are_none_are_refused():
     masses = SCENE.masses.copy()
     masses[4] = np.inf
