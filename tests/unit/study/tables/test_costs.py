@@ -157,46 +157,36 @@ def test_effects_are_joined_in_one_time(tmp_path):
 def test_contributions_are_judged_before_the_horizon_and_bring_their_times(tmp_path):
     """Two frames count; bending moves less than the floor, the only group of b cannot go."""
     rows = [
-        (scene, effect, role, frame, force, energy)
-        for scene, effects in (
-            ("a", [("spring", "constraint group", 3.0), ("bending", "constraint group", 1.0)]),
-            ("b", [("strain", "constraint group", 4.0)]),
+        (scene, effect, "constraint group", number, force, energy)
+        for scene, effect, force in (
+            ("a", "spring", 3.0),
+            ("a", "bending", 1.0),
+            ("b", "strain", 4.0),
         )
-        for effect, role, force in effects
-        for frame, energy in enumerate([1.0, 5.0, 2.0])
+        for number, energy in enumerate([1.0, 5.0, 2.0])
     ]
     rows.append(("b", "kick", "start", 0, 4.0 * np.sqrt(3.0), 7.0))
-    header = ["scene", "effect", "role", "frame", "force", "energy"]
-    write_table(pd.DataFrame(rows, columns=header), tmp_path / "all.csv")
+    acting = frame("scene effect role frame force energy", *rows)
     drifts = {
         ("a", "1e-10"): [1e-6, 1e-5, 1.0], ("a", "without bending"): [1e-7, 1e-7, 9.0],
         ("a", "without spring"): [1e-2, 1e-1, 1.0], ("b", "1e-10"): [1e-6, 1e-6, 1e-6],
         ("b", "without kick"): [0.5, 0.6, 0.7],
     }  # fmt: skip
-    sensitivity = pd.DataFrame(
-        [
-            (*key, frame, value)
-            for key, drift in drifts.items()
-            for frame, value in enumerate(drift)
-        ],
-        columns=["scene", "perturbation", "frame", "relative_difference"],
-    )
-    costs = pd.DataFrame(
-        [("a", "bending", 3, 0.25, 0.5), ("a", "global solve", 9, 0.25, 0.5)],
-        columns=["scene", "effect", "elements", "ms_per_frame", "share"],
-    )
-    removed = pd.DataFrame(
-        [
-            ("a", "nothing", 2, 0, 0.5, 0.0),
-            ("a", "bending", 1, 3, 0.3, 0.25),
-            ("a", "bending + spring", 0, 6, 0.1, 0.35),
-        ],
-        columns=["scene", "left_out", "groups", "elements", "ms_per_frame", "own_ms"],
-    )
-    write_table(costs, tmp_path / "costs.csv")
-    write_table(removed, tmp_path / "removed.csv")
-    named = {"parts": "costs", "left_out": "removed", "contributions": "all"}
-    files = {key: [File(str(tmp_path / f"{n}.csv"), {})] for key, n in named.items()}
+    drifting = [(*key, number, v) for key, own in drifts.items() for number, v in enumerate(own)]
+    sensitivity = frame("scene perturbation frame relative_difference", *drifting)
+    costs = frame(
+        "scene effect elements ms_per_frame share",
+        ("a", "bending", 3, 0.25, 0.5), ("a", "global solve", 9, 0.25, 0.5),
+    )  # fmt: skip
+    removed = frame(
+        "scene left_out groups elements ms_per_frame own_ms",
+        ("a", "nothing", 2, 0, 0.5, 0.0), ("a", "bending", 1, 3, 0.3, 0.25),
+        ("a", "bending + spring", 0, 6, 0.1, 0.35),
+    )  # fmt: skip
+    files = {}
+    for name, table in {"parts": costs, "left_out": removed, "contributions": acting}.items():
+        files[name] = [File(str(tmp_path / f"{name}.csv"), {})]
+        write_table(table, files[name][0].path)
     made = effects_cost(NOT_TIMED, sensitivity, HORIZON, **files)
     assert made.effect.tolist() == [
         "bending", "global solve", "nothing", "bending + spring", "spring", "strain", "kick",

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from builders import frame
 from pdrom.core.errors import StorageError
 from pdrom.core.store import write_hdf5, write_table
 from pdrom.model.held_out import MOTIONS, PLAYBACK
@@ -58,9 +59,8 @@ def test_singular_values_with_their_share_and_round_off(tmp_path):
 # Sensitivity --------------------------------------------------------------------------------------
 
 
-def sensitivity_files(tmp_path) -> list[File]:
+def perturbed(tmp_path) -> pd.DataFrame:
     """Scene a leaves the threshold in frame 2 (held out: 1), scene b never does."""
-    columns = ["scene", "perturbation", "seed", "frame", "relative_difference"]
     values = {
         ("a", "1e-10", 1): [0.0, 1e-9, 5e-3, 1e-9],
         ("a", "1e-10", 2): [0.0, 2e-9, 1e-9, 1.0],
@@ -69,16 +69,10 @@ def sensitivity_files(tmp_path) -> list[File]:
         ("b", "1e-10", 1): [1e-12, 3e-12, 2e-12, 1e-12],
         ("b", "heldout", 1): [1e-12] * 4,
     }
-    parts = []
-    for scene in ("a", "b"):
-        rows = [
-            dict(zip(columns, (*key, frame, v), strict=True))
-            for key, series in values.items()
-            if key[0] == scene
-            for frame, v in enumerate(series)
-        ]
-        parts.append(written(tmp_path / f"sensitivity_{scene}.csv", *rows))
-    return parts
+    rows = [(*key, number, v) for key, own in values.items() for number, v in enumerate(own)]
+    path = tmp_path / "sensitivity.csv"
+    write_table(frame("scene perturbation seed frame relative_difference", *rows), path)
+    return sensitivity([File(str(path), {})])
 
 
 # Reruns -------------------------------------------------------------------------------------------
@@ -219,7 +213,7 @@ def files(tmp_path) -> Files:
             time("b", ms=0.5, group="all", method="ecsw-1e-02", position_basis="pod", k=8),
         ),
     ]  # fmt: skip
-    return Files(full_order, reruns, subspaces, timings, sensitivity(sensitivity_files(tmp_path)))
+    return Files(full_order, reruns, subspaces, timings, perturbed(tmp_path))
 
 
 def test_what_users_look_at_before_the_horizon(files):

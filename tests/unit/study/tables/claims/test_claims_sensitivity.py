@@ -3,6 +3,7 @@
 import pandas as pd
 import pytest
 
+from builders import frame
 from pdrom.core.yamlfile import validate
 from places import ROOT
 from study.tables import declared
@@ -10,17 +11,9 @@ from study.tables.claims import claims as module
 from study.tables.claims.rules import PARTS, ClaimRule, TestRule, load_claims
 
 PATH = ROOT / "config" / "claims.yaml"
-ERRORS = pd.DataFrame(
-    {
-        "scene": ["a", "a", "b", "b"],
-        "group": "spring",
-        "method": "deim",
-        "r": [6, 20, 6, 20],
-        "split": "train",
-        "relative_error": [0.9, 0.3, 0.8, 0.4],
-        "gain": 1.0,
-    }
-)
+ERRORS = frame(
+    "scene r relative_error", ("a", 6, 0.9), ("a", 20, 0.3), ("b", 6, 0.8), ("b", 20, 0.4)
+).assign(group="spring", method="deim", split="train", gain=1.0)
 
 
 def made(**rule) -> pd.DataFrame:
