@@ -5,7 +5,6 @@ and signs go through mathematics. Figures are drawn with DejaVu Sans, which has 
 """
 
 import unicodedata
-from collections.abc import Iterator
 
 from pdrom.core.errors import ConfigurationError, PaperError
 
@@ -61,12 +60,6 @@ def replaced(text: str) -> str:
 def plain_words(text: str) -> str:
     """Return ``text`` with dollar signs escaped, which matplotlib would read as mathematics."""
     return unicodedata.normalize("NFC", text).replace("$", r"\$")
-
-
-def characters() -> Iterator[str]:
-    """Every character that can be typeset."""
-    every = (chr(code) for code in range(0x20, 0x2300))
-    return (c for c in every if unicodedata.normalize("NFC", c) == c and _typeset(c) is not None)
 
 
 def _typeset(character: str) -> str | None:

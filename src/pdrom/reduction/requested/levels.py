@@ -90,7 +90,7 @@ class Level:
             return FRAME + IN_PYTHON * slow + self.iterations * iteration
         size, iteration = self.model.columns.B.shape[1], ITERATION
         for group in scene.groups:
-            count, rows = self.model.evaluated(group), group.rows_per_element
+            count, rows = len(self.model.chosen(group).elements), group.rows_per_element
             iteration += count * rows * (SAMPLED * rows + DENSE * size)
         in_python = REDUCED_IN_PYTHON * (slow or len(scene.contacts) > 0)
         return REDUCED_FRAME + in_python + self.iterations * iteration

@@ -189,11 +189,12 @@ class ReducedLocalStep:
     Attributes
     ----------
     local_kernel : compiled form of the online part; None for a group without a sampling kernel
+    frame_lagged : whether the group has data that ``begin_frame`` freezes for a frame
     """
 
     def __init__(self, group: ConstraintGroup, reduction: Reduction) -> None:
         """Precompute the arrays that ``reduction`` of ``group`` needs during a run."""
-        self.name = group.name
+        self.name, self.frame_lagged = group.name, group.frame_lagged
         self._group = group
         self._elements = np.ascontiguousarray(reduction.elements, dtype=np.int64)
         self._everything = len(self._elements) == group.elements
@@ -204,11 +205,6 @@ class ReducedLocalStep:
             sampled = 3 * group.rows_per_element * len(self._elements)
             self.local_kernel = self._lift.kernel(group.sampler(self._elements), sampled)
             self._pass = LocalPass([self.local_kernel])
-
-    @property
-    def frame_lagged(self) -> bool:
-        """Whether the group has data that ``begin_frame`` freezes for a frame."""
-        return self._group.frame_lagged
 
     def begin_frame(self, q: np.ndarray) -> None:
         """Freeze frame-lagged data of the sampled elements at positions ``q`` (N, 3) m."""

@@ -53,16 +53,12 @@ class SubspaceModel:
 
     def elements_evaluated(self, scene: Scene) -> int:
         """Number of elements that the local steps of ``scene`` evaluate in an iteration."""
-        return sum(self.evaluated(group) for group in scene.groups)
+        return sum(len(self.chosen(group).elements) for group in scene.groups)
 
     def chosen(self, group: ConstraintGroup) -> Samples | Interpolation:
         """Samples or interpolation of ``group``; all its elements if it has neither."""
         every = Samples(np.arange(group.elements), np.ones(group.elements))
         return self.samples.get(group.name, every)
-
-    def evaluated(self, group: ConstraintGroup) -> int:
-        """Number of elements of ``group`` that a local step evaluates."""
-        return len(self.chosen(group).elements)
 
     def loop(self, scene: Scene) -> tuple[Stepper, State]:
         """Step loop of ``scene`` in the coordinates of the subspace, and the initial state."""

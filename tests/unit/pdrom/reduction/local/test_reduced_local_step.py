@@ -28,6 +28,7 @@ class InventedGroup:
     elements = ELEMENTS
     rows_per_element = P
     local_kernel = None
+    frame_lagged = False
 
     def __init__(self, projections: np.ndarray) -> None:
         rng = np.random.default_rng(8)
