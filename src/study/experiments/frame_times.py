@@ -1,7 +1,7 @@
-"""Times of frames over several processes: one for every full-order run, and of quoted reductions.
+"""Frame times over several processes: every full-order run, and reductions with quoted speed-ups.
 
 Every process times everything in another random order. The full-order run of each scene is timed
-twice, the second time as a control: what two identical runs differ by is no speed-up.
+twice: the second time is a control, because a difference of identical runs is no speed-up.
 """
 
 from collections import defaultdict
@@ -49,12 +49,12 @@ class SubspaceCase(ConfigModel):
 
     @property
     def labels(self) -> dict[str, str]:
-        """Labels of the file that holds it."""
+        """Labels of the file that contains the model."""
         return {"scene": self.scene}
 
 
 class ProjectionCase(ConfigModel):
-    """Reduced projections, positions unreduced, whose speed-up is quoted."""
+    """Reduced projections with unreduced positions whose speed-up is quoted."""
 
     scene: SceneName
     group: str
@@ -63,14 +63,14 @@ class ProjectionCase(ConfigModel):
 
     @property
     def labels(self) -> dict[str, str]:
-        """Labels of its files."""
+        """Labels of the files of its basis, sampling and snapshots."""
         return {"scene": self.scene, "group": self.group, "method": self.method}
 
 
 class FrameTimes(Processes):
     """Section ``frame_times``: the protocol, and the reductions whose speed-up is quoted.
 
-    Full-order runs of all scenes are timed, and every model of the large ones.
+    The full-order runs of all scenes and every model of the large scenes are timed as well.
     """
 
     subspaces: tuple[SubspaceCase, ...] = ()
@@ -78,7 +78,7 @@ class FrameTimes(Processes):
 
 
 class NamedScene(ConfigModel):
-    """A scene with the label of its files."""
+    """A scene with the labels of its files."""
 
     scene: SceneConfig
 
@@ -89,7 +89,7 @@ class NamedScene(ConfigModel):
 
 
 class Options(ConfigModel):
-    """Settings of the times."""
+    """Settings of the frame times."""
 
     frame_times: Processes
     timed_scenes: tuple[NamedScene, ...]
@@ -102,12 +102,12 @@ class Options(ConfigModel):
 
 @dataclass(frozen=True)
 class TimedScene(Case):
-    """A scene, timed in full order, once more as a control, and with its reductions.
+    """A scene, timed at full order, once more as a control, and with its reductions.
 
-    mesh : file of the mesh; it is made if there is none
-    projections : reduced ones with their methods, and the files of their bases and samplings
-    models : files of position subspaces, with the method, kind of basis and number of modes of
-        those that are timed; every one if that is None
+    mesh : file of the mesh; None builds it from the configuration
+    projections : cases with their methods and the files of their bases and samplings
+    models : for each file of position subspaces, (method, kind of basis, number of modes) of the
+        models to time; None times all
     """
 
     scene: SceneConfig
@@ -118,7 +118,7 @@ class TimedScene(Case):
     models: dict[str, list[tuple[str, str, int]] | None] = field(default_factory=dict)
 
     def variants(self) -> Iterator[Variant]:
-        """Every loop of the scene."""
+        """Yield every loop of the scene."""
         config = self.scene
         mesh = config.mesh.build(Path()) if self.mesh is None else load_mesh(self.mesh)
         scene = Scene.build(config, mesh)
@@ -158,7 +158,7 @@ class TimedScene(Case):
     alone=True,
 )
 def frame_times(settings: Options, times: File, seconds: File, **files: list[File]) -> None:
-    """Start the processes one after the other, and join what they measured."""
+    """Run the timing processes one after the other and write their measurements to one table."""
     asked = settings.frame_times
     scenes: dict[str, TimedScene] = {}
     for named, file in zip(settings.timed_scenes, files["meshes"], strict=True):
@@ -178,7 +178,7 @@ def frame_times(settings: Options, times: File, seconds: File, **files: list[Fil
         scenes[case.scene].models[file.path] = chosen[file.path]
     for named, file in zip(
         settings.large_scenes, files["large"], strict=True
-    ):  # may be among the others
+    ):  # a large scene may also be one of `timed_scenes`
         scene = TimedScene(named.scene, settings.solver, asked.frames)
         scenes.setdefault(named.scene.name, scene).models[file.path] = None
     table = pd.DataFrame(in_processes([*scenes.values()], asked), columns=COLUMNS)

@@ -1,4 +1,4 @@
-"""The hard cases, by name."""
+"""Catalogue of the hard cases, by name."""
 
 from functools import partial
 from typing import Any
@@ -38,14 +38,14 @@ ROTATION = {"effect": "deformation_gradient", "weight": 1e8}
 VOLUME = {"effect": "volume", "weight": 1e6}
 AREA = {"effect": "area", "weight": 1e6}
 
-# Checks of free bodies without forces, of such bodies from rest, and of all other scenes.
+# Checks of free bodies without forces, of such bodies starting at rest, and of all other scenes.
 FREE = ("finite", "bounded", "objective", "momentum", "determinism")
 CALM = (*FREE, "energy")
 FORCED = ("finite", "bounded", "objective", "determinism")
 
 
 def sheet(wave: float = 0.0) -> Mesh:
-    """A lying sheet of 36 vertices, with ``wave`` as in `cloth`."""
+    """A horizontal sheet of 36 vertices, with ``wave`` as in `cloth`."""
     return cloth(6, 6, "xz", wave=wave)
 
 
@@ -67,25 +67,25 @@ def one_tetrahedron() -> Mesh:
 
 
 def scaled(mesh: Mesh, *factors: float) -> Mesh:
-    """``mesh`` with its axes scaled by ``factors`` (one, or three)."""
+    """Return ``mesh`` with its axes scaled by ``factors`` (one for all axes, or three)."""
     return Mesh(mesh.points * np.array(factors), mesh.triangles, mesh.tetrahedra)
 
 
 def shifted(mesh: Mesh, *offset: float) -> Mesh:
-    """``mesh`` moved by ``offset``."""
+    """Return ``mesh`` moved by ``offset``."""
     return Mesh(mesh.points + np.array(offset), mesh.triangles, mesh.tetrahedra)
 
 
 def _case(
     name: str, why: str, holds: tuple[str, ...], mesh: Shape, *effects: dict, **rest: Any
 ) -> HardCase:
-    """Return a case; ``rest`` are its start, bound and slow, and settings of the scene."""
+    """Return a case; ``rest`` has start, bound and slow of the case, and settings of the scene."""
     own = {key: rest.pop(key) for key in ("start", "bound", "slow") if key in rest}
     return HardCase(name, why, holds, mesh, effects, rest, **own)
 
 
 def _heavy_and_light(mesh: Mesh) -> np.ndarray:
-    """Masses over eight decades, in random order."""
+    """Masses (N,) kg over eight decades, in random order."""
     order = np.random.default_rng(3).permutation(mesh.vertices)
     return np.logspace(-4, 4, mesh.vertices)[order]
 
@@ -104,7 +104,7 @@ def _two_sheets(*offset: float) -> Mesh:
 
 
 def _one_bad_element() -> Mesh:
-    """A bar with one vertex almost in the opposite face of its tetrahedron."""
+    """A bar with one vertex moved almost into the opposite face of its tetrahedron."""
     mesh = small_bar()
     points = mesh.points.copy()
     corners = points[mesh.tetrahedra[1]]
@@ -114,7 +114,7 @@ def _one_bad_element() -> Mesh:
 
 
 def _squashed() -> list[HardCase]:
-    """Sheets and bars flattened to a plane, a line, a point; needles and merged vertices."""
+    """Sheets and bars that start flattened to a plane, a line or a point."""
     bar = "every tetrahedron is flattened to a {}: F is singular"
     flat = "every triangle is collinear: the sheet is a {}"
     kinds = (
@@ -181,9 +181,9 @@ def _states() -> list[HardCase]:
 
 
 def _sizes() -> list[HardCase]:
-    """Volume and area constraints, whose nearest shape is not unique."""
+    """Volume and area constraints, whose nearest shapes are not unique."""
     lying = mapped((1, 0, 5), (0, 1, 0), (0, 0, 1))
-    # a body of constant volume or area may stretch without limit by its momentum
+    # volume or area constraints do not limit the stretch that momentum causes
     loose, cases = 40.0, []
     for label, mesh, group, flat in (
         ("volume", small_bar, VOLUME, scales(1, 1, 0)),
@@ -242,7 +242,7 @@ def _meshes() -> list[HardCase]:
 
 
 def _settings() -> list[HardCase]:
-    """Extreme weights, masses, steps, forces."""
+    """Extreme weights, masses, time steps and forces."""
     held = (GRAVITY, LEFT)
     return [
         _case("stiffness_ratio", "stiffness of the groups differs by twelve decades", FORCED,
@@ -290,7 +290,7 @@ def _settings() -> list[HardCase]:
 
 
 def _boundaries() -> list[HardCase]:
-    """Pins, handles, floor."""
+    """Pins, handles and the floor."""
     tear = {"effect": "translate", "select": "right", "offset": [100, 0, 0], "over": 1, "until": 10}
     twist = {"effect": "rotate", "select": "right", "axis": "x", "degrees": 180, "over": 1}
     again = {"effect": "translate", "select": "left", "offset": [1, 0, 0], "over": 5}
@@ -315,7 +315,7 @@ def _boundaries() -> list[HardCase]:
 
 
 def _air() -> list[HardCase]:
-    """Drag and wind."""
+    """Drag and wind at extreme speeds and coefficients."""
     storm = {"effect": "wind", "velocity": [3e3, 9e3, 3e3]}
     return [
         _case("storm", "wind of ten thousand metres a second, held on one side", FORCED, sheet,
@@ -329,7 +329,7 @@ def _air() -> list[HardCase]:
 
 
 def _obstacles() -> list[HardCase]:
-    """Obstacles: edges, tunnelling, starts inside one, zero and infinite friction."""
+    """Obstacles: edges, tunnelling, starts inside an obstacle, zero and infinite friction."""
     ball = {"effect": "sphere", "centre": [0, 1, 0], "radius": 0.4}
     edge = {"effect": "box", "lower": [-0.02, 1.0, -2], "upper": [0.03, 1.9, 2], "friction": 0.5}
     plate = {"effect": "box", "lower": [-9, 1, -9], "upper": [9, 1, 9]}
@@ -376,7 +376,7 @@ def _obstacles() -> list[HardCase]:
 
 
 def _unstructured() -> list[HardCase]:
-    """Unstructured meshes: no two elements are alike, and none lies along an axis."""
+    """Unstructured meshes: no two elements are equal, and none is aligned with an axis."""
     ring, skin, starfish, torus = (
         partial(read_mesh_file, config_file(f"scenes/meshes/{name}").resolve()) for name in MESHES
     )
@@ -428,5 +428,5 @@ CASES: dict[str, HardCase] = {case.name: case for part in PARTS for case in part
 
 
 def reducible_cases(slow: bool = False) -> list[str]:
-    """Names of the cases that are not refused, either all slow ones or all others."""
+    """Names of the cases that are not expected to be refused: the slow ones, or all others."""
     return [name for name, c in CASES.items() if c.slow == slow and c.holds != ("refused",)]
