@@ -1,1 +1,1 @@
-"""The questions that the study asks, one module each."""
+"""Experiments of the study, one module for each question that the study answers."""

@@ -1,4 +1,4 @@
-"""The mesh of a scene, checked, its full-order runs, and their snapshots of a group."""
+"""Mesh of a scene, its full-order runs, and the snapshots of each reduced group."""
 
 from pathlib import Path
 
@@ -19,9 +19,9 @@ from study.experiments.kit.base import Solver, experiment, scene_of
     writes={"out": MESH},
 )
 def mesh(sources: list[Path], config: MeshConfig, out: File) -> None:
-    """Build the mesh of ``config`` with its ``sources``, check it and save it to ``out``.
+    """Build the mesh of ``config`` from its ``sources``, check it and save it to ``out``.
 
-    MeshError names the fault. Jobs run in the project's folder.
+    Paths are relative to the project's folder. Raises MeshError, which names the fault.
     """
     made = check_mesh(config.build(Path()), config.label)
     save_mesh(made, out.path, {"label": config.label})
@@ -33,10 +33,10 @@ def mesh(sources: list[Path], config: MeshConfig, out: File) -> None:
     writes={"train": TRAIN, "heldout": HELDOUT, "kick": KICK, "stiffness": STIFFNESS},
 )
 def fom(mesh: File, config: SceneConfig, solver: Solver, **runs: File) -> None:
-    """Simulate the training and the held-out ``runs`` of a scene, each into its file.
+    """Simulate the training motion and the held-out motions of a scene, each into one of ``runs``.
 
-    The first held-out one stores the projections of the odd frames only; of the other ones nothing
-    but the positions is used.
+    The training run and the first held-out run also store projections for the snapshots (the latter
+    at odd frames only); of all other runs only positions are used.
     """
     frames, plans = config.frames, config.reduce
     wanted = {
@@ -53,7 +53,7 @@ def fom(mesh: File, config: SceneConfig, solver: Solver, **runs: File) -> None:
     writes={"out": SNAPSHOTS},
 )
 def snapshots(mesh: File, train: File, heldout: File, config: SceneConfig, out: File) -> None:
-    """Split the projections of a group that two runs stored and save them to ``out``."""
+    """Select the projections of a group from the two runs that store them; save them to ``out``."""
     group = out["group"]
     scene = scene_of(config, mesh)
     frames = sets.training_frames(scene.config.frames, scene.config.reduce[group].train)

@@ -1,7 +1,7 @@
-"""Times of frames over several processes: one for every full-order run, and of quoted reductions.
+"""Frame times over several processes: every full-order run, and reductions with quoted speed-ups.
 
 Every process times everything in another random order. The full-order run of each scene is timed
-twice, the second time as a control: what two identical runs differ by is no speed-up.
+twice: the second time is a control, because a difference of identical runs is no speed-up.
 """
 
 from collections import defaultdict
@@ -58,7 +58,7 @@ class ProjectionCase(OfScene):
 class FrameTimes(Processes):
     """Section ``frame_times``: the protocol, and the reductions whose speed-up is quoted.
 
-    Full-order runs of all scenes are timed, and every model of the large ones.
+    The full-order runs of all scenes and every model of the large scenes are timed as well.
     """
 
     subspaces: tuple[SubspaceCase, ...] = ()
@@ -72,7 +72,7 @@ class NamedScene(OfScene):
 
 
 class Options(ConfigModel):
-    """Settings of the times."""
+    """Settings of the frame times."""
 
     frame_times: Processes
     timed_scenes: tuple[NamedScene, ...]
@@ -87,10 +87,10 @@ class Options(ConfigModel):
 class TimedScene:
     """A scene, timed in full order, once more as a control, and with its reductions.
 
-    mesh : file of the mesh; it is made if there is none
-    projections : reduced ones with their methods, and the files of their bases and samplings
-    models : files of position subspaces, with the method, kind of basis and number of modes of
-        those that are timed; every one if that is None
+    mesh : file of the mesh; None builds it from the configuration
+    projections : cases with their methods and the files of their bases and samplings
+    models : for each file of position subspaces, (method, kind of basis, number of modes) of the
+        models to time; None times all
     """
 
     scene: SceneConfig
@@ -101,7 +101,7 @@ class TimedScene:
     models: dict[str, list[tuple[str, str, int]] | None] = field(default_factory=dict)
 
     def variants(self) -> Iterator[Variant]:
-        """Every loop of the scene."""
+        """Yield every loop of the scene."""
         config = self.scene
         mesh = config.mesh.build(Path()) if self.mesh is None else load_mesh(self.mesh)
         scene = Scene.build(config, mesh)
@@ -141,7 +141,7 @@ class TimedScene:
     alone=True,
 )
 def frame_times(settings: Options, times: File, seconds: File, **files: list[File]) -> None:
-    """Start the processes one after the other, and join what they measured."""
+    """Run the timing processes one after the other and write their measurements to one table."""
     asked = settings.frame_times
     scenes: dict[str, TimedScene] = {}
     for named, file in zip(settings.timed_scenes, files["meshes"], strict=True):

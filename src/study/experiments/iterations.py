@@ -1,6 +1,6 @@
-"""Error of K iterations against the limit K -> infinity: frames solved to the minimum.
+"""Error of K iterations against the limit K -> infinity, in which every frame is minimised.
 
-The local/global iteration converges linearly and slowly on stiff meshes. It is a quasi-Newton step
+The local/global iteration converges linearly, and slowly on stiff meshes. It is a quasi-Newton step
 with the constant system matrix A for a Hessian, so that L-BFGS started from A (Liu, Bouaziz and
 Kavan 2017, section 4) has the same stationary points and reaches them in far fewer evaluations.
 """
@@ -37,9 +37,9 @@ COLUMNS = [
 
 
 class IterationCounts(ConfigModel):
-    """Full-order runs with K in ``counts``.
+    """Numbers of iterations K, ``counts``, of full-order runs.
 
-    Every K runs with Anderson acceleration over ``anderson_window`` iterates, too (0: not).
+    Each K also runs with Anderson acceleration over ``anderson_window`` iterates (0: none).
     """
 
     counts: tuple[Annotated[int, Field(ge=1, le=10_000)], ...] = (1, 2, 5, 10, 20, 40)
@@ -47,10 +47,10 @@ class IterationCounts(ConfigModel):
 
 
 class IterationSweep(IterationCounts):
-    """Section ``iterations``: the counts, against a run whose every frame is converged.
+    """Section ``iterations``: the counts, compared with a run in which every frame is converged.
 
     A frame is converged when one more iteration moves no vertex by more than ``tolerance`` times
-    the extent; ``limit`` bounds the evaluations it may take.
+    the extent; ``limit`` bounds its number of evaluations.
     """
 
     tolerance: kit.Tolerance = 1e-8
@@ -81,12 +81,12 @@ def iterations(
 ) -> None:
     """Run a scene with every K up to its horizon, and once to convergence.
 
-    Each K runs plainly (``window`` 0) and with Anderson acceleration. Each row has the error of a
+    Each K runs plainly (``window`` 0) and with Anderson acceleration. Each row has the error of one
     K against the converged run and against the scene's own run; the last row is the converged run
     itself (``iterations`` empty) with its largest residual: the change by one more iteration,
     relative to the extent. If a frame stays above the tolerance there is no converged reference,
-    and the errors against it are empty. The runs in position subspaces, whose iterations and
-    training frames are those of the scene, have their error against it, too.
+    and the errors against it are empty. The table ``models`` has the errors of runs in position
+    subspaces against it; their iterations and training frames are those of the scene.
     """
     scene = kit.scene_of(config, files["mesh"])
     system = scene.system_with(solver)
@@ -128,13 +128,13 @@ def iterations(
 
 
 def accelerated(counts: list[int], window: int) -> list[tuple[int, int]]:
-    """(K, window) of all runs of ``counts`` K: plain ones, then those where two iterates mix."""
+    """(K, window) of all runs of ``counts`` K: plain ones, then accelerated ones with K > 2."""
     plain = [(count, 0) for count in counts]
     return plain + [(count, window) for count in counts if window and count > 2]
 
 
 def stepper_of(scene: Scene, system: GlobalSystem, iterations: int, window: int) -> Stepper:
-    """Full-order step loop of ``scene``, with ``iterations`` and a ``window`` of acceleration."""
+    """Full-order step loop of ``scene`` with other ``iterations`` and Anderson ``window``."""
     changes = {"iterations": iterations, "anderson_window": window}
     other = replace(scene, config=scene.config.model_copy(update=changes))
     return other.stepper(system, track_objective=False)
@@ -142,17 +142,17 @@ def stepper_of(scene: Scene, system: GlobalSystem, iterations: int, window: int)
 
 MEMORY = 8
 SUFFICIENT = 1e-4  # Armijo's constant
-SHORTEST = 1e-4  # a shorter step is given up for a plain iteration, which cannot rise
+SHORTEST = 1e-4  # instead of a shorter step do a plain iteration, which cannot raise the objective
 
 Evaluate = Callable[[np.ndarray], tuple[float, np.ndarray]]
 
 
 class Minimum(NamedTuple):
-    """End of a minimisation.
+    """Result of `minimise`.
 
-    y : (n, 3) last iterate
-    change : largest entry by which one more local/global iteration would move it, m
-    evaluations : local and global steps done
+    y : (n, 3) last iterate, m
+    change : largest entry by which one more local/global iteration would change it, m
+    evaluations : number of local and global steps done
     """
 
     y: np.ndarray
@@ -167,12 +167,12 @@ def minimise(
 
     Parameters
     ----------
-    evaluate : y -> objective and the result G(y) of one local/global iteration; the gradient is
-        A (y - G(y)), and G(y) equals y on fixed rows
+    evaluate : y -> objective and the result G(y) of one local/global iteration; the gradient is A
+        (y - G(y)), and G(y) equals y on fixed rows
     matrix : A, (n, n) symmetric positive definite
-    y : (n, 3) m where it starts
-    tolerance : the end is reached when no entry of G(y) - y is larger, m
-    limit : evaluations allowed
+    y : (n, 3) start, m
+    tolerance : largest entry of G(y) - y at which the iteration ends, m
+    limit : largest number of evaluations
     """
     pairs: list[_Pair] = []
     objective, target = evaluate(y)
@@ -199,7 +199,7 @@ def minimise(
         after = target - trial
         moved, change = trial - y, d - after
         both = matrix @ np.hstack([moved, change])
-        a_moved, a_change = both[:, :3].copy(), both[:, 3:].copy()  # in one piece: read often
+        a_moved, a_change = both[:, :3].copy(), both[:, 3:].copy()  # contiguous: read often
         curvature = float(np.vdot(moved, a_change))
         if curvature > 0.0:
             pairs = [*pairs, _Pair(moved, change, a_moved, a_change, curvature)][-MEMORY:]
@@ -208,7 +208,7 @@ def minimise(
 
 
 class _Pair(NamedTuple):
-    """A step and the change of A^-1 gradient along it, each also multiplied by A."""
+    """A step, the change of A^-1 gradient along it, and the products of both with A."""
 
     step: np.ndarray
     change: np.ndarray
@@ -218,7 +218,7 @@ class _Pair(NamedTuple):
 
 
 def _direction(d: np.ndarray, pairs: list[_Pair]) -> np.ndarray:
-    """The two-loop recursion (Nocedal 1980) for q = A^-1 gradient in place of the gradient."""
+    """Direction by the two-loop recursion (Nocedal 1980), with q = A^-1 gradient as input."""
     q, alphas = d.copy(), []
     for pair in reversed(pairs):
         alpha = np.vdot(pair.a_step, q) / pair.curvature
@@ -230,9 +230,9 @@ def _direction(d: np.ndarray, pairs: list[_Pair]) -> np.ndarray:
 
 
 class ConvergedStepper(Stepper):
-    """The step loop of a full-order scene with as many iterations as the minimum needs.
+    """Step loop of a full-order scene that iterates every frame to its minimum.
 
-    ``changes`` and ``evaluations`` hold one number per frame done so far (see `Minimum`).
+    ``changes`` and ``evaluations`` have one number for each frame done so far (see `Minimum`).
     """
 
     def __init__(self, scene: Scene, system: GlobalSystem, tolerance: float, limit: int) -> None:
@@ -250,7 +250,7 @@ class ConvergedStepper(Stepper):
     def step(
         self, state: State, frame: int, on_last_iterate: Callable[[np.ndarray], None] | None = None
     ) -> tuple[State, FrameReport]:
-        """Do ``frame`` from ``state``; no objective, and no iterate for ``on_last_iterate``."""
+        """Advance ``state`` by ``frame``, without objective and calls of ``on_last_iterate``."""
         s, elimination, base = self._begin(state, frame)
         rhs = np.empty_like(s)
 
@@ -270,9 +270,9 @@ class ConvergedStepper(Stepper):
 
 
 def converged_run(scene: Scene, tolerance: float, limit: int) -> np.ndarray | None:
-    """Positions (F + 1, N, 3) m of a run of ``scene`` in converged frames, the initial ones first.
+    """Positions (F + 1, N, 3) m of a run of ``scene`` with converged frames, initial ones first.
 
-    None where a frame does not reach the ``tolerance`` in ``limit`` evaluations.
+    None if a frame does not reach the ``tolerance`` within ``limit`` evaluations.
     """
     best = ConvergedStepper(scene, scene.system, tolerance, limit)
     positions = kit.followed(best, scene.initial_state(), scene.config.frames)

@@ -1,9 +1,9 @@
 """Record of the machine, its units of time, and the library versions.
 
 ``./reproduce run python -m study.experiments.machine`` measures the units in a few seconds: the
-processor time on one thread of 1e9 steps x <- a x + b that wait for each other (scalar), 1e9 sums
-and products in independent vectors of four doubles (vector), 1e9 bytes read from an array of
-256 MiB (memory). Each is the least of some repeats in turns, scaled from a smaller number of steps.
+processor time on one thread of 1e9 dependent steps x <- a x + b (scalar), of 1e9 sums and products
+in independent vectors of four doubles (vector), and of reading 1e9 bytes of an array of 256 MiB
+(memory). Each is the minimum over some repeats in turns, scaled from a smaller number of steps.
 """
 
 import sys
@@ -21,9 +21,9 @@ from pdrom.model.compiled.rows import WIDTH, load
 from study.artifact.paths import MACHINE, File
 from study.experiments.kit.base import experiment
 
-AT_ONCE = 8  # independent vectors, enough to hide the latency of what is measured
+AT_ONCE = 8  # independent vectors, enough to hide the latency of sums and products
 SCALAR_STEPS, VECTOR_TIMES = 10**7, 10**6
-MEMORY_BYTES = 2**28  # read at a time, more than every cache holds
+MEMORY_BYTES = 2**28  # read in one call, larger than any cache
 REPEATS = 15
 
 
@@ -31,14 +31,14 @@ REPEATS = 15
     "Record of the machine and the library versions", reads={}, writes={"out": MACHINE}, alone=True
 )
 def machine(out: File) -> None:
-    """Measure the units, and write them to ``out`` with what is known of the machine."""
+    """Measure the units, and write them to ``out`` with the data of machine and libraries."""
     write_text(this.machine(units()).model_dump_json(indent=2) + "\n", out.path)
 
 
 def units() -> Units:
-    """Measure this machine; of some repeats the fastest counts."""
+    """Measure the units of this machine, each as the minimum over some repeats."""
     numbers = np.ones(MEMORY_BYTES // 8)
-    # amount of one call in units of 1e9, and the call
+    # amount of work of one call in units of 1e9, and the call
     trials: list[tuple[float, Callable[[int], object]]] = [
         (1e-9 * SCALAR_STEPS, lambda share: _chain(SCALAR_STEPS // share)),
         (
@@ -62,7 +62,7 @@ def _seconds(run: Callable[[int], object]) -> float:
 
 @compiled(nogil=True)
 def _chain(times):
-    """The end of so many ``times`` x <- x / 2 + 1, each of which waits for the one before."""
+    """Repeat x <- x / 2 + 1 ``times`` times, each dependent on the one before; return the end."""
     x = 0.0
     for _ in range(times):
         x = 0.5 * x + 1.0
@@ -71,7 +71,7 @@ def _chain(times):
 
 @compiled(nogil=True)
 def _products(numbers, times):
-    """So many ``times`` x <- one + x one in `AT_ONCE` independent vectors, from the ``numbers``."""
+    """Repeat x <- one + x one ``times`` times in `AT_ONCE` independent vectors."""
     one = load(numbers, 0)
     a, b = load(numbers, WIDTH), load(numbers, 2 * WIDTH)
     c, d = load(numbers, 3 * WIDTH), load(numbers, 4 * WIDTH)
@@ -87,7 +87,7 @@ def _products(numbers, times):
 
 @compiled(nogil=True)
 def _read(numbers):
-    """Sum of the numbers, a multiple of 32 of them."""
+    """Sum of the ``numbers``, whose count is a multiple of 32."""
     a, b, c, d = constant(0.0), constant(0.0), constant(0.0), constant(0.0)
     e, f, g, h = constant(0.0), constant(0.0), constant(0.0), constant(0.0)
     for i in range(0, len(numbers), AT_ONCE * WIDTH):

@@ -1,4 +1,4 @@
-"""The basis of a group, from its snapshots."""
+"""Basis of a reduced group, from its snapshots."""
 
 import logging
 
@@ -18,7 +18,7 @@ log = logging.getLogger(__name__)
     writes={"out": BASIS},
 )
 def pod(snapshots: File, spec: BasisSpec, out: File) -> None:
-    """Compute a basis ``spec`` of the training ``snapshots`` and save it to ``out``."""
+    """Compute the basis of ``spec`` from the training ``snapshots`` and save it to ``out``."""
     data = load_snapshots(snapshots.path)
     basis = basis_of(data, spec)
     log.info("numerical rank %d of %d snapshots", basis.rank, len(data.train))

@@ -1,9 +1,9 @@
-"""Reduced runs repeated, the ladder from the published choices to sound ones, bases of round-off.
+"""Repeated reduced runs, the ladder from published to sound choices, and bases of round-off.
 
-A run is one draw of what nobody means to choose: which frames train, and the last digits of the
-start. Where an error of the run decides something, its repetitions say how much of it is that.
-Held-out motions are repetitions, too, of a run that is trained on several motions. A group whose
-projections are round-off is reduced on bases of that noise.
+A run depends on choices that are arbitrary: the training frames, and the last digits of the start.
+If a conclusion depends on the error of a run, repetitions with other choices show the scatter of
+that error. For a run trained on several motions, held-out motions are repetitions, too. A group
+whose projections are round-off is reduced on bases of that noise.
 """
 
 import logging
@@ -52,15 +52,15 @@ NOISE_COLUMNS = [
 ]  # fmt: skip
 ALL, PLANE, VERTEX = "all", "plane", "vertex"
 Methods = Mapping[str, MethodSpec]
-Runs = list[tuple[dict[str, Any], Rerun | None]]  # rows of one start, and its runs
+Runs = list[tuple[dict[str, Any], Rerun | None]]  # table rows of one start, each with its run
 Rungs = Annotated[tuple[MethodSpec, ...], Field(min_length=1)]
 
 
 class Repetitions(ConfigModel):
     """Settings of repeated runs.
 
-    repetitions : draws, each with a seed of its own, from 1
-    perturbation : length by which a start is moved, over the extent
+    repetitions : number of draws, with seeds 1, 2, ...
+    perturbation : length by which a start is moved, relative to the extent
     """
 
     repetitions: Annotated[int, Field(ge=1, le=1000)] = 5
@@ -73,7 +73,7 @@ class ReducedRuns:
 
     data : snapshots of the group
     reference : (F + 1, N, 3) m, positions of the full-order run
-    end : first frame that is not judged
+    end : first frame that is not compared (the horizon)
     blowup_extent : see `pdrom.reduction.sampling.local_step.rerun`
     """
 
@@ -87,11 +87,11 @@ class ReducedRuns:
 
     @cached_property
     def displacement(self) -> np.ndarray:
-        """Norms (F,) m of the full-order run, see `displacement_norms`."""
+        """Displacement norms (F,) m of the full-order run, see `displacement_norms`."""
         return displacement_norms(self.reference)
 
     def until_the_end(self) -> "ReducedRuns":
-        """Copy of the runs up to the first frame that is not judged, but of two frames at least."""
+        """Copy of the runs shortened to the frames before ``end``, but to at least two frames."""
         frames = min(self.scene.config.frames, max(2, self.end))
         scene = self.scene.changed(frames=frames)
         return replace(self, scene=scene, reference=self.reference[: frames + 1])
@@ -99,7 +99,7 @@ class ReducedRuns:
     def basis(
         self, method: MethodSpec, frames: int | None = None, signs: int | None = None
     ) -> Basis:
-        """Basis for ``method``; seeds may draw training ``frames``, and ``signs`` of the modes."""
+        """Basis for ``method``; ``frames`` and ``signs`` are seeds of training frames and signs."""
         key = (method.basis_id, frames, signs)
         if key not in self._bases:
             train = None if frames is None else drawn(self.data, frames)
@@ -108,22 +108,22 @@ class ReducedRuns:
         return self._bases[key]
 
     def run(self, reduction: Reduction, offset: np.ndarray | None = None) -> Rerun:
-        """Run with ``reduction`` from the scene's start, moved by ``offset`` (N, 3) m."""
+        """Run with ``reduction`` from the scene's start, displaced by ``offset`` (N, 3) m."""
         return rerun_reduced(
             self.scene, self.group, reduction, self.reference, self.blowup_extent, offset=offset
         )
 
     def error(self, outcome: Rerun) -> float | None:
-        """Relative error before the end; None for a run that did not get there."""
+        """Relative error before ``end``; None for a run that stopped earlier."""
         return error_within(outcome.difference, self.displacement, self.end)
 
     def repeat(
         self, method: MethodSpec, sizes: Sequence[int], varied: Varied, asked: Repetitions
     ) -> list[dict[str, Any]]:
-        """Every repetition of ``method`` at each of ``sizes`` that its basis has, by size.
+        """Rows of every repetition of ``method`` at each of ``sizes`` that its basis has, by size.
 
-        ``varied`` says what the seed draws: the start, or the training snapshots. The error is that
-        before the end, inf for a run that ended earlier.
+        ``varied`` names the choice that the seed draws: the start, or the training snapshots.
+        Errors are over the frames before ``end``, inf for a run that stopped earlier.
         """
         rows, made, offset = [], {}, None
         if varied == "start":
@@ -143,10 +143,10 @@ class ReducedRuns:
     def on_motions(
         self, method: MethodSpec, sizes: Sequence[int], counts: Sequence[int]
     ) -> Iterator[dict[str, Any]]:
-        """Runs of held-out motions, with a basis of each number of training motions in ``counts``.
+        """Runs of held-out motions, with a basis for each number of training motions in ``counts``.
 
-        The first of these is the scene's training motion, the others are drawn by seeds. Of n
-        motions every n-th training snapshot is taken.
+        The first training motion is that of the scene, the others are drawn by seeds. With n
+        training motions, every n-th training snapshot of each is used.
         """
         config, mesh = self.scene.config, self.scene.mesh
         frames = self.data.frames["train"]
@@ -185,7 +185,7 @@ def recorded(
 
 
 def drawn(data: sets.SnapshotSet, seed: int) -> np.ndarray:
-    """Snapshots (n, e p, 3), as many as train in ``data``, drawn by ``seed`` from all, in order."""
+    """Snapshots (n, e p, 3) drawn by ``seed`` from all of ``data``, n as in training."""
     frames = np.concatenate([data.frames["train"], data.frames["test"]])
     chosen = np.random.default_rng(seed).choice(len(frames), len(data.train), replace=False)
     chosen = chosen[np.argsort(frames[chosen])]
@@ -196,7 +196,7 @@ def drawn(data: sets.SnapshotSet, seed: int) -> np.ndarray:
 class Cell(ConfigModel):
     """Runs that are repeated, at each of ``sizes``.
 
-    training_motions : numbers of motions on which runs of held-out motions are trained
+    training_motions : numbers of training motions of the runs on held-out motions
     """
 
     sizes: Annotated[tuple[kit.Modes, ...], Field(min_length=1)]
@@ -205,20 +205,20 @@ class Cell(ConfigModel):
 
 
 class Cells(Cell):
-    """Runs that are repeated: every method at every size in every scene (all groups of it)."""
+    """Repeated runs: every method at every size in every scene, for all of its groups."""
 
     scenes: Annotated[tuple[SceneName, ...], Field(min_length=1)]
     methods: Annotated[tuple[str, ...], Field(min_length=1)]
 
 
 class RepetitionSection(Repetitions):
-    """Section ``repetitions``: how runs are repeated, and which."""
+    """Section ``repetitions``: how runs are repeated, and which runs."""
 
     cells: tuple[Cells, ...] = ()
 
 
 class Repeated(Cell):
-    """A method of the job's scene and group, with what it depends on."""
+    """A repeated method of the job's scene and group, with its specification."""
 
     method: str
     spec: MethodSpec
@@ -227,12 +227,12 @@ class Repeated(Cell):
 class Ladder(Repetitions):
     """The rungs of a ladder; runs are repeated on other training frames.
 
-    r : basis size of all rungs (the numerical rank where that is smaller)
-    signs : how many choices of the singular vectors' signs the first rung is repeated with
+    r : basis size of all rungs (the numerical rank if that is smaller)
+    signs : number of repetitions of the first rung with other signs of the singular vectors
     repeated : scenes whose runs are repeated
-    up, down : methods, from the published one upwards, and the sound one less one ingredient
+    up, down : methods from the published one upwards, and the sound one without one ingredient each
     square : separate or shared coefficients on single rows or whole elements, at each of ``sizes``;
-        rows are sampled p times as often as elements, which have p of them: as many entries
+        p times as many rows as elements (of p rows each) are sampled: as many entries
     """
 
     r: Annotated[int, Field(ge=1, le=100_000)] = 20
@@ -244,7 +244,7 @@ class Ladder(Repetitions):
     sizes: tuple[kit.Modes, ...] = ()
 
     def rungs(self, p: int) -> list[tuple[str, MethodSpec, int | None, int]]:
-        """(direction, method, seed of the signs, size) of all rows of a group, in order."""
+        """(direction, method, seed of signs, size) of all rows, for elements of ``p`` rows."""
         rows: list[tuple[str, MethodSpec, int | None, int]] = []
         rows += [("up", method, None, self.r) for method in self.up]
         rows += [("down", method, None, self.r) for method in self.down]
@@ -259,7 +259,7 @@ class Ladder(Repetitions):
 
 
 class LadderSection(Ladder):
-    """Section ``ladder``: the rungs, and ``scenes`` whose reduced groups are run with them."""
+    """Section ``ladder``: the rungs, and ``scenes`` whose reduced groups run with them."""
 
     scenes: tuple[str, ...] = ()
 
@@ -268,8 +268,8 @@ class NoiseRuns(ConfigModel):
     """Runs on bases of round-off.
 
     sizes : numbers of modes
-    repetitions : starts, each with another round-off
-    perturbation : length by which they move a vertex, over the extent: a few units of round-off
+    repetitions : number of starts, each with its own round-off
+    perturbation : displacement of a vertex relative to the extent: a few units of round-off
     """
 
     sizes: Annotated[tuple[kit.Modes, ...], Field(min_length=1)] = (6, 10, 20)
@@ -278,14 +278,14 @@ class NoiseRuns(ConfigModel):
 
 
 class Noise(NoiseRuns):
-    """Section ``noise``: ``cases`` are scenes with a group each, as far as the study holds them."""
+    """Section ``noise``: ``cases`` maps scenes to a group; those not in the study are ignored."""
 
     cases: dict[str, str] = Field(default_factory=dict)
     methods: tuple[str, ...] = ("deim-joint", "published")
 
 
 class Options(ConfigModel):
-    """Settings of the runs of a scene with a group reduced; no ladder and no noise if None."""
+    """Settings of a scene with one group reduced; None for ladder or noise omits these runs."""
 
     scene: SceneConfig
     repetitions: Repetitions
@@ -314,9 +314,9 @@ class Options(ConfigModel):
     },
 )
 def repetitions(settings: Options, **files: paths.File) -> None:
-    """Repeat every listed run of the scene and group, climb the ladder, reduce the round-off.
+    """Repeat the listed runs of the scene and group, run the ladder, and reduce round-off.
 
-    What the configuration does not ask of a scene has a table without rows.
+    Tables of runs that the configuration does not request have no rows.
     """
     labels = files["out"].labels
     runs = ReducedRuns(
@@ -352,7 +352,7 @@ def repetitions(settings: Options, **files: paths.File) -> None:
 
 
 def _ladder(runs: ReducedRuns, short: ReducedRuns, ladder: Ladder) -> Iterator[dict[str, Any]]:
-    """Rows of every rung; ``short`` are those of the ``runs`` that are repeated."""
+    """Yield the row of every rung; ``short`` are the shortened ``runs``, for repetitions."""
     data = runs.data
     for direction, method, seed, r in ladder.rungs(data.rows_per_element):
         rung = method.title if seed is None else f"signs {seed}"
@@ -362,7 +362,7 @@ def _ladder(runs: ReducedRuns, short: ReducedRuns, ladder: Ladder) -> Iterator[d
         if direction == "square" and r > basis.rank:
             continue
         size = min(r, basis.rank)
-        # a group that is round-off has no reduction
+        # a group whose projections are round-off has no modes and no reduction
         for reduction in reductions(basis, method, [size] if size else []).values():
             outcome = runs.run(reduction)
             row |= {**outcome.row(runs.displacement), "r": size}
@@ -388,11 +388,11 @@ def _ladder(runs: ReducedRuns, short: ReducedRuns, ladder: Ladder) -> Iterator[d
 def noisy_runs(
     scene: Scene, group: str, asked: NoiseRuns, methods: Methods, limit: float, file: h5py.File
 ) -> list[dict[str, Any]]:
-    """Perturb the start of ``scene``, run, make bases without a cutoff, rerun.
+    """Perturb the start of ``scene``, run, compute bases without a cutoff, and rerun.
 
-    Returned are the rows of all runs with the ``group`` reduced by each of ``methods``. The runs of
-    one start of each kind go to ``file``, in the layout of `study.experiments.reruns`; marked where
-    r exceeds the rank; ``limit`` is the extent of a blow-up over that of the rest shape.
+    Returns the rows of all runs with the ``group`` reduced by each of ``methods``. For each of
+    `kinds` the runs of one start go to ``file``, as in `study.experiments.reruns`, marked if r
+    exceeds the rank; ``limit`` is the extent of a blow-up relative to that of the rest shape.
     """
     rows = []
     for axes in kinds(scene):
@@ -413,7 +413,7 @@ def noisy_runs(
 
 
 def irregular(runs: Runs) -> bool:
-    """Whether a method runs at some sizes and blows up at others."""
+    """Whether a method completes runs at some sizes and blows up at others."""
     ends: dict[str, set[bool]] = {}
     for row, outcome in runs:
         if outcome is not None:
@@ -422,18 +422,18 @@ def irregular(runs: Runs) -> bool:
 
 
 def kinds(scene: Scene) -> tuple[str, ...]:
-    """Names of the sets of coordinates of ``scene`` that a start perturbs.
+    """Names of the sets of coordinates of ``scene`` that a perturbed start changes.
 
-    Of a flat mesh, too, those of its plane alone, and these with the axis across it at a single
-    vertex.
+    A flat mesh also has the coordinates in its plane only, and these together with the normal
+    coordinate of a single vertex.
     """
     return (ALL, PLANE, VERTEX) if np.ptp(scene.mesh.points, axis=0).min() == 0.0 else (ALL,)
 
 
 def roundoff_field(scene: Scene, axes: str, size: float, seed: int) -> np.ndarray:
-    """Displacement (N, 3) m of a start, zero where ``axes`` of `kinds` say.
+    """Displacement (N, 3) m of a start, zero in coordinates outside of the set ``axes`` of `kinds`.
 
-    ``scene``, ``size`` and ``seed`` as in `perturbation_field`; the seed draws the vertex, too.
+    ``scene``, ``size`` and ``seed`` as in `perturbation_field`; the seed also draws the vertex.
     """
     field = kit.perturbation_field(scene, size, seed)
     if axes != ALL:
@@ -448,7 +448,7 @@ def roundoff_field(scene: Scene, axes: str, size: float, seed: int) -> np.ndarra
 def _noisy(
     scene: Scene, name: str, start: np.ndarray, sizes: Sequence[int], methods: Methods, limit: float
 ) -> Iterator[tuple[dict[str, Any], Rerun | None]]:
-    """Rows and runs from one ``start`` (N, 3) m, which is added to the initial positions.
+    """Rows and runs from one ``start`` (N, 3) m, a displacement of the initial positions.
 
     The reductions are trained on its full-order run, on all that is stored, be it round-off: there
     is no cutoff, and no axis is left out. A method with separate systems then has one for an axis

@@ -1,4 +1,4 @@
-"""Runs within requested tolerances, on motions that no calibration has seen."""
+"""Runs within requested tolerances, on motions that are not used for the calibration."""
 
 import logging
 from collections.abc import Iterator
@@ -29,14 +29,14 @@ COLUMNS = [
 
 
 class RequestedRuns(run.ToleranceSettings):
-    """Every tolerance of ``errors``, requested on each of ``motions``."""
+    """Runs with each requested tolerance of ``errors`` on each of ``motions``."""
 
     errors: Annotated[tuple[Tolerance, ...], Field(min_length=1)] = (0.1, 0.03, 0.01)
     motions: Annotated[tuple[HeldOutMotion, ...], Field(min_length=1)] = MOTIONS
 
 
 class RequestedTolerances(RequestedRuns):
-    """Section ``requested_tolerances``: ``scenes`` (all if empty, the large ones too)."""
+    """Section ``requested_tolerances``: ``scenes``; if empty, all scenes with the large ones."""
 
     scenes: tuple[str, ...] = ()
 
@@ -53,13 +53,13 @@ class RequestedTolerances(RequestedRuns):
 def requested_tolerances(
     sources: list[Path], config: SceneConfig, section: RequestedRuns, out: File
 ) -> None:
-    """Calibrate a scene, and run every held-out motion within every tolerance.
+    """Calibrate a scene, and run every held-out motion within every requested tolerance.
 
     Parameters
     ----------
     sources : files of the mesh; the job depends on them
-    config : of the scene
-    section : tolerances, motions, and the levels
+    config : settings of the scene
+    section : tolerances, motions, and settings of the levels
     out : table of the runs
     """
     training = Scene.build(config, config.mesh.build(Path()))
@@ -80,7 +80,7 @@ def requested_tolerances(
 def _rows(
     scene: Scene, recorded: np.ndarray, own: run.Calibration, section: RequestedRuns
 ) -> Iterator[dict[str, Any]]:
-    """Rows of the motion of ``scene``; ``recorded`` is the training motion of the study."""
+    """Rows of the motion of ``scene``; ``recorded`` (F + 1, N, 3) m is the training motion."""
     frames = scene.config.frames
     motion = Motion(scene, min(section.errors) / section.factor, "position")
     judged = motion.unconverged, motion.sensitivity
@@ -115,7 +115,7 @@ def _rows(
 
 
 def _error(motion: Motion, reached: np.ndarray, end: int, quantity: Quantity) -> float | None:
-    """Error of ``reached`` (F + 1, N, 3) over the first frames, up to ``end``; None without any."""
+    """Error of ``reached`` (F + 1, N, 3) m over the first ``end`` frames; None if ``end`` is 0."""
     if not end:
         return None
     differences = reached[1:] - motion.reference[1:]

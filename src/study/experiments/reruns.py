@@ -1,6 +1,6 @@
-"""Sampling of a group by one method, then the scene again with the group reduced, for every r.
+"""Sampling of a group by one method, and runs of the scene with the group reduced, for every r.
 
-And one scene over the time step and over the stiffness, by every method (`stability`).
+`stability` runs one scene with several time steps and stiffnesses, by every method.
 """
 
 import logging
@@ -43,7 +43,7 @@ ERROR_COLUMNS = [
     "relative_error", "relative_error_x", "relative_error_y", "relative_error_z",
     "gain", "rows_sampled", "elements_sampled",
 ]  # fmt: skip
-MOTION = "motion"  # column of the held-out rows only
+MOTION = "motion"  # column that only the table of held-out runs has
 
 
 class Sweep(ConfigModel):
@@ -53,7 +53,7 @@ class Sweep(ConfigModel):
     step: kit.Count = 10
 
     def ranks(self, largest: int) -> list[int]:
-        """Sizes 1 .. ``largest``, which is always among them."""
+        """Sizes from 1 to ``largest``; ``largest`` is always included."""
         dense = range(1, min(self.dense_to, largest) + 1)
         coarse = range(self.dense_to + self.step, largest + 1, self.step)
         return sorted({*dense, *coarse, largest} - {0})
@@ -89,9 +89,9 @@ class Options(ConfigModel):
     },
 )
 def reruns(motions: list[File], settings: Options, **files: File) -> None:
-    """Sample the group, then rerun the scene for every r, as trained and as held out.
+    """Sample the group, then rerun the training motion and the held-out motions for every r.
 
-    One job does all: starting another process takes longer than the sampling.
+    One job does all this, because starting another process takes longer than the sampling.
     """
     space, data = load_basis(files["basis"].path), load_snapshots(files["snapshots"].path)
     _sample(space, data, settings, files["sampling"], files["errors"])
@@ -115,10 +115,10 @@ def reruns(motions: list[File], settings: Options, **files: File) -> None:
 def _runs(
     yardstick: Yardstick, sampling: File, basis: Basis, settings: Options, file: h5py.Group
 ) -> Iterator[dict[str, Any]]:
-    """Run a motion for every r and yield the rows; an r beyond the rank is a marked row.
+    """Run a motion for every r and yield the rows; an r beyond the rank gives a marked row.
 
-    The runs go to ``file``, with positions where that is not a group of another one: of the
-    training motion figures are drawn.
+    The runs are stored in ``file``; positions only of the training motion, which ``file`` being the
+    root group indicates: figures show that motion only.
     """
     labels, scene = sampling.labels, yardstick.scene
     system = scene.system_with(settings.solver)
@@ -151,7 +151,7 @@ def _sample(
 
     Parameters
     ----------
-    basis, data : of the group, from its training snapshots, and all of its snapshots
+    basis, data : basis of the group, from its training snapshots, and all of its snapshots
     sampling, errors : files to write; their labels are the first columns of the table
     """
     labels = sampling.labels
@@ -182,19 +182,19 @@ SHORT_COLUMNS = [
     "scene", "method", "r", "h", "stiffness_ratio", "finite", "blowup_frame", "max_extent",
     "energy_ratio", "gain", "group", "position_basis", "k", "frames", "relative_error",
 ]  # fmt: skip
-Local = list[tuple[dict[str, Any], Reduction | None]]  # labels, and the reduction
+Local = list[tuple[dict[str, Any], Reduction | None]]  # labels of each reduction of a group
 Models = list[tuple[dict[str, Any], SubspaceModel]]
 
 
 class ShortRuns(ConfigModel):
-    """Short runs over the time step and over the stiffness of the reduced groups.
+    """Short runs with other time steps and other stiffnesses of the reduced groups.
 
     The bases and samplings are those of the scene's own setting.
 
-    ranks : basis sizes, as far as the study holds them; position subspaces run at their largest
+    ranks : basis sizes, as far as they exist in the study; subspaces run at their largest size only
     time_steps : h in seconds, in addition to the scene's own
     stiffness_ratios : factors on the weights of the reduced groups, in addition to 1
-    duration : seconds of simulated time, within ``min_frames`` and ``max_frames``
+    duration : simulated time in seconds, between ``min_frames`` and ``max_frames`` frames
     """
 
     ranks: tuple[kit.Rank, ...] = ()
@@ -214,9 +214,9 @@ class ShortRuns(ConfigModel):
 
 
 class Stability(ShortRuns):
-    """Section ``stability``: the short runs, and how they are judged.
+    """Section ``stability``: the short runs, and limits by which they are classified.
 
-    scenes : where, as far as the study holds them
+    scenes : names of the scenes; those that are not in the study are ignored
     wrong : relative error above which a run is finite but wrong
     departure : multiple of the full-order run's largest extent above which a run has left the
         scene; the key is ``left``
@@ -228,7 +228,7 @@ class Stability(ShortRuns):
 
     @property
     def left(self) -> float:
-        """`departure`, by its key."""
+        """Value of `departure`, under its key."""
         return self.departure
 
 
@@ -261,7 +261,7 @@ def stability(
 ) -> None:
     """Run the full order, every local reduction and the largest subspaces at every setting.
 
-    Bases and samplings are those of the scene's own setting: how far do they carry?
+    Bases and samplings are those of the scene's own setting, to see how far they are valid.
     """
     scene = kit.scene_of(config, mesh)
     local: Local = []
@@ -278,7 +278,7 @@ def stability(
         found: Models = load_models(file.path)
         largest = max(labels["k"] for labels, _ in found)
         models += [(labels, model) for labels, model in found if labels["k"] == largest]
-    # one of time step and stiffness at a time leaves the scene's own setting
+    # time step and stiffness are varied one at a time
     h, limits = scene.config.time_step, (short.min_frames, short.max_frames)
     ratios = sorted({1.0, *short.stiffness_ratios} - {1.0})
     grid = [(step, 1.0) for step in sorted({h, *short.time_steps})] + [(h, own) for own in ratios]
@@ -297,10 +297,10 @@ def stability(
 def _rows(
     scene: Scene, local: Local, models: Models, solver: str, limit: float
 ) -> Iterator[dict[str, Any]]:
-    """Rows of the full order of ``scene`` and, if that is finite, of everything else.
+    """Rows of the full order of ``scene`` and, if that run is finite, of all reductions.
 
-    ``limit`` is the extent of a blow-up over that of the rest shape; a reduction is None where the
-    basis has fewer modes.
+    ``limit`` is the extent of a blow-up relative to that of the rest shape. A reduction in
+    ``local`` is None if the basis has fewer modes than requested.
     """
     system = scene.system_with(solver)
     nothing = np.zeros((scene.config.frames + 1, *scene.mesh.points.shape))

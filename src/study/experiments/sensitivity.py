@@ -1,8 +1,8 @@
-"""Drift of full-order runs that should be the same (docs/study.md), and what effects do in a run.
+"""Drift of full-order runs that should be equal (docs/study.md), and contributions of effects.
 
-What a run does when its start moves by 1e-10 of the extent bounds what any reduced model can be
-blamed for. Beside the start, the solver (another order of summation), the number of iterations and
-the time step are changed, and each effect is left out.
+The change of a run after moving its start by 1e-10 of the extent is the accuracy that can be
+expected of any reduced model. Other runs change the solver (another order of summation), the number
+of iterations or the time step, or leave out an effect.
 """
 
 from collections.abc import Iterator
@@ -31,14 +31,14 @@ Perturbation = Annotated[float, Field(gt=0.0, lt=1.0)]
 EFFECTS = ["scene", "effect", "role", "frame", "force", "energy"]
 Row = tuple[str, str, int, float, float]
 COLUMNS = ["scene", "perturbation", "seed", "frame", "relative_difference"]
-# A run is repeated with the first of these that it does not use itself.
+# A run is repeated with the first of these solvers that is not the default.
 OTHER_SOLVERS = ("splu", "splu-columns")
 
 
 class PerturbedRuns(ConfigModel):
-    """Starts moved by ``perturbations`` times the extent, each with every seed.
+    """Starts moved by ``perturbations`` times the extent, each with every one of ``seeds``.
 
-    ``reference`` is the perturbation that defines the horizon, and that of held-out motions.
+    ``reference`` is the perturbation for the horizon, and the only one of held-out motions.
     """
 
     perturbations: tuple[Perturbation, ...] = (1e-12, 1e-10, 1e-8)
@@ -66,10 +66,10 @@ class Sensitivity(PerturbedRuns):
 def sensitivity(
     mesh: File, config: SceneConfig, chosen: PerturbedRuns, out: File, effects: File
 ) -> None:
-    """Write differences of a scene's perturbed runs, and of its held-out motions, to ``out``."""
+    """Write differences of perturbed runs of a scene and its held-out motions to ``out``."""
     scene = scene_of(config, mesh)
     parts = [sensitivities(scene, chosen.perturbations, chosen.seeds)]
-    for motion in MOTIONS:  # the horizon of a held-out motion is its own
+    for motion in MOTIONS:  # each held-out motion has its own horizon
         other = scene_of(config, mesh, motion)
         parts += perturbed(other, trajectory(other), chosen.reference, chosen.seeds, motion)
     write_table(pd.concat(parts, ignore_index=True), out.path)
@@ -77,14 +77,14 @@ def sensitivity(
 
 
 class _Watched:
-    """Stands for a contact and remembers how far it moved the vertices in a frame."""
+    """Wrapper of a contact that records the displacements that it causes in a frame."""
 
     def __init__(self, contact: Contact) -> None:
         self.name, self._contact = contact.name, contact
         self.moved = np.zeros(())
 
     def apply(self, positions: np.ndarray, before: np.ndarray, held: np.ndarray) -> None:
-        """Apply the contact and record what it moves."""
+        """Apply the contact and record the displacements of the vertices."""
         wanted = positions.copy()
         self._contact.apply(positions, before, held)
         self.moved = positions - wanted
@@ -94,12 +94,12 @@ def contributions(scene: Scene) -> pd.DataFrame:
     """Force (norm, N) and energy (J) by effect and frame of a run of ``scene``, `EFFECTS`.
 
     Effects with the same name count as one. Forces are those at the end of a frame, on the vertices
-    that nothing holds: S^T W (p - S q) of a group, M a of a force, M d / h^2 of a contact that
-    moves the vertices by d. A hold exerts what its vertices lack, M (q' - q - h v) / h^2 less all
-    others; a start M v / h in the first frame.
+    that are not held: S^T W (p - S q) of a group, M a of a force, M d / h^2 of a contact that moves
+    vertices by d. The force of a hold is the remainder of M (q' - q - h v) / h^2 at its vertices,
+    after all other forces; that of a start is M v / h in the first frame.
 
-    The energy of a group is W_j, that of a force its potential, with an arbitrary zero, and that
-    of a start the kinetic energy that it brings. Where an effect has none it is nan.
+    The energy is W_j for a group, the potential with an arbitrary zero for a force, and the added
+    kinetic energy for a start. It is nan for effects without an energy.
     """
     watched = [_Watched(contact) for contact in scene.contacts]
     space = VertexSpace(scene.system, scene.forces, scene.boundaries, contacts=watched)  # type: ignore[arg-type]
@@ -136,7 +136,7 @@ def _frame(
         forces[key] = forces.get(key, 0.0) + np.broadcast_to(force, after.positions.shape)
         energies[effect.name] = energies.get(effect.name, 0.0) + energy
 
-    for group in scene.groups:  # what is frozen is that of the last frame
+    for group in scene.groups:  # their frame-lagged data are those of this frame
         missing = group.project(after.positions) - group.S @ after.positions
         weighted = group.row_weights[:, None] * missing
         energy = 0.5 * float(np.sum(missing * weighted))
@@ -154,7 +154,7 @@ def _frame(
         (name, role, frame, float(np.linalg.norm(force[~held])), energies[name])
         for (name, role), force in forces.items()
     ]
-    squares: dict[str, float] = {}  # a hold that is not active exerts nothing
+    squares: dict[str, float] = {}  # a hold that is not active exerts no force
     for boundary in scene.boundaries:
         pulled = lacking[boundary.held(frame)] if boundary in active else np.zeros(3)
         squares[boundary.name] = squares.get(boundary.name, 0.0) + float(np.sum(pulled**2))
@@ -163,10 +163,10 @@ def _frame(
 
 
 def relative_difference(other: np.ndarray, base: np.ndarray) -> np.ndarray:
-    """Per-frame difference of ``other`` from ``base``, trajectories (F + 1, N, 3), relative, (F,).
+    """Relative difference (F,) of ``other`` from ``base``, trajectories (F + 1, N, 3), by frame.
 
     || Q'_f - Q_f ||_F over the root mean square of || Q_f - Q_0 ||_F over the run: one
-    normalisation for all frames, so that a slow start is not divided by nothing.
+    normalisation for all frames avoids a division by almost zero in slow first frames.
     """
     difference = (other - base)[1:].reshape(len(base) - 1, -1)
     return np.linalg.norm(difference, axis=1) / mean_motion(base)
@@ -177,7 +177,7 @@ def perturbed(
 ) -> Iterator[pd.DataFrame]:
     """Rows of runs whose start is moved by ``size``, with each of ``seeds``, under a ``label``.
 
-    ``base`` (F + 1, N, 3) m is the run of ``scene`` that they are compared with.
+    ``base`` (F + 1, N, 3) m is the unperturbed run of ``scene``.
     """
     for seed in seeds:
         other = trajectory(scene, perturbation_field(scene, size, seed))
@@ -187,10 +187,10 @@ def perturbed(
 def sensitivities(
     scene: Scene, perturbations: tuple[float, ...], seeds: tuple[int, ...]
 ) -> pd.DataFrame:
-    """Table of `COLUMNS` for ``scene``: ``perturbations`` of the start by ``seeds``, and others.
+    """Table of `COLUMNS` for ``scene``: ``perturbations`` of the start by ``seeds``, and variants.
 
-    The others are another solver, 4 K iterations, half the time step, and no effect of one name
-    (label `without`); the only constraint group cannot be left out.
+    The variants are another solver, 4 K iterations, half the time step, and the scene without the
+    effects of one name (label `without`), unless it would have no constraint group left.
     """
     base, config = trajectory(scene), scene.config
     parts: list[pd.DataFrame] = []
@@ -206,7 +206,7 @@ def sensitivities(
     variants = {
         "solver": trajectory(scene, system=scene.system_with(solver)),
         "iterations x4": trajectory(scene.changed(iterations=4 * config.iterations)),
-        # built anew: twice the frames have to meet the limit on their number, too
+        # built from the configuration, to check its limit on the number of frames
         "h/2": trajectory(Scene.build(halved.config, halved.mesh))[::2],
     }
     for effect in removable(config):
@@ -218,12 +218,12 @@ def sensitivities(
 
 
 def without(effect: str) -> str:
-    """Label of the runs without an effect."""
+    """Label of the runs without ``effect``."""
     return f"without {effect}"
 
 
 def removable(config: SceneConfig) -> list[str]:
-    """Names of the effects of ``config`` without which the scene still is one, each once."""
+    """Names of the effects of ``config`` except an only constraint group, each name once."""
     names = dict.fromkeys(e.effect for e in config.effects)
     return [name for name in names if config.groups != [name]]
 

@@ -1,8 +1,8 @@
-"""Position subspaces with full projections, with sampled elements and with those of hrpd.
+"""Position subspaces with full projections, with sampled elements and with projections of hrpd.
 
-The models of a large scene are made and run in one job with its full-order runs, which no other job
-reads; `study.experiments.frame_times` times them. A file of a scene's models and of joint rows is
-what a page loads, to run them in the reader's browser (`live`).
+The models of a large scene are made and run in one job together with its full-order runs, which no
+other job reads; `study.experiments.frame_times` times them. `live` writes a scene's models and
+joint rows to a file that a web page loads, to run them in the reader's browser.
 """
 
 import json
@@ -63,7 +63,7 @@ Sampled = Mapping[str, subspace.Samples | Interpolation]
 
 
 class Hrpd(HrpdSpec):
-    """Sampled constraints with interpolation, and the numbers of modes k that have them."""
+    """Sampled constraints with interpolation; ``sizes`` are numbers of modes k with such models."""
 
     sizes: tuple[kit.Modes, ...] = ()
 
@@ -71,7 +71,7 @@ class Hrpd(HrpdSpec):
 class SubspaceModels(ConfigModel):
     """Position subspaces: kinds of basis, numbers of modes, tolerances of the sampling, its norm.
 
-    ``hrpd`` adds models with interpolated projections; None leaves them out.
+    ``hrpd`` adds models with interpolated projections; None adds none.
     """
 
     bases: tuple[kit.PositionBasis, ...] = ("pod", "skinning")
@@ -96,7 +96,7 @@ class Subspace(SubspaceModels):
 
 
 class LargeModels(SubspaceModels):
-    """Models of a large scene; none evaluates all projections, which takes too long."""
+    """Models of a large scene, without those with full projections, which take too long."""
 
     bases: tuple[kit.PositionBasis, ...] = ("pod",)
     sizes: tuple[kit.Modes, ...] = (20,)
@@ -173,9 +173,9 @@ def online(
     out: File,
     models: File,
 ) -> None:
-    """Reduce a large scene by every model and run all motions with each.
+    """Reduce a large scene by every model and run all motions with each model.
 
-    Its mesh is made of the ``sources``, its full-order runs are made here and not kept.
+    The mesh is built from the ``sources``; the full-order runs are made here and not stored.
     """
     mesh = config.mesh.build(Path())
     variants = {kit.TRAIN: config} | {str(name): config.heldout_variant(name) for name in MOTIONS}
@@ -205,15 +205,15 @@ def _runs(
     limit: float,
     compared: bool,
 ) -> pd.DataFrame:
-    """Rows of all motions of a scene, one after the other, with every model.
+    """Rows of all motions of a scene, one motion after the other, with every model.
 
     The models are trained on the training motion.
 
     Parameters
     ----------
-    file : receives the models
-    limit : extent over that of the rest shape above which a run ends as a blow-up
-    compared : whether the file receives coordinates and deviations of each run, too
+    file : file that receives the models
+    limit : extent relative to that of the rest shape above which a run ends as a blow-up
+    compared : whether coordinates and deviations of each run are stored in ``file``, too
     """
     rows: list[dict[str, Any]] = []
     played = {
@@ -225,7 +225,7 @@ def _runs(
         subspace.store_columns(file.create_group(f"columns/{base}"), columns)
         spent: dict[str, float] = defaultdict(float)
         for of_model, (method, samples) in clocked(models):
-            # one call samples for all tolerances: it is made at the first of them
+            # elements for all tolerances are sampled together, while the first model is made
             family = subspace.ECSW if method.startswith(subspace.ECSW) else method
             spent[family] += of_model
             model = subspace.SubspaceModel(kind, columns, samples)
@@ -254,9 +254,9 @@ def _runs(
 def _subspaces(
     motion: Yardstick, settings: SubspaceModels
 ) -> Iterator[tuple[str, Columns, str, int, Iterator[tuple[str, Sampled]]]]:
-    """Name, columns, kind and size of every subspace, with the models in it.
+    """Yield name, columns, kind and size of every subspace, with the models in it.
 
-    The frames of ``motion`` that train are the even ones, which train the projections, too.
+    The training frames of ``motion`` are the even ones, as for the bases of projections.
     """
     scene, points = motion.scene, motion.scene.mesh.points
     count = max(plan.train for plan in scene.config.reduce.values())
@@ -284,16 +284,16 @@ def _subspaces(
             yield f"{kind}_k{k:03d}", columns, kind, k, models
 
 
-LARGEST = 3_000_000  # bytes of a file
-GHOST = 250_000  # positions of the full-order run that a file holds, about
+LARGEST = 3_000_000  # limit of the size of a file, bytes
+GHOST = 250_000  # approximate number of positions of the full-order run in a file
 JOINT = "deim-joint"
 FORMAT = 1
 Labelled = tuple[dict[str, Any], subspace.SubspaceModel]
 
 
 class LiveModels(ConfigModel):
-    """Models of the page: numbers of modes k, tolerances of the sampling, and the modes r of the
-    joint rows; each as far as the study has it."""
+    """Models of the page, as far as they exist in the study: numbers of modes k, tolerances of the
+    sampling, and the number of modes r of the joint rows."""
 
     sizes: tuple[kit.Modes, ...] = (10, 20, 40)
     tolerances: tuple[kit.Tolerance, ...] = (3e-2, 1e-2, 1e-3)
@@ -303,7 +303,7 @@ class LiveModels(ConfigModel):
 class Live(LiveModels):
     """Section ``live``: the models of the page, and the ``scenes`` that a reader chooses from.
 
-    Shown are those that the study has models of: position subspaces, or ``online.scenes``.
+    Scenes without models in the study (position subspaces, or ``online.scenes``) are left out.
     """
 
     scenes: tuple[SceneName, ...] = ()
@@ -318,7 +318,7 @@ class JointRows(kit.OfScene):
 
 
 class Options(ConfigModel):
-    """Settings of the models of a scene."""
+    """Settings of the models of a scene for the page."""
 
     scene: SceneConfig
     title: str
@@ -340,11 +340,11 @@ class Options(ConfigModel):
     writes={"out": paths.LIVE_MODEL},
 )
 def live(mesh: File, train: File, settings: Options, out: File, **files: list[File]) -> None:
-    """Write the models with the recorded full-order run.
+    """Write the models of a scene and its recorded full-order run to the file of the page.
 
     Parameters
     ----------
-    bases, samplings : of the joint rows, in the order of the settings
+    bases, samplings : files of the joint rows, in the order of the settings
 
     Raises
     ------
@@ -366,7 +366,7 @@ def live(mesh: File, train: File, settings: Options, out: File, **files: list[Fi
     given = (settings.joint_rows, files["bases"], files["samplings"])
     for case, file, sampling in zip(*given, strict=True):
         basis = load_basis(file.path)
-        # of the size asked for, or of the largest that exists
+        # the requested size, or the largest that exists
         size = min(asked.joint_rows, basis.rank)
         reduction = runfiles.load_reduction(basis, sampling.path, case.spec, size)
         chosen += list(_joint(scene, case.group, reduction, chosen))
@@ -378,7 +378,7 @@ def live(mesh: File, train: File, settings: Options, out: File, **files: list[Fi
         "title": settings.title,
         **exported.export_scene(scene),
         **_models(scene, chosen),
-        # the surface, and every so many frames of the full-order run at its vertices
+        # the surface, and positions of its vertices at every ``stride``-th full-order frame
         "shown": {
             "vertices": pack_array(used, "u4"),
             "triangles": pack_array(triangles.reshape(-1, 3), "u4"),
@@ -400,7 +400,7 @@ def live(mesh: File, train: File, settings: Options, out: File, **files: list[Fi
 def _joint(
     scene: Scene, group: str, reduction: Reduction, beside: list[Labelled]
 ) -> Iterator[Labelled]:
-    """Joint rows of a group for each subspace of the models ``beside``; others as sampled there."""
+    """Joint rows of a group in each subspace of the models ``beside``; other groups as sampled."""
     for model in {id(model.columns): model for _, model in beside}.values():
         joint = interpolation_of(scene.group(group), model.columns, reduction)
         labels = {"family": "joint", "k": model.columns.modes, "r": reduction.r}
@@ -409,7 +409,7 @@ def _joint(
 
 
 def _models(scene: Scene, chosen: list[Labelled]) -> dict[str, Any]:
-    """Bases and models; a model knows the place of its basis."""
+    """Bases and models for the page; a model has the index of its basis."""
     by_basis: dict[int, list[subspace.SubspaceModel]] = {}
     for _, model in chosen:
         by_basis.setdefault(id(model.columns), []).append(model)

@@ -1,6 +1,6 @@
-"""Milliseconds a frame of full-order and reduced runs, of local steps alone, and of effects.
+"""Milliseconds per frame of full-order and reduced runs, of single local steps, and of effects.
 
-On the mesh of a scene (`timing`), and by iteration on growing meshes (`scaling`).
+`timing` measures on the mesh of a scene, `scaling` by iteration on growing meshes.
 """
 
 import logging
@@ -38,9 +38,9 @@ from study.experiments.kit.measurement import Protocol, Variant, measure
 
 
 class NumpyLocalStep:
-    """Vectorised NumPy projections of all elements, SciPy sparse products around them.
+    """Vectorised NumPy projections of all elements, with SciPy sparse products before and after.
 
-    The time of the products with S^T is counted separately, here as in the other implementation.
+    The time of the products with S^T is counted separately, as in `InterpretedLocalStep`.
     """
 
     def __init__(self, group: ConstraintGroup) -> None:
@@ -63,7 +63,7 @@ class NumpyLocalStep:
 
 
 class InterpretedLocalStep:
-    """One element after the other in interpreted Python, as straightforward codes do it."""
+    """Interpreted Python code that projects one element after the other, as in simple programs."""
 
     def __init__(self, group: ConstraintGroup) -> None:
         self.name, self.group, self.begin_frame = group.name, group, group.begin_frame
@@ -88,7 +88,7 @@ class InterpretedLocalStep:
         return energy
 
 
-# Makers of a local step of the step loop, by name.
+# Classes of local steps for the step loop, by name.
 IMPLEMENTATIONS: dict[str, Callable[[ConstraintGroup], Any]] = {
     "numpy": NumpyLocalStep,
     "interpreted": InterpretedLocalStep,
@@ -106,7 +106,7 @@ ITERATIONS = [
     "scene", "method", "vertices", "elements", "r", "k", "elements_sampled",
     "ms_per_iteration", "local_ms", "global_ms", "vertices_ms", "local_share",
 ]  # fmt: skip
-STATES, SIZED_STATES = 5, 4  # states of a run at which local steps are timed alone
+STATES, SIZED_STATES = 5, 4  # numbers of states of a run at which single local steps are timed
 TrainingFrames = Annotated[int, Field(ge=3, le=1000)]
 
 
@@ -114,8 +114,8 @@ class Timing(Protocol):
     """Section ``timing``: the protocol of the timing jobs.
 
     The slow implementations of the full-order run are timed over fewer frames, the interpreted one
-    over fewer iterations, too. ``breakeven`` are the sizes r of the reduced local steps that are
-    timed alone, in ``breakeven_repeats`` short repeats.
+    also over fewer iterations. ``breakeven`` are the sizes r of the reduced local steps that are
+    timed as single steps, with ``breakeven_repeats`` short repeats.
     """
 
     numpy_frames: kit.Count = 4
@@ -126,7 +126,7 @@ class Timing(Protocol):
 
 
 class Options(ConfigModel):
-    """Settings of the times of a scene."""
+    """Settings of the timings of a scene."""
 
     scene: SceneConfig
     methods: dict[str, MethodSpec]
@@ -155,7 +155,7 @@ class Options(ConfigModel):
     alone=True,
 )
 def timing(mesh: File, fom: File, settings: Options, **files: Any) -> None:
-    """Measure frames (``out``), local steps alone, effects, and frames ``without`` each of them."""
+    """Measure frames, single local steps, effects, and frames of scenes without each effect."""
     scene, asked = kit.scene_of(settings.scene, mesh), settings.timing
     system, name = scene.system_with(settings.solver), scene.config.name
     frames = min(asked.frames, scene.config.frames)
@@ -166,7 +166,7 @@ def timing(mesh: File, fom: File, settings: Options, **files: Any) -> None:
     for sampling in files["samplings"]:
         spec = settings.methods[sampling["method"]]
         basis = load_basis(runfiles.basis_of(sampling, spec, files["bases"]).path)
-        with open_hdf5(sampling.path) as stored:  # sizes that the file holds
+        with open_hdf5(sampling.path) as stored:  # sizes r in the file
             held = {int(key[1:]) for key in stored if key.startswith("r")}
         timed = held.intersection(kit.resolve_ranks(settings.ranks, basis.rank))
         sizes = held.intersection(kit.resolve_ranks(asked.breakeven, basis.rank))
@@ -207,7 +207,7 @@ def timing(mesh: File, fom: File, settings: Options, **files: Any) -> None:
 def _full_order(
     scene: Scene, system: GlobalSystem, frames: int, asked: Timing, common: dict[str, Any]
 ) -> tuple[Variant, list[Variant]]:
-    """The full-order run in the slowest implementation, of some iterations only, and in others."""
+    """Full-order runs: the slowest implementation with some iterations only, and the others."""
     quick = variant(scene, system, scene.groups, frames, {**common, "implementation": "compiled"})
     made = [quick]
     for name, step in IMPLEMENTATIONS.items():
@@ -223,7 +223,7 @@ def _full_order(
 def _other_counts(
     scene: Scene, system: GlobalSystem, frames: int, asked: IterationCounts, common: dict[str, Any]
 ) -> list[Variant]:
-    """The compiled full-order run with other numbers of iterations, plain and accelerated."""
+    """Compiled full-order runs with other numbers of iterations, plain and accelerated."""
     variants = []
     counts = sorted({*asked.counts, scene.config.iterations})
     own = (scene.config.iterations, scene.config.anderson_window)
@@ -237,9 +237,9 @@ def _other_counts(
 
 
 class SizedBreakEven(ConfigModel):
-    """Reduced local steps timed alone on every mesh size: methods, sizes r, short repeats.
+    """Single reduced local steps timed on every mesh size: methods, sizes r, short repeats.
 
-    Bases come from the first ``training_frames`` frames.
+    Bases are computed from the first ``training_frames`` frames.
     """
 
     methods: tuple[str, ...] = ("deim-joint", "block-deim")
@@ -249,7 +249,7 @@ class SizedBreakEven(ConfigModel):
 
 
 class Sized(Protocol):
-    """Cost on one mesh size.
+    """Settings of the cost on one mesh size.
 
     ``training_frames`` frames train ``method`` with r modes (only the local step reduced) and
     energy-conserving sampling to ``tolerance`` with k modes; ``frames`` are timed.
@@ -271,7 +271,7 @@ class Scaling(Sized):
 
 
 class SizedOptions(ConfigModel):
-    """Settings of the costs on a mesh size."""
+    """Settings of the costs on one mesh size."""
 
     scene: SceneConfig
     scaled_methods: dict[str, MethodSpec]
@@ -286,7 +286,7 @@ class SizedOptions(ConfigModel):
     alone=True,
 )
 def scaling(sources: list[Path], settings: SizedOptions, iterations: File, breakeven: File) -> None:
-    """Measure a scene on one mesh: ``factor`` times the vertices along each side."""
+    """Measure a scene on one mesh with ``factor`` times the vertices along each side."""
     config, sized = settings.scene, settings.scaling
     specs, alone = settings.scaled_methods, settings.scaling.breakeven
     factor = float(iterations["factor"])
@@ -336,10 +336,10 @@ def scaling(sources: list[Path], settings: SizedOptions, iterations: File, break
 
 
 def _training(scene: Scene, system: GlobalSystem, frames: int) -> tuple[np.ndarray, ...]:
-    """Positions (n, N, 3) m after the first n ``frames`` of the full-order run of ``scene``.
+    """Positions (n, N, 3) m, projections and roundoff of the first n ``frames`` at full order.
 
-    Beside them the projections (n, e p, 3) of its first group at the last local iterates, and their
-    roundoff (n,).
+    Projections (n, e p, 3) are of the first group of ``scene``, at the last local iterate of each
+    frame, with their roundoff (n,).
     """
     group = scene.groups[0]
     loop, state = scene.stepper(system, track_objective=False), scene.initial_state()
@@ -362,7 +362,7 @@ def _reductions(
     spec: MethodSpec,
     asked: Sequence[int],
 ) -> list[Reduction]:
-    """Reductions of the first group in sizes as large as ``asked``, as far as the rank allows."""
+    """Reductions of the first group at each size in ``asked``, limited by the numerical rank."""
     group = scene.groups[0]
     basis = compute_basis(
         projections,

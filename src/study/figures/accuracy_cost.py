@@ -25,7 +25,7 @@ BLIND = {"color": style.FAILED, "linewidth": 0.9, "linestyle": "-."}
 RATES = (60, 30)  # frames per second that count as real time
 LARGE, SMALL = 2.6, 1.6  # heights of the large and of the small panels, inches
 LINE, GAP = 0.145, 0.06  # inches: height of a legend line, gap between rows of legend blocks
-COLUMNS = 4  # number of legend blocks side by side
+COLUMNS = 4  # number of legend blocks in a row
 # Families of models, each with its colour.
 FAMILIES = {
     "full order, fewer iterations": style.BLACK,
@@ -44,7 +44,7 @@ Block = tuple[str, list[Line2D]]
 def look_of(method: str, position_basis: str, drawn: Drawn) -> Look:
     """Family of a model and its name in the family; tolerances and position bases share a name.
 
-    Method titles are taken from ``drawn``. The family is None for a method that is not drawn.
+    Titles of methods are those in ``drawn``. The family is None for a method that is not drawn.
     """
     if method == FEWER:
         return ITERATIONS, "K iterations"
@@ -172,7 +172,7 @@ def _points(ax: Axes, rows: pd.DataFrame, size: float, colour: str, **look: Any)
 
 
 def label_iterations(ax: Axes, found: TradeOffs, scene: str) -> None:
-    """Write the number of iterations beside each full-order run with fewer iterations in ``scene``.
+    """Label each full-order run of ``scene`` with fewer iterations by its number of iterations.
 
     The runs are in ``found`` and are drawn on ``ax``; neighbouring runs share a label.
     """
@@ -271,7 +271,7 @@ def _label(ax: Axes, x: float, text: str) -> None:
 
 
 LEAST, MOST = 1e-4, 1.0  # limits of the error axis; errors outside are drawn on them
-BESIDE = 4  # panels side by side, at most
+BESIDE = 4  # largest number of panels in a row
 TOLERANCES, TIMES, REACHED = (5e-3, 2e-1), (1e-2, 1e1), (1e-4, 1e0)
 # Colour of each outcome of a request, and a factor that shifts its dots along the tolerance axis.
 KINDS = {
@@ -396,9 +396,9 @@ def requested_tolerances(options: Options, table: pd.DataFrame) -> Figure:
 def dots(
     ax: Axes, tolerances: pd.Series, values: pd.Series, limits: tuple[float, float], colour: str
 ) -> None:
-    """Draw ``values`` against ``tolerances`` as dots on ``ax``, if there are any.
+    """Draw ``values`` against ``tolerances`` as dots on ``ax``; nothing if there are no values.
 
-    ``values`` beyond the ``limits`` are drawn on them. Without values, nothing is drawn.
+    Values beyond the ``limits`` are drawn on the limit.
     """
     if not values.empty:
         ax.plot(

@@ -44,7 +44,7 @@ Looks = dict[str, tuple[str, str]]
 
 
 class BreakEven(Methods):
-    """Options: scenes, methods, and the number of panels side by side."""
+    """Options: scenes, methods, and the number of panels in a row."""
 
     columns: Columns = 3
 
@@ -281,8 +281,8 @@ def _draw_moved(ax: Axes, rows: pd.DataFrame, scenes: list[str], looks: Looks) -
 def effects_cost(options: Scenes, drawn: Drawn, table: pd.DataFrame) -> Figure:
     """Draw a bar per scene, divided by effect; on the right one scene without some of its effects.
 
-    On the right, a tick marks the time of the whole scene minus the cost of the missing effects in
-    it. If a bar ends at its tick, effects that a scene lacks cost it no time.
+    On the right, a tick marks the time of the whole scene minus the time of the missing effects in
+    it. A bar that ends at its tick shows that effects which a scene lacks cost it no time.
     """
     costs, removed = table.dropna(subset=["share"]), table.dropna(subset=["without_ms"])
     removed = removed.sort_values("effect", key=lambda name: name != NOTHING, kind="stable")

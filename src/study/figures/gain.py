@@ -1,4 +1,4 @@
-"""Figures of errors: by basis size, with the singular values; against the gain; by choice."""
+"""Figures of errors: against the basis size, with singular values; against the gain; by choice."""
 
 from pathlib import Path
 
@@ -36,7 +36,7 @@ _KEYS = ["scene", "group", "method", "r"]
     },
 )
 def error_against_gain(options: kit.Methods, drawn: Drawn, **tables: pd.DataFrame) -> Figure:
-    """Draw a dot per run, error within the horizon over gain, and failures by decade of gain.
+    """Draw a dot per run, error within the horizon against gain, and failures by decade of gain.
 
     Runs that ended before their horizon lie on the upper limit of the axes, singular interpolations
     on the right limit.
@@ -115,10 +115,10 @@ def _draw_decades(ax: Axes, runs: pd.DataFrame) -> None:
 def ladder(options: kit.Scenes, table: pd.DataFrame) -> Figure:
     """Draw a row per choice of the method (rung): the error of the run left, the gain right.
 
-    Rows above the line go from the published method to the sound one; rows below it lack one choice
-    of the sound method. A thin bar is the range over other training frames, a broad pale bar the
-    range over signs of the singular vectors for the published method. Runs that blew up before the
-    horizon, and singular interpolations, lie on the right limit of the axes.
+    Rows above the line lead from the published method to the sound one; each row below it is the
+    sound method without one choice. A thin bar is the range over other training frames, a broad
+    pale bar the range over signs of the singular vectors for the published method. Runs that blew
+    up before the horizon, and singular interpolations, lie on the right limit of the axes.
     """
     table = options.rows(table)
     table = table[table.gain.notna() & (table.direction != "square")]
@@ -293,7 +293,7 @@ def _draw_values(ax: Axes, rows: pd.DataFrame, colour: str, marker: str) -> None
 def reconstruction_error(
     options: Reconstruction, drawn: Drawn, table: pd.DataFrame, published: Path
 ) -> Figure:
-    """Draw a panel per experiment with the error of each method and split over the basis size.
+    """Draw a panel per experiment with the error of each method and split against the basis size.
 
     If an experiment has no errors because its projections are round-off, its panel has a note. The
     published code's table has errors of the x and y axes, but no total error.

@@ -23,7 +23,7 @@ from study.figures.sensitivity_floor import FLOORS, Floors
 from study.tables.kit.results import trained
 
 NOISY = {"all": "all axes", "plane": "in the plane", "vertex": "one vertex across"}
-WRONG = 0.1  # relative error above which a run has failed; a run that cannot start has failed, too
+WRONG = 0.1  # relative error above which a run has failed; so has a run that cannot start
 DISTANCES = (1e-4, 1.0)  # limits of the colour scale, in extents of the mesh
 FOOTER = 0.55  # height of the colour scale, inches
 TOLERANCE = "ecsw-1e-02"  # method of the position-subspace run in the first figure
@@ -157,7 +157,7 @@ def nothing_ran(panels: list[RunPanel]) -> bool:
 
 
 def obstacles_of(experiment: Experiment, positions: np.ndarray) -> list[Mesh] | None:
-    """Obstacles near ``positions`` (F, N, 3) m; None for a floor alone, drawn as a shadow."""
+    """Obstacles near ``positions`` (F, N, 3) m; None if there is only a floor (a shadow)."""
     bodies = obstacles(positions, experiment.effects)
     floor = any(effect.effect == "floor" for effect in experiment.effects)
     return None if floor and len(bodies) == 1 else bodies
@@ -268,9 +268,9 @@ def _alike(table: pd.DataFrame) -> dict[tuple[tuple[int, str], ...], list[str]]:
     reads=RUNS,
 )
 def cloth_all_grid(options: ReducedRuns, drawn: Drawn, horizon: Horizon, **files: Files) -> Figure:
-    """Draw a row per reduced group, below a row of the full-order run; methods side by side.
+    """Draw a row of the full-order run, then a row per reduced group; each method has its columns.
 
-    Each method has a column per instant, a fraction of the scene's horizon. All pictures have the
+    The columns of a method are instants, fractions of the scene's horizon. All pictures have the
     same camera and scale, except framed ones, whose scale is printed. The basis size is the first
     in ``options.ranks`` that ran.
     """

@@ -378,7 +378,7 @@ def _height(window: Window, count: int) -> float:
 
 
 def _draw_product(figure: Figure, basis: Basis, centred: np.ndarray, title: str) -> None:
-    """Draw the four matrices; rows of snapshots and modes are sorted by axis, first x."""
+    """Draw the four matrices; rows of snapshots and modes are sorted by axis: x, y, z."""
     from matplotlib.colors import LogNorm
 
     rank, tiny = basis.rank, np.finfo(float).tiny
@@ -424,7 +424,7 @@ def _draw_matrix(ax: Axes, matrix: np.ndarray, title: str) -> None:
 
 
 def _row(figure: Figure, count: int, bottom: float, height: float, label: str) -> list[Axes]:
-    """Axes for a row of pictures, ``bottom`` inches from below, with ``label`` on the left."""
+    """Axes for a row of pictures, ``bottom`` inches above the lower edge; ``label`` is left."""
     whole, step = figure.get_figheight(), (style.WIDTH - LEFT) / max(count, 1) / style.WIDTH
     middle = (bottom + 0.5 * height) / whole
     figure.text(0.008, middle, label, va="center", fontsize=7.5)
@@ -441,7 +441,7 @@ def _row(figure: Figure, count: int, bottom: float, height: float, label: str) -
 def _draw_column(
     ax: Axes, elements: shapes.ElementMap, points: np.ndarray, column: np.ndarray, camera: Camera
 ) -> str:
-    """Draw one signed entry of each element, over the largest; return the name of the entry."""
+    """Draw the signed entry of each element relative to the largest; return the entry's name."""
     values, words = shapes.signed_entry(column, len(column) // (3 * len(elements.cells)))
     largest = max(float(np.abs(values).max()), np.finfo(float).tiny)
     elements.draw(ax, points, values / largest, camera, shapes.signed())

@@ -50,7 +50,7 @@ class Floors:
         return end if end < len(self.of[scene]) else None
 
     def instant(self, scene: str, frame: int) -> str:
-        """Label of ``frame``, marked past the scene's horizon, where errors cannot be judged."""
+        """Label of ``frame``, marked if it is past the scene's horizon and cannot be compared."""
         end = self.horizon(scene)
         return f"frame {frame}" if end is None or frame <= end else f"frame {frame}, past horizon"
 
@@ -59,7 +59,7 @@ LOW, HIGH = 1e-12, 1e2
 
 
 class Floored(Scenes):
-    """Options: scenes, and the number of panels side by side."""
+    """Options: scenes, and the number of panels in a row."""
 
     columns: Columns = 3
 

@@ -12,8 +12,8 @@ from study.figures.kit.declaration import Drawn, Methods, NothingToDraw, Ranks, 
 
 CELLS = 48  # largest width of a strip in cells; further blocks go to another strip
 ROW = 0.145  # height of a row of cells, inches
-GAP = 0.45  # between blocks, in cells
-LEAST = 2.0  # least width of a title, in cells
+GAP = 0.45  # distance between blocks, in cells
+LEAST = 2.0  # smallest width of a title, in cells
 DENSE = 30  # above this number of columns, labels are vertical and titles have two lines
 
 
@@ -55,7 +55,7 @@ class Block:
 
 @dataclass(frozen=True)
 class Strip:
-    """Blocks side by side with common rows; ``rows`` maps (scene, group) to a label."""
+    """A row of blocks with common rows; ``rows`` maps (scene, group) to a label."""
 
     rows: dict[tuple[str, str], str]
     blocks: Sequence[Block]

@@ -1,8 +1,8 @@
-"""Tables of error against time: points of each method and size, tolerances, what pays.
+"""Tables of error against time: points of each method and size, tolerances, pay-off.
 
 The error of a point has one of two references; only rows with the same reference are comparable.
-The reference of ``fom`` and ``fom-anderson`` is the full-order run whose frames are converged
-(K -> infinity), of every other method the scene's own full-order run with finitely many iterations.
+The reference of ``fom`` and ``fom-anderson`` is the full-order run whose frames are converged (K ->
+infinity), of all other methods the scene's own full-order run with finitely many iterations.
 
 Among the other methods, ``full`` without a position subspace is the scene's own full-order run,
 with error zero by definition. ``fewer-iterations`` is the full-order run with fewer iterations,
@@ -61,7 +61,7 @@ def accuracy_cost(
     models: list[paths.File],
     iterations: Mapping[str, int],
 ) -> pd.DataFrame:
-    """Points of reduced runs with a known error within the horizon and time, and full-order runs.
+    """Points of full-order runs, and of reduced runs with a time and an error within the horizon.
 
     A point is Pareto-optimal among the points of its scene whose errors have the same reference.
 
@@ -90,7 +90,7 @@ def accuracy_cost(
 
 
 def _sweep(errors: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
-    """Full-order runs for every K against the converged run, and again as fewer-iterations."""
+    """Full-order runs of every K (`FOM`, `ANDERSON`), and those below the scene's K as `FEWER`."""
     full = times[times.method.isna() | times.method.isin([FOM, ANDERSON])]
     cost = full[["scene", "method", "iterations", "ms_per_frame"]]
     cost = cost.fillna({"method": FOM})
@@ -169,7 +169,7 @@ def requested_tolerances(runs: list[paths.File]) -> pd.DataFrame:
 # Columns that identify a curve, the rows that differ only in size r.
 CURVE = ["scene", "group", "method", "factor"]
 OWN_MESH = "1"  # mesh factor of a scene's configured mesh, which the files ``own`` contain
-SHARE = 1e-3  # of the force of a scene, up to which a group counts for nothing
+SHARE = 1e-3  # groups with at most this share of the force of a scene are negligible
 _ERROR = "relative_error_within_horizon"
 
 
@@ -276,8 +276,8 @@ def payoff(reruns: pd.DataFrame, points: pd.DataFrame, effects: pd.DataFrame) ->
 
     Sizes are chosen by the training motion in the table ``reruns`` and evaluated on the held-out
     motions, see `with_held_out`. Groups with at most `SHARE` of the force of a scene are left out.
-    The first row is the full order with fewer iterations (of ``points``), against the same run of
-    the scene as all reductions; it needs no training, and nothing is held out from it.
+    The first row is the full order with fewer iterations (from ``points``), compared with the same
+    run of the scene as all reductions; it has no held-out columns, as it needs no training.
     """
     shares = effects.set_index(["scene", "effect"]).force_share
     weak = shares.index[shares <= SHARE]
@@ -292,7 +292,7 @@ def payoff(reruns: pd.DataFrame, points: pd.DataFrame, effects: pd.DataFrame) ->
         speed = fastest.speedup.to_numpy(float)
         best = own.sort_values(_ERROR, kind="stable").groupby(["scene", "group"]).head(1)
         seen = best[best.error_heldout.notna()]
-        # one run of every scene and group, so that the medians of all rows are over the same ones
+        # one run for every scene and group, so that medians of all methods cover the same cases
         every = pd.concat([fastest, best[~(best[_ERROR] <= FAILED)]])
         rows.append({
             "position_basis": basis,
@@ -317,7 +317,7 @@ def payoff(reruns: pd.DataFrame, points: pd.DataFrame, effects: pd.DataFrame) ->
 
 
 def _fewer(points: pd.DataFrame) -> pd.DataFrame:
-    """Full-order runs with fewer iterations, with their speed-ups over those of the scenes."""
+    """Full-order runs with fewer iterations, with speed-ups over the scene's own full-order run."""
     full = points[(points.method == "full") & (points.position_basis == "full")]
     fewer = points[points.method == FEWER]
     speedup = fewer.scene.map(full.set_index("scene").ms_per_frame) / fewer.ms_per_frame

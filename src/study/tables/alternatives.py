@@ -1,4 +1,4 @@
-"""Errors and times of projective dynamics, of alternative solvers and of a reduction.
+"""Errors and times of projective dynamics, of alternative solvers and of reductions.
 
 Table winners gives the fastest method for each error and the meshes on which a reduction is faster.
 """
@@ -23,7 +23,7 @@ MOTION = text("motion", f"held-out motion, one of: {', '.join(MOTIONS)}")
 # Columns that identify a candidate (a solver with its settings) in all motions.
 CANDIDATE = ["scene", "factor", "stiffness", *settings.SETTING]
 
-# Rounding decides which iterates a two-level iteration rejects; its errors have few exact digits.
+# Rounding decides which iterates a two-level iteration rejects: its errors differ by machine.
 LOOSE = 0.3
 REFERENCES = ("implicit", "continuous")
 CASE = ["scene", "vertices", "stiffness", "motion"]
@@ -84,7 +84,7 @@ def alternatives(parts: list[paths.File], times: list[paths.File]) -> pd.DataFra
 
 
 def beside(rows: pd.DataFrame, times: pd.DataFrame) -> tuple[pd.DataFrame, list[int]]:
-    """``rows`` with ``times`` (ms): a column for each process, with the names of these columns."""
+    """Join ``rows`` with ``times`` (ms), a column per process; return these column names, too."""
     wide = times.set_index([*CANDIDATE, "process"]).ms_per_frame.unstack("process")
     wide["vertices_ms"] = times.groupby(CANDIDATE, dropna=False).vertices_ms.median()
     own = rows.drop(columns="vertices_ms", errors="ignore")
@@ -141,7 +141,7 @@ def beside(rows: pd.DataFrame, times: pd.DataFrame) -> tuple[pd.DataFrame, list[
 def winners(rows: pd.DataFrame, times: list[paths.File], limits: Sequence[float]) -> pd.DataFrame:
     """One row per scene, mesh, stiffness, motion, reference and error limit.
 
-    The method is empty where none reaches the limit. Limits below `KNOWN` times the error of the
+    The method is empty if none reaches the limit. Limits below `KNOWN` times the error of the
     continuous-time reference have no row. Some methods run in the first motion only.
     """
     found = []
@@ -166,9 +166,9 @@ def winners(rows: pd.DataFrame, times: list[paths.File], limits: Sequence[float]
 
 
 def _best(rows: pd.DataFrame, limit: float, processes: list[int]) -> dict[str, object]:
-    """Columns of the fastest, second and reduced method within ``limit``; absent where none is.
+    """Columns of the fastest, second and reduced method within ``limit``; without keys if none is.
 
-    A speed-up is the median ratio of two times measured in the same one of the ``processes``.
+    A speed-up is the median over ``processes`` of ratios of two times within one process.
     """
     reaching = rows[rows.error <= limit].sort_values("ms_per_frame", kind="stable")
     inside = reaching.method.isin(settings.REDUCTIONS)

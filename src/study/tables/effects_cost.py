@@ -1,4 +1,4 @@
-"""Tables of times: of full-order runs by effect, local step and size of the mesh; speed-ups."""
+"""Tables of times: effects and local steps of full-order runs, mesh sizes, and speed-ups."""
 
 from collections.abc import Iterator
 
@@ -67,8 +67,8 @@ def effects_cost(
 
     Parameters
     ----------
-    parts, left_out : times of effects, and of scenes without some of them; they are scaled to the
-        full-order times in ``frame_times`` by `in_one_time`
+    parts, left_out : times of effects, and of scenes without some of them; `in_one_time` scales
+        them to the full-order times in ``frame_times``
     contributions : forces and energies by frame
     sensitivity, horizon : arguments of `horizons`, the end of each scene's comparable frames;
         ``moved`` is empty for the only group of a scene, which cannot be left out
@@ -352,13 +352,13 @@ def _errors(reruns: pd.DataFrame, keys: list[str]) -> pd.DataFrame:
 
 
 def large_errors(large: pd.DataFrame) -> pd.DataFrame:
-    """Errors of each model of large scenes over whole runs, from the rows of all motions."""
+    """Errors of each model of large scenes over whole runs; ``large`` has all motions."""
     whole = large.rename(columns={"relative_error": _ERROR}).assign(horizon_frame=1)
     return _errors(whole, _MODEL)
 
 
 def _first_known(made: pd.DataFrame, sources: list[pd.DataFrame], column: str) -> pd.DataFrame:
-    """``made`` with ``column`` filled from the first of ``sources`` that has the row's value."""
+    """Fill ``column`` of ``made`` from the first of ``sources`` that has a value for the row."""
     found = pd.Series(float("nan"), made.index)
     for source in sources:
         keys = [key for key in _LABELS if key in source.columns]

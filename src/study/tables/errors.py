@@ -1,11 +1,11 @@
 """Tables of errors: of reconstructions, perturbed runs, and single choices of the method.
 
-Table gain_interventions: does the error of a run fall if only the gain is lowered? A correlation of
-gain and error over methods may come from anything in which the methods differ. The methods compared
-there have the same basis and size. They differ in the sampling, or in whether the axes share
-coefficients (four combinations, from table ladder). If separate coefficients did harm only by their
-gain, a lower gain would also lower the error for coefficients of one kind: the last two steps
-compare all such pairs of runs, ordered by gain.
+Table gain_interventions shows whether the error of a run falls if only the gain is lowered. A
+correlation of gain and error over methods may have any difference of the methods as its cause. The
+methods compared there have the same basis and size. They differ in the sampling, or in whether the
+axes share coefficients (four combinations, from table ladder). If separate coefficients did harm
+only by their gain, a lower gain would also lower the error for coefficients of one kind: the last
+two steps compare all such pairs of runs, ordered by gain.
 """
 
 from collections.abc import Iterator, Mapping
@@ -35,7 +35,7 @@ _CELL = ["scene", "group", "method", "r", "varied"]
         number("relative", "over the first one"),
         flag("above_roundoff", "larger than the rounding errors of the projections"),
     ),
-    # the basis without weights and centring; which other bases exist depends on the configuration
+    # only bases without weights and centring; other bases depend on the configuration
     reads={"bases": EachOf(paths.BASIS, "usual_bases")},
 )
 def singular_values(bases: list[paths.File]) -> pd.DataFrame:
@@ -208,7 +208,7 @@ KINDS = {
 _PLACE = ["scene", "group", "r"]
 VOLUMES = ("deformation_gradient", "tetrahedron_strain", "volume")  # groups of tetrahedra
 MESHES = ALL, SHEETS, BARS = "all", "sheets", "bars"
-# Constructor of columns that say something about many runs.
+# Constructor of columns that summarise many runs.
 share = partial(number, compared="share")
 
 

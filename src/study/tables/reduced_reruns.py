@@ -1,4 +1,4 @@
-"""Tables of reduced runs: their errors and times, and where each method fails."""
+"""Tables of reduced runs: their errors and times, and the cases in which each method fails."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -54,9 +54,9 @@ def reduced_reruns(
 
     There is one row per motion, scene, group, method and r, followed by runs in position subspaces,
     in which all groups are reduced and r is the number of evaluated elements. The horizon is the
-    first frame that perturbed runs make incomparable, per scene and motion. Errors within it use
-    earlier frames only; they are empty for a run that blew up before. Rows of the method `PLAYBACK`
-    show the recorded training motion in place of each held-out one.
+    first frame at which perturbed runs differ too much for a comparison, per scene and motion.
+    Errors within it use earlier frames only; they are empty for a run that blew up before. Rows of
+    the method `PLAYBACK` show the recorded training motion in place of each held-out one.
 
     Parameters
     ----------
@@ -161,7 +161,7 @@ def _with_times(runs: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
     return pd.concat([local, subspace], ignore_index=True)
 
 
-# only after the first outcome are further results of a run used
+# further results of a run are used only if its outcome is the first of these
 OUTCOMES = ("accurate", "wrong", "left the scene", "blow-up", "not run", "not judged")
 SETTING = ["experiment", "scene", "h", "stiffness_ratio"]  # columns that identify a full-order run
 # Share of the runs on degenerate meshes whose outcome may differ between machines by rounding.
@@ -214,7 +214,7 @@ def stability(
 
 
 def outcomes(runs: pd.DataFrame, wrong: float, departure: float) -> list[str]:
-    """Outcome of each of ``runs``: ``wrong`` limits the error, ``departure`` relative extent."""
+    """Outcome of each run by two limits: ``wrong`` for its error, ``departure`` for its extent."""
     full = runs[(runs.method == "full") & (runs.position_basis == "full")]
     extents = full.set_index(SETTING).max_extent.rename("full_extent")
     error = runs.relative_error.astype(float)

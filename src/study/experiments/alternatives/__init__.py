@@ -1,1 +1,1 @@
-"""Alternatives to projective dynamics, on the axes of error and time."""
+"""Comparison of projective dynamics with alternatives: error against time per frame."""

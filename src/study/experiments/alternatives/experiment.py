@@ -1,8 +1,8 @@
 """Error and time of every method on one scene, against two references.
 
-One reference is the implicit step of the scene, solved to convergence, which more iterations
-approach. The other is the motion in continuous time, which the implicit step itself misses and
-which a user wants. All methods run the held-out motions; only the reduction has a training motion.
+The first reference is the implicit step of the scene, solved to convergence, which methods approach
+with more iterations. The second is the motion in continuous time, which a user wants and which the
+implicit step misses. All methods run the held-out motions; only reductions are trained.
 """
 
 import logging
@@ -38,7 +38,7 @@ from study.experiments.kit import runfiles
 from study.experiments.kit.base import experiment
 from study.experiments.kit.measurement import Processes, Variant, in_processes
 
-REDUCED, ACCELERATED = REDUCTIONS = "ecsw", "ecsw-anderson"  # the others are full-order ones
+REDUCED, ACCELERATED = REDUCTIONS = "ecsw", "ecsw-anderson"  # all other methods are full-order
 TWO_LEVEL: Final = "two-level"  # full order, with a trained subspace for its coarse level
 TRAINED: Final = (TWO_LEVEL, *REDUCTIONS)
 CONVERGED: Final = "converged"  # the implicit step solved to convergence
@@ -74,7 +74,7 @@ def _methods(steps: dict[str, Any]) -> dict[str, Any]:
     return steps
 
 
-# More iterations of one step, and more steps of one iteration. Other settings are slower.
+# One step with more iterations, and more steps with one iteration; other settings are slower.
 STEPS: dict[str, tuple[Steps, ...]] = {
     "projective": (
         (1, 1), (1, 2), (1, 3), (1, 4), (1, 5), (1, 10), (1, 20), (1, 40), (1, 80),
@@ -89,10 +89,10 @@ STEPS: dict[str, tuple[Steps, ...]] = {
 
 
 class ContinuousReference(ConfigModel):
-    """The motion in continuous time: explicit steps, halved from ``substeps`` a frame on.
+    """Motion in continuous time: explicit steps, ``substeps`` of them a frame in the first run.
 
-    They are halved until the estimated error is below ``tolerance``, as long as the vertices times
-    the steps of a frame are at most ``limit``.
+    The step is halved until the estimated error is below ``tolerance``, as long as the product of
+    vertices and steps of a frame does not exceed ``limit``.
     """
 
     substeps: kit.Count = 40
@@ -101,9 +101,9 @@ class ContinuousReference(ConfigModel):
 
 
 class ImplicitReference(ConfigModel):
-    """The implicit step of the scene: a frame is converged when one more local/global iteration
-    moves no vertex by more than ``tolerance`` times the extent; ``limit`` bounds the evaluations.
-    Runs that train a reduction stop at the larger ``training_tolerance``.
+    """Implicit step, solved until one more local/global iteration of a frame moves no vertex by
+    more than ``tolerance`` times the extent; ``limit`` bounds the evaluations of a frame. Runs that
+    train a reduction stop at the larger ``training_tolerance``.
     """
 
     tolerance: kit.Tolerance = 1e-7
@@ -114,14 +114,14 @@ class ImplicitReference(ConfigModel):
 class Comparison(Processes):
     """Comparison of methods on one scene and one mesh.
 
-    ``steps`` has pairs (substeps of a frame, iterations of each substep) for each method. Errors
-    are taken over all frames of each of the held-out ``motions``. On its own mesh a scene runs with
-    each of its factors on all weights in ``stiffness`` (1 if it has none). Each of ``processes``
-    new processes times ``frames`` spread over the first motion. The reduction has each of ``modes``
-    and samples elements to ``tau``; it is trained on each number of ``training_motions``, the first
-    of which is that of the scene. The coarse level of two-level samples to ``coarse_tau`` and is
-    trained on the fewest. ``work`` bounds vertices x substeps x iterations of a frame of a method,
-    and vertices x motions of the ``training``; what is beyond it is left out.
+    ``steps`` has pairs (substeps of a frame, iterations of each substep) by method. Errors cover
+    all frames of each of the held-out ``motions``. On its own mesh a scene runs with each of its
+    factors on all weights in ``stiffness`` (1 if it has none). Each of ``processes`` new processes
+    times ``frames`` frames spread over the first motion. Reductions have each number of ``modes``,
+    sample to ``tau`` and are trained on each number of ``training_motions``, the first of which is
+    the scene's. The coarse level of two-level samples to ``coarse_tau`` and is trained on the
+    fewest. ``work`` bounds vertices x substeps x iterations of a frame of a method, and vertices x
+    motions of the ``training``; anything beyond it is left out.
     """
 
     stiffness: dict[str, Factors] = Field(default_factory=dict)
@@ -142,23 +142,23 @@ class Comparison(Processes):
     repeats: kit.Repeats = 1
 
     def factors(self, scene: str, size: float) -> tuple[float, ...]:
-        """Factors on all weights of a scene with ``size`` times the vertices along a side."""
+        """Factors on all weights of ``scene`` with ``size`` times the vertices along a side."""
         return self.stiffness.get(scene, (1.0,)) if size == 1.0 else (1.0,)
 
     def pairs(self, method: str, vertices: int) -> list[tuple[int, int]]:
-        """Pairs (substeps, iterations) with which ``method`` runs on a mesh of ``vertices``."""
+        """Pairs (substeps, iterations) of ``method`` on a mesh with this number of ``vertices``."""
         steps = self.steps.get(method, ())
         return [(n, k) for n, k in steps if self.affords(method, vertices * n * k)]
 
     def affords(self, method: str, work: int) -> bool:
-        """Whether a frame of ``method`` may have ``work``, vertices x substeps x iterations."""
+        """Whether ``method`` may do ``work``, vertices x substeps x iterations of a frame."""
         return work <= self.work.get(method, work)
 
 
 class Alternatives(Comparison):
     """Section ``alternatives``: factors on the vertices along a side for each of ``scenes``.
 
-    The total mass does not depend on the factor. The table of winners has a row for each of
+    The total mass does not depend on the factor. The table of winners has a row for each error in
     ``errors``.
     """
 
@@ -179,9 +179,9 @@ COLUMNS = [
 
 @dataclass(frozen=True)
 class Trained:
-    """A reduced ``model`` for frames of so many ``substeps``, trained on so many ``motions``.
+    """A reduced ``model`` for frames of ``substeps`` steps, trained on a number of ``motions``.
 
-    seconds : processor time of the training, its full-order runs included, s
+    seconds : processor time of the training with its full-order runs, s
     coarse : whether it is the coarse level of the two-level method and not a reduction
     """
 
@@ -194,11 +194,11 @@ class Trained:
 
 @dataclass(frozen=True)
 class Candidate:
-    """A method with its settings.
+    """A method with its settings, ready to run on one scene.
 
     steps : number of steps of the loop in a frame
-    positions, output : map coordinates of the loop to vertex positions, the latter in single
-        precision (of a loop in a position subspace, whose ``columns`` it has)
+    positions, output : map coordinates of the loop to vertex positions, ``output`` in float32
+    columns : columns of the loop's position subspace, None if its coordinates are positions
     """
 
     labels: dict[str, object]
@@ -210,14 +210,14 @@ class Candidate:
     columns: Columns | None = None
 
     def state(self, state: State, scene: Scene) -> State:
-        """Coordinates of the loop for a ``state`` of the vertices of ``scene``."""
+        """State in coordinates of the loop for a ``state`` of the vertices of ``scene``."""
         if self.columns is None:
             return state
         own = (self.columns, scene.masses)
         return State(coordinates(*own, state.positions), coordinates(*own, state.velocities))
 
     def run(self, frames: int, limit: float, extent: float) -> np.ndarray | None:
-        """Return positions (F + 1, N, 3) at the ends of frames, the initial ones first.
+        """Return positions (F + 1, N, 3) at the ends of frames, preceded by the initial ones.
 
         None if the run is not finite, or grows beyond ``limit`` times the ``extent`` (m).
         """
@@ -232,9 +232,9 @@ class Candidate:
 def candidates(
     scene: Scene, models: Sequence[Trained], settings: Comparison
 ) -> Iterator[Candidate]:
-    """Every method with each of its pairs in ``settings``, on the motion of ``scene``.
+    """Yield every method with each of its pairs in ``settings``, on the motion of ``scene``.
 
-    ``models`` are the result of `trained` for another motion.
+    ``models`` are results of `trained` for another motion.
     """
     systems: dict[int, GlobalSystem] = {}
     start, reduced = scene.initial_state(), []
@@ -268,12 +268,12 @@ def candidates(
 
 
 def trained(training: Scene, settings: Comparison) -> Iterator[Trained]:
-    """Position subspaces with sampled elements; columns and samples come from training motions.
+    """Yield position subspaces with sampled elements, trained on one or more training motions.
 
-    These are the motion of ``training`` and further ones that the scene draws by seeds. The columns
-    are modes of nearly converged frames, of n motions every n-th one. The samples are trained on
-    iterates of these motions in these columns, for every number of substeps that a reduction takes.
-    The fewest motions also give a coarse level.
+    Training motions are that of ``training`` and further ones, which the scene draws by seeds. The
+    columns are modes of nearly converged frames: with n motions, every n-th frame of each. The
+    elements are sampled on iterates of these motions in these columns, for every number of substeps
+    that a reduction needs. With the fewest motions a coarse level is made, too.
     """
     vertices, own = training.mesh.vertices, settings.implicit
     taken, coarse = (
@@ -313,7 +313,7 @@ def trained(training: Scene, settings: Comparison) -> Iterator[Trained]:
 
 
 def substepped(scene: Scene, substeps: int, iterations: int, window: int = 0) -> Scene:
-    """The scene with ``substeps`` shorter frames for each frame, of ``iterations`` each.
+    """Return the scene with each frame split into ``substeps`` frames of ``iterations`` each.
 
     Effects keep their times in seconds. ``window`` is that of Anderson acceleration, 0 for none.
     """
@@ -340,10 +340,10 @@ class Timed:
     settings: Comparison
 
     def variants(self) -> Iterator[Variant]:
-        """Loops of all candidates; ``steps`` of one are a frame."""
+        """Loops of all candidates; a frame consists of ``steps`` steps of a loop."""
         scene, wanted = self.scene, min(self.settings.frames, self.scene.config.frames)
         places = np.linspace(0, scene.config.frames - 1, wanted).round().astype(int)
-        # the boundaries remember where they took hold, for the loops that begin later
+        # this run makes the boundaries store their first positions, which later starts need
         states = [
             scene.initial_state(),
             *(end for end, _ in simulate(scene, track_objective=False)),
@@ -358,7 +358,7 @@ class Timed:
 
 
 class Options(ConfigModel):
-    """Settings of the comparison on a mesh size."""
+    """Settings of the comparison on one mesh size."""
 
     scene: SceneConfig
     alternatives: Comparison
@@ -378,7 +378,7 @@ def alternatives(sources: list[Path], settings: Options, out: File, times: File)
     ----------
     sources : files of the mesh; the job depends on them
     settings : scene, methods and limits
-    out, times : tables of the errors and of the times, with the factor among their labels
+    out, times : tables of errors and of times, with the factor among their labels
     """
     factor, section = float(out["factor"]), settings.alternatives
     rows, cases = [], []
@@ -402,7 +402,7 @@ def alternatives(sources: list[Path], settings: Options, out: File, times: File)
 
 
 def sized(config: SceneConfig, factor: float, stiffness: float) -> SceneConfig:
-    """``config`` on a mesh ``factor`` times finer, of equal mass, weights times ``stiffness``."""
+    """Return ``config`` with a ``factor`` times finer mesh of equal mass, and scaled weights."""
     finer = config.coarsened(factor, 1.0)
     counts = [c.mesh.build(Path()).vertices for c in (config, finer)]
     effects = tuple(
@@ -416,11 +416,11 @@ def sized(config: SceneConfig, factor: float, stiffness: float) -> SceneConfig:
 def _rows(
     scene: Scene, recorded: np.ndarray, models: tuple[Trained, ...], settings: Options
 ) -> Iterator[dict[str, Any]]:
-    """Errors of every candidate in the motion of ``scene``, those of the reference first.
+    """Errors of the references, then of every candidate, in the motion of ``scene``.
 
-    The second row is playback of the ``recorded`` training motion. There is no error against the
-    implicit step where a frame of it did not converge, or where it would cost too much, and none of
-    a run that blew up.
+    The first row is the converged implicit step, the second the playback of the ``recorded``
+    training motion. Errors against the implicit step are None where a frame of it did not converge
+    or it would be too expensive; all errors of a run that blew up are None.
     """
     section, name, vertices = settings.alternatives, scene.config.name, scene.mesh.vertices
     frames, wanted, implicit = scene.config.frames, section.continuous, None

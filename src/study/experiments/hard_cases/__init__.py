@@ -1,1 +1,1 @@
-"""Hard cases: scenes at the edge of what may happen, what must hold."""
+"""Hard cases: scenes with extreme input, and the properties that their runs must have."""

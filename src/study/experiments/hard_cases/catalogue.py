@@ -1,4 +1,4 @@
-"""The hard cases, by name."""
+"""Catalogue of the hard cases, by name."""
 
 from functools import partial
 from typing import Any
@@ -26,14 +26,14 @@ ROTATION = {"effect": "deformation_gradient", "weight": 1e8}
 VOLUME = {"effect": "volume", "weight": 1e6}
 AREA = {"effect": "area", "weight": 1e6}
 
-# Checks of free bodies without forces, of such bodies from rest, and of all other scenes.
+# Checks of free bodies without forces, of such bodies starting at rest, and of all other scenes.
 FREE = ("finite", "bounded", "objective", "momentum", "determinism")
 CALM = (*FREE, "energy")
 FORCED = ("finite", "bounded", "objective", "determinism")
 
 
 def sheet(wave: float = 0.0) -> Mesh:
-    """A lying sheet of 36 vertices, with ``wave`` as in `cloth`."""
+    """A horizontal sheet of 36 vertices, with ``wave`` as in `cloth`."""
     return cloth(6, 6, "xz", wave=wave)
 
 
@@ -55,12 +55,12 @@ def one_tetrahedron() -> Mesh:
 
 
 def scaled(mesh: Mesh, *factors: float) -> Mesh:
-    """``mesh`` with its axes scaled by ``factors`` (one, or three)."""
+    """Return ``mesh`` with its axes scaled by ``factors`` (one for all axes, or three)."""
     return Mesh(mesh.points * np.array(factors), mesh.triangles, mesh.tetrahedra)
 
 
 def shifted(mesh: Mesh, *offset: float) -> Mesh:
-    """``mesh`` moved by ``offset``."""
+    """Return ``mesh`` moved by ``offset``."""
     return Mesh(mesh.points + np.array(offset), mesh.triangles, mesh.tetrahedra)
 
 
@@ -73,7 +73,7 @@ def _case(
 
 
 def _heavy_and_light(mesh: Mesh) -> np.ndarray:
-    """Masses over eight decades, in random order."""
+    """Masses (N,) kg over eight decades, in random order."""
     order = np.random.default_rng(3).permutation(mesh.vertices)
     return np.logspace(-4, 4, mesh.vertices)[order]
 
@@ -92,7 +92,7 @@ def _two_sheets(*offset: float) -> Mesh:
 
 
 def _one_bad_element() -> Mesh:
-    """A bar with one vertex almost in the opposite face of its tetrahedron."""
+    """A bar with one vertex moved almost into the opposite face of its tetrahedron."""
     mesh = small_bar()
     points = mesh.points.copy()
     corners = points[mesh.tetrahedra[1]]
@@ -421,5 +421,5 @@ CASES: dict[str, record.HardCase] = {case.name: case for part in PARTS for case 
 
 
 def reducible_cases(slow: bool = False) -> list[str]:
-    """Names of the cases that are not refused, either all slow ones or all others."""
+    """Names of the cases that are not expected to be refused: the slow ones, or all others."""
     return [name for name, c in CASES.items() if c.slow == slow and c.holds != ("refused",)]

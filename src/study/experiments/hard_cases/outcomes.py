@@ -1,4 +1,4 @@
-"""Every reduction trained on the run of a hard case itself: its outcome and the expected one."""
+"""Outcome of every reduction in every hard case, compared with the expected outcome."""
 
 import logging
 from collections import Counter
@@ -60,7 +60,7 @@ ReducibleCase = Annotated[str, AfterValidator(lambda case: _known(case, reducibl
 
 
 class Expectation(ConfigModel):
-    """Cases in which a reduction fails, and why.
+    """Cases in which a reduction fails, and the reason.
 
     fails : cases in which it must fail
     may_fail : cases in which round-off decides whether it fails
@@ -79,7 +79,7 @@ class Expectation(ConfigModel):
 
 
 def surprise(outcome: str, case: str, expected: Expectation | None) -> str:
-    """Say how the ``outcome`` of ``case`` contradicts the ``expected`` one, "" if it does not."""
+    """Describe how the ``outcome`` of ``case`` contradicts the ``expected`` one, else ""."""
     must, may = (expected.fails, expected.may_fail) if expected else ((), ())
     if outcome in FAILURES:
         listed = case in (*must, *may)
@@ -88,7 +88,7 @@ def surprise(outcome: str, case: str, expected: Expectation | None) -> str:
 
 
 class Training:
-    """The full-order run of a case with the snapshots of its first group (the reduced one)."""
+    """Full-order run of a case with snapshots of its first group, which is the one to reduce."""
 
     def __init__(self, case: record.HardCase) -> None:
         self.case = case
@@ -107,7 +107,7 @@ class Training:
             self._roundoff.append(self.group.roundoff(y))
 
     def basis(self, spec: MethodSpec) -> Basis:
-        """Basis of the snapshots of the even frames, as ``spec`` asks."""
+        """Basis of the snapshots of the even frames, of the kind that ``spec`` requires."""
         if spec.basis_id not in self._bases:
             self._bases[spec.basis_id] = compute_basis(
                 np.stack(self._snapshots),
@@ -123,7 +123,7 @@ class Training:
 class ReducedRun:
     """A reduced run; ``run`` is None if the basis is empty.
 
-    r : basis size, in a subspace the number of evaluated elements
+    r : basis size; in a subspace the number of evaluated elements
     k : number of columns of the position subspace, None in vertex positions
     gain : gain of the interpolation, None without interpolation
     """
@@ -134,7 +134,7 @@ class ReducedRun:
     gain: float | None = None
 
     def outcome(self, training: Training) -> str:
-        """One of `HOLDS`, `NOTHING`, `FAILURES`: the first that applies to the run."""
+        """Return the first of `NOTHING`, `FAILURES` that applies to the run, else `HOLDS`."""
         run = self.run
         if run is None:
             return NOTHING
@@ -156,14 +156,14 @@ class ReducedRun:
 
 
 def names(methods: Methods) -> list[str]:
-    """All reductions: the methods, then each position subspace with each way of sampling."""
+    """Names of all reductions: the methods, then each position subspace with each sampling."""
     return [*methods, *(f"{basis}-{sampling}" for basis in BASES for sampling in BASES[basis])]
 
 
 def reduced_run(training: Training, name: str, methods: Methods, limit: float) -> ReducedRun:
-    """Run the case of ``training`` again with the reduction ``name`` of ``methods``.
+    """Run the case of ``training`` again with the reduction ``name``, one of `names`.
 
-    ``limit`` is the extent of a blow-up, m.
+    The run ends as a blow-up when its extent exceeds ``limit`` (m).
 
     Raises
     ------
@@ -186,7 +186,7 @@ def reduced_run(training: Training, name: str, methods: Methods, limit: float) -
 
 
 def _subspace(training: Training, kind: str, sampling: str, limit: float) -> ReducedRun:
-    """Run in a position subspace; ECSW is trained on a run that begins at the case's start."""
+    """Run in a position subspace; ECSW is trained on a run that begins at the start of the case."""
     scene = training.scene
     columns = make_columns(scene, training.run.positions[1::2], kind, k=K)
     start = training.case.start(scene)
@@ -210,7 +210,7 @@ def _subspace(training: Training, kind: str, sampling: str, limit: float) -> Red
 def row(
     training: Training, name: str, methods: Methods, expected: Mapping[str, Expectation]
 ) -> dict[str, Any]:
-    """Row of the reduction ``name``: sizes, figures of the run, outcome, reason of a failure."""
+    """Table row of the reduction ``name``: sizes, measures of the run, outcome and reason."""
     try:
         reduced = reduced_run(training, name, methods, limit=BLOWUP * training.extent)
     except NotReducibleError as error:
@@ -234,7 +234,7 @@ def row(
 class HardCases(ConfigModel):
     """Section ``hard_cases``: the cases; if empty, all that are not slow.
 
-    expected : for a reduction, its failures and their reason; others must never fail
+    expected : failures by reduction, with their reason; a reduction without entry must never fail
     """
 
     cases: tuple[ReducibleCase, ...] = ()
@@ -262,7 +262,7 @@ def hard_cases(
 ) -> None:
     """Run the cases with every reduction; log outcomes that contradict the expected ones.
 
-    ``meshes`` are declared as inputs only: the cases read these files themselves.
+    ``meshes`` only declares the mesh files as inputs: the cases read these files themselves.
     """
     found = []
     for name in asked.cases or reducible_cases():

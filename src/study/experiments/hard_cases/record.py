@@ -1,4 +1,4 @@
-"""A hard case with states to start from; the record of a run, its rounding errors, the checks.
+"""Hard cases: starts, records of runs, bounds of their rounding errors, and checks.
 
 In exact arithmetic 1/(2h^2) |M^1/2 (y - s)|^2 + sum_j W_j(y) falls in every iteration. Computed
 values differ for two reasons (u = eps, c a small constant for the length of the sums):
@@ -11,8 +11,8 @@ values differ for two reasons (u = eps, c a small constant for the length of the
   vertices, so that r <= c u |B|^T |A| |y|, and the explicit inverse adds d <= c u cond(A) |z|,
   where A has columns scaled to length one.
 
-lambda_min is bounded from below by the smallest mass over h^2, without pins: where masses are
-round-off compared with the weights, and only pins make A regular, the bound is very loose.
+The smallest mass over h^2 bounds lambda_min from below, without pins. The bound is very loose if
+masses are round-off compared with the weights and only pins make A regular.
 """
 
 from collections.abc import Callable, Sequence
@@ -39,12 +39,12 @@ SEED = 7
 class HardCase:
     """A scene that is hard for a named reason, and the properties that its run must have.
 
-    why : what makes the scene hard
+    why : property that makes the scene hard
     holds : names of the checks that the full-order run must pass (`record.CHECKS`); a case with
-        "refused" alone raises an error when its scene is built or run
+        only "refused" must raise an error when its scene is built or run
     mesh, effects, settings : arguments of `build`; the mesh as a function
-    start : the state before the first frame
-    bound : largest extent that is no blow-up, over the largest extent of start, rest and handles
+    start : function that makes the state before the first frame
+    bound : largest allowed extent, relative to the largest extent of start, rest shape and handles
     slow : whether only the slow tests run the case
     """
 
@@ -59,7 +59,7 @@ class HardCase:
     slow: bool = False
 
     def scene(self) -> Scene:
-        """Build the scene; PdromError if it is refused."""
+        """Build the scene; raise PdromError if it is refused."""
         return build(self.mesh(), *self.effects, **self.settings)
 
 
@@ -87,7 +87,7 @@ def at_rest(positions: np.ndarray) -> State:
 
 
 def mapped(*rows: tuple[float, float, float]) -> Start:
-    """Rest shape under the linear map with these three ``rows`` about its centre, at rest."""
+    """Start at rest: the rest shape under the linear map with these ``rows`` about its centre."""
 
     def start(scene: Scene) -> State:
         points = scene.mesh.points
@@ -98,12 +98,12 @@ def mapped(*rows: tuple[float, float, float]) -> Start:
 
 
 def scales(x: float, y: float, z: float) -> Start:
-    """The rest shape scaled by ``x``, ``y``, ``z`` about its centre (negative: mirrored)."""
+    """Start at rest: the rest shape scaled about its centre; a negative factor mirrors it."""
     return mapped((x, 0, 0), (0, y, 0), (0, 0, z))
 
 
 def scrambled(size: float = 1.0) -> Start:
-    """Vertices at random in a box of ``size`` rest extents."""
+    """Start at rest: vertices at random in a box of ``size`` rest extents."""
 
     def start(scene: Scene) -> State:
         points = scene.mesh.points
@@ -114,7 +114,7 @@ def scrambled(size: float = 1.0) -> Start:
 
 
 def noisy(start: Start, size: float) -> Start:
-    """``start`` with normal noise of ``size`` rest extents."""
+    """Return ``start`` with normal noise of ``size`` rest extents, at rest."""
 
     def moved(scene: Scene) -> State:
         noise = np.random.default_rng(SEED).standard_normal(scene.mesh.points.shape)
@@ -124,14 +124,14 @@ def noisy(start: Start, size: float) -> Start:
 
 
 def pairs_merged(scene: Scene) -> State:
-    """Every odd vertex of ``scene`` lies on the vertex before it: edges of length zero."""
+    """Start with every odd vertex on the vertex before it, so that edges have length zero."""
     points = scene.mesh.points.copy()
     points[1::2] = points[: len(points) - len(points) % 2 : 2]
     return at_rest(points)
 
 
 def folded(scene: Scene) -> State:
-    """The half x > 0 of ``scene`` lies on the half x < 0: vertices of its elements coincide."""
+    """Start with the half x > 0 mirrored onto the half x < 0, where vertices coincide."""
     points = scene.mesh.points.copy()
     centre = 0.5 * (points[:, 0].min() + points[:, 0].max())
     points[:, 0] = centre - np.abs(points[:, 0] - centre)
@@ -139,12 +139,12 @@ def folded(scene: Scene) -> State:
 
 
 def falling(speed: float) -> Start:
-    """The rest shape, all vertices moving down at ``speed``, m/s."""
+    """Start in the rest shape, with all vertices moving down at ``speed``, m/s."""
     return lambda scene: _vertical(scene, np.full(len(scene.mesh.points), -speed))
 
 
 def meeting(speed: float) -> Start:
-    """The upper half of the vertices moves down and the lower half up at ``speed``, m/s."""
+    """Start with the upper vertices moving down and the lower ones up, at ``speed``, m/s."""
 
     def start(scene: Scene) -> State:
         y = scene.mesh.points[:, 1]
@@ -161,20 +161,20 @@ def _vertical(scene: Scene, speeds: np.ndarray) -> State:
 
 
 def lowered(offset: float) -> Start:
-    """The rest shape moved by ``offset`` along y."""
+    """Start at rest: the rest shape moved by ``offset`` (m) along y."""
     return lambda scene: at_rest(scene.mesh.points + np.array([0.0, offset, 0.0]))
 
 
 EPS = np.finfo(float).eps
-# A row of S or A has about 10 entries, and each value passes through a few further operations.
+# Constant c: a row of S or A has about 10 entries, and each value undergoes a few more operations.
 OPERATIONS = 32.0
-# Largest distance from the rest shape, over the extent, of a shape that counts as recovered.
+# A shape counts as recovered up to this distance from the rest shape, relative to the extent.
 RECOVERED = 1e-2
 
 
 @dataclass(frozen=True)
 class Roundoff:
-    """Largest rise of the objective of one step loop by rounding alone.
+    """Bound for rises of the objective by rounding alone, for one step loop.
 
     basis : B (N, K) of the positions B z; None if the coordinates of ``loop`` are the positions
     """
@@ -184,9 +184,9 @@ class Roundoff:
     basis: np.ndarray | None = None
 
     def allowance(self, before: State, after: State, first: float) -> float:
-        """Largest rise by rounding, in joule, in a frame with first objective ``first``.
+        """Largest rise by rounding in a frame whose first objective is ``first``, both J.
 
-        The size of the iterates is estimated by the states ``before`` and ``after`` the frame.
+        The size of the iterates is estimated from the states ``before`` and ``after`` the frame.
         """
         h = self.loop.time_step
         acceleration = self.loop.space.acceleration(before.positions, before.velocities)
@@ -203,7 +203,7 @@ class Roundoff:
         return evaluation + self._dense(self.basis, size, largest)
 
     def _noise(self, size: float) -> float:
-        """R: the objective of rounding errors where all coordinates are of ``size``."""
+        """R: the objective of rounding errors alone if all coordinates have this ``size``, J."""
         h = self.loop.time_step
         unit = OPERATIONS * EPS * size
         total = 1.5 * float(self.scene.masses.sum()) / h**2 * (2.0 * unit) ** 2
@@ -213,7 +213,7 @@ class Roundoff:
         return total
 
     def _residual(self, size: float) -> np.ndarray:
-        """c u |A| |y| of the vertices, (N,)."""
+        """Bound c u |A| |y| for the residual of the vertices, (N,), if ``size`` bounds all |y|."""
         rows = np.asarray(abs(self.scene.system.matrix).sum(axis=1)).ravel()
         return OPERATIONS * EPS * size * rows
 
@@ -221,7 +221,7 @@ class Roundoff:
         matrix = b.T @ (self.scene.masses[:, None] * b) / self.loop.time_step**2
         steps: Sequence[Any] = self.loop.local_steps  # in a subspace each has a matrix
         matrix = matrix + sum(step.matrix for step in steps)
-        # columns are scaled to length one: the sizes of the coordinates do not matter
+        # scaled columns of length one make the result independent of the units of coordinates
         scale = np.sqrt(np.diag(matrix))
         eigenvalues = np.linalg.eigvalsh(matrix / np.outer(scale, scale))
         smallest, greatest = max(eigenvalues[0], EPS * eigenvalues[-1]), eigenvalues[-1]
@@ -235,10 +235,10 @@ class Roundoff:
 class Record:
     """A run, frame by frame; it ends before the first frame that is not finite.
 
-    positions, velocities : (F + 1, N, 3) m and m/s, the start first
-    rise : (F,) largest rise of the objective from one iteration to the next over the frame's first
-        objective, zero if it never rose
-    excess : (F,) that rise minus the largest rise by rounding alone, J
+    positions, velocities : (F + 1, N, 3) m and m/s, with the start as the first entry
+    rise : (F,) largest rise of the objective between successive iterations, relative to the frame's
+        first objective; zero if it never rose
+    excess : (F,) absolute rise minus the bound for rounding errors, J
     energy : (F + 1,) sum of the kinetic energy and the potential energy of the groups, J
     blowup_frame : first frame that is not finite or too large, None if there is none
     """
@@ -257,14 +257,14 @@ class Record:
 
 
 class Watched:
-    """A reduced local step that reports the energy of the full projections as its own."""
+    """Reduced local step that reports the energy of the full projections instead of its own."""
 
     def __init__(self, step: LocalStep, group: LocalStep) -> None:
         self.name = step.name
         self._step, self._group = step, group
 
     def begin_frame(self, q: np.ndarray) -> None:
-        """Freeze the frame's data of the reduced step and of the group at ``q`` (N, 3) m."""
+        """Freeze frame-lagged data of the reduced step and of the group at ``q`` (N, 3) m."""
         self._step.begin_frame(q)
         self._group.begin_frame(q)
 
@@ -287,7 +287,7 @@ def record(
     Parameters
     ----------
     model : the position subspace of ``loop``; None if its coordinates are the positions
-    limit : extent in metres at which the run ends as a blow-up
+    limit : extent in metres above which the run ends as a blow-up
     observe : called with the number and the last local iterate of every frame
     """
     roundoff = Roundoff(scene, loop, None if model is None else model.columns.B)
@@ -330,7 +330,7 @@ def record(
 def full_order(
     case: HardCase, scene: Scene, observe: Callable[[int, np.ndarray], None] | None = None
 ) -> Record:
-    """Run ``scene`` of ``case`` from its start; ``observe`` as in `record`."""
+    """Run ``scene`` at full order from the start of ``case``; ``observe`` as in `record`."""
     return record(scene, scene.stepper(), case.start(scene), observe=observe)
 
 
@@ -338,19 +338,19 @@ Check = Callable[[HardCase, Scene, Record], str]
 
 
 def finite(case: HardCase, scene: Scene, run: Record) -> str:
-    """Every frame is there and finite."""
+    """Check that every frame exists and is finite."""
     whole = len(run.positions) == scene.config.frames + 1
     return "" if whole else f"not finite in frame {run.blowup_frame}"
 
 
 def bounded(case: HardCase, scene: Scene, run: Record) -> str:
-    """The extent stays below the case's bound."""
+    """Check that the extent stays below the bound of the case."""
     limit = case.bound * reach(scene, run)
     return "" if run.extent <= limit else f"extent {run.extent:.3g} m, allowed {limit:.3g} m"
 
 
 def reach(scene: Scene, run: Record) -> float:
-    """Largest extent of rest, start and held vertices, m."""
+    """Largest extent of the rest shape, the start and the held vertices, m."""
     sizes = [scene.mesh.extent, float(np.ptp(run.positions[0], axis=0).max())]
     held = np.unique(np.concatenate([[], *(b.vertices for b in scene.boundaries)]).astype(int))
     if len(held):
@@ -359,7 +359,7 @@ def reach(scene: Scene, run: Record) -> float:
 
 
 def objective(case: HardCase, scene: Scene, run: Record) -> str:
-    """No iteration raises the objective by more than rounding explains."""
+    """Check that no iteration raises the objective by more than rounding explains."""
     worst = int(np.argmax(run.excess))
     if run.excess[worst] <= 0.0:
         return ""
@@ -367,10 +367,10 @@ def objective(case: HardCase, scene: Scene, run: Record) -> str:
 
 
 def energy(case: HardCase, scene: Scene, run: Record) -> str:
-    """Kinetic plus potential energy never exceeds its value at the start.
+    """Check that kinetic plus potential energy never exceeds its value at the start.
 
-    From rest the first frame obeys this for every K, since its objective is this energy; later
-    frames obey it by the damping of the implicit step.
+    For a start at rest the first frame obeys this for every K, since its objective is this energy;
+    later frames obey it by the damping of the implicit step.
     """
     start, largest = run.energy[0], run.energy.max()
     elastic = float(np.abs(run.positions).max()) ** 2 * float(abs(scene.system.matrix).sum())
@@ -380,14 +380,14 @@ def energy(case: HardCase, scene: Scene, run: Record) -> str:
 
 
 def momentum(case: HardCase, scene: Scene, run: Record) -> str:
-    """Linear momentum changes by gravity only."""
+    """Check that linear momentum is changed by gravity only."""
     h, masses = scene.config.time_step, scene.masses
     pull = sum((f.acceleration(run.positions[0], run.velocities[0]) for f in scene.forces), 0.0)
     frames = np.arange(len(run.velocities))[:, None]
     found = np.einsum("n,fna->fa", masses, run.velocities)
     expected = found[0] + frames * h * masses.sum() * np.broadcast_to(pull, 3)
     error = np.abs(found - expected).max()
-    # the columns of S^T W p and of the residual of the solve sum to zero up to rounding
+    # columns of S^T W p and of the linear solver's residual sum to zero up to rounding
     size = float(np.abs(run.positions).max()) + float(np.abs(run.velocities).max()) * h
     noise = EPS * OPERATIONS * size * (masses.sum() / h + h * abs(scene.system.matrix).sum())
     allowed = noise * max(1.0, np.sqrt(len(found)))
@@ -397,21 +397,21 @@ def momentum(case: HardCase, scene: Scene, run: Record) -> str:
 
 
 def determinism(case: HardCase, scene: Scene, run: Record) -> str:
-    """A second run gives the same bits."""
+    """Check that a second run gives the same bits."""
     again = full_order(case, case.scene())
     same = np.array_equal(run.positions, again.positions)
     return "" if same and np.array_equal(run.rise, again.rise) else "a second run differs"
 
 
 def recovers(case: HardCase, scene: Scene, run: Record) -> str:
-    """The run ends in the rest shape, up to a rigid motion."""
+    """Check that the run ends in the rest shape, up to a rigid motion."""
     residuals, scale = shape_residuals(scene.mesh.points[None], run.positions[-1:])
     error = scale[0] * float(np.linalg.norm(residuals, axis=2).max()) / scene.mesh.extent
     return "" if error <= RECOVERED else f"ends {error:.2g} extents from its rest shape"
 
 
 def still(case: HardCase, scene: Scene, run: Record) -> str:
-    """Nothing moves."""
+    """Check that nothing moves."""
     moved = float(np.abs(run.positions - run.positions[0]).max())
     allowed = 1e-9 * float(np.abs(run.positions[0]).max())
     return "" if moved <= allowed else f"moves by {moved:.1e} m"
@@ -426,7 +426,7 @@ CHECKS: dict[str, Check] = {
 def faults(case: HardCase) -> list[str]:
     """Return the checks that the full-order run of ``case`` fails, each with its reason.
 
-    For a case that must be refused, building or running the scene must raise a `PdromError`.
+    If the case must be refused, building or running the scene must raise a `PdromError`.
     """
     if case.holds == ("refused",):
         try:

@@ -1,1 +1,1 @@
-"""Helpers of experiments: settings, measurement, runs that only experiments make."""
+"""Helpers of experiments: settings, measurement, and runs that several experiments need."""

@@ -1,10 +1,10 @@
-"""Declaration of an experiment, settings that several share and scenes from files.
+"""Declaration of experiments, settings that several of them share, and scenes from files.
 
 An experiment is a question that the study asks, with files as the answer.
 
-The floor of a scene is how far its full-order run drifts when the start is moved a little, by frame
-and over all seeds (`study.experiments.sensitivity`). From the horizon on the floor exceeds a
-threshold, and a difference between two runs says nothing about their methods.
+The sensitivity floor of a scene is the drift of its full-order run after a small displacement of
+the start, by frame, maximal over all seeds (`study.experiments.sensitivity`). At the horizon the
+floor exceeds a threshold; later differences between two runs say nothing about their methods.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -36,12 +36,12 @@ def experiment(
 ) -> Callable[[Callable[..., None]], Experiment]:
     """Declare the function below as an experiment, see `Artifact`.
 
-    ``title`` names its jobs; nothing runs at the same time as those of an ``alone`` one.
+    ``title`` names its jobs; no other job runs at the same time as an ``alone`` one.
 
     Raises
     ------
     TypeError
-        If the function does not take what it reads and writes.
+        If the parameters of the function are not the names in ``reads`` and ``writes``.
     """
 
     def decorate(function: Callable[..., Any]) -> Experiment:
@@ -56,18 +56,18 @@ def experiments() -> dict[str, Experiment]:
     return declared_in("study.experiments", Experiment)
 
 
-FOM = "fom"  # the full-order run with its own or another number of iterations
-ANDERSON = "fom-anderson"  # the same with accelerated iterations
+FOM = "fom"  # full-order run with the scene's or another number of iterations
+ANDERSON = "fom-anderson"  # full-order run with Anderson acceleration
 
-# phases of a frame other than effects
+# phases of a frame that belong to no effect
 RIGHT, GLOBAL, REST = "right-hand side", "global solve", "rest of the frame"
-# a run ends when its bounding box exceeds this multiple of the rest extent
+# a run ends as a blow-up when its bounding box exceeds this multiple of the rest extent
 BlowupExtent = Annotated[float, Field(gt=1.0, le=1e12)]
 Count = Annotated[int, Field(ge=1, le=100_000)]
 Repeats = Annotated[int, Field(ge=1, le=1000)]
 Modes = Annotated[int, Field(ge=1, le=1000)]
 Tolerance = Annotated[float, Field(gt=0.0, lt=1.0)]
-# factors on the vertices along a side, for scenes by name
+# factors on the number of vertices along a side, by name of the scene
 Sizes = dict[str, tuple[Annotated[float, Field(gt=0.0, le=100.0)], ...]]
 PositionBasis = Literal["pod", "skinning"]
 Rank = Annotated[int, Field(ge=1, le=100_000)] | Literal["full"]
@@ -85,17 +85,17 @@ class OfScene(ConfigModel):
 
 
 def floor_of(table: pd.DataFrame, scene: str, perturbation: float | str) -> np.ndarray:
-    """Sensitivity floor (F,) of a scene at one size (or under one label) of the perturbation.
+    """Sensitivity floor (F,) of a scene for one size (or one label) of the perturbation.
 
     Empty if the scene was not perturbed in this way.
 
     Parameters
     ----------
     table : perturbed runs with scene, perturbation, frame and relative_difference; seeds may be
-        rows of their own or joined
+        separate rows or already combined
     """
     label = perturbation if isinstance(perturbation, str) else f"{perturbation:g}"
-    # a column without words is read from a file as numbers
+    # a column that contains only numbers is read from a file as floats
     rows = table[(table.scene == scene) & (table.perturbation.astype(str) == label)]
     return rows.groupby("frame").relative_difference.max().to_numpy(float)
 
@@ -107,7 +107,7 @@ def horizon(floor: np.ndarray, threshold: float) -> int:
 
 
 def horizons(table: pd.DataFrame, perturbation: float | str, threshold: float) -> dict[str, int]:
-    """`horizon` of every scene of the table by ``threshold``, see `floor_of` (``perturbation``)."""
+    """`horizon` of every scene of ``table``, by ``threshold`` and the floor of `floor_of`."""
     scenes = table.scene.unique()
     return {s: horizon(floor_of(table, s, perturbation), threshold) for s in scenes}
 
@@ -122,22 +122,22 @@ Solver = Annotated[str, AfterValidator(_known)]
 
 
 class Horizon(ConfigModel):
-    """Up to which frame a run is judged: the spread of the runs perturbed by ``perturbation``.
+    """Last frame at which runs are compared: where runs perturbed by ``perturbation`` diverge.
 
-    The horizon is the first frame at which the spread exceeds ``threshold``.
+    The horizon is the first frame at which their spread exceeds ``threshold``.
     """
 
     perturbation: Tolerance
     threshold: Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 
     def frames(self, perturbed: File) -> int:
-        """Frames before the horizon of a scene, from the table of its perturbed runs."""
+        """Number of frames before the horizon, from the table ``perturbed`` of a scene."""
         spread = floor_of(read_table(perturbed.path), perturbed["scene"], self.perturbation)
         return horizon(spread, self.threshold)
 
 
 def resolve_ranks(ranks: Sequence[Rank], rank: int) -> list[int]:
-    """``ranks`` ascending, "full" replaced by the numerical ``rank`` (left out if 0)."""
+    """Sort ``ranks`` and replace "full" by the numerical ``rank`` (left out if 0)."""
     full = [rank] if "full" in ranks and rank > 0 else []
     return sorted({*(int(r) for r in ranks if r != "full"), *full})
 
@@ -146,7 +146,7 @@ TRAIN = "train"
 
 
 def scene_of(config: SceneConfig, mesh: File, run: str = TRAIN) -> Scene:
-    """Scene of ``config`` and ``run`` ("train" or a held-out motion) on its mesh file."""
+    """Scene of ``config`` in the motion ``run`` ("train" or a held-out motion) on its mesh file."""
     chosen = config if run == TRAIN else config.heldout_variant(cast(HeldOutMotion, run))
     scene = Scene.build(chosen, load_mesh(mesh.path))
     scene.log_holds()
@@ -154,19 +154,19 @@ def scene_of(config: SceneConfig, mesh: File, run: str = TRAIN) -> Scene:
 
 
 def positions_of(run: File, frames: int | None = None) -> np.ndarray:
-    """Positions (F + 1, N, 3) m of a full-order run, or of its first ``frames``."""
+    """Positions (F + 1, N, 3) m of a full-order run, or of its first ``frames`` frames."""
     with open_hdf5(run.path) as file:
         return file["positions"][: None if frames is None else frames + 1]
 
 
 def followed(loop: Stepper, state: State, frames: int) -> np.ndarray:
-    """Positions (F + 1, N, 3) m that ``loop`` reaches from ``state`` on, the first ones first."""
+    """Positions (F + 1, N, 3) m of ``loop`` over ``frames``, beginning with ``state``."""
     ends = [after.positions for after, _ in loop.run(state, range(frames))]
     return np.stack([state.positions, *ends])
 
 
 def perturbation_field(scene: Scene, size: float, seed: int) -> np.ndarray:
-    """Random directions by ``seed``, of length ``size`` times the extent of ``scene``, (N, 3) m."""
+    """Vectors (N, 3) m in random directions, each ``size`` times the extent of ``scene`` long."""
     field = np.random.default_rng(seed).standard_normal((scene.mesh.vertices, 3))
     return size * scene.mesh.extent * field / np.linalg.norm(field, axis=1, keepdims=True)
 
@@ -178,11 +178,11 @@ def varied(
     duration: float,
     frames: Sequence[int],
 ) -> SceneConfig:
-    """``config`` with ``time_step`` (s) and the reduced groups' weights times ``stiffness_ratio``.
+    """Return ``config`` with ``time_step`` (s) and the reduced groups' weights scaled.
 
-    Schedules keep their times in seconds, so that their frame numbers change. The run takes
-    ``duration`` seconds, but at least ``frames[0]`` and at most ``frames[1]`` frames. The other
-    groups keep their weights.
+    Schedules keep their times in seconds, so that their frame numbers change. The run lasts
+    ``duration`` seconds, but at least ``frames[0]`` and at most ``frames[1]`` frames. Groups that
+    are not reduced keep their weights.
     """
     count = min(max(round(duration / time_step), frames[0]), frames[1])
     effects = []
@@ -191,6 +191,6 @@ def varied(
         if isinstance(effect, GroupConfig) and effect.effect in config.reduce:
             effect = effect.model_copy(update={"weight": stiffness_ratio * effect.weight})
         effects.append(effect)
-    # the experiments, with their numbers of training snapshots, belong to the original run
+    # the settings of the reduction, with numbers of training snapshots, stay those of the scene
     changes = {"time_step": time_step, "frames": count, "effects": tuple(effects)}
     return config.model_copy(update=changes)

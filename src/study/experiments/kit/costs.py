@@ -1,6 +1,6 @@
-"""Time of each effect of a scene in a frame, that a scene without it saves, of local steps alone.
+"""Times per frame of each effect and of a scene without it, and times of single local steps.
 
-Effects are timed by stand-ins around them, so that a normal run holds no timer at all.
+Effects are timed by wrappers, so that a normal run contains no timers.
 """
 
 from collections.abc import Callable, Hashable, Mapping, Sequence
@@ -32,20 +32,20 @@ COLUMNS = [
 ]  # fmt: skip
 COSTS = ["scene", "effect", "elements", "ms_per_frame", "share"]
 LEFT_OUT = ["scene", "left_out", "groups", "elements", "ms_per_frame", "own_ms"]
-# Questions that the step loop asks an effect of each role, see `_roles`.
+# Methods of an effect that the step loop calls, for each role of `_roles`.
 _QUESTIONS = (
     ("begin_frame", "accumulate"), ("acceleration",), ("active", "held", "takes_hold", "path"),
     ("apply",),
 )  # fmt: skip
-# Entries of the record: address and record of the kernel, the places of the seconds and clocks of
-# its two parts and of its preparation.
+# Entries of the record of a timed kernel: address and record of the kernel itself, and addresses of
+# the seconds and clocks of its two parts and of its preparation.
 KERNEL, RECORD, SECONDS, CLOCKS, SIZE = range(OWN, OWN + 5)
 
 
 def variant(
     scene: Scene, system: GlobalSystem, steps: Sequence[LocalStep], frames: int, labels: dict
 ) -> Variant:
-    """Loop of a ``scene`` with these local ``steps`` and no objective, from its own start."""
+    """Loop of a ``scene`` with these local ``steps`` and no objective, from the scene's start."""
     loop = scene.stepper(system, steps, track_objective=False)
     return Variant(labels, loop, scene.initial_state(), frames)
 
@@ -55,16 +55,16 @@ def local_costs(
 ) -> pd.DataFrame:
     """Milliseconds of one local step, mean over some states.
 
-    Of a reduced one also the dense product that solves for its coefficients, and its
-    reconstruction, alone.
+    For reduced local steps, also the time of the dense product that solves for the coefficients and
+    of the reconstruction, each measured separately.
 
-    All steps are interleaved.
+    All steps are measured in turn.
 
     Parameters
     ----------
-    often : ``warmup``, ``repeats``: evaluations before the clock starts, and measured ones
+    often : ``warmup``, ``repeats``: numbers of unmeasured and of measured evaluations
     reduced : local steps by group, method and r, bound to the groups of ``scene``
-    states : (n, N, 3) positions in m; frame-lagged data are those of the first
+    states : (n, N, 3) positions in m; frame-lagged data are frozen at the first
     """
     groups = {name: scene.group(name) for name, _, _ in reduced}
     rhs, iterates = vertices(len(states[0])), [as_vertices(y) for y in states]
@@ -89,7 +89,7 @@ def local_costs(
 
 
 def _each(call: Callable[..., object], arguments: Sequence[tuple]) -> Callable[[], None]:
-    """A function that does ``call`` with each of the ``arguments``."""
+    """Return a function that calls ``call`` with each of the ``arguments``."""
 
     def every() -> None:
         for own in arguments:
@@ -99,11 +99,11 @@ def _each(call: Callable[..., object], arguments: Sequence[tuple]) -> Callable[[
 
 
 class Timed:
-    """Stands for an effect and adds up the time of the questions that the step loop asks it.
+    """Wrapper of an effect that adds up the time of its methods called by the step loop.
 
     Attributes
     ----------
-    local_kernel : of a group, whose kernel is timed inside the compiled loop
+    local_kernel : kernel of a group, timed inside the compiled loop; None for other effects
     """
 
     def __init__(self, effect: Effect, questions: Sequence[str]) -> None:
@@ -122,11 +122,11 @@ class Timed:
 
     @property
     def kernel_seconds(self) -> float:
-        """Part of `seconds` that is spent inside the compiled loop."""
+        """The share of `seconds` that is spent inside the compiled loop."""
         return float(self._kernel.sum())
 
     def reset(self) -> None:
-        """Begin again."""
+        """Set all times to zero."""
         self._asked = 0.0
         self._kernel[:] = 0.0
 
@@ -145,13 +145,13 @@ def effect_costs(
 ) -> pd.DataFrame:
     """Table of `COSTS` of the full-order run: effects, right-hand side, global solve, the rest.
 
-    An effect that a scene lists several times has one row. Elements are those of a group, the
-    vertices that a hold may ever hold, else all vertices. The shares add up to one. The right-hand
-    side is what the compiled loop's local steps take in addition to the groups.
+    An effect that a scene lists several times has one row. ``elements`` is the number of elements
+    of a group, of vertices that a hold may ever fix, else of all vertices. The shares add up to
+    one. The right-hand side is the time of the compiled local pass outside of the groups.
 
     Parameters
     ----------
-    warmup, repeats : runs before the timed ones, and timed ones
+    warmup, repeats : numbers of unmeasured and of measured runs
     """
     questions = zip(_roles(scene), _QUESTIONS, strict=True)
     by_role: Any = [[Timed(effect, asked) for effect in role] for role, asked in questions]
@@ -176,7 +176,7 @@ def _roles(scene: Scene) -> tuple[Sequence[Effect], ...]:
 def _profile(
     loop: Stepper, scene: Scene, frames: int, stands: list[Timed], names: list[str]
 ) -> list[list[float]]:
-    """Milliseconds of each frame: total, then all phases."""
+    """Milliseconds of each frame: first the total, then all phases."""
     state, rows = scene.initial_state(), []
     for frame in range(frames):
         for stand in stands:
@@ -185,7 +185,7 @@ def _profile(
         own = [sum(stand.seconds for stand in stands if stand.name == name) for name in names]
         inside = sum(stand.kernel_seconds for stand in stands)
         total, (_, local, solve, _) = float(report.seconds.sum()), report.seconds.tolist()
-        # a loop outside compiled code asks the groups themselves
+        # without compiled local pass the groups are called directly: no time outside of them
         right = local - inside if inside > 0.0 else 0.0
         parts = [*own, right, solve, total - sum(own) - right - solve]
         rows.append([1e3 * part for part in (total, *parts)])
@@ -193,7 +193,7 @@ def _profile(
 
 
 def _elements(scene: Scene, name: str) -> int:
-    """Elements of the effects called ``name``."""
+    """Number of elements (or vertices) of the effects called ``name``, see `effect_costs`."""
     for group in scene.groups:
         if group.name == name:
             return group.elements
@@ -202,10 +202,10 @@ def _elements(scene: Scene, name: str) -> int:
 
 
 def left_out_sets(scene: Scene) -> list[tuple[str, ...]]:
-    """Effects to leave out in turn: none, every effect of a frame alone, all groups but one.
+    """Sets of effects to leave out: none, each effect on its own, all groups but one.
 
-    Empty for a scene with a single group: without it there is nothing to project. Effects of the
-    start, such as a kick, take no time of a frame.
+    Empty for a scene with a single group, which cannot be left out. Effects of the start, such as a
+    kick, cost no time in a frame and are never left out.
     """
     groups = scene.config.groups
     if len(groups) < 2:
@@ -220,10 +220,10 @@ def left_out_sets(scene: Scene) -> list[tuple[str, ...]]:
 def left_out(
     scene: Scene, costs: pd.DataFrame, frames: int, warmup: int, repeats: int, solver: str
 ) -> pd.DataFrame:
-    """Table of `LEFT_OUT`: time of the scene without some of its effects, built without them.
+    """Table of `LEFT_OUT`: times of the scene built without some of its effects.
 
-    ``own_ms`` is what the effects cost inside the whole scene (``costs``, see `effect_costs`).
-    ``frames``, ``warmup`` and ``repeats`` as there, ``solver`` is the name of the linear solver.
+    ``own_ms`` is the time of these effects in the complete scene (``costs``, see `effect_costs`).
+    ``frames``, ``warmup`` and ``repeats`` as there; ``solver`` names the linear solver.
     """
     sets = left_out_sets(scene)
     if not sets:
@@ -254,7 +254,7 @@ def _timed(y, rhs, record, part):
 
 
 def timed(kernel: LocalKernel) -> tuple[LocalKernel, np.ndarray]:
-    """A kernel that does the same, and the seconds (3,) that its parts and preparation took."""
+    """Return ``kernel`` with timers, and the seconds (3,) of its parts and its preparation."""
     seconds, clocks = np.zeros(PREPARE + 1), np.stack([clock() for _ in range(PREPARE + 1)])
     arrays = (seconds, clocks)
     places = [kernel.address, kernel.record.ctypes.data, *(array.ctypes.data for array in arrays)]

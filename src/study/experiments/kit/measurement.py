@@ -1,11 +1,11 @@
-"""Timings in one process, after a warm-up, with the compared variants in turn; medians count.
+"""Timings in one process, after a warm-up, with the compared variants in turn.
 
-A variant makes a step loop and its initial state. Every repeat runs each variant once, from there,
-so that drifts of the machine's clock hit all variants alike. Of each frame the repeat with the
-median time counts: an interruption hits one frame of one repeat, and is left out.
+A variant has a step loop and its initial state. Every repeat runs each variant once from there, so
+that changes of the processor's clock rate affect all variants alike. For each frame the repeat with
+the median time counts, which excludes interruptions: each affects one frame of one repeat.
 
-Where a process has its arrays and its code in memory changes its times by more than its repeats
-scatter. Only new processes show that (`in_processes`); a fork would inherit the places.
+The addresses of arrays and code in a process change its times by more than its repeats scatter.
+Only new processes show that (`in_processes`); a fork would inherit the addresses.
 """
 
 import logging
@@ -31,10 +31,10 @@ from study.experiments.kit.base import Count, Repeats
 T = TypeVar("T")
 log = logging.getLogger(__name__)
 
-# Times of a frame: the whole; prediction at its beginning, contacts and velocities at its end;
-# projections of all groups, and coefficients of reduced ones; product with S^T W, where an
-# implementation does it apart from the projections; from coefficients to the right-hand side; the
-# global step; the positions of all vertices, where the loop has other coordinates.
+# Times of a frame, in this order: total; prediction, contacts and velocities; projections of all
+# groups, and coefficients of reduced ones; product with S^T W, if an implementation separates it
+# from the projections; right-hand side from coefficients; global step; positions of all vertices
+# if the loop has other coordinates.
 PHASES = (
     "ms_per_frame", "inertia_ms", "local_ms", "assembly_ms", "lift_ms", "global_ms", "vertices_ms",
 )  # fmt: skip
@@ -50,7 +50,7 @@ class Protocol(ConfigModel):
 
 
 class Processes(Protocol):
-    """``processes`` that each time every run: ``frames``, ``warmup`` and ``repeats`` of each."""
+    """``processes`` that each time every run, with ``frames``, ``warmup`` and ``repeats``."""
 
     frames: Count = 4
     repeats: Repeats = 3
@@ -59,12 +59,12 @@ class Processes(Protocol):
 
 @dataclass(frozen=True)
 class Variant:
-    """A loop to time: labels for the table, the loop with its first state, and how many frames.
+    """A loop to time: labels for the table, the loop with its first state, and number of frames.
 
-    ``share`` is the part of a frame's iterations that the loop does; the times of the phases that
-    repeat with the iterations are divided by it. ``output`` makes the positions of all vertices
-    from the coordinates of a loop in a subspace, after every ``steps`` of its steps. ``starts`` are
-    pairs (state, number of the next step) from which as many steps are timed, one after the other,
+    ``share`` is the fraction of a frame's iterations that the loop does; the times of phases inside
+    the iterations are divided by it. ``output`` computes the positions of all vertices from the
+    coordinates of a loop in a subspace, after every ``steps`` of its steps. ``starts`` are pairs
+    (state, number of the next step); if given, ``steps`` steps are timed from each of them in turn,
     in place of the first ``frames``.
     """
 
@@ -79,14 +79,14 @@ class Variant:
 
 
 def measure(variants: Sequence[Variant], warmup: int, repeats: int) -> list[dict[str, Any]]:
-    """Time all variants; factorisations are cached by the first run, the warm-up.
+    """Time all variants; their first run, a warm-up, also factorises and caches matrices.
 
-    Returned are the labels of each, with its mean times per frame, in ms, of the median repeat of
-    each frame, by phase (`PHASES`).
+    Returns the labels of each variant with its times by phase (`PHASES`): means over the frames, in
+    ms, each frame from its median repeat.
 
     Parameters
     ----------
-    warmup, repeats : runs of each variant before the timed ones, and timed ones
+    warmup, repeats : numbers of unmeasured and of measured runs of each variant
     """
     samples: list[list[np.ndarray]] = [[] for _ in variants]
     for repeat in range(-warmup, repeats):
@@ -103,7 +103,7 @@ def measure(variants: Sequence[Variant], warmup: int, repeats: int) -> list[dict
 def measure_calls(
     calls: Mapping[Hashable, Callable[[], object]], warmup: int, repeats: int
 ) -> dict[Hashable, float]:
-    """Median time in ms of each of ``calls`` over the repeats, interleaved; ``warmup`` before."""
+    """Median time in ms of each of ``calls``, made in turn: ``warmup`` rounds, then repeats."""
     samples: dict[Hashable, list[float]] = {key: [] for key in calls}
     for _ in range(warmup + repeats):
         for key, call in calls.items():
@@ -114,7 +114,7 @@ def measure_calls(
 
 
 def clocked(made: Iterable[T]) -> Iterator[tuple[float, T]]:
-    """Every item of ``made`` with the processor time that it took to make, s."""
+    """Yield every item of ``made`` with the processor time for making it, s."""
     items = iter(made)
     while True:
         before = process_time()
@@ -126,7 +126,7 @@ def clocked(made: Iterable[T]) -> Iterator[tuple[float, T]]:
 
 
 def _time_once(variant: Variant) -> np.ndarray:
-    """Milliseconds of each frame that ran, by phase (`PHASES`)."""
+    """Milliseconds by phase (`PHASES`) of each frame, up to the first that is not finite."""
     loop, state, rows = variant.loop, variant.start, []
     frame = -1
     with np.errstate(over="ignore", invalid="ignore"):
@@ -155,10 +155,10 @@ def _time_once(variant: Variant) -> np.ndarray:
 
 
 def median_frames(samples: np.ndarray) -> np.ndarray:
-    """Mean over the frames of ``samples`` (repeats, frames, phases) at each one's median repeat.
+    """Mean over the frames of ``samples`` (repeats, frames, phases), each in its median repeat.
 
-    The median is that of the total, the first phase. The phases of one repeat belong together,
-    medians of each phase would not.
+    The median repeat of a frame is that of the total, the first phase. All phases of a frame are
+    from one repeat; medians of each phase would not add up to the total.
     """
     order = np.argsort(samples[:, :, 0], axis=0, kind="stable")[len(samples) // 2]
     return samples[order, np.arange(samples.shape[1])].mean(axis=0)
@@ -175,7 +175,7 @@ def in_processes(
     Raises
     ------
     PdromError
-        A process failed; the message ends with its last line.
+        A process failed; the message ends with the last line of its output.
     """
     rows: list[dict[str, Any]] = []
     with TemporaryDirectory() as folder:

@@ -1,4 +1,4 @@
-"""Reductions and bases from their files, errors of runs, and what is stored of them."""
+"""Load reductions and bases from their files, compute errors of runs, and store runs."""
 
 import os
 from collections.abc import Sequence
@@ -19,7 +19,7 @@ from study.artifact.paths import File
 def load_reduction(
     basis: Basis, sampling: str | os.PathLike[str], method: MethodSpec, r: int
 ) -> Reduction:
-    """Reduction of size r by ``method``, ``basis`` and the file ``sampling``, or StorageError."""
+    """Return the reduction of size r from ``basis`` and ``sampling``; else StorageError."""
     with open_hdf5(sampling) as file:
         store = file[f"r{r:04d}"]
         stored = Sampling(store["entries"][...], store["elements"][...])
@@ -27,7 +27,7 @@ def load_reduction(
 
 
 def basis_of(sampling: File, method: MethodSpec, bases: Sequence[File]) -> File:
-    """Basis among ``bases`` that ``method`` needs for the file ``sampling``; else StorageError."""
+    """Return the basis that ``method`` needs for the file ``sampling``; else StorageError."""
     wanted = {"scene": sampling["scene"], "group": sampling["group"], "basis": method.basis_id}
     for basis in bases:
         if basis.labels == wanted:
@@ -36,13 +36,13 @@ def basis_of(sampling: File, method: MethodSpec, bases: Sequence[File]) -> File:
 
 
 def run_error(run: np.ndarray, reference: np.ndarray) -> float | None:
-    """Relative error of a ``run`` against a ``reference``, positions (F + 1, N, 3) m of both."""
+    """Relative error of a ``run`` against a ``reference``, both positions (F + 1, N, 3) m."""
     difference = np.linalg.norm((run - reference)[1:].reshape(len(run) - 1, -1), axis=1)
     return trajectory_error(difference, displacement_norms(reference))
 
 
 def store_end(store: h5py.Group, outcome: Rerun, with_positions: bool = True) -> None:
-    """Store where a run ended, and in single precision what is drawn of it."""
+    """Store the blow-up frame, the largest extent and, in single precision, positions of a run."""
     blowup = -1 if outcome.blowup_frame is None else outcome.blowup_frame
     store.attrs.update(blowup_frame=blowup, max_extent=outcome.max_extent)
     if with_positions:

@@ -39,7 +39,7 @@ Names = tuple[str, ...]
 Ranks = tuple[Annotated[int, Field(ge=0)] | Literal["full"], ...]  # full: the numerical rank
 Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
 Instants = Annotated[tuple[Fraction, ...], Field(min_length=1)]  # fractions of a run's length
-Columns = Annotated[int, Field(ge=1, le=6)]  # panels side by side
+Columns = Annotated[int, Field(ge=1, le=6)]  # number of panels in a row
 Count = Annotated[int, Field(ge=1, le=12)]  # number of modes or iterations
 AZIMUTH = 30.0  # azimuth of every camera, degrees
 
@@ -49,7 +49,7 @@ class NothingToDraw(Exception):
 
 
 class Options(ConfigModel):
-    """Options of a figure without choices; subclasses add keys.
+    """Options that all figures have: none; subclasses add keys.
 
     Chosen names that the configuration lacks are not drawn. An empty list of names, or a list whose
     names are all absent, selects everything in the configuration.
@@ -86,7 +86,7 @@ class Methods(Scenes):
 
 
 class View(Methods):
-    """Options: elevation of the camera, degrees; up is opposite to the gravity of a scene."""
+    """Options: elevation of the camera, degrees; up in the picture is opposite to gravity."""
 
     elevation: Annotated[float, Field(ge=-90.0, le=90.0)] = 20.0
 
@@ -164,7 +164,7 @@ class Reduction(_Plain):
 
 
 class Drawn(_Plain):
-    """Part of a study that a figure draws: experiments and methods selected by its options.
+    """The experiments and methods of a study that a figure draws, selected by its options.
 
     experiments, reductions : selected experiments, and methods by name, in the requested order
     groups : all constraint groups of the model, whose order decides their colours
@@ -292,8 +292,8 @@ def figure(
 ) -> Callable[[Callable[..., Figure]], Declaration]:
     """Return a decorator that declares a function, called with ``options`` and inputs, as a figure.
 
-    A function with a parameter ``drawn`` also gets the part of the study selected by the options.
-    Line breaks in the caption count as blanks.
+    If the function has a parameter ``drawn``, it also gets the experiments and methods selected by
+    the options. Line breaks in the caption count as blanks.
 
     Raises
     ------

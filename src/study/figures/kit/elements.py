@@ -107,8 +107,8 @@ def element_map(group: str, mesh: Mesh, elements: int, source: str) -> ElementMa
     Raises
     ------
     StorageError
-        If ``group`` is no constraint group, or the mesh has another number of elements than the
-        file ``source`` says.
+        If ``group`` is no constraint group, or ``mesh`` has another number of elements than
+        ``elements``, the number in the file ``source``.
     ConfigurationError
         If no effect has the name ``group``.
     """

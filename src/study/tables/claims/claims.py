@@ -193,7 +193,7 @@ VARIED = ("threshold", "share", "margin", "sizes", "splits", "scenes")
 FRAGILE = 0.01
 _Rows = list[pd.DataFrame]
 _Keep = Callable[[pd.Series], pd.Series]
-_Variation = tuple[str, str, Sequence[TestRule], _Rows]  # what varies, how, the tests, their rows
+_Variation = tuple[str, str, Sequence[TestRule], _Rows]  # kind, label, changed tests, their rows
 
 
 @declare(

@@ -1,4 +1,4 @@
-"""Metrics of claims: functions that give a number and labels for chosen rows of a table."""
+"""Metrics of claims: functions that return a number and labels for selected rows of a table."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -163,7 +163,7 @@ def noise_error(rows: pd.DataFrame, accuracy: float) -> pd.Series:
 def position_basis_ratio(rows: pd.DataFrame, accuracy: float) -> pd.DataFrame:
     """Error with the POD position basis over that with the skinning basis at equal k, per scene.
 
-    Pairs in which both errors exceed ``accuracy`` are left out: their ratio means nothing.
+    Pairs in which both errors exceed ``accuracy`` are left out, as their ratio is meaningless.
     """
     kinds = [rows[rows.position_basis == kind] for kind in ("pod", "skinning")]
     pod, skinning = (rows.set_index(["scene", "k"])[_ERROR] for rows in kinds)

@@ -37,10 +37,10 @@ class TestRule(ConfigModel):
     metric : name in `METRICS`
     where : column -> allowed values
     accuracy : largest error of a run that counts as accurate, for metrics that depend on it
-    margin : a ratio of times that differs from the threshold by less than this factor decides
-        nothing, see `factor`
-    share : fraction of the rows that must agree: the test holds if so many satisfy the comparison,
-        does not hold if so many violate it, and depends otherwise
+    margin : a ratio of times that differs from the threshold by less than this factor does not
+        decide, see `factor`
+    share : fraction of rows that must agree: the test holds if at least this fraction satisfies the
+        comparison, does not hold if it violates it, and depends otherwise
     by : column for whose values a verdict "depends" counts the rows separately
     """
 
@@ -108,8 +108,8 @@ class ClaimRule(ConfigModel):
     section, shown : section and figures of the preprint
     qualifiers : conditions that a fair test has to respect
     published : tests on the preprint's own variants and scenes
-    beyond : tests on sound variants and well-posed scenes; where none decides, whether the claim
-        carries over is not tested
+    beyond : tests on sound variants and well-posed scenes; if none of them decides, the verdict
+        beyond the preprint is "not tested"
     changes : history of the rules, oldest first
     """
 
@@ -155,8 +155,8 @@ def load_claims(path: Path, added: Added = NONE_ADDED) -> dict[str, ClaimRule]:
 
     Parameters
     ----------
-    added : name of a set in the file -> values that a study appends to it, for scenes that the
-        rules were not written for
+    added : name of a set in the file -> values that a study appends to it, for scenes that the file
+        does not list
 
     Raises
     ------

@@ -181,7 +181,7 @@ def shared(names: str) -> list[Column]:
     return [by_name[name] for name in names.split()]
 
 
-# Function of a table and the project files it reads (by name): timed columns of each row.
+# Function of a table and of the project files it reads; returns the timed columns of each row.
 TimedCells = Callable[..., Sequence[Collection[str]]]
 
 

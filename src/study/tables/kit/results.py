@@ -1,9 +1,8 @@
-"""Rows of experiment results in comparable times, runs of reduced_reruns, medians over motions.
+"""Experiment results on a common time scale, runs of reduced_reruns, and medians over motions.
 
 Each job times the full-order run of its scene together with the variants, but machine speed differs
-between jobs. All times of a job are multiplied by the time of the full-order run in the table
-frame_times over its time in the job, so that this run has the same time everywhere. Ratios of times
-within a job do not change.
+between jobs. All times of a job are therefore multiplied by one factor: the time of the full-order
+run in the table frame_times over its time in the job. Ratios of times within a job do not change.
 
 Errors over held-out motions are summarised by their median, as fixed in config/claims.yaml.
 """
@@ -29,7 +28,7 @@ COLUMNS = (
     integer(COUNT, "held-out motions that were run, can be judged and are far enough"),
     number("playback_error", "median error of playback on these motions, see reduced_reruns"),
 )
-# A held-out motion is a test only where playback has a larger error than this.
+# A held-out motion is used as a test only if the error of playback exceeds this value.
 FAR = 0.3
 _WHOLE = {"k": "Int64", "r": "Int64"}
 EXPERIMENT = ["scene", "group"]
@@ -90,7 +89,7 @@ def median_interval(values: Sequence[float] | np.ndarray) -> tuple[float, float,
 
 
 def in_words(median: float, low: float, high: float) -> str:
-    """Text with the ``median`` and the interval from ``low`` to ``high``."""
+    """Text with the ``median`` and the interval from ``low`` to ``high``, rounded."""
     return f"{_rounded(median)} ({_rounded(low)} to {_rounded(high)})"
 
 
@@ -113,9 +112,9 @@ def trained(reruns: pd.DataFrame) -> pd.DataFrame:
 def over_motions(reruns: pd.DataFrame, keys: Sequence[str] = KEYS) -> pd.DataFrame:
     """Median, least and largest error of each run over its held-out motions, and their number.
 
-    A run that ended before the horizon has an infinite error. Sizes above the numerical rank, which
-    cannot run, and motions whose horizon is frame 0 or that playback nearly meets (`FAR`) are left
-    out.
+    A run that ended before the horizon has an infinite error. Left out are sizes above the
+    numerical rank, which cannot run, and motions with the horizon in frame 0 or with an error of
+    playback of at most `FAR`.
 
     Parameters
     ----------
@@ -135,7 +134,7 @@ def over_motions(reruns: pd.DataFrame, keys: Sequence[str] = KEYS) -> pd.DataFra
 
 
 def with_held_out(runs: pd.DataFrame, reruns: pd.DataFrame) -> pd.DataFrame:
-    """``runs`` with the columns of `over_motions` of ``reruns``, empty where it lacks the run."""
+    """Join ``runs`` with the columns of `over_motions` of ``reruns``, empty for runs it lacks."""
     own = runs.astype(_WHOLE).drop(columns="playback_error", errors="ignore")
     return own.merge(over_motions(reruns), on=KEYS, how="left")
 
@@ -143,7 +142,7 @@ def with_held_out(runs: pd.DataFrame, reruns: pd.DataFrame) -> pd.DataFrame:
 def judged_runs(reruns: pd.DataFrame, reconstruction: pd.DataFrame) -> pd.DataFrame:
     """Training-motion runs of sampled methods with unreduced positions and a sufficient basis.
 
-    A basis suffices where the run with orthogonal projection has an error of at most `FAILED`. The
+    A basis suffices if the run with orthogonal projection has an error of at most `FAILED`. The
     result has the columns of ``reruns`` and
 
     gain : gain of the reduction

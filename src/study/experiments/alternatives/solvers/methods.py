@@ -1,7 +1,7 @@
 """Projective dynamics in substeps: K iterations in each of n steps (Macklin et al. 2019: K = 1).
 
-Methods: plain, with Anderson acceleration (`pdrom.model.dynamics.acceleration`), with a coarse
-level for it, with Chebyshev's semi-iteration (Wang 2015, alg. 1), and explicit integration.
+Methods: plain, with Anderson acceleration (`pdrom.model.dynamics.acceleration`), the latter with a
+coarse level, with Chebyshev's semi-iteration (Wang 2015, alg. 1), and explicit integration.
 """
 
 from dataclasses import dataclass
@@ -29,15 +29,15 @@ from study.experiments.alternatives.solvers.substeps import (
 from study.experiments.kit.base import followed
 
 WINDOW = 5  # number of differences of earlier iterates, as in Peng et al. 2018
-# The estimated rate of the plain iteration, and the number of iterations before extrapolation. Both
-# are set by hand, as in Wang 2015: of five rates this one does best on the motions of both sheets
-# in the comparison, which favours the method. A rate measured from the first iterates does worse.
+# Estimated convergence rate of the plain iteration, and number of plain iterations before the
+# extrapolation. Both are set by hand, as in Wang 2015: of five rates this is best on both sheets
+# of the comparison, which favours the method. A rate measured from the first iterates is worse.
 RATE = 0.98
 PLAIN = 5
 
 
 class SmallSteps(Alternative):
-    """The local/global iteration for all groups, with the system matrix of a substep."""
+    """Plain local/global iteration for all groups, with the system matrix of a substep."""
 
     name = "projective"
 
@@ -88,14 +88,14 @@ def _anderson(
             objective = add_projections(tables, y, rhs) + inertia_energy(y, s, inertia)
             if not refuse(history, y, objective):
                 sweep(panels, vertices, loads, work, rhs, y)
-                # the last image is not extrapolated: its objective is known not to rise
+                # the last image is not extrapolated, so that its objective cannot rise
                 if k < iterations - 1:
                     combine(history, y)
         end(y, before, step, v)
 
 
 class Chebyshev(Alternative):
-    """Extrapolates each plain iterate from the iterate before the last, by a growing weight."""
+    """Chebyshev's semi-iteration: extrapolates from the second-last iterate, weights vary."""
 
     name = "chebyshev"
 
@@ -131,16 +131,16 @@ def _chebyshev(
         end(y, before, step, v)
 
 
-INNER = 10  # iterations in the span, with Anderson acceleration
+INNER = 10  # iterations on the coarse level, with Anderson acceleration
 
 
 class TwoLevel(Alternative):
     """Anderson acceleration with a coarse level: the subspace of a ``model`` of the scene.
 
-    A plain iteration is slow for deformations that are stiff in the system matrix A and soft in the
-    objective. Its image G(y) is therefore corrected in the span of columns V with V^T A V = 1: the
-    component g = V^T A (G(y) - y) of its step is replaced by the step z that minimises the
-    objective of y + V z, in which sampled elements stand for all elements. This is the full
+    The plain iteration converges slowly for deformations that are stiff in the system matrix A and
+    soft in the objective. Its image G(y) is therefore corrected in the span of columns V with V^T A
+    V = 1: the component g = V^T A (G(y) - y) of its step is replaced by the step z that minimises
+    the objective of y + V z, in which sampled elements stand for all elements. This is the full
     approximation scheme (Brandt 1977) with one additive smoothing step: -g is the exact gradient in
     the span, so that z = g = 0 where y solves the frame, whatever the samples are. The corrected
     map is accelerated; an iterate that raises the objective is replaced by the last image without
@@ -207,7 +207,7 @@ def _two_level(
         for k in range(iterations):
             rhs[:] = base
             objective = add_projections(tables, y, rhs) + inertia_energy(y, s, inertia)
-            # a corrected image may raise the objective, even the first one
+            # even the first corrected image may raise the objective
             if refuse(history, y, objective, 0):
                 y[:] = plain
                 continue
@@ -221,7 +221,7 @@ def _two_level(
 
 @compiled(nogil=True)
 def _correct(coarse, start, image):
-    """Replace the step from ``start`` to ``image`` in the span by the sampled minimiser's step."""
+    """Replace the component of ``image - start`` in the span by the step to the sampled minimum."""
     span, duals, rows, steps, inverse, vertices, tables, history = coarse
     size, sampled = WIDTH * span.shape[1], WIDTH * len(vertices)
     step, x, at_start = np.zeros(size), np.empty(sampled), np.zeros(sampled)
@@ -249,7 +249,7 @@ def _correct(coarse, start, image):
 
 @compiled(nogil=True)
 def _add_product(matrix, x, out):
-    """Add ``matrix`` (m, n) times ``x``, n rows of four, to ``out``, m rows of four, all flat."""
+    """Add ``matrix`` (m, n) times ``x`` (n rows of four) to ``out`` (m rows of four), both flat."""
     m, n = matrix.shape
     numbers = matrix.reshape(-1)
     for i in range(m):
@@ -267,10 +267,10 @@ UNSTABLE = 1e100  # m; a run that is larger, or not finite, is called unstable
 
 
 class Explicit(Alternative):
-    """Position Verlet for all groups: half a drift, a kick, half a drift; no ``iterations``.
+    """Position Verlet for all groups: half a drift, a kick, half a drift; ``iterations`` is unused.
 
-    Of second order and symplectic (Tuckerman et al. 1992), with one evaluation of the forces a
-    substep. Stable while the substep is shorter than 2 / omega of the stiffest mode.
+    Second order and symplectic (Tuckerman et al. 1992), with one force evaluation per substep.
+    Stable while the substep is shorter than 2 / omega of the stiffest mode.
     """
 
     name = "explicit"
@@ -280,7 +280,7 @@ class Explicit(Alternative):
         for group in scene.groups:
             total = total + group.system_matrix()
         total.sort_indices()
-        # S^T W S of all groups, as `_multiply` takes it
+        # sum of S^T W S over all groups, as CSR arrays for `_multiply`
         self._stiffness = *(i.astype(np.int32) for i in (total.indptr, total.indices)), total.data
 
     def _advance(self, part: Substeps) -> None:
@@ -314,7 +314,7 @@ def _explicit(y, v, acceleration, step, substeps, inverse, tables, stiffness):
 
 @compiled(nogil=True)
 def _multiply(matrix, y, out):
-    """Overwrite ``out`` by the matrix (CSR) times ``y``, both padded vectors, flat."""
+    """Write the product of the ``matrix`` (CSR) and ``y`` to ``out``, both padded vectors, flat."""
     indptr, indices, data = matrix
     for i in range(len(indptr) - 1):
         total = constant(0.0)
@@ -325,7 +325,7 @@ def _multiply(matrix, y, out):
 
 @dataclass(frozen=True)
 class Continuous:
-    """Positions (F + 1, N, 3) m at the ends of frames, the initial ones first.
+    """Result of `continuous`: positions (F + 1, N, 3) m at the ends of frames, initial ones first.
 
     error : estimate of || Q - Q_exact || / || Q - Q_0 ||, from the change by the last halving
     substeps : number of explicit steps of a frame
@@ -339,7 +339,7 @@ class Continuous:
 def continuous(
     scene: Scene, frames: int, tolerance: float, substeps: int, limit: int
 ) -> Continuous:
-    """Run ``frames`` of ``scene`` by explicit steps, halved until the error is small.
+    """Run ``frames`` of ``scene`` by explicit steps, halving the step until the error is small.
 
     Parameters
     ----------
@@ -352,9 +352,9 @@ def continuous(
         after = followed(Explicit(scene, substeps), start, frames)
         if before is not None:
             change = _change(before, after)
-            # Richardson's estimate of the remaining error: a third of the last change where changes
-            # fall to a quarter, as with a method of second order; the whole change where they do
-            # not fall to a half, because the motion is not smooth or not yet resolved
+            # Richardson's estimate of the remaining error: a third of the last change if changes
+            # fall to a quarter, as in a method of second order; the whole change if they do not
+            # even fall to a half, because the motion is not smooth or not yet resolved
             ratio = last / change if change > 0.0 and np.isfinite(last) else 1.0
             error = change / min(max(ratio - 1.0, 1.0), 3.0)
             if error <= tolerance or 2 * substeps > limit:
@@ -364,7 +364,7 @@ def continuous(
 
 
 def _change(before: np.ndarray, after: np.ndarray) -> float:
-    """Relative change of a run; inf if one of them is unstable."""
+    """Relative change between two runs; inf if one of them is unstable."""
     if not max(np.abs(before).max(), np.abs(after).max()) < UNSTABLE:
         return float("inf")
     difference, moved = np.linalg.norm(after - before), np.linalg.norm(after - after[0])

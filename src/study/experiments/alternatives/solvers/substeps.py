@@ -1,8 +1,8 @@
 """A frame in equal substeps, with the same fixed vertices and contacts as in the step loop.
 
 The potential energy of all groups, W(y) = sum_j 1/2 sum_e w_e |S_e y - p_e(y)|^2, has the gradient
-S^T W S y - S^T W p(y): p is the nearest point of the manifold, so that its derivative is tangential
-and drops out (Bouaziz et al. 2014, sect. 3).
+S^T W S y - S^T W p(y): p is the nearest point of the manifold, so that the derivative of p is
+tangential and drops out (Bouaziz et al. 2014, sect. 3).
 """
 
 from abc import abstractmethod
@@ -36,7 +36,7 @@ METHODS = Registry(
 
 
 class Substeps(NamedTuple):
-    """Arguments of the compiled loops over some substeps of a frame, in their order.
+    """Arguments of the compiled loops over substeps of a frame, in the order of their signatures.
 
     y, v : positions m and velocities m/s as padded vectors, flat; changed in place
     acceleration : (3,) m/s^2
@@ -56,17 +56,17 @@ class Substeps(NamedTuple):
 
 
 class Alternative(Stepper):
-    """A frame of length h in ``substeps`` steps of ``iterations`` each.
+    """Base class of methods that divide a frame into ``substeps`` steps of ``iterations`` each.
 
     A handle moves at constant speed during a frame, whatever the number of substeps; contacts act
-    at the end of the frame, as in the step loop. Groups freeze their data once a frame, at its
-    beginning. Loops with equal substeps may share a factored ``system``. `METHODS` has all classes.
+    at the end of the frame, as in the step loop. Groups freeze their data when a frame begins.
+    Loops with equal substeps may share a factored ``system``. `METHODS` lists all classes.
 
     Raises
     ------
     SceneError
-        A force that depends on the motion (it would have to be evaluated in every substep), or a
-        group without a compiled local step.
+        A force other than gravity (if it depends on the motion, every substep would have to
+        evaluate it), or a group without a compiled local step.
     """
 
     name: ClassVar[str]
@@ -88,18 +88,18 @@ class Alternative(Stepper):
         self.substeps = substeps
         self.masses = scene.masses
         kernels = [group.local_kernel for group in scene.groups if group.local_kernel is not None]
-        # the kernels own the memory to which the tables point
+        # the tables point to memory of the kernels, which must therefore stay alive
         self._kernels = local = LocalPass(kernels)
         self.tables = local.first, local.preparing, local.second
         self._prepare(scene)
 
     def _prepare(self, scene: Scene) -> None:
-        """Make the data that the method uses in all frames; nothing by default."""
+        """Prepare data that the method uses in all frames; nothing by default."""
 
     def step(
         self, state: State, frame: int, on_last_iterate: Callable[[np.ndarray], None] | None = None
     ) -> tuple[State, FrameReport]:
-        """Do ``frame`` from ``state``; no objective, and no iterate for ``on_last_iterate``."""
+        """Advance ``state`` by ``frame``, without objective and calls of ``on_last_iterate``."""
         started = perf_counter()
         q = state.positions
         fixed, targets = self.space.fixed(frame, q)
@@ -118,7 +118,7 @@ class Alternative(Stepper):
                     *(self.iterations, fixed, now),
                 )
             )
-        # vertices that a contact moves get their mean velocity over the frame
+        # vertices moved by a contact get their mean velocity over the frame
         free = positions.copy()
         self.space.correct(positions, q, frame)
         moved = (positions != free).any(axis=1)
@@ -132,10 +132,10 @@ class Alternative(Stepper):
 
     @abstractmethod
     def _advance(self, part: Substeps) -> None:
-        """Do the substeps; positions and velocities change in place."""
+        """Advance positions and velocities over these substeps, in place."""
 
     def _factor(self, part: Substeps) -> Factor:
-        """Factor of the system matrix without the fixed vertices, as `sweep` takes it."""
+        """Factor of the system matrix without the fixed vertices, in the format of `sweep`."""
         elimination = self.space.eliminate(part.fixed, part.targets)
         assert isinstance(elimination, Elimination)
         assert elimination.factor is not None
@@ -146,14 +146,14 @@ class Alternative(Stepper):
 def begin(y, v, acceleration, step, fixed, targets, before, s):
     """Begin a substep of an implicit method at its prediction s = y + step v + step^2 a.
 
-    ``before`` receives the positions; fixed vertices of ``s`` and ``y`` go to their targets.
+    ``before`` receives the old positions; fixed vertices of ``s`` and ``y`` move to their targets.
 
     Parameters
     ----------
     y, v : padded positions m and velocities m/s, flat
     acceleration : (3,) m/s^2
-    step : s
-    fixed, targets : fixed vertices (n,) and their positions at the end (n, 3) m
+    step : length of the substep, s
+    fixed, targets : fixed vertices (n,) and their positions (n, 3) m at the end of the substep
     """
     for i in range(len(y) // WIDTH):
         for axis in range(3):
@@ -169,14 +169,14 @@ def begin(y, v, acceleration, step, fixed, targets, before, s):
 
 @compiled(nogil=True)
 def end(y, before, step, v):
-    """Set velocities ``v`` from the positions ``before`` and ``y`` at both ends of a ``step``."""
+    """Set velocities ``v`` from ``before`` and ``y``, positions at both ends of a ``step``."""
     for k in range(len(y)):
         v[k] = (y[k] - before[k]) / step
 
 
 @compiled(nogil=True)
 def add_projections(tables, y, rhs):
-    """Add S^T W p(y) of all groups to ``rhs``, both padded, flat; return the energy W(y).
+    """Add S^T W p(y) of all groups to ``rhs`` (padded and flat, as ``y``); return the energy W(y).
 
     ``tables`` are `first`, `preparing` and `second` of a `LocalPass` of the groups.
     """
