@@ -13,14 +13,14 @@ import pytest
 from places import ROOT
 
 LIMITS = {
-    "lines of src": 36_385,
-    "modules of src": 216,
-    "lines of tests": 24_863,
+    "lines of src": 35_985,
+    "modules of src": 215,
+    "lines of tests": 24_061,
     "words of documentation": 24_564,
     "tables": 25,
     "figures": 23,
     "experiments": 19,
-    "percent of src in decorators, signatures and imports": 18.74,
+    "percent of src in decorators, signatures and imports": 18.40,
 }
 PAGES = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "config/README.md", "docs/**/*.md")
 
