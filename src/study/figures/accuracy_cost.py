@@ -200,20 +200,20 @@ def handles(found: TradeOffs) -> list[Block]:
 
 @figure(
     title="What accuracy costs in time",
-    caption="""Error within the horizon against the time per frame of every reduced model, and of
-    the full-order run with fewer iterations $K$; both against the scene's own full-order run, whose
-    time is the vertical line. A colour is a family of models, a marker one of its members (one for
-    all tolerances; hollow: in a subspace of skinning weights), a line the best trade-offs within
-    the family: further down and further left is better. The horizontal line is the full-order run's
-    own error, against the converged one: errors below it cannot be seen. Arrows on the rim are
-    errors outside the axis, crosses runs that blew up. Below, a scene for each other constraint
-    group.""",
     reads={"table": TableOf("accuracy_cost"), "runs": TableOf("reduced_reruns")},
 )
 def accuracy_cost(
     options: Methods, drawn: Drawn, table: pd.DataFrame, runs: pd.DataFrame
 ) -> Figure:
-    """Draw the first scene in a large panel, and below it one scene per other constraint group."""
+    """Error within the horizon against the time per frame of every reduced model, and of the
+    full-order run with fewer iterations $K$; both against the scene's own full-order run, whose
+    time is the vertical line. A colour is a family of models, a marker one of its members (one for
+    all tolerances; hollow: in a subspace of skinning weights), a line the best trade-offs within
+    the family: further down and further left is better. The horizontal line is the full-order run's
+    own error, against the converged one: errors below it cannot be seen. Arrows on the rim are
+    errors outside the axis, crosses runs that blew up. Below, a scene for each other constraint
+    group.
+    """
     found, (first, *rest) = trade_offs(drawn, table, runs)
     groups = {}  # scene -> group in words
     for scene in (first, *rest):
@@ -288,18 +288,15 @@ TRAINED = {
 BARE = "the same without the vertices"
 
 
-@figure(
-    title="Alternatives to projective dynamics",
-    caption="""Error of whole trajectories against the implicit step solved to convergence, over the
-    time per frame with the positions of all vertices, on the first held-out motion. Black: the best
+@figure(title="Alternatives to projective dynamics", reads={"table": TableOf("alternatives")})
+def alternatives(options: Scenes, table: pd.DataFrame) -> Figure:
+    r"""Error of whole trajectories against the implicit step solved to convergence, over the time
+    per frame with the positions of all vertices, on the first held-out motion. Black: the best
     points of all full-order methods, whose settings are the grey dots. Colours: the best points of
     the reduction (ecsw) trained on frames of one motion or of several; dotted: without the time of
-    the vertices. Dashed: playback of the training recording, which takes no time.
-    $\\times 100$: the same scene with stiffer weights. Errors outside are drawn on the rim.""",
-    reads={"table": TableOf("alternatives")},
-)
-def alternatives(options: Scenes, table: pd.DataFrame) -> Figure:
-    """Draw a panel per scene, mesh and stiffness."""
+    the vertices. Dashed: playback of the training recording, which takes no time. $\times 100$: the
+    same scene with stiffer weights. Errors outside are drawn on the rim.
+    """
     table = options.rows(table[table.motion == FIRST])
     cases = list(table.groupby(["scene", "vertices", "stiffness"]))
     if not cases:
@@ -356,14 +353,14 @@ def best_points(rows: pd.DataFrame, error: str) -> pd.DataFrame:
 
 @figure(
     title="Requested tolerances and errors reached",
-    caption="""A dot for each scene and held-out motion. Left: the error that a run reached against
-    the tolerance that was requested; dots of met tolerances above their line are broken. Right: its
-    time over that of a frame with the scene's own iterations, checks and failed levels included.
-    What lies outside is drawn on the rim.""",
     reads={"table": TableOf("requested_tolerances")},
 )
 def requested_tolerances(options: Options, table: pd.DataFrame) -> Figure:
-    """Draw errors (left) and relative times (right) against the requested tolerances."""
+    """A dot for each scene and held-out motion. Left: the error that a run reached against the
+    tolerance that was requested; dots of met tolerances above their line are broken. Right: its
+    time over that of a frame with the scene's own iterations, checks and failed levels included.
+    What lies outside is drawn on the rim.
+    """
     table = table[table.error.notna()]
     if table.empty:
         raise NothingToDraw("no tolerance was requested")

@@ -49,18 +49,15 @@ class BreakEven(Methods):
     columns: Columns = 3
 
 
-@figure(
-    title="Where the time of a frame goes",
-    caption="""Share of the local step and of the global solve in the time of a full-order frame,
-    for three implementations of the same local step. The printed number is the share of the local
-    step, that is of both shades of orange: the projections and the right-hand side that is
-    assembled from them, in one pass where they are compiled. The dashed line is the 70 % of claim
-    C1; beside the bar stands the time per frame. An interpreted loop confirms the claim everywhere,
-    compiled code only where projections are expensive.""",
-    reads={"table": TableOf("local_share")},
-)
+@figure(title="Where the time of a frame goes", reads={"table": TableOf("local_share")})
 def local_share(options: Scenes, drawn: Drawn, table: pd.DataFrame) -> Figure:
-    """Draw a panel per implementation, a bar per scene with the time per frame at its end."""
+    """Share of the local step and of the global solve in the time of a full-order frame, for three
+    implementations of the same local step. The printed number is the share of the local step, that
+    is of both shades of orange: the projections and the right-hand side that is assembled from
+    them, in one pass where they are compiled. The dashed line is the 70 % of claim C1; beside the
+    bar stands the time per frame. An interpreted loop confirms the claim everywhere, compiled code
+    only where projections are expensive.
+    """
     scenes = drawn.scenes_of(table, "no timings")
     present = set(table[table.scene.isin(scenes)].implementation)
     implementations = [i for i in TITLES if i in present]
@@ -100,16 +97,13 @@ def _draw_bars(ax: Axes, rows: pd.DataFrame, scenes: list[str]) -> None:
     ax.tick_params(axis="y", length=0)
 
 
-@figure(
-    title="Cost against mesh size",
-    caption="""Time of one local/global iteration against the number of vertices: the full-order
-    run, the same with only the local step reduced, and the hyper-reduced run in a position
-    subspace, with the positions of all vertices as a line of its own. Beside the ends of curves
-    stands the exponent of a fitted power law, where there are three sizes of the mesh or more.""",
-    reads={"table": TableOf("scaling")},
-)
+@figure(title="Cost against mesh size", reads={"table": TableOf("scaling")})
 def scaling(options: Scenes, drawn: Drawn, table: pd.DataFrame) -> Figure:
-    """Draw a panel per scene with the times of an iteration and its phases over the mesh size."""
+    """Time of one local/global iteration against the number of vertices: the full-order run, the
+    same with only the local step reduced, and the hyper-reduced run in a position subspace, with
+    the positions of all vertices as a line of its own. Beside the ends of curves stands the
+    exponent of a fitted power law, where there are three sizes of the mesh or more.
+    """
     asked = options.scenes or tuple(dict.fromkeys(table.scene))
     scenes = [scene for scene in asked if (table.scene == scene).any()]
     if not scenes:
@@ -158,16 +152,13 @@ def _draw_times(ax: Axes, rows: pd.DataFrame) -> None:
             )  # fmt: skip
 
 
-@figure(
-    title="When a reduced local step stops paying",
-    caption="""Time of the reduced local step over that of the full one, both compiled and on one
-    thread, against the number $r$ of basis vectors; one line per scene and method, timed alone on
-    states of the full-order run. Above the dashed line the reduction costs more than all
-    projections. Lines end at the numerical rank.""",
-    reads={"table": TableOf("breakeven")},
-)
+@figure(title="When a reduced local step stops paying", reads={"table": TableOf("breakeven")})
 def break_even(options: BreakEven, drawn: Drawn, table: pd.DataFrame) -> Figure:
-    """Draw a panel per constraint group, a line per scene and method, and the break-even line."""
+    """Time of the reduced local step over that of the full one, both compiled and on one thread,
+    against the number $r$ of basis vectors; one line per scene and method, timed alone on states of
+    the full-order run. Above the dashed line the reduction costs more than all projections. Lines
+    end at the numerical rank.
+    """
     table = drawn.rows(table)
     table = table[table.factor == 1.0]
     if table.empty:
@@ -197,17 +188,17 @@ def break_even(options: BreakEven, drawn: Drawn, table: pd.DataFrame) -> Figure:
 
 @figure(
     title="What each effect contributes",
-    caption="""Left: norm of the force of each effect on the free vertices over the frames of a
-    scene (of a hold: on the vertices that it holds). Right: how far the run moves when an effect is
-    left out, before the horizon; the grey bar ends at the sensitivity floor, below which nothing
-    can be told from round-off. Open markers lie below the floor, at the left edge where nothing
-    changes at all. The only group of a scene cannot be left out.""",
     reads={"table": TableOf("effects_cost"), "contributions": EachOf(CONTRIBUTIONS, "experiments")},
 )
 def effects_contribution(
     options: Scenes, drawn: Drawn, table: pd.DataFrame, contributions: list[File]
 ) -> Figure:
-    """Draw forces over time for a few scenes (left), and drifts of all scenes (right)."""
+    """Left: norm of the force of each effect on the free vertices over the frames of a scene (of a
+    hold: on the vertices that it holds). Right: how far the run moves when an effect is left out,
+    before the horizon; the grey bar ends at the sensitivity floor, below which nothing can be told
+    from round-off. Open markers lie below the floor, at the left edge where nothing changes at all.
+    The only group of a scene cannot be left out.
+    """
     table = table.dropna(subset=["force"])
     scenes = drawn.scenes_of(table, "no contributions of effects")
     rows = table[table.scene.isin(scenes)]
@@ -270,19 +261,12 @@ def _draw_moved(ax: Axes, rows: pd.DataFrame, scenes: list[str], looks: Looks) -
     style.grid(ax)
 
 
-@figure(
-    title="What each effect costs",
-    caption="""Left: share of each effect in the time of a full-order frame, which is printed beside
-    the bar. Right: the frame of one scene built without some of its effects; the tick is the whole
-    less what these effects cost in it. A bar that ends at the tick pays nothing for what the scene
-    does not list.""",
-    reads={"table": TableOf("effects_cost")},
-)
+@figure(title="What each effect costs", reads={"table": TableOf("effects_cost")})
 def effects_cost(options: Scenes, drawn: Drawn, table: pd.DataFrame) -> Figure:
-    """Draw a bar per scene, divided by effect; on the right one scene without some of its effects.
-
-    On the right, a tick marks the time of the whole scene minus the time of the missing effects in
-    it. A bar that ends at its tick shows that effects which a scene lacks cost it no time.
+    """Left: share of each effect in the time of a full-order frame, which is printed beside the
+    bar. Right: the frame of one scene built without some of its effects; the tick is the whole less
+    what these effects cost in it. A bar that ends at the tick pays nothing for what the scene does
+    not list.
     """
     costs, removed = table.dropna(subset=["share"]), table.dropna(subset=["without_ms"])
     removed = removed.sort_values("effect", key=lambda name: name != NOTHING, kind="stable")

@@ -24,11 +24,6 @@ _KEYS = ["scene", "group", "method", "r"]
 
 @figure(
     title="Error of the run against the gain",
-    caption="""Left: every run of a sampled method whose basis suffices (the orthogonal projection
-    does not fail at the same size), over all scenes and sizes. Dashed: the error from which on a
-    run counts as failed. Arrows on the rim lie outside the axes. Crosses: range and median over
-    runs, in some scenes, that are trained on as many resampled frames. Right: how many of them
-    failed, by decade of the gain.""",
     reads={
         "reruns": TableOf("reduced_reruns"),
         "errors": TableOf("reconstruction_error"),
@@ -36,10 +31,11 @@ _KEYS = ["scene", "group", "method", "r"]
     },
 )
 def error_against_gain(options: kit.Methods, drawn: Drawn, **tables: pd.DataFrame) -> Figure:
-    """Draw a dot per run, error within the horizon against gain, and failures by decade of gain.
-
-    Runs that ended before their horizon lie on the upper limit of the axes, singular interpolations
-    on the right limit.
+    """Left: every run of a sampled method whose basis suffices (the orthogonal projection does not
+    fail at the same size), over all scenes and sizes. Dashed: the error from which on a run counts
+    as failed. Arrows on the rim lie outside the axes. Crosses: range and median over runs, in some
+    scenes, that are trained on as many resampled frames. Right: how many of them failed, by decade
+    of the gain.
     """
     runs = drawn.rows(judged_runs(tables["reruns"], tables["errors"]))
     if runs.empty:
@@ -102,23 +98,14 @@ def _draw_decades(ax: Axes, runs: pd.DataFrame) -> None:
     style.grid(ax)
 
 
-@figure(
-    title="One choice after the other",
-    caption="""Above the line one ingredient after the other is changed, from the published code to
-    whole elements with oversampling; below it each row takes a single ingredient away from the
-    complete method or exchanges it. Left the error of the rerun within the horizon, right the gain
-    of the interpolation; what blew up or is singular lies on the right rim. Bars show the range
-    over runs that are trained on as many resampled frames, on some scenes; pale ones that over
-    choices of the arbitrary signs of the singular vectors.""",
-    reads={"table": TableOf("ladder")},
-)
+@figure(title="One choice after the other", reads={"table": TableOf("ladder")})
 def ladder(options: kit.Scenes, table: pd.DataFrame) -> Figure:
-    """Draw a row per choice of the method (rung): the error of the run left, the gain right.
-
-    Rows above the line lead from the published method to the sound one; each row below it is the
-    sound method without one choice. A thin bar is the range over other training frames, a broad
-    pale bar the range over signs of the singular vectors for the published method. Runs that blew
-    up before the horizon, and singular interpolations, lie on the right limit of the axes.
+    """Above the line one ingredient after the other is changed, from the published code to whole
+    elements with oversampling; below it each row takes a single ingredient away from the complete
+    method or exchanges it. Left the error of the rerun within the horizon, right the gain of the
+    interpolation; what blew up or is singular lies on the right rim. Bars show the range over runs
+    that are trained on as many resampled frames, on some scenes; pale ones that over choices of the
+    arbitrary signs of the singular vectors.
     """
     table = options.rows(table)
     table = table[table.gain.notna() & (table.direction != "square")]
@@ -221,18 +208,15 @@ def _published(path: Path, columns: list[str], options: Beside, each: Experiment
 @figure(
     number=9,
     title="Decay of the singular values",
-    caption="""Singular values of the training snapshots, relative to the first. Hollow ones lie
-    below the round-off of the projections and are noise. Grey lines are the output of the published
-    code for the scene that comes closest.""",
     reads={
         "table": TableOf("singular_values"),
         "published": ProjectFile(f"{PUBLISHED_CODE}/singular_values.csv"),
     },
 )
 def singular_values(options: Beside, drawn: Drawn, table: pd.DataFrame, published: Path) -> Figure:
-    """Draw a panel per experiment: singular values relative to the first one.
-
-    Values that are pure round-off are hollow, and the region below the round-off is shaded.
+    """Singular values of the training snapshots, relative to the first. Hollow ones lie below the
+    round-off of the projections and are noise. Grey lines are the output of the published code for
+    the scene that comes closest.
     """
     figure, panels = _panels(options, drawn, table, VALUES, legend=2)
     reference = False
@@ -282,9 +266,6 @@ def _draw_values(ax: Axes, rows: pd.DataFrame, colour: str, marker: str) -> None
 @figure(
     number=8,
     title="Reconstruction error of three scenes of the preprint",
-    caption="""Relative error of reconstructed projections against the number $r$ of basis vectors,
-    for the snapshots used (train), the frames between them (test) and another run (held out).
-    Errors above the axis are drawn on its rim with an arrow head.""",
     reads={
         "table": TableOf("reconstruction_error"),
         "published": ProjectFile(f"{PUBLISHED_CODE}/reconstruction_error.csv"),
@@ -293,10 +274,9 @@ def _draw_values(ax: Axes, rows: pd.DataFrame, colour: str, marker: str) -> None
 def reconstruction_error(
     options: Reconstruction, drawn: Drawn, table: pd.DataFrame, published: Path
 ) -> Figure:
-    """Draw a panel per experiment with the error of each method and split against the basis size.
-
-    If an experiment has no errors because its projections are round-off, its panel has a note. The
-    published code's table has errors of the x and y axes, but no total error.
+    """Relative error of reconstructed projections against the number $r$ of basis vectors, for the
+    snapshots used (train), the frames between them (test) and another run (held out). Errors above
+    the axis are drawn on its rim with an arrow head.
     """
     methods = [m for m in drawn.methods if (table.method == m).any()]
     if not methods:

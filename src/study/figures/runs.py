@@ -196,18 +196,18 @@ def strain_runs(options: ReducedRuns, drawn: Drawn, horizon: Horizon, **files: F
 @figure(
     number=5,
     title="Bending only, reduced",
-    caption="""Sheets with bending constraints only, near the end of the run: full order against
-    reduced projections. The projections of a flat sheet are round-off: in the preprint's two scenes
-    the basis is one of noise, and what it does depends on which axes the round-off of the start
-    reaches (drawn is the first start of which some sizes run and others do not, or else the first;
-    all are counted below the pictures and in the figure of reductions on bases of round-off). The
-    curved sheet has projections that matter.""",
     reads={**RUNS, "noise": TableOf("noise"), "noise_runs": Every(NOISE_RUNS)},
 )
 def bending_runs(
     options: ReducedRuns, drawn: Drawn, horizon: Horizon, noise: pd.DataFrame, **files: Files
 ) -> Figure:
-    """Draw reduced runs; if all projections are round-off, runs on bases of round-off, if any."""
+    """Sheets with bending constraints only, near the end of the run: full order against reduced
+    projections. The projections of a flat sheet are round-off: in the preprint's two scenes the
+    basis is one of noise, and what it does depends on which axes the round-off of the start reaches
+    (drawn is the first start of which some sizes run and others do not, or else the first; all are
+    counted below the pictures and in the figure of reductions on bases of round-off). The curved
+    sheet has projections that matter.
+    """
     noise_runs = files.pop("noise_runs")
     runs, rows = Runs(options, drawn, horizon, **files), []
     for each in drawn.experiments:
@@ -256,23 +256,14 @@ def _alike(table: pd.DataFrame) -> dict[tuple[tuple[int, str], ...], list[str]]:
     return kinds
 
 
-@figure(
-    number=4,
-    title="Three constraint groups, one of them reduced",
-    caption="""The cloth with bending, springs and strain at instants up to the scene's horizon,
-    beyond which no difference could be blamed on a reduction: the full-order run, then runs that
-    reduce the projections of one group only, by two methods. Triangles are coloured by their
-    distance to the full-order run, whose outline is grey; a framed picture is drawn to the smaller
-    scale given below it. Springs carry nearly all of the force, so that reducing strain changes
-    little whatever the method.""",
-    reads=RUNS,
-)
+@figure(number=4, title="Three constraint groups, one of them reduced", reads=RUNS)
 def cloth_all_grid(options: ReducedRuns, drawn: Drawn, horizon: Horizon, **files: Files) -> Figure:
-    """Draw a row of the full-order run, then a row per reduced group; each method has its columns.
-
-    The columns of a method are instants, fractions of the scene's horizon. All pictures have the
-    same camera and scale, except framed ones, whose scale is printed. The basis size is the first
-    in ``options.ranks`` that ran.
+    """The cloth with bending, springs and strain at instants up to the scene's horizon, beyond
+    which no difference could be blamed on a reduction: the full-order run, then runs that reduce
+    the projections of one group only, by two methods. Triangles are coloured by their distance to
+    the full-order run, whose outline is grey; a framed picture is drawn to the smaller scale given
+    below it. Springs carry nearly all of the force, so that reducing strain changes little whatever
+    the method.
     """
     runs, one = Runs(options, drawn, horizon, **files), drawn.experiments[0]
     mesh, camera = load_mesh(one.path(runs.meshes)), options.camera(one)
@@ -341,12 +332,6 @@ def _colours() -> ScalarMappable:
 
 @figure(
     title="Two scenes under five reductions",
-    caption="""One instant of the motion that trained all of them. `deim-joint` is the preprint's
-    method: joint rows, a system for each axis. `deim` samples single entries, `block-deim` whole
-    elements, `gappy` three elements a mode, all with shared coefficients. `ecsw` reduces positions
-    and sums sampled elements with non-negative weights. $r$ and $k$ are numbers of modes, errors
-    are relative to the motion; the outline is the full order. A framed picture is drawn to the
-    smaller scale given below it.""",
     reads={
         **RUNS,
         "subspaces": EachOf(SUBSPACES, "drawn_subspaces"),
@@ -356,7 +341,13 @@ def _colours() -> ScalarMappable:
 def teaser(
     options: ReducedRuns, drawn: Drawn, horizon: Horizon, errors: pd.DataFrame, **files: Files
 ) -> Figure:
-    """Draw a row per experiment: the full order, a panel per method, a sampled subspace."""
+    """One instant of the motion that trained all of them. `deim-joint` is the preprint's method:
+    joint rows, a system for each axis. `deim` samples single entries, `block-deim` whole elements,
+    `gappy` three elements a mode, all with shared coefficients. `ecsw` reduces positions and sums
+    sampled elements with non-negative weights. $r$ and $k$ are numbers of modes, errors are
+    relative to the motion; the outline is the full order. A framed picture is drawn to the smaller
+    scale given below it.
+    """
     subspaces = files.pop("subspaces")
     runs, errors = Runs(options, drawn, horizon, **files), trained(errors)
     return view.draw_rows(

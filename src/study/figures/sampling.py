@@ -69,11 +69,6 @@ class Iteration:
 @figure(
     number=2,
     title="The first iterations of DEIM",
-    caption="""In step $k$ the residual of mode $k$ is taken against the modes before it,
-    interpolated at the entries picked so far, and the entry where it is largest in absolute value
-    is picked next. An element has the colour of its largest entry, so that the ringed one, which
-    holds the picked entry, is the darkest; white dots are elements picked before. Each step asks
-    for one number, whose whole element has to be projected for it.""",
     reads={
         "meshes": EachOf(MESH, "first_run"),
         "bases": EachOf(BASIS, "first_run"),
@@ -83,9 +78,11 @@ class Iteration:
 def deim_iterations(
     options: Steps, drawn: kit.Drawn, meshes: list[File], bases: list[File], samples: list[File]
 ) -> Figure:
-    """Draw per step the residual of the current mode on the mesh and the elements picked so far.
-
-    Only the first experiment and the first method that exist are drawn.
+    """In step $k$ the residual of mode $k$ is taken against the modes before it, interpolated at
+    the entries picked so far, and the entry where it is largest in absolute value is picked next.
+    An element has the colour of its largest entry, so that the ringed one, which holds the picked
+    entry, is the darkest; white dots are elements picked before. Each step asks for one number,
+    whose whole element has to be projected for it.
     """
     method, reduction = next(iter(drawn.reductions.items()), ("", None))
     if not samples or reduction is None or reduction.rows == "all":
@@ -191,10 +188,6 @@ def _joint_residual(V: np.ndarray, entries: np.ndarray, k: int) -> np.ndarray:
 @figure(
     number=3,
     title="Elements hit by the entries of vectorised DEIM",
-    caption="""Single entries, picked without regard to elements, scatter over the mesh. Left: the
-    elements they belong to, by axis. Middle: how many of its entries each touched element
-    contributes. Right: numbers that have to be computed for $r$ interpolation entries, because a
-    projection yields all entries of its element at once.""",
     reads={
         "meshes": EachOf(MESH, "experiments"),
         "snapshots": EachOf(SNAPSHOTS, "experiments"),
@@ -208,10 +201,10 @@ def deim_entries(
     snapshots: list[File],
     samples: list[File],
 ) -> Figure:
-    """Draw a row per experiment: sampled elements, entries per element, and numbers computed.
-
-    The first method that samples single entries is drawn on the mesh, at the requested or largest
-    r. The right panel compares it with all other methods.
+    """Single entries, picked without regard to elements, scatter over the mesh. Left: the elements
+    they belong to, by axis. Middle: how many of its entries each touched element contributes.
+    Right: numbers that have to be computed for $r$ interpolation entries, because a projection
+    yields all entries of its element at once.
     """
     methods = drawn.methods
     scalar = [m for m in methods if drawn.reductions[m].rows == "scalar"]
@@ -319,11 +312,6 @@ class Snapshots(kit.View):
 @figure(
     number=1,
     title="Snapshots of the projections and their modes",
-    caption="""The snapshots of one constraint group, a column each, less their mean, are the
-    product of modes, singular values (a diagonal, dark where large) and coefficients; red entries
-    are positive, blue ones negative. Below, columns of the first matrix on the moving mesh and the
-    first modes on the mesh at rest: an element has the colour of one of its entries, whose axis and
-    row are named, relative to the largest.""",
     reads={
         "meshes": EachOf(MESH, "first_run"),
         "full_order": EachOf(TRAIN, "first_run"),
@@ -332,11 +320,11 @@ class Snapshots(kit.View):
     },
 )
 def snapshots_and_modes(options: Snapshots, drawn: kit.Drawn, **files: list[File]) -> Figure:
-    """Draw snapshots less their mean = modes x singular values x coefficients, as matrices.
-
-    Below are columns of the snapshot matrix on the moving mesh, and modes on the mesh at rest. Each
-    element has the colour of one of its entries, the entry that is largest on some element. Only
-    the first experiment and method that exist are drawn.
+    """The snapshots of one constraint group, a column each, less their mean, are the product of
+    modes, singular values (a diagonal, dark where large) and coefficients; red entries are
+    positive, blue ones negative. Below, columns of the first matrix on the moving mesh and the
+    first modes on the mesh at rest: an element has the colour of one of its entries, whose axis and
+    row are named, relative to the largest.
     """
     if not files["bases"]:
         raise kit.NothingToDraw(options.words())

@@ -64,21 +64,14 @@ class Floored(Scenes):
     columns: Columns = 3
 
 
-@figure(
-    title="Sensitivity floor and horizon",
-    caption="""How far full-order runs drift apart whose initial positions differ by
-    {sensitivity.reference} of the extent. The horizon, given in the legends, is the first frame
-    above the threshold of {sensitivity.threshold}: beyond it a reduced run cannot be judged by its
-    error. Dashed lines are twins, scenes that end before.""",
-    reads=FLOORS,
-)
+@figure(title="Sensitivity floor and horizon", reads=FLOORS)
 def sensitivity_floor(
     options: Floored, drawn: Drawn, sensitivity: list[File], horizon: Horizon
 ) -> Figure:
-    """Draw a panel per kind of scene, and in it the floor of each scene over the frames.
-
-    The grey line is the threshold. A dot marks the horizon, the frame at which a scene exceeds the
-    threshold. A variant of a scene ("twin") has the colour of the scene and is dashed.
+    """How far full-order runs drift apart whose initial positions differ by {sensitivity.reference}
+    of the extent. The horizon, given in the legends, is the first frame above the threshold of
+    {sensitivity.threshold}: beyond it a reduced run cannot be judged by its error. Dashed lines are
+    twins, scenes that end before.
     """
     floors = Floors(sensitivity, horizon)
     kinds: dict[str, list[str]] = {}

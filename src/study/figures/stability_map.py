@@ -112,20 +112,13 @@ class Sizes(Methods):
     ranks: Ranks = ()
 
 
-@figure(
-    title="Where each method can be trusted",
-    caption="""How every run on the training motion ended, by method, size and scene. Accurate or
-    wrong: the error within the horizon is at most, or above, {stability.wrong}; left the scene: the
-    bounding box exceeds {stability.left} times the largest one of the full-order run; blow-up:
-    numbers that are not finite, or an extent beyond the limit, in the printed frame. Groups whose
-    projections are round-off are left out.""",
-    reads={"table": TableOf("stability")},
-)
+@figure(title="Where each method can be trusted", reads={"table": TableOf("stability")})
 def stability_map(options: Sizes, drawn: Drawn, table: pd.DataFrame) -> Figure:
-    """Draw strips of blocks: a block per method with a column per size; a row per experiment.
-
-    Runs with unreduced positions come first, then runs in position subspaces. Experiments in which
-    no reduction could run, because their projections are round-off, are left out.
+    """How every run on the training motion ended, by method, size and scene. Accurate or wrong: the
+    error within the horizon is at most, or above, {stability.wrong}; left the scene: the bounding
+    box exceeds {stability.left} times the largest one of the full-order run; blow-up: numbers that
+    are not finite, or an extent beyond the limit, in the printed frame. Groups whose projections
+    are round-off are left out.
     """
     table = options.rows(table)
     table = table[(table.experiment == "rerun") & (table.group.notna())]

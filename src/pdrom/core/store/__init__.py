@@ -208,13 +208,10 @@ def read_text(path: str | os.PathLike[str]) -> str:
     return Path(path).read_text(encoding="utf-8")
 
 
-FLOAT_FORMAT = "%.10g"
-
-
 def write_table(table: "pd.DataFrame", path: str | os.PathLike[str]) -> None:
     """Write a table as CSV to ``path``: fixed float format, an empty cell for no value."""
     with atomic_path(path) as temporary:
-        table.to_csv(temporary, index=False, float_format=FLOAT_FORMAT, lineterminator="\n")
+        table.to_csv(temporary, index=False, float_format="%.10g", lineterminator="\n")
 
 
 def read_table(

@@ -1,13 +1,11 @@
 """Declaration of a figure: title, caption, inputs, options, and the function that draws it.
 
-A figure is declared by a decorator on its drawing function in a module of `study.figures`::
+A figure is declared by a decorator on its drawing function in a module of `study.figures`, whose
+docstring is the caption::
 
-    @figure(
-        title="Rest shapes",
-        caption="Vertices of each mesh.",
-        reads={"meshes": EachOf(MESH, "experiments")},
-    )
-    def rest_shapes(options: Scenes, drawn: Drawn, meshes: list[File]) -> Figure: ...
+    @figure(title="Rest shapes", reads={"meshes": EachOf(MESH, "experiments")})
+    def rest_shapes(options: Scenes, drawn: Drawn, meshes: list[File]) -> Figure:
+        'Vertices of each mesh.'
 """
 
 import logging
@@ -288,17 +286,17 @@ class Declaration(Artifact):
 
 
 def figure(
-    *, title: str, caption: str, reads: Mapping[str, Read], number: int | None = None
+    *, title: str, reads: Mapping[str, Read], number: int | None = None, caption: str = ""
 ) -> Callable[[Callable[..., Figure]], Declaration]:
     """Return a decorator that declares a function, called with ``options`` and inputs, as a figure.
 
     If the function has a parameter ``drawn``, it also gets the experiments and methods selected by
-    the options. Line breaks in the caption count as blanks.
+    the options. The ``caption`` is by default the docstring; line breaks in it count as blanks.
 
     Raises
     ------
     TypeError
-        If the function's parameters do not match ``reads``.
+        If the function has no caption, or its parameters do not match ``reads``.
     """
 
     def decorate(function: Callable[..., Figure]) -> Declaration:
@@ -306,7 +304,9 @@ def figure(
         writes = {"pdf": FIGURE.where(name=name), "png": FIGURE_PICTURE.where(name=name)}
         drawn = {"drawn": Settings(Drawn)} if "drawn" in function.__annotations__ else {}
         given = {"options": Setting("options"), **drawn, **reads}
-        words = " ".join(caption.split())
+        words = " ".join((caption or function.__doc__ or "").split())
+        if not words:
+            raise TypeError(f"figure {name}: the function has no docstring, which is its caption")
         made = Declaration(name, title, given, writes, function, caption=words, number=number)
         return declare(made)
 

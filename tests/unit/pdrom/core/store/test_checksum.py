@@ -217,11 +217,3 @@ def test_the_checksum_is_what_b2sum_checks(result):
         return
     command = ["b2sum", "--check", "--strict", store.checksum_path(result).name]
     assert subprocess.run(command, cwd=folder, check=False).returncode == 0
-
-
-def test_a_file_without_checksum_that_replaces_one_with_it_takes_the_checksum_along(tmp_path):
-    path = tmp_path / "t.txt"
-    store.write_text("result", path)
-    store.write_text("a user's own", path, with_checksum=False)
-    assert list(tmp_path.iterdir()) == [path]
-    assert store.check_file(path) == "no checksum"

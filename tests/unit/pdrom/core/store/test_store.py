@@ -129,23 +129,17 @@ def test_a_kill_between_the_checksum_and_the_file_is_healed(tmp_path, existed, c
     assert sorted(tmp_path.iterdir()) == sorted([path, store.checksum_path(path), other])
 
 
-def occupied(folder, kind):
-    """Create a link, a pipe or a folder at the path of a result; return the path."""
-    path = folder / "result.txt"
+@pytest.mark.parametrize("kind", ["a link", "no regular file", "a folder"])
+@pytest.mark.parametrize("place", [store.require_place, lambda path: store.write_text("new", path)])
+def test_what_is_no_regular_file_is_refused_and_stays(tmp_path, kind, place):
+    path = tmp_path / "result.txt"
     if kind == "a link":
-        (folder / "other").write_text("mine")
-        path.symlink_to(folder / "other")
+        (tmp_path / "other").write_text("mine")
+        path.symlink_to(tmp_path / "other")
     elif kind == "no regular file":
         os.mkfifo(path)
     else:
         path.mkdir()
-    return path
-
-
-@pytest.mark.parametrize("kind", ["a link", "no regular file", "a folder"])
-@pytest.mark.parametrize("place", [store.require_place, lambda path: store.write_text("new", path)])
-def test_what_is_no_regular_file_is_refused_and_stays(tmp_path, kind, place):
-    path = occupied(tmp_path, kind)
     before, names = path.lstat(), sorted(tmp_path.iterdir())
     with pytest.raises(StorageError, match=rf"result\.txt: cannot be written \({kind}"):
         place(path)
