@@ -142,16 +142,8 @@ def body(name):
 
 @pytest.mark.parametrize("name", BODIES)
 def test_corners_are_on_the_surface_that_keeps_vertices_out(name):
-<<<<<<< HEAD
     (contact,) = make_scene(SPRING, {"effect": name, **BODIES[name]}).contacts
     assert np.abs(contact.gaps(body(name).points)).max() < 1e-12
-=======
-    assert np.abs(obstacle(name).depths(body(name).points)).max() < 1e-12
-
-
-def test_the_floor_is_at_its_height():
-    assert body("floor").points[:, 1] == pytest.approx(np.full(4, 0.3))
->>>>>>> model2
 
 
 @pytest.mark.parametrize("name", ["sphere", "box"])

@@ -74,18 +74,6 @@ def test_a_pair_that_passed_is_put_back():
     assert after[upper, 1].min() > after[~upper, 1].max()
 
 
-<<<<<<< HEAD
-=======
-def test_what_is_apart_is_left_alone():
-    scene = sheet()
-    (contact,) = scene.contacts
-    positions = 1.2 * scene.mesh.points
-    ended = positions.copy()
-    contact.correct(ended, scene.mesh.points)
-    assert np.array_equal(ended, positions)
-
-
->>>>>>> model2
 def test_two_runs_give_the_same_bits():
     scenes = [sheet(GRAVITY, {"effect": "floor"}, frames=20) for _ in range(2)]
     start = folded(scenes[0]).positions - scenes[0].mesh.points
