@@ -68,8 +68,8 @@ class Floored(Scenes):
 def sensitivity_floor(
     options: Floored, drawn: Drawn, sensitivity: list[File], horizon: Horizon
 ) -> Figure:
-    """How far full-order runs drift apart whose initial positions differ by {sensitivity.reference}
-    of the extent. The horizon, given in the legends, is the first frame above the threshold of
+    """Drift of full-order runs whose initial positions differ by {sensitivity.reference} of the
+    extent. The horizon, given in the legends, is the first frame above the threshold of
     {sensitivity.threshold}: beyond it a reduced run cannot be judged by its error. Dashed lines are
     twins, scenes that end before.
     """

@@ -114,7 +114,7 @@ class Sizes(Methods):
 
 @figure(title="Where each method can be trusted", reads={"table": TableOf("stability")})
 def stability_map(options: Sizes, drawn: Drawn, table: pd.DataFrame) -> Figure:
-    """How every run on the training motion ended, by method, size and scene. Accurate or wrong: the
+    """End of every run on the training motion, by method, size and scene. Accurate or wrong: the
     error within the horizon is at most, or above, {stability.wrong}; left the scene: the bounding
     box exceeds {stability.left} times the largest one of the full-order run; blow-up: numbers that
     are not finite, or an extent beyond the limit, in the printed frame. Groups whose projections

@@ -8,15 +8,20 @@ import pytest
 
 from pdrom.core.errors import ConfigurationError
 from study.artifact.paths import MESH, RERUNS
-from study.figures.kit.declaration import Scenes, declarations, load_choices
+from study.figures.kit.declaration import Scenes, declarations, figure, load_choices
 
 ENTRY = "singular_values:\n  columns: 2\n"
 
 
 def test_figures_of_the_paper_come_first_in_their_order():
-    numbers = [figure.number for figure in declarations().values()]
+    numbers = [declared.number for declared in declarations().values()]
     assert numbers[:9] == list(range(1, 10))
     assert set(numbers[9:]) == {None}
+
+
+def test_a_figure_has_a_caption():
+    with pytest.raises(TypeError, match="no docstring, which is its caption"):
+        figure(title="Nothing", reads={})(lambda options: options)
 
 
 def test_a_figure_without_an_entry_has_its_defaults(tmp_path):
