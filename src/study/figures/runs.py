@@ -163,33 +163,21 @@ def obstacles_of(experiment: Experiment, positions: np.ndarray) -> list[Mesh] | 
     return None if floor and len(bodies) == 1 else bodies
 
 
-@figure(
-    title="The bar, reduced", caption=f"Bars with tetrahedral constraints: {COMPARED}", reads=RUNS
-)
+@figure(title="The bar, reduced", more=COMPARED, reads=RUNS)
 def bar_runs(options: ReducedRuns, drawn: Drawn, horizon: Horizon, **files: Files) -> Figure:
-    """Draw full-order and reduced runs in rows, see `Runs.draw`."""
+    """Bars with tetrahedral constraints:"""
     return Runs(options, drawn, horizon, **files).draw()
 
 
-@figure(
-    number=6,
-    title="Springs only, reduced",
-    caption=f"Sheets with edge springs only: {COMPARED}",
-    reads=RUNS,
-)
+@figure(number=6, title="Springs only, reduced", more=COMPARED, reads=RUNS)
 def spring_runs(options: ReducedRuns, drawn: Drawn, horizon: Horizon, **files: Files) -> Figure:
-    """Draw full-order and reduced runs in rows, see `Runs.draw`."""
+    """Sheets with edge springs only:"""
     return Runs(options, drawn, horizon, **files).draw()
 
 
-@figure(
-    number=7,
-    title="Triangle strain only, reduced",
-    caption=f"Sheets with triangle strain only: {COMPARED}",
-    reads=RUNS,
-)
+@figure(number=7, title="Triangle strain only, reduced", more=COMPARED, reads=RUNS)
 def strain_runs(options: ReducedRuns, drawn: Drawn, horizon: Horizon, **files: Files) -> Figure:
-    """Draw full-order and reduced runs in rows, see `Runs.draw`."""
+    """Sheets with triangle strain only:"""
     return Runs(options, drawn, horizon, **files).draw()
 
 

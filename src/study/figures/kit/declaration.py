@@ -286,12 +286,12 @@ class Declaration(Artifact):
 
 
 def figure(
-    *, title: str, reads: Mapping[str, Read], number: int | None = None, caption: str = ""
+    *, title: str, reads: Mapping[str, Read], number: int | None = None, more: str = ""
 ) -> Callable[[Callable[..., Figure]], Declaration]:
     """Return a decorator that declares a function, called with ``options`` and inputs, as a figure.
 
     If the function has a parameter ``drawn``, it also gets the experiments and methods selected by
-    the options. The ``caption`` is by default the docstring; line breaks in it count as blanks.
+    the options. The caption is the docstring and then ``more``; line breaks count as blanks.
 
     Raises
     ------
@@ -304,9 +304,9 @@ def figure(
         writes = {"pdf": FIGURE.where(name=name), "png": FIGURE_PICTURE.where(name=name)}
         drawn = {"drawn": Settings(Drawn)} if "drawn" in function.__annotations__ else {}
         given = {"options": Setting("options"), **drawn, **reads}
-        words = " ".join((caption or function.__doc__ or "").split())
-        if not words:
+        if not function.__doc__:
             raise TypeError(f"figure {name}: the function has no docstring, which is its caption")
+        words = " ".join([*function.__doc__.split(), *more.split()])
         made = Declaration(name, title, given, writes, function, caption=words, number=number)
         return declare(made)
 
