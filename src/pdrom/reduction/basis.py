@@ -17,15 +17,15 @@ from pdrom.reduction.snapshots import SnapshotSet
 class Basis:
     """Affine space mean + span V of vectorised projections.
 
-    Entry i of a vector is axis i % 3 of row i // 3; row i // 3 belongs to element
-    i // (3 * rows_per_element).
+    Entry i of a vector is axis i % 3 of row i // 3; row i // 3 belongs to element i // (3 *
+    rows_per_element).
 
     V : (3 e p, rank); orthonormal (in the weighted inner product), or orthonormal axis by axis if
         ``separate_axes``
     mean : (3 e p,)
     singular_values : all singular values of the weighted, centred train matrix
     rank : number of singular values above round-off; V has no further columns
-    roundoff : absolute size of a singular value that is noise
+    roundoff : singular values up to this absolute size are noise
     active_axes : for each axis, whether its snapshots exceed round-off
     origin : name of the basis in error messages: the path of its file
     """
@@ -107,7 +107,7 @@ def compute_basis(
     Raises
     ------
     SnapshotError
-        Fewer than two snapshots, a wrong shape, NaN or Inf, a row without mass where it weighs.
+        Fewer than two snapshots, a wrong shape, NaN or Inf, a row without mass if masses weigh.
     """
     _check(snapshots, row_mass, rows_per_element, spec)
     matrix = snapshots.reshape(len(snapshots), -1).T
@@ -122,7 +122,7 @@ def compute_basis(
         # basis made of it. Subtracting the first snapshot makes no such error.
         rounded = 0.5 * np.finfo(float).eps * matrix.shape[1] * float(np.linalg.norm(matrix))
         mean, error = matrix.mean(axis=1), max(roundoff, rounded)
-        # the mean contains a constant axis already; "mean-in-modes" adds it to the modes again
+        # the mean contains a constant axis, which is thus inactive, unlike with "mean-in-modes"
         shown = matrix - mean[:, None]
     elif spec.centring == "mean-in-modes":
         mean = matrix[:, 0].copy()
@@ -304,8 +304,8 @@ def numerical_rank(singular_values: np.ndarray, shape: tuple[int, int], roundoff
     """Count the ``singular_values`` (n,) of a matrix of ``shape`` above both round-off levels.
 
     The relative level max(shape) eps sigma_1 is the backward error of the SVD. The absolute level
-    ``roundoff`` is the error of the data themselves: where a projection is the difference of
-    cancelling terms, all of its singular values may be noise although they decay nicely.
+    ``roundoff`` is the error of the data themselves: if a projection is the difference of
+    cancelling terms, all of its singular values may be noise although they decay smoothly.
     """
     if len(singular_values) == 0:
         return 0

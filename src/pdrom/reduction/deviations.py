@@ -1,7 +1,7 @@
 """Deviations of a run from the full-order run: norms for each frame, and errors over the run.
 
-Compared are positions, velocities, shapes (the difference after the best rigid motion of each
-frame, Kabsch 1976), the total energy, and the frame in which an obstacle is first touched.
+Positions, velocities, shapes (the difference after the best rigid motion of each frame, Kabsch
+1976), the total energy, and the frame of first contact with an obstacle are compared.
 """
 
 from collections.abc import Mapping
@@ -70,7 +70,7 @@ class Yardstick:
     def units(self) -> dict[str, float]:
         """Extent norm, m, and time step, s: keyword arguments of `errors_within`.
 
-        The extent norm is sqrt(N) times the mesh extent: every vertex is off by the extent.
+        The extent norm, sqrt(N) times the mesh extent, is that of a shift by the extent.
         """
         norm = self.scene.mesh.extent * float(np.sqrt(self.reference.shape[1]))
         return {"extent_norm": norm, "time_step": self.scene.config.time_step}
@@ -135,7 +135,7 @@ def errors_within(
     drift, count = None, end // STRIDE + 1  # the first energy belongs to the start
     if count > 1 and len(reference["energy"]):
         drift = float(np.abs(run["energy"][:count] - reference["energy"][:count]).max())
-    # delay of the first contact; inf: it is missing, -inf: the full-order run has none
+    # delay of the first contact; inf: only the full-order run has one, -inf: only the other run
     first, wanted = (
         float(np.argmax(touched)) if np.any(touched) else np.inf
         for touched in (run["contact"][:end], reference["contact"][:end])

@@ -1,4 +1,4 @@
-"""A reduction method is a combination of ingredients; the presets are named combinations.
+"""Reduction methods as combinations of ingredients; the presets are named combinations.
 
 The module of a sample selection is imported only when a method uses it.
 """
@@ -31,9 +31,9 @@ class BasisSpec(ConfigModel):
     """Recipe of a basis from snapshots.
 
     weighting : "mass" makes the modes orthonormal in the lumped-mass inner product of the rows
-    centring : "affine" subtracts the mean and adds it back online; "mean-in-modes" is the way of
-        the published code (first snapshot subtracted, modes rescaled, it is added to every mode,
-        re-orthogonalised per axis)
+    centring : "affine" subtracts the mean and adds it back online; "mean-in-modes" follows the
+        published code: it subtracts the first snapshot, rescales the modes, adds that snapshot to
+        every mode and orthogonalises the modes again per axis
     layout : "vectorised" has one column per snapshot with coefficients shared by x, y, z;
         "per-axis" has one basis for each axis
     """
@@ -60,15 +60,15 @@ class MethodSpec(BasisSpec):
         "joint" one row for x, y and z with separate coefficients (the preprint's variant),
         "element" all 3p entries of an element
     selection : name in `SELECTIONS`, such as "greedy" (the residual, DEIM)
-    solve : of the sampled equations: "square", least squares by "qr", or normal equations with
-        Tikhonov term ("tikhonov", the published code)
-    oversampling : samples per mode; further ones by S-OPT after selection "s-opt", otherwise by
+    solve : solution of the sampled equations: "square", least squares by "qr", or normal equations
+        with Tikhonov term ("tikhonov", the published code)
+    oversampling : samples per mode; additional ones by S-OPT after selection "s-opt", otherwise by
         GappyPOD+E
     gain_bound : samples are added (GappyPOD+E) until the gain is at most this, so that the error of
         a projection is at most this multiple of the best approximation's; None: no bound
-    coefficients : "shared" by the axes or "per-axis"; None takes what the rows and the basis imply
-    repeat_rows : whether the greedy may pick a row again (the published code does not exclude it)
-    title : what the method is called in figures and tables
+    coefficients : "shared" by the axes or "per-axis"; None: as ``rows`` and the basis imply
+    repeat_rows : whether the greedy selection may repeat a row, as in the published code
+    title : name of the method in figures and tables
     """
 
     title: str
@@ -128,7 +128,7 @@ class MethodSpec(BasisSpec):
 
     @property
     def may_oversample(self) -> bool:
-        """Whether the method may take more samples than modes, to bound the gain."""
+        """Whether the method allows more samples than modes, to bound the gain."""
         return self.rows in ("scalar", "element") and self.solve != "square"
 
     @property

@@ -20,7 +20,7 @@ def training_frames(frames: int, count: int) -> np.ndarray:
 
 
 def test_frames(frames: int) -> np.ndarray:
-    """Numbers (n,) int64 of the odd ones among ``frames`` frames."""
+    """Numbers (n,) int64 of the odd frames among ``frames`` frames."""
     return np.arange(1, frames, 2)
 
 
@@ -84,7 +84,7 @@ def collect(
     Raises
     ------
     SnapshotError
-        A split is empty, lacks a training frame, or holds NaN or Inf.
+        A split is empty, lacks a training frame, or contains NaN or Inf.
     """
     p, frames, roundoff = _read(training_run, group.name)
     held, held_frames, _ = _read(heldout_run, group.name)

@@ -1,1 +1,1 @@
-"""The step loop of projective dynamics, its global system and the acceleration."""
+"""The step loop of projective dynamics, its global system and its acceleration."""

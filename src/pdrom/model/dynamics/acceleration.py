@@ -52,14 +52,14 @@ def _weights(gram, projection, count):
 
 @compiled
 def forget(history):
-    """Delete all iterates of ``history`` at the beginning of a frame or substep."""
+    """Delete all iterates of ``history``, at the beginning of a frame or substep."""
     history[6][DIFFERENCES] = -1
     history[7][0] = np.inf
 
 
 @compiled
 def refuse(history, y, objective, plain=1):
-    """Compiled `Anderson.refuse`, with a ``history``; ``y`` (n,) has this ``objective``.
+    """Compiled `Anderson.refuse` for a ``history``; the iterate ``y`` (n,) has this ``objective``.
 
     The first ``plain`` iterates after a start or a rejection are not compared: they are images of
     the local/global iteration, whose objective cannot rise.
@@ -76,7 +76,7 @@ def refuse(history, y, objective, plain=1):
 
 @compiled
 def combine(history, image):
-    """Compiled `Anderson.combine`, with a ``history``; ``image`` (n,) is the flat array G(y)."""
+    """Compiled `Anderson.combine` for a ``history``; ``image`` (n,) is the flat array G(y)."""
     start, residual, last_image, residuals, images, gram, numbers, _ = history
     numbers[DIFFERENCES] += 1
     differences, window = numbers[DIFFERENCES], len(gram)
@@ -117,8 +117,8 @@ def _history(window: int, n: int) -> History:
     return (*vectors, *differences, np.empty((window, window)), np.zeros(1, np.int64), np.empty(1))
 
 
-# The history of iterations without acceleration. Compiled loops distinguish it by its type, so that
-# they do not compile the acceleration if it is not used.
+# The history of iterations without acceleration. Compiled loops distinguish it by its type and then
+# do not compile the acceleration.
 NO_HISTORY = None
 
 

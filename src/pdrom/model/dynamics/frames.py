@@ -112,7 +112,7 @@ class CompiledIterations:
         elimination: Elimination,
         seconds: np.ndarray,
     ) -> None:
-        """Do the iterations ``which`` of a frame's ``iterations`` K in place.
+        """Compute the iterations ``which`` of the K ``iterations`` of a frame, in place.
 
         Parameters
         ----------
@@ -120,7 +120,7 @@ class CompiledIterations:
         y, base : iterate and (M/h^2) s, (N, 3) views of padded arrays (N, 4)
         s : (N, 3) prediction
         elimination : the factored system, for which `takes` is true
-        seconds : (4,) the times of local and global steps are added to entries 1 and 2
+        seconds : (4,) s; the times of local and global steps are added to entries 1 and 2
         """
         history = NO_HISTORY if self._acceleration is None else self._acceleration.history
         tracked = len(objective) > 0 or history is not None
@@ -139,16 +139,16 @@ def all_iterations(
     which, y, s, base, rhs, inertia, tables, second, factor, history, objective,
     seconds, watch,
 ):  # fmt: skip
-    """Do iterations of a frame in place, see `CompiledIterations.run`.
+    """Compute iterations of a frame in place, see `CompiledIterations.run`.
 
     Parameters
     ----------
-    which : (first, end, K): do the iterations first, ..., end - 1 of the K iterations of a frame
+    which : (first, end, K): compute iterations first, ..., end - 1 of the K iterations of a frame
     y, s, base, rhs : iterate, prediction, (M/h^2) s, working array; flat rows of four numbers
     inertia : (N,) M/h^2, kg/s^2
-    tables, second : of the local steps, see `CompiledIterations.compiled_arguments`
-    factor : of the global system, see `pdrom.model.dynamics.solvers.Factor`
-    history : of the acceleration; with `NO_HISTORY` its code is not compiled
+    tables, second : arrays of the local steps, see `CompiledIterations.compiled_arguments`
+    factor : factor of the global system, see `pdrom.model.dynamics.solvers.Factor`
+    history : history of the acceleration; with `NO_HISTORY` its code is not compiled
     objective, seconds : as in `CompiledIterations.run`
     watch : a buffer from `pdrom.model.compiled.functions.clock`
     """
@@ -202,10 +202,10 @@ class WholeFrames:
 
     Parameters
     ----------
-    space : its ``held_path`` and ``system`` are used
+    space : space whose ``held_path`` and ``system`` are used
     loop : the compiled iterations
-    forces : each with a ``rate`` (not None)
-    contacts : each with a ``height`` (not None)
+    forces : forces, each with a ``rate`` (not None)
+    contacts : contacts, each with a ``height`` (not None)
     """
 
     def __init__(
@@ -239,9 +239,9 @@ class WholeFrames:
         boundaries: Sequence[Boundary],
         contacts: Sequence[Contact],
     ) -> bool:
-        """Return whether compiled code can do all local ``steps`` and effects of a scene.
+        """Return whether compiled code supports all local ``steps`` and effects of a scene.
 
-        It cannot do ``forces``, ``boundaries`` or ``contacts`` that are wrapped in other objects.
+        It does not support ``forces``, ``boundaries`` or ``contacts`` that other objects wrap.
         """
         return (
             all(isinstance(force, Force) and force.rate is not None for force in forces)
@@ -257,7 +257,7 @@ class WholeFrames:
 
         Parameters
         ----------
-        q, v : (N, 3) positions, m, and velocities, m/s, at the beginning
+        q, v : (N, 3) positions, m, and velocities, m/s, at the beginning of the first frame
         h : time step, s
         iterations : number of iterations per frame
         track : whether the objective is computed
@@ -290,7 +290,7 @@ def _accelerate(constants, rates, velocities, result):
         for axis in range(3):
             total = 0.0
             for k in range(len(constants)):
-                # no product with a zero rate, which would make nan of a velocity that is not finite
+                # no product with a zero rate: it would be nan for a velocity that is not finite
                 own = -rates[k, i] * velocities[i, axis] if rates[k, i] else constants[k, i, axis]
                 total += own
             result[i, axis] = total

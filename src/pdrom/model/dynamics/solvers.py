@@ -3,8 +3,8 @@
 Panels (supernodes) are consecutive columns of a factor that substitution ("sweep") treats together.
 A panel stores all rows below its columns in which at least one of its columns has an entry, with
 explicit zeros in the other columns. In a wider panel, fewer numbers are read twice and substitution
-waits less often for the preceding column, but more zeros are stored. Dynamic programming partitions
-the columns such that an estimated number of processor cycles is smallest.
+waits less often for the preceding column, but more zeros are stored. Dynamic programming finds the
+partition of the columns with the smallest estimated number of processor cycles.
 """
 
 from typing import Any
@@ -68,7 +68,7 @@ def panels(lower: sparse.csc_array, diagonal: np.ndarray) -> tuple[Any, ...]:
 def _count_rows_below(indptr, indices, seen, below):
     """Write to below[w, j] the number of rows below the panel of the w columns up to column j.
 
-    ``seen`` (n,) is working memory, filled with -1. The caller makes all arrays in Python, because
+    ``seen`` (n,) is working memory, filled with -1. The caller allocates arrays in Python, because
     each allocation in compiled code takes a tenth of a second to compile.
     """
     for j in range(len(seen)):
@@ -101,7 +101,7 @@ def _choose(below, widths, cost, chosen):
 
 @compiled
 def _fill(indptr, indices, data, inverse, first, row_start, value_start, rows, values, place):
-    """Write ``rows`` and ``values`` of all panels; ``place`` (n,) is working memory of -1."""
+    """Write ``rows`` and ``values`` of all panels; the work array ``place`` (n,) is all -1."""
     for panel in range(len(first) - 1):
         a, b = first[panel], first[panel + 1]
         width, start = b - a, row_start[panel]
@@ -161,7 +161,7 @@ class SuperLUSolver:
     Parameters
     ----------
     matrix : (n, n)
-    vertices : (n,) vertex of each unknown, a row of the arrays (N, 3)
+    vertices : (n,) vertex of each unknown, which is its row in the arrays (N, 3)
     coupling : (n, m) matrix entries between the unknowns and m held vertices; None if m = 0
     """
 

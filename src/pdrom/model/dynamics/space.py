@@ -23,7 +23,7 @@ class Solve(Protocol):
 class Space(ABC):
     """Interface of the step loop to its coordinates.
 
-    Arrays are (n, 3) with n coordinates: ``positions`` and their ``velocities`` at the beginning of
+    Arrays are (n, 3) for n coordinates: ``positions`` and their ``velocities`` at the beginning of
     a frame, the iterate ``y``, the prediction ``s``. ``h`` is the time step in seconds.
     """
 
@@ -32,7 +32,7 @@ class Space(ABC):
         return positions + h * velocities + h**2 * self.acceleration(positions, velocities)
 
     def copy(self, s: np.ndarray) -> np.ndarray:
-        """Return a copy of ``s`` (n, 3), which is a result of `predict` or `inertia`."""
+        """Return a copy of ``s`` (n, 3), a result of `predict` or `inertia`."""
         return s.copy()
 
     def end(self, y: np.ndarray, before: np.ndarray, h: float) -> tuple[np.ndarray, np.ndarray]:
@@ -80,7 +80,7 @@ class Space(ABC):
 
 
 class VertexSpace(Space):
-    """The positions of all vertices as coordinates, with the effects of a scene in three roles."""
+    """Vertex positions as coordinates, with forces, boundaries and contacts of a scene."""
 
     def __init__(
         self,

@@ -86,7 +86,7 @@ class Stepper:
     def step(
         self, state: State, frame: int, on_last_iterate: Observer = None
     ) -> tuple[State, FrameReport]:
-        """Do ``frame`` (0-based) from ``state``; call ``on_last_iterate`` with the last local y."""
+        """Compute ``frame`` (0-based); ``on_last_iterate`` gets y of the last local step."""
         if on_last_iterate is None:
             for done in self._at_once(state, range(frame, frame + 1)):
                 return done
@@ -114,7 +114,7 @@ class Stepper:
                 yield after
 
     def _at_once(self, state: State, frames: range) -> Sequence[tuple[State, FrameReport]]:
-        """Do as many of the first frames as one compiled call can; return their results or ()."""
+        """Compute as many first frames as one compiled call can; return their results or ()."""
         if self._whole is None:
             return ()
         q, v, h = state.positions, state.velocities, self.time_step
@@ -131,7 +131,7 @@ class Stepper:
         ]
 
     def _begin(self, state: State, frame: int) -> tuple[np.ndarray, Solve, np.ndarray]:
-        """Return the prediction s with ``fixed`` coordinates at targets, the system, (M/h^2) s."""
+        """Return the prediction s with fixed coordinates at targets, the system, (M/h^2) s."""
         space, h = self.space, self.time_step
         s = space.predict(state.positions, state.velocities, h)
         fixed, targets = space.fixed(frame, state.positions)
@@ -145,9 +145,9 @@ class Stepper:
     def _iterate(
         self, s: np.ndarray, base: np.ndarray, system: Solve, seconds: np.ndarray, watch: Observer
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Do all iterations of a frame from y = s; return the last y and the objective (K,).
+        """Compute all iterations of a frame from y = s; return the last y and the objective (K,).
 
-        Their computation times are added to ``seconds``.
+        The computation times of local and global steps are added to ``seconds``.
         """
         y = self.space.copy(s)
         objective = np.full(self.iterations if self._track else 0, np.nan)
@@ -171,7 +171,7 @@ class Stepper:
     def _in_python(
         self, k: int, vectors: Vectors, system: Solve, objective: np.ndarray, seconds: np.ndarray
     ) -> None:
-        """Do iteration k with any local steps: update y, ``objective`` and ``seconds`` in place.
+        """Compute iteration k with any local steps; update y, objective and seconds in place.
 
         ``vectors`` are s, (M/h^2) s and y.
         """

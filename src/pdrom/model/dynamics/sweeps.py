@@ -166,7 +166,7 @@ def load(beside, indptr, indices, data, targets, loads):
 def _sweep(
     count, first, row_start, value_start, rows, values, size, vertices, loads, x, rhs, y
 ):  # fmt: skip
-    """Do `sweep` with ``count`` panels and ``size`` unknowns; other arguments are addresses."""
+    """Compute `sweep` for ``count`` panels and ``size`` unknowns; other arguments: addresses."""
     first, vertices = integers(first, count + 1), integers(vertices, size)
     row_start, value_start = indices(row_start, count + 1), indices(value_start, count + 1)
     rows, values = integers(rows, row_start[count]), doubles(values, value_start[count])
@@ -187,7 +187,7 @@ def _sweep(
         store(y, WIDTH * at(vertices, i), load_row(x, WIDTH * i))
 
 
-# Called by its address, so that it is not compiled again with each loop that calls it.
+# Loops call it by its address, so that it is not compiled again with each of them.
 SWEEP = Callback(_sweep, types.void(*(types.intp,) * 12))
 _call = caller(types.void)
 

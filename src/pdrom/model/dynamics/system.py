@@ -17,7 +17,7 @@ ACCURACY = 1e-6
 
 
 class Elimination:
-    """The system without the vertices ``fixed``; one factorisation is used for x, y and z.
+    """The system without the vertices ``fixed``; one factorisation serves x, y and z.
 
     Attributes
     ----------
@@ -59,9 +59,9 @@ class Elimination:
 def require_accurate(matrix, solve: Callable[[np.ndarray, np.ndarray], object]) -> None:
     """Raise SolverError if ``solve`` does not reproduce a known solution for a ``matrix`` (n, n).
 
-    ``solve`` takes a right-hand side (n, 3) and the array that receives the solution.
-    The known solution is a translation, for which the terms of all elements cancel. Only inertia
-    (and pins) remain, which are lost first by rounding errors in the matrix.
+    ``solve`` takes a right-hand side (n, 3) and the array that receives the solution. The known
+    solution is a translation, for which the terms of all elements cancel. Only the terms of inertia
+    (and pins) remain, which rounding errors in the matrix destroy first.
     """
     if matrix.shape[0] == 0:
         return

@@ -1,4 +1,4 @@
-"""Registry of effects by their names; a module is imported only when a scene lists its effect."""
+"""Registry of effects by name; a module is imported only when a scene lists its effect."""
 
 from pdrom.core.registry import Registry
 

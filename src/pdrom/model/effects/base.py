@@ -28,7 +28,7 @@ from pdrom.core.yamlfile import ConfigModel, describe, shown
 from pdrom.model.effects import EFFECTS
 from pdrom.model.mesh.types import Length, Mesh
 
-# A vertex inside an obstacle by at most this fraction of the mesh extent counts as touching it.
+# A vertex up to this deep inside an obstacle, relative to the mesh extent, counts as touching it.
 TOUCHING = 1e-6
 
 
@@ -42,7 +42,7 @@ Vector = tuple[Length, Length, Length]
 
 
 class EffectConfig(ConfigModel):
-    """Base of an effect's configuration: unknown keys are refused, instances are frozen."""
+    """Base class of effect configurations: unknown keys are refused, instances are frozen."""
 
     effect: str
 
@@ -62,18 +62,18 @@ class EffectConfig(ConfigModel):
         """Raise ValueError if the effect is unstable with a step of ``time_step`` s."""
 
     def redirected(self, axes: Sequence[int]) -> Self:
-        """A handle that moves in another direction within ``axes``; other effects do not change."""
+        """Return the effect; for a handle, with another direction of motion in ``axes``."""
         return self
 
     def tilted(self, degrees: float, axes: Sequence[int], place: int) -> Self:
-        """Gravity turned by ``degrees``; any other effect is unchanged.
+        """Return gravity turned by ``degrees``, any other effect unchanged.
 
         It turns towards ``axes[place]`` (of 0, 1, 2), counted without an axis along gravity.
         """
         return self
 
     def carried(self, offset: Sequence[float], over: int) -> "EffectConfig":
-        """Pins that move by ``offset`` (m) in ``over`` frames; other effects are unchanged."""
+        """Return the effect; for pins, a handle that moves by ``offset`` m in ``over`` frames."""
         return self
 
     def body(self, low: np.ndarray, high: np.ndarray) -> Mesh | None:
@@ -129,7 +129,7 @@ class Force(Effect):
 
 
 class Boundary(Effect):
-    """Effect that prescribes positions of ("holds") vertices, by elimination, not by a penalty."""
+    """Effect that holds vertices: prescribes their positions, by elimination, not by a penalty."""
 
     vertices: np.ndarray
     """All vertices that the effect holds in any frame, ascending (n,) int64."""
@@ -146,22 +146,22 @@ class Boundary(Effect):
 
     @abstractmethod
     def held(self, frame: int) -> np.ndarray:
-        """Return the vertices (n,) int64 that are held in ``frame``, in which `active` is true."""
+        """Return the vertices (n,) int64 that are held in ``frame``, if it is `active`."""
 
     @abstractmethod
     def targets(self, frame: int, current: np.ndarray) -> np.ndarray:
         """Return the positions (n, 3) m of the held vertices at the end of ``frame``.
 
-        ``current`` (n, 3) m are their positions at its beginning. The effect stores them in the
+        ``current`` (n, 3) m are their positions at its beginning, which the effect stores in the
         first frame of a hold.
         """
 
     def takes_hold(self, frame: int) -> bool:
-        """Return whether a hold begins in ``frame``: targets depend on the positions before it."""
+        """Return whether a hold begins in ``frame``: targets depend on the positions then."""
         return True
 
     def path(self, frames: range, current: np.ndarray) -> np.ndarray:
-        """Return targets (f, n, 3) m of f ``frames``; a hold may begin in the first one only."""
+        """Return targets (f, n, 3) m of f ``frames``; a hold may begin in the first only."""
         first = self.targets(frames.start, current)
         if not self.moves:
             return np.broadcast_to(first, (len(frames), *first.shape))
@@ -208,7 +208,7 @@ class Contact(Effect):
     def doubt(self, rest: np.ndarray, free: np.ndarray) -> str:
         """Return a warning about positions ``rest`` (N, 3) m of ``free`` vertices (n,), or "".
 
-        By default the warning is about vertices that the contact moves in the first frame.
+        By default it warns of vertices that the contact moves in the first frame.
         """
         moved = rest.copy()
         self.correct(moved, rest)
@@ -270,8 +270,8 @@ def held_path(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the held vertices (m,) and their targets (n, m, 3) m in the first n >= 1 ``frames``.
 
-    The n frames end before the first one in which other vertices are held or a hold begins, as its
-    targets are not yet known.
+    The n frames end before the first one in which other vertices are held or a hold begins, as the
+    targets of this hold are not yet known.
 
     Parameters
     ----------
@@ -294,5 +294,5 @@ def held_path(
         known += 1
     paths = [b.path(frames[:known], q) for b, q in zip(active, current, strict=True)]
     if single:
-        return vertices, np.array(paths[0], order="C")  # no view: a new type is compiled anew
+        return vertices, np.array(paths[0], order="C")  # no view: its type would be compiled, too
     return vertices, np.concatenate([np.empty((known, 0, 3)), *paths], axis=1)[:, first]

@@ -46,7 +46,7 @@ class Damping(Force):
     """Acceleration -c v with the velocity v at the beginning of the frame (explicit)."""
 
     class Config(EffectConfig):
-        """``rate`` c in 1/s; the explicit treatment needs c h < 2, another step is refused."""
+        """``rate`` c in 1/s; explicit treatment requires c h < 2, larger time steps are refused."""
 
         effect: Literal["damping"] = "damping"
         rate: Annotated[float, Field(ge=0.0, le=1e3, allow_inf_nan=False)]
@@ -70,7 +70,7 @@ class Drag(Force):
     """Force -c A_v v on each vertex, where A_v is a third of the rest area of its triangles.
 
     Over a frame a free vertex has the exact decay v exp(-c A_v h / m_v), so that the velocity never
-    changes its sign. Vertices inside a volume have A_v = 0.
+    changes its sign. Interior vertices of a volume have A_v = 0.
     """
 
     class Config(EffectConfig):

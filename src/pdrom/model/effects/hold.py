@@ -1,4 +1,4 @@
-"""Boundary effects that hold vertices for a range of frames, at rest or along a motion (handle)."""
+"""Boundary effects that hold vertices for a range of frames, at rest or in motion (handles)."""
 
 from abc import abstractmethod
 from collections.abc import Sequence
@@ -13,7 +13,7 @@ from pdrom.model.mesh.types import Mesh
 
 
 class HoldConfig(EffectConfig):
-    """Frames ``start`` <= f < ``until`` (None: to the end) and the vertices that are held."""
+    """Held vertices, and frames ``start`` <= f < ``until`` of the hold (None: to the end)."""
 
     select: Selection
     start: FrameNumber = 0
@@ -77,7 +77,7 @@ class Pins(Hold):
 
 
 class HandleConfig(HoldConfig):
-    """A motion that takes ``over`` frames from ``start`` on and then holds."""
+    """A motion that lasts ``over`` frames from ``start``; then the vertices are held at rest."""
 
     over: Annotated[FrameNumber, Field(ge=1)]
 

@@ -1,4 +1,4 @@
-"""A handle: held vertices that follow given offsets and rotations over time."""
+"""A handle whose held vertices follow given offsets and rotations over time."""
 
 from collections.abc import Sequence
 from typing import Annotated, Literal, Self
@@ -15,11 +15,11 @@ Degrees = Annotated[float, Field(ge=-1e6, le=1e6)]
 
 
 class Key(ConfigModel):
-    """Pose ``at`` so many frames after ``start``.
+    """Pose of a handle, ``at`` this number of frames after ``start``.
 
-    offset : metres from where the handle took hold
+    offset : displacement since the beginning of the hold, m
     turn : degrees about x, y and z as a rotation vector (its direction is the axis, its length the
-        angle), right-handed about the middle of the handle's bounding box where it took hold
+        angle), right-handed about the centre of the bounding box when the hold begins
     """
 
     at: Annotated[int, Field(ge=1, le=1_000_000)]
@@ -28,7 +28,7 @@ class Key(ConfigModel):
 
 
 class Keyframes(Hold):
-    """Held vertices that move as a rigid body from key to key, and rest after the last key.
+    """Held vertices that move as a rigid body from key to key and stay in place after the last key.
 
     Offsets and rotation vectors are interpolated: ``linear``, with a kink at each key, or
     ``smooth``, by monotone cubics without overshoot (Fritsch and Butland 1984). Angles above 180
@@ -36,7 +36,7 @@ class Keyframes(Hold):
     """
 
     class Config(HoldConfig):
-        """``keys`` in the order of time; before them, at ``start``, the handle is where it was."""
+        """``keys`` in the order of time; at ``start``, before them, offset and turn are zero."""
 
         effect: Literal["keyframes"] = "keyframes"
         keys: Annotated[tuple[Key, ...], Field(min_length=1, max_length=10_000)]

@@ -1,4 +1,4 @@
-"""A smooth random initial velocity, used for test trajectories that are not trained on."""
+"""A smooth random initial velocity, used for held-out test motions."""
 
 from typing import Annotated, Literal
 

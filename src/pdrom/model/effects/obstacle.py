@@ -10,7 +10,7 @@ from pdrom.model.effects.base import Contact, EffectConfig, Vector
 from pdrom.model.mesh.selection import require_direction, require_ordered
 from pdrom.model.mesh.types import Length, Mesh, PositiveLength
 
-# A vertex at a depth of at most this fraction of the mesh extent counts as outside.
+# A vertex up to this deep inside, relative to the mesh extent, counts as outside.
 SLACK = 1e-9
 
 Entries = tuple[np.ndarray, np.ndarray, np.ndarray]
@@ -19,17 +19,17 @@ Entries = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 class ObstacleConfig(EffectConfig):
-    """``friction`` mu: 0 glides, ``.inf`` sticks."""
+    """``friction`` coefficient mu: 0 for no friction, ``.inf`` for sticking."""
 
     friction: Annotated[float, Field(ge=0.0)] = 0.0
 
 
 class Obstacle(Contact):
-    """A fixed convex body that vertices, but not edges and triangles, cannot enter.
+    """A fixed convex body that vertices cannot enter; edges and triangles can.
 
     A vertex whose straight path of a frame enters the body continues in the tangent plane at the
     entry point, even if the path leaves the body again, so that fast vertices do not pass through.
-    A vertex that is inside at the beginning of a frame goes to the nearest surface point. Both
+    A vertex that is inside at the beginning of a frame moves to the nearest surface point. Both
     corrections move it by a depth d along the normal and shorten its tangential motion by mu d, to
     not less than zero: Coulomb's law for the impulse m d / h of the frame. Impacts are inelastic.
     """
@@ -72,7 +72,7 @@ class Obstacle(Contact):
 
     @abstractmethod
     def depths(self, points: np.ndarray) -> np.ndarray:
-        """Return distances (n,) m to the surface of ``points`` (n, 3) m inside; <= 0 outside."""
+        """Return depths (n,) m of ``points`` (n, 3) m below the surface; <= 0 outside."""
 
     @abstractmethod
     def normals(self, points: np.ndarray) -> np.ndarray:
@@ -120,7 +120,7 @@ UP = np.array([0.0, 1.0, 0.0])
 
 
 class Sphere(Obstacle):
-    """A ball, which vertices cannot enter; see `Obstacle`."""
+    """A sphere, which vertices cannot enter; see `Obstacle`."""
 
     class Config(ObstacleConfig):
         """``centre`` and ``radius`` in metres."""

@@ -17,14 +17,14 @@ KNOTS = (0.0, -1.0, 1.0, -1.0, 0.0)
 
 
 class Poke(Boundary):
-    """Moves a vertex 0 -> -z -> +z -> -z -> 0, releases it, and continues with the next vertex.
+    """Boundary that moves a vertex 0 -> -z -> +z -> -z -> 0, releases it, and moves the next one.
 
     Vertices are chosen by farthest-point sampling from the centre, except those in ``avoid``. The
     reproduced preprint gives no speeds; amplitude, frames and order are chosen by this study.
     """
 
     class Config(EffectConfig):
-        """``amplitude`` in metres along ``axis``; ``over`` frames of motion, ``rest`` between."""
+        """``amplitude`` in m along ``axis``; ``over`` frames of motion, then ``rest`` frames."""
 
         effect: Literal["poke"] = "poke"
         amplitude: Length = 0.2

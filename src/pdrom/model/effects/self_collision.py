@@ -11,7 +11,7 @@ from pdrom.model.mesh.types import MAX_LENGTH, MIN_LENGTH, Mesh
 
 # Largest number of searches for close pairs per frame, and of sweeps over the pairs per search.
 SEARCHES, SWEEPS = 20, 100
-# Radius of the search for pairs over the thickness; sweeps may bring these pairs closer.
+# Radius of the search for pairs, relative to the thickness; sweeps may bring such pairs closer.
 REACH = 1.25
 # Sweeps end when no pair is closer than this fraction of the thickness.
 ENOUGH = 0.95
@@ -20,7 +20,7 @@ COVER = 1.0 / np.sqrt(3.0)
 
 
 class SelfCollision(Contact):
-    """Contact that separates pairs of vertices closer than the thickness but not so at rest.
+    """Contact that separates vertices closer than the thickness, except pairs that are so at rest.
 
     Close pairs (found by a k-d tree) are moved apart along their connecting line, in proportion to
     their inverse masses (zero for held vertices); momentum is conserved if none is held. Sweeps
@@ -49,7 +49,7 @@ class SelfCollision(Contact):
         self._needed = COVER * np.linalg.norm(edges[:, 0] - edges[:, 1], axis=1).max()
 
     def doubt(self, rest: np.ndarray, free: np.ndarray) -> str:
-        """Return a warning with the thickness that is needed, "" if the scene's is sufficient.
+        """Return a warning with the required thickness, or "" if that of the scene is sufficient.
 
         ``rest`` and ``free`` are as in `Contact.doubt`.
         """
@@ -91,7 +91,7 @@ class SelfCollision(Contact):
 
 @njit(cache=True)
 def _separate(q, before, pairs, inverse_masses, thickness, enough, sweeps):
-    """Move close ``pairs`` of q apart in place; return the least distance in the first sweep."""
+    """Move close ``pairs`` of q apart in place; return the smallest distance in the first sweep."""
     first = thickness
     for sweep in range(sweeps):
         closest = thickness

@@ -1,8 +1,8 @@
 """Levels of accuracy (full-order and reduced solvers with K iterations), their runs and errors.
 
-The reference of a motion solves the implicit step with so many accelerated iterations that a run
-with half of them agrees within the tolerance. The error of that run is taken as the error of the
-reference.
+The reference of a motion solves the implicit step by accelerated iterations. Their number is large
+enough if a run with half of them differs by less than the tolerance. The error of that run is used
+as the error of the reference.
 
 The cost of a frame is computed from operation counts, not timed, so that the choice of a level is
 reproducible. The constants were measured on one thread of a 2024 processor; only ratios matter.
@@ -22,7 +22,7 @@ from pdrom.reduction.rerun import mean_motion
 from pdrom.reduction.subspace.model import SubspaceModel
 from pdrom.reduction.subspace.space import projector
 
-WINDOW = 5  # differences of iterates that Anderson's acceleration combines
+WINDOW = 5  # number of differences of iterates that Anderson acceleration combines
 # Full-order cost in ns: per projection and squared number of rows, per entry of the factor, per
 # vertex of an accelerated iteration; per compiled frame, and extra per frame computed in Python.
 PROJECTION, ENTRY, ACCELERATED = 5.0, 0.9, 6.5
@@ -99,7 +99,7 @@ class Level:
 class Trajectory:
     """A run of ``level`` on the motion of ``scene``, frame by frame.
 
-    Only one run of a scene may be active: its boundaries store the positions where they took hold.
+    Only one run of a scene may be active: its boundaries store positions when a hold begins.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ class Trajectory:
     Attributes
     ----------
     ends : positions (N, 3) m at the start and at the end of every computed frame
-    defects : defects of the checked frames, m, see `check`
+    defects : frame -> defect of each checked frame, m, see `check`
     seconds : processor time of the frames, s
     """
 
@@ -199,7 +199,7 @@ def relative_errors(
 
 
 def last_within(errors: np.ndarray, tolerance: float) -> int:
-    """Largest number of first frames whose `relative_errors` ``errors`` is within ``tolerance``."""
+    """Largest n for which the error of the first n frames, errors[n - 1], is within tolerance."""
     within = np.flatnonzero(errors <= tolerance)
     return int(within[-1]) + 1 if len(within) else 0
 
@@ -214,7 +214,7 @@ class Motion:
     Attributes
     ----------
     reference : (F + 1, N, 3) m, positions
-    iterations : iterations of each frame of the reference
+    iterations : number of iterations in each frame of the reference
     unconverged : errors (F,) of a run with half the iterations
     sensitivity : relative differences (F,) of a run whose start is perturbed, see `MOVED`
     unit : root mean square displacement of a frame, m

@@ -9,7 +9,7 @@ run accumulates defects and amplifies them. The error of the run is estimated as
 calibration, times the ratio of the defects in checked frames (run / calibration) or the ratio of
 the distances to the run of a second level with a perturbed start, if these exceed 1. The tolerance
 counts as met for the frames over which the estimate is within it. A failed reduction is replaced by
-a full-order level, and a failed one by the most accurate one. No choice depends on timings.
+a full-order level, a failed full order by the most accurate level. Timings decide nothing.
 """
 
 import logging
@@ -38,7 +38,7 @@ CALIBRATED = 100
 # An error counts as unknown if it can be computed for less than this fraction of the frames.
 JUDGED = 0.1
 PROBED = 6  # number of frames of a calibration run whose defects are computed
-CHECKS = 2  # least number of checked frames of a run
+CHECKS = 2  # smallest number of checked frames of a run
 # A reduction is run only if its estimated work, with checks, is less than this fraction of the full
 # order's: the estimate is not more accurate than that.
 WORTH = 2.0 / 3.0
@@ -52,8 +52,8 @@ AMPLIFIED = "a second run, of another accuracy and moved by round-off, departs a
 class Request(ConfigModel):
     """Largest relative error of a run against its implicit step, solved to convergence.
 
-    error : 0.01 is one per cent
-    quantity : whose error it is, over all frames
+    error : largest error, such as 0.01 for one per cent
+    quantity : quantity, position or velocity, whose error over all frames is limited
     """
 
     error: Annotated[float, Field(gt=0.0, lt=1.0)]
@@ -91,15 +91,15 @@ def read_request(wish: object, source: str = "error") -> Request:
 
 
 class ToleranceSettings(ConfigModel):
-    """Levels that are calibrated, and the factor of the estimates.
+    """Levels that are calibrated, and the safety factor of their errors.
 
-    modes, tolerances : of the reductions: k, tau
-    frames : of the training motions that the elements are sampled for, at most
-    training_motions : training motion and further ones that train the reductions
-    plain, accelerated : iterations of the full order, without and with acceleration
-    iterations : of the reductions, accelerated
-    factor : by which estimated errors are multiplied
-    every : one of so many frames of a reduction is checked
+    modes, tolerances : numbers of modes k and sampling tolerances tau of the reductions
+    frames : largest number of frames of the training motions for which elements are sampled
+    training_motions : number of motions that train the reductions, the training motion included
+    plain, accelerated : numbers of full-order iterations, without and with acceleration
+    iterations : numbers of iterations of the reductions, all accelerated
+    factor : safety factor by which estimated errors are multiplied
+    every : number of frames of a reduction for each checked frame
     """
 
     modes: tuple[Count, ...] = (20, 40)
@@ -119,7 +119,7 @@ class Calibrated:
 
     work : estimated cost of a frame, ns
     errors : for each motion, errors (F,) over the first 1, ..., F frames
-    defect : largest defect of a frame, relative to the displacement of the motion
+    defect : largest defect of a frame, relative to the root mean square displacement of the motion
     ms : processor time of a frame of the first motion, ms
     """
 
@@ -142,14 +142,14 @@ class Outcome:
     positions : (F + 1, N, 3) m, the initial ones first
     frames : number of first frames for which the estimated error is within the tolerance; 0 if the
         request is refused: the most accurate full order has run then
-    limit : reason why later frames are not within it; empty if all frames are
+    limit : reason why the estimate exceeds it in later frames; empty if all frames are within it
     expected : error of the chosen level on the motions of the calibration, times the factor
     estimate : estimated error over these frames, times the factor; None if the request is refused
-    level : title of the level that made the positions
+    level : title of the level that computed the positions
     reduced : whether that level is a reduced model
     failed : titles of the levels that were tried before
     checks : numbers of the frames that were checked
-    seconds : processor time of all frames that were done, without what precedes the first of them
+    seconds : processor time of all computed frames, without preparations before the first one
     full_ms : processor time of a frame of the cheapest full order that meets the tolerance in the
         calibration, without checks
     """
@@ -176,7 +176,7 @@ class Outcome:
 class Calibration:
     """Calibrated ``levels``, ordered by work, and the reference ``motions`` they were run on.
 
-    Errors are errors of one quantity. Valid for tolerances not below that of the calibration.
+    All errors are those of one quantity. Valid for tolerances not below that of the calibration.
     """
 
     levels: list[Calibrated]
@@ -190,7 +190,7 @@ class Calibration:
         return max(full, key=lambda each: (each.level.iterations, each.level.window))
 
     def horizon(self, error: float) -> tuple[int, str]:
-        """Number of first frames with errors known to the tolerance ``error``, and its limit."""
+        """Number of first frames with errors known to ``error``, and the reason for this limit."""
         least = error / self.settings.factor
         converged = min(levels.last_within(motion.unconverged, least) for motion in self.motions)
         sharp = min(levels.last_within(motion.sensitivity, least) for motion in self.motions)
@@ -289,7 +289,7 @@ class CheckedRun:
         """Run ``level`` to its end or the first failed check; return it and estimated errors (F,).
 
         The expected error is multiplied by the ratio of defects (root mean square of the run over
-        calibration) if above 1. All are infinite if no error is known, or check or run failed.
+        calibration) if above 1. All errors are inf if none is known, or if a check or run failed.
         """
         own, frames, full = self._own, self._frames, self._own.full_order(self._error).level
         largest = BLOWUP_EXTENT * self._scene.mesh.extent
@@ -334,7 +334,7 @@ def check_frames(frames: int, count: int) -> list[int]:
 def calibrate(
     training: Scene, settings: ToleranceSettings, request: Request, on_frame: OnFrame = silent
 ) -> Calibration:
-    """Run every level of ``settings`` on the ``training`` motion and on one far from it.
+    """Run every level of ``settings`` on the ``training`` motion and on a variation of it.
 
     Parameters
     ----------

@@ -82,12 +82,11 @@ BLOCK = 16  # columns that LAPACK eliminates at a time
 class GrowingFit:
     """Least-squares fit of each mode by the earlier modes at a growing set of sampled rows.
 
-    The coefficients c of mode v_k solve (S V_k) c = S v_k, where S takes the sampled rows.
+    The coefficients c of mode v_k solve (S V_k) c = S v_k, where S selects the sampled rows.
 
-    The triangular factor R (r, r) of the sampled rows of all modes is stored, and further rows
-    are rotated into it. R[:k, :k] c = R[:k, k] has the same least-squares solutions as the
-    sampled equations. Adding s rows costs O(s r^2); factoring all m rows again would cost
-    O(m k^2).
+    The triangular factor R (r, r) of the sampled rows of all modes is stored, and further rows are
+    rotated into it. R[:k, :k] c = R[:k, k] has the same least-squares solutions as the sampled
+    equations. Adding s rows costs O(s r^2); factoring all m rows again would cost O(m k^2).
     """
 
     def __init__(self, modes: int) -> None:
@@ -113,9 +112,9 @@ class GrowingFit:
 def block_elements(v: np.ndarray, size: int) -> np.ndarray:
     """Greedy element indices for the basis ``v`` (size e, r), min(e, r) of them, nested in r.
 
-    Mode k is fitted by the earlier modes on the entries of the elements taken so far (least
+    Mode k is fitted by the earlier modes on the entries of the elements selected so far (least
     squares, more equations than unknowns); the element with the largest residual norm (times
-    `tie_weights`) follows.
+    `tie_weights`) is selected next.
     """
     total = len(v) // size
     return _greedy([v], total, min(total, v.shape[1]), repeat=False)
@@ -125,7 +124,7 @@ def joint_rows(v: np.ndarray, active: tuple[bool, ...], repeat: bool) -> np.ndar
     """Greedy row indices (r,) for the basis ``v`` (3 rows, r), nested in r.
 
     For mode k each axis a has its own system (P^T V_a) c_a = P^T v_{k,a}; the row with the largest
-    sum of squared residuals of the three axes (times `tie_weights`) is taken for all axes. A
+    sum of squared residuals of the three axes (times `tie_weights`) is selected for all axes. A
     singular system is solved in the least-squares sense: the row was chosen for the joint norm and
     may be useless for one axis. With ``repeat`` a row may be picked again, as in the published
     code; without it, the result has at most as many entries as the basis has rows.
@@ -142,7 +141,7 @@ def joint_rows(v: np.ndarray, active: tuple[bool, ...], repeat: bool) -> np.ndar
 def _greedy(parts: Sequence[np.ndarray], total: int, count: int, repeat: bool) -> np.ndarray:
     """Pick ``count`` of ``total`` blocks of rows by the residuals of ``parts`` of the modes.
 
-    Each part has as many rows in a block, and coefficients of its own.
+    Each part has its own coefficients; all of its blocks have the same number of rows.
     """
     fits = [(np.asfortranarray(part), GrowingFit(part.shape[1])) for part in parts]
     weights = tie_weights(total) ** 2

@@ -2,8 +2,8 @@
 
 B. Peherstorfer, Z. Drmac, S. Gugercin, Stability of discrete empirical interpolation and gappy
 proper orthogonal decomposition with randomized and deterministic sampling points, SIAM J. Sci.
-Comput. 42 (2020), section 4. Points are generalised to blocks of rows (the elements), and how many
-there are may follow from a bound on the gain instead of being given.
+Comput. 42 (2020), section 4. Points are generalised to blocks of rows (the elements), and their
+number is either given or follows from a bound on the gain.
 """
 
 import numpy as np
@@ -57,7 +57,7 @@ class _Growing:
     def __init__(self, v: np.ndarray, size: int, elements: np.ndarray) -> None:
         self._rows = np.ascontiguousarray(v)
         self._blocks = self._rows.reshape(-1, size, v.shape[1])
-        # a tenth of the blocks' size suffices to bound the growth closely, see `_growth_at_most`
+        # these products, a tenth as large as the blocks, give close bounds, see `_growth_at_most`
         self._squares = self._blocks @ self._blocks.transpose(0, 2, 1)
         self._sizes = np.trace(self._squares, axis1=1, axis2=2)
         self.picked, self.total = [int(e) for e in elements], len(self._blocks)

@@ -1,4 +1,4 @@
-"""The greedy selection: largest residual of the next mode, of single entries or whole elements."""
+"""Greedy selection of single entries or whole elements by the largest residual of the next mode."""
 
 from collections.abc import Sequence
 

@@ -211,7 +211,7 @@ class ReducedLocalStep:
         self._group.begin_frame(q, None if self._everything else self._elements)
 
     def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
-        """Add the reduced S^T W p(``y``), (N, 3), to ``rhs``; return nan: the energy is unknown."""
+        """Add the reduced S^T W p(``y``), (N, 3), to ``rhs``; return nan for the unknown energy."""
         if self._pass is not None:
             return self._pass.accumulate(y, rhs)
         self.solve(self.sample(y))
@@ -301,7 +301,7 @@ def rerun(
     ----------
     reference : (F + 1, N, 3) positions of the full-order run
     blowup_extent : the run ends when the extent exceeds this multiple of the rest extent
-    offset : (N, 3) m, added to the first positions
+    offset : (N, 3) m, added to the initial positions
     system : factored system of the scene's global step
     local_steps : local steps that replace the steps of the scene's groups
     """

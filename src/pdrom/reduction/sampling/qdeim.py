@@ -14,15 +14,15 @@ ROWS_A_MODE, FEW = 2, 8
 def qdeim_elements(v: np.ndarray, size: int) -> np.ndarray:
     """Q-DEIM element indices for the basis ``v`` (size e, r), min(e, r) of them.
 
-    The columns of V^T are pivots, in groups of ``size`` that belong to one element. The group with
-    the largest Frobenius norm (times `tie_weights`) is taken, and the direction in R^r that
-    dominates it is removed from all groups. For ``size`` 1 this is the method of the paper. With
-    larger sizes, removing the whole group would exhaust R^r after about r / size elements; one
-    direction per element gives as many elements as modes, the same cost as the greedy selection.
-    The removed directions are orthonormal and lie in the span of the taken groups, so that the
-    sampled rows of V have full column rank.
+    Candidates for pivots are the columns of V^T, in groups of ``size`` that belong to one element.
+    The group with the largest Frobenius norm (times `tie_weights`) is selected, and the direction
+    in R^r that dominates it is removed from all groups. For ``size`` 1 this is the method of the
+    paper. With larger sizes, removing the whole group would exhaust R^r after about r / size
+    elements; one direction per element gives as many elements as modes, the same cost as the greedy
+    selection. The removed directions are orthonormal and lie in the span of the selected groups, so
+    that the sampled rows of V have full column rank.
 
-    Not nested in r. Cost O(n r^2), n = size e.
+    Selections are not nested in r. Cost O(n r^2), n = size e.
     """
     left = _Left(v, size)
     candidates = min(left.total, ROWS_A_MODE * v.shape[1] // size + 1)
@@ -34,11 +34,11 @@ def qdeim_elements(v: np.ndarray, size: int) -> np.ndarray:
 
 
 class _Left:
-    """Groups of columns after removal of the taken directions, with bounds on their norms.
+    """Groups of columns after removal of the selected directions, with bounds on their norms.
 
     Norms only decrease. A pivot among the groups with the largest bounds is therefore the pivot of
     all groups as long as its norm exceeds the bounds of the others, which are updated only when it
-    does not. So the matrix is read a few times in all, where LAPACK reads it once per pivot.
+    does not. The matrix is thus read only a few times, where LAPACK reads it once per pivot.
     """
 
     def __init__(self, v: np.ndarray, size: int) -> None:

@@ -1,4 +1,4 @@
-"""A reduced projection: p(q) is replaced by mean + V c, with c from sampled entries of p."""
+"""Reduced projections: p(q) is replaced by mean + V c, with c from sampled entries of p."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -57,8 +57,8 @@ class Sampling:
     """Entries and elements that a method evaluates online.
 
     entries : indices into the vectorised projection (length 3 e p), in order of selection; for
-        "joint" rows the x entry of each row stands for the row
-    elements : unique indices of the elements of these entries, by their first entry
+        "joint" rows the x entry of each row represents the row
+    elements : unique indices of the elements of these entries, in the order of their first entries
     """
 
     entries: np.ndarray
@@ -68,7 +68,7 @@ class Sampling:
     def of_entries(
         cls, entries: np.ndarray, rows_per_element: int, elements: int, repeats: bool = False
     ) -> "Sampling":
-        """Sampling of ``entries``; SamplingError if one is out of range or repeated without leave.
+        """Sampling of ``entries``; SamplingError if one is out of range or forbiddenly repeated.
 
         Parameters
         ----------
@@ -132,7 +132,7 @@ class Reduction:
     ----------
     v : (3 e p, r) modes
     elements : elements to evaluate, in the order of ``sampling.elements``
-    blocks : sets of coefficients
+    blocks : sets of coefficients, each with its entries and its operator
     """
 
     def __init__(self, basis: Basis, sampling: Sampling, spec: MethodSpec, r: int) -> None:
@@ -151,7 +151,7 @@ class Reduction:
             orthonormal = np.allclose(gram, np.eye(len(gram)), rtol=0.0, atol=1e-12)
             return Block(axis, entries, matrix, matrix.T if orthonormal else np.linalg.pinv(matrix))
         entries = self.sampling.entries
-        if self.spec.rows == "joint":  # one index stands for the whole row
+        if self.spec.rows == "joint":  # one index represents the whole row
             axes = np.arange(3) if axis is None else np.array([axis])
             entries = (3 * (entries // 3)[:, None] + axes).ravel()
         elif axis is not None:
@@ -241,7 +241,7 @@ def select_path(basis: Basis, spec: MethodSpec, ranks: Sequence[int]) -> dict[in
         if spec.rows == "element":
             samplings[r] = Sampling.of_elements(chosen, *counts)
         else:
-            # the x entry of each row stands for the row
+            # the x entry of each row represents the row
             entries = 3 * chosen if spec.rows == "joint" else chosen
             samplings[r] = Sampling.of_entries(entries, *counts, repeats=spec.repeat_rows)
     return samplings

@@ -22,9 +22,9 @@ DEPENDENT = 1e-12
 def s_opt_path(v: np.ndarray, size: int) -> np.ndarray:
     """Greedy maximisation of the S-measure S(A) = (sqrt(det A^T A) / prod_j |A_j|)^(1/r).
 
-    Return min(e, r) elements, nested in r: step k maximises S of the first k modes at k
-    elements. The first step, where S is 1 for every element, takes the largest norm of the first
-    mode, as classical DEIM does.
+    Return min(e, r) elements, nested in r: step k maximises S of the first k modes at k elements.
+    In the first step S is 1 for every element; it selects the element with the largest norm of the
+    first mode, as classical DEIM does.
 
     Parameters
     ----------
@@ -52,8 +52,8 @@ class SOpt(Selection):
     def extend(self, v: np.ndarray, size: int, chosen: np.ndarray, count: int) -> np.ndarray:
         """Extend ``chosen`` to ``count`` elements, each maximising the S-measure of all modes.
 
-        Ends with all e elements if there are fewer. Raises SamplingError if the modes depend on
-        each other at the elements to start with.
+        Returns all e elements if there are fewer. Raises SamplingError if the modes depend on each
+        other at the elements to start with.
         """
         count = min(count, len(v) // size)
         if count <= len(chosen):
@@ -67,13 +67,13 @@ class SOpt(Selection):
 class _Sampled:
     """Sampled elements, with the data that give the S-measure after adding any other element.
 
-    With G the Gram matrix of the sampled rows and B (s, k) the rows of a candidate,
-    det(G + B^T B) = det G det(I + M), M = B G^-1 B^T. Taking an element D updates all M at once
-    (Woodbury): M <- M - X (I + D G^-1 D^T)^-1 X^T, X = B G^-1 D^T. A mode d that is added to the
-    columns multiplies the determinant by the squared norm of its least-squares residual, with a
-    candidate q + z^T (I + M)^-1 z: q from the rows that are sampled already, z the candidate's part
-    of the residual; afterwards M <- M + z z^T / q. One step costs O(s e (s + k)) instead of a
-    determinant for each element.
+    With G the Gram matrix of the sampled rows and B (s, k) the rows of a candidate, det(G + B^T B)
+    = det G det(I + M), M = B G^-1 B^T. Sampling an element D updates all M at once (Woodbury): M <-
+    M - X (I + D G^-1 D^T)^-1 X^T, X = B G^-1 D^T. A mode d that is added to the columns multiplies
+    the determinant by the squared norm of its least-squares residual. With a candidate this is q +
+    z^T (I + M)^-1 z: q from the rows that are sampled already, z the candidate's rows of the
+    residual; afterwards M <- M + z z^T / q. One step costs O(s e (s + k)) instead of a determinant
+    for each element.
 
     picked : sampled elements in order of selection
     """
@@ -97,7 +97,7 @@ class _Sampled:
     def best(self, mode: int | None = None) -> int:
         """Element that gives the largest S-measure of the columns, after ``mode`` is added to them.
 
-        The first of the largest is taken. SamplingError if no element makes the modes independent.
+        Ties go to the first element. SamplingError if no element makes the modes independent.
         """
         if not self.picked and mode is not None:
             return int(np.argmax(self._squares[:, mode]))

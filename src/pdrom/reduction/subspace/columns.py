@@ -1,10 +1,10 @@
 """Columns B (N, K) of a position subspace q = B z with coordinates z (K, 3); axes share B.
 
-The free vertices get k modes and, always, the affine columns 1, x, y, z of the rest shape: the rest
-shape and every rigid motion are in the space. Vertices that a boundary condition holds at any time
-form atoms, sets that are held and released together. Each atom has its own columns: affine ones
-and POD modes of its released motion. While an atom is held its coordinates are fixed, so that pins
-and handles are met exactly; otherwise they are unknowns. The space is constant during a run.
+The free vertices get k modes and, always, the affine columns 1, x, y, z of the rest shape: the
+space contains the rest shape and every rigid motion. Vertices that a boundary condition holds at
+any time form atoms, sets that are held and released together. Each atom has its own columns: affine
+ones and POD modes of its released motion. While an atom is held its coordinates are fixed, so that
+pins and handles are met exactly; otherwise they are unknowns. The space never changes in a run.
 """
 
 from collections.abc import Sequence
@@ -17,10 +17,10 @@ from pdrom.model.effects.base import Boundary
 from pdrom.model.mesh.selection import farthest_points
 from pdrom.reduction.basis import fix_signs, pod
 
-# A column is dropped if its part orthogonal to the earlier columns is relatively below this.
+# A column is dropped if its component orthogonal to the earlier ones is relatively below this.
 DEPENDENT = 1e-9
 
-# Relative truncation of the POD modes of an atom's non-affine motion.
+# Relative tolerance at which the POD modes of an atom's non-affine motion are truncated.
 OWN_MOTION = 1e-3
 
 # Motion below this fraction of the positions is round-off.
@@ -56,7 +56,7 @@ def displacement_modes(
     """First k POD modes (N, k) of displacements, mass-weighted, without their affine part.
 
     Each axis of each frame of ``trajectory`` (n, N, 3) is one snapshot, so that x, y and z share
-    the modes (Monem et al. 2023). Fewer are returned where the data hold fewer.
+    the modes (Monem et al. 2023). Fewer are returned if the data contain fewer.
 
     Parameters
     ----------
@@ -157,9 +157,9 @@ def atoms(boundaries: Sequence[Boundary], vertices: int) -> list[np.ndarray]:
 def skinning_weights(points: np.ndarray, handles: int) -> np.ndarray:
     """Weights (N, handles) at ``points`` (N, 3) m: smooth, in [0, 1], summing to 1 at every vertex.
 
-    Handles are vertices by farthest-point sampling. Each has the compactly supported kernel
-    (1 - d/R)^4 (4 d/R + 1) of Wendland with R three times the covering radius, so that every vertex
-    is reached; dividing by the sum makes a partition of unity.
+    Handles are vertices by farthest-point sampling. Each has the compactly supported kernel (1 -
+    d/R)^4 (4 d/R + 1) of Wendland with R three times the covering radius, so that every vertex lies
+    in the support of a kernel; dividing by the sum makes a partition of unity.
     """
     chosen = farthest_points(points, np.arange(len(points)), handles)
     distance = np.linalg.norm(points[:, None, :] - points[chosen][None], axis=2)
@@ -174,8 +174,8 @@ def skinning_weights(points: np.ndarray, handles: int) -> np.ndarray:
 def skinning_modes(points: np.ndarray, masses: np.ndarray, k: int) -> np.ndarray:
     """k mass-orthonormal columns (N, k) in the span of w_h [1, x, y, z], affine part removed.
 
-    w_h are the `skinning_weights` of as many handles as k columns need. Columns in excess of k are
-    dropped by singular value, so that the basis has the same size as others it is compared with.
+    w_h are the `skinning_weights` of as many handles as k columns need. Of more than k columns
+    those with the largest singular values are kept, so that bases of equal size are compared.
 
     Parameters
     ----------

@@ -1,24 +1,24 @@
 """Energy-conserving sampling and weighting (Farhat et al. 2014) for projective dynamics.
 
-A few elements with non-negative factors xi stand for all: sum_e xi_e g_e ~ sum_e g_e, where g_e is
-what an element contributes to the reduced equations over the training iterates. The same factors
+A few elements with non-negative factors xi represent all: sum_e xi_e g_e ~ sum_e g_e, where g_e is
+the contribution of an element to the reduced equations over the training iterates. The same factors
 weight the element in the system matrix and in the right-hand side. The reduced problem is then
 again a projective-dynamics problem, with weights xi_e w_e >= 0: whatever the factors and the state,
 its objective cannot rise in an iteration. Their quality decides the accuracy, not the stability.
 
-Training iterates come from a run in the position subspace with all projections. One iteration,
-A z' = (M/h^2) s + sum_e B^T S_e^T w_e p_e(B z), can be written as sum_e g_e = (M/h^2)(s - z') with
-g_e = B^T S_e^T w_e (S_e B z' - p_e(B z)). Sampled elements whose factors satisfy
-sum_e xi_e g_e = sum_e g_e map z to the same z', with their own matrix on the left. So the pairs
-(z, z') of a run are what the factors must reproduce. A residual r of the equations moves the next
-iterate by A^-1 r and misses the minimum of the iteration's quadratic objective by 1/2 r^T A^-1 r.
-That is how its size is measured (`Norm` "energy"): in the plain norm the stiff coordinates would
-hide errors of the soft ones, which the run follows.
+Training iterates come from a run in the position subspace with all projections. One iteration, A z'
+= (M/h^2) s + sum_e B^T S_e^T w_e p_e(B z), can be written as sum_e g_e = (M/h^2)(s - z') with g_e =
+B^T S_e^T w_e (S_e B z' - p_e(B z)). Sampled elements whose factors satisfy sum_e xi_e g_e = sum_e
+g_e map z to the same z', with their own matrix on the left. The factors must therefore reproduce
+the pairs (z, z') of a run. A residual r of the equations moves the next iterate by A^-1 r and
+misses the minimum of the iteration's quadratic objective by 1/2 r^T A^-1 r. `Norm` "energy"
+measures residuals by this loss: in the plain norm the stiff coordinates would hide errors of the
+soft ones, which determine the motion.
 
 `Norm` "response" measures the effect of r on the run. In each mode of (K, M) the frame ends obey
-x_{n+1} / c^2 - 2 x_n + x_{n-1} = h^2 r_n with c^2 = 1 / (1 + h^2 omega^2). To an r_n that is new
-in every frame the mode responds with h^2 c^2 sqrt((1 + c^2) / (1 + 3 c^2)) / (1 - c^2) times the
-root mean square of r_n, between 0.7 and 1 of the static response 1 / omega^2. For a mode without
+x_{n+1} / c^2 - 2 x_n + x_{n-1} = h^2 r_n with c^2 = 1 / (1 + h^2 omega^2). To an r_n that is new in
+every frame the mode responds with h^2 c^2 sqrt((1 + c^2) / (1 + 3 c^2)) / (1 - c^2) times the root
+mean square of r_n, between 0.7 and 1 of the static response 1 / omega^2. For a mode without
 stiffness, the response over a run of the scene's length is used.
 
 The factors are found by sparse non-negative least squares, stopped early (`nnls_path`).
@@ -135,8 +135,8 @@ def _measure(space: ReducedSpace, fixed: np.ndarray, norm: Norm, frames: int) ->
     return measure
 
 
-# Rows to which the training equations are hashed, per coordinate of the subspace. They must be
-# several times as many as the chosen elements, or the factors would fit the hashing.
+# Rows to which the training equations are hashed, per coordinate of the subspace. Without several
+# times as many rows as selected elements, the factors would fit the hashing.
 SKETCH = 60
 # Numbers of candidate elements, initial and largest: the equations of all elements of a large mesh
 # would not fit the memory, and neighbouring elements are similar.
@@ -149,8 +149,8 @@ def ecsw_elements(
 ) -> list[tuple[np.ndarray, np.ndarray]]:
     """Select elements (m,) and their factors xi > 0 (m,) for each tolerance.
 
-    In a large group, candidates are a random (seeded) subset, doubled up to `MOST` while it misses
-    a tolerance; the sum that the samples approximate is always taken over all elements.
+    In a large group, candidates are a random (seeded) subset. It is doubled, up to `MOST`, as long
+    as a tolerance is missed; the sum that the samples approximate is always that of all elements.
 
     Parameters
     ----------
@@ -177,10 +177,10 @@ def training_equations(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the equations of ``elements`` (m, len(elements)), Fortran order, and sums (m,).
 
-    For each pair (z, z') of iterates and each coordinate there is one equation,
-    g_e = B^T S_e^T w_e (S_e B z' - p_e(B z)), in the norm of A^-1 (see module `training`),
-    all together scaled so that the sum of all elements has norm 1. The share of the rest weight is
-    one more equation: a group at rest (no force at all) still keeps its stiffness.
+    For each pair (z, z') of iterates and each coordinate there is one equation, g_e = B^T S_e^T w_e
+    (S_e B z' - p_e(B z)), in the norm of `TrainingFrame.measure`, all together scaled so that the
+    sum of all elements has norm 1. The share of the rest weight is one more equation: a group at
+    rest (no force at all) still keeps its stiffness.
 
     Many equations are hashed to `SKETCH` K rows with random signs (seeded), which keeps norms of
     combinations up to a few per cent (count sketch, Charikar et al. 2002) and never forms an e x e
@@ -242,7 +242,7 @@ log = logging.getLogger(__name__)
 # A unit column depends on the active columns if its orthogonal part is below this.
 DEPENDENT = 1e-7
 
-# Columns join as a block: correlations above CLOSE times the largest, at most BLOCK of the active.
+# A block of columns to add: correlations above CLOSE times the largest, at most BLOCK x the active.
 CLOSE = 0.7
 BLOCK = 0.2
 
@@ -252,14 +252,14 @@ def nnls_path(
 ) -> list[tuple[np.ndarray, np.ndarray]]:
     """Non-negative x with || G x - b || <= tolerance || b || for each of several tolerances.
 
-    The active-set method of Lawson and Hanson: the columns with the largest correlation join, the
-    least-squares problem of the active columns is solved, columns that would turn negative leave.
-    The search passes the tolerances from the coarsest to the finest and stores each solution, so
-    that the supports stay small. Where many columns are active a few join at a time, which saves
-    passes over G; when none of a block stays, the next column comes alone, as in the original
-    method, whose end is the minimum. The normal equations of the active columns grow by rows of a
-    Cholesky factor; with columns scaled to length one their accuracy suffices for tolerances down
-    to about 1e-6. Beside G, no array is larger than G's active columns.
+    The active-set method of Lawson and Hanson: the columns with the largest correlation are added,
+    the least-squares problem of the active columns is solved, columns that would turn negative are
+    removed. The search passes the tolerances from the coarsest to the finest and stores each
+    solution, so that the supports stay small. If many columns are active, several are added at a
+    time, which saves passes over G; if none of them stays, only one column is added next, as in the
+    original method, which ends at the minimum. The normal equations of the active columns grow by
+    rows of a Cholesky factor; with columns scaled to length one their accuracy suffices for
+    tolerances down to about 1e-6. Besides G, no array is larger than G's active columns.
 
     Parameters
     ----------
@@ -270,7 +270,7 @@ def nnls_path(
     Returns
     -------
     For each tolerance, in the order given: support, the indices of the positive entries, ascending
-    (n,), and their values (n,). Where a tolerance cannot be reached it is the best x found.
+    (n,), and their values (n,). If a tolerance cannot be reached, x is the best found.
     """
     search = _ActiveSet(g, b)
     found: dict[float, tuple[np.ndarray, np.ndarray]] = {}
@@ -328,7 +328,7 @@ class _ActiveSet:
             if joined:
                 self._solve()
             staying = set(self._active).intersection(joined)
-            # a column that is dependent or leaves at once is banned, or it would be picked again
+            # ban a column that is dependent or removed at once, or it would be picked again
             if len(block) == 1 and not staying:
                 self._banned[block] = True
             self._alone = not staying and len(block) > 1
@@ -364,7 +364,7 @@ class _ActiveSet:
         return True
 
     def _solve(self) -> None:
-        """Least squares on the active columns; columns that turn negative are taken out."""
+        """Least squares on the active columns; columns that turn negative are removed."""
         while self._active:
             n = len(self._active)
             half = self._forward(self._target[:n])
@@ -405,9 +405,9 @@ class _ActiveSet:
 
 @njit(cache=True, error_model="numpy")
 def _remove_row(factor, n, column):
-    """Take row and column ``column`` out of the matrix whose Cholesky factor (n, n) is given.
+    """Remove row and column ``column`` from the matrix whose Cholesky factor (n, n) is given.
 
-    The rows below move up, and the rest of their factor takes the lost column in as a rank-one
+    The rows below move up, and the rest of their factor absorbs the lost column by a rank-one
     update (Gill, Golub, Murray, Saunders 1974, method C1).
     """
     lost = factor[column + 1 : n, column].copy()

@@ -1,7 +1,7 @@
 """Export of a subspace model as plain data for the browser's simulation code (`engine.js`).
 
-The engine makes strains and the reduced system from basis, rest shape and samples, by the formulas
-of `pdrom.reduction.subspace`. Exported numbers are doubles unless stated otherwise.
+The engine computes strains and the reduced system from basis, rest shape and samples, by the
+formulas of `pdrom.reduction.subspace`. Exported numbers are doubles unless stated otherwise.
 """
 
 from collections.abc import Iterable
@@ -87,7 +87,7 @@ def require_known(config: SceneConfig) -> None:
 
 
 def export_basis(scene: Scene, columns: Columns, needed: np.ndarray) -> dict[str, Any]:
-    """Export ``columns`` of a subspace of ``scene`` and all data derived from them alone.
+    """Export ``columns`` of a subspace of ``scene`` and all data that depend on no samples.
 
     Parameters
     ----------
@@ -130,8 +130,8 @@ def export_model(scene: Scene, model: SubspaceModel) -> dict[str, Any]:
 
 
 def _stencil(group: ConstraintGroup, chosen: Samples | Interpolation) -> np.ndarray:
-    """Vertices (m, corners) of the elements that are sampled."""
-    assert isinstance(group, StencilGroup)  # others are refused
+    """Vertices (m, corners) of the sampled elements."""
+    assert isinstance(group, StencilGroup)  # `require_known` refuses other groups
     return group.stencil[chosen.elements]
 
 

@@ -7,14 +7,14 @@ In the free coordinates z of a position subspace one iteration is
     z = c + L^T p        global solve, with c = A^-1 (M/h^2 s - load) and L = W D A^-1
 
 D and L are (m p, K'). An iteration consists of two small dense products and the projections; it
-allocates nothing and no array grows with the mesh. Without frame-lagged groups, c is one product
-of a matrix with s, whose held coordinates are set to their targets, and one compiled call computes
+allocates nothing and no array grows with the mesh. Without frame-lagged groups, c is one product of
+a matrix with s, whose held coordinates are set to their targets, and one compiled call computes
 many frames, up to the first frame that meets a floor.
 
-The matrix of a product lies in blocks of `TALL` rows, column by column, so that a column of a block
-meets a vector in `TALL` products that do not wait for each other. Vectors are three numbers each,
-one after the other, and are read and written four numbers at a time: their arrays are longer by
-what that needs (`vectors`). The order of every sum is that of the columns, whatever the processor.
+The matrix of a product lies in blocks of `TALL` rows, column by column, so that the products of a
+column of a block with a vector do not wait for each other. Vectors are three numbers each, one
+after the other, but are read and written four numbers at a time; their arrays have space for the
+additional numbers (`vectors`). The order of every sum is that of the columns on all processors.
 """
 
 from collections.abc import Sequence
@@ -39,8 +39,8 @@ from pdrom.reduction.subspace.space import DenseElimination, ReducedSpace
 class FusedStepper(Stepper):
     """The step loop with fused iterations; same results as the plain one up to round-off.
 
-    Its time counts as local: there is no separate global step. A loop with other local steps than
-    `SubspaceLocalStep`, or with a group without a gradient kernel, iterates as the plain one does.
+    Its time counts as local: there is no separate global step. With a local step that is no
+    `SubspaceLocalStep`, or a group without a gradient kernel, it iterates as the plain loop does.
     """
 
     def __init__(self, scene: Scene, space: ReducedSpace, local_steps: Sequence[LocalStep]) -> None:
@@ -67,7 +67,7 @@ class FusedStepper(Stepper):
 
 
 class _Fused:
-    """Iterations and frames in a space, with the operators of every set of held coordinates."""
+    """Iterations and frames in a space, with the operators for every set of held coordinates."""
 
     def __init__(
         self, space: ReducedSpace, sampled: "_Sampled", acceleration: Anderson | None
@@ -116,7 +116,7 @@ class _Fused:
     ) -> Blocks | None:
         """Run as many of ``frames`` as one call can do, see `WholeFrames.run`; no objective.
 
-        Return None in a frame that meets a floor and in some frames after it: contact often lasts.
+        Return None for a frame that meets a floor and some frames after it, as contact often lasts.
         """
         if self._waiting and frames.start:
             self._waiting -= 1
@@ -174,8 +174,8 @@ class _Sampled:
 class _Operators:
     """Matrices of an iteration for one set of held coordinates, and its vectors.
 
-    iterated : D, L^T, d_0, c and z; weights of the rows, M/h^2 of the free coordinates and room for
-        a difference of them, for the objective
+    iterated : D, L^T, d_0, c and z; for the objective: weights of the rows, M/h^2 of the free
+        coordinates, and working memory
     begun : product that gives c from s, coupling to the held coordinates, working vectors
     """
 

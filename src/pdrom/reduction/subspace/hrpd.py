@@ -2,9 +2,9 @@
 
 Brandt, Eisemann and Hildebrandt (2018, sect. 5): the projections of a group are confined to a
 smooth, low-dimensional space and fitted, in the weighted least-squares sense, to the projections of
-sampled constraints. The space needs no training: its functions are skinning weights on the
-elements times the rest vectors S q_rest, so that every field of linear maps that varies slowly over
-the mesh is in it. The source adds the weights themselves as further columns (the translations of a
+sampled constraints. The space needs no training: its functions are skinning weights on the elements
+times the rest vectors S q_rest, so that it contains every field of linear maps that varies slowly
+over the mesh. The source adds the weights themselves as further columns (the translations of a
 skinning space); they are left out, since S annihilates translations and their value depends on the
 arbitrary frame of each element.
 """
@@ -32,8 +32,8 @@ SINGULAR = 1e8
 class HrpdSpec(ConfigModel):
     """Sampled constraints with interpolation (Brandt et al. 2018).
 
-    dimension : dimension of the space of projections (fewer if there are fewer)
-    samples : sampled elements (all, if there are fewer)
+    dimension : largest dimension of the space of projections
+    samples : largest number of sampled elements
     """
 
     dimension: Annotated[int, Field(ge=1, le=10_000)] = 60

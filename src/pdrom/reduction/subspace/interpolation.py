@@ -1,8 +1,8 @@
 """Local steps in the coordinates of a position subspace, by sampling or by interpolation.
 
-Interpolation: a few elements are evaluated, their values give coefficients c, and the coefficients
-give the right-hand side B^T S^T W (mean + V c). Products over the length of the mesh are formed
-before the run; the system matrix is the same as with all projections.
+Interpolation evaluates a few elements, computes coefficients c from their values, and from these
+the right-hand side B^T S^T W (mean + V c). Products over the length of the mesh are formed before
+the run; the system matrix is the same as with all projections.
 """
 
 from dataclasses import dataclass
@@ -18,9 +18,9 @@ from pdrom.reduction.subspace.columns import Columns
 class Interpolation:
     """Arrays that one group needs online, in a subspace of K coordinates.
 
-    elements : (m,) sampled elements, ascending; none where the projections are constant
-    operator : (r, n), maps sampled values to coefficients; n is m p where the axes share one
-        operator (coefficients (r, 3)) and 3 m p where they share the coefficients (r, 1)
+    elements : (m,) sampled elements, ascending; none if the projections are constant
+    operator : (r, n), maps sampled values to coefficients; n is m p if the axes share one operator
+        (coefficients (r, 3)) and 3 m p if they share the coefficients (r, 1)
     modes : (K, r) or (3 K, r), B^T S^T W V
     offset : (K, 3) constant part of the right-hand side
     stiffness : (K, K) B^T S^T W S B of all elements
@@ -36,7 +36,7 @@ class Interpolation:
 
 
 class InterpolatedLocalStep:
-    """The local step of a group whose projections are interpolated."""
+    """Local step of a group whose projections are interpolated."""
 
     def __init__(
         self, group: ConstraintGroup, columns: Columns, interpolation: Interpolation
@@ -57,7 +57,7 @@ class InterpolatedLocalStep:
             self.group.begin_frame(self._rows @ q)
 
     def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
-        """Add B^T S^T W p at ``y`` (K, 3) to ``rhs`` (K, 3); the energy is unknown: nan."""
+        """Add B^T S^T W p at ``y`` (K, 3) to ``rhs`` (K, 3); return nan for the unknown energy."""
         i = self._interpolation
         rhs += i.offset
         if len(self._elements) == 0:
@@ -77,7 +77,7 @@ def reduced_strain(group: ConstraintGroup, columns: Columns) -> tuple[np.ndarray
 def interpolation_of(
     group: ConstraintGroup, columns: Columns, reduction: Reduction
 ) -> Interpolation:
-    """Interpolation in ``columns`` by a ``reduction`` of full-order projections (joint rows, say).
+    """Interpolation in ``columns`` by a full-order ``reduction``, for example of joint rows.
 
     Coefficients of blocks that belong to single axes are stacked.
     """

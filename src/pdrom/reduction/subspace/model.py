@@ -1,4 +1,4 @@
-"""A scene in a position subspace: columns, sampled elements, step loop; stored and loaded."""
+"""Model of a scene in a position subspace: columns, sampled elements, step loop, and storage."""
 
 import os
 from collections.abc import Mapping, Sequence
@@ -109,13 +109,13 @@ class Output:
 
 @compiled(nogil=True)
 def _multiply(panels, z, sums, result):
-    """Write the product of ``panels`` and ``z`` to ``result`` (N, 3); ``sums`` is working room."""
+    """Write the product of ``panels`` and ``z`` to ``result`` (N, 3); ``sums`` is a work array."""
     a, b, c = sums[0], sums[1], sums[2]
     for p in range(len(panels)):
         panel, first = panels[p], p * PANEL
         a[:], b[:], c[:] = 0.0, 0.0, 0.0
         for k in range(0, len(z), TERMS):
-            # named numbers, since the compiler would read z again for every vertex
+            # in local variables, since the compiler would read z again for every vertex
             r, s, t, u = z[k], z[k + 1], z[k + 2], z[k + 3]
             r0, s0, t0, u0 = r[0], s[0], t[0], u[0]
             r1, s1, t1, u1 = r[1], s[1], t[1], u[1]
@@ -159,10 +159,10 @@ def sample_elements(
 ) -> list[dict[str, Samples]]:
     """Select energy-conserving samples of every group for each tolerance.
 
-    They are trained on iterates of the subspace with all projections, in some of the training
-    ``frames`` of a run that begins at ``start`` (coordinates) or where the scene does, and as many
-    of each of the ``others``, scenes of further training motions. They meet the tolerances in
-    ``norm`` (see module `ecsw`).
+    They are trained on iterates of a run in the subspace with all projections, in some of the
+    training ``frames``. The run begins at ``start`` (coordinates), or at the scene's start if None.
+    Each of the ``others``, scenes of further training motions, adds as many frames. The samples
+    meet the tolerances in ``norm`` (see module `ecsw`).
     """
     count = -(-FRAMES // (1 + len(others)))
     chosen = frames[np.unique(np.linspace(0, len(frames) - 1, count).round().astype(int))]

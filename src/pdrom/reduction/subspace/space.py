@@ -26,13 +26,13 @@ class DenseElimination:
 
     Parameters
     ----------
-    matrix : (K, K) of the reduced system, kg/s^2
+    matrix : (K, K) matrix of the reduced system, kg/s^2
     fixed : coordinates (m,) that have targets, ascending
 
     Raises
     ------
     SolverError
-        The block of the free coordinates is not positive definite, or its solution inaccurate.
+        The block of the free coordinates is not positive definite, or its solution is inaccurate.
     """
 
     def __init__(self, matrix: np.ndarray, fixed: np.ndarray) -> None:
@@ -117,7 +117,7 @@ class ReducedSpace(Space):
 
     @cached_property
     def affine(self) -> tuple[np.ndarray, float, np.ndarray]:
-        """Acceleration by all forces as constant (K, 3), rate and rates (K, K) or none, (0, 0)."""
+        """Acceleration by all forces: constant (K, 3), rate, and rates (K, K) or unused (0, 0)."""
         constant, rate, rates = np.zeros((len(self.matrix), 3)), 0.0, np.zeros((0, 0))
         for own, factor in self.forces:
             constant += own
@@ -129,7 +129,7 @@ class ReducedSpace(Space):
 
     @property
     def whole_frames(self) -> bool:
-        """Whether nothing but floors corrects coordinates at the end of a frame."""
+        """Whether only floors, and no other contacts, correct coordinates at the end of a frame."""
         return all(contact.height is not None for contact in self._contacts)
 
     def free_frames(self, path: np.ndarray) -> int:
@@ -205,8 +205,8 @@ def reduced_state(scene: Scene, columns: Columns) -> State:
 def _reduce_force(force: base.Force, columns: Columns, scene: Scene) -> tuple[np.ndarray, Any]:
     """Project a force on the subspace: return (constant (K, 3), rate) of a = constant + rate v.
 
-    It has to be affine in the velocity, with one rate for all vertices (a number) or one for each
-    of them (a matrix (K, K), which is exact as well); another force is refused, not approximated.
+    The force has to be affine in the velocity, with one rate for all vertices (a number) or one for
+    each of them (a matrix (K, K), also exact); other forces are refused, not approximated.
     """
     shape = scene.mesh.points.shape
     rng = np.random.default_rng(0)
@@ -256,7 +256,7 @@ class _ReducedBoundary:
 
 
 def probe_vertices(n: int) -> np.ndarray:
-    """Vertices, of n in a mesh, at which contacts are detected, ascending."""
+    """Vertices of a mesh with n vertices at which contacts are detected, ascending."""
     return np.unique(np.linspace(0, n - 1, min(PROBES, n)).round().astype(np.int64))
 
 
