@@ -249,15 +249,13 @@ class Stability(ShortRuns):
 )
 def stability(
     mesh: File,
-    bases: list[File],
-    samplings: list[File],
-    subspaces: list[File],
     config: SceneConfig,
     methods: dict[str, MethodSpec],
     short: ShortRuns,
     blowup_extent: kit.BlowupExtent,
     solver: kit.Solver,
     out: File,
+    **files: list[File],
 ) -> None:
     """Run the full order, every local reduction and the largest subspaces at every setting.
 
@@ -265,16 +263,16 @@ def stability(
     """
     scene = kit.scene_of(config, mesh)
     local: Local = []
-    for file in samplings:
+    for file in files["samplings"]:
         spec = methods[file["method"]]
-        basis = load_basis(runfiles.basis_of(file, spec, bases).path)
+        basis = load_basis(runfiles.basis_of(file, spec, files["bases"]).path)
         for r in kit.resolve_ranks(short.ranks, basis.rank):
             labels = {"group": file["group"], "method": file["method"], "r": r}
             known = r <= basis.rank
             reduction = runfiles.load_reduction(basis, file.path, spec, r=r) if known else None
             local.append((labels | {"position_basis": "full"}, reduction))
     models: Models = []
-    for file in subspaces:
+    for file in files["subspaces"]:
         found: Models = load_models(file.path)
         largest = max(labels["k"] for labels, _ in found)
         models += [(labels, model) for labels, model in found if labels["k"] == largest]

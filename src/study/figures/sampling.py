@@ -212,7 +212,7 @@ def deim_entries(
         raise kit.NothingToDraw("no method that samples single entries (deim, qdeim)")
     sampled = []
     for each in drawn.experiments:
-        samplings = {m: read_samplings(each.path(samples, method=m)) for m in methods}
+        samplings = {m: read_samplings(each.path(files["samples"], method=m)) for m in methods}
         if samplings[scalar[0]]:
             sampled.append((each, samplings))
     if not sampled:
@@ -220,12 +220,11 @@ def deim_entries(
     figure = style.new_figure(ROW_HEIGHT * len(sampled) + 0.55)
     axes = figure.subplots(len(sampled), 3, squeeze=False, width_ratios=[1.25, 1.0, 1.1])
     for row, (each, samplings) in zip(axes, sampled, strict=True):
-        source = each.path(snapshots)
+        source = each.path(files["snapshots"])
         with open_hdf5(source) as file:
             count, rows = int(file.attrs["elements"]), int(file.attrs["rows_per_element"])
-        elements = shapes.element_map(
-            each.group, load_mesh(each.path(meshes)), count, source=source
-        )
+        mesh = load_mesh(each.path(files["meshes"]))
+        elements = shapes.element_map(each.group, mesh, count, source=source)
         views = samplings[scalar[0]]
         asked = [view for rank in options.ranks for view in views if view.r == rank]
         chosen = (asked or views[-1:])[0]

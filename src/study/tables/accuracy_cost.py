@@ -55,11 +55,9 @@ CONVERGED, OWN = "converged", "own iterations"
 )
 def accuracy_cost(
     reruns: pd.DataFrame,
-    timings: list[paths.File],
     frame_times: pd.DataFrame,
-    sweeps: list[paths.File],
-    models: list[paths.File],
     iterations: Mapping[str, int],
+    **files: list[paths.File],
 ) -> pd.DataFrame:
     """Points of full-order runs, and of reduced runs with a time and an error within the horizon.
 
@@ -69,14 +67,14 @@ def accuracy_cost(
     ----------
     iterations : scene -> number K of local/global iterations per frame in the scene's settings
     """
-    times = results.timings_in_one_time(timings, frame_times)
+    times = results.timings_in_one_time(files["timings"], frame_times)
     times = times[times.implementation == "compiled"]
     full = times[times.method.isna()].copy()
     full = full.assign(method="full", position_basis="full", relative_error_within_horizon=0.0)
-    sweep = _sweep(results.joined(sweeps), times)
+    sweep = _sweep(results.joined(files["sweeps"]), times)
     points = results.trained(reruns).dropna(subset=_POINT)
     points = results.with_held_out(points.assign(iterations=points.scene.map(iterations)), reruns)
-    known = results.joined(models).reindex(columns=[*_MODEL, "error_converged"])
+    known = results.joined(files["models"]).reindex(columns=[*_MODEL, "error_converged"])
     known = known.astype({"k": "Int64"})
     points = points.merge(known, on=_MODEL, how="left")
     own = sweep[sweep.method == FOM].set_index(["scene", "iterations"]).error_converged

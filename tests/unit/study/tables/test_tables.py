@@ -323,8 +323,8 @@ def sweep(folder, **changes) -> File:
 
 def points(files, runs, *parts) -> pd.DataFrame:
     """The table accuracy_cost of these runs, with files of other iterations and of models."""
-    sweeps, models = list(parts[:1]), list(parts[1:])
-    return accuracy_cost(runs, files.timings, NOT_TIMED, sweeps, models, {"a": 10, "b": 20})
+    read = {"timings": files.timings, "sweeps": list(parts[:1]), "models": list(parts[1:])}
+    return accuracy_cost(runs, NOT_TIMED, {"a": 10, "b": 20}, **read)
 
 
 def test_accuracy_cost_holds_full_runs_and_reruns(files, tmp_path):
