@@ -13,14 +13,14 @@ import pytest
 from places import ROOT
 
 LIMITS = {
-    "lines of src": 35_985,
+    "lines of src": 35_864,
     "modules of src": 215,
-    "lines of tests": 24_061,
-    "words of documentation": 24_564,
+    "lines of tests": 24_052,
+    "words of documentation": 24_562,
     "tables": 25,
     "figures": 23,
     "experiments": 19,
-    "percent of src in decorators, signatures and imports": 18.40,
+    "percent of src in decorators, signatures and imports": 17.96,
 }
 PAGES = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "config/README.md", "docs/**/*.md")
 

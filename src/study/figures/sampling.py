@@ -194,13 +194,7 @@ def _joint_residual(V: np.ndarray, entries: np.ndarray, k: int) -> np.ndarray:
         "samples": EachOf(SAMPLING, "runs"),
     },
 )
-def deim_entries(
-    options: Entries,
-    drawn: kit.Drawn,
-    meshes: list[File],
-    snapshots: list[File],
-    samples: list[File],
-) -> Figure:
+def deim_entries(options: Entries, drawn: kit.Drawn, **files: list[File]) -> Figure:
     """Single entries, picked without regard to elements, scatter over the mesh. Left: the elements
     they belong to, by axis. Middle: how many of its entries each touched element contributes.
     Right: numbers that have to be computed for $r$ interpolation entries, because a projection

@@ -137,11 +137,7 @@ def pareto(error: Sequence[float], cost: Sequence[float]) -> list[bool]:
         integer("failed", "levels that were tried before", compared="error"),
         integer("checks", "frames that a more accurate level did as well", compared="error"),
         *shared("ms_per_frame"),
-        text(
-            "full_level",
-            "cheapest full order within the tolerance by the calibration",
-            compared="error",
-        ),
+        text("full_level", "cheapest full order within it by the calibration", compared="error"),
         number("full_error", "its error over the same frames"),
         timed(number("full_ms", "time of its frame, without checks", "ms")),
         timed(number("over_full", "time of a frame over that")),
@@ -239,28 +235,13 @@ def break_even(r: Sequence[int], ratio: Sequence[float]) -> int | None:
         timed(number("best_speedup", "median over them of the fastest accurate run's speed-up")),
         timed(number("least_speedup", "the smallest of them")),
         timed(number("most_speedup", "the largest of them")),
-        timed(
-            number(
-                "error_train",
-                "on the training motion: median over all scenes (and groups) of the fastest "
-                "accurate run, or of the most accurate one where none is accurate",
-            )
-        ),
-        timed(
-            number(
-                "error_heldout",
-                "median of the errors of the same runs on held-out motions, of each the median",
-            )
-        ),
+        timed(number("error_train", "median over all: fastest accurate run, else most accurate")),
+        timed(number("error_heldout", "median of the same runs held out, each over its motions")),
         integer("heldout", "scenes (and groups) with a held-out motion"),
         timed(number("error_heldout_low", "median of the least error of each over its motions")),
         timed(number("error_heldout_high", "median of the largest")),
         *shared("playback_error"),
-        count(
-            "accurate_heldout",
-            "scenes (and groups) whose most accurate size on the training motion has at most a "
-            "tenth held out",
-        ),
+        count("accurate_heldout", "those whose most accurate size has at most a tenth held out"),
         timed(integer("pays_heldout", "those that pay whose run has at most a tenth held out")),
     ),
     reads={

@@ -12,7 +12,16 @@ from study.experiments.frame_times import CONTROL, FULL, REDUCED
 from study.experiments.kit.base import FOM, GLOBAL, REST, RIGHT, Horizon, floor_of, horizons
 from study.experiments.sensitivity import without
 from study.tables.kit import results
-from study.tables.kit.declaration import flag, integer, number, shared, table, text, timed
+from study.tables.kit.declaration import (
+    flag,
+    integer,
+    number,
+    quantiles,
+    shared,
+    table,
+    text,
+    timed,
+)
 
 KEYS = ["scene", "effect"]
 NOTHING = "nothing"  # value of the column effect for the whole scene, with no effect left out
@@ -43,11 +52,7 @@ FEWEST = 3  # least number of meshes for the fit of an exponent
         number("force", "root mean square over the frames of the norm of its force", "N"),
         number("force_share", "of the sum over the effects of the scene"),
         number("energy", "range of the energy that it holds, where it has one", "J"),
-        number(
-            "moved",
-            "how far the run moves without it: largest drift before the horizon",
-            compared="error",
-        ),
+        number("moved", "largest drift of the run without it before the horizon", compared="error"),
         *shared("sensitivity_floor"),
         flag("above_floor", "moved is larger than the sensitivity floor", compared="error"),
     ),
@@ -218,15 +223,12 @@ _TIMES = ["ms_per_frame", "vertices_ms", "speedup", "speedup_low", "speedup_high
         *shared("scene vertices"),
         integer("processes", "processes that timed it"),
         *shared("ms_per_frame"),
-        timed(number("low_ms", "2.5 % quantile of this median (bootstrap)", "ms")),
-        timed(number("high_ms", "97.5 % quantile", "ms")),
+        *map(timed, quantiles("low_ms high_ms", unit="ms")),
         timed(number("control_ratio", "time of the same run, timed once more, over this one")),
-        timed(number("control_low", "2.5 % quantile of this median")),
-        timed(number("control_high", "97.5 % quantile")),
+        *map(timed, quantiles("control_low control_high")),
         timed(flag("control_agrees", "the quantiles enclose one")),
         timed(number("twin_ratio", "time of the scene's twin, the same frames, over this one")),
-        timed(number("twin_low", "2.5 % quantile of this median")),
-        timed(number("twin_high", "97.5 % quantile")),
+        *map(timed, quantiles("twin_low twin_high")),
     ),
     reads={"parts": Every(paths.FRAME_TIMES)},
 )
@@ -269,12 +271,8 @@ def frame_times(parts: list[File]) -> pd.DataFrame:
         timed(flag("loses", "dearer than the full order: the upper quantile is below one")),
         timed(number("training_s", "time of the training run", "s")),
         timed(number("reduction_s", "processor time of basis and sampling", "s")),
-        timed(
-            number("frames_to_break_even", "frames after which both are paid back; none if never")
-        ),
-        number(
-            "error_train", "of the training motion before the horizon, over all of a large scene"
-        ),
+        timed(number("frames_to_break_even", "frames that pay both back; none if never")),
+        number("error_train", "of the training motion before the horizon (large: over all)"),
         *results.COLUMNS,
     ),
     reads={

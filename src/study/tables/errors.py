@@ -19,6 +19,7 @@ import pandas as pd
 from pdrom.reduction.basis import load_basis
 from study.artifact import paths
 from study.artifact.reads import EachOf, Every, TableOf
+from study.tables.kit import declaration
 from study.tables.kit.declaration import count, flag, integer, number, shared, table, text
 from study.tables.kit.results import FAILED, RESAMPLES, SEED, families, joined, judged_runs
 
@@ -103,9 +104,7 @@ def sensitivity(parts: list[paths.File]) -> pd.DataFrame:
         # the gain has no reproducible value because the modes are made of round-off
         replace(*shared("gain"), compared="skipped"),
         *shared("frames finite blowup_frame"),
-        number(
-            "relative_error", "error of the positions over all frames, which end at the horizon"
-        ),
+        number("relative_error", "error of the positions over all frames up to the horizon"),
     ),
     reads={"parts": Every(paths.NOISE)},
 )
@@ -120,15 +119,11 @@ def noise(parts: list[paths.File]) -> pd.DataFrame:
         *shared("scene group method r"),
         text("varied", "training (frames), start; held-out motions, with the number trained on"),
         integer("repetitions", "runs; their range encloses the median of all but by 2^(1 - n)"),
-        integer(
-            "ended", "runs that ended before the horizon, with an infinite error", compared="error"
-        ),
+        integer("ended", "runs that ended early, with an infinite error", compared="error"),
         number("error_median", "median of the errors of the positions before the horizon"),
-        number("error_low", "the least of them"),
-        number("error_high", "the largest"),
+        *declaration.extremes("error"),
         number("gain_median", "median of the gains"),
-        number("gain_low", "the least of them"),
-        number("gain_high", "the largest"),
+        *declaration.extremes("gain"),
         number("spread", "largest error over least", compared="error"),
     ),
     reads={"parts": Every(paths.REPETITIONS)},
@@ -175,11 +170,9 @@ def repetitions(parts: list[paths.File]) -> pd.DataFrame:
         number("error_heldout", "the same of the held-out motion"),
         *shared("finite blowup_frame relative_error_within_horizon"),
         integer("repetitions", "runs trained on other frames, where they were repeated"),
-        number("error_median", "median of their errors before the horizon"),
-        number("error_low", "the least of them"),
-        number("error_high", "the largest; inf for a run that ended earlier"),
-        number("gain_low", "the least of their gains"),
-        number("gain_high", "the largest"),
+        number("error_median", "median of their errors; inf for a run that ended early"),
+        *declaration.extremes("error"),
+        *declaration.extremes("gain"),
     ),
     reads={"parts": Every(paths.LADDER)},
 )
@@ -225,11 +218,7 @@ share = partial(number, compared="share")
         count("rescued", "pairs among these whose error after does not"),
         share("gain_ratio", "median of the gain after over that before"),
         share("error_ratio", "median of the error of the run after over that before"),
-        share(
-            "error_ratio_low",
-            "2.5 % quantile of this median, families of scenes resampled (bootstrap)",
-        ),
-        share("error_ratio_high", "97.5 % quantile"),
+        *declaration.quantiles("error_ratio_low error_ratio_high", share),
         share("p_value", "two-sided sign test over all families, for which a tie is no fall"),
         count("families", "families among the scenes: a scene and its twin"),
         count("families_fallen", "those whose median error ratio is below one"),

@@ -261,9 +261,7 @@ def _rerun_rows(
         *shared("k r gain frames"),
         flag("finite", "no frame blew up", compared="error", tolerance=FRAGILE),
         *shared("blowup_frame"),
-        number(
-            "max_extent", "largest extent over the scale of the full-order run", compared="error"
-        ),
+        number("max_extent", "largest extent over the full order's scale", compared="error"),
         text("outcome", "how the reduction fared", compared="error", tolerance=FRAGILE),
         text("why", "reason of a refusal or of an expected failure", compared="error"),
     ),

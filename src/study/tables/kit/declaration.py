@@ -112,6 +112,19 @@ def timed(column: Column) -> Column:
     return replace(column, timed=True)
 
 
+def quantiles(names: str, make: Callable[..., Column] = number, unit: str = "") -> list[Column]:
+    """Two columns, ``names``, with the bootstrap interval of the median in the column before."""
+    low, high = names.split()
+    meaning = "2.5 % quantile of this median (bootstrap)"
+    return [make(low, meaning, unit), make(high, "97.5 % quantile", unit)]
+
+
+def extremes(name: str) -> list[Column]:
+    """Columns ``name_low`` and ``name_high``: range of the repetitions of one ``name``."""
+    words = {"low": "least", "high": "largest"}
+    return [number(f"{name}_{end}", f"{word} {name}") for end, word in words.items()]
+
+
 # Columns that several tables share, so that a column name has the same meaning in each.
 _SHARED = (
     text("scene", "name of the scene"),
@@ -169,8 +182,7 @@ _SHARED = (
     timed(number("local_ms", "time of the local step in a frame", "ms")),
     timed(number("global_ms", "time of the global solve in a frame", "ms")),
     timed(number("speedup", "time of the full-order run over that of this one")),
-    timed(number("speedup_low", "2.5 % quantile of this median (bootstrap)")),
-    timed(number("speedup_high", "97.5 % quantile")),
+    *map(timed, quantiles("speedup_low speedup_high")),
     timed(number("local_share", "local step over it and the global solve")),
 )
 
