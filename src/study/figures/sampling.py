@@ -332,7 +332,7 @@ class Snapshots(kit.View):
     },
 )
 def snapshots_and_modes(options: Snapshots, drawn: kit.Drawn, **files: list[File]) -> Figure:
-    """Draw snapshots less their mean = modes x singular values x coefficients, as matrices.
+    """Draw snapshots minus their mean = modes x singular values x coefficients, as matrices.
 
     Below are columns of the snapshot matrix on the moving mesh, and modes on the mesh at rest. Each
     element has the colour of one of its entries, the entry that is largest on some element. Only
@@ -424,7 +424,7 @@ def _draw_matrix(ax: Axes, matrix: np.ndarray, title: str) -> None:
 
 
 def _row(figure: Figure, count: int, bottom: float, height: float, label: str) -> list[Axes]:
-    """Axes for a row of pictures, ``bottom`` inches above the lower edge; ``label`` is left."""
+    """Axes of a row of pictures ``bottom`` inches above the lower edge, ``label`` on the left."""
     whole, step = figure.get_figheight(), (style.WIDTH - LEFT) / max(count, 1) / style.WIDTH
     middle = (bottom + 0.5 * height) / whole
     figure.text(0.008, middle, label, va="center", fontsize=7.5)
