@@ -402,7 +402,7 @@ def alternatives(sources: list[Path], settings: Options, out: File, times: File)
 
 
 def sized(config: SceneConfig, factor: float, stiffness: float) -> SceneConfig:
-    """Return ``config`` with a ``factor`` times finer mesh, weights times ``stiffness``."""
+    """``config`` on a ``factor`` times finer mesh of equal mass, weights times ``stiffness``."""
     finer = config.coarsened(factor, 1.0)
     counts = [c.mesh.build(Path()).vertices for c in (config, finer)]
     effects = tuple(

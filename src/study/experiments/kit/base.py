@@ -167,7 +167,7 @@ def varied(
     duration: float,
     frames: Sequence[int],
 ) -> SceneConfig:
-    """Return ``config`` with ``time_step`` (s) and the reduced groups' weights scaled.
+    """Return ``config`` with ``time_step`` (s), reduced groups' weights times ``stiffness_ratio``.
 
     Schedules keep their times in seconds, so that their frame numbers change. The run lasts
     ``duration`` seconds, but at least ``frames[0]`` and at most ``frames[1]`` frames. Groups that

@@ -95,7 +95,7 @@ def _anderson(
 
 
 class Chebyshev(Alternative):
-    """Chebyshev's semi-iteration: extrapolates from the second-last iterate, weights vary."""
+    """Chebyshev's semi-iteration: extrapolates from the second-last iterate by varying weights."""
 
     name = "chebyshev"
 
