@@ -332,7 +332,7 @@ class Snapshots(kit.View):
     },
 )
 def snapshots_and_modes(options: Snapshots, drawn: kit.Drawn, **files: list[File]) -> Figure:
-    """Draw snapshots minus their mean = modes x singular values x coefficients, as matrices.
+    """Draw snapshots less their mean = modes x singular values x coefficients, as matrices.
 
     Below are columns of the snapshot matrix on the moving mesh, and modes on the mesh at rest. Each
     element has the colour of one of its entries, the entry that is largest on some element. Only
