@@ -17,8 +17,8 @@ from pdrom.reduction.snapshots import SnapshotSet
 class Basis:
     """Affine space mean + span V of vectorised projections.
 
-    Entry i of a vector is axis i % 3 of row i // 3; row i // 3 belongs to element i // (3 *
-    rows_per_element).
+    Entry i of a vector is axis i % 3 of row i // 3, which belongs to element i // (3 p); p is the
+    number of rows per element.
 
     V : (3 e p, rank); orthonormal (in the weighted inner product), or orthonormal axis by axis if
         ``separate_axes``
@@ -118,8 +118,8 @@ def compute_basis(
     if spec.centring == "affine":
         # A sum of n terms is wrong by at most n eps/2 times the sum of their magnitudes (Higham
         # 2002, section 4.2), the same in every column. Without this bound on the Frobenius norm,
-        # constant snapshots, whose centred matrix is that error and nothing else, would get a
-        # basis made of it. Subtracting the first snapshot makes no such error.
+        # constant snapshots, whose centred matrix contains only that error, would get a basis
+        # of round-off. Subtracting the first snapshot makes no such error.
         rounded = 0.5 * np.finfo(float).eps * matrix.shape[1] * float(np.linalg.norm(matrix))
         mean, error = matrix.mean(axis=1), max(roundoff, rounded)
         # the mean contains a constant axis, which is thus inactive, unlike with "mean-in-modes"

@@ -104,7 +104,7 @@ class Yardstick:
         return errors_within(self.deviations(outcome), self.series, end, **self.units)
 
     def _touched(self, positions: np.ndarray) -> np.ndarray:
-        """Return for each frame of ``positions`` (f, N, 3) m 1 if it touches an obstacle, else 0.
+        """Array (f,): 1 if a frame of ``positions`` (f, N, 3) m touches an obstacle, else 0.
 
         Vertices that touch the obstacle at the start are ignored.
         """

@@ -167,8 +167,8 @@ def minimise(
 
     Parameters
     ----------
-    evaluate : y -> objective and the result G(y) of one local/global iteration; the gradient is A
-        (y - G(y)), and G(y) equals y on fixed rows
+    evaluate : y -> objective and the result G(y) of one local/global iteration; the gradient is
+        A (y - G(y)), and G(y) equals y on fixed rows
     matrix : A, (n, n) symmetric positive definite
     y : (n, 3) start, m
     tolerance : largest entry of G(y) - y at which the iteration ends, m
@@ -250,7 +250,7 @@ class ConvergedStepper(Stepper):
     def step(
         self, state: State, frame: int, on_last_iterate: Callable[[np.ndarray], None] | None = None
     ) -> tuple[State, FrameReport]:
-        """Advance ``state`` by ``frame``, without objective and calls of ``on_last_iterate``."""
+        """Compute ``frame`` from ``state``; no objective, no call of ``on_last_iterate``."""
         s, elimination, base = self._begin(state, frame)
         rhs = np.empty_like(s)
 

@@ -71,7 +71,7 @@ def _chain(times):
 
 @compiled(nogil=True)
 def _products(numbers, times):
-    """Repeat x <- one + x one ``times`` times in `AT_ONCE` independent vectors."""
+    """Repeat x <- one + x one ``times`` times in `AT_ONCE` vectors that begin as ``numbers``."""
     one = load(numbers, 0)
     a, b = load(numbers, WIDTH), load(numbers, 2 * WIDTH)
     c, d = load(numbers, 3 * WIDTH), load(numbers, 4 * WIDTH)

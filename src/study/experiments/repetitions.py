@@ -232,7 +232,7 @@ class Ladder(Repetitions):
     repeated : scenes whose runs are repeated
     up, down : methods from the published one upwards, and the sound one without one ingredient each
     square : separate or shared coefficients on single rows or whole elements, at each of ``sizes``;
-        p times as many rows as elements (of p rows each) are sampled: as many entries
+        p rows are sampled for each sampled element of p rows, so that both have as many entries
     """
 
     r: Annotated[int, Field(ge=1, le=100_000)] = 20

@@ -36,7 +36,7 @@ class RequestedRuns(run.ToleranceSettings):
 
 
 class RequestedTolerances(RequestedRuns):
-    """Section ``requested_tolerances``: ``scenes``; if empty, all scenes with the large ones."""
+    """Section ``requested_tolerances``: ``scenes`` (if empty all, including the large ones)."""
 
     scenes: tuple[str, ...] = ()
 

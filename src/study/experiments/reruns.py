@@ -117,8 +117,8 @@ def _runs(
 ) -> Iterator[dict[str, Any]]:
     """Run a motion for every r and yield the rows; an r beyond the rank gives a marked row.
 
-    The runs are stored in ``file``; positions only of the training motion, which ``file`` being the
-    root group indicates: figures show that motion only.
+    The runs are stored in ``file``, with positions only if that is the root group of the file,
+    which contains the training motion: figures show no other motion.
     """
     labels, scene = sampling.labels, yardstick.scene
     system = scene.system_with(settings.solver)

@@ -1,6 +1,6 @@
 """Drift of full-order runs that should be equal (docs/study.md), and contributions of effects.
 
-The change of a run after moving its start by 1e-10 of the extent is the accuracy that can be
+The change of a run after moving its start by 1e-10 of the extent limits the accuracy that can be
 expected of any reduced model. Other runs change the solver (another order of summation), the number
 of iterations or the time step, or leave out an effect.
 """

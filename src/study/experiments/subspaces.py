@@ -400,7 +400,7 @@ def live(mesh: File, train: File, settings: Options, out: File, **files: list[Fi
 def _joint(
     scene: Scene, group: str, reduction: Reduction, beside: list[Labelled]
 ) -> Iterator[Labelled]:
-    """Joint rows of a group in each subspace of the models ``beside``; other groups as sampled."""
+    """Joint rows of a group in each subspace of models ``beside``; other groups keep samples."""
     for model in {id(model.columns): model for _, model in beside}.values():
         joint = interpolation_of(scene.group(group), model.columns, reduction)
         labels = {"family": "joint", "k": model.columns.modes, "r": reduction.r}

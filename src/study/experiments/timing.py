@@ -155,7 +155,7 @@ class Options(ConfigModel):
     alone=True,
 )
 def timing(mesh: File, fom: File, settings: Options, **files: Any) -> None:
-    """Measure frames, single local steps, effects, and frames of scenes without each effect."""
+    """Measure frames (``out``), single local steps, effects, and frames ``without`` each effect."""
     scene, asked = kit.scene_of(settings.scene, mesh), settings.timing
     system, name = scene.system_with(settings.solver), scene.config.name
     frames = min(asked.frames, scene.config.frames)

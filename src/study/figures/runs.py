@@ -157,7 +157,7 @@ def nothing_ran(panels: list[RunPanel]) -> bool:
 
 
 def obstacles_of(experiment: Experiment, positions: np.ndarray) -> list[Mesh] | None:
-    """Obstacles near ``positions`` (F, N, 3) m; None if there is only a floor (a shadow)."""
+    """Obstacles near ``positions`` (F, N, 3) m; None for a floor only, drawn as a shadow."""
     bodies = obstacles(positions, experiment.effects)
     floor = any(effect.effect == "floor" for effect in experiment.effects)
     return None if floor and len(bodies) == 1 else bodies

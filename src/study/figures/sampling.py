@@ -405,7 +405,7 @@ def _draw_matrix(ax: Axes, matrix: np.ndarray, title: str) -> None:
 
 
 def _row(figure: Figure, count: int, bottom: float, height: float, label: str) -> list[Axes]:
-    """Axes for a row of pictures, ``bottom`` inches above the lower edge; ``label`` is left."""
+    """Axes of a row of pictures ``bottom`` inches above the lower edge, ``label`` on the left."""
     whole, step = figure.get_figheight(), (style.WIDTH - LEFT) / max(count, 1) / style.WIDTH
     middle = (bottom + 0.5 * height) / whole
     figure.text(0.008, middle, label, va="center", fontsize=7.5)

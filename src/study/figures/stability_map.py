@@ -22,7 +22,7 @@ class Look:
     """Look of an outcome: cell colour, symbol in the cell and its colour, legend text.
 
     Outcomes also differ in lightness, and cells of failed runs have a symbol, so that they can be
-    told apart without colour. The symbol of a blow-up is its frame.
+    distinguished without colour. The symbol of a blow-up is its frame.
     """
 
     face: str

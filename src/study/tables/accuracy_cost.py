@@ -1,8 +1,8 @@
 """Tables of error against time: points of each method and size, tolerances, pay-off.
 
 The error of a point has one of two references; only rows with the same reference are comparable.
-The reference of ``fom`` and ``fom-anderson`` is the full-order run whose frames are converged (K ->
-infinity), of all other methods the scene's own full-order run with finitely many iterations.
+The reference of ``fom`` and ``fom-anderson`` is the full-order run whose frames are converged, with
+K -> infinity; for all other methods it is the scene's own full-order run with a finite number.
 
 Among the other methods, ``full`` without a position subspace is the scene's own full-order run,
 with error zero by definition. ``fewer-iterations`` is the full-order run with fewer iterations,

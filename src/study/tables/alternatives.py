@@ -32,7 +32,7 @@ MOTION = text("motion", f"held-out motion, one of: {', '.join(MOTIONS)}")
 # Columns that identify a candidate (a solver with its settings) in all motions.
 CANDIDATE = ["scene", "factor", "stiffness", *settings.SETTING]
 
-# Rounding decides which iterates a two-level iteration rejects: its errors differ by machine.
+# Rounding decides which iterates a two-level iteration rejects: errors differ between machines.
 LOOSE = 0.3
 REFERENCES = ("implicit", "continuous")
 CASE = ["scene", "vertices", "stiffness", "motion"]
@@ -168,7 +168,7 @@ def winners(rows: pd.DataFrame, times: list[paths.File], limits: Sequence[float]
 
 
 def _best(rows: pd.DataFrame, limit: float, processes: list[int]) -> dict[str, object]:
-    """Columns of the fastest, second and reduced method within ``limit``; without keys if none is.
+    """Columns of the fastest, second and reduced method within ``limit``, as far as they exist.
 
     A speed-up is the median over ``processes`` of ratios of two times within one process.
     """

@@ -200,7 +200,7 @@ def stability(
     """Rows of the study's reduced runs (experiment "rerun"), then of short runs ("sweep").
 
     Method "full" with position basis "full" is the full-order run. The error of a "rerun" row is
-    taken within the horizon, the error of a "sweep" row over the whole run.
+    computed within the horizon, the error of a "sweep" row over the whole run.
 
     Parameters
     ----------
@@ -214,7 +214,7 @@ def stability(
 
 
 def outcomes(runs: pd.DataFrame, wrong: float, departure: float) -> list[str]:
-    """Outcome of each run by two limits: ``wrong`` for its error, ``departure`` for its extent."""
+    """Outcome of each of ``runs``; ``wrong`` limits the error, ``departure`` the extent."""
     full = runs[(runs.method == "full") & (runs.position_basis == "full")]
     extents = full.set_index(SETTING).max_extent.rename("full_extent")
     error = runs.relative_error.astype(float)

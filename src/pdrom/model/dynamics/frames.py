@@ -3,8 +3,8 @@
 The iterate ``y`` and the prediction ``s`` are flat arrays of rows of four numbers (x, y, z, 0).
 ``inertia`` (N,) is M/h^2 in kg/s^2, ``time_step`` is h in s.
 
-If local steps and solver are compiled, one compiled loop does the iterations of a frame. One call
-does several whole frames in scenes where Python has nothing to do between two frames: forces are
+If local steps and solver are compiled, one compiled loop runs the iterations of a frame. One call
+runs several whole frames in scenes that need no Python code between two frames: forces are
 constant or proportional to the velocity, local steps are compiled without frame-lagged data, and
 all contacts are floors. A call ends before a later frame in which the set of held (prescribed)
 vertices changes or a hold begins, because the targets of the vertices are known only then."""

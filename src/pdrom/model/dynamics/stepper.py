@@ -86,7 +86,7 @@ class Stepper:
     def step(
         self, state: State, frame: int, on_last_iterate: Observer = None
     ) -> tuple[State, FrameReport]:
-        """Compute ``frame`` (0-based); ``on_last_iterate`` gets y of the last local step."""
+        """Compute ``frame`` (0-based) from ``state``; ``on_last_iterate`` gets the last local y."""
         if on_last_iterate is None:
             for done in self._at_once(state, range(frame, frame + 1)):
                 return done

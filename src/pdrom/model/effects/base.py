@@ -294,5 +294,5 @@ def held_path(
         known += 1
     paths = [b.path(frames[:known], q) for b, q in zip(active, current, strict=True)]
     if single:
-        return vertices, np.array(paths[0], order="C")  # no view: its type would be compiled, too
+        return vertices, np.array(paths[0], order="C")  # a copy: code is compiled anew for views
     return vertices, np.concatenate([np.empty((known, 0, 3)), *paths], axis=1)[:, first]

@@ -80,7 +80,7 @@ class Obstacle(Contact):
 
     @abstractmethod
     def entries(self, start: np.ndarray, end: np.ndarray) -> Entries:
-        """Return where paths from ``start`` (n, 3) m, outside, to ``end`` (n, 3) m enter."""
+        """Return the entries of straight paths from ``start`` (n, 3) m, outside, to ``end``."""
 
 
 class Plane(Obstacle):

@@ -70,7 +70,7 @@ def read_request(wish: object, source: str = "error") -> Request:
     Raises
     ------
     ConfigurationError
-        Naming ``source``: no number above 0 and below 1, or an unknown quantity.
+        If ``wish`` has an unknown quantity or no number between 0 and 1; names ``source``.
     """
     if isinstance(wish, Request):
         return wish
@@ -141,8 +141,8 @@ class Outcome:
 
     positions : (F + 1, N, 3) m, the initial ones first
     frames : number of first frames for which the estimated error is within the tolerance; 0 if the
-        request is refused: the most accurate full order has run then
-    limit : reason why the estimate exceeds it in later frames; empty if all frames are within it
+        request is refused, in which case the most accurate full order has run
+    limit : reason why later frames are not within the tolerance; empty if all frames are
     expected : error of the chosen level on the motions of the calibration, times the factor
     estimate : estimated error over these frames, times the factor; None if the request is refused
     level : title of the level that computed the positions
@@ -208,7 +208,7 @@ class Calibration:
         return self.settings.factor * float(max(errors[end - 1] for errors in known))
 
     def admissible(self, error: float) -> list[Calibrated]:
-        """Levels with an expected error of at most ``error``; none if no full-order level has."""
+        """Levels with an expected error of at most ``error``; none if all are reductions."""
         good = [each for each in self.levels if self.expected(each, error) <= error]
         return good if any(not each.reduced for each in good) else []
 
@@ -302,7 +302,7 @@ class CheckedRun:
         for frame in check_frames(frames, frames // own.settings.every if level.reduced else 0):
             run.to(frame).check(exact)
             size = np.sqrt(np.mean(np.square(list(run.defects.values())))) / own.motions[0].unit
-            with np.errstate(divide="ignore", invalid="ignore"):  # nothing may move
+            with np.errstate(divide="ignore", invalid="ignore"):  # defects may be zero
                 estimate = expected * float(np.fmax(1.0, np.divide(size, level.defect)))
             if not (estimate <= self._error and np.ptp(run.ends[-1], axis=0).max() <= largest):
                 return run, hopeless
@@ -413,7 +413,7 @@ def transferred(trained: Scene, scene: Scene) -> Scene:
     Raises
     ------
     ConfigurationError
-        Naming the scene: it has another mesh or other constraint groups.
+        If ``scene``, which the message names, has another mesh or other constraint groups.
     """
     mesh, own = trained.mesh, scene.mesh
     alike = [

@@ -1,8 +1,8 @@
 """The reduced local step: S^T W p(y) is replaced by S^T W (mean + V c(y)).
 
-Its compiled part gets the coefficients from sampled entries and reconstructs ("lift"). Coefficients
-come in sets: one set that all axes share, or one set for each axis. A column of the lift adds the
-reconstruction by one set of coefficients to one axis of the right-hand side."""
+Compiled code computes the coefficients from sampled entries and the reconstruction ("lift"). There
+is one set of coefficients that all axes share, or one set for each axis. A column of the lift adds
+the reconstruction by one set of coefficients to one axis of the right-hand side."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -36,8 +36,8 @@ AXES, OWN_SETS, LIFTED, OFFSET, SECONDS, PROJECTIONS, CLOCK, SIZE = range(OWN + 
 class Lift:
     """Arrays of a reduced local step, for r modes, N vertices and c columns.
 
-    starts : (sets + 1,) where the sampled entries of each set begin
-    positions : sampled entries of each set among the numbers of the sampled elements
+    starts : (sets + 1,) index at which the sampled entries of each set begin
+    positions : index of each sampled entry in the projections of the sampled elements
     packed : working memory for the sampled entries of one set
     operators : solution operators (r, m) of all sets, flattened, one after the other
     shifts : (sets, r) operator times the mean at the entries, subtracted from the coefficients

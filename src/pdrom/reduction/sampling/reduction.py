@@ -68,7 +68,7 @@ class Sampling:
     def of_entries(
         cls, entries: np.ndarray, rows_per_element: int, elements: int, repeats: bool = False
     ) -> "Sampling":
-        """Sampling of ``entries``; SamplingError if one is out of range or forbiddenly repeated.
+        """Sampling of ``entries``; SamplingError if out of range, or repeated without ``repeats``.
 
         Parameters
         ----------

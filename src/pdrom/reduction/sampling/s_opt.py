@@ -67,13 +67,13 @@ class SOpt(Selection):
 class _Sampled:
     """Sampled elements, with the data that give the S-measure after adding any other element.
 
-    With G the Gram matrix of the sampled rows and B (s, k) the rows of a candidate, det(G + B^T B)
-    = det G det(I + M), M = B G^-1 B^T. Sampling an element D updates all M at once (Woodbury): M <-
-    M - X (I + D G^-1 D^T)^-1 X^T, X = B G^-1 D^T. A mode d that is added to the columns multiplies
-    the determinant by the squared norm of its least-squares residual. With a candidate this is q +
-    z^T (I + M)^-1 z: q from the rows that are sampled already, z the candidate's rows of the
-    residual; afterwards M <- M + z z^T / q. One step costs O(s e (s + k)) instead of a determinant
-    for each element.
+    With G the Gram matrix of the sampled rows and B (s, k) the rows of a candidate,
+    det(G + B^T B) = det G det(I + M), M = B G^-1 B^T. Sampling an element D updates all M at once
+    (Woodbury): M <- M - X (I + D G^-1 D^T)^-1 X^T, X = B G^-1 D^T. A mode d that is added to the
+    columns multiplies the determinant by the squared norm of its least-squares residual. With a
+    candidate this is q + z^T (I + M)^-1 z: q from the rows that are sampled already, z the
+    candidate's rows of the residual; afterwards M <- M + z z^T / q. One step costs O(s e (s + k))
+    instead of a determinant for each element.
 
     picked : sampled elements in order of selection
     """

@@ -157,9 +157,9 @@ def atoms(boundaries: Sequence[Boundary], vertices: int) -> list[np.ndarray]:
 def skinning_weights(points: np.ndarray, handles: int) -> np.ndarray:
     """Weights (N, handles) at ``points`` (N, 3) m: smooth, in [0, 1], summing to 1 at every vertex.
 
-    Handles are vertices by farthest-point sampling. Each has the compactly supported kernel (1 -
-    d/R)^4 (4 d/R + 1) of Wendland with R three times the covering radius, so that every vertex lies
-    in the support of a kernel; dividing by the sum makes a partition of unity.
+    Handles are vertices by farthest-point sampling. Each has the compactly supported kernel
+    (1 - d/R)^4 (4 d/R + 1) of Wendland with R three times the covering radius, so that every vertex
+    lies in the support of a kernel; dividing by the sum makes a partition of unity.
     """
     chosen = farthest_points(points, np.arange(len(points)), handles)
     distance = np.linalg.norm(points[:, None, :] - points[chosen][None], axis=2)

@@ -6,14 +6,14 @@ weight the element in the system matrix and in the right-hand side. The reduced 
 again a projective-dynamics problem, with weights xi_e w_e >= 0: whatever the factors and the state,
 its objective cannot rise in an iteration. Their quality decides the accuracy, not the stability.
 
-Training iterates come from a run in the position subspace with all projections. One iteration, A z'
-= (M/h^2) s + sum_e B^T S_e^T w_e p_e(B z), can be written as sum_e g_e = (M/h^2)(s - z') with g_e =
-B^T S_e^T w_e (S_e B z' - p_e(B z)). Sampled elements whose factors satisfy sum_e xi_e g_e = sum_e
-g_e map z to the same z', with their own matrix on the left. The factors must therefore reproduce
-the pairs (z, z') of a run. A residual r of the equations moves the next iterate by A^-1 r and
-misses the minimum of the iteration's quadratic objective by 1/2 r^T A^-1 r. `Norm` "energy"
-measures residuals by this loss: in the plain norm the stiff coordinates would hide errors of the
-soft ones, which determine the motion.
+Training iterates come from a run in the position subspace with all projections. One iteration,
+A z' = (M/h^2) s + sum_e B^T S_e^T w_e p_e(B z), can be written as sum_e g_e = (M/h^2)(s - z') with
+g_e = B^T S_e^T w_e (S_e B z' - p_e(B z)). Sampled elements whose factors satisfy
+sum_e xi_e g_e = sum_e g_e map z to the same z', with their own matrix on the left. The factors must
+therefore reproduce the pairs (z, z') of a run. A residual r of the equations moves the next iterate
+by A^-1 r and misses the minimum of the iteration's quadratic objective by 1/2 r^T A^-1 r. `Norm`
+"energy" measures residuals by this loss: in the plain norm the stiff coordinates would hide errors
+of the soft ones, which determine the motion.
 
 `Norm` "response" measures the effect of r on the run. In each mode of (K, M) the frame ends obey
 x_{n+1} / c^2 - 2 x_n + x_{n-1} = h^2 r_n with c^2 = 1 / (1 + h^2 omega^2). To an r_n that is new in
@@ -177,10 +177,10 @@ def training_equations(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the equations of ``elements`` (m, len(elements)), Fortran order, and sums (m,).
 
-    For each pair (z, z') of iterates and each coordinate there is one equation, g_e = B^T S_e^T w_e
-    (S_e B z' - p_e(B z)), in the norm of `TrainingFrame.measure`, all together scaled so that the
-    sum of all elements has norm 1. The share of the rest weight is one more equation: a group at
-    rest (no force at all) still keeps its stiffness.
+    For each pair (z, z') of iterates and each coordinate there is one equation,
+    g_e = B^T S_e^T w_e (S_e B z' - p_e(B z)), in the norm of `TrainingFrame.measure`, all together
+    scaled so that the sum of all elements has norm 1. The share of the rest weight is one more
+    equation: a group at rest (no force at all) still keeps its stiffness.
 
     Many equations are hashed to `SKETCH` K rows with random signs (seeded), which keeps norms of
     combinations up to a few per cent (count sketch, Charikar et al. 2002) and never forms an e x e

@@ -87,7 +87,7 @@ def require_known(config: SceneConfig) -> None:
 
 
 def export_basis(scene: Scene, columns: Columns, needed: np.ndarray) -> dict[str, Any]:
-    """Export ``columns`` of a subspace of ``scene`` and all data that depend on no samples.
+    """Export ``columns`` of a subspace of ``scene`` and all data that do not depend on samples.
 
     Parameters
     ----------

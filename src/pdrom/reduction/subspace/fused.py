@@ -318,7 +318,7 @@ def run_frames(
     Parameters
     ----------
     positions, velocities : (F + 1, K, 3) coordinates, the first ones given, the others written
-    acceleration, rate, rates : by all forces, see `ReducedSpace.affine`
+    acceleration, rate, rates : terms of all forces, see `ReducedSpace.affine`
     h : time step, s
     fixed, free : (m,), (K',) held coordinates and the others
     targets : (F, m, 3) values of the held coordinates

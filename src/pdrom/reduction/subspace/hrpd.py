@@ -41,7 +41,7 @@ class HrpdSpec(ConfigModel):
 
 
 def hrpd(group: ConstraintGroup, columns: Columns, sampled: "SampledSpace | None") -> Interpolation:
-    """Interpolation of ``group`` in the subspace ``columns``; ``sampled`` None: no projections."""
+    """Interpolation of ``group`` in ``columns``; without projections if ``sampled`` is None."""
     strain, stiffness = reduced_strain(group, columns)
     offset = np.zeros((len(stiffness), 3))
     if sampled is None:

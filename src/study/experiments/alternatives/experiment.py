@@ -2,7 +2,7 @@
 
 The first reference is the implicit step of the scene, solved to convergence, which methods approach
 with more iterations. The second is the motion in continuous time, which a user wants and which the
-implicit step misses. All methods run the held-out motions; only reductions are trained.
+implicit step misses. All methods run the held-out motions; only subspaces are trained.
 """
 
 import logging
@@ -402,7 +402,7 @@ def alternatives(sources: list[Path], settings: Options, out: File, times: File)
 
 
 def sized(config: SceneConfig, factor: float, stiffness: float) -> SceneConfig:
-    """Return ``config`` with a ``factor`` times finer mesh of equal mass, and scaled weights."""
+    """``config`` on a ``factor`` times finer mesh of equal mass, weights times ``stiffness``."""
     finer = config.coarsened(factor, 1.0)
     counts = [c.mesh.build(Path()).vertices for c in (config, finer)]
     effects = tuple(

@@ -210,7 +210,7 @@ def _subspace(training: Training, kind: str, sampling: str, limit: float) -> Red
 def row(
     training: Training, name: str, methods: Methods, expected: Mapping[str, Expectation]
 ) -> dict[str, Any]:
-    """Table row of the reduction ``name``: sizes, measures of the run, outcome and reason."""
+    """Table row of the reduction ``name``: sizes, measures, outcome, reason of a failure."""
     try:
         reduced = reduced_run(training, name, methods, limit=BLOWUP * training.extent)
     except NotReducibleError as error:

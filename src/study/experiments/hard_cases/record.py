@@ -98,7 +98,7 @@ def mapped(*rows: tuple[float, float, float]) -> Start:
 
 
 def scales(x: float, y: float, z: float) -> Start:
-    """Start at rest: the rest shape scaled about its centre; a negative factor mirrors it."""
+    """Start at rest: rest shape scaled by ``x``, ``y``, ``z`` about its centre (< 0: mirrored)."""
     return mapped((x, 0, 0), (0, y, 0), (0, 0, z))
 
 

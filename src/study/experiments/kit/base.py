@@ -122,9 +122,9 @@ Solver = Annotated[str, AfterValidator(_known)]
 
 
 class Horizon(ConfigModel):
-    """Last frame at which runs are compared: where runs perturbed by ``perturbation`` diverge.
+    """Horizon of a scene, before which runs are compared, by its runs with this ``perturbation``.
 
-    The horizon is the first frame at which their spread exceeds ``threshold``.
+    It is the first frame at which the spread of these runs exceeds ``threshold``.
     """
 
     perturbation: Tolerance
@@ -166,7 +166,7 @@ def followed(loop: Stepper, state: State, frames: int) -> np.ndarray:
 
 
 def perturbation_field(scene: Scene, size: float, seed: int) -> np.ndarray:
-    """Vectors (N, 3) m in random directions, each ``size`` times the extent of ``scene`` long."""
+    """Random vectors (N, 3) m by ``seed``, each ``size`` times the extent of ``scene`` long."""
     field = np.random.default_rng(seed).standard_normal((scene.mesh.vertices, 3))
     return size * scene.mesh.extent * field / np.linalg.norm(field, axis=1, keepdims=True)
 
@@ -178,7 +178,7 @@ def varied(
     duration: float,
     frames: Sequence[int],
 ) -> SceneConfig:
-    """Return ``config`` with ``time_step`` (s) and the reduced groups' weights scaled.
+    """Return ``config`` with ``time_step`` (s), reduced groups' weights times ``stiffness_ratio``.
 
     Schedules keep their times in seconds, so that their frame numbers change. The run lasts
     ``duration`` seconds, but at least ``frames[0]`` and at most ``frames[1]`` frames. Groups that

@@ -42,7 +42,7 @@ _INNER = ("assembly_seconds", "lift_seconds")
 
 
 class Protocol(ConfigModel):
-    """``frames`` of each run, after ``warmup`` unmeasured runs, in ``repeats`` measured ones."""
+    """``repeats`` measured runs of ``frames`` frames each, after ``warmup`` unmeasured runs."""
 
     frames: Count = 10
     warmup: Annotated[int, Field(ge=0, le=1000)] = 1

@@ -1,7 +1,7 @@
 """Tables about the preprint's claims, by the rules of config/claims.yaml.
 
-Verdicts: evaluation of the tests of a claim and combination of their results. Table claims has
-the verdicts, claims_tests the result of every test, claims_sensitivity the verdicts under changed
+The tests of a claim are evaluated and their results combined to verdicts. Table claims has the
+verdicts, claims_tests the result of every test, claims_sensitivity the verdicts under changed
 rules.
 """
 
@@ -136,7 +136,7 @@ def _text(value: float) -> str:
 def combined(verdicts: Sequence[str]) -> str:
     """Verdict of a claim whose tests have ``verdicts``: it holds if all of them hold.
 
-    Without a test that decides it is not tested.
+    Without any verdict, the claim is not tested.
     """
     if not verdicts:
         return UNTESTED

@@ -38,7 +38,7 @@ def reruns(table: pd.DataFrame, where: Where) -> pd.DataFrame:
     Runs with reduced positions are included only if ``where`` selects a position basis, because a
     method may have the same name with full and reduced positions. ``r: [full]`` selects the largest
     size tried for each scene, group and method. A run that blew up before its first frame counts as
-    tried: without it, a smaller size that survived would be taken for full rank.
+    tried: without it, a smaller size that survived would be mistaken for full rank.
     """
     table = trained(table)
     table = table if "position_basis" in where else table[table.position_basis == "full"]

@@ -236,7 +236,7 @@ class Table(Artifact):
         Raises
         ------
         StorageError
-            If there are rows and a column is missing or holds a value that does not fit.
+            If there are rows and a column is missing or contains a value that does not fit.
         """
         missing = [name for name in self.column_names if name not in table.columns]
         if missing and len(table):

@@ -1,7 +1,7 @@
 """Projective dynamics in substeps: K iterations in each of n steps (Macklin et al. 2019: K = 1).
 
-Methods: plain, with Anderson acceleration (`pdrom.model.dynamics.acceleration`), the latter with a
-coarse level, with Chebyshev's semi-iteration (Wang 2015, alg. 1), and explicit integration.
+Methods: plain, Anderson acceleration (`pdrom.model.dynamics.acceleration`), the same with a coarse
+level, Chebyshev's semi-iteration (Wang 2015, alg. 1), and explicit integration.
 """
 
 from dataclasses import dataclass
@@ -95,7 +95,7 @@ def _anderson(
 
 
 class Chebyshev(Alternative):
-    """Chebyshev's semi-iteration: extrapolates from the second-last iterate, weights vary."""
+    """Chebyshev's semi-iteration: extrapolates from the second-last iterate by varying weights."""
 
     name = "chebyshev"
 
@@ -138,13 +138,13 @@ class TwoLevel(Alternative):
     """Anderson acceleration with a coarse level: the subspace of a ``model`` of the scene.
 
     The plain iteration converges slowly for deformations that are stiff in the system matrix A and
-    soft in the objective. Its image G(y) is therefore corrected in the span of columns V with V^T A
-    V = 1: the component g = V^T A (G(y) - y) of its step is replaced by the step z that minimises
-    the objective of y + V z, in which sampled elements stand for all elements. This is the full
-    approximation scheme (Brandt 1977) with one additive smoothing step: -g is the exact gradient in
-    the span, so that z = g = 0 where y solves the frame, whatever the samples are. The corrected
-    map is accelerated; an iterate that raises the objective is replaced by the last image without
-    correction.
+    soft in the objective. Its image G(y) is therefore corrected in the span of columns V with
+    V^T A V = 1: the component g = V^T A (G(y) - y) of its step is replaced by the step z that
+    minimises the objective of y + V z, in which sampled elements represent all elements. This is
+    the full approximation scheme (Brandt 1977) with one additive smoothing step: -g is the exact
+    gradient in the span, so that z = g = 0 where y solves the frame, whatever the samples are. The
+    corrected map is accelerated; an iterate that raises the objective is replaced by the last image
+    without correction.
 
     Raises
     ------

@@ -99,7 +99,7 @@ class Alternative(Stepper):
     def step(
         self, state: State, frame: int, on_last_iterate: Callable[[np.ndarray], None] | None = None
     ) -> tuple[State, FrameReport]:
-        """Advance ``state`` by ``frame``, without objective and calls of ``on_last_iterate``."""
+        """Compute ``frame`` from ``state``; no objective, no call of ``on_last_iterate``."""
         started = perf_counter()
         q = state.positions
         fixed, targets = self.space.fixed(frame, q)
