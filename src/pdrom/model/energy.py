@@ -36,7 +36,7 @@ class EnergyScale:
 
     zero : this smallest potential, J
     peak : largest total energy of the full-order run, J, minus ``zero``
-    own : energies of the full-order run at the frames of `energies`, relative as in `relative`
+    own : energies of the full-order run minus ``zero``, divided by ``peak``, see `energies`
     """
 
     scene: Scene

@@ -21,7 +21,7 @@ Sources = Any
 
 @dataclass(frozen=True)
 class Every:
-    """All files of the kind ``place`` in the configuration whose labels agree with the job's."""
+    """All files of the kind ``place`` that the study makes for the scene, group ... of the job."""
 
     place: Place
 

@@ -88,7 +88,7 @@ class TimedScene:
     """A scene, timed in full order, once more as a control, and with its reductions.
 
     mesh : file of the mesh; None builds it from the configuration
-    projections : cases with their methods and the files of their bases and samplings
+    projections : reduced local steps to time: group, method and size, with basis and samples
     models : for each file of position subspaces, (method, kind of basis, number of modes) of the
         models to time; None times all
     """

@@ -223,7 +223,7 @@ def without(effect: str) -> str:
 
 
 def removable(config: SceneConfig) -> list[str]:
-    """Names of the effects of ``config`` except an only constraint group, each name once."""
+    """Effects without which ``config`` still has a constraint group, by name, each once."""
     names = dict.fromkeys(e.effect for e in config.effects)
     return [name for name in names if config.groups != [name]]
 

@@ -254,7 +254,7 @@ def _runs(
 def _subspaces(
     motion: Yardstick, settings: SubspaceModels
 ) -> Iterator[tuple[str, Columns, str, int, Iterator[tuple[str, Sampled]]]]:
-    """Yield name, columns, kind and size of every subspace, with the models in it.
+    """Yield name, columns, kind and size of every subspace, with the reduced models that use it.
 
     The training frames of ``motion`` are the even ones, as for the bases of projections.
     """

@@ -117,8 +117,8 @@ def stability_map(options: Sizes, drawn: Drawn, table: pd.DataFrame) -> Figure:
     """End of every run on the training motion, by method, size and scene. Accurate or wrong: the
     error within the horizon is at most, or above, {stability.wrong}; left the scene: the bounding
     box exceeds {stability.left} times the largest one of the full-order run; blow-up: numbers that
-    are not finite, or an extent beyond the limit, in the printed frame. Groups whose projections
-    are round-off are left out.
+    are not finite, or an extent beyond the limit, in the frame whose number is printed. Groups
+    whose projections are round-off are left out.
     """
     table = options.rows(table)
     table = table[(table.experiment == "rerun") & (table.group.notna())]

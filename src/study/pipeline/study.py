@@ -262,7 +262,7 @@ def _with_subspaces(study: Study) -> list[str]:
     return _held(study, section.scenes or takes)
 
 
-# Values of the label "name" for kinds of files that every study has.
+# Names of the tables, figures and TeX inputs that every study makes, by the kind of their files.
 NAMES: dict[paths.Place, Callable[[], Iterable[str]]] = {
     paths.TABLE: declared,
     paths.FIGURE: declarations,

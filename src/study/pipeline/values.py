@@ -125,7 +125,7 @@ class Run(Experiment):
 
     @property
     def labels(self) -> dict[str, str]:
-        """Labels of the files of this group and method."""
+        """Scene, group and method, which occur in the paths of the files of this run."""
         return {**super().labels, "method": self.method}
 
 

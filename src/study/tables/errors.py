@@ -101,7 +101,7 @@ def sensitivity(parts: list[paths.File]) -> pd.DataFrame:
         integer("seed", "of the start's round-off"),
         *shared("method r"),
         integer("rank", "modes that the snapshots have without a cutoff", compared="value"),
-        # the gain has no reproducible value because the modes are made of round-off
+        # modes of round-off differ between machines, and so does the gain of their interpolation
         replace(*shared("gain"), compared="skipped"),
         *shared("frames finite blowup_frame"),
         number("relative_error", "error of the positions over all frames up to the horizon"),

@@ -21,7 +21,7 @@ from study.verification.subject import Status, Subject, ended, options_parser, s
 NOTHING = "Nothing to be done"
 CODES = "exit codes: 0 all holds; 1 faulty input; 2 not understood; 3 differs; 4 not there"
 PAGE = "verification.md"
-# Largest number of differences per line that the page lists.
+# Largest number of differences that the page `PAGE` lists for each table, figure or claim.
 ON_PAGE = 20
 
 

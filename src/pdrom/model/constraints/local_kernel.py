@@ -136,7 +136,7 @@ class LocalPass:
             )
 
     def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
-        """Add S^T W p(y) at ``y`` (N, 3) to ``rhs`` (N, 3), padded or not; return the energy, J."""
+        """Add S^T W p(y) at ``y`` (N, 3) to ``rhs`` (N, 3), and return the energy, J."""
         right = rows.flat(rhs)
         if rows.shares(rhs, right):
             return self._add(rows.flat(y), right)

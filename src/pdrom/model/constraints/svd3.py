@@ -144,7 +144,7 @@ def factor_block(work):
 
 @lanes.lane_function
 def compose_block(work):
-    """Write U diag(sigma) V^T of `factor_block` to P, except in lanes that are marked `FOUND`."""
+    """Write U diag(sigma) V^T of `factor_block` to P, except where P is known already (`FOUND`)."""
     for lane in range(LANES):
         u, v = lanes.load_matrix(work, B, lane), lanes.load_matrix(work, V, lane)
         sigma, found = load(work, SIGMA, lane), work[FOUND * LANES + lane] != 0.0

@@ -407,8 +407,8 @@ def _calibrated(level: Level, motions: Sequence[Motion], on_frame: OnFrame) -> C
 def transferred(trained: Scene, scene: Scene) -> Scene:
     """Return ``trained`` with the material, masses, step, frames and obstacles of ``scene``.
 
-    A calibration depends on all of these. Held vertices, their paths and the start remain as in
-    ``trained``.
+    Errors measured in a calibration depend on all of these. Held vertices, their paths and the
+    start remain as in ``trained``.
 
     Raises
     ------

@@ -94,7 +94,7 @@ def training_run(
         first = state.positions
         state, _ = loop.step(state, frame)
         if frame in wanted:
-            # after a contact correction the end of the frame is not an iterate
+            # the last iterate is not the end of the frame if a contact has corrected this
             if len(iterates) == 1:
                 iterates.append(state.positions)
             pairs = np.stack([iterates[:-1], iterates[1:]], axis=1)

@@ -344,7 +344,7 @@ def finite(case: HardCase, scene: Scene, run: Record) -> str:
 
 
 def bounded(case: HardCase, scene: Scene, run: Record) -> str:
-    """Check that the extent stays below the bound of the case."""
+    """Check that the bounding box of every frame stays below the size that ``case`` allows."""
     limit = case.bound * reach(scene, run)
     return "" if run.extent <= limit else f"extent {run.extent:.3g} m, allowed {limit:.3g} m"
 
@@ -369,8 +369,8 @@ def objective(case: HardCase, scene: Scene, run: Record) -> str:
 def energy(case: HardCase, scene: Scene, run: Record) -> str:
     """Check that kinetic plus potential energy never exceeds its value at the start.
 
-    For a start at rest the first frame obeys this for every K, since its objective is this energy;
-    later frames obey it by the damping of the implicit step.
+    For a start at rest the first frame obeys this after any number of iterations, since its
+    objective is this energy; later frames obey it by the damping of the implicit step.
     """
     start, largest = run.energy[0], run.energy.max()
     elastic = float(np.abs(run.positions).max()) ** 2 * float(abs(scene.system.matrix).sum())

@@ -78,9 +78,9 @@ def reconstruction(rows: pd.DataFrame, accuracy: float) -> pd.Series:
 
 
 def axis_reconstruction(rows: pd.DataFrame, accuracy: float) -> pd.Series:
-    """Reconstruction error of each row and axis, see `reconstruction`.
+    """Errors of reconstructed projections as in `reconstruction`, for each of the axes x, y and z.
 
-    An axis is left out if its projections are round-off at every size, where no error is defined.
+    An axis whose projections are round-off at every basis size has no error and is left out.
     """
     rows = rows[rows.gain.notna()]
     curve = [rows[label] for label in (*_RUN, "split", "axis")]

@@ -89,7 +89,7 @@ class Column:
         if self.kind == "text":
             return values
         if self.kind == "flag":
-            # as objects, because pandas turns flags joined with an empty column into numbers
+            # of type object, because pandas turns flags joined with an empty column into numbers
             others = values[values.notna() & ~values.isin([True, False])]
             if len(others):
                 raise ValueError(f"'{others.iloc[0]}'")

@@ -150,7 +150,7 @@ def begin(y, v, acceleration, step, fixed, targets, before, s):
 
     Parameters
     ----------
-    y, v : padded positions m and velocities m/s, flat
+    y, v : positions m and velocities m/s of all vertices, one after the other in a vector
     acceleration : (3,) m/s^2
     step : length of the substep, s
     fixed, targets : fixed vertices (n,) and their positions (n, 3) m at the end of the substep
