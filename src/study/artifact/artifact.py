@@ -1,6 +1,6 @@
-"""Artifact: a function that makes files of the study, with a declaration of its reads and writes.
+"""Artifact: a function that makes files of the study, with its declared input and output files.
 
-A decorator declares an artifact; the function's parameters have the names of reads and writes::
+A decorator declares it; the parameters have the names of ``reads`` (inputs) and ``writes``::
 
     @experiment(
         "POD of {group} in {scene} ({basis})",
@@ -9,8 +9,9 @@ A decorator declares an artifact; the function's parameters have the names of re
     )
     def pod(snapshots: File, spec: BasisSpec, out: File) -> None: ...
 
-Settings are validated by the function's annotations, and a job depends on declared reads only. The
-labels of a job (scene, group ...) are the labels in the paths that it writes.
+Settings are validated by the function's annotations, and a job depends on declared inputs only. An
+artifact has one job for each combination of the wildcards (scene, group ...) in its output paths;
+their values in one job are called ``labels`` in the code.
 """
 
 import inspect
@@ -32,16 +33,16 @@ A = TypeVar("A", bound="Artifact")
 
 @dataclass(frozen=True)
 class Artifact:
-    """A function that makes files of the study, with what it reads and writes.
+    """A function that makes files of the study, with its input and output files.
 
-    A function with the parameter ``outputs`` gets all output paths in it, by name, as for many
-    files or files in configurable folders, and writes the files itself.
+    A function with a parameter ``outputs`` gets a mapping of all output paths by name in it. This
+    serves functions with many output files, or with files in configurable folders.
 
     name : name of the function
-    title : message of a run when the job starts, with labels in braces
-    reads : reads by the names of the function's parameters
-    writes : kinds of files by the names of the parameters that receive them
-    alone : True if it measures times, so that no other job may run at the same time
+    title : progress message when a job starts; ``{scene}`` etc. stand for the job's scene etc.
+    reads : input files and settings, by the names of the function's parameters
+    writes : kinds of output files, by the names of the parameters that receive them
+    alone : True if the function measures times, so that no other job may run meanwhile
     """
 
     name: str
@@ -64,12 +65,12 @@ class Artifact:
 
     @property
     def labels(self) -> list[str]:
-        """Names of a job's labels, taken from the paths that it writes."""
+        """Names of the wildcards (scene, group ...) in the paths of the output files."""
         return list(dict.fromkeys(name for place in self.writes.values() for name in place.labels))
 
     @property
     def files(self) -> dict[str, FileRead]:
-        """Reads that are files, by parameter name."""
+        """Declared inputs that are files, not settings, by parameter name."""
         reads = self.reads.items()
         return {name: read for name, read in reads if not isinstance(read, SettingRead)}
 
@@ -85,19 +86,19 @@ class Artifact:
         return self.function(*arguments, **named)
 
     def settings(self, sources: Sources, labels: Labels) -> dict[str, Any]:
-        """Typed settings of a job by parameter name; ConfigurationError if a key is unknown."""
+        """Return a job's validated settings by parameter; ConfigurationError for an unknown key."""
         reads = [(name, read) for name, read in self.reads.items() if isinstance(read, SettingRead)]
         values = {name: read.value(sources, labels) for name, read in reads}
         return {name: self.types[name].validate_python(value) for name, value in values.items()}
 
     def plain(self, settings: Mapping[str, Any]) -> dict[str, Any]:
-        """Return typed ``settings`` as plain data, reduced to the fields of the annotated types."""
+        """Return typed ``settings`` as JSON data, with the fields of the annotated types only."""
         return {k: self.types[k].dump_python(v, mode="json") for k, v in settings.items()}
 
     def perform(
         self, settings: Mapping[str, Any], inputs: Mapping[str, Any], outputs: Mapping[str, str]
     ) -> None:
-        """Run a job: plain ``settings``, and paths ``inputs`` and ``outputs``, by parameter name.
+        """Run a job with JSON ``settings``, and paths ``inputs`` and ``outputs``, all by parameter.
 
         Raises
         ------
@@ -110,18 +111,19 @@ class Artifact:
         self.function(**self.read(settings, inputs), **made)
 
     def read(self, settings: Mapping[str, Any], inputs: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the function's arguments: content of the files ``inputs``, typed ``settings``."""
+        """Return the function's arguments: contents of ``inputs`` and validated ``settings``."""
         content = {name: read.content(inputs[name]) for name, read in self.files.items()}
         return content | {k: t.validate_python(settings[k]) for k, t in self.types.items()}
 
 
 def make(address: str, code: str, labels: Labels, **job: Mapping[str, Any]) -> None:
-    """Run a job of the artifact at ``address``; its outputs record rule, settings and code.
+    """Run a job of the artifact at ``address``; each output file records rule, settings and code.
 
     Parameters
     ----------
     code : fingerprint of the code that the job runs
-    job : plain ``settings``, and paths ``inputs`` and ``outputs``, by parameter name
+    labels : scene, group ... of the job, by name
+    job : JSON ``settings``, and paths ``inputs`` and ``outputs``, each by parameter name
     """
     made = load(address)
     with made_by(made.rule, {**job["settings"], "labels": dict(labels)}, code):
@@ -129,7 +131,7 @@ def make(address: str, code: str, labels: Labels, **job: Mapping[str, Any]) -> N
 
 
 def declare(made: A, *parameters: str) -> A:
-    """Return ``made``; TypeError if its function's parameters differ from reads and others."""
+    """Return ``made``; TypeError if its function takes others than its reads and ``parameters``."""
     try:
         inspect.signature(made.function).bind(**made.reads, **dict.fromkeys(parameters))
     except TypeError as error:
@@ -146,9 +148,9 @@ def load(address: str) -> Artifact:
 
 @cache
 def declared_in(package: str, kind: type[A]) -> dict[str, A]:
-    """Return the artifacts of a kind that modules of a package declare, sorted by name.
+    """Return all artifacts of the class ``kind`` in the modules of a package, sorted by name.
 
-    Only modules that import from the module of ``kind`` can declare one; others are not imported.
+    Only modules that import from the module of ``kind`` are searched; others are not imported.
     """
     root, found = Path(import_module(package).__path__[0]), {}
     for path in root.rglob("*.py"):
@@ -163,7 +165,7 @@ def declared_in(package: str, kind: type[A]) -> dict[str, A]:
 
 
 def modules_in(value: Any) -> Iterator[str]:
-    """Yield the names of code modules listed by models in ``value``, as by effects of a scene."""
+    """Yield all ``modules`` (names of modules) of Pydantic models in ``value``, such as effects."""
     if isinstance(value, BaseModel):
         yield from getattr(value, "modules", ())
         for name in type(value).model_fields:

@@ -34,12 +34,12 @@ FORMAT = "%(asctime)s %(levelname)-7s %(name)s: %(message)s"
 
 
 class _LogFile(logging.FileHandler):
-    """Log file that ignores a full disk, which the job's own outputs report."""
+    """Log file that ignores a full disk; the job fails anyway when it writes its outputs."""
 
     stream: TextIOWrapper
 
     def handleError(self, record: logging.LogRecord) -> None:
-        """Ignore an error of writing: the default prints a traceback for every message."""
+        """Ignore an error of writing; the base class would print a traceback for every message."""
 
 
 @contextmanager
@@ -95,9 +95,9 @@ def job_log(path: str) -> Iterator[logging.Logger]:
 
 @contextmanager
 def planning_log(quiet: bool) -> Iterator[None]:
-    """Show the packages' warnings on stderr, or drop them if ``quiet``.
+    """Show warnings of pdrom and study on stderr, or drop them if ``quiet``.
 
-    Every job makes the plan again in its own process; the warnings of the main process suffice.
+    Every job makes the plan again in its own process, quietly: the main process has shown them.
     """
     handler = logging.NullHandler() if quiet else logging.StreamHandler()
     handler.setLevel(logging.WARNING)
@@ -142,9 +142,9 @@ class Usage:
 
 
 def usage_since(start: float) -> Usage:
-    """Usage since ``start``, s of the monotonic clock; processor time and memory of the process.
+    """Return the wall time since ``start`` (s, monotonic clock), and this process's other usage.
 
-    Processor time starts at zero in a forked job.
+    Processor time counts from the start of the process; in a forked job it starts at zero.
     """
     used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
     return Usage(

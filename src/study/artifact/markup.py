@@ -1,6 +1,6 @@
 r"""Conversion of the mark-up of titles and captions to TeX, plain text and reStructuredText.
 
-The mark-up has two forms: ```name``` is a name of the study, ``$r \le 20$`` is mathematics.
+The mark-up has two forms: ```name``` is set in typewriter, ``$r \le 20$`` is mathematics.
 ``{key}`` stands for a setting of the configuration (`filled`).
 """
 
@@ -27,7 +27,7 @@ def filled(text: str, value: Callable[[str], float]) -> str:
 
 
 def number(value: float) -> str:
-    """Number ``value`` as mathematics in mark-up, with exponents as powers of ten."""
+    """Format ``value`` as a formula in mark-up; exponents become powers of ten."""
     mantissa, mark, exponent = f"{value:g}".partition("e")
     if not mark:
         return f"${mantissa}$"

@@ -1,7 +1,7 @@
 """Layout of a results folder: the only module that defines the paths of results.
 
-A `Place` is a kind of file. It converts labels (scene, group, method ...) to a path, and a path to
-labels. The pipeline chooses the results folder itself, one for each configuration.
+A `Place` is a kind of file. Its path has wildcards for scene, group, method ..., whose values are
+called labels. The pipeline chooses the results folder itself, one for each configuration.
 """
 
 import re
@@ -15,7 +15,7 @@ from pdrom.core.errors import StorageError
 
 RESULTS = "results"
 
-# Regular expressions of label values, also used for the wildcards of the workflow.
+# Regular expressions for the values of wildcards in paths, by name; the workflow uses them too.
 LABELS = {
     "mesh": r"[A-Za-z0-9_.-]+",
     "scene": r"[a-z][a-z0-9_]*",
@@ -31,16 +31,16 @@ _LABEL = re.compile(r"\{(\w+)\}")
 
 @dataclass(frozen=True)
 class Place:
-    """A kind of file; ``pattern`` is its path in the results folder, with labels in braces."""
+    """A kind of file; ``pattern`` is its path in the results folder, with wildcards in braces."""
 
     pattern: str
 
     def at(self, results: str, **labels: str) -> str:
-        """Path of the file with these labels in the folder ``results``."""
+        """Path in the folder ``results``; ``labels`` are the values of scene, group ... in it."""
         return f"{results}/{self.pattern.format(**labels)}"
 
     def where(self, **labels: str) -> "Place":
-        """Return the kind of file with some labels fixed to values."""
+        """Return the kind of file in whose path some wildcards are replaced by values."""
         pattern = self.pattern
         for label, value in labels.items():
             pattern = pattern.replace(f"{{{label}}}", value)
@@ -48,11 +48,11 @@ class Place:
 
     @property
     def labels(self) -> list[str]:
-        """Names of the labels in the pattern."""
+        """Names of the wildcards (scene, group ...) in the pattern."""
         return _LABEL.findall(self.pattern)
 
     def file(self, path: str) -> "File":
-        """Return ``path`` as a `File` with its labels; StorageError if it is not of this kind."""
+        """Return ``path`` with scene, group ... in it; StorageError if the pattern does not fit."""
         found = self._expression.search(path)
         if found is None:
             raise StorageError(f"{path}: no file of the kind '{self.pattern}'")
@@ -63,16 +63,16 @@ class Place:
         return [self.file(path) for path in paths]
 
     def paths(self, sources: Any, labels: Mapping[str, str]) -> str:
-        """Return the path that `study.artifact.reads.Sources` have for a job with ``labels``."""
+        """Return the path of this kind of file for a job whose scene, group ... are ``labels``."""
         return str(sources.file(self, labels))
 
     def content(self, paths: Any) -> "File":
-        """Return the argument of an artifact's function that reads its own file of this kind."""
+        """Return the `File` at the path ``paths``, as the argument of an artifact's function."""
         return self.file(str(paths))
 
     @cached_property
     def _expression(self) -> re.Pattern[str]:
-        texts = _LABEL.split(self.pattern)  # every other one is a label
+        texts = _LABEL.split(self.pattern)  # every second text is the name of a wildcard
         texts[::2] = map(re.escape, texts[::2])
         texts[1::2] = [f"(?P<{label}>{LABELS[label]})" for label in texts[1::2]]
         return re.compile(rf"(?:^|/){''.join(texts)}$")
@@ -80,7 +80,7 @@ class Place:
 
 @dataclass(frozen=True)
 class File:
-    """A file: its path and the labels in the path, which ``file[label]`` returns."""
+    """A file: its path, and scene, group ... in the path by name; ``file["scene"]`` returns one."""
 
     path: str
     labels: dict[str, str]
@@ -143,7 +143,7 @@ PLACES = tuple(place for place in vars().copy().values() if isinstance(place, Pl
 
 
 def labels_in(path: str, results: str) -> Iterator[dict[str, str]]:
-    """Yield the labels of ``path``, a file in ``results``, for each kind of file that fits."""
+    """Yield scene, group ... in ``path``, by name, for each kind of file that the path fits."""
     for place in PLACES:
         with suppress(StorageError):
             labels = place.file(path).labels

@@ -1,8 +1,8 @@
-"""Reads of an artifact: declarations of the files and settings that it needs.
+"""Declarations of the files and settings that an artifact needs, called its reads.
 
-A read contains no path: it names a kind of file, a table or a key of the configuration. For the
-labels of a job, `Sources` find the path or the list of paths of a `FileRead`, of which the
-artifact's function gets the ``content`` by name, and the ``value`` of a `SettingRead`.
+A read contains no path: it names a kind of file, a table or a key of the configuration. `Sources`
+find the paths or the value for a job, given its scene, group ... (``labels``). The artifact's
+function receives the ``content`` of files and the ``value`` of settings.
 """
 
 from collections.abc import Mapping
@@ -15,7 +15,7 @@ from study.artifact.paths import Place
 
 Labels = Mapping[str, str]
 Paths = str | list[str]
-# Finds the paths and settings of a study for a job's labels: `study.pipeline.plan.Plan`.
+# An object that finds paths and settings for a job's scene, group ...: `study.pipeline.plan.Plan`.
 Sources = Any
 
 
@@ -34,7 +34,7 @@ class Every:
 
 @dataclass(frozen=True)
 class EachOf(Every):
-    """One file of the kind ``place`` per entry of the setting ``key``; entries have ``labels``."""
+    """One file of the kind ``place`` for each scene, group ... that the setting ``key`` lists."""
 
     key: str
 
@@ -57,7 +57,7 @@ class TableOf:
 
 
 class EditedFiles:
-    """Base class of reads of hand-edited files; jobs rerun for new content, not for new dates."""
+    """Base class for hand-edited input files: a job reruns if their content changes, not dates."""
 
     def content(self, paths: Any) -> Any:
         return Path(paths) if isinstance(paths, str) else [Path(path) for path in paths]
@@ -114,7 +114,7 @@ class Settings:
         return self.model.model_validate({key: sources.value(key, labels) for key in fields})
 
 
-# a `Place` is the job's own file of its kind
+# A `Place` as an input is the one file of this kind with the job's own scene, group ....
 FileRead = Every | TableOf | ProjectFile | ProjectFiles | SourcesOf | Place
 SettingRead = Setting | Settings
 Read = FileRead | SettingRead

@@ -15,14 +15,14 @@ from pathlib import Path
 from pdrom.core.errors import ConfigurationError, PdromError
 from pdrom.core.yamlfile import read_yaml, shown
 
-# Options with which Snakemake prints or draws something and runs no job.
+# Options with which Snakemake only prints or draws something; it runs no job.
 LOOKS_ONLY = (
     "dryrun", "lint", "list_rules", "list_target_rules", "print_compilation", "containerize",
     "dag", "rulegraph", "filegraph", "d3dag", "list_conda_envs", "list_changes",
     "list_input_changes", "list_params_changes", "list_untracked", "summary", "detailed_summary",
     "archive", "generate_unit_tests",
 )  # fmt: skip
-# Options that choose Snakemake's own output, which this project's progress lines do not replace.
+# Options that choose Snakemake's own output; if one is given, it is shown in place of our progress.
 OWN_OUTPUT = ("logger", "quiet", "verbose", "printshellcmds", "debug_dag")
 YAML = (".yaml", ".yml", ".json")
 TEMPLATE_KEY = "__use_yte__"
@@ -32,25 +32,25 @@ RECORD = Path(".snakemake/last_run.json")
 class CommandLine:
     """Options of Snakemake's command line that this project evaluates.
 
-    arguments : the whole command line, which is parsed by Snakemake's parser; that ends the process
-        for an unknown option
+    arguments : the whole command line; Snakemake parses it, and exits for an unknown option
     configfiles : files of ``--configfile``, in order
     settings : ``key=value`` pairs of ``--config``
     targets : names of files and rules
     report : file of ``--report``, None without one
     looks_only : True if no job runs and no result is written
     plans : True for a dry run (``-n``) without any other option of `LOOKS_ONLY`
-    own_output, cores : whether an option of `OWN_OUTPUT`, or a number of cores or jobs, is given
+    own_output : True if an option of `OWN_OUTPUT` is given
+    cores : True if a number of cores or jobs is given
     executor : Snakemake's executor, from command line or profile; None runs jobs on this machine
 
     Raises
     ------
     ConfigurationError
-        A target stands where it is read as a value of ``--config`` or ``--configfile``.
+        A target directly follows ``--config`` or ``--configfile`` and is read as its value.
     """
 
     def __init__(self, arguments: Sequence[str]) -> None:
-        # imported late: Snakemake's jobs import this module too and need no parser
+        # imported here because Snakemake's jobs import this module too and need no parser
         from snakemake.cli import get_argument_parser
 
         found = vars(get_argument_parser().parse_args(list(arguments)))
@@ -90,10 +90,10 @@ class CommandLine:
         return [*files, *(["--config", *self.settings] if self.settings else [])]
 
     def rewritten(self, more: Sequence[str], made: Mapping[str, Sequence[str]]) -> list[str]:
-        """Return the arguments with the options ``more`` and the files ``made`` for each target."""
+        """Return the arguments, with options ``more`` and each target replaced by its files."""
         targets = dict.fromkeys(file for target in self.targets for file in made[target])
         options = _before_targets(self.arguments)
-        # an option may have the name of a target as its value, so that all options are searched
+        # targets may stand anywhere among the options, whose values may have the same names
         for target in () if "--" in self.arguments else self.targets:
             options.remove(target)
         return [*options, *more, *(["--", *targets] if targets else [])]
@@ -126,7 +126,7 @@ def one_line() -> Iterator[None]:
 
 def remember(command: CommandLine) -> None:
     """Record the configuration options of ``command``, which is about to run, in `RECORD`."""
-    # imported late: it loads NumPy, and the environment variables must be set before that
+    # imported here because it loads NumPy, before which environment variables must be set
     from pdrom.core.store import write_text
 
     write_text(json.dumps(command.configuration) + "\n", RECORD)
