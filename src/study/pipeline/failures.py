@@ -1,4 +1,4 @@
-"""Report of a failed run: its last lines name every failed job with the cause of the failure."""
+"""Report printed at the end of a failed run: every failed job with the cause of the failure."""
 
 import logging
 import re
@@ -42,7 +42,7 @@ _FULL_DISK = 1 << 18  # free bytes below which the disk counts as full
 
 @dataclass(frozen=True)
 class Failure:
-    """A failed job: its rule, its log, its first output, and Snakemake's message ``said``."""
+    """A failed job: its rule, path of its log, its first output; ``said``: Snakemake's message."""
 
     rule: str
     log: str
@@ -55,10 +55,10 @@ class Failure:
         return _content(self.log) if path.is_file() and path.stat().st_mtime >= begun else ""
 
     def line(self, begun: float) -> str:
-        """Error line: job, cause, crash position; ``begun`` is the start of the run, s."""
+        """Error line: job, cause, source line of a crash; ``begun`` is the run's Unix time in s."""
         folder = next((p for p in Path(self.output).parents if p.is_dir()), Path())
         errors = _ERROR.findall(_content(self.log))
-        # the log of a job that could not start is left over from an older run
+        # a job that could not start wrote no log: an existing log is from an older run
         if errors and cause(self.said, folder) not in _STATUSES.values():
             return f"pdrom: job {self.rule} failed: {errors[-1]}"
         return (
@@ -93,7 +93,7 @@ def cause(said: str, folder: Path) -> str:
 
 
 def crash(written: str, log: str) -> str:
-    """Source line of this project at which a job crashed, as text; empty if it did not crash."""
+    """Text naming this project's source line at which a job crashed; empty without a crash."""
     found = list(_CRASH.finditer(written))
     if not found:
         return ""
@@ -127,7 +127,7 @@ class Failures(logging.Handler):
             files = (getattr(record, name, ()) for name in ("log", "output"))
             log, output = (next(iter(names), "") for names in files)
             failure = Failure(record.rule_name, log, output or "its result", said)
-            # Snakemake reports every job of a failed batch, also those that never started
+            # Snakemake reports every job of a failed batch, also jobs that never started
             if not getattr(record, "indent", False) or _ERROR.search(failure.written(self._begun)):
                 self.jobs.append(failure)
         elif event == LogEvent.ERROR:
@@ -150,13 +150,13 @@ class Failures(logging.Handler):
         listed again here with the error from its log.
         """
         lines = []
-        for name, log in self.batches:  # jobs that a cluster ran as one, with the cause in its log
+        for name, log in self.batches:  # batches of jobs on a cluster; the log has the cause
             found = _BY_SLURM.search(_content(log))
             how = (found["why"] or found["status"]).lower() if found else "a job of it failed"
             lines.append(f"pdrom: batch {name} failed: {how} (log: {log})")
         lines += [job.line(self._begun) for job in self.jobs]
         if self.stopped:
-            # jobs that were ended together with the run are no failures of their own
+            # do not list jobs that failed only because the run was ended
             lines = [line for line in lines if not line.endswith(tuple(_CAUSES.values()))]
             lines.append(f"pdrom: {self.stopped}")
         text = "\n".join([*dict.fromkeys([*lines, *self.other]), ADVICE]) + "\n"

@@ -21,8 +21,8 @@ from pdrom.core.registry import Registry
 PACKAGES = {
     name: Path(package.__path__[0]) for name, package in (("pdrom", pdrom), ("study", study))
 }
-# Modules left out of fingerprints: they only define file paths, which change no result, and
-# Snakemake compares the paths of a job's files itself. A new kind of file causes no rerun of jobs.
+# Modules left out of fingerprints, so that a new kind of file causes no rerun: they only define
+# paths of files. Paths change no result, and Snakemake itself compares the paths of a job's files.
 LAYOUT = {"study.artifact.paths", "study.artifact.reads"}
 SCRIPTS = Path("workflow/scripts")
 
@@ -31,9 +31,9 @@ SCRIPTS = Path("workflow/scripts")
 def fingerprint(*places: str) -> str:
     """SHA-256 over the given modules and all modules of these packages that they import.
 
-    Imports are found statically, inside functions too. Modules that a registry loads on demand are
-    not followed, and registry entries for other modules are ignored: the caller passes the entries
-    that it uses, written as in the registry.
+    Imports are found statically, inside functions too. A registry is a mapping of names to strings
+    "module:attribute" that are loaded on demand. Its entries are not followed: the caller passes
+    those that it uses, written as in the registry.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ def _read(module: str) -> tuple[list[str], str]:
 
 
 def _statements(tree: ast.AST) -> list[ast.AST]:
-    """Return ``tree`` and all statements in it; to visit expressions too would take far longer."""
+    """Return ``tree`` and all statements in it; expressions are not visited, which saves time."""
     found = [tree]
     for node in found:  # the list grows
         for field in ("body", "handlers", "orelse", "finalbody", "cases"):
@@ -107,9 +107,9 @@ def _statements(tree: ast.AST) -> list[ast.AST]:
 
 
 def digest_of_code(tree: ast.Module, module: str = "") -> str:
-    """Hash of parsed code without comments, layout, docstrings and names of other modules' code.
+    """Hash of parsed code without comments, layout, docstrings and references to other modules.
 
-    These names are registry entries that refer to modules other than ``module``.
+    The references are registry entries "module:attribute" for modules other than ``module``.
     """
     for node in _statements(tree):
         if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef)):
@@ -138,15 +138,15 @@ def digest(root: Path, *names: str) -> str:
 
 
 def track_scripts(workflow: Any) -> None:
-    """Make a hash of each rule's script a parameter of the rule, in place of the script's date."""
-    # imported late: a plan can be made without Snakemake
+    """Rerun a rule's jobs when the code of its script, not when the date of the file, changes."""
+    # imported here so that a plan can be made without Snakemake
     from snakemake.settings.types import RerunTrigger
 
     for rule in workflow.rules:
         if rule.script:
             text = (SCRIPTS / Path(rule.script).name).read_text(encoding="utf-8")
             rule.set_params(script=digest_of_code(ast.parse(text))[:16])
-    # Snakemake sets the rerun triggers after it has read the rules, so that a property changes them
+    # Snakemake sets its rerun triggers later than this call, so that a property must filter them
     type(workflow).rerun_triggers = property(
         lambda self: frozenset(self.dag_settings.rerun_triggers) - {RerunTrigger.CODE}
     )

@@ -25,7 +25,7 @@ class Folders:
 
     @property
     def documents(self) -> dict[str, str]:
-        """PDFs of manuscript and supplement, in one folder, by the name of their TeX source."""
+        """Paths of both PDFs (manuscript, supplement), by the name of the TeX source."""
         supplement = Path(self.manuscript).with_name("supplement.pdf").as_posix()
         return dict(zip(DOCUMENTS, (self.manuscript, supplement), strict=True))
 
@@ -35,7 +35,7 @@ def folders(configfiles: Iterable[str | Path], settings: Iterable[str]) -> Folde
 
     The default configuration has the folders ``results`` and ``paper``. Every other one has
     ``results/studies/NAME``. NAME is the key ``study`` of the configuration, else the stem of its
-    last file, else `OWN` if there are only settings from the command line.
+    last file. If there are only settings from the command line, NAME is `OWN`.
 
     Parameters
     ----------

@@ -24,7 +24,7 @@ OPTIONS = ("--scheduler", "greedy", "--rerun-incomplete")
 
 LINES = ("--logger", "pdrom")
 
-# First arguments that pass the other arguments to a module, with the name of that module.
+# Modules that receive the remaining arguments, by the first argument.
 HANDED_ON = {
     "test": "pytest",
     "verify": "study.verification.command",
@@ -38,8 +38,8 @@ def completed(arguments: Sequence[str]) -> list[str]:
     Raises
     ------
     ConfigurationError
-        A configuration file is missing or is not a mapping; a target was taken for the value of an
-        option; a figure does not exist.
+        A configuration file is missing or is not a mapping, a target was read as the value of an
+        option, or a figure does not exist.
     """
     if arguments[:1] == ["figure"]:
         from study.pipeline.targets import figure_arguments  # late: it imports the whole package
@@ -58,7 +58,7 @@ def completed(arguments: Sequence[str]) -> list[str]:
         from study.pipeline.targets import described, files  # late: it imports the whole package
 
         made = {target: files(target, own) for target in command.targets}
-        # the files of a target that is only a name are printed
+        # print the files if a target is a name and not a path
         for target, found in made.items():
             if found != [target]:
                 sys.stderr.write(f"reproduce: {described(target)}: {', '.join(found)}\n")
@@ -66,7 +66,7 @@ def completed(arguments: Sequence[str]) -> list[str]:
 
 
 def _start(command: Sequence[str]) -> NoReturn:
-    """Replace this process by a program, which is searched for on PATH as a shell does."""
+    """Replace this process by the program ``command[0]``, found on PATH, with its arguments."""
     if not command:
         sys.exit(
             "pdrom: run: the name of a program is missing, as in: ./reproduce run pdrom --help"
@@ -78,7 +78,7 @@ def _start(command: Sequence[str]) -> NoReturn:
 
 
 def main() -> None:
-    """Run Snakemake, or the module or program of a special first argument; exit with its status."""
+    """Run Snakemake, or the module or program that the first argument selects, and exit."""
     settle()
     word = sys.argv[1] if sys.argv[1:] else ""
     if word in HANDED_ON:

@@ -1,7 +1,7 @@
 """The manifest of a study: its result files with checksums, code, settings and environments.
 
-It is written at the end of every successful run. It uses the checksum files of the results, so that
-no large file is read again: HDF5 files have their BLAKE2b digest, other files also a SHA-256. Equal
+It is written at the end of every successful run, from the checksum files of the results, so that no
+large file is read again. HDF5 files have a BLAKE2b digest only, other files also a SHA-256. Equal
 results have equal manifests.
 """
 
@@ -26,7 +26,7 @@ _ENVIRONMENT = ("pdrom_version", "python_version", "library_versions")
 
 
 class Entry(ConfigModel):
-    """Result file: size, digests, and what made it; ``environment``: key in `environments`.
+    """Entry of a result file: size, digests, its rule, and its key in `Manifest.environments`.
 
     sha256 : None for an HDF5 file, or a file that was damaged before the manifest was written
     """
@@ -104,7 +104,7 @@ def study_files(plan: Plan) -> Iterator[str]:
 def asked_for(found: Iterable[str], plan: Plan) -> Iterator[str]:
     """Yield the paths of ``found`` outside the plan that a command-line target may have requested.
 
-    The scene and the method in such a path exist.
+    A path is such a target if the scene and the method in it exist.
     """
     scenes, methods = set(scene_names(plan.study.root)), {*plan.study.methods, ""}
     for path in found:

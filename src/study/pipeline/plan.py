@@ -1,6 +1,6 @@
-"""Plan of a study for the workflow rules: jobs of artifacts, from the declarations and the study.
+"""Plan of a study: for every artifact its jobs, which become rules and jobs of the workflow.
 
-The jobs have file names, parameters and code fingerprints.
+Jobs have paths of input and output files, settings and fingerprints of their code.
 """
 
 import logging
@@ -56,14 +56,14 @@ def check_subspaces(study: Study) -> None:
 
 
 def check_live(study: Study) -> None:
-    """Raise ConfigurationError for a scene whose models the live page cannot represent or load."""
+    """Raise ConfigurationError for a scene whose models the live web page cannot run or load."""
     settings = study.settings
     for name in (labels["scene"] for labels in labels_of(study, LIVE_MODEL)):
         try:
             require_known(study.scene(name))
         except SceneError as error:
             raise ConfigurationError(f"live.scenes: {error}") from error
-        # the least size: vertices, masses and bases (modes and four affine columns) in base 64
+        # lower bound of a file's size: vertices, masses and bases (k + 4 columns) in base 64
         vertices = study.vertices[name]
         section = settings.subspace if name in study.scenes else settings.online
         sizes = [k for k in settings.live.sizes if k in section.sizes and "pod" in section.bases]
@@ -99,11 +99,11 @@ def check_texts(study: Study) -> None:
 
 @dataclass(frozen=True)
 class Job:
-    """A job: an artifact for one set of labels such as scene and group.
+    """A job: an artifact with values (``labels``) of scene, group ... in its output paths.
 
-    inputs, outputs : paths by name
-    settings : plain data
-    content : checksum of the hand-edited files among the inputs, whose dates may be set back
+    inputs, outputs : paths by name of the function's parameter
+    settings : settings by name of the parameter, as JSON data
+    content : checksum of the hand-edited files among the inputs, whose dates are not reliable
     code : fingerprint of the code that the job runs
     """
 
@@ -146,7 +146,7 @@ def load_plan(
     Parameters
     ----------
     files : configuration files, named in error messages
-    quiet : whether warnings are dropped, see `study.artifact.logs.planning_log`
+    quiet : True to drop warnings
 
     Raises
     ------
@@ -165,7 +165,7 @@ def load_plan(
 class Plan:
     """Jobs, files and settings of a study that the workflow rules need.
 
-    It answers to the reads of artifacts, as an implementation of `Sources`.
+    It finds the paths and settings that artifacts declare as their inputs.
     """
 
     def __init__(self, study: Study, folders: Folders = OF_STUDY) -> None:
@@ -175,7 +175,7 @@ class Plan:
         self.tables = declared()
 
     def check(self) -> None:
-        """Read every file that the configuration names, so that faults show before any job."""
+        """Read every file that the configuration names, to find faults before any job starts."""
         settings = self.study.settings
         load_claims(self.study.root / "config" / "claims.yaml", settings.claim_sets)
         for key in ("ladder", "live", "subspace", "scaling", "stability"):
@@ -193,12 +193,12 @@ class Plan:
 
     @cached_property
     def fixed(self) -> dict[str, list[Job]]:
-        """Jobs of tables, figures, pages and manuscript, by the name of their log folder."""
+        """Jobs that exist once per study (tables, figures, pages, manuscript), by log folder."""
         return {
             "tables": [self.job(table) for table in self.tables.values()],
             "figures": [self.job(figure) for figure in declarations().values()],
             "article": [self.job(live_page), self.job(article)],
-            # the configuration determines where the manuscript's PDFs lie
+            # the paths of the manuscript's PDFs depend on the configuration
             "paper": [
                 self.job(paper_inputs),
                 replace(self.job(paper), outputs=self.folders.documents),
@@ -223,11 +223,11 @@ class Plan:
         return {*self.made, *measured}
 
     def job(self, artifact: Artifact, labels: Labels = MappingProxyType({})) -> Job:
-        """Return the job with these labels; ConfigurationError if an input or a key is unknown."""
+        """Job for scene, group ... in ``labels``; ConfigurationError if an input is unknown."""
         own = {name: labels[name] for name in artifact.labels}
         key = (artifact.rule, *own.values())
         if key not in self._jobs:
-            known = {**own, "figure": artifact.name}  # options of a figure are found by its name
+            known = {**own, "figure": artifact.name}  # the name selects the options of a figure
             settings = artifact.settings(self, known)
             inputs = {k: read.paths(self, known) for k, read in artifact.files.items()}
             edited = [k for k, read in artifact.files.items() if isinstance(read, EditedFiles)]
@@ -246,9 +246,9 @@ class Plan:
     # Methods of the protocol `Sources`, used by declarations -------------------------------------
 
     def file(self, place: Place, labels: Labels) -> str:
-        """Path of the file of the kind ``place`` that belongs to a job with these ``labels``.
+        """Path of the file of the kind ``place`` for scene, group ... of a job in ``labels``.
 
-        A missing label "mesh" follows from the scene, a missing label "basis" from the method.
+        If ``labels`` have no mesh, it follows from the scene; a missing basis from the method.
         """
         found = dict(labels)
         if "mesh" in place.labels and "mesh" not in found:
@@ -258,7 +258,7 @@ class Plan:
         return place.at(self.results, **{name: found[name] for name in place.labels})
 
     def files(self, place: Place, labels: Labels) -> list[str]:
-        """Paths of all files of the kind ``place`` whose labels agree with ``labels`` of a job."""
+        """Paths of all files of the kind ``place`` whose scene, group ... agree with ``labels``."""
         study = self.study.only(labels["scene"]) if "scene" in labels else self.study
         return [
             place.at(self.results, **held)
@@ -273,7 +273,7 @@ class Plan:
         return TABLE.at(self.results, name=name)
 
     def value(self, key: str, labels: Labels) -> Any:
-        """Configuration value of ``key``, or a value derived from ``labels`` (see `DERIVED`)."""
+        """Configuration value of ``key``, or a value derived for a job (`DERIVED`)."""
         head, *parts = key.split(".")
         if head not in DERIVED:
             return self.study.value(key)

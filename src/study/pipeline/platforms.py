@@ -40,5 +40,5 @@ def obstacle(system: str, processor: str, python: tuple[int, int], libc: str) ->
 
 if __name__ == "__main__":
     libc = platform.libc_ver()[0] if platform.system() == "Linux" else ""
-    # the reason ends the process, if there is one
+    # exit with the reason as error message, or successfully without one
     sys.exit(obstacle(platform.system(), platform.machine(), sys.version_info[:2], libc))

@@ -8,12 +8,12 @@ from itertools import accumulate
 
 from snakemake_interface_logger_plugins.common import LogEvent
 
-# Least number of jobs, and least share of the expected work, done before an estimate is shown.
+# An estimate is shown after at least so many finished jobs and this share of the expected work.
 ENOUGH_JOBS, ENOUGH = 2, 0.05
 # Least remaining time of an unfinished job, as a share of its expected time.
 REST = 0.1
-# Beginnings of Snakemake's reasons for a job, with shorter texts. The last reason only follows from
-# other jobs and is left out if there is another reason.
+# Beginnings of Snakemake's reasons for running a job, with shorter texts. The reason `FOLLOWS` is
+# a consequence of other jobs, and is left out if there is another reason.
 FOLLOWS = "Input files updated by another job"
 REASONS = {
     "Forced execution": "forced",
@@ -34,7 +34,7 @@ class Expected:
     """Expected time of a job.
 
     seconds : expected duration of the job
-    share : share of this machine's cores that the job claims; 1 on a cluster
+    share : claimed fraction of this machine's cores; 1 on a cluster
     after : expected seconds of the longest chain of jobs that wait for this job
     """
 
@@ -45,13 +45,13 @@ class Expected:
 
 @dataclass
 class Estimate:
-    """Estimate of the remaining seconds of a run of ``jobs``, by job number.
+    """Estimate of the remaining seconds of a run.
 
-    The slowdown of this machine is the median quotient of measured and expected times of finished
-    jobs, weighted by expected time, so that the few jobs which compile kernels have little effect.
-    The degree of parallel work follows from the time that all jobs have claimed until now.
+    The slowdown of this machine is the median ratio of measured to expected time of finished jobs,
+    weighted by expected time, so that the few jobs that compile kernels have little effect. The
+    average number of parallel jobs follows from the core time that jobs have claimed until now.
 
-    begun, ended : times in s at which jobs started and ended, by job number
+    jobs, begun, ended : expected times, and times in s of start and end, by job number
     """
 
     jobs: Mapping[int, Expected] = field(default_factory=dict)
@@ -92,12 +92,12 @@ def rounded(seconds: float) -> str:
 
 
 class Preview(logging.Handler):
-    """Log handler that counts the jobs of a dry run, from Snakemake's log.
+    """Log handler that counts the jobs of a dry run, by reading Snakemake's log.
 
     Parameters
     ----------
-    seconds : function that returns the expected processor seconds of a job, given its log
-    cores : number of cores, all of which a job that measures times claims
+    seconds : function that returns the expected processor seconds of a job from its log's path
+    cores : number of cores of the run; a job that measures times claims all of them
     """
 
     def __init__(self, seconds: Callable[[str], float], cores: int) -> None:

@@ -20,9 +20,9 @@ PARAMETERS = ("settings", "content", "code")
 def rules(plan: Plan, cores: int) -> Iterator[SimpleNamespace]:
     """Yield the rule of each artifact of ``plan``; rules that measure times claim ``cores``.
 
-    A rule has what one of Snakemake has, values that depend on a job's labels as functions of the
-    wildcards, and ``shown``: arguments of Snakemake's function ``report`` for each output to show,
-    by output name.
+    Attributes of a rule are those of a Snakemake rule; functions of the wildcards give values that
+    differ between its jobs. The attribute ``shown`` has the arguments of Snakemake's function
+    ``report`` for each output of the HTML report, by output name.
     """
     for experiment in plan.experiments.values():
         yield _experiment(plan, experiment, cores)
@@ -48,7 +48,7 @@ def _experiment(plan: Plan, experiment: Experiment, cores: int) -> SimpleNamespa
             name: f"{plan.results}/{place.pattern}" for name, place in experiment.writes.items()
         },
         log=f"{plan.results}/logs/{experiment.rule}{'/' if labels else ''}{labels}.log",
-        # scenes share no jobs except their meshes, so that a scene's jobs form a batch on a cluster
+        # on a cluster the jobs of one scene form a batch: different scenes share only mesh jobs
         group=None if experiment.alone or "scene" not in experiment.labels else "scene",
         threads=cores if experiment.alone else 1,
         # a job that measures times gets a whole node of a cluster
@@ -60,7 +60,7 @@ def _experiment(plan: Plan, experiment: Experiment, cores: int) -> SimpleNamespa
 
 
 def _fixed(plan: Plan, job: Job, folder: str, numbers: Mapping[str, Numbers]) -> SimpleNamespace:
-    """Rule of a job without labels; ``numbers``: figure numbers in manuscript and preprint."""
+    """Rule of the one ``job`` of an artifact without wildcards; ``numbers``: numbers of figures."""
     artifact, paths = job.artifact, job.outputs
     params = {"artifact": artifact.address, **{name: getattr(job, name) for name in PARAMETERS}}
     shown: dict[str, dict[str, Any]] = {}
@@ -97,7 +97,7 @@ def _fixed(plan: Plan, job: Job, folder: str, numbers: Mapping[str, Numbers]) ->
 
 
 def _figure(figure: Declaration, numbers: Numbers) -> dict[str, Any]:
-    """Arguments of ``report`` for a figure; the report sorts figures by their first label."""
+    """Arguments of Snakemake's ``report`` for a figure; its first entry of labels sorts figures."""
     own = {"paper": numbers.manuscript or UNNUMBERED}
     if numbers.preprint is None:
         category, labels = "Figures of this study", {"name": figure.name, **own}

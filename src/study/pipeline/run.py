@@ -30,16 +30,16 @@ RUN_TIMES = Path("config/reference/run_times.csv")
 
 
 def units_of(study: str, root: Path) -> Units:
-    """Speed of the machine that timed ``study`` ("full" or "tiny"); `RUN_TIMES` has the values."""
+    """Speed of the machine that timed ``study`` ("full" or "tiny"), from the file `RUN_TIMES`."""
     row = read_table(root / RUN_TIMES, result=False).set_index("study").loc[study]
     return Units(**row[list(Units.model_fields)])
 
 
 def expected_seconds(plan: Plan) -> Callable[[str], float]:
-    """Function that returns the expected processor seconds of a job, given the path of its log.
+    """Return a function that gives a job's expected processor seconds from the path of its log.
 
     Kinds of jobs that were never measured get the median of all kinds. Times are scaled by the
-    speed of the machine that the plan's last run has recorded.
+    speed of this machine, if an earlier run of the plan has measured it.
     """
     root, full = plan.study.root, plan.study.settings.coarsen == Coarsen()
     study, column = ("full", "seconds") if full else ("tiny", "coarse_seconds")
@@ -48,7 +48,7 @@ def expected_seconds(plan: Plan) -> Callable[[str], float]:
         record = (root / MACHINE.at(plan.results)).read_bytes()
         here = Machine.model_validate_json(record).units
     except (OSError, ValidationError):
-        here = None  # before the first run, or a record of an older version
+        here = None  # no run has recorded this machine's speed, or the record has an old format
     slower = 1.0 if here is None else here.unit_s / units_of(study, root).unit_s
     seconds = slower * table[column]
     known = dict(zip(table.kind, seconds, strict=True))
@@ -57,14 +57,14 @@ def expected_seconds(plan: Plan) -> Callable[[str], float]:
 
 
 def tell_expectation(workflow: Any, plan: Plan) -> None:
-    """Log the expected seconds of every job of Snakemake's ``workflow`` for the lines of a run.
+    """Log the expected seconds of every job of ``workflow``, for the progress lines of a run.
 
-    A job's share of the machine is 1 if it measures times, or if jobs run on a cluster.
+    A job that measures times claims the whole machine, as does every job on a cluster.
     """
     dag, seconds_of = workflow.dag, expected_seconds(plan)
     expected: dict[int, Expected] = {}
     after: dict[Any, float] = {}
-    # jobs are visited from last to first, so that the time after each job is already known
+    # visit jobs before their prerequisites, so that the time after each job is already known
     for job in reversed([job for level in dag.toposorted() for job in level]):
         if not dag.needrun(job) or not job.log:
             continue
@@ -80,17 +80,17 @@ def tell_expectation(workflow: Any, plan: Plan) -> None:
     )
 
 
-# Folders whose files Snakemake compares by date.
+# Folders of files whose dates Snakemake compares; future dates in them are replaced.
 DATED = ("results", "paper", "config", "workflow")
 # Snakemake's executor that runs the jobs of a batch on a node of a cluster.
 JOBSTEP = "slurm-jobstep"
 
 
 class Run:
-    """The run of this process: locks its folder, starts the jobs' server, reports the outcome."""
+    """The run of this process: locks its folder, starts the fork server, reports the outcome."""
 
     def __init__(self) -> None:
-        """Lock the working directory, or end the process with one line.
+        """Lock the working directory; end the process with an error message if it is locked.
 
         A command that runs no job, such as a dry run, takes no lock and works during another run.
         """
@@ -107,9 +107,9 @@ class Run:
         logging.getLogger("snakemake.logging").addHandler(self.failures)
 
     def check(self, plan: Plan, rules: Iterable[Any], cores: int) -> None:
-        """Check targets and report; print the jobs of a dry run on ``cores`` at its end.
+        """Check that targets and report can be made; print the jobs of a dry run at its end.
 
-        ``plan`` and Snakemake's ``rules`` belong to the same workflow.
+        ``rules`` are Snakemake's rules of ``plan``; ``cores`` is the number of cores of the run.
 
         Raises
         ------
@@ -129,15 +129,15 @@ class Run:
             atexit.register(lambda: sys.stdout.write(planned.text()))
 
     def title(self, plan: Plan) -> str:
-        """Name of this run's configuration, with a note if it is not the full study of ``plan``."""
+        """Name of this run's configuration, and how it differs from the full study, if it does."""
         named, words = configuration(self.command), plan.study.apart
         return f"{named} ({words})" if words else named
 
     def start(self, workflow: Any, plan: Plan) -> None:
         """Start the fork server, unless jobs run on a cluster; log the expected times of jobs."""
-        # No limit on the rate of job starts: with a limit, Snakemake starts a timer after each job
-        # choice, which triggers another choice and another timer. At the end of a run these timers
-        # take a third of a core, and the process waits for the last one.
+        # Remove the limit on the rate of job starts. With a limit, Snakemake starts a timer each
+        # time it selects jobs, which triggers another selection and another timer. At the end of a
+        # run these timers take a third of a core, and the process waits for the last one.
         workflow.scheduler.job_rate_limiter = None
         running.stop_at_sigterm(self.failures.note_sigterm)
         say_compilation(os.environ.get("NUMBA_CACHE_DIR", ""))
@@ -178,6 +178,6 @@ def start_batch(workflow: Any) -> None:
 
 
 def say_compilation(cache: str) -> None:
-    """Announce that kernels are compiled first, if the cache folder has no compiled time step."""
+    """Print that kernels are compiled first, if the folder ``cache`` has no compiled time step."""
     if not any(Path(cache).glob("dynamics*/*.nbi")):
         sys.stderr.write("pdrom: the first jobs compile kernels (once, some minutes)\n")

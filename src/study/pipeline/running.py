@@ -1,12 +1,12 @@
 """The process of a run: its lock on the folder, the dates of its files, and its end by SIGTERM.
 
-The operating system releases the lock when the process ends, for whatever reason, so that no lock
-is left behind. Snakemake's own lock consists of files, which a killed run leaves behind: a process
-that has the lock of the operating system may delete these files.
+The operating system releases the lock when the process ends, for whatever reason. Snakemake's own
+lock consists of files, which a killed run leaves behind: a process that has the operating system's
+lock deletes them.
 
-Snakemake compares dates and refuses a result that is older than its inputs. After the clock was set
-back, no run would succeed until the clock has passed the dates of existing files. At SIGTERM,
-Snakemake would wait for running jobs, which takes minutes.
+Snakemake compares dates and refuses a result that is older than its inputs. If the clock was set
+back, no run could succeed before the clock passes the dates of existing files, so that future dates
+are replaced. At SIGTERM, jobs are ended, since Snakemake would wait minutes for running jobs.
 """
 
 import errno
@@ -29,7 +29,7 @@ from pdrom.core.errors import INTERRUPTED, PdromError
 FOLDER = Path(".snakemake")
 LOCK = FOLDER / "run.lock"
 SNAKEMAKE_LOCKS = FOLDER / "locks"
-# Nanoseconds between successive dates when future dates are replaced by dates just before now.
+# Nanoseconds between successive new dates, where dates in the future are replaced.
 STEP_NS = 10_000
 # Seconds after SIGTERM at which a job that still runs is killed.
 PATIENCE = 5.0
@@ -78,7 +78,7 @@ def remove_stale_locks() -> None:
 
 
 def settle_dates(folders: Iterable[str | Path]) -> int:
-    """Replace future dates of files in ``folders`` by dates just before now; return their number.
+    """Replace future file dates in ``folders`` by dates just before now; return how many.
 
     The order of the dates remains, so that newer files still cause reruns. The date of a symbolic
     link itself is changed, not the date of its target, which may lie elsewhere.
@@ -96,7 +96,7 @@ def settle_dates(folders: Iterable[str | Path]) -> int:
 
 
 def end_at_sigterm() -> None:
-    """Install a handler that ends this process with one line at SIGTERM, while no job runs."""
+    """Install a handler for SIGTERM before any job runs: print one line, and end this process."""
 
     def end(number: int, frame: object) -> None:
         _say(b"pdrom: ended by SIGTERM\n")
@@ -106,7 +106,7 @@ def end_at_sigterm() -> None:
 
 
 def stop_at_sigterm(note: Callable[[], None]) -> None:
-    """Install a handler for SIGTERM: call ``note``, end all jobs, then the run as by Ctrl-C."""
+    """Install a handler for SIGTERM: call ``note``, end all jobs, then the run as Ctrl-C does."""
 
     def stop(number: int, frame: object) -> None:
         _say(b"pdrom: SIGTERM: ending the jobs that run\n")
@@ -125,13 +125,13 @@ def _say(line: bytes) -> None:
 
 
 def _end_jobs() -> None:
-    """End the processes of all jobs, also of new ones, repeatedly until this process ends."""
+    """End the processes of all jobs, including new ones, in a loop until this process ends."""
     begin, own = time.monotonic(), psutil.Process()
     while True:
         late = time.monotonic() - begin > PATIENCE
         for process in own.children(recursive=True):
             with suppress(psutil.Error, ProcessLookupError):
-                # the fork server has its own session and ends the forks of clients that are gone
+                # skip the fork server (it has its own session): it ends the forks of dead clients
                 if os.getsid(process.pid) == os.getsid(0):
                     process.send_signal(signal.SIGKILL if late else signal.SIGTERM)
         time.sleep(0.5)

@@ -1,4 +1,4 @@
-"""Scenes of config/scenes with the changes of a study, built in advance to detect every fault.
+"""Scenes of config/scenes, changed as a study configures, and built to detect faults before a run.
 
 A configuration can also derive variants of scenes: finer meshes, other weights, other starts.
 """
@@ -24,7 +24,7 @@ Positive = Annotated[float, Field(gt=0.0, le=1e12, allow_inf_nan=False)]
 
 
 class GivenOnce(ConfigModel):
-    """Base of models in whose lists no entry is given twice."""
+    """Base class of settings that rejects lists with repeated entries."""
 
     @model_validator(mode="after")
     def _given_once(self) -> Self:
@@ -35,7 +35,7 @@ class GivenOnce(ConfigModel):
 
 
 class Coarsen(ConfigModel):
-    """Factors on mesh resolution (vertices along a side) and on every frame number."""
+    """Factors for the mesh resolution (vertices along a side) and for all frame numbers."""
 
     resolution: Fraction = 1.0
     frames: Fraction = 1.0
@@ -46,11 +46,11 @@ class Coarsen(ConfigModel):
 
 
 class Replicate(ConfigModel):
-    """Another sample of every scene, on which rules that were fixed before are tried again.
+    """Changes that turn every scene into a new sample, on which rules fixed before are tested.
 
     frames_factor : stretches handles, pins and schedules in time; below 1 the motion is faster
-    kick : speed of a random start (m/s), along the axes of the scene's held-out motions
-    seed : of that start; held-out motions take the seeds that follow theirs by as much
+    kick : speed of random initial velocities, m/s, along the axes of the held-out motions
+    seed : seed of these velocities; it is also added to the seeds of the held-out motions
     """
 
     frames_factor: Annotated[float, Field(ge=0.1, le=10.0)] = 1.0
@@ -58,7 +58,7 @@ class Replicate(ConfigModel):
     seed: Seed = 0
 
     def of(self, scene: SceneConfig) -> SceneConfig:
-        """Return ``scene`` at another speed, with another start and other held-out seeds."""
+        """Return ``scene`` at another speed, with other initial velocities and held-out seeds."""
         if self == Replicate():
             return scene
         effects = [effect.with_frames_scaled(self.frames_factor) for effect in scene.effects]
@@ -79,7 +79,7 @@ def scene_names(root: Path) -> list[str]:
 
 
 def require_scenes(root: Path, names: Iterable[str], key: str) -> None:
-    """Raise ConfigurationError, with ``key`` in front, if a scene of ``names`` has no file."""
+    """Raise ConfigurationError, which names ``key``, if a scene of ``names`` has no file."""
     known = scene_names(root)
     for name in names:
         if name not in known:
@@ -98,7 +98,7 @@ def load_bound_scene(root: Path, name: str, *changes: Change) -> Scene:
 
 
 def bind(root: Path, scene: SceneConfig, source: str) -> Scene:
-    """Return ``scene``, built on its mesh from ``root``; ``source`` begins messages about faults.
+    """Return ``scene``, built on its mesh; error messages begin with ``source``.
 
     Raises
     ------
@@ -108,7 +108,7 @@ def bind(root: Path, scene: SceneConfig, source: str) -> Scene:
     try:
         mesh = scene.mesh.build(root)
         bound = Scene.build(scene, mesh)
-        # constraint groups of the held-out variant are equal, so that only other effects are built
+        # the held-out variant has equal constraint groups, so that only its other effects are built
         heldout = scene.heldout_variant()
         other = tuple(e for e in heldout.effects if not isinstance(e, GroupConfig))
         Scene.build(heldout.model_copy(update={"effects": other}), mesh)
@@ -148,11 +148,11 @@ def not_taken(scene: SceneConfig) -> list[str]:
 
 
 class Variants(GivenOnce):
-    """Section ``variants``: every combination of the lists, of every scene.
+    """Section ``variants``: variants of every scene, by every combination of the lists.
 
-    resolutions : factors of the vertices along each side of the mesh
-    stiffness_ratios : factors of the weights of the reduced groups
-    seeds : random starts by `kick`, the largest speed of a vertex in m/s
+    resolutions : factors for the number of vertices along each side of the mesh
+    stiffness_ratios : factors for the weights of the reduced groups
+    seeds : seeds of random initial velocities of at most `kick`, m/s
     """
 
     scenes: tuple[SceneName, ...] = ()
@@ -183,5 +183,5 @@ class Variants(GivenOnce):
 
 
 def _word(number: float) -> str:
-    """Number as text for a scene's name: ``p`` for the point, ``m`` for minus, no plus."""
+    """Number as part of a scene's name: ``p`` replaces the point, ``m`` the minus sign."""
     return f"{number:g}".replace(".", "p").replace("-", "m").replace("+", "")

@@ -1,8 +1,8 @@
 """Check that NumPy and SciPy calculate correctly on this machine, with the kernels that jobs use.
 
-``./reproduce`` runs this check before it accepts a new environment. The kernels of a linear algebra
-library can be broken on a processor for some shapes of matrices, and then end the process without a
-message, so that the name of each calculation is printed before it is made.
+``./reproduce`` runs this check before it accepts a new environment. A linear algebra library can be
+broken on a processor for some shapes of matrices, and can end the process without a message. The
+name of each calculation is therefore printed before it is made.
 """
 
 import faulthandler
@@ -13,7 +13,7 @@ from typing import Any
 
 from pdrom.core.environment import settle
 
-# Rows as in scenes, from one element to a constraint group. Columns are sizes of bases.
+# Shapes of matrices as in scenes: rows of one element up to a constraint group, sizes of bases.
 ROWS = (1, 2, 3, 4, 6, 9, 12, 27, 48, 96, 100, 256, 300, 900, 1000, 2700)
 COLUMNS = (1, 2, 3, 4, 6, 8, 12, 16, 20, 25, 32, 50)
 # Tolerance relative to the largest entry; rounding errors at these sizes are far smaller.
@@ -21,7 +21,7 @@ TOLERANCE = 1e-9
 
 
 def main() -> None:
-    """Make all calculations; after a failure the last line on standard output names it."""
+    """Make all calculations; the last line on standard output names a calculation that fails."""
     faulthandler.enable()
     settle()
     for what in calculations():

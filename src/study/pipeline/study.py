@@ -1,7 +1,7 @@
 """The study: the scenes, methods and settings that one configuration covers, and its files.
 
-The possible labels of a kind of file follow from the scenes, their constraint groups and the
-methods of the study. Kinds that exist only for some of these are listed at the end.
+Most kinds of files exist for every scene, constraint group and method of the study. Kinds that
+exist only for some of these are listed at the end.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -41,8 +41,8 @@ from study.tables import declared
 class StudySettings(scene_kit.GivenOnce):
     """Content of config/default.yaml, possibly overridden by --configfile.
 
-    A section is declared by the experiment whose settings it holds; a default stands there, or here
-    for keys without a section, and nowhere else.
+    The type of a section is declared by the experiment that it configures. It defines the default
+    values; this class defines those of keys without a section.
     ``study`` names the folder of the results, see `study.pipeline.folders`.
     """
 
@@ -86,19 +86,19 @@ class Study:
     ) -> None:
         """Build all scenes of a merged ``config`` below ``root``.
 
-        ``source`` begins error messages; ``configuration`` is the name shown in the manuscript.
+        Error messages begin with ``source``; the manuscript shows the name ``configuration``.
 
         Raises
         ------
         ConfigurationError
-            The message names file, key, value and the allowed values; nothing is computed before.
+            A setting is wrong; the message names file, key, value and the allowed values.
         """
         self.root, self.configuration = root, configuration
         self.settings = settings = validate(StudySettings, config, source)
         self.titles: dict[str, str] = {}  # titles of scenes, for tables and figures
         self.vertices: dict[str, int] = {}
         self._known: dict[str, SceneConfig] = {}
-        # changes to every scene of config/scenes, in their order
+        # changes to every scene of config/scenes, in the order in which they apply
         self._changes = changes = (settings.replicate, settings.coarsen)
         self.bound: dict[str, Scene] = {
             name: scene_kit.load_bound_scene(root, name, *changes) for name in settings.scenes
@@ -129,19 +129,19 @@ class Study:
 
     def scene(self, name: str) -> SceneConfig:
         """Return any scene by ``name``; ConfigurationError if its file is missing or faulty."""
-        if name not in self._known:  # checked, but its built form is not stored
+        if name not in self._known:  # built to check it, but not stored in `bound`
             self._physics(scene_kit.load_bound_scene(self.root, name, *self._changes))
         return self._known[name]
 
     def _physics(self, scene: Scene) -> SceneConfig:
-        """Scene configuration with its title replaced by its name: jobs do not depend on titles."""
+        """Return the scene's configuration with the name as title: jobs do not depend on titles."""
         config = scene.config
         self.titles[config.name], self.vertices[config.name] = config.title, scene.mesh.vertices
         self._known[config.name] = config.model_copy(update={"title": config.name})
         return self._known[config.name]
 
     def only(self, scene: str) -> "Study":
-        """Return a copy of the study with ``scene`` alone, which may be outside the study."""
+        """Return a copy of the study with only this ``scene``, which may be outside the study."""
         single = copy(self)
         single.scenes = {scene: self.scene(scene)}
         return single
@@ -163,7 +163,7 @@ class Study:
 
     @property
     def apart(self) -> str:
-        """Words that distinguish results from those of the full study; empty for the full study."""
+        """Text about the differences from the full study; empty for the full study."""
         if self.is_full:
             return ""
         coarsen = self.settings.coarsen
@@ -202,7 +202,7 @@ class Study:
         return BasisSpec(**{key: getattr(method, key) for key in BasisSpec.model_fields})
 
     def named_methods(self, names: Iterable[str], key: str) -> dict[str, MethodSpec]:
-        """Methods by ``names``; ConfigurationError, with ``key`` in front, for an unknown name."""
+        """Methods by name; ConfigurationError, with ``key`` in the message, for an unknown name."""
         known = self.every_method
         for name in names:
             if name not in known:
@@ -211,7 +211,7 @@ class Study:
 
 
 def part_of(value: Any, parts: Iterable[str], key: str) -> Any:
-    """Entry of ``value`` at the path ``parts`` of ``key``; ConfigurationError if there is none."""
+    """Nested attribute of ``value`` along the names ``parts``; ConfigurationError without one."""
     for part in parts:
         if not hasattr(value, part):
             known = choices(part, getattr(type(value), "model_fields", ()))
@@ -224,7 +224,7 @@ Labels = dict[str, str]
 
 
 def labels_of(study: Study, place: paths.Place) -> list[Labels]:
-    """Labels of every file of the kind ``place``, in the order of ``study``, without repetition."""
+    """Scene, group ... of every file of the kind ``place`` that the study makes, in its order."""
     names = place.labels
     scenes = SCENES[place](study) if place in SCENES else study.scenes
     known: Iterable[Labels] = [{}]
@@ -254,7 +254,7 @@ def _held(study: Study, listed: Iterable[str]) -> list[str]:
 
 
 def _with_subspaces(study: Study) -> list[str]:
-    """Scenes with position subspaces: the configured ones, else all whose effects allow these."""
+    """Scenes with models in position subspaces: those configured, else all possible ones."""
     section = study.settings.subspace
     if not (section.bases and section.sizes):
         return []
@@ -269,11 +269,11 @@ NAMES: dict[paths.Place, Callable[[], Iterable[str]]] = {
     paths.FIGURE_PICTURE: declarations,
     paths.PAPER_INPUT: lambda: FILES,
 }
-# Files of models in position subspaces.
+# Kinds of files for reduced models whose vertex positions lie in a subspace.
 MODELS = (
     paths.SUBSPACES, paths.SUBSPACES_TRAIN, paths.SUBSPACES_HELDOUT, paths.SUBSPACES_SECONDS,
 )  # fmt: skip
-# Scenes that have files of a kind; a mapping also gives the factors of the mesh size of each scene.
+# Scenes that have files of a kind, possibly as a mapping to factors of each scene's mesh size.
 SCENES: dict[paths.Place, Callable[[Study], Iterable[str]]] = {
     **dict.fromkeys(MODELS, _with_subspaces),
     paths.SCALING: lambda study: study.settings.scaling.scenes,
@@ -282,14 +282,14 @@ SCENES: dict[paths.Place, Callable[[Study], Iterable[str]]] = {
     paths.ALTERNATIVE_TIMES: lambda study: study.settings.alternatives.scenes,
     paths.ONLINE: lambda study: study.online,
     paths.ONLINE_MODELS: lambda study: study.online,
-    # scenes for which the study has reduced models
+    # configured scenes for which the study makes reduced models
     paths.LIVE_MODEL: lambda study: [
         scene
         for scene in study.settings.live.scenes
         if scene in {*_with_subspaces(study), *study.online}
     ],
     paths.STABILITY: lambda study: _held(study, study.settings.stability.scenes),
-    # the configured scenes, else all, also large ones
+    # the configured scenes, else all scenes, including large ones
     paths.REQUESTED_TOLERANCES: lambda study: [
         scene
         for scene in (*study.scenes, *study.online)

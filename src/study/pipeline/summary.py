@@ -1,7 +1,7 @@
 """Texts about a finished run: its last lines, and results/contents.md, an overview of the study.
 
 The overview lists every claim, figure, table and section of the text with the command that makes it
-and its processor minutes, then the captions of the figures and the columns of the tables.
+and the processor minutes of this command, then captions of figures and columns of tables.
 """
 
 import os
@@ -116,9 +116,9 @@ def configuration(command: CommandLine) -> str:
 
 
 def verdicts_in(results: str) -> dict[str, tuple[str, str]]:
-    """Verdicts of each claim, (published, beyond); empty if the table cannot be read."""
+    """Verdicts on each claim (for published settings, beyond them); empty without a valid table."""
     path = paths.TABLE.at(results, name="claims")
-    # a damaged file is not renamed here; the job that reads it sets it aside
+    # a damaged file is not renamed here, but by the next job that reads it
     if not Path(path).is_file() or check_file(path) is not Condition.INTACT:
         return {}
     table = read_table(path, ["claim", "verdict", "verdict_beyond"])
@@ -161,7 +161,7 @@ def _source(read: Read) -> str:
 class Entry(NamedTuple):
     """A line of the overview.
 
-    kind : claim, figure, table, section (source file of the text with numbers) or manuscript
+    kind : claim, figure, table, section (TeX file whose text contains numbers) or manuscript
     files : paths of its files in the default configuration
     words : arguments of ./reproduce that make these files
     """
@@ -182,7 +182,7 @@ def entries() -> Iterator[Entry]:
             "figure", name, (paths.FIGURE.at(paths.RESULTS, name=name),), ("figure", number)
         )
     tables = {name: paths.TABLE.at(paths.RESULTS, name=name) for name in declared()}
-    # where a figure has the same name, the name stands for both, so that the table's path is used
+    # use a table's path if a figure has the same name, since the name would request both
     words = {name: path if name in declarations() else name for name, path in tables.items()}
     for name, path in tables.items():
         yield Entry("table", name, (path,), (words[name],))
@@ -196,7 +196,7 @@ def entries() -> Iterator[Entry]:
 
 
 def contents(command: CommandLine, dag: Any, folders: Folders) -> str:
-    """Text of the overview of a run that has made everything.
+    """Text of the overview, after a run that has made all files.
 
     Parameters
     ----------
@@ -222,7 +222,7 @@ def contents(command: CommandLine, dag: Any, folders: Folders) -> str:
 def costs(
     listed: Sequence[Entry], dag: Any, folders: Folders
 ) -> Iterator[tuple[int, float | None]]:
-    """Yield for each entry its number of jobs, with all prerequisites, and their processor minutes.
+    """Yield the number of jobs, with all prerequisites, and processor minutes of each entry.
 
     The minutes are None if a job was not measured. ``dag`` is Snakemake's graph of jobs.
     """

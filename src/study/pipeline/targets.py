@@ -1,4 +1,4 @@
-"""Targets of the command line: figures by number or name, tables, files; with suggestions."""
+"""Targets of the command line: figures by number or name, tables, files; checks and suggestions."""
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from itertools import takewhile
@@ -49,7 +49,7 @@ def figure_arguments(arguments: Sequence[str]) -> list[str]:
 
 
 def described(target: str) -> str:
-    """Target as text for the user; a figure is followed by its numbers in the documents."""
+    """Text of a ``target`` for the user; numbers in the documents follow the name of a figure."""
     word, _, name = target.partition(" ")
     return f"{WORD} {figure_numbers(Path())[name].label(name)}" if word == WORD else target
 
@@ -57,8 +57,8 @@ def described(target: str) -> str:
 def files(target: str, folders: Folders) -> list[str]:
     """Return the paths in ``folders`` for ``target``, the name of a figure or table or a path.
 
-    A path below ``results`` is moved to the results folder of this study. ``figure NAME`` means
-    the figure only, also if a table has the same name.
+    A path below ``results`` becomes one in the results folder of this study. ``figure NAME`` is
+    the figure only, even if a table has the same name.
     """
     word, _, name = target.partition(" ")
     alone = word == WORD and name in declarations()
@@ -70,7 +70,7 @@ def files(target: str, folders: Folders) -> list[str]:
 
 
 def own_file(path: str, folders: Folders) -> str:
-    """Translate a path of the full study to the same file in ``folders``; keep other paths."""
+    """Translate a path in the full study's folders to that in ``folders``; keep other paths."""
     for document, file in Folders().documents.items():
         if path == file:
             return folders.documents[document]
@@ -100,7 +100,7 @@ def check_targets(plan: Plan, targets: Iterable[str], rules: Sequence[Any]) -> N
 
 
 def _allowed(study: Study, label: str, before: Mapping[str, str]) -> Collection[str] | None:
-    """Allowed values of ``label``, given the labels ``before`` it; None if all are allowed."""
+    """Allowed values of ``label`` (scene, group ...) after values ``before``; None if all are."""
     match label:
         case "scene":
             return {*scene_names(study.root), *study.scenes}
@@ -116,7 +116,7 @@ def _allowed(study: Study, label: str, before: Mapping[str, str]) -> Collection[
 
 
 def _unknown(plan: Plan, target: str, rules: Collection[str]) -> str:
-    """Last part of the message about an unknown target; ``rules`` are names without labels."""
+    """Last part of the message about an unknown target; ``rules`` have no wildcards."""
     scenes = {*scene_names(plan.study.root), *plan.study.scenes}
     if target in scenes:
         example = paths.FULL_ORDER.at(plan.results, scene=target, run="train")

@@ -1,4 +1,4 @@
-"""Measurements stored in git: costs of jobs, and verdicts on claims for another set of scenes.
+"""Update of results stored in git: costs of jobs, and verdicts on claims for other scenes.
 
 ``./reproduce run python -m study.pipeline.tracked costs`` updates `config/reference/job_costs.csv`
 from the logs of the full and of the tiny study in ``results``. The file holds, for each kind of
@@ -67,7 +67,7 @@ def measured_costs(results: str, coarse: str) -> pd.DataFrame:
 
 
 def recorded_verdicts(claims: Path, rules: Path) -> pd.DataFrame:
-    """Return verdicts and measured values of all claims, fingerprints of their rules, and the date.
+    """Return verdicts and measured values of claims, fingerprints of the claims' rules, and date.
 
     Parameters
     ----------

@@ -1,9 +1,9 @@
-"""Settings derived from the configuration for a job, by the names that artifacts read (`DERIVED`).
+"""Settings of a job that are derived from the configuration, by the names in `DERIVED`.
 
-Names outside `DERIVED` are keys of the configuration. If a setting is annotated with the base class
-of its section, it has the fields of the base class only, so that a job depends on nothing else.
+All other settings are keys of the configuration. If a setting is annotated with the base class of
+its section, it has the fields of the base class only, so that a job depends on nothing else.
 
-The label of a figure's job is the name of the figure. Its options choose what the figure draws.
+``labels`` contain scene, group ... of the job, for a figure its name, which selects its options.
 """
 
 from collections.abc import Callable, Mapping
@@ -31,12 +31,12 @@ from study.pipeline.folders import DEFAULT
 from study.pipeline.study import Study, labels_of
 from study.tables.kit.results import FAR
 
-# The preferred basis in tables that show one basis of each constraint group.
+# Basis used in tables that show one basis for each constraint group, if a method has it.
 USUAL_BASIS = "none-none-vectorised"
 
 
 def _stability(study: Study, labels: Labels) -> Stability:
-    """Settings of short runs, restricted to sizes r for which the study computes samples."""
+    """Settings of the stability experiment, with those sizes r for which the study has samples."""
     section = study.settings.stability
     held = tuple(r for r in section.ranks if r in study.settings.ranks)
     return section.model_copy(update={"ranks": held})
@@ -53,17 +53,17 @@ def _usual_bases(study: Study, labels: Labels) -> list[paths.File]:
 
 
 def _holds(study: Study, place: paths.Place, labels: Labels) -> bool:
-    """Return whether the study makes the file of kind ``place`` for these labels of a job."""
+    """Return whether the study makes the file of kind ``place`` for the job's scene, group ...."""
     return {name: labels[name] for name in place.labels} in labels_of(study, place)
 
 
 def _of_scene(study: Study, place: paths.Place, labels: Labels) -> tuple[OfScene, ...]:
-    """Scene of a job as a tuple; empty if the study does not make its file of kind ``place``."""
+    """The job's scene as a tuple; empty if the study makes no file of kind ``place`` for it."""
     return (OfScene(scene=labels["scene"]),) if _holds(study, place, labels) else ()
 
 
 def _joint_rows(study: Study, labels: Labels) -> tuple[JointRows, ...]:
-    """Reduced groups of a scene with the method `JOINT`; empty if the study lacks either."""
+    """Reduced groups of a scene, by method `JOINT`; empty if the study lacks scene or method."""
     scene = labels["scene"]
     if JOINT not in study.methods or scene not in study.scenes:
         return ()
@@ -78,7 +78,7 @@ def _named(scenes: Mapping[str, SceneConfig]) -> list[NamedScene]:
 
 
 def _subspace_cases(study: Study, labels: Labels) -> tuple[SubspaceCase, ...]:
-    """Configured cases of frame times whose models in position subspaces the study makes."""
+    """Position-subspace models to time per frame, as configured, if the study makes them."""
     held = {labels["scene"] for labels in labels_of(study, paths.SUBSPACES)}
     models = study.settings.subspace
     return tuple(
@@ -89,7 +89,7 @@ def _subspace_cases(study: Study, labels: Labels) -> tuple[SubspaceCase, ...]:
 
 
 def _projection_cases(study: Study, labels: Labels) -> tuple[ProjectionCase, ...]:
-    """Configured cases of frame times whose samples the study computes."""
+    """Reductions to time per frame, as configured, if the study computes their samples."""
     held = labels_of(study, paths.SAMPLING)
     return tuple(
         case
@@ -99,9 +99,9 @@ def _projection_cases(study: Study, labels: Labels) -> tuple[ProjectionCase, ...
 
 
 def scaled_methods(study: Study, labels: Labels) -> dict[str, MethodSpec]:
-    """Methods timed on meshes of increasing size, by name; ``labels`` are not used.
+    """Methods that are timed on meshes of increasing size, by name; ``labels`` are not used.
 
-    These methods may be outside of the study's own methods.
+    They need not be among the methods of the study.
     """
     section = study.settings.scaling
     found = study.named_methods([section.method], "scaling.method")
@@ -109,7 +109,7 @@ def scaled_methods(study: Study, labels: Labels) -> dict[str, MethodSpec]:
 
 
 def _repeated(study: Study, labels: Labels) -> tuple[Repeated, ...]:
-    """Repetitions of a scene, one per cell and method; methods may be outside the study."""
+    """Repeated runs of a scene, one for each method of each configured entry (``cell``)."""
     cells = [c for c in study.settings.repetitions.cells if labels["scene"] in c.scenes]
     return tuple(
         Repeated(method=name, spec=spec, **cell.model_dump(include={*Cell.model_fields}))
@@ -125,14 +125,14 @@ class Run(Experiment):
 
     @property
     def labels(self) -> dict[str, str]:
-        """Scene, group and method, which occur in the paths of the files of this run."""
+        """Scene, group and method, by name, as they occur in the paths of this run's files."""
         return {**super().labels, "method": self.method}
 
 
 def _options(study: Study, labels: Labels) -> Options:
     """Options of a figure, with scenes outside the study removed.
 
-    A list of scenes or methods without any of the study becomes empty, which means all.
+    If no listed scene or method is in the study, the list becomes empty, which means all.
     """
     chosen = study.figures[labels["figure"]]
     update: dict[str, tuple[str, ...]] = {}
@@ -181,7 +181,7 @@ def _runs(study: Study, labels: Labels) -> tuple[Run, ...]:
 
 
 def _facts(study: Study, labels: Labels) -> Facts:
-    """Facts that the manuscript states and that are no results: captions, settings, page limits."""
+    """Contents of the manuscript that are no results: captions, settings, limits of pages."""
     own = study.is_own
     said = [(name, each.words(study.value)) for name, each in declarations().items()]
     return Facts(
@@ -283,7 +283,7 @@ DERIVED: dict[str, Callable[[Study, Labels], Any]] = {
     "reductions": _reductions,
     "runs": _runs,
     "first_run": lambda study, labels: _runs(study, labels)[:1],
-    # reduced groups of a figure in scenes for which the study makes position-subspace models
+    # reduced groups that a figure shows, in scenes with models in position subspaces
     "drawn_subspaces": lambda study, labels: tuple(
         each
         for each in _experiments(study, labels)

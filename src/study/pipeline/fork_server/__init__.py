@@ -3,8 +3,8 @@
 A job's interpreter needs about a second to load NumPy, SciPy, pandas and numba, and a study has
 hundreds of jobs. One server process loads them once; each job is a fork of it. The workflow starts
 scripts by `client.py`, which asks the server for a fork, hands over its streams, environment and
-folder, and ends as the fork ends. Where no server answers (a platform without safe forks, a server
-that was killed), the client becomes the plain interpreter itself.
+folder, and exits with the status of the fork. If no server answers (on a platform without safe
+forks, or after the server was killed), the client runs the script in its own interpreter.
 
 No job outlives its run, whichever process is killed. The server ends the forks of a killed client
 or run, the operating system ends the forks of a killed server, the client ends the processes that
@@ -22,14 +22,14 @@ from pathlib import Path
 
 from study.pipeline.fork_server.client import ADDRESS, PIPE, place_of
 
-# Path of the Python interpreter; the workflow uses the command of `interpreter` in its place.
+# Path of the Python interpreter. The workflow starts scripts by the command of `interpreter`.
 PYTHON = sys.executable
 
 # Forks of a process that has loaded system frameworks are unsafe on macOS.
 SUPPORTED = sys.platform == "linux"
 
-# Modules that the server loads in advance: third-party libraries of most jobs or of all figures,
-# modules that every job imports first, and the most frequent experiment.
+# Modules that the server loads in advance: third-party libraries that most jobs or all figures
+# use, modules that every job imports first, and the modules of the most frequent experiment.
 LIBRARIES = (
     "h5py", "matplotlib.backends.backend_agg", "matplotlib.backends.backend_pdf", "numba", "numpy",
     "pandas", "study.artifact.logs", "pdrom.core.provenance", "study.experiments.kit.base",
@@ -39,17 +39,17 @@ LIBRARIES = (
 
 
 def interpreter() -> str:
-    """Shell command that runs a script by the client, used in place of the plain interpreter."""
+    """Shell command that runs a script in a fork of the server, by way of `client.py`."""
     client = Path(__file__).with_name("client.py")
     return f"{shlex.quote(PYTHON)} -I -S {shlex.quote(str(client))}"
 
 
 def hold_pipe(place: Path) -> None:
-    """Open a named pipe that closes with this process, so that jobs that are no forks end with it.
+    """Open a named pipe until this process ends; jobs outside the fork server then end, too.
 
     Parameters
     ----------
-    place : path of the pipe, passed to jobs by an environment variable; an old file is replaced
+    place : path of the pipe, passed to jobs by an environment variable; an old pipe is replaced
 
     Raises
     ------
@@ -67,16 +67,16 @@ def hold_pipe(place: Path) -> None:
 def start_server(libraries: Sequence[str] = LIBRARIES) -> None:
     """Start the fork server of this process; the server ends when this process does.
 
-    The address goes into an environment variable, which jobs inherit. It is an abstract socket name
-    of Linux, which is no file and disappears with the last process that listens there, so that
-    nothing is left of a killed run. Clients that connect before the ``libraries`` are loaded wait
-    in the socket's queue.
+    Jobs inherit the server's address in an environment variable. The address is an abstract socket
+    name of Linux: it is no file and disappears with the last listening process, so that a killed
+    run leaves nothing behind. Clients that connect before the ``libraries`` are loaded wait in the
+    socket's queue.
     """
     if not SUPPORTED:
         return
     name = f"pdrom-{secrets.token_hex(16)}"
-    # the server reads one end of a pipe whose other end only this process holds: when this process
-    # is gone, the server notices
+    # The server reads one end of a pipe whose other end only this process has open: the pipe closes
+    # when this process ends, and the server notices that.
     owner, _kept_open = os.pipe()
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as listener:
         listener.bind(place_of(name))

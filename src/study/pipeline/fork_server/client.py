@@ -1,8 +1,8 @@
-"""Run a script in a fork of the server, or in a plain interpreter where no server answers.
+"""Run a script in a fork of the server, or in this interpreter if no server answers.
 
-This file is started by its path, for every job: it imports a few standard modules only. A plain
-interpreter ends itself when the run that started it has ended: the run keeps one end of a pipe open
-(`study.pipeline.fork_server.hold_pipe`), which a killed run closes, on every platform.
+This file is started for every job, and imports only a few standard modules to start fast. A script
+outside the server ends when the run has ended: the run keeps one end of a pipe open
+(`study.pipeline.fork_server.hold_pipe`), which closes when the run is killed, on every platform.
 """
 
 import os
@@ -19,7 +19,7 @@ FORWARDED = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 def main() -> int:
-    """Return the exit code of the job; a job that died of a signal ends this process by it, too."""
+    """Run the job and return its exit code; end by the same signal if a signal ended the job."""
     name = os.environ.get(ADDRESS)
     script = len(sys.argv) == 2 and not sys.argv[1].startswith("-")
     # signals are blocked until the job's process number is known, so that they can be forwarded
@@ -59,7 +59,7 @@ def connect(name: str) -> socket.socket | None:
 
 
 def place_of(name: str) -> bytes:
-    """Address of an abstract socket (Linux), which is a name and has no file."""
+    """Address of the abstract socket ``name`` of Linux, which has no file."""
     return b"\0" + os.fsencode(name)
 
 
@@ -76,7 +76,7 @@ def of_this_user(connection: socket.socket) -> bool:
 def ask(connection: socket.socket) -> bytes:
     """Request a fork over ``connection``; return its process number, b"" if the server is gone.
 
-    The server gets the standard streams and a pipe, from which the fork reads what it needs.
+    The server gets the standard streams, and a pipe with folder, script and environment of the job.
     """
     environment = [f"{key}={value}" for key, value in os.environ.items() if key != ADDRESS]
     parts = [os.getcwd(), os.path.abspath(sys.argv[1]), *environment]
@@ -99,13 +99,13 @@ def receive(connection: socket.socket) -> bytes:
 
 
 def forward(job: int, number: int) -> None:
-    """Send signal ``number`` to the process group of a job, which what it started belongs to."""
+    """Send signal ``number`` to the process group of a ``job``: itself and what it has started."""
     with suppress(ProcessLookupError):
         os.killpg(job, number)
 
 
 def run_alone() -> None:
-    """Run the script whose path is the second argument as the main module, while the run lives."""
+    """Run the script ``sys.argv[2]`` as the main module; it is killed when the run ends."""
     import runpy
     import threading
 
@@ -117,7 +117,7 @@ def run_alone() -> None:
 
 
 def end_with(pipe: str) -> None:
-    """Kill this job when the run ends, which closes ``pipe``: only the run opens it to write."""
+    """Kill this job when ``pipe`` closes: only the run opens it to write, so the run has ended."""
     try:
         # without O_NONBLOCK, open would wait for a writer if the run has already ended
         number = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)

@@ -1,8 +1,8 @@
-"""The server process from which jobs are forked.
+"""Server process from which jobs are forked.
 
 It has one thread. It loads third-party libraries and the modules that every job imports first; it
 does not load modules of effects, which only some scenes list.
-It ends, together with its jobs, when the process that started it is gone. A client that is killed
+It ends, together with its jobs, when the process that started it has ended. A client that is killed
 or sends an invalid request is disconnected; other clients are not affected.
 """
 
@@ -27,10 +27,10 @@ _DIES_WITH_PARENT = 1  # constant PR_SET_PDEATHSIG of <sys/prctl.h>
 
 
 class Server:
-    """Server that forks a job for each request until its owner, the process of the run, is gone.
+    """Server that forks a job for each request until its owner, the process of the run, ends.
 
-    A request is a message with three standard streams and a pipe; from the pipe the fork reads
-    folder, script and environment, each ended by a zero byte, and one more zero byte.
+    A request is a message with the descriptors of three standard streams and of a pipe. The fork
+    reads folder, script and environment from the pipe, each ended by a zero byte, and a last zero.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ class Server:
         self.silent: list[socket.socket] = []
         # clients that wait for the end of their job, by the process number of the job
         self.jobs: dict[int, socket.socket] = {}
-        # a signal writes a byte into this pipe, which ends the wait of the loop
+        # the end of a job (SIGCHLD) writes a byte into this pipe, on which the loop waits
         self.wake, self._waker = os.pipe()
         os.set_blocking(self._waker, False)
         self._process = os.getpid()
@@ -64,7 +64,7 @@ class Server:
                 return None
             if self.wake in ready:
                 os.read(self.wake, 4096)
-            # exit statuses of ended jobs go to their clients, which may be gone
+            # send exit statuses of ended jobs to their clients, which may have ended
             for process in list(self.jobs):
                 done, status = os.waitpid(process, os.WNOHANG)
                 if done:
@@ -86,10 +86,10 @@ class Server:
                     client.close()
 
     def _answer(self, client: socket.socket) -> str | None:
-        """Fork a job if the client's message is a request; return the script in the fork.
+        """Fork a job if the client's message is a request.
 
-        In the server, return None. Another client, whose connection is closed, runs its job in a
-        plain interpreter.
+        Return the script in the fork, None in the server. Without a request the connection is
+        closed, and the client runs its script outside the server.
         """
         self.silent.remove(client)
         streams: list[int] = []
@@ -144,13 +144,13 @@ class Server:
 
 
 def main() -> None:
-    """Load the libraries and serve; in a fork, run the job's script as an interpreter would."""
+    """Load the libraries and serve requests; in a fork, run the job's script as main module."""
     listener = socket.socket(fileno=int(sys.argv[1]))
     owner, libraries = int(sys.argv[2]), sys.argv[3:]
     for library in libraries:
         importlib.import_module(library)
     if "numba" in libraries:
-        # register numba's own functions once, which each fork would repeat
+        # register numba's own functions here, else each fork would do it
         target = importlib.import_module("numba.core.registry").cpu_target
         target.typing_context.refresh()
         target.target_context.refresh()
@@ -167,7 +167,7 @@ def main() -> None:
     atexit._run_exitfuncs()
     sys.stdout.flush()
     sys.stderr.flush()
-    # as in `multiprocessing`: to free the memory of the libraries would take longer than the fork
+    # exit at once, as in `multiprocessing`: freeing the libraries' memory would take far longer
     os._exit(0)
 
 
