@@ -33,28 +33,28 @@ from study.tables.claims.metrics import METRICS
 from study.tables.claims.rules import Added, ClaimRule, TestRule, load_claims
 from study.tables.kit.declaration import QUANTITIES, TOLERANCES
 
-# Bytes: larger pictures are compressed with losses; larger PDFs are not copied to the pages.
+# Limits in bytes: larger pictures are compressed with losses, larger PDFs are not on the pages.
 LOSSLESS, COPIED = 150_000, 200_000
-MANY = 4  # least number of option keys for which equal options mean related figures
+MANY = 4  # figures whose options have the same type are related if it has so many keys
 
 
 def shown_figure(
     name: str, node: Node, size: tuple[int, int], with_pdf: bool, pages: Mapping[str, str]
 ) -> Node:
-    """Return the node of a figure with its picture, caption, command, data and related figures.
+    """Return the syntax tree node of a figure: picture, caption, command, links to related data.
 
     Parameters
     ----------
-    node : node of the figure in the syntax tree
+    node : node of the figure in pandoc's syntax tree
     size : width and height of the picture, pixels
     with_pdf : whether the pages include a PDF of the figure
-    pages : page of each figure that the documents contain, by the figure's name
+    pages : file name of the page with each figure, by the figure's name
     """
     attribute, caption, _ = node["c"]
     picture = attributes("", "", width=str(size[0]), height=str(size[1]), loading="lazy")
     alternative = words(plain(caption[1]).strip())
     image = {"t": "Image", "c": [picture, alternative, [f"figures/{name}.webp", ""]]}
-    # plain words as alternative text: pandoc hides a caption that equals the alternative text
+    # the alternative text is without formatting: pandoc hides a caption that equals it
     made = {"t": "RawInline", "c": ["html", _origin(name, with_pdf, pages)]}
     origin = [{"t": "Plain", "c": [*words("Command: "), made]}]
     told = [caption[0], [*caption[1], boxed("Div", origin, "", "origin")]]
@@ -81,9 +81,9 @@ def _origin(name: str, with_pdf: bool, pages: Mapping[str, str]) -> str:
 
 
 def _kin(name: str, pages: Mapping[str, str]) -> list[str]:
-    """Names of related figures in ``pages``, which show other scenes in the same way.
+    """Names of related figures in ``pages``, which show other scenes in the same form.
 
-    Related figures share a type of options with at least `MANY` keys, or the start of the name.
+    Their options have the same type with at least `MANY` keys, or one name begins with the other.
     """
     listed = declarations()
     mine = listed[name].options
@@ -131,7 +131,7 @@ def table_page(name: str, csv: bytes, template: str) -> str:
 
 
 def argument(name: str) -> str:
-    """Argument of ./reproduce that makes table ``name``; facts belong to ``paper_inputs``."""
+    """Argument of ./reproduce that makes table ``name``; ``paper_inputs`` makes tables of facts."""
     if name in FACTS:
         return "paper_inputs"
     return TABLE.at(RESULTS, name=name) if name in declarations() else name
@@ -225,7 +225,7 @@ VERIFIED, INDEX = "verified.js", "index.html"
 
 
 def write_verified(found: Mapping[str, str], folder: Path) -> None:
-    """Write outcomes of ``verify``, by kind and name as in ``table payoff``, into ``folder``.
+    """Write the outcomes of ``verify`` into ``folder``; a key is kind and name ("table payoff").
 
     The file is a script, because a page opened from a disk can load scripts but no data.
     """
@@ -269,8 +269,8 @@ def write_article(
     tables, machine : CSV of the tables and the record of the machine
     inputs : inputs of the manuscript, including the file `NUMBERS`
     figures, pictures : PDF and PNG of each figure
-    facts, claims : configuration facts, and the file of the claims' rules
-    added : values that the study adds to the sets of ``claims``, see `load_claims`
+    facts, claims : facts about the configuration, and the file of the claims' rules
+    added : values that the study adds to named sets of scenes etc. in ``claims``
     assets : templates, style and script, see `ASSETS`
     """
     made = {file["name"]: file.path for file in inputs}

@@ -30,7 +30,7 @@ _NUMBER = re.compile(
 )
 _TAIL = re.compile(r"(\(|, )(\d[\d/, ]*)([)}]?)$")  # last number, as in "holds (20/20)"
 _FIGURE = r"\begin{figure}\includegraphics{%s.pdf}\caption{%s}\label{fig:%s}\end{figure}"
-# Short definitions of the preamble, which pandoc reads; definitions of layout are replaced.
+# One-line definitions of the preamble, which pandoc can read. Definitions of layout are replaced.
 _SHORT = re.compile(r"(?m)^\\(?:newcommand\{\\(?!longtableof|tablefile)\w+\}.*\}|newtheorem.*)$")
 REPLACED = r"""
 \newcommand{\longtableof}[4]{\begin{table}\caption{#3}\label{#2}\input{#4}\end{table}}
@@ -96,8 +96,8 @@ def linked_table(table: Rows, tables: Mapping[str, pd.DataFrame]) -> str:
     """Return the TeX ``table`` with its numbers as links to rows of the study's tables.
 
     The links lead to the one of ``tables`` with most columns in common. If both have equally many
-    rows, these correspond in order. Otherwise a link selects rows with equal cells in the common
-    columns, as far as such rows exist (the cell may be a rounded number, a sum or a title).
+    rows, these correspond in order. Otherwise a link selects the rows with equal cells in common
+    columns; columns without an equal cell (rounded numbers, sums, titles) are ignored.
     """
     (columns, header), *body = table
     origin = max(tables, key=lambda name: len({*header} & {*tables[name]}))
@@ -109,7 +109,7 @@ def linked_table(table: Rows, tables: Mapping[str, pd.DataFrame]) -> str:
 
 
 def _agreeing(table: pd.DataFrame, header: Sequence[str], cells: Sequence[str]) -> list[str]:
-    """Filters ``column=value`` that select the rows of ``table`` with the cells of a TeX row."""
+    """Filters ``column=value`` that select the rows of ``table`` with equal cells to a TeX row."""
     found = []
     for title, cell in zip(header, cells, strict=True):
         for value in (_plain(cell), _plain(cell).replace(" ", "_")) if title in table else ():

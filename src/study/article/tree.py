@@ -1,4 +1,4 @@
-"""Pandoc's syntax tree: construction of nodes; numbers and links of the article's parts."""
+"""Nodes of pandoc's syntax tree, and numbers and links of the article's sections, figures etc."""
 
 import re
 from collections import Counter
@@ -21,7 +21,7 @@ def attributes(identifier: str = "", classes: str = "", **keys: str) -> list[Any
 def boxed(
     kind: str, content: list[Node], identifier: str = "", classes: str = "", **keys: str
 ) -> Node:
-    """Node of the ``kind`` Span or Div around ``content``; see `attributes` for the others."""
+    """Node of the ``kind`` Span or Div around ``content``, with `attributes`."""
     return {"t": kind, "c": [attributes(identifier, classes, **keys), content]}
 
 
@@ -55,7 +55,7 @@ def plain(node: Any) -> str:
 
 
 def changed(node: Any, visit: Callable[[Node], Any]) -> Any:
-    """Return a tree with nodes replaced by ``visit``, which returns None to leave a node as it is.
+    """Return a tree with nodes replaced by ``visit``; a node remains if that returns None.
 
     Replacements are not visited again. A returned list replaces one node by several.
     """
@@ -81,7 +81,7 @@ PARAGRAPH = 4  # heading level of LaTeX paragraphs
 
 @dataclass
 class Labels:
-    """Numbers and pages of labels, with counters of one document's figures, tables and others."""
+    """TeX labels with numbers and pages; counters of one document's figures, tables and others."""
 
     prefix: str
     page: str
@@ -113,8 +113,8 @@ def numbered(tree: Node, labels: Labels, shown: Callable[[str, Node], Node]) -> 
 
     Parameters
     ----------
-    labels : receives the number of every label
-    shown : function of a figure's name and its numbered node that returns the node to show
+    labels : receives the number of every TeX label
+    shown : function that returns the node to show, given a figure's name and its numbered node
     """
 
     def visit(node: Node) -> Any:
@@ -146,7 +146,7 @@ def _table(label: str, node: Node, labels: Labels) -> Node:
     """Table as a scrollable region, with its number and caption in front."""
 
     def headed(node: Node) -> Node | None:
-        """Formula in a table head, with its text for screen readers; None for other nodes."""
+        """Add a text for screen readers to a formula in a table head; None for other nodes."""
         return boxed("Span", [node, _heard(plain(node))]) if node["t"] == "Math" else None
 
     content = _captioned(node, f"Table {labels.next('table', label)}.")["c"]
@@ -164,7 +164,7 @@ def _heard(text: str) -> Node:
 
 
 def _captioned(node: Node, opening: str) -> Node:
-    """Figure or table with ``opening``, its number, in front of its caption."""
+    """Figure or table with ``opening`` (such as "Table 3.") in front of its caption."""
     attribute, (short, blocks), *others = node["c"]
     words_of_caption = blocks[0]["c"] if blocks else []
     strong = {"t": "Strong", "c": words(opening)}

@@ -18,7 +18,7 @@ HEAD = re.compile(r'pdromLive\(\{"format":1,"scene":("\w+"),"title":("(?:[^"\\]|
 
 
 def _write(models: list[File], html: Path, outputs: Mapping[str, str], **parts: Path) -> None:
-    """Write the page from its template and ``parts``; it loads a scene's models when chosen.
+    """Write the page from its template and ``parts``; the page loads the models of a chosen scene.
 
     Raises
     ------
@@ -31,7 +31,7 @@ def _write(models: list[File], html: Path, outputs: Mapping[str, str], **parts: 
 
 
 def _listed(file: File) -> dict[str, str] | None:
-    """Entry of a scene in the page's list; None if the study has no models of the scene."""
+    """Entry of a scene in the page's list, by its file of models; None if that has no models."""
     text = read_text(file.path)
     if '"models":[]' in text:
         return None

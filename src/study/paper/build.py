@@ -34,10 +34,10 @@ class Facts(BaseModel):
     """Facts that the manuscript states and that are not results of experiments.
 
     captions : titles and captions of the figures, as TeX, by name
-    part : configuration of the results if it is not the full study's, else None
+    part : name of the results' configuration, None for the full study
     full_study : name of the full study's configuration
     pages : largest number of pages, by document
-    tables : facts of the configuration (scenes, methods, study), as rows of tables
+    tables : rows of tables about the configuration (scenes, methods, study), by table
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -59,11 +59,11 @@ def write_inputs(
 ) -> None:
     r"""Write macros.tex, figures.tex, TeX tables, bibliographies and the file `NUMBERS`.
 
-    Sources are the TeX files ``source``, BibTeX ``references``, CSV ``tables``, the record of the
+    Inputs are the TeX files ``source``, BibTeX ``references``, CSV ``tables``, the record of the
     ``machine`` and ``facts``. ``outputs`` are the paths of the files by name.
 
-    The file `NUMBERS` gives the origin of the numbers of every ``\val`` key and TeX table, and
-    which blocks of each document are shown (`decisions`).
+    The file `NUMBERS` has, for every ``\val`` key and TeX table, the table cells of its numbers,
+    and for each document, which sentences are shown (`decisions`).
     """
     texts = documents(source[0].parent)
     whole = "".join(texts.values())
@@ -100,7 +100,7 @@ def fact_tables(machine: Path, facts: Facts) -> dict[str, pd.DataFrame]:
     row["kernels"] = ", ".join(sorted({k.architecture for k in record.kernels if k.architecture}))
     if record.units is not None:
         row |= {**record.units.model_dump(), "unit_s": record.units.unit_s}
-    # names of a machine come from outside and may contain any character
+    # names of processor and system may contain any character
     words = {key: replaced(value) for key, value in row.items() if isinstance(value, str)}
     return {**tables, "machine": pd.DataFrame([{**row, **words}])}
 
@@ -114,8 +114,8 @@ def build(
 ) -> None:
     """Build the PDFs of the paper and of its supplement.
 
-    The two PDFs link to each other and must lie in one folder. ``source`` are the TeX files,
-    ``figures`` and ``inputs`` (from `write_inputs`) the files that these read.
+    The two PDFs link to each other and must lie in one folder. ``source`` are the TeX files; they
+    include ``figures`` and ``inputs``, the files of `write_inputs`.
     """
     results = [Path(file.path) for file in (*figures, *inputs)]
     for path in results:

@@ -13,7 +13,7 @@ SUPPLEMENT = "S"  # prefix of the figure numbers in the supplement
 
 
 class Numbers(NamedTuple):
-    """Numbers of a figure: manuscript, "3" for the paper or "S7" for its supplement, and preprint.
+    """Numbers of a figure: manuscript ("3" in the paper, "S7" in the supplement) and preprint.
 
     A number is None if the document does not contain the figure.
     """

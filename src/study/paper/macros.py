@@ -1,4 +1,4 @@
-r"""Numbers of the manuscript, and sentences that are shown if the study has their numbers.
+r"""Numbers of the manuscript, and sentences that are left out if the study lacks their numbers.
 
 The TeX source refers to a number by a key, which is the number's place in a table::
 
@@ -11,7 +11,7 @@ macro, so that no number is typed by hand.
 
 A block ``\known{... \val{key} ...}`` is a sentence, ``\row{... & \val{key} \\}`` a table row. If
 the tables have no row for one of its keys, the block is left out. A note about the full study
-replaces the first such sentence of each paragraph.
+replaces the first sentence that is left out of each paragraph.
 """
 
 import re
@@ -63,7 +63,7 @@ def macros(source: str, tables: Mapping[str, pd.DataFrame]) -> str:
 
 
 def _defined(lines: Sequence[str], kind: str, texts: Mapping[str, str]) -> str:
-    """TeX ``lines`` with a macro ``kind@NAME`` for each of ``texts``, and the end of the block."""
+    """TeX ``lines``, a macro ``kind@NAME`` for each of ``texts`` by name, and ``makeatother``."""
     made = [rf"\expandafter\def\csname {kind}@{k}\endcsname{{{text}}}" for k, text in texts.items()]
     return "\n".join([*lines, *made, r"\makeatother"]) + "\n"
 
@@ -73,7 +73,7 @@ class Number(NamedTuple):
 
     text : the number as TeX
     value : unrounded value, None if there is none
-    rows : row numbers of the values in ``table``, counted from 0
+    rows : numbers of the table rows from which the value is computed, from 0
     take : name of the aggregate, None for a single cell
     """
 
@@ -111,9 +111,9 @@ def number_of(key: str, tables: Mapping[str, pd.DataFrame]) -> Number:
 
 
 def is_held(key: str, tables: Mapping[str, pd.DataFrame]) -> bool:
-    """Return whether ``tables`` have a row for ``key``, with a value or without.
+    """Return whether ``tables`` have a row for ``key``; its cell may be empty.
 
-    For counts only the filters in the columns `_LABELS` apply, so that a count may be 0.
+    For a count, only filters in the columns `_LABELS` must match a row, so that it may be 0.
     """
     table, filters, _, aggregate = _parse(key, tables)
     if aggregate in _COUNTS:
@@ -189,7 +189,7 @@ SHOWN, NOTED, DROPPED = "shown", "noted", "dropped"
 
 
 class Sentence(NamedTuple):
-    """A block: its text, the number of its paragraph, if it is a table row, and where it lies."""
+    """A ``known`` or ``row`` block: text, number of its paragraph, positions in the source."""
 
     text: str
     paragraph: int
@@ -220,7 +220,7 @@ def sentences(source: str) -> list[Sentence]:
 
 
 def decisions(source: str, tables: Mapping[str, pd.DataFrame]) -> list[str]:
-    """Return for each block of ``source``: shown, noted (replaced by a note) or dropped."""
+    r"""Decide for each ``\known`` or ``\row`` block: shown, noted (replaced by a note), dropped."""
     made, noted = [], set()
     for sentence in sentences(source):
         if all(is_held(key, tables) for key in keys_of(sentence.text)):
@@ -236,9 +236,9 @@ def decisions(source: str, tables: Mapping[str, pd.DataFrame]) -> list[str]:
 def provenance(decided: Mapping[str, Sequence[str]], part: str | None, full_study: str) -> str:
     r"""Return the TeX definitions of ``\known``, ``\row``, ``\ifpart`` and configuration names.
 
-    The decisions on the blocks of each document, in ``decided``, are stored under its name, TeX's
-    ``\jobname``. ``part`` is the configuration of the results, ``\configuration``, or None for the
-    full study, for which ``\ifpart`` is false. ``full_study`` is the full study's configuration.
+    ``decided`` has the decisions on the blocks of each document by the document's name, which is
+    ``\jobname`` in TeX. ``part`` is the results' configuration (``\configuration``), None for the
+    full study, where ``\ifpart`` is false. ``full_study`` is the full study's configuration.
     """
     lines = [
         r"\newif\ifpart",
@@ -252,7 +252,7 @@ def provenance(decided: Mapping[str, Sequence[str]], part: str | None, full_stud
         r"\let\known@dropped\@gobble",
         r"\newcommand{\known@next}{\csname known@\jobname @\arabic{known}\endcsname}",
         r"\newcommand{\known}[1]{\stepcounter{known}\known@next{#1}}",
-        # a row that is left out must not start a table cell
+        # \noalign: a row that is left out must not start a table cell
         r"\newcommand{\row}[1]{\noalign{\stepcounter{known}}\known@next{#1}}",
     ]
     for document, made in decided.items():
@@ -263,7 +263,7 @@ def provenance(decided: Mapping[str, Sequence[str]], part: str | None, full_stud
 
 
 def note(part: str | None, full_study: str) -> str:
-    """Return the TeX note in place of sentences that are left out; arguments as in `provenance`."""
+    """TeX note in place of omitted sentences; ``part``: configuration, None for the full study."""
     if part is None:
         return "Sentences are left out here whose numbers this study does not hold."
     full = rf"\texttt{{{escape(full_study)}}}"
@@ -271,7 +271,7 @@ def note(part: str | None, full_study: str) -> str:
 
 
 def closing(source: str, start: int) -> int:
-    """Position in ``source`` of the brace that closes the block with its content at ``start``."""
+    """Position in ``source`` of the brace that closes a block whose content begins at ``start``."""
     depth = 1
     for brace in _BRACE.finditer(source, start):
         depth += {"{": 1, "}": -1}.get(brace[0], 0)

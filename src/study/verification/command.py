@@ -21,19 +21,19 @@ from study.verification.subject import Status, Subject, ended, options_parser, s
 NOTHING = "Nothing to be done"
 CODES = "exit codes: 0 all holds; 1 faulty input; 2 not understood; 3 differs; 4 not there"
 PAGE = "verification.md"
-# Largest number of differences that the page `PAGE` lists for each table, figure or claim.
+# Largest number of differences that the file `PAGE` lists for each table, figure or claim.
 ON_PAGE = 20
 
 
 def update(subject: Subject, reason: str) -> Path:
-    """Replace the expected tables of ``subject``, for a ``reason``; return the folder with them.
+    """Replace the expected tables by those of ``subject``, log the reason, return their folder.
 
     Raises
     ------
     ConfigurationError
         The reason is empty.
     StorageError
-        A table is missing, damaged, or older than its inputs: nothing is written.
+        A table is missing, damaged, or older than its inputs; then nothing is written.
     """
     words = " ".join(reason.split())
     if not words:
@@ -89,7 +89,7 @@ def verify(arguments: Sequence[str]) -> Status:
     ConfigurationError
         The configuration is faulty, or it has no expected tables.
     StorageError
-        A file cannot be read or written; --update is refused.
+        A file cannot be read or written, or --update is refused.
     """
     asked = parser().parse_args(arguments)
     subject = Subject.of(asked.configfile, asked.config)
@@ -129,7 +129,7 @@ def verify_tables(subject: Subject) -> Status:
 
 
 def status_of(lines: Iterable[Line]) -> Status:
-    """Exit code of ``lines``: a missing result before a difference, else success."""
+    """Exit code for ``lines``: `MISSING` if a result is missing, else `DIFFERS` or `HOLDS`."""
     outcomes = {line.outcome for line in lines}
     if Outcome.MISSING in outcomes:
         return Status.MISSING
@@ -148,7 +148,7 @@ def counted(lines: Sequence[Line]) -> str:
 
 
 def page(lines: Sequence[Line], about: str) -> str:
-    """Return the Markdown page of all ``lines``; ``about`` says on its top what was compared."""
+    """Return the Markdown page of all ``lines``; ``about`` is its first sentence."""
     meaning = "What is compared, and what the outcomes mean, is in `docs/verification.md`."
     parts = ["# Verification", "", about, meaning, "", counted(lines) + ".", ""]
     for kind in dict.fromkeys(line.kind for line in lines):

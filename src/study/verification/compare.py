@@ -1,6 +1,6 @@
 """Comparison of a table with the expected table: pairs of rows, distances of cells, differences.
 
-Rounding errors decide some rows, such as chaotic or ill-conditioned runs (`Context`).
+Rows that depend on rounding errors, as of chaotic or ill-conditioned runs, are compared by counts.
 """
 
 from collections import Counter
@@ -18,15 +18,15 @@ from study.tables.kit.results import trained
 
 # Differences up to this size count as rounding errors of sums.
 FLOOR = 1e-12
-# Relative tolerances of sample numbers that a fit determines, and of the numbers of wrong runs.
+# Relative tolerances of numbers of samples that a fit determines, and of errors of wrong runs.
 FITTED, OF_WRONG_RUNS = 0.25, 0.3
 # Part of the names of methods whose elements are chosen by a non-negative least-squares fit.
 FITTING = "ecsw"
-# Limits of the amplification (gain) of samples. Above the first, errors of reruns have few or no
-# digits in common on different kernels; above the second, also approximation errors and the gain.
+# Limits of the gain (amplification of errors by the samples). Above the first, errors of reruns on
+# two processors have few or no equal digits; above the second, approximation errors and gains, too.
 OF_RUNS, DIRECT = 1e2, 1e5
 RUNS, SPECTRA, RECONSTRUCTION = "reduced_reruns", "singular_values", "reconstruction_error"
-# Relative error above which a run is wrong, as everywhere in the study.
+# Relative error above which a run is wrong, as in all tables of the study.
 WRONG = 0.1
 # Columns with the error of a run; the first one that a table has decides if the run is wrong.
 OF_RUN = ("relative_error_within_horizon", "relative_error")
@@ -35,16 +35,16 @@ SAMPLES = ("scene", "group", "method", "r")
 RUN = (*SAMPLES, "position_basis", "k")
 # Largest number of cells that describe a row in a message.
 NAMED = 6
-# A column of at least `LEAST` numbers must also agree far more closely than the tolerance of one
-# cell: nine of ten cells if it has at least `TEN` errors, else half of its cells, are closer than
-# `CLOSE`, or than 1/`OWN` of the column's own tolerance. In a shorter column without own tolerance
-# all cells are closer than `LONE`.
+# A small shift of a whole column is a difference, too: a share of its cells must differ by less
+# than `CLOSE`, or than 1/`OWN` of the column's own tolerance. The share is `MOST` for a column of
+# at least `TEN` errors without own tolerance, else `HALF`. In a column of fewer than `LEAST` cells
+# without own tolerance, all cells must differ by less than `LONE`.
 MOST, HALF, TEN, LEAST = 0.9, 0.5, 10, 3
 CLOSE, OWN, LONE = 1e-5, 50, 0.01
-# Limits for cells that rounding decides: (share of runs that may be off, distance that counts as
-# off, columns by which runs are grouped). A tenth may be off by a factor 10, half by a factor 2.
+# Limits for cells that depend on rounding: (share of runs that may differ, distance above which
+# they do, columns by which runs are grouped). A tenth may differ by a factor 10, half by 2.
 LOOSE = ((0.1, 1 - 1 / 10, ("scene", "noisy_axes", "method")), (0.5, 1 - 1 / 2, ("scene",)))
-# Least number of differing cells that a text or flag column with a tolerance may have.
+# A text or flag column with a tolerance may have this number of differing cells in any case.
 FEW = 3
 Difference = tuple[float, str]  # distance of the cells (inf without a measure), text of a message
 
@@ -87,20 +87,19 @@ def pairs(table: Table, expected: pd.DataFrame, found: pd.DataFrame) -> list[tup
 
 
 def _key(cell: object) -> str:
-    """Cell as text, of fewer digits than references have; empty text for a missing value."""
+    """Cell as text, with fewer digits than expected tables store; empty for a missing value."""
     if cell is None or cell is pd.NA or cell != cell:
         return ""
     return f"{cell:.6g}" if isinstance(cell, float) else str(cell)
 
 
 class Context:
-    """Facts from other expected tables that show which rows rounding errors decide.
+    """Facts from other expected tables that show which rows depend on rounding errors.
 
-    chaotic : scenes with frames beyond their horizon, where rounding errors decide
+    chaotic : scenes with frames after the horizon, where perturbed runs differ too much to compare
     modes : number of modes above round-off by scene and group
-    gains : amplification of the samples by the columns `SAMPLES`
-    ended : runs without an error, by the columns `RUN`, in the expected and in the found table of
-        runs; some tables list only runs that have an error
+    gains : gain (amplification of errors by the samples), by the columns `SAMPLES`
+    ended : runs without an error, by the columns `RUN`, in the expected and in the found table
     """
 
     def __init__(
@@ -146,11 +145,11 @@ class Comparison:
         return np.array([column.name not in names for names in self._timed], dtype=bool)
 
     def firm(self, column: Column) -> np.ndarray:
-        """Boolean array (rows): True where rounding errors do not decide the column's cell."""
+        """Boolean array (rows): True where the column's cell does not depend on rounding errors."""
         return ~np.any([np.zeros(len(self.e)), *self.loose(column).values()], axis=0)
 
     def _loose(self, column: Column) -> dict[str, np.ndarray]:
-        """Boolean arrays (rows) by reason: True where rounding errors decide the column's cell."""
+        """Boolean arrays (rows) by reason: True where the cell depends on rounding errors."""
         if names_row(column):
             return {}
         chaotic = self.e.filter(items=["scene"]).isin(list(self.context.chaotic)).any(axis=1)
@@ -183,7 +182,7 @@ class Comparison:
         return np.fmax.reduce(found)
 
     def wrong(self, column: Column) -> np.ndarray:
-        """Boolean array of cells of an error ``column`` in wrong runs, where changes grow.
+        """Boolean array of cells of an error ``column`` in wrong runs, which get a wider tolerance.
 
         A run is wrong if its error is above `WRONG`; the cell's own error must be above it, too.
         """
@@ -195,9 +194,9 @@ class Comparison:
         return (self.e[judged] > WRONG).all(axis=1).to_numpy(dtype=bool)
 
     def fitted(self) -> np.ndarray:
-        """Boolean array of rows of reductions whose number of samples is the outcome of a fit.
+        """Boolean array of rows of reductions whose number of samples is determined by a fit.
 
-        Tables without the column ``method`` but with the fit's tolerance ``tau`` contain no others.
+        Without a column ``method``, all rows are such if there is a column ``tau`` (its tolerance).
         """
         if "method" not in self.e:
             return np.full(len(self.e), "tau" in self.e)
@@ -212,15 +211,15 @@ class Comparison:
         return limit
 
     def beyond(self, column: Column, wider: float = 0.0) -> np.ndarray:
-        """Boolean array of compared cells that are off by more than tolerance and ``wider``."""
+        """Boolean array of compared cells that differ by more than the tolerance and ``wider``."""
         limit = np.maximum(self.limits(column), wider)
         return (self.apart(column) > limit) & self.compared(column)
 
     def apart(self, column: Column) -> np.ndarray:
         """Distance of each pair of cells of ``column``, array (rows).
 
-        The distance of shares is their difference, of other numbers the difference over the larger
-        number. It is 0 for equal cells, inf for unequal texts or if one value is missing.
+        It is the difference for shares, and the difference over the larger number for other
+        numbers. It is 0 for equal cells, inf for unequal texts or if one value is missing.
         """
         e, f = self.e[column.name], self.f[column.name]
         numbers = all(pd.api.types.is_numeric_dtype(cells) for cells in (e, f))
@@ -237,9 +236,9 @@ class Comparison:
 
 
 def judge(comparison: Comparison) -> tuple[list[str], str]:
-    """Return texts of all differences, largest first, and how many cells were compared, in words.
+    """Return texts of all differences, largest first, and a text with the number of compared cells.
 
-    Cells that rounding decides are compared by counts; the words number them by the reason.
+    Cells that depend on rounding are compared by counts; the text has their number by reason.
     """
     found = [*_rows(comparison)]
     compared, loose = 0, Counter[str]()
@@ -256,7 +255,7 @@ def judge(comparison: Comparison) -> tuple[list[str], str]:
 def _difference(
     where: str, expected: str, found: str, size: float = np.inf, allowed: float = 0.0
 ) -> Difference:
-    """Difference of a ``size``, and its text with the place ``where``: row and column in words."""
+    """Return a difference: its ``size``, and a text; ``where`` names row and column."""
     off = f" (off by {size:.2g}, allowed {allowed:.2g})" if np.isfinite(size) else ""
     return size, f"{where}: expected {expected}, found {found}{off}"
 
@@ -264,8 +263,8 @@ def _difference(
 def _rows(comparison: Comparison) -> Iterator[Difference]:
     """Yield differences for rows without a matching row in the other table, and for their order.
 
-    Some tables list only runs that have an error (`Table.only_with_error`). In these, a row makes
-    no difference if its run has an error in its table but none in the other one.
+    Some tables list only runs that have an error (`Table.only_with_error`). In such a table, a row
+    may be missing if its run has no error in that study.
     """
     table, context, words = comparison.table, comparison.context, ("a row", "none")
     for side, frame in enumerate((comparison.expected, comparison.found)):
@@ -303,7 +302,7 @@ def _cells(comparison: Comparison, column: Column) -> Iterator[Difference]:
 
 
 def _shifted(comparison: Comparison, column: Column, firm: np.ndarray) -> Iterator[Difference]:
-    """Yield a difference if most cells of a column are off by little, as by a small shift."""
+    """Yield a difference if most cells of a column have changed by a little (see `MOST`)."""
     there = (comparison.e[column.name].fillna(0) != 0).to_numpy(dtype=bool)
     cells = firm & there & comparison.compared(column)
     own, count = column.tolerance, cells.sum()
@@ -320,9 +319,9 @@ def _shifted(comparison: Comparison, column: Column, firm: np.ndarray) -> Iterat
 
 
 def _loose(comparison: Comparison, column: Column, cells: np.ndarray) -> Iterator[Difference]:
-    """Yield differences where too many runs have cells off, among cells that rounding decides.
+    """Yield a difference where too many runs differ, among the ``cells`` that depend on rounding.
 
-    A value that is missing in one table counts as off. Cells of the same run count once.
+    A value that is missing in one table counts as a difference. Cells of one run count once.
     """
     rows = comparison.e[cells]
     run = [*SAMPLES, *({"seed"} & set(rows.columns))]

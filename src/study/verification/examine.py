@@ -22,7 +22,7 @@ from study.verification.subject import Subject
 
 RULES = Path("config/claims.yaml")
 CLAIMS = "claims"
-# Verdict columns of the table of claims, with the name of their tests in the rules and a label.
+# Verdict columns of the table of claims; for each the key of its tests in the rules, and its name.
 PARTS = {"verdict": ("published", "as published"), "verdict_beyond": ("beyond", "beyond")}
 
 
@@ -40,7 +40,7 @@ class Line(NamedTuple):
     """Outcome of one claim, figure or table.
 
     kind : claim, figure or table
-    text : size and place of the largest difference, or a reason
+    text : size, row and column of the largest difference, or a reason
     details : all differences as text, largest first
     """
 
@@ -58,11 +58,11 @@ GOOD = (Outcome.REPRODUCED, Outcome.NOT_COMPARABLE)
 
 
 class Examination:
-    """Comparison of existing and expected results of a subject; results are cached.
+    """Comparison of a subject's results with the expected ones, by functions with cached results.
 
-    condition : function of a path: `Condition` of the file, None if it is missing
-    read : function of a table's name: table as read from its file, see `found`
-    again : function of a table's name: table made again from other tables, see `_again`
+    condition : returns the `Condition` of the file at a path, None if it is missing
+    read : returns the table of a name, as read from its file
+    again : returns the table of a name, made again from other tables (`_again`)
     """
 
     def __init__(self, subject: Subject) -> None:
@@ -71,7 +71,7 @@ class Examination:
         self.read, self.again = cache(self._read), cache(self._again)
 
     def lines(self) -> list[Line]:
-        """Lines of all claims, figures and tables, and of CSV files that are no declared table."""
+        """Outcomes of all claims, figures and tables, and of CSV files that are no known table."""
         tables = {name: self.table(name) for name in declared()}
         figures = [self._figure(job, tables) for job in self.subject.plan.fixed["figures"]]
         folder = Path(TABLE.at(self.subject.results, name="any")).parent
@@ -103,12 +103,12 @@ class Examination:
 
     @cached_property
     def expected(self) -> dict[str, Reference]:
-        """Existing references of tables, by name."""
+        """Expected tables that exist, by name."""
         return read_references(folder_of(self.subject.results))
 
     @cached_property
     def context(self) -> compare.Context:
-        """Context of the comparison, from the expected tables and the found table of runs."""
+        """Rows that depend on rounding errors, by expected tables and the found table of runs."""
         tables = {name: reference.frame for name, reference in self.expected.items()}
         try:
             return compare.Context(tables, self.found(compare.RUNS))
@@ -129,7 +129,7 @@ class Examination:
             return read_table(files[job.outputs["table"]])
 
     def table(self, name: str) -> Line:
-        """Line with the outcome of the table ``name``."""
+        """Outcome of the comparison of the table ``name``."""
 
         def line(outcome: Outcome, text: str, *details: str) -> Line:
             return Line("table", name, outcome, text, details)
@@ -164,7 +164,7 @@ class Examination:
         return line(Outcome.REPRODUCED, compared)
 
     def claims(self) -> list[Line]:
-        """Lines with the outcomes of all claims."""
+        """Outcomes of the comparison of all claims."""
         line = self.table(CLAIMS)
         try:
             found = self.found(CLAIMS).set_index("claim")
@@ -209,7 +209,7 @@ class Examination:
 
 
 def _claim(name: str, expected: pd.DataFrame, found: pd.DataFrame, decided: pd.DataFrame) -> Line:
-    """Outcome of claim ``name`` by tables of claims; ``decided`` is made from existing tables."""
+    """Outcome of claim ``name``; ``decided`` is the table ``found``, made again from its inputs."""
     if name not in expected.index or name not in found.index:
         text = "the claim is new" if name in found.index else "the claim is gone"
         return Line("claim", name, Outcome.DIFFERS, text)

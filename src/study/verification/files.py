@@ -71,7 +71,7 @@ def verify_files(subject: Subject) -> Status:
 
 
 def _fault(path: str, entry: Entry | None, ours: bool) -> str:
-    """Fault of the file at ``path`` in words; empty if the file agrees with its entry."""
+    """Text on the fault of the file at ``path``; empty if the file agrees with its entry."""
     if not ours:
         return FOREIGN
     if not Path(path).is_file():
@@ -84,7 +84,7 @@ def _fault(path: str, entry: Entry | None, ours: bool) -> str:
 
 @contextmanager
 def made(job: Job) -> Iterator[dict[str, Path]]:
-    """Run a job into a temporary folder; yield the new files by the paths of the study's files.
+    """Run a job in a temporary folder; yield a mapping of its output paths to the new files.
 
     Raises
     ------
@@ -106,7 +106,7 @@ def made(job: Job) -> Iterator[dict[str, Path]]:
 
 
 def differing(job: Job) -> list[str]:
-    """Paths of a job's outputs that differ from outputs made again; all if the job fails."""
+    """Paths of a job's outputs that differ when the job is repeated; all if it fails then."""
     try:
         with made(job) as files:
             return [old for old, new in files.items() if not filecmp.cmp(old, new, shallow=False)]

@@ -20,7 +20,7 @@ from study.tables import declared
 from study.tables.kit.declaration import Table
 from study.verification.compare import kept
 
-# Stored digits of numbers; tolerances are at least a hundred times the rounding error.
+# Stored digits of numbers: their rounding error is at most a hundredth of the tolerances.
 DIGITS = 9
 PACKED_FROM = 50_000
 LOG = "changes.md"
@@ -32,7 +32,7 @@ Written by `./reproduce verify --update --reason "..."`, newest last.
 
 
 class Reference(NamedTuple):
-    """An expected table: ``frame`` has all declared columns, ``columns`` the stored ones."""
+    """An expected table: ``frame`` has all declared columns, ``columns`` names the stored ones."""
 
     frame: pd.DataFrame
     columns: tuple[str, ...]
@@ -78,7 +78,7 @@ def read_reference(table: Table, folder: Path) -> Reference | None:
 
 
 def read_references(folder: Path) -> dict[str, Reference]:
-    """Return the existing references in ``folder`` by the table's name; errors as for one."""
+    """Return the expected tables in ``folder``, by name; errors are those of `read_reference`."""
     read = {name: read_reference(table, folder) for name, table in declared().items()}
     return {name: reference for name, reference in read.items() if reference is not None}
 

@@ -21,7 +21,7 @@ from study.pipeline.plan import Plan, load_plan
 
 @dataclass(frozen=True)
 class Subject:
-    """Results of a configuration, and the commands that make them.
+    """Results of one configuration, and the command that makes them.
 
     options : command-line options that name the configuration
     """
@@ -57,7 +57,7 @@ class Subject:
     @cached_property
     def plan(self) -> Plan:
         """Plan of the configuration, merged from its files and settings as by Snakemake."""
-        # imported late: ``--help`` and faults of the arguments need no Snakemake
+        # imported here because ``--help`` and errors in the arguments need no Snakemake
         from snakemake.cli import parse_config
         from snakemake.settings.types import ConfigSettings
         from snakemake.utils import update_config
