@@ -19,14 +19,14 @@ from study.tables.accuracy_cost import FEWER, pareto
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "*")
 ERROR, TIME = "relative_error_within_horizon", "ms_per_frame"
 LOW, HIGH = 1e-3, 1e2  # limits of the error axis; errors outside are arrows at its ends
-ABOVE, BELOW, BLOWN_UP = 6, 7, "x"  # Matplotlib markers: carets up and down, and a cross
+ABOVE, BELOW, BLOWN_UP = 6, 7, "x"  # Matplotlib markers of errors off the axis, and of blow-ups
 OWN = {"color": style.GREY, "linewidth": 1.2}
 BLIND = {"color": style.FAILED, "linewidth": 0.9, "linestyle": "-."}
-RATES = (60, 30)  # frames per second that count as real time
+RATES = (60, 30)  # frame rates of real time, 1/s, drawn as lines
 LARGE, SMALL = 2.6, 1.6  # heights of the large and of the small panels, inches
-LINE, GAP = 0.145, 0.06  # inches: height of a legend line, gap between rows of legend blocks
+LINE, GAP = 0.145, 0.06  # height of a legend line, gap between rows of legend blocks, inches
 COLUMNS = 4  # number of legend blocks in a row
-# Families of models, each with its colour.
+# Families of reduced models and of full-order runs, each with its colour.
 FAMILIES = {
     "full order, fewer iterations": style.BLACK,
     "orthogonal projection": style.PURPLE,
@@ -42,7 +42,7 @@ Block = tuple[str, list[Line2D]]
 
 
 def look_of(method: str, position_basis: str, drawn: Drawn) -> Look:
-    """Family of a model and its name in the family; tolerances and position bases share a name.
+    """Family of a model and its legend entry in the family, which all tolerances of a method share.
 
     Titles of methods are those in ``drawn``. The family is None for a method that is not drawn.
     """
@@ -57,7 +57,7 @@ def look_of(method: str, position_basis: str, drawn: Drawn) -> Look:
 
 
 def markers(looks: list[Look]) -> dict[Look, str]:
-    """Marker of each (family, name), different within a family, in the order of ``looks``."""
+    """Marker of each (family, legend entry); markers within a family are different."""
     found: dict[Look, str] = {}
     for look in dict.fromkeys(looks):
         before = sum(family == look[0] for family, _ in found)
@@ -73,7 +73,7 @@ class TradeOffs:
     blown_up : reduced runs that blew up before an error could be computed
     own_ms : scene -> time per frame of its own full-order run, ms
     own_error : scene -> error of that full-order run against the converged run
-    marker : (family, name) -> Matplotlib marker
+    marker : (family, legend entry) -> Matplotlib marker
     """
 
     points: pd.DataFrame
@@ -83,14 +83,14 @@ class TradeOffs:
     marker: dict[Look, str]
 
     def members(self, family: str) -> dict[str, str]:
-        """Names of the models in ``family`` with their markers."""
+        """Mapping of the legend entries in ``family`` to their markers."""
         return {name: marker for (own, name), marker in self.marker.items() if own == family}
 
 
 def trade_offs(
     drawn: Drawn, table: pd.DataFrame, runs: pd.DataFrame
 ) -> tuple[TradeOffs, list[str]]:
-    """Points of the scenes and methods in ``drawn``, and the list of scenes with points.
+    """Points (error, time) of scenes and methods in ``drawn``, and the list of scenes with points.
 
     Parameters
     ----------
@@ -117,7 +117,7 @@ def trade_offs(
 
 
 def _drawn(table: pd.DataFrame, drawn: Drawn) -> pd.DataFrame:
-    """Rows of ``table`` whose models are drawn, with columns for their family and name in it."""
+    """Rows of ``table`` that are drawn, with their family and legend entry in two new columns."""
     names = zip(table.method, table.position_basis, strict=True)
     looks = pd.DataFrame(
         [look_of(*name, drawn) for name in names], table.index, ["family", "member"], dtype=object
@@ -182,7 +182,7 @@ def label_iterations(ax: Axes, found: TradeOffs, scene: str) -> None:
 
 
 def handles(found: TradeOffs) -> list[Block]:
-    """Legend blocks of the families in ``found``: a colour per family, a marker per name."""
+    """Legend blocks of the families in ``found``: one colour each, with a marker per entry."""
     common = {"linewidth": 1.0, "markersize": 4.0}
     entries = [
         ("full order", [
@@ -252,7 +252,7 @@ def accuracy_cost(
 
 
 def _draw_rates(ax: Axes) -> None:
-    """Draw vertical lines at frame rates of real time; name rates beyond the axis at its end."""
+    """Draw vertical lines at the frame rates `RATES`; name rates beyond the axis at its end."""
     high = ax.get_xlim()[1]
     beyond = [rate for rate in RATES if 1e3 / rate >= high]
     for rate in set(RATES) - set(beyond):

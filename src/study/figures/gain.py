@@ -1,4 +1,4 @@
-"""Figures of errors: against the basis size, with singular values; against the gain; by choice."""
+"""Figures of errors against gain, choice of method, and basis size; figure of singular values."""
 
 from pathlib import Path
 
@@ -18,7 +18,7 @@ from study.tables.kit.results import FAILED, judged_runs
 GAINS = (1.0, 1e5)  # limits of the gain axis; points outside are drawn on them
 ERRORS, LADDER_ERRORS = (1e-5, 1e2), (1e-4, 1e2)
 ENDS = ("low", "median", "high")
-DECADES = 4  # number of separate decades; gains above 10^4 are counted together
+DECADES = 4  # number of decades of the gain with a bar; the last also counts larger gains
 _KEYS = ["scene", "group", "method", "r"]
 
 
@@ -63,7 +63,7 @@ def error_against_gain(options: kit.Methods, drawn: Drawn, **tables: pd.DataFram
 def _draw_method(
     ax: Axes, runs: pd.DataFrame, ranges: pd.DataFrame, colour: str, marker: str
 ) -> None:
-    """Draw runs as dots, and the ranges of gain and error over repetitions as crosses."""
+    """Draw runs as dots on ``ax``, and ranges of gain and error over repetitions as crosses."""
     x, y = runs.gain.to_numpy(float), runs.error.to_numpy(float)
     multiples.rim_arrows(ax, x, y, colour=colour, across=GAINS, along=ERRORS)
     ax.plot(
@@ -183,7 +183,7 @@ def _panels(
     limits: tuple[float, float],
     legend: int,
 ) -> tuple[Figure, list[Panel]]:
-    """Figure with a panel per experiment in ``table`` and space for ``legend`` lines below."""
+    """Figure with a panel per scene and group in ``table``, and space for ``legend`` lines."""
     pairs = [
         (each, rows)
         for each in drawn.experiments
@@ -199,7 +199,7 @@ def _panels(
 
 
 def _published(path: Path, columns: list[str], options: Beside, each: Experiment) -> pd.DataFrame:
-    """Rows of the published code's output ``path`` for ``each`` experiment; may be empty."""
+    """Rows of the file ``path``, output of the published code, for scene and group of ``each``."""
     output = read_table(path, ["experiment", "group", *columns], result=False)
     name = options.published.get(each.scene)
     return output[(output.experiment == name) & (output.group == each.group)]
@@ -241,7 +241,7 @@ def singular_values(options: Beside, drawn: Drawn, table: pd.DataFrame, publishe
 def _draw_values(ax: Axes, rows: pd.DataFrame, colour: str, marker: str) -> None:
     """Draw singular values; values that are round-off are hollow, in a shaded region.
 
-    The region ends between the smallest value above round-off and the largest at round-off.
+    The region ends between the smallest value above round-off and the largest that is round-off.
     """
     component = rows.component.to_numpy(float)
     above = rows.above_roundoff.astype(bool).to_numpy()
@@ -309,7 +309,7 @@ def reconstruction_error(
 
 
 def _draw_errors(ax: Axes, rows: pd.DataFrame, method: str) -> bool:
-    """Draw the errors of ``method``, with arrows for larger ones; return whether it has any."""
+    """Draw the errors of ``method``, with arrows above the axis; return whether it has any."""
     colour, marker = style.method_styles([method])[method]
     drawn = False
     for split, dashes in style.SPLITS.items():

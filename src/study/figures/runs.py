@@ -23,7 +23,7 @@ from study.figures.sensitivity_floor import FLOORS, Floors
 from study.tables.kit.results import trained
 
 NOISY = {"all": "all axes", "plane": "in the plane", "vertex": "one vertex across"}
-WRONG = 0.1  # relative error above which a run has failed; so has a run that cannot start
+WRONG = 0.1  # relative error above which a run has failed; a run that cannot start has failed, too
 DISTANCES = (1e-4, 1.0)  # limits of the colour scale, in extents of the mesh
 FOOTER = 0.55  # height of the colour scale, inches
 TOLERANCE = "ecsw-1e-02"  # method of the position-subspace run in the first figure
@@ -42,7 +42,7 @@ full-order run at the same instant; a framed picture is drawn to the smaller sca
 
 @dataclass(frozen=True)
 class Shown:
-    """Experiment at the drawn frame, with its full-order positions and a text for the frame.
+    """A scene at the drawn frame, with its full-order positions and a text for the frame.
 
     full : (1, N, 3) full-order positions, m
     colour : RGB colour of the reduced runs
@@ -69,7 +69,7 @@ class Shown:
     def row(
         self, label: str, panels: list[RunPanel], window: Window, note: str | None = None
     ) -> Row:
-        """Row of the full-order panel followed by ``panels``, with ``label`` below the title."""
+        """Row of pictures: the full-order run, then ``panels``; ``label`` is below the title."""
         first = RunPanel("full order", style.FULL_ORDER, self.full[0], reference=True)
         panels = [replace(panel, obstacles=self.bodies) for panel in (first, *panels)]
         return Row(
@@ -85,7 +85,7 @@ class Shown:
 
 @dataclass(frozen=True)
 class Runs:
-    """Inputs of figures of runs: files of each scene, and ``reruns`` per scene and method."""
+    """Inputs of figures of runs: a file of each kind per scene, for ``reruns`` also per method."""
 
     options: ReducedRuns
     drawn: Drawn
@@ -105,7 +105,7 @@ class Runs:
         return Floors(self.sensitivity, self.horizon)
 
     def shown(self, experiment: Experiment) -> Shown:
-        """Data of ``experiment`` at the last of the instants in the options."""
+        """Data of the scene of ``experiment`` at the last of the options' instants."""
         path, instant = experiment.path(self.full_order), self.options.frames[-1:]
         (frame,), full = positions_at(path, instant)
         return Shown(
@@ -120,7 +120,7 @@ class Runs:
         )
 
     def reduced(self, shown: Shown) -> dict[str, list[RunPanel]]:
-        """Method -> panels of the experiment's reduced runs with the basis sizes in the options."""
+        """Panels of the reduced runs with the basis sizes in the options, by method."""
         found = {}
         for method in self.drawn.methods:
             path = shown.experiment.path(self.reruns, method=method)
@@ -142,11 +142,11 @@ class Runs:
         ]
 
     def draw(self) -> Figure:
-        """Draw a row per experiment and method: the full-order run, then reduced runs by size.
+        """Draw a row per scene and method: the full-order run, then reduced runs by size.
 
-        All pictures of an experiment show the last instant of the options with the same camera. A
-        picture that does not fit has a frame and its own scale, printed below. The grey outline is
-        the full-order run.
+        All pictures of a scene show the last instant of the options with the same camera. A picture
+        that does not fit has a frame and its own scale, printed below. The grey outline is the
+        full-order run.
         """
         return view.draw_rows([row for each in self.drawn.experiments for row in self.rows(each)])
 
@@ -157,7 +157,7 @@ def nothing_ran(panels: list[RunPanel]) -> bool:
 
 
 def obstacles_of(experiment: Experiment, positions: np.ndarray) -> list[Mesh] | None:
-    """Obstacles near ``positions`` (F, N, 3) m; None for a floor only, drawn as a shadow."""
+    """Obstacles near ``positions`` (F, N, 3) m; None if a floor, drawn as a shadow, is the only."""
     bodies = obstacles(positions, experiment.effects)
     floor = any(effect.effect == "floor" for effect in experiment.effects)
     return None if floor and len(bodies) == 1 else bodies
@@ -210,7 +210,7 @@ def bending_runs(
 def noise_rows(drawn: Drawn, shown: Shown, table: pd.DataFrame, path: str) -> list[Row]:
     """One row per method and kind of perturbed start; pictures state the number of failed starts.
 
-    Kinds of start with equal failure counts at every size share a row, with a run of the first.
+    Kinds with equal numbers of failures at every size share a row, which shows a run of the first.
 
     Parameters
     ----------
@@ -233,7 +233,7 @@ def noise_rows(drawn: Drawn, shown: Shown, table: pd.DataFrame, path: str) -> li
 
 
 def _alike(table: pd.DataFrame) -> dict[tuple[tuple[int, str], ...], list[str]]:
-    """(size r, text with the number of failed starts) for all sizes -> kinds of start."""
+    """Kinds of start by their failures: a text with the number of failed starts for each size r."""
     table = table[table.r <= table["rank"]]
     failed = ~(table.relative_error <= WRONG)
     kinds: dict[tuple[tuple[int, str], ...], list[str]] = {}
@@ -293,7 +293,7 @@ def cloth_all_grid(options: ReducedRuns, drawn: Drawn, horizon: Horizon, **files
 def _over_time(
     path: str, options: ReducedRuns, title: str, frames: list[int], full: np.ndarray, mesh: Mesh
 ) -> list[RunPanel] | None:
-    """Panels of a reduced run at ``frames``, coloured by distance; None if no size ran."""
+    """Panels of a reduced run at ``frames``, coloured by distance to ``full``; None if none ran."""
     infos = choose_ranks(rerun_infos(path), options.ranks)
     info = next((i for i in infos if not i.marked), None)
     if info is None:
@@ -361,7 +361,7 @@ def _teaser_row(
     for method, found in reduced.items() if ran else ():
         own = errors[(errors.group == experiment.group) & (errors.method == method)]
         drawn = [panel for panel in found if panel.positions is not None]
-        # if no chosen size exists, the panels are those of the largest sizes
+        # without a chosen size, `found` has the largest sizes
         sizes = (drawn or found)[-(len(runs.options.ranks) or 1) :]
         own = own[own.position_basis == "full"]
         panels += [_with_error(panel, method, own, "r") for panel in sizes]
@@ -373,7 +373,7 @@ def _teaser_row(
 
 
 def _with_error(panel: RunPanel, method: str, rows: pd.DataFrame, size: str) -> RunPanel:
-    """``panel`` with its method in the title, and its error within the horizon below."""
+    """Return ``panel`` with its method in the title, and its error before the horizon below."""
     number = int(panel.title.split()[2])
     error = rows[rows[size] == number].relative_error_within_horizon.dropna()
     remark = f"error {error.iloc[0]:.2g}" if len(error) else panel.remark
@@ -381,7 +381,7 @@ def _with_error(panel: RunPanel, method: str, rows: pd.DataFrame, size: str) -> 
 
 
 def _subspace(frame: int, path: str) -> RunPanel | None:
-    """Panel of the position-subspace run at ``frame``; None without a run of at most MODES."""
+    """Panel of the run in the largest subspace of at most `MODES` modes; None without one."""
     colour = style.surface_colour(style.GREEN)
     with open_hdf5(path) as file:
         models = file["models"]

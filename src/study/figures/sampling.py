@@ -30,20 +30,20 @@ NEWEST = {
     "markerfacecolor": "none", "markeredgecolor": style.SKY, "markeredgewidth": 1.6,
     "markersize": 8.5,
 }  # fmt: skip
-SEVERAL = "several"  # label of elements with sampled entries of several axes
+SEVERAL = "several"  # legend of elements with sampled entries of several axes
 AXES = {**style.AXES, SEVERAL: "#333333"}
 ROW_HEIGHT = 1.85  # height of a row of panels, inches
 
 
 class Steps(kit.View):
-    """Options: view and number of iterations; only the first scene and method are drawn."""
+    """Options: camera and number of iterations; only the first scene and method are drawn."""
 
     count: kit.Count = 6
     columns: kit.Columns = 3
 
 
 class Entries(kit.View):
-    """Options: view and basis sizes, of which the first that exists is drawn on the mesh."""
+    """Options: camera, and basis sizes, of which the first that exists is drawn on the mesh."""
 
     ranks: kit.Ranks = ()
 
@@ -52,11 +52,11 @@ class Entries(kit.View):
 class Iteration:
     """Step k of a greedy selection of samples.
 
-    magnitude : (e,) residual of mode k per element, in the measure that the selection maximises:
-        the largest entry (``rows`` "scalar"), the largest norm of a row over x, y, z ("joint"),
-        or the norm of all entries of the element ("element")
+    magnitude : (e,) size of mode k's residual on each element, which the selection maximises: the
+        largest entry (``rows`` "scalar"), the largest norm of a row over x, y, z ("joint"), or the
+        norm of all entries of the element ("element")
     earlier, newest : indices of the elements picked before, and of the element of this step
-    entry : vector index of the (first) entry picked in this step
+    entry : index in the mode of the (first) entry picked in this step
     """
 
     k: int
@@ -137,7 +137,7 @@ def iterations(
     Parameters
     ----------
     V : (3 e p, rank) modes of e elements with p = ``rows_per_element``
-    entries : vector indices in the order of selection: one per step for ``rows`` "scalar" and
+    entries : row indices of V in the order of selection: one per step for ``rows`` "scalar" and
         "joint" (the x entry of a row represents the row), 3 p per step for "element"
 
     Raises
@@ -169,7 +169,7 @@ def iterations(
 
 
 def _shared_residual(V: np.ndarray, entries: np.ndarray, k: int) -> np.ndarray:
-    """Residual of mode k with coefficients shared by all axes; least squares when oversampled."""
+    """Residual of mode k, with coefficients shared by all axes (least squares if oversampled)."""
     if k == 0:
         return V[:, 0]
     coefficients = np.linalg.lstsq(V[entries, :k], V[entries, k], rcond=None)[0]
@@ -288,15 +288,15 @@ def _draw_evaluations(ax: Axes, samplings: dict[str, list[SamplingView]], per_el
     style.grid(ax)
 
 
-# (left end, width, height) in inches of the four matrices, aligned at their upper ends
+# (left edge, width, height) of the four matrices in inches; their upper edges are aligned
 BLOCKS = ((0.75, 1.6, 1.9), (2.8, 1.6, 1.9), (4.8, 0.85, 0.85), (6.0, 0.85, 0.85))
 SIGNS = ((2.575, "="), (4.6, "×"), (5.825, "×"))
-ABOVE, TITLE, FOOTER = 0.36, 0.34, 0.44  # inches for two lines, for a title, for the scale
-LEFT, TALLEST = 0.75, 1.45  # left end and largest height of pictures, inches
+ABOVE, TITLE, FOOTER = 0.36, 0.34, 0.44  # heights of two lines, a title, the colour scale, inches
+LEFT, TALLEST = 0.75, 1.45  # left edge and largest height of pictures, inches
 
 
 class Snapshots(kit.View):
-    """Options: view, instants of the snapshots, and the number of modes."""
+    """Options: camera, instants of the snapshots, and number of modes."""
 
     frames: kit.Instants = (0.1, 0.5, 0.9)
     count: kit.Count = 6
@@ -405,7 +405,7 @@ def _draw_matrix(ax: Axes, matrix: np.ndarray, title: str) -> None:
 
 
 def _row(figure: Figure, count: int, bottom: float, height: float, label: str) -> list[Axes]:
-    """Axes of a row of pictures ``bottom`` inches above the lower edge, ``label`` on the left."""
+    """Axes for a row of pictures, ``bottom`` inches above the lower edge, with a ``label``."""
     whole, step = figure.get_figheight(), (style.WIDTH - LEFT) / max(count, 1) / style.WIDTH
     middle = (bottom + 0.5 * height) / whole
     figure.text(0.008, middle, label, va="center", fontsize=7.5)
@@ -422,7 +422,7 @@ def _row(figure: Figure, count: int, bottom: float, height: float, label: str) -
 def _draw_column(
     ax: Axes, elements: shapes.ElementMap, points: np.ndarray, column: np.ndarray, camera: Camera
 ) -> str:
-    """Draw the signed entry of each element relative to the largest; return the entry's name."""
+    """Draw one entry of each element, relative to the largest; return the entry's name."""
     values, words = shapes.signed_entry(column, len(column) // (3 * len(elements.cells)))
     largest = max(float(np.abs(values).max()), np.finfo(float).tiny)
     elements.draw(ax, points, values / largest, camera, shapes.signed())

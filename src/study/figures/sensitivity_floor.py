@@ -1,4 +1,4 @@
-"""Figure of the drift between full-order runs with perturbed starts, and of scene horizons."""
+"""Figure of the drift between full-order runs with perturbed starts, and of scenes' horizons."""
 
 from collections.abc import Sequence
 
@@ -24,7 +24,7 @@ COLUMNS = ["scene", "perturbation", "frame", "relative_difference"]
 
 
 class Floors:
-    """Sensitivity floor (drift of perturbed runs by frame) and horizon of each scene.
+    """Sensitivity floor (drift of perturbed runs by frame) and horizon (its frame above a limit).
 
     The attribute ``of`` maps a scene to its floor: the largest relative difference over all seeds
     by frame (F,), empty if the scene has no perturbed runs.
@@ -50,7 +50,7 @@ class Floors:
         return end if end < len(self.of[scene]) else None
 
     def instant(self, scene: str, frame: int) -> str:
-        """Label of ``frame``, marked if it is past the scene's horizon and cannot be compared."""
+        """Text with ``frame``, and a remark if it is past the scene's horizon: not comparable."""
         end = self.horizon(scene)
         return f"frame {frame}" if end is None or frame <= end else f"frame {frame}, past horizon"
 

@@ -10,7 +10,7 @@ from pdrom.view.artists import Axes, Figure
 from study.artifact.reads import TableOf
 from study.figures.kit.declaration import Drawn, Methods, NothingToDraw, Ranks, figure
 
-CELLS = 48  # largest width of a strip in cells; further blocks go to another strip
+CELLS = 48  # largest width of a row of blocks, in cells; further blocks go to another row
 ROW = 0.145  # height of a row of cells, inches
 GAP = 0.45  # distance between blocks, in cells
 LEAST = 2.0  # smallest width of a title, in cells
@@ -21,8 +21,8 @@ DENSE = 30  # above this number of columns, labels are vertical and titles have 
 class Look:
     """Look of an outcome: cell colour, symbol in the cell and its colour, legend text.
 
-    Outcomes also differ in lightness, and cells of failed runs have a symbol, so that they can be
-    distinguished without colour. The symbol of a blow-up is its frame.
+    Outcomes can be told apart without colour: they differ in lightness, and cells of failed runs
+    have a symbol. The symbol of a blow-up is the number of its frame.
     """
 
     face: str
@@ -41,12 +41,12 @@ LOOKS = {
 }
 
 
-Cells = dict[tuple[str, str], pd.Series]  # (scene, group) -> row of the table
+Cells = dict[tuple[str, str], pd.Series]  # (scene, group) -> row of the table stability
 
 
 @dataclass(frozen=True)
 class Block:
-    """Neighbouring columns under one title, with a label and the cells of each column."""
+    """Neighbouring columns of cells under one title; each column has a label."""
 
     title: str
     labels: Sequence[str]

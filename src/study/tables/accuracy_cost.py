@@ -1,12 +1,12 @@
-"""Tables of error against time: points of each method and size, tolerances, pay-off.
+"""Tables of error against time: each method and size, requested tolerances, and where methods pay.
 
 The error of a point has one of two references; only rows with the same reference are comparable.
-The reference of ``fom`` and ``fom-anderson`` is the full-order run whose frames are converged, with
-K -> infinity; for all other methods it is the scene's own full-order run with a finite number.
+For ``fom`` and ``fom-anderson`` it is a full-order run with converged frames (K -> infinity local/
+global iterations), for all other methods the scene's own full-order run with its finite number K.
 
 Among the other methods, ``full`` without a position subspace is the scene's own full-order run,
 with error zero by definition. ``fewer-iterations`` is the full-order run with fewer iterations,
-which a reduction must beat. ``fom-anderson`` is a full-order run with accelerated iterations.
+which a reduction must beat. ``fom-anderson`` is a full-order run with Anderson acceleration.
 """
 
 from collections.abc import Mapping, Sequence
@@ -59,9 +59,9 @@ def accuracy_cost(
     iterations: Mapping[str, int],
     **files: list[paths.File],
 ) -> pd.DataFrame:
-    """Points of full-order runs, and of reduced runs with a time and an error within the horizon.
+    """One row per full-order run, and per reduced run with a time and an error before the horizon.
 
-    A point is Pareto-optimal among the points of its scene whose errors have the same reference.
+    The column ``pareto`` compares rows of the same scene whose errors have the same reference.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ def accuracy_cost(
 
 
 def _sweep(errors: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
-    """Full-order runs of every K (`FOM`, `ANDERSON`), and those below the scene's K as `FEWER`."""
+    """Full-order runs by number of iterations; those with fewer than the scene also as `FEWER`."""
     full = times[times.method.isna() | times.method.isin([FOM, ANDERSON])]
     cost = full[["scene", "method", "iterations", "ms_per_frame"]]
     cost = cost.fillna({"method": FOM})
@@ -110,7 +110,7 @@ def reference_of(points: pd.DataFrame) -> pd.Series:
 
 
 def pareto(error: Sequence[float], cost: Sequence[float]) -> list[bool]:
-    """Whether, for each point, no other is as good in ``error`` and ``cost`` and better in one."""
+    """Whether each point is Pareto-optimal: no other is as good in both, and better in one."""
     return [
         not any((e <= a) & (c <= b) & ((e < a) | (c < b)) for e, c in zip(error, cost, strict=True))
         for a, b in zip(error, cost, strict=True)
@@ -162,7 +162,7 @@ def requested_tolerances(runs: list[paths.File]) -> pd.DataFrame:
 
 # Columns that identify a curve, the rows that differ only in size r.
 CURVE = ["scene", "group", "method", "factor"]
-OWN_MESH = "1"  # mesh factor of a scene's configured mesh, which the files ``own`` contain
+OWN_MESH = "1"  # value of the column ``factor`` for a scene's configured mesh
 SHARE = 1e-3  # groups with at most this share of the force of a scene are negligible
 _ERROR = "relative_error_within_horizon"
 
@@ -183,11 +183,11 @@ _ERROR = "relative_error_within_horizon"
     reads={"own": Every(paths.BREAK_EVEN), "sized": Every(paths.BREAK_EVEN_SIZED)},
 )
 def breakeven(own: list[paths.File], sized: list[paths.File]) -> pd.DataFrame:
-    """One row per size r of each curve (see `CURVE`), with local-step times and break-even size.
+    """One row per scene, group, method, mesh and size r: local-step times and break-even size.
 
     Files ``own`` are for the configured mesh of each scene, ``sized`` for other mesh sizes.
 
-    ``breakeven_r`` is one value per curve. It is empty if the reduction is still faster at the
+    ``breakeven_r`` does not depend on r. It is empty if the reduction is still faster at the
     largest size (the numerical rank), and the smallest size tried if it is never faster.
     """
     rows = joined([*own, *(file for file in sized if file["factor"] != OWN_MESH)])
@@ -206,7 +206,7 @@ def break_even(r: Sequence[int], ratio: Sequence[float]) -> int | None:
     """Smallest size from which on the reduced local step costs at least as much as the full one.
 
     The ratio is interpolated linearly between the last size with a ratio below one and the next.
-    None if the ratio is below one at the largest size; the smallest size if it never is below.
+    Return None if the ratio is below one at the largest size, the smallest size if it never is.
 
     Parameters
     ----------
@@ -253,10 +253,10 @@ def break_even(r: Sequence[int], ratio: Sequence[float]) -> int | None:
 def payoff(reruns: pd.DataFrame, points: pd.DataFrame, effects: pd.DataFrame) -> pd.DataFrame:
     """One row per position basis and method, over all scenes and sizes that ran and were timed.
 
-    Sizes are chosen by the training motion in the table ``reruns`` and evaluated on the held-out
-    motions, see `with_held_out`. Groups with at most `SHARE` of the force of a scene are left out.
-    The first row is the full order with fewer iterations (from ``points``), compared with the same
-    run of the scene as all reductions; it has no held-out columns, as it needs no training.
+    Sizes are chosen by the error on the training motion and evaluated on held-out motions. Groups
+    with at most `SHARE` of the force of a scene are left out. The first row is the full order with
+    fewer iterations (from ``points``). As it needs no training, it has no held-out columns. All
+    speed-ups are over the scene's own full-order run.
     """
     shares = effects.set_index(["scene", "effect"]).force_share
     weak = shares.index[shares <= SHARE]
@@ -271,7 +271,7 @@ def payoff(reruns: pd.DataFrame, points: pd.DataFrame, effects: pd.DataFrame) ->
         speed = fastest.speedup.to_numpy(float)
         best = own.sort_values(_ERROR, kind="stable").groupby(["scene", "group"]).head(1)
         seen = best[best.error_heldout.notna()]
-        # one run for every scene and group, so that medians of all methods cover the same cases
+        # one run per scene and group, so that medians of all methods cover the same groups
         every = pd.concat([fastest, best[~(best[_ERROR] <= FAILED)]])
         rows.append({
             "position_basis": basis,

@@ -1,6 +1,6 @@
 """Errors and times of projective dynamics, of alternative solvers and of reductions.
 
-Table winners gives the fastest method for each error and the meshes on which a reduction is faster.
+Table winners has the fastest method for each allowed error, and meshes where it is a reduction.
 """
 
 from collections.abc import Sequence
@@ -32,14 +32,14 @@ MOTION = text("motion", f"held-out motion, one of: {', '.join(MOTIONS)}")
 # Columns that identify a candidate (a solver with its settings) in all motions.
 CANDIDATE = ["scene", "factor", "stiffness", *settings.SETTING]
 
-# Rounding decides which iterates a two-level iteration rejects: errors differ between machines.
+# Tolerance of errors between machines: rounding decides which iterates two-level methods reject.
 LOOSE = 0.3
 REFERENCES = ("implicit", "continuous")
 CASE = ["scene", "vertices", "stiffness", "motion"]
 SPEEDUP = ("reduced_speedup", "reduced_speedup_low", "reduced_speedup_high")
 CURVE = ["scene", "stiffness", "reference", "limit"]
 PLAIN = "projective"
-KNOWN = 3.0  # a motion counts for an error limit of at least this factor times its reference error
+KNOWN = 3.0  # allowed errors below this multiple of the reference's own error are not evaluated
 
 
 @table(
@@ -75,7 +75,7 @@ KNOWN = 3.0  # a motion counts for an error limit of at least this factor times 
     reads={"parts": Every(paths.ALTERNATIVES), "times": Every(paths.ALTERNATIVE_TIMES)},
 )
 def alternatives(parts: list[paths.File], times: list[paths.File]) -> pd.DataFrame:
-    """One row per candidate and held-out motion, in the order of the files ``parts``.
+    """One row per solver with its settings and held-out motion, in the order of files ``parts``.
 
     ``times`` has the frame times measured in each process; the table gives their medians.
     """
@@ -93,14 +93,14 @@ def alternatives(parts: list[paths.File], times: list[paths.File]) -> pd.DataFra
 
 
 def beside(rows: pd.DataFrame, times: pd.DataFrame) -> tuple[pd.DataFrame, list[int]]:
-    """Join ``rows`` with ``times`` (ms), a column per process; return these column names, too."""
+    """Join ``rows`` with a column of times (ms) per process; also return these columns' names."""
     wide = times.set_index([*CANDIDATE, "process"]).ms_per_frame.unstack("process")
     wide["vertices_ms"] = times.groupby(CANDIDATE, dropna=False).vertices_ms.median()
     own = rows.drop(columns="vertices_ms", errors="ignore")
     return own.merge(wide.reset_index(), on=CANDIDATE, how="left"), list(wide.columns[:-1])
 
 
-# The winning row depends on the measured times, hence all columns about it are marked as timed.
+# The fastest method depends on measured times, so that all columns about it are marked as timed.
 @table(
     title="Who reaches an error in the shortest time",
     columns=(
@@ -143,8 +143,8 @@ def beside(rows: pd.DataFrame, times: pd.DataFrame) -> tuple[pd.DataFrame, list[
 def winners(rows: pd.DataFrame, times: list[paths.File], limits: Sequence[float]) -> pd.DataFrame:
     """One row per scene, mesh, stiffness, motion, reference and error limit.
 
-    The method is empty if none reaches the limit. Limits below `KNOWN` times the error of the
-    continuous-time reference have no row. Some methods run in the first motion only.
+    The method is empty if no method reaches the limit. Limits below `KNOWN` times the error of the
+    continuous-time reference have no row. Some methods were run in the first motion only.
     """
     found = []
     if len(rows):
@@ -168,7 +168,7 @@ def winners(rows: pd.DataFrame, times: list[paths.File], limits: Sequence[float]
 
 
 def _best(rows: pd.DataFrame, limit: float, processes: list[int]) -> dict[str, object]:
-    """Columns of the fastest, second and reduced method within ``limit``, as far as they exist.
+    """Columns about the fastest, the second and the reduced method with an error within ``limit``.
 
     A speed-up is the median over ``processes`` of ratios of two times within one process.
     """
@@ -204,7 +204,7 @@ def _best(rows: pd.DataFrame, limit: float, processes: list[int]) -> dict[str, o
 
 def _pays(curve: pd.DataFrame) -> dict[str, object]:
     """Mesh sizes from which a reduction is faster in every motion (or None), and its speed-ups."""
-    # NaN where a method misses the error limit in one of the motions
+    # speed-ups are NaN where a method misses the error limit in one of the motions
     every = curve.assign(plain=curve.plain_ms / curve.reduced_ms)
     worst = every.groupby("vertices")[["plain", "reduced_speedup"]].agg(
         lambda speedups: speedups.min(skipna=False)

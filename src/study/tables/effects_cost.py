@@ -72,10 +72,10 @@ def effects_cost(
 
     Parameters
     ----------
-    parts, left_out : times of effects, and of scenes without some of them; `in_one_time` scales
-        them to the full-order times in ``frame_times``
+    parts, left_out : times of effects, and of scenes without some of them; they are scaled to the
+        full-order times in ``frame_times``
     contributions : forces and energies by frame
-    sensitivity, horizon : arguments of `horizons`, the end of each scene's comparable frames;
+    sensitivity, horizon : drift of perturbed runs and its limit, which ends the compared frames;
         ``moved`` is empty for the only group of a scene, which cannot be left out
     """
     costs, removed = results.joined(files["parts"]), results.joined(files["left_out"])
@@ -105,7 +105,7 @@ def effects_cost(
 
 
 def _absent(rows: pd.DataFrame, others: pd.DataFrame) -> np.ndarray:
-    """Boolean array: whether ``others`` lacks the scene and effect of each of ``rows``."""
+    """Boolean array: for each of ``rows``, whether ``others`` has no row of scene and effect."""
     keys, known = (pd.MultiIndex.from_frame(each[KEYS]) for each in (rows, others))
     return ~keys.isin(known)
 
@@ -124,7 +124,7 @@ def _acting(frames: pd.DataFrame, sensitivity: pd.DataFrame, horizon: Horizon) -
     ends = horizons(sensitivity, horizon.perturbation, horizon.threshold)
 
     def largest(scene: str, label: float | str) -> float | None:
-        """Largest drift of run ``label`` before the horizon; None without such a run or frame."""
+        """Largest drift of the run ``label`` before the horizon; None without run or frame."""
         drift = floor_of(sensitivity, scene, label)[: ends[scene]]
         return float(drift.max()) if len(drift) else None
 
@@ -149,7 +149,7 @@ def _acting(frames: pd.DataFrame, sensitivity: pd.DataFrame, horizon: Horizon) -
 def local_share(timings: list[File], frame_times: pd.DataFrame) -> pd.DataFrame:
     """One row per scene and implementation, with ``timings`` scaled to the table ``frame_times``.
 
-    Assembly is added to the local step, as compiled kernels project and scatter in one pass.
+    Shares include assembly of the right-hand side: compiled kernels project and assemble in a pass.
     """
     times = results.timings_in_one_time(timings, frame_times)
     full = times[times.method.isna()].copy()
@@ -206,7 +206,7 @@ _MODEL = ["scene", "position_basis", "k", "method"]
 _REDUCTION = ["scene", "group", "method", "r"]
 _LABELS = ["scene", "group", "method", "position_basis", "k", "r"]
 _ERROR = "relative_error_within_horizon"
-# The control times the full-order run a second time. If both times differ by more than this factor,
+# The full-order run is timed twice as a control. If both times differ by more than this factor,
 # speed-ups are not shown. Fixed on 2026-11-22, before any control had been measured.
 CONFIRMED = 1.5
 UNCONFIRMED = "not confirmed by its control"
@@ -233,7 +233,7 @@ _TIMES = ["ms_per_frame", "vertices_ms", "speedup", "speedup_low", "speedup_high
     reads={"parts": Every(paths.FRAME_TIMES)},
 )
 def frame_times(parts: list[File]) -> pd.DataFrame:
-    """One row per scene in ``parts``: medians over processes, ratios within a process."""
+    """One row per scene: median frame times over processes, and medians of ratios in a process."""
     rows = results.joined(parts)
     if rows.empty:
         return rows
@@ -309,7 +309,7 @@ def speedups(times: pd.DataFrame, reruns: pd.DataFrame, **files: list[File]) -> 
 
 
 def timed_reductions(rows: pd.DataFrame, times: pd.DataFrame) -> Iterator[dict]:
-    """Labels, median times and speed-up of each reduction over the processes, as dictionaries.
+    """Yield scene, group, method ..., median times and speed-up of each reduction, as dictionaries.
 
     Parameters
     ----------
@@ -350,13 +350,13 @@ def _errors(reruns: pd.DataFrame, keys: list[str]) -> pd.DataFrame:
 
 
 def large_errors(large: pd.DataFrame) -> pd.DataFrame:
-    """Errors of each model of large scenes over whole runs; ``large`` has all motions."""
+    """Errors of each model of large scenes over all frames; ``large`` has rows of all motions."""
     whole = large.rename(columns={"relative_error": _ERROR}).assign(horizon_frame=1)
     return _errors(whole, _MODEL)
 
 
 def _first_known(made: pd.DataFrame, sources: list[pd.DataFrame], column: str) -> pd.DataFrame:
-    """Fill ``column`` of ``made`` from the first of ``sources`` that has a value for the row."""
+    """Return ``made`` with ``column`` from the first of ``sources`` that has a value for a row."""
     found = pd.Series(float("nan"), made.index)
     for source in sources:
         keys = [key for key in _LABELS if key in source.columns]

@@ -1,11 +1,11 @@
 """Tables of errors: of reconstructions, perturbed runs, and single choices of the method.
 
-Table gain_interventions shows whether the error of a run falls if only the gain is lowered. A
-correlation of gain and error over methods may have any difference of the methods as its cause. The
-methods compared there have the same basis and size. They differ in the sampling, or in whether the
-axes share coefficients (four combinations, from table ladder). If separate coefficients did harm
-only by their gain, a lower gain would also lower the error for coefficients of one kind: the last
-two steps compare all such pairs of runs, ordered by gain.
+Table gain_interventions shows whether the error of a run falls if only the gain is lowered (the
+gain is the amplification of errors by the samples). A correlation of gain and error over methods
+may have any difference of the methods as its cause. The methods compared there have the same basis
+and size. They differ in the sampling, or in whether the axes share coefficients (four combinations,
+from table ladder). If separate coefficients did harm only by their gain, a lower gain would also
+lower the error among methods with the same kind of coefficients: the last two steps compare them.
 """
 
 from collections.abc import Iterator, Mapping
@@ -36,7 +36,7 @@ _CELL = ["scene", "group", "method", "r", "varied"]
         number("relative", "over the first one"),
         flag("above_roundoff", "larger than the rounding errors of the projections"),
     ),
-    # only bases without weights and centring; other bases depend on the configuration
+    # one basis per group, without weights and centring if a method of the study has such a basis
     reads={"bases": EachOf(paths.BASIS, "usual_bases")},
 )
 def singular_values(bases: list[paths.File]) -> pd.DataFrame:
@@ -68,7 +68,7 @@ def singular_values(bases: list[paths.File]) -> pd.DataFrame:
     reads={"parts": Every(paths.RECONSTRUCTION)},
 )
 def reconstruction_error(parts: list[paths.File]) -> pd.DataFrame:
-    """Rows of the files ``parts`` of all methods, in order."""
+    """Rows of all files ``parts``, one file per scene, group and method, in order."""
     return joined(parts)
 
 
@@ -83,7 +83,7 @@ def reconstruction_error(parts: list[paths.File]) -> pd.DataFrame:
     reads={"parts": Every(paths.SENSITIVITY)},
 )
 def sensitivity(parts: list[paths.File]) -> pd.DataFrame:
-    """Largest difference in ``parts`` over the seeds, per scene, perturbation and frame."""
+    """Largest relative difference over the seeds, per scene, perturbation and frame."""
     keys = ["scene", "perturbation", "frame"]
     rows = joined(parts).groupby(keys, sort=False, as_index=False)
     return rows["relative_difference"].max()
@@ -129,7 +129,7 @@ def noise(parts: list[paths.File]) -> pd.DataFrame:
     reads={"parts": Every(paths.REPETITIONS)},
 )
 def repetitions(parts: list[paths.File]) -> pd.DataFrame:
-    """One row per scene, group, method, r and variation, with statistics over its repetitions.
+    """One row per scene, group, method, r and what is varied, with statistics over repetitions.
 
     The median of a distribution lies outside the range of n independent draws with probability
     2^(1 - n): five draws enclose it with probability 15/16, whatever the distribution is.
@@ -193,7 +193,7 @@ SQUARE = {
     "whole elements, separate coefficients": ("single rows, separate", "whole elements, separate"),
     "whole elements, shared coefficients": ("single rows, shared", "whole elements, shared"),
 }
-# Methods by kind of coefficients; their runs are compared in pairs, ordered by gain.
+# Methods with the same kind of coefficients; any two of their runs are compared, by falling gain.
 KINDS = {
     "lower gain, shared coefficients": ("deim", "block-deim", "gappy"),
     "lower gain, separate coefficients": ("deim-joint", "published"),
@@ -201,7 +201,7 @@ KINDS = {
 _PLACE = ["scene", "group", "r"]
 VOLUMES = ("deformation_gradient", "tetrahedron_strain", "volume")  # groups of tetrahedra
 MESHES = ALL, SHEETS, BARS = "all", "sheets", "bars"
-# Constructor of columns that summarise many runs.
+# Constructor of number columns that summarise many runs, with the tolerance of shares.
 share = partial(number, compared="share")
 
 
@@ -233,11 +233,11 @@ share = partial(number, compared="share")
 def gain_interventions(
     reruns: pd.DataFrame, reconstruction: pd.DataFrame, ladder: pd.DataFrame
 ) -> pd.DataFrame:
-    """Rows of each step and kind of mesh, from runs by `judged_runs` and the table ``ladder``.
+    """One row per step (change of method that lowers the gain) and kind of mesh.
 
     Results of one family (a scene and its variant, "twin") are dependent: the bootstrap
-    resamples families and the sign test counts families. Errors below the sensitivity floor are
-    raised to it. A run that ended early has an infinite error; a pair of two such runs is left out.
+    resamples families and the sign test counts families. Errors below the drift of perturbed runs
+    are raised to it. A run that ended early has an infinite error; two such runs make no pair.
     """
     runs = judged_runs(reruns, reconstruction)
     rows = []
@@ -253,7 +253,7 @@ def gain_interventions(
 def _steps(
     runs: pd.DataFrame, square: pd.DataFrame
 ) -> Iterator[tuple[str, str, str, pd.DataFrame]]:
-    """Name of each step, method before, method after, and table of the compared pairs."""
+    """Yield name of each step, method before, method after, and table of the compared runs."""
     for name, methods in STEPS.items():
         yield name, *methods, _pairs(runs, *methods)
     for name, (before, after) in SQUARE.items():
@@ -271,7 +271,7 @@ def _steps(
 
 
 def _square(ladder: pd.DataFrame, runs: pd.DataFrame) -> pd.DataFrame:
-    """Ladder runs of the four combinations, at the scenes, groups and sizes in ``runs``."""
+    """Runs of table ladder by coefficients and samples (`SQUARE`), for groups and sizes in runs."""
     chosen = ladder[(ladder.direction == "square") & ladder.gain.notna()]
     chosen = chosen.rename(columns={"rung": "method"})
     error = chosen.relative_error_within_horizon.astype(float).fillna(np.inf)

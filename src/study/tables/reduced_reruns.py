@@ -1,4 +1,4 @@
-"""Tables of reduced runs: their errors and times, and the cases in which each method fails."""
+"""Tables of reduced runs: errors and times, outcomes by method, and outcomes in hard cases."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -63,7 +63,7 @@ def reduced_reruns(
     full_order : runs of all motions
     runs, rows, rows_heldout : HDF5 files of the runs, and their tables in the same order
     subspaces, subspace_rows, subspace_rows_heldout : such files for runs in position subspaces
-    sensitivity, horizon : arguments of `horizons`; a held-out motion is a label in the table
+    sensitivity, horizon : drift of perturbed runs of each motion, and its limit (`horizons`)
     """
     judged: list[pd.DataFrame] = []
     for motion in (TRAIN, *MOTIONS):
@@ -89,7 +89,7 @@ def reduced_reruns(
 
 
 def _played(full_order: list[File], ends: Mapping[str, int], motion: str) -> pd.DataFrame:
-    """Rows of playback on the held-out ``motion`` of every scene; ``ends`` are the horizons."""
+    """Errors of showing the recorded training motion in place of ``motion``; ``ends``: horizons."""
     runs = {(run["scene"], run["run"]): run for run in full_order}
     rows = []
     for scene in dict.fromkeys(run["scene"] for run in full_order):
@@ -106,7 +106,7 @@ def _played(full_order: list[File], ends: Mapping[str, int], motion: str) -> pd.
 
 
 def _judged(run: File, row: File, end: int, motion: str) -> pd.DataFrame:
-    """Table ``row`` of one motion with errors; a file without a group has reduced positions."""
+    """Rows of one motion in table ``row``, with errors before frame ``end`` from file ``run``."""
     table = read_table(row.path)
     if motion != TRAIN:  # tables of training runs have no column "motion"
         table = table[table.motion == motion]
@@ -126,7 +126,7 @@ def _judged(run: File, row: File, end: int, motion: str) -> pd.DataFrame:
 def _errors(
     runs: Sequence[h5py.Group], reference: Series, end: int, units: Mapping[str, Any]
 ) -> dict[str, list[float | None]]:
-    """Errors before frame ``end`` by name; None for sizes above the rank, which have no frames."""
+    """Errors of each run before frame ``end``, by name; None for a run without frames."""
     known = {unit: float(units[unit]) for unit in ("extent_norm", "time_step")}
     found = [
         errors_within({series: run[series][...] for series in DEVIATIONS}, reference, end, **known)
@@ -138,7 +138,7 @@ def _errors(
 
 
 def _with_times(runs: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
-    """``runs`` with their times and the speed-up over the compiled full-order run."""
+    """Return ``runs`` with times and with speed-ups over the compiled full-order run."""
     full = times[times.method.isna() & (times.implementation == "compiled")]
     reference = full.set_index("scene").ms_per_frame
     reduced = times[times.method.notna()].copy()
@@ -151,7 +151,7 @@ def _with_times(runs: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
     local = runs[runs.position_basis == "full"].merge(
         reduced.loc[~inside, keys + measured], on=keys, how="left"
     )
-    # timings of subspace models are matched by their size k, as r is their number of elements
+    # match times of subspace models by size k: their r is the number of evaluated elements
     keys = [k for k in KEYS if k != "r"]
     subspace = runs[runs.position_basis != "full"]
     if len(subspace) == 0:
@@ -161,10 +161,10 @@ def _with_times(runs: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
     return pd.concat([local, subspace], ignore_index=True)
 
 
-# further results of a run are used only if its outcome is the first of these
+# possible outcomes; only runs with the first one are used further
 OUTCOMES = ("accurate", "wrong", "left the scene", "blow-up", "not run", "not judged")
 SETTING = ["experiment", "scene", "h", "stiffness_ratio"]  # columns that identify a full-order run
-# Share of the runs on degenerate meshes whose outcome may differ between machines by rounding.
+# Fraction of runs on degenerate meshes whose outcome may differ between machines, by rounding.
 FRAGILE = 0.005
 
 
@@ -214,7 +214,7 @@ def stability(
 
 
 def outcomes(runs: pd.DataFrame, wrong: float, departure: float) -> list[str]:
-    """Outcome of each of ``runs``; ``wrong`` limits the error, ``departure`` the extent."""
+    """Outcome of each run; ``wrong``: largest error, ``departure``: largest relative extent."""
     full = runs[(runs.method == "full") & (runs.position_basis == "full")]
     extents = full.set_index(SETTING).max_extent.rename("full_extent")
     error = runs.relative_error.astype(float)
@@ -268,5 +268,5 @@ def _rerun_rows(
     reads={"parts": Every(paths.HARD_CASES)},
 )
 def hard_cases(parts: list[File]) -> pd.DataFrame:
-    """Rows of the files ``parts`` in the order of the cases and methods."""
+    """Rows of the files ``parts``, in the order of the hard cases and methods."""
     return joined(parts)

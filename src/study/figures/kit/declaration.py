@@ -34,7 +34,7 @@ from study.artifact.paths import FIGURE, FIGURE_PICTURE, File
 from study.artifact.reads import Read, Setting, Settings
 
 Names = tuple[str, ...]
-Ranks = tuple[Annotated[int, Field(ge=0)] | Literal["full"], ...]  # full: the numerical rank
+Ranks = tuple[Annotated[int, Field(ge=0)] | Literal["full"], ...]  # "full" is the numerical rank
 Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
 Instants = Annotated[tuple[Fraction, ...], Field(min_length=1)]  # fractions of a run's length
 Columns = Annotated[int, Field(ge=1, le=6)]  # number of panels in a row
@@ -72,19 +72,19 @@ class Options(ConfigModel):
 
 
 class Scenes(Options):
-    """Options: scenes, in the order in which they are drawn."""
+    """Options of a figure: scenes, in the order in which they are drawn."""
 
     scenes: Names = ()
 
 
 class Methods(Scenes):
-    """Options: scenes and reduction methods, in the order in which they are drawn."""
+    """Options of a figure: scenes and reduction methods, in the order in which they are drawn."""
 
     methods: Names = ()
 
 
 class View(Methods):
-    """Options: elevation of the camera, degrees; up in the picture is opposite to gravity."""
+    """Options of a figure: elevation of the camera, degrees; gravity points down in the picture."""
 
     elevation: Annotated[float, Field(ge=-90.0, le=90.0)] = 20.0
 
@@ -94,7 +94,7 @@ class View(Methods):
 
 
 class Beside(Scenes):
-    """Options: panels per row, and scene -> experiment of the published code drawn with it."""
+    """Options: number of panels per row, and the published code's experiment for each scene."""
 
     columns: Columns = 3
     published: dict[str, str] = Field(default_factory=dict)
@@ -115,7 +115,7 @@ class Experiment(_Plain):
     """A constraint group that is reduced in a scene.
 
     mesh, effects : identifier of the scene's mesh, and all of its effects
-    only : whether the scene reduces no other group
+    only : True if the scene reduces no other group
     """
 
     scene: str
@@ -131,7 +131,7 @@ class Experiment(_Plain):
 
     @property
     def labels(self) -> dict[str, str]:
-        """Labels that identify the files of the experiment."""
+        """Scene, group and mesh, by name, as they occur in the paths of the files."""
         return {"scene": self.scene, "group": self.group, "mesh": self.mesh}
 
     @property
@@ -141,13 +141,13 @@ class Experiment(_Plain):
         return name if self.only else f"{name}: {self.group.replace('_', ' ')}"
 
     def find(self, files: Sequence[File], **labels: str) -> str | None:
-        """Path of the first of ``files`` with the experiment's and further ``labels``, or None."""
+        """Path of the first of ``files`` of this scene, group, mesh and ``labels``; else None."""
         own = self.labels | labels
         found = (f.path for f in files if all(own.get(k, v) == v for k, v in f.labels.items()))
         return next(found, None)
 
     def path(self, files: Sequence[File], **labels: str) -> str:
-        """Path of the first matching file, see `find`; raise LookupError if there is none."""
+        """Path of the first file that `find` finds; LookupError if there is none."""
         path = self.find(files, **labels)
         if path is None:
             raise LookupError(f"no file of {self.labels | labels}")
@@ -155,7 +155,7 @@ class Experiment(_Plain):
 
 
 class Reduction(_Plain):
-    """Title of a reduction method, and the rows that it samples (`MethodSpec.rows`)."""
+    """Title of a reduction method, and the kind of rows that it samples (`MethodSpec.rows`)."""
 
     title: str
     rows: str
@@ -164,7 +164,7 @@ class Reduction(_Plain):
 class Drawn(_Plain):
     """The experiments and methods of a study that a figure draws, selected by its options.
 
-    experiments, reductions : selected experiments, and methods by name, in the requested order
+    experiments, reductions : selected scenes with a reduced group, and methods by name, in order
     groups : all constraint groups of the model, whose order decides their colours
     """
 
@@ -198,7 +198,7 @@ class Drawn(_Plain):
         return plain_words(held.title if held else method)
 
     def handles(self, looks: Mapping[str, tuple[str, str]], **common: Any) -> list[Line2D]:
-        """Legend entries titled by method, with (colour, marker) ``looks`` and ``common`` style."""
+        """Legend entry of each method in ``looks`` (colour, marker), with style ``common``."""
         return [
             style.handle(self.title(method), color=colour, marker=marker, **common)
             for method, (colour, marker) in looks.items()
@@ -215,7 +215,7 @@ class Drawn(_Plain):
         return scenes
 
     def rows(self, table: pd.DataFrame) -> pd.DataFrame:
-        """Rows of ``table`` whose experiment and method are selected."""
+        """Rows of ``table`` whose scene, group and method are selected."""
         pairs = pd.MultiIndex.from_frame(table[["scene", "group"]])
         held = pairs.isin([(each.scene, each.group) for each in self.experiments])
         return table[held & table.method.isin(self.methods)]
@@ -233,12 +233,12 @@ ELSEWHERE = "the full study (config/default.yaml) draws it"
 class Declaration(Artifact):
     """Figure of the study, with the name of the function that draws it.
 
-    The function gets its inputs and ``options``, whose type defines the keys and defaults of the
-    figure in config/figures.yaml. It raises `NothingToDraw` if the configuration has no data for
-    the figure, and StorageError for a damaged file.
+    The function gets its inputs and ``options``, whose type defines keys and defaults of the
+    figure's options in config/figures.yaml. It raises `NothingToDraw` if the configuration has no
+    data for the figure, and StorageError for a damaged file.
 
-    title, caption : text in light mark-up (`study.artifact.markup`); ``{key}`` in a caption names
-        a setting of the configuration
+    title, caption : text in the mark-up of `study.artifact.markup`; ``{key}`` in a caption stands
+        for the value of a setting
     number : number of the reproduced figure in the preprint; None for a figure of this study
     """
 
@@ -290,8 +290,8 @@ def figure(
 ) -> Callable[[Callable[..., Figure]], Declaration]:
     """Return a decorator that declares a function, called with ``options`` and inputs, as a figure.
 
-    If the function has a parameter ``drawn``, it also gets the experiments and methods selected by
-    the options. The caption is the docstring and then ``more``; line breaks count as blanks.
+    A function with a parameter ``drawn`` also gets the scenes, groups and methods selected by the
+    options. The caption is the docstring followed by ``more``; line breaks count as blanks.
 
     Raises
     ------

@@ -37,7 +37,7 @@ def signed() -> ScalarMappable:
 
 @dataclass(frozen=True)
 class ElementMap:
-    """Elements of one constraint group on one mesh.
+    """Elements of one constraint group on one mesh, which `draw` colours by values.
 
     kind : mesh entity of an element: vertex, edge, triangle or tetrahedron
     cells : (e, m) vertex indices of each element
@@ -54,8 +54,8 @@ class ElementMap:
     def face_values(self, values: np.ndarray) -> np.ndarray:
         """Values of the elements (e,) transferred to the surface triangles (T,).
 
-        A triangle gets its own value, the value of its tetrahedron, or the mean over vertices: of
-        their values (NaN if none has one), or of the mean values of the edges at each vertex.
+        A triangle gets its own value, the value of its tetrahedron, or the mean of its vertices
+        (NaN if none has a value). The value of a vertex is its own, or the mean over its edges.
         """
         triangles = self.mesh.triangles
         if self.kind == "triangle":
@@ -85,7 +85,7 @@ class ElementMap:
         camera: Camera,
         colours: ScalarMappable,
     ) -> None:
-        """Draw on ``ax``, seen by ``camera``, the mesh with vertices at ``points`` (N, 3) m.
+        """Draw the mesh with vertices at ``points`` (N, 3) m on ``ax``, as seen by ``camera``.
 
         Each element has a value in ``values`` (e,), which ``colours`` maps to a colour.
         """
@@ -102,12 +102,12 @@ class ElementMap:
 
 
 def element_map(group: str, mesh: Mesh, elements: int, source: str) -> ElementMap:
-    """Elements of the constraint ``group`` on ``mesh``, in the order of the group's rows.
+    """Elements of the constraint ``group`` on ``mesh``, in the order of their projections' rows.
 
     Raises
     ------
     StorageError
-        If ``group`` is no constraint group, or ``mesh`` has another number of elements than
+        If ``group`` is no constraint group, or its number of elements on ``mesh`` is not
         ``elements``, the number in the file ``source``.
     ConfigurationError
         If no effect has the name ``group``.
@@ -122,7 +122,7 @@ def element_map(group: str, mesh: Mesh, elements: int, source: str) -> ElementMa
 
 
 def signed_entry(vector: np.ndarray, rows_per_element: int) -> tuple[np.ndarray, str]:
-    """Values (e,) of the entry that is largest on some element, and the name of this entry.
+    """Values (e,) of the element entry with the largest absolute value, and its name (axis, row).
 
     vector : vector with 3 p entries for each of e elements, with p = ``rows_per_element``
     """

@@ -35,9 +35,9 @@ class Outcome:
 
     verdict : one of `VERDICTS`; "cannot be decided" if nothing can be compared, "depends on the
         machine" if ratios of times close to the threshold decide
-    measured : range of the values, in words
-    sentence : number of rows that satisfy the comparison, in words
-    condition : if the verdict depends, that number for each value of the column ``by`` of the test
+    measured : text with the range of the values
+    sentence : text with the number of rows that satisfy the comparison
+    condition : this number for each value of the test's column ``by``, if the verdict is "depends"
     """
 
     verdict: str
@@ -47,7 +47,7 @@ class Outcome:
 
 
 def values_of(test: TestRule, tables: Tables) -> pd.DataFrame:
-    """Labels and a value for each row of ``tables`` that ``test`` compares."""
+    """Scene, group, method ... and the compared value of each row that ``test`` selects."""
     return METRICS[test.metric].values(tables, dict(test.where), test.accuracy)
 
 
@@ -57,14 +57,14 @@ def satisfied(test: TestRule, values: np.ndarray) -> np.ndarray:
 
 
 def close(test: TestRule, values: np.ndarray) -> np.ndarray:
-    """Boolean array: whether each value is a ratio of times within the margin of the threshold."""
+    """Boolean array: whether a value is a ratio of times too close to the threshold to decide."""
     ratio = METRICS[test.metric].ratio
     apart = ratio(values) / ratio(np.array(test.threshold))
     return (apart > 1.0 / test.factor) & (apart < test.factor)
 
 
 def answer(share: float, good: int, total: int) -> str:
-    """Verdict if ``good`` of ``total`` rows satisfy a test and a fraction ``share`` must agree."""
+    """Verdict of a test that ``good`` of ``total`` rows satisfy, if a fraction ``share`` must."""
     if total == 0:
         return UNDECIDED
     if good >= share * total:
@@ -73,7 +73,7 @@ def answer(share: float, good: int, total: int) -> str:
 
 
 def answer_of(test: TestRule, values: np.ndarray) -> str:
-    """Verdict of ``test``; `MACHINE` if it depends on the values close to the threshold."""
+    """Verdict of ``test``; `MACHINE` if values close to the threshold could change it."""
     near = close(test, values)
     sure, total = int((satisfied(test, values) & ~near).sum()), len(values)
     answers = {answer(test.share, sure + more, total) for more in range(int(near.sum()) + 1)}
@@ -134,9 +134,9 @@ def _text(value: float) -> str:
 
 
 def combined(verdicts: Sequence[str]) -> str:
-    """Verdict of a claim whose tests have ``verdicts``: it holds if all of them hold.
+    """Verdict of a claim whose tests have ``verdicts``: it holds if all tests hold.
 
-    Without any verdict, the claim is not tested.
+    Without any tests, the claim is "not tested".
     """
     if not verdicts:
         return UNTESTED
@@ -147,7 +147,7 @@ def combined(verdicts: Sequence[str]) -> str:
 
 
 def timed_columns(rule: ClaimRule) -> set[str]:
-    """Columns in the row of a claim that depend on measured times, by its ``rule``."""
+    """Columns whose cell depends on measured times, in the row of the claim with this ``rule``."""
     found: set[str] = set()
     for part, suffix in PARTS.items():
         timed = [test for test in getattr(rule, part) if test.timed]
@@ -160,7 +160,7 @@ def timed_columns(rule: ClaimRule) -> set[str]:
 
 
 def by_rules(timed: Callable[[ClaimRule, Any], set[str]]) -> TimedCells:
-    """Function for `Table.timed_cells` that calls ``timed`` with each row and its claim's rule."""
+    """Function for `Table.timed_cells`: calls ``timed`` with the claim's rule and each row."""
 
     def timed_cells(table: pd.DataFrame, **files: Path) -> list[set[str]]:
         rules = load_claims(files["rules"])
@@ -170,7 +170,7 @@ def by_rules(timed: Callable[[ClaimRule, Any], set[str]]) -> TimedCells:
 
 
 def timed_parts(*cells: str) -> TimedCells:
-    """Function that marks ``cells`` as timed columns in rows whose verdict depends on timing."""
+    """Function for `Table.timed_cells`: columns ``cells`` in rows whose verdict uses times."""
     return by_rules(
         lambda rule, row: {*cells} if f"verdict{PARTS[row.part]}" in timed_columns(rule) else set()
     )
@@ -181,19 +181,19 @@ WORDS = {"source", "paper", "figure_or_table", "section", "shown", "text", "qual
 SAID = {"what", "metric", "decides", "compare", "threshold", "share"}
 FOUND = ("satisfied", "of", "close", "least", "median", "most", "verdict")
 ONE_OF = f"one of: {', '.join(VERDICTS)}"
-# Constructor of columns that depend on timing and are not compared.
+# Constructor of columns that depend on timing and that verification does not compare.
 skipped = partial(Column, timed=True, compared="skipped")
-FACTORS = (0.5, 0.8, 1.25, 2.0)  # on thresholds
+FACTORS = (0.5, 0.8, 1.25, 2.0)  # multiples of each threshold that are tried
 SHARES = (0.5, 0.6, 0.75, 0.9, 1.0)
 MARGINS = (1.0, 1.25, 1.5, 2.0, 3.0, 5.0)  # margins of tests that compare times; 1 is no margin
 SMALL = 10  # largest size r that counts as small
 SPLITS = ("train", "test", "heldout")
 VARIED = ("threshold", "share", "margin", "sizes", "splits", "scenes")
-# Share of the rows whose verdict may differ between machines because it rests on a few runs.
+# Fraction of rows whose verdict may differ between machines, because few runs determine it.
 FRAGILE = 0.01
 _Rows = list[pd.DataFrame]
 _Keep = Callable[[pd.Series], pd.Series]
-_Variation = tuple[str, str, Sequence[TestRule], _Rows]  # kind, label, changed tests, their rows
+_Variation = tuple[str, str, Sequence[TestRule], _Rows]  # kind, name, changed tests, their rows
 
 
 @declare(
@@ -222,7 +222,7 @@ _Variation = tuple[str, str, Sequence[TestRule], _Rows]  # kind, label, changed 
     timed_cells=by_rules(lambda rule, row: timed_columns(rule)),
 )
 def claims(rules: Path, added: Added, **tables: pd.DataFrame) -> pd.DataFrame:
-    """One row per claim, in the order of the file ``rules``; ``added`` is as in `load_claims`."""
+    """One row per claim, in the order of ``rules``; ``added`` extends sets of scenes in them."""
     found = load_claims(rules, added)
     return pd.DataFrame([_row(name, rule, tables) for name, rule in found.items()])
 
@@ -283,7 +283,7 @@ def _timed_of_test(rule: ClaimRule, row: Any) -> set[str]:
     timed_cells=by_rules(_timed_of_test),
 )
 def claims_tests(rules: Path, added: Added, **tables: pd.DataFrame) -> pd.DataFrame:
-    """One row per claim, part and test, in the order of the file ``rules``; see `claims`."""
+    """One row per claim, verdict and test, in the order of the file ``rules``; see `claims`."""
     rows = [
         {"claim": name, "part": part, **test.model_dump(include=SAID), **_found(test, tables)}
         for name, rule in load_claims(rules, added).items()
@@ -294,7 +294,7 @@ def claims_tests(rules: Path, added: Added, **tables: pd.DataFrame) -> pd.DataFr
 
 
 def _found(test: TestRule, tables: Tables) -> dict[str, Any]:
-    """Margin, counts, verdict and range of the values (None where there are no values)."""
+    """Margin, counts, verdict and range of the values of a test (range None without values)."""
     values = values_of(test, tables)[VALUE].to_numpy(float)
     good, total = int(satisfied(test, values).sum()), len(values)
     spread = (values.min(), np.median(values), values.max()) if total else (None, None, None)
@@ -318,14 +318,14 @@ def _found(test: TestRule, tables: Tables) -> dict[str, Any]:
     timed_cells=timed_parts("verdict", "verdict_of_rules", "same"),
 )
 def claims_sensitivity(rules: Path, added: Added, **tables: pd.DataFrame) -> pd.DataFrame:
-    """One row per claim of the file ``rules``, part and variation; see `claims`."""
+    """One row per claim of ``rules``, verdict, and change of its tests; see `sensitivity_rows`."""
     return sensitivity_rows(load_claims(rules, added), tables)
 
 
 def sensitivity_rows(rules: Mapping[str, ClaimRule], tables: Tables) -> pd.DataFrame:
-    """One row per claim, part and variation of the tests that decide the verdict.
+    """One row per claim, verdict, and variation of the tests that decide the verdict.
 
-    A variation is left out if a test has no rows; a split or filter also if it changes nothing.
+    A variation is left out if a test selects no rows then, or if a split or filter has no effect.
     """
     made = []
     for claim, rule in rules.items():
@@ -353,7 +353,7 @@ def _with(test: TestRule, **changes: Any) -> TestRule:
 
 
 def _variations(tests: Sequence[TestRule], rows: _Rows, tables: Tables) -> Iterator[_Variation]:
-    """Variations: tests with other limits, on a subset of their rows, or on another split."""
+    """Yield tests with other limits, on a part of their rows, or on another set of snapshots."""
     for factor in FACTORS:
         changed = [_with(test, threshold=factor * test.threshold) for test in tests]
         yield "threshold", f"x {factor:g}", changed, rows
@@ -379,7 +379,7 @@ def _variations(tests: Sequence[TestRule], rows: _Rows, tables: Tables) -> Itera
 def _kept(
     tests: Sequence[TestRule], rows: _Rows, varied: str, column: str, keeps: Mapping[str, _Keep]
 ) -> Iterator[_Variation]:
-    """Variations that restrict ``rows`` by one of the filters ``keeps`` on ``column``."""
+    """Yield variations that keep only rows selected by one of the filters ``keeps`` of a column."""
     for name, keep in keeps.items():
         kept = [values[keep(values[column])] if column in values else values for values in rows]
         if sum(map(len, kept)) < sum(map(len, rows)):
@@ -407,7 +407,7 @@ def _kept(
     timed_cells=timed_parts("verdict", "same", "measured"),
 )
 def replication(claims: pd.DataFrame, rules: Path, recorded: Path) -> pd.DataFrame:
-    """One row per claim in both ``claims`` and the file ``recorded``, and part of the claim."""
+    """One row per claim and verdict, for claims both in ``claims`` and in the file ``recorded``."""
     loaded = load_claims(rules)
     both = claims.merge(pd.read_csv(recorded), on="claim", suffixes=("", "_replication"))
     unchanged = [

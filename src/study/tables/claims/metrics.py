@@ -1,4 +1,4 @@
-"""Metrics of claims: functions that return a number and labels for selected rows of a table."""
+"""Metrics of claims: functions that return a number for each selected row of a table, or group."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -37,8 +37,8 @@ def reruns(table: pd.DataFrame, where: Where) -> pd.DataFrame:
 
     Runs with reduced positions are included only if ``where`` selects a position basis, because a
     method may have the same name with full and reduced positions. ``r: [full]`` selects the largest
-    size tried for each scene, group and method. A run that blew up before its first frame counts as
-    tried: without it, a smaller size that survived would be mistaken for full rank.
+    size tried for each scene, group and method. This includes runs that blew up before the first
+    frame: otherwise a smaller size that survived would be mistaken for full rank.
     """
     table = trained(table)
     table = table if "position_basis" in where else table[table.position_basis == "full"]
@@ -50,7 +50,7 @@ def reruns(table: pd.DataFrame, where: Where) -> pd.DataFrame:
 
 
 def by_axis(table: pd.DataFrame, where: Where) -> pd.DataFrame:
-    """Rows of ``table`` repeated for each axis, with that axis' error as ``relative_error``."""
+    """Selected rows of ``table``, once per axis x, y, z, with its error as ``relative_error``."""
     parts = [table.assign(axis=a, relative_error=table[f"relative_error_{a}"]) for a in AXES]
     return filtered(pd.concat(parts, ignore_index=True), where)
 
@@ -60,14 +60,14 @@ def held_out(
 ) -> pd.DataFrame:
     """Rows selected by ``choose``, with the median over held-out motions as their error.
 
-    Runs without a known error on a held-out motion are left out. Times are of the training motion.
+    Runs without an error on held-out motions are left out. Times are those of the training motion.
     """
     runs = with_held_out(trained(table), table)
     return choose(runs[runs[MEDIAN].notna()].assign(**{_ERROR: runs[MEDIAN]}), where)
 
 
 def decay(rows: pd.DataFrame, accuracy: float) -> pd.Series:
-    """Singular values over the largest one, for groups with any singular value above round-off."""
+    """Singular values relative to the largest; groups with round-off values only are left out."""
     rows = rows[rows.groupby(["scene", "group"]).above_roundoff.transform("any")]
     return rows.relative
 
@@ -95,7 +95,7 @@ def elements_per_entry(rows: pd.DataFrame, accuracy: float) -> pd.Series:
 
 
 def local_ratio(name: str, rows: pd.DataFrame, accuracy: float) -> pd.Series:
-    """Time of a reduced local step, or a part of it, over that of the full compiled local step.
+    """Time of a reduced local step, or of a part of it, over that of the full compiled local step.
 
     The value is column ``name`` at the largest size of each scene, group, method and mesh: if the
     dense solve becomes too expensive at some size, the largest size shows it.
@@ -135,9 +135,9 @@ def trend_p_value(name: str, rows: pd.DataFrame, accuracy: float) -> pd.DataFram
 
     Errors are read from column ``name``, for repeated runs a median over repetitions. Treatments
     are the sizes of an experiment (scene, group, method) in ascending order; blow-ups share the
-    highest rank. A family is a scene with its variant ("twin"); as its experiments are dependent,
-    their mean ranks form one block. Only experiments with the most common number of sizes count.
-    The result has one row, or none with fewer than two blocks or fewer than three sizes.
+    highest rank. A block is a family, a scene with its variant ("twin"), with the mean ranks of its
+    experiments, as these are dependent. Only experiments with the most common number of sizes are
+    used. The result has one row, or none with fewer than two blocks or fewer than three sizes.
     """
     # imported here because it takes a second, which planning the workflow does not need
     from scipy.stats import page_trend_test, rankdata
@@ -156,12 +156,12 @@ def trend_p_value(name: str, rows: pd.DataFrame, accuracy: float) -> pd.DataFram
 
 
 def noise_error(rows: pd.DataFrame, accuracy: float) -> pd.Series:
-    """Error of runs on bases of round-off; infinite where a run ends early or cannot start."""
+    """Error of runs whose basis is round-off; infinite if a run ends early or cannot start."""
     return rows[rows.r <= rows["rank"]].relative_error.fillna(np.inf)
 
 
 def position_basis_ratio(rows: pd.DataFrame, accuracy: float) -> pd.DataFrame:
-    """Error with the POD position basis over that with the skinning basis at equal k, per scene.
+    """Error with POD position basis over error with skinning basis of equal size k, per scene.
 
     Pairs in which both errors exceed ``accuracy`` are left out, as their ratio is meaningless.
     """
@@ -182,8 +182,8 @@ def over_the_rest(share: np.ndarray) -> np.ndarray:
 class Metric:
     """Metric of a test, computed from columns of one table.
 
-    of : function of the chosen rows and ``accuracy``; returns values of some of these rows, or a
-        table of labels and a `VALUE` for each row
+    of : function of the selected rows and ``accuracy``; returns values of some of these rows, or a
+        table of columns such as scene and group with a `VALUE` in each row
     choose : function of the table and ``where`` (column -> allowed values) that selects the rows
     labels : columns allowed in ``where`` in addition to the columns of the table
     ratio : function that converts a value to a ratio of two times, for metrics based on times
@@ -197,7 +197,7 @@ class Metric:
     ratio: Callable[[np.ndarray], np.ndarray] = np.asarray
 
     def values(self, tables: Tables, where: Where, accuracy: float) -> pd.DataFrame:
-        """Table of labels and a `VALUE` for each row of the metric's table that ``where`` allows.
+        """Columns such as scene, and a `VALUE`, for each row of the table that ``where`` allows.
 
         Parameters
         ----------
@@ -217,11 +217,11 @@ def _of_reruns(of: Values, *more: str) -> Metric:
 
 _RECONSTRUCTION = "reconstruction_error"
 METRICS = {
-    # of the local step in the time of a frame
+    # share of the local step in the time of a frame
     "local_share": Metric(
         lambda rows, _: rows.local_share, "local_share", ("local_share",), ratio=over_the_rest
     ),
-    # within the horizon, infinite for a blow-up before it
+    # error before the horizon; infinite for a run that blew up before it
     "rerun_error": _of_reruns(lambda rows, _: rows[_ERROR].fillna(np.inf)),
     "useful_speedup": _of_reruns(useful_speedup, "speedup"),
     "best_useful_speedup": _of_reruns(best_useful_speedup, "speedup"),

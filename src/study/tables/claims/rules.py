@@ -1,4 +1,4 @@
-"""Rules of config/claims.yaml: the claims of the preprint with the tests of two verdicts each."""
+"""Rules of config/claims.yaml: claims of the preprint, each with tests for two verdicts."""
 
 import datetime
 import hashlib
@@ -17,7 +17,7 @@ from study.tables import declared
 from study.tables.claims.metrics import METRICS, Value
 
 SETS = "sets"
-_NAMED = "@"  # prefix of the name of a set of values in ``where``
+_NAMED = "@"  # in ``where``, the prefix of the name of a set of values
 Added = Mapping[str, Sequence[Value]]
 NONE_ADDED: Added = MappingProxyType({})
 MARGIN = 1.5  # default margin of tests that compare times
@@ -38,10 +38,10 @@ class TestRule(ConfigModel):
     where : column -> allowed values
     accuracy : largest error of a run that counts as accurate, for metrics that depend on it
     margin : a ratio of times that differs from the threshold by less than this factor does not
-        decide, see `factor`
-    share : fraction of rows that must agree: the test holds if at least this fraction satisfies the
-        comparison, does not hold if it violates it, and depends otherwise
-    by : column for whose values a verdict "depends" counts the rows separately
+        count for either side, see `factor`
+    share : the test holds if at least this fraction of rows satisfies the comparison, does not hold
+        if at least this fraction violates it; else the verdict is "depends"
+    by : column; for a verdict "depends", rows are counted for each of its values
     """
 
     __test__ = False
@@ -101,7 +101,7 @@ class Change(ConfigModel):
 
 
 class ClaimRule(ConfigModel):
-    """A claim of the preprint, its place there, and the tests that decide it.
+    """A claim of the preprint, its section and figures there, and the tests that decide it.
 
     text : the claim in our words
     paper : the statement of the preprint, in a few words
@@ -151,7 +151,7 @@ class ClaimRule(ConfigModel):
 
 
 def load_claims(path: Path, added: Added = NONE_ADDED) -> dict[str, ClaimRule]:
-    """Claims of the file ``path`` by identifier, with the sets of values substituted.
+    """Claims of the file ``path`` by identifier; names of sets are replaced by their values.
 
     Parameters
     ----------
@@ -181,7 +181,7 @@ def load_claims(path: Path, added: Added = NONE_ADDED) -> dict[str, ClaimRule]:
 
 
 def _resolved(entry: Any, sets: Mapping[str, list[Value]], place: str) -> Any:
-    """``entry`` with each list item ``@name`` replaced by the values of the set ``name``."""
+    """Return ``entry`` with each list item ``@name`` replaced by the values of the set ``name``."""
     if isinstance(entry, dict):
         return {key: _resolved(value, sets, place) for key, value in entry.items()}
     if not isinstance(entry, list):

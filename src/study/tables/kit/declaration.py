@@ -27,8 +27,8 @@ from study.artifact.artifact import Artifact, declare, declared_in
 from study.artifact.paths import TABLE
 from study.artifact.reads import Read
 
-# Kinds of column content, each with a rule for how far results of two machines may differ, based on
-# measurements: docs/decisions/0010-six-kinds.md.
+# Kinds of column content. Each determines how far results of two machines may differ; limits are
+# based on measurements, see docs/decisions/0010-six-kinds.md.
 Quantity = Literal["exact", "value", "error", "share", "timed", "skipped"]
 QUANTITIES: dict[Quantity, str] = {
     "exact": "names, parameters, sizes, truth values: equal",
@@ -40,7 +40,7 @@ QUANTITIES: dict[Quantity, str] = {
 }
 # Allowed difference of one number between two machines, unless the column has its own tolerance.
 TOLERANCES: dict[Quantity, float] = {"exact": 1e-8, "value": 1e-4, "error": 0.05, "share": 0.1}
-# The same allowed difference for integers of quantity "share" (numbers of runs).
+# Allowed difference of integers of quantity "share" (numbers of runs) between two machines.
 TALLY = 2.0
 Kind = Literal["text", "integer", "number", "flag"]
 _DTYPES: dict[Kind, str] = {"integer": "Int64", "number": "float64", "flag": "boolean"}
@@ -53,9 +53,9 @@ class Column:
     meaning : description of the content for readers, in a few words
     unit : empty for text, counts and dimensionless numbers
     timed : whether values depend on timing (or on memory in use), so that two runs may differ
-    compared : quantity of the column, if it does not follow from kind and name
-    tolerance : allowed difference, if not the default of its quantity; for text and flags the
-        fraction of rows that may differ
+    compared : kind of content (`Quantity`), if it does not follow from type and name
+    tolerance : allowed difference, if not the default of its kind of content; for text and flags
+        the fraction of rows that may differ
     """
 
     kind: Kind
@@ -68,7 +68,7 @@ class Column:
 
     @property
     def quantity(self) -> Quantity:
-        """Quantity of the column, which sets how far results of two machines may differ."""
+        """Kind of content, which determines how far results of two machines may differ."""
         if self.compared or self.timed:
             return self.compared or "timed"
         if self.kind != "number":
@@ -89,7 +89,7 @@ class Column:
         if self.kind == "text":
             return values
         if self.kind == "flag":
-            # of type object, because pandas turns flags joined with an empty column into numbers
+            # pandas turns flags into numbers when a table is joined with an empty column
             others = values[values.notna() & ~values.isin([True, False])]
             if len(others):
                 raise ValueError(f"'{others.iloc[0]}'")
@@ -113,14 +113,14 @@ def timed(column: Column) -> Column:
 
 
 def quantiles(names: str, make: Callable[..., Column] = number, unit: str = "") -> list[Column]:
-    """Two columns, ``names``, with the bootstrap interval of the median in the column before."""
+    """Two columns ``names``: bootstrap interval of the median in the column before them."""
     low, high = names.split()
     meaning = "2.5 % quantile of this median (bootstrap)"
     return [make(low, meaning, unit), make(high, "97.5 % quantile", unit)]
 
 
 def extremes(name: str) -> list[Column]:
-    """Columns ``name_low`` and ``name_high``: range of the repetitions of one ``name``."""
+    """Columns ``name_low`` and ``name_high``: least and largest value over repetitions."""
     words = {"low": "least", "high": "largest"}
     return [number(f"{name}_{end}", f"{word} {name}") for end, word in words.items()]
 
@@ -193,7 +193,7 @@ def shared(names: str) -> list[Column]:
     return [by_name[name] for name in names.split()]
 
 
-# Function of a table and of the project files it reads; returns the timed columns of each row.
+# Function of a table and its project files; returns names of columns that depend on timing, by row.
 TimedCells = Callable[..., Sequence[Collection[str]]]
 
 
@@ -201,7 +201,7 @@ TimedCells = Callable[..., Sequence[Collection[str]]]
 class Table(Artifact):
     """Table of the study; calling it with the function's inputs computes the data frame.
 
-    timed_cells : function that returns the timed columns of each row, if they differ between rows
+    timed_cells : function that returns the columns that depend on timing, if rows differ in them
     only_with_error : whether the table lists only runs that have an error before their horizon
     """
 
@@ -231,7 +231,7 @@ class Table(Artifact):
         return tuple(column.name for column in self.columns if column.timed)
 
     def checked(self, table: pd.DataFrame) -> pd.DataFrame:
-        """``table`` with exactly the declared columns, in their order and with their types.
+        """Return ``table`` with exactly the declared columns, in their order and with their types.
 
         Raises
         ------

@@ -1,8 +1,8 @@
-"""Experiment results on a common time scale, runs of reduced_reruns, and medians over motions.
+"""Helpers for tables: times on a common scale, rows of reduced_reruns, medians over motions.
 
 Each job times the full-order run of its scene together with the variants, but machine speed differs
 between jobs. All times of a job are therefore multiplied by one factor: the time of the full-order
-run in the table frame_times over its time in the job. Ratios of times within a job do not change.
+run in table frame_times over its time in the job. Ratios of times within a job do not change.
 
 Errors over held-out motions are summarised by their median, as fixed in config/claims.yaml.
 """
@@ -46,7 +46,7 @@ def joined(files: Iterable[File]) -> pd.DataFrame:
 def in_one_time(
     table: pd.DataFrame, own: pd.Series, times: pd.DataFrame, columns: Collection[str]
 ) -> pd.DataFrame:
-    """``table`` with its time ``columns`` scaled to the times of the table frame_times.
+    """Return ``table`` with its time ``columns`` scaled to the times of the table frame_times.
 
     Scenes that the table frame_times lacks retain the times measured in their job.
 
@@ -113,8 +113,8 @@ def over_motions(reruns: pd.DataFrame, keys: Sequence[str] = KEYS) -> pd.DataFra
     """Median, least and largest error of each run over its held-out motions, and their number.
 
     A run that ended before the horizon has an infinite error. Left out are sizes above the
-    numerical rank, which cannot run, and motions with the horizon in frame 0 or with an error of
-    playback of at most `FAR`.
+    numerical rank, which cannot run, motions with the horizon in frame 0, and motions so close to
+    the training motion that playing the latter has an error of at most `FAR`.
 
     Parameters
     ----------
@@ -147,8 +147,8 @@ def judged_runs(reruns: pd.DataFrame, reconstruction: pd.DataFrame) -> pd.DataFr
 
     gain : gain of the reduction
     error : error of the run within the horizon; inf if it blew up before
-    orthogonal_error : error of orthogonal projection at its largest size up to r (bases without
-        centring have one mode more)
+    orthogonal_error : error of orthogonal projection at its largest size up to r; other methods may
+        have one mode more, if their bases are not centred
     failed : whether the error exceeds `FAILED`
     """
     runs = trained(reruns)
