@@ -36,7 +36,7 @@ def fom(mesh: File, config: SceneConfig, solver: Solver, **runs: File) -> None:
     """Simulate the training motion and the held-out motions of a scene, each into one of ``runs``.
 
     The training run and the first held-out run also store projections for the snapshots (the latter
-    at odd frames only); of all other runs only positions are used.
+    at odd frames only); all other runs store positions only.
     """
     frames, plans = config.frames, config.reduce
     wanted = {

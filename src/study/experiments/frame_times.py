@@ -1,7 +1,7 @@
-"""Frame times over several processes: every full-order run, and reductions with quoted speed-ups.
+"""Frame times over several processes: full-order runs, and reductions whose speed-up is published.
 
 Every process times everything in another random order. The full-order run of each scene is timed
-twice: the second time is a control, because a difference of identical runs is no speed-up.
+twice, as a control: speed-ups as small as the difference of identical runs mean nothing.
 """
 
 from collections import defaultdict
@@ -40,7 +40,7 @@ SECONDS_COLUMNS = ["scene", "group", "method", "r", "reduction_s"]
 
 
 class SubspaceCase(OfScene):
-    """A model of a position subspace whose speed-up is quoted."""
+    """A model in a position subspace whose speed-up the text cites."""
 
     method: str
     position_basis: PositionBasis = "pod"
@@ -48,7 +48,7 @@ class SubspaceCase(OfScene):
 
 
 class ProjectionCase(OfScene):
-    """Reduced projections, positions unreduced, whose speed-up is quoted."""
+    """Reduced projections of a group, with unreduced positions, whose speed-up the text cites."""
 
     group: str
     method: str
@@ -56,7 +56,7 @@ class ProjectionCase(OfScene):
 
 
 class FrameTimes(Processes):
-    """Section ``frame_times``: the protocol, and the reductions whose speed-up is quoted.
+    """Section ``frame_times``: numbers of runs, and the reductions whose speed-up the text cites.
 
     The full-order runs of all scenes and every model of the large scenes are timed as well.
     """
@@ -66,7 +66,7 @@ class FrameTimes(Processes):
 
 
 class NamedScene(OfScene):
-    """A scene by its name, the label of its files."""
+    """A scene with its name, which occurs in the paths of its files."""
 
     config: SceneConfig
 
@@ -85,7 +85,7 @@ class Options(ConfigModel):
 
 @dataclass(frozen=True)
 class TimedScene:
-    """A scene, timed in full order, once more as a control, and with its reductions.
+    """A scene to time: its full-order run twice (once as a control), and its reductions.
 
     mesh : file of the mesh; None builds it from the configuration
     projections : reduced local steps to time: group, method and size, with basis and samples
@@ -101,7 +101,7 @@ class TimedScene:
     models: dict[str, list[tuple[str, str, int]] | None] = field(default_factory=dict)
 
     def variants(self) -> Iterator[Variant]:
-        """Yield every loop of the scene."""
+        """Yield every step loop to time: full order, its control, and reductions."""
         config = self.scene
         mesh = config.mesh.build(Path()) if self.mesh is None else load_mesh(self.mesh)
         scene = Scene.build(config, mesh)
@@ -159,7 +159,7 @@ def frame_times(settings: Options, times: File, seconds: File, **files: list[Fil
     for case, file in zip(settings.subspace_cases, files["subspaces"], strict=True):
         chosen[file.path].append((case.method, case.position_basis, case.k))
         scenes[case.scene].models[file.path] = chosen[file.path]
-    # these may be among the others
+    # a large scene may be among the scenes above
     for named, file in zip(settings.large_scenes, files["large"], strict=True):
         scene = TimedScene(named.config, settings.solver, asked.frames)
         scenes.setdefault(named.scene, scene).models[file.path] = None

@@ -1,8 +1,8 @@
-"""Error of K iterations against the limit K -> infinity, in which every frame is minimised.
+"""Error of K local/global iterations per frame against the limit K -> infinity.
 
-The local/global iteration converges linearly, and slowly on stiff meshes. It is a quasi-Newton step
-with the constant system matrix A for a Hessian, so that L-BFGS started from A (Liu, Bouaziz and
-Kavan 2017, section 4) has the same stationary points and reaches them in far fewer evaluations.
+In the limit, every frame minimises its objective. The iteration converges linearly, and slowly on
+stiff meshes. It is a quasi-Newton step with the constant system matrix A as Hessian: L-BFGS started
+from A (Liu, Bouaziz and Kavan 2017, section 4) has the same limit, in far fewer evaluations.
 """
 
 import logging
@@ -37,9 +37,9 @@ COLUMNS = [
 
 
 class IterationCounts(ConfigModel):
-    """Numbers of iterations K, ``counts``, of full-order runs.
+    """Numbers of local/global iterations per frame (``counts``) of full-order runs.
 
-    Each K also runs with Anderson acceleration over ``anderson_window`` iterates (0: none).
+    Each is also run with Anderson acceleration over ``anderson_window`` iterates (0: none).
     """
 
     counts: tuple[Annotated[int, Field(ge=1, le=10_000)], ...] = (1, 2, 5, 10, 20, 40)
@@ -50,7 +50,7 @@ class IterationSweep(IterationCounts):
     """Section ``iterations``: the counts, compared with a run in which every frame is converged.
 
     A frame is converged when one more iteration moves no vertex by more than ``tolerance`` times
-    the extent; ``limit`` bounds its number of evaluations.
+    the extent of the mesh; ``limit`` is the largest number of evaluations of a frame.
     """
 
     tolerance: kit.Tolerance = 1e-8
@@ -79,14 +79,14 @@ def iterations(
     solver: kit.Solver,
     **files: paths.File,
 ) -> None:
-    """Run a scene with every K up to its horizon, and once to convergence.
+    """Run a scene up to its horizon with every number K of iterations, and once to convergence.
 
-    Each K runs plainly (``window`` 0) and with Anderson acceleration. Each row has the error of one
-    K against the converged run and against the scene's own run; the last row is the converged run
-    itself (``iterations`` empty) with its largest residual: the change by one more iteration,
-    relative to the extent. If a frame stays above the tolerance there is no converged reference,
-    and the errors against it are empty. The table ``models`` has the errors of runs in position
-    subspaces against it; their iterations and training frames are those of the scene.
+    Each K is run without (``window`` 0) and with Anderson acceleration. A row has the errors for
+    one K against the converged run and against the scene's own run. The last row is the converged
+    run itself (``iterations`` empty) with its largest residual: the change by one more iteration,
+    relative to the extent. If a frame stays above the tolerance, there is no converged run, and
+    errors against it are empty. The table ``models`` has the errors of runs in position subspaces
+    against the converged run; their iterations and training frames are those of the scene.
     """
     scene = kit.scene_of(config, files["mesh"])
     system = scene.system_with(solver)
@@ -128,7 +128,7 @@ def iterations(
 
 
 def accelerated(counts: list[int], window: int) -> list[tuple[int, int]]:
-    """(K, window) of all runs of ``counts`` K: plain ones, then accelerated ones with K > 2."""
+    """(iterations, window) of all runs: plain ones, then accelerated ones with more than 2."""
     plain = [(count, 0) for count in counts]
     return plain + [(count, window) for count in counts if window and count > 2]
 
@@ -142,7 +142,7 @@ def stepper_of(scene: Scene, system: GlobalSystem, iterations: int, window: int)
 
 MEMORY = 8
 SUFFICIENT = 1e-4  # Armijo's constant
-SHORTEST = 1e-4  # instead of a shorter step do a plain iteration, which cannot raise the objective
+SHORTEST = 1e-4  # shorter steps are replaced by a plain iteration, which cannot raise the objective
 
 Evaluate = Callable[[np.ndarray], tuple[float, np.ndarray]]
 
@@ -151,7 +151,7 @@ class Minimum(NamedTuple):
     """Result of `minimise`.
 
     y : (n, 3) last iterate, m
-    change : largest entry by which one more local/global iteration would change it, m
+    change : largest change of a coordinate by one more local/global iteration, m
     evaluations : number of local and global steps done
     """
 
@@ -167,8 +167,8 @@ def minimise(
 
     Parameters
     ----------
-    evaluate : y -> objective and the result G(y) of one local/global iteration; the gradient is
-        A (y - G(y)), and G(y) equals y on fixed rows
+    evaluate : function of y that returns the objective and the result G(y) of one local/global
+        iteration; the gradient is A (y - G(y)), and G(y) equals y on fixed rows
     matrix : A, (n, n) symmetric positive definite
     y : (n, 3) start, m
     tolerance : largest entry of G(y) - y at which the iteration ends, m
@@ -199,7 +199,7 @@ def minimise(
         after = target - trial
         moved, change = trial - y, d - after
         both = matrix @ np.hstack([moved, change])
-        a_moved, a_change = both[:, :3].copy(), both[:, 3:].copy()  # contiguous: read often
+        a_moved, a_change = both[:, :3].copy(), both[:, 3:].copy()  # contiguous, as read often
         curvature = float(np.vdot(moved, a_change))
         if curvature > 0.0:
             pairs = [*pairs, _Pair(moved, change, a_moved, a_change, curvature)][-MEMORY:]
@@ -208,7 +208,7 @@ def minimise(
 
 
 class _Pair(NamedTuple):
-    """A step, the change of A^-1 gradient along it, and the products of both with A."""
+    """A step of L-BFGS, the change of A^-1 gradient along it, and products of both with A."""
 
     step: np.ndarray
     change: np.ndarray
@@ -232,7 +232,7 @@ def _direction(d: np.ndarray, pairs: list[_Pair]) -> np.ndarray:
 class ConvergedStepper(Stepper):
     """Step loop of a full-order scene that iterates every frame to its minimum.
 
-    ``changes`` and ``evaluations`` have one number for each frame done so far (see `Minimum`).
+    ``changes`` and ``evaluations`` have one number of `Minimum` for each frame computed so far.
     """
 
     def __init__(self, scene: Scene, system: GlobalSystem, tolerance: float, limit: int) -> None:
@@ -250,7 +250,7 @@ class ConvergedStepper(Stepper):
     def step(
         self, state: State, frame: int, on_last_iterate: Callable[[np.ndarray], None] | None = None
     ) -> tuple[State, FrameReport]:
-        """Compute ``frame`` from ``state``; no objective, no call of ``on_last_iterate``."""
+        """Compute ``frame`` from ``state``, without objective; ``on_last_iterate`` is ignored."""
         s, elimination, base = self._begin(state, frame)
         rhs = np.empty_like(s)
 

@@ -1,4 +1,4 @@
-"""Record of the machine, its units of time, and the library versions.
+"""Record of the machine, its speed by three units of time, and the library versions.
 
 ``./reproduce run python -m study.experiments.machine`` measures the units in a few seconds: the
 processor time on one thread of 1e9 dependent steps x <- a x + b (scalar), of 1e9 sums and products
@@ -31,14 +31,14 @@ REPEATS = 15
     "Record of the machine and the library versions", reads={}, writes={"out": MACHINE}, alone=True
 )
 def machine(out: File) -> None:
-    """Measure the units, and write them to ``out`` with the data of machine and libraries."""
+    """Measure the units of time; write them to ``out`` with data about machine and libraries."""
     write_text(this.machine(units()).model_dump_json(indent=2) + "\n", out.path)
 
 
 def units() -> Units:
-    """Measure the units of this machine, each as the minimum over some repeats."""
+    """Measure the units of time of this machine, each as the minimum over some repeats."""
     numbers = np.ones(MEMORY_BYTES // 8)
-    # amount of work of one call in units of 1e9, and the call
+    # (amount of work of one call in units of 1e9, function of a divisor of this amount)
     trials: list[tuple[float, Callable[[int], object]]] = [
         (1e-9 * SCALAR_STEPS, lambda share: _chain(SCALAR_STEPS // share)),
         (
@@ -62,7 +62,7 @@ def _seconds(run: Callable[[int], object]) -> float:
 
 @compiled(nogil=True)
 def _chain(times):
-    """Repeat x <- x / 2 + 1 ``times`` times, each dependent on the one before; return the end."""
+    """Compute x <- x / 2 + 1 ``times`` times, each step from the last result; return the result."""
     x = 0.0
     for _ in range(times):
         x = 0.5 * x + 1.0
@@ -71,7 +71,7 @@ def _chain(times):
 
 @compiled(nogil=True)
 def _products(numbers, times):
-    """Repeat x <- one + x one ``times`` times in `AT_ONCE` vectors that begin as ``numbers``."""
+    """Compute x <- a + x a ``times`` times for `AT_ONCE` vectors x; ``numbers`` has a and all x."""
     one = load(numbers, 0)
     a, b = load(numbers, WIDTH), load(numbers, 2 * WIDTH)
     c, d = load(numbers, 3 * WIDTH), load(numbers, 4 * WIDTH)

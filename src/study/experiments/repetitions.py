@@ -1,9 +1,9 @@
-"""Repeated reduced runs, the ladder from published to sound choices, and bases of round-off.
+"""Repeated reduced runs, runs that change one choice of the method at a time, bases of round-off.
 
 A run depends on choices that are arbitrary: the training frames, and the last digits of the start.
 If a conclusion depends on the error of a run, repetitions with other choices show the scatter of
-that error. For a run trained on several motions, held-out motions are repetitions, too. A group
-whose projections are round-off is reduced on bases of that noise.
+that error. With several training motions, held-out motions are repetitions, too. A ladder leads
+from published to sound choices, one per rung. Projections that are round-off make bases of noise.
 """
 
 import logging
@@ -59,8 +59,8 @@ Rungs = Annotated[tuple[MethodSpec, ...], Field(min_length=1)]
 class Repetitions(ConfigModel):
     """Settings of repeated runs.
 
-    repetitions : number of draws, with seeds 1, 2, ...
-    perturbation : length by which a start is moved, relative to the extent
+    repetitions : number of random draws, with seeds 1, 2, ...
+    perturbation : length of random displacements of initial positions, relative to the extent
     """
 
     repetitions: Annotated[int, Field(ge=1, le=1000)] = 5
@@ -74,7 +74,7 @@ class ReducedRuns:
     data : snapshots of the group
     reference : (F + 1, N, 3) m, positions of the full-order run
     end : first frame that is not compared (the horizon)
-    blowup_extent : see `pdrom.reduction.sampling.local_step.rerun`
+    blowup_extent : multiple of the rest shape's extent above which a run ends as a blow-up
     """
 
     scene: Scene
@@ -87,11 +87,11 @@ class ReducedRuns:
 
     @cached_property
     def displacement(self) -> np.ndarray:
-        """Displacement norms (F,) m of the full-order run, see `displacement_norms`."""
+        """Norms (F,) m of the full-order run's displacement from its first positions, by frame."""
         return displacement_norms(self.reference)
 
     def until_the_end(self) -> "ReducedRuns":
-        """Copy of the runs shortened to the frames before ``end``, but to at least two frames."""
+        """Copy with the run shortened to frames before ``end``, but to two frames at least."""
         frames = min(self.scene.config.frames, max(2, self.end))
         scene = self.scene.changed(frames=frames)
         return replace(self, scene=scene, reference=self.reference[: frames + 1])
@@ -99,7 +99,7 @@ class ReducedRuns:
     def basis(
         self, method: MethodSpec, frames: int | None = None, signs: int | None = None
     ) -> Basis:
-        """Basis for ``method``; ``frames`` and ``signs`` are seeds of training frames and signs."""
+        """Basis for ``method``; seeds ``frames`` and ``signs`` draw training frames and signs."""
         key = (method.basis_id, frames, signs)
         if key not in self._bases:
             train = None if frames is None else drawn(self.data, frames)
@@ -120,10 +120,10 @@ class ReducedRuns:
     def repeat(
         self, method: MethodSpec, sizes: Sequence[int], varied: Varied, asked: Repetitions
     ) -> list[dict[str, Any]]:
-        """Rows of every repetition of ``method`` at each of ``sizes`` that its basis has, by size.
+        """Rows of every repetition of ``method`` at each of ``sizes`` up to the rank, by size.
 
-        ``varied`` names the choice that the seed draws: the start, or the training snapshots.
-        Errors are over the frames before ``end``, inf for a run that stopped earlier.
+        ``varied`` is what is drawn at random: initial positions, or training snapshots. Errors are
+        over the frames before ``end``, inf for a run that stopped earlier.
         """
         rows, made, offset = [], {}, None
         if varied == "start":
@@ -143,7 +143,7 @@ class ReducedRuns:
     def on_motions(
         self, method: MethodSpec, sizes: Sequence[int], counts: Sequence[int]
     ) -> Iterator[dict[str, Any]]:
-        """Runs of held-out motions, with a basis for each number of training motions in ``counts``.
+        """Rows of held-out motions, by a basis for each number of training motions in ``counts``.
 
         The first training motion is that of the scene, the others are drawn by seeds. With n
         training motions, every n-th training snapshot of each is used.
@@ -185,7 +185,7 @@ def recorded(
 
 
 def drawn(data: sets.SnapshotSet, seed: int) -> np.ndarray:
-    """Snapshots (n, e p, 3) drawn by ``seed`` from all of ``data``, n as in training."""
+    """Draw as many snapshots (n, e p, 3) by ``seed`` from all of ``data`` as are for training."""
     frames = np.concatenate([data.frames["train"], data.frames["test"]])
     chosen = np.random.default_rng(seed).choice(len(frames), len(data.train), replace=False)
     chosen = chosen[np.argsort(frames[chosen])]
@@ -194,9 +194,9 @@ def drawn(data: sets.SnapshotSet, seed: int) -> np.ndarray:
 
 
 class Cell(ConfigModel):
-    """Runs that are repeated, at each of ``sizes``.
+    """Runs that are repeated, at each basis size in ``sizes``.
 
-    training_motions : numbers of training motions of the runs on held-out motions
+    training_motions : numbers of training motions, each for runs of held-out motions
     """
 
     sizes: Annotated[tuple[kit.Modes, ...], Field(min_length=1)]
@@ -218,21 +218,21 @@ class RepetitionSection(Repetitions):
 
 
 class Repeated(Cell):
-    """A repeated method of the job's scene and group, with its specification."""
+    """A method whose runs of the job's scene and group are repeated, with its specification."""
 
     method: str
     spec: MethodSpec
 
 
 class Ladder(Repetitions):
-    """The rungs of a ladder; runs are repeated on other training frames.
+    """Methods (rungs) that differ in one choice each; runs are repeated on other training frames.
 
     r : basis size of all rungs (the numerical rank if that is smaller)
     signs : number of repetitions of the first rung with other signs of the singular vectors
     repeated : scenes whose runs are repeated
-    up, down : methods from the published one upwards, and the sound one without one ingredient each
-    square : separate or shared coefficients on single rows or whole elements, at each of ``sizes``;
-        p rows are sampled for each sampled element of p rows, so that both have as many entries
+    up, down : methods from the published to the sound one; the sound one without a choice each
+    square : separate or shared coefficients with single rows or whole elements as samples, at each
+        of ``sizes``; p single rows replace an element of p rows, for equal numbers of entries
     """
 
     r: Annotated[int, Field(ge=1, le=100_000)] = 20
@@ -244,7 +244,7 @@ class Ladder(Repetitions):
     sizes: tuple[kit.Modes, ...] = ()
 
     def rungs(self, p: int) -> list[tuple[str, MethodSpec, int | None, int]]:
-        """(direction, method, seed of signs, size) of all rows, for elements of ``p`` rows."""
+        """List (direction, method, seed of signs, basis size) of all runs; ``p``: element rows."""
         rows: list[tuple[str, MethodSpec, int | None, int]] = []
         rows += [("up", method, None, self.r) for method in self.up]
         rows += [("down", method, None, self.r) for method in self.down]
@@ -259,16 +259,16 @@ class Ladder(Repetitions):
 
 
 class LadderSection(Ladder):
-    """Section ``ladder``: the rungs, and ``scenes`` whose reduced groups run with them."""
+    """Section ``ladder``: the methods, and ``scenes`` whose reduced groups are run with them."""
 
     scenes: tuple[str, ...] = ()
 
 
 class NoiseRuns(ConfigModel):
-    """Runs on bases of round-off.
+    """Runs with bases computed from projections that are only round-off.
 
     sizes : numbers of modes
-    repetitions : number of starts, each with its own round-off
+    repetitions : number of randomly displaced initial positions
     perturbation : displacement of a vertex relative to the extent: a few units of round-off
     """
 
@@ -278,14 +278,14 @@ class NoiseRuns(ConfigModel):
 
 
 class Noise(NoiseRuns):
-    """Section ``noise``: ``cases`` maps scenes to a group; those not in the study are ignored."""
+    """Section ``noise``: ``cases`` maps scenes to a group; scenes not in the study are ignored."""
 
     cases: dict[str, str] = Field(default_factory=dict)
     methods: tuple[str, ...] = ("deim-joint", "published")
 
 
 class Options(ConfigModel):
-    """Settings of a scene with one group reduced; None for ladder or noise omits these runs."""
+    """Settings of a scene with one group reduced; None omits the runs of ladder or noise."""
 
     scene: SceneConfig
     repetitions: Repetitions
@@ -314,7 +314,7 @@ class Options(ConfigModel):
     },
 )
 def repetitions(settings: Options, **files: paths.File) -> None:
-    """Repeat the listed runs of the scene and group, run the ladder, and reduce round-off.
+    """Run repetitions, ladder, and reductions with bases of round-off, for one scene and group.
 
     Tables of runs that the configuration does not request have no rows.
     """
@@ -352,7 +352,7 @@ def repetitions(settings: Options, **files: paths.File) -> None:
 
 
 def _ladder(runs: ReducedRuns, short: ReducedRuns, ladder: Ladder) -> Iterator[dict[str, Any]]:
-    """Yield the row of every rung; ``short`` are the shortened ``runs``, for repetitions."""
+    """Yield the row of every method of the ladder; repetitions use ``short``, shortened runs."""
     data = runs.data
     for direction, method, seed, r in ladder.rungs(data.rows_per_element):
         rung = method.title if seed is None else f"signs {seed}"
@@ -388,7 +388,7 @@ def _ladder(runs: ReducedRuns, short: ReducedRuns, ladder: Ladder) -> Iterator[d
 def noisy_runs(
     scene: Scene, group: str, asked: NoiseRuns, methods: Methods, limit: float, file: h5py.File
 ) -> list[dict[str, Any]]:
-    """Perturb the start of ``scene``, run, compute bases without a cutoff, and rerun.
+    """Perturb initial positions, run, compute bases without a cutoff of round-off, and rerun.
 
     Returns the rows of all runs with the ``group`` reduced by each of ``methods``. For each of
     `kinds` the runs of one start go to ``file``, as in `study.experiments.reruns`, marked if r
@@ -413,7 +413,7 @@ def noisy_runs(
 
 
 def irregular(runs: Runs) -> bool:
-    """Whether a method completes runs at some sizes and blows up at others."""
+    """Whether some method completes runs at some basis sizes and blows up at others."""
     ends: dict[str, set[bool]] = {}
     for row, outcome in runs:
         if outcome is not None:
@@ -422,18 +422,18 @@ def irregular(runs: Runs) -> bool:
 
 
 def kinds(scene: Scene) -> tuple[str, ...]:
-    """Names of the sets of coordinates of ``scene`` that a perturbed start changes.
+    """Names of the sets of coordinates that are perturbed at the start of ``scene``, in turn.
 
-    A flat mesh also has the coordinates in its plane only, and these together with the normal
-    coordinate of a single vertex.
+    They are all coordinates. For a flat mesh also those in its plane, and those in its plane with
+    the normal coordinate of a single vertex.
     """
     return (ALL, PLANE, VERTEX) if np.ptp(scene.mesh.points, axis=0).min() == 0.0 else (ALL,)
 
 
 def roundoff_field(scene: Scene, axes: str, size: float, seed: int) -> np.ndarray:
-    """Displacement (N, 3) m of a start, zero in coordinates outside of the set ``axes`` of `kinds`.
+    """Random displacement (N, 3) m, zero in coordinates outside of the set ``axes`` of `kinds`.
 
-    ``scene``, ``size`` and ``seed`` as in `perturbation_field`; the seed also draws the vertex.
+    ``size`` is its length relative to the extent; ``seed`` draws the displacement and the vertex.
     """
     field = kit.perturbation_field(scene, size, seed)
     if axes != ALL:
@@ -450,9 +450,9 @@ def _noisy(
 ) -> Iterator[tuple[dict[str, Any], Rerun | None]]:
     """Rows and runs from one ``start`` (N, 3) m, a displacement of the initial positions.
 
-    The reductions are trained on its full-order run, on all that is stored, be it round-off: there
-    is no cutoff, and no axis is left out. A method with separate systems then has one for an axis
-    in which nothing moves, as its text says; elsewhere in this study such an axis has none.
+    The reductions are trained on all projections of its full-order run, even if they are round-off:
+    there is no cutoff, and no axis is left out. A method with separate systems has, as published,
+    a system for an axis in which nothing moves; elsewhere in this study such an axis has none.
     """
     group, plan, frames = scene.group(name), scene.config.reduce[name], scene.config.frames
     reference, projections = recorded(scene, name, start)

@@ -29,14 +29,14 @@ COLUMNS = [
 
 
 class RequestedRuns(run.ToleranceSettings):
-    """Runs with each requested tolerance of ``errors`` on each of ``motions``."""
+    """Settings: each of ``motions`` is run with each requested tolerance in ``errors``."""
 
     errors: Annotated[tuple[Tolerance, ...], Field(min_length=1)] = (0.1, 0.03, 0.01)
     motions: Annotated[tuple[HeldOutMotion, ...], Field(min_length=1)] = MOTIONS
 
 
 class RequestedTolerances(RequestedRuns):
-    """Section ``requested_tolerances``: ``scenes`` (if empty all, including the large ones)."""
+    """Section ``requested_tolerances``, with ``scenes``; an empty list is all, with large ones."""
 
     scenes: tuple[str, ...] = ()
 
@@ -59,7 +59,7 @@ def requested_tolerances(
     ----------
     sources : files of the mesh; the job depends on them
     config : settings of the scene
-    section : tolerances, motions, and settings of the levels
+    section : tolerances, motions, and settings of the levels of accuracy to choose from
     out : table of the runs
     """
     training = Scene.build(config, config.mesh.build(Path()))
@@ -80,7 +80,7 @@ def requested_tolerances(
 def _rows(
     scene: Scene, recorded: np.ndarray, own: run.Calibration, section: RequestedRuns
 ) -> Iterator[dict[str, Any]]:
-    """Rows of the motion of ``scene``; ``recorded`` (F + 1, N, 3) m is the training motion."""
+    """Rows of the motion of ``scene`` by tolerance; ``recorded``: training run (F + 1, N, 3) m."""
     frames = scene.config.frames
     motion = Motion(scene, min(section.errors) / section.factor, "position")
     judged = motion.unconverged, motion.sensitivity

@@ -1,4 +1,4 @@
-"""Sampling of a group by one method, and runs of the scene with the group reduced, for every r.
+"""Sampling of a group by one method, and runs with the group reduced, for every basis size r.
 
 `stability` runs one scene with several time steps and stiffnesses, by every method.
 """
@@ -47,7 +47,7 @@ MOTION = "motion"  # column that only the table of held-out runs has
 
 
 class Sweep(ConfigModel):
-    """Basis sizes of the reconstruction error: all up to ``dense_to``, then every ``step``-th."""
+    """Basis sizes of reconstruction errors: all up to ``dense_to``, then every ``step``-th."""
 
     dense_to: kit.Count = 10
     step: kit.Count = 10
@@ -89,7 +89,7 @@ class Options(ConfigModel):
     },
 )
 def reruns(motions: list[File], settings: Options, **files: File) -> None:
-    """Sample the group, then rerun the training motion and the held-out motions for every r.
+    """Sample the group, then run training and held-out motions with reductions of every size r.
 
     One job does all this, because starting another process takes longer than the sampling.
     """
@@ -115,10 +115,10 @@ def reruns(motions: list[File], settings: Options, **files: File) -> None:
 def _runs(
     yardstick: Yardstick, sampling: File, basis: Basis, settings: Options, file: h5py.Group
 ) -> Iterator[dict[str, Any]]:
-    """Run a motion for every r and yield the rows; an r beyond the rank gives a marked row.
+    """Run a motion for every basis size r and yield the rows; r above the rank gives a marked row.
 
-    The runs are stored in ``file``, with positions only if that is the root group of the file,
-    which contains the training motion: figures show no other motion.
+    The runs are stored in ``file``. Positions are stored only in the file's root group, which
+    contains the training motion: figures show no other motion.
     """
     labels, scene = sampling.labels, yardstick.scene
     system = scene.system_with(settings.solver)
@@ -147,12 +147,12 @@ def _runs(
 def _sample(
     basis: Basis, data: SnapshotSet, settings: Options, sampling: File, errors: File
 ) -> None:
-    """Select samples for every r of the sweep and of the reruns; write them and the error table.
+    """Select samples for every size r to reconstruct or rerun; write them and the error table.
 
     Parameters
     ----------
     basis, data : basis of the group, from its training snapshots, and all of its snapshots
-    sampling, errors : files to write; their labels are the first columns of the table
+    sampling, errors : files to write; scene, group ... in their paths are the first columns
     """
     labels = sampling.labels
     asked = kit.resolve_ranks(settings.ranks, basis.rank)
@@ -182,7 +182,7 @@ SHORT_COLUMNS = [
     "scene", "method", "r", "h", "stiffness_ratio", "finite", "blowup_frame", "max_extent",
     "energy_ratio", "gain", "group", "position_basis", "k", "frames", "relative_error",
 ]  # fmt: skip
-Local = list[tuple[dict[str, Any], Reduction | None]]  # labels of each reduction of a group
+Local = list[tuple[dict[str, Any], Reduction | None]]  # (first columns of its rows, reduction)
 Models = list[tuple[dict[str, Any], SubspaceModel]]
 
 
@@ -191,7 +191,7 @@ class ShortRuns(ConfigModel):
 
     The bases and samplings are those of the scene's own setting.
 
-    ranks : basis sizes, as far as they exist in the study; subspaces run at their largest size only
+    ranks : basis sizes r, as far as the study has them; subspaces are run at their largest size
     time_steps : h in seconds, in addition to the scene's own
     stiffness_ratios : factors on the weights of the reduced groups, in addition to 1
     duration : simulated time in seconds, between ``min_frames`` and ``max_frames`` frames
@@ -214,12 +214,12 @@ class ShortRuns(ConfigModel):
 
 
 class Stability(ShortRuns):
-    """Section ``stability``: the short runs, and limits by which they are classified.
+    """Section ``stability``: short runs, and limits by which the outcome of runs is classified.
 
     scenes : names of the scenes; those that are not in the study are ignored
     wrong : relative error above which a run is finite but wrong
-    departure : multiple of the full-order run's largest extent above which a run has left the
-        scene; the key is ``left``
+    departure : a run with more than this multiple of the full-order run's largest extent has left
+        the scene; the key is ``left``
     """
 
     scenes: tuple[str, ...] = ()
@@ -228,7 +228,7 @@ class Stability(ShortRuns):
 
     @property
     def left(self) -> float:
-        """Value of `departure`, under its key."""
+        """Value of `departure`, by the name of its key in the configuration."""
         return self.departure
 
 
@@ -257,7 +257,7 @@ def stability(
     out: File,
     **files: list[File],
 ) -> None:
-    """Run the full order, every local reduction and the largest subspaces at every setting.
+    """Run full order, reductions and largest subspaces with every time step and stiffness.
 
     Bases and samplings are those of the scene's own setting, to see how far they are valid.
     """
@@ -295,7 +295,7 @@ def stability(
 def _rows(
     scene: Scene, local: Local, models: Models, solver: str, limit: float
 ) -> Iterator[dict[str, Any]]:
-    """Rows of the full order of ``scene`` and, if that run is finite, of all reductions.
+    """Rows of the full-order run of ``scene`` and, if that is finite, of runs by all reductions.
 
     ``limit`` is the extent of a blow-up relative to that of the rest shape. A reduction in
     ``local`` is None if the basis has fewer modes than requested.

@@ -1,8 +1,8 @@
-"""Drift of full-order runs that should be equal (docs/study.md), and contributions of effects.
+"""Drift between full-order runs that should be equal (docs/study.md), and forces of effects.
 
 The change of a run after moving its start by 1e-10 of the extent limits the accuracy that can be
-expected of any reduced model. Other runs change the solver (another order of summation), the number
-of iterations or the time step, or leave out an effect.
+expected of any reduced model. Other runs have another linear solver (another order of summation),
+number of iterations or time step, or leave out an effect.
 """
 
 from collections.abc import Iterator
@@ -31,14 +31,14 @@ Perturbation = Annotated[float, Field(gt=0.0, lt=1.0)]
 EFFECTS = ["scene", "effect", "role", "frame", "force", "energy"]
 Row = tuple[str, str, int, float, float]
 COLUMNS = ["scene", "perturbation", "seed", "frame", "relative_difference"]
-# A run is repeated with the first of these solvers that is not the default.
+# Linear solvers; a run is repeated with the first one that is not the default.
 OTHER_SOLVERS = ("splu", "splu-columns")
 
 
 class PerturbedRuns(ConfigModel):
-    """Starts moved by ``perturbations`` times the extent, each with every one of ``seeds``.
+    """Runs from initial positions moved by ``perturbations`` times the extent, for all ``seeds``.
 
-    ``reference`` is the perturbation for the horizon, and the only one of held-out motions.
+    ``reference`` is the perturbation for the horizon, and the only one for held-out motions.
     """
 
     perturbations: tuple[Perturbation, ...] = (1e-12, 1e-10, 1e-8)
@@ -53,7 +53,7 @@ class PerturbedRuns(ConfigModel):
 
 
 class Sensitivity(PerturbedRuns):
-    """Section ``sensitivity``: ``threshold`` is the relative difference that ends the horizon."""
+    """Section ``sensitivity``: the relative difference ``threshold`` ends the compared frames."""
 
     threshold: Annotated[float, Field(gt=0.0, allow_inf_nan=False)] = 1e-3
 
@@ -77,7 +77,7 @@ def sensitivity(
 
 
 class _Watched:
-    """Wrapper of a contact that records the displacements that it causes in a frame."""
+    """Wrapper of a contact that records by how much the contact moves vertices in a frame."""
 
     def __init__(self, contact: Contact) -> None:
         self.name, self._contact = contact.name, contact
@@ -91,12 +91,12 @@ class _Watched:
 
 
 def contributions(scene: Scene) -> pd.DataFrame:
-    """Force (norm, N) and energy (J) by effect and frame of a run of ``scene``, `EFFECTS`.
+    """Norm of the force (N) and energy (J) of each effect, by frame of a run of ``scene``.
 
-    Effects with the same name count as one. Forces are those at the end of a frame, on the vertices
-    that are not held: S^T W (p - S q) of a group, M a of a force, M d / h^2 of a contact that moves
-    vertices by d. The force of a hold is the remainder of M (q' - q - h v) / h^2 at its vertices,
-    after all other forces; that of a start is M v / h in the first frame.
+    Effects with the same name count as one. Forces are those at the end of a frame, on free
+    vertices: S^T W (p - S q) of a group, M a of a force, M d / h^2 of a contact that moves vertices
+    by d. The force of pins or handles is the remainder of M (q' - q - h v) / h^2 at their vertices,
+    without all other forces; that of initial velocities v is M v / h in the first frame.
 
     The energy is W_j for a group, the potential with an arbitrary zero for a force, and the added
     kinetic energy for a start. It is nan for effects without an energy.
@@ -136,7 +136,7 @@ def _frame(
         forces[key] = forces.get(key, 0.0) + np.broadcast_to(force, after.positions.shape)
         energies[effect.name] = energies.get(effect.name, 0.0) + energy
 
-    for group in scene.groups:  # their frame-lagged data are those of this frame
+    for group in scene.groups:  # data that groups compute once per frame are of this frame
         missing = group.project(after.positions) - group.S @ after.positions
         weighted = group.row_weights[:, None] * missing
         energy = 0.5 * float(np.sum(missing * weighted))
@@ -154,7 +154,7 @@ def _frame(
         (name, role, frame, float(np.linalg.norm(force[~held])), energies[name])
         for (name, role), force in forces.items()
     ]
-    squares: dict[str, float] = {}  # a hold that is not active exerts no force
+    squares: dict[str, float] = {}  # pins and handles that are not active exert no force
     for boundary in scene.boundaries:
         pulled = lacking[boundary.held(frame)] if boundary in active else np.zeros(3)
         squares[boundary.name] = squares.get(boundary.name, 0.0) + float(np.sum(pulled**2))
@@ -175,9 +175,9 @@ def relative_difference(other: np.ndarray, base: np.ndarray) -> np.ndarray:
 def perturbed(
     scene: Scene, base: np.ndarray, size: float, seeds: tuple[int, ...], label: str
 ) -> Iterator[pd.DataFrame]:
-    """Rows of runs whose start is moved by ``size``, with each of ``seeds``, under a ``label``.
+    """Rows of runs from initial positions moved by ``size`` times the extent, for all ``seeds``.
 
-    ``base`` (F + 1, N, 3) m is the unperturbed run of ``scene``.
+    ``base`` (F + 1, N, 3) m is the unperturbed run; column ``perturbation`` contains ``label``.
     """
     for seed in seeds:
         other = trajectory(scene, perturbation_field(scene, size, seed))
@@ -187,10 +187,10 @@ def perturbed(
 def sensitivities(
     scene: Scene, perturbations: tuple[float, ...], seeds: tuple[int, ...]
 ) -> pd.DataFrame:
-    """Table of `COLUMNS` for ``scene``: ``perturbations`` of the start by ``seeds``, and variants.
+    """Drift by frame of perturbed runs of ``scene`` (``perturbations``, ``seeds``) and variants.
 
-    The variants are another solver, 4 K iterations, half the time step, and the scene without the
-    effects of one name (label `without`), unless it would have no constraint group left.
+    Variants are another solver, four times the iterations, half the time step, and the scene
+    without the effects of one name, unless it would have no constraint group left.
     """
     base, config = trajectory(scene), scene.config
     parts: list[pd.DataFrame] = []
@@ -206,7 +206,7 @@ def sensitivities(
     variants = {
         "solver": trajectory(scene, system=scene.system_with(solver)),
         "iterations x4": trajectory(scene.changed(iterations=4 * config.iterations)),
-        # built from the configuration, to check its limit on the number of frames
+        # build it from the configuration, which checks that there are not too many frames
         "h/2": trajectory(Scene.build(halved.config, halved.mesh))[::2],
     }
     for effect in removable(config):
@@ -218,12 +218,12 @@ def sensitivities(
 
 
 def without(effect: str) -> str:
-    """Label of the runs without ``effect``."""
+    """Value of the column ``perturbation`` for runs without ``effect``."""
     return f"without {effect}"
 
 
 def removable(config: SceneConfig) -> list[str]:
-    """Effects without which ``config`` still has a constraint group, by name, each once."""
+    """Names of the effects without which the scene still has a constraint group, each once."""
     names = dict.fromkeys(e.effect for e in config.effects)
     return [name for name in names if config.groups != [name]]
 

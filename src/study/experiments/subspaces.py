@@ -1,8 +1,8 @@
-"""Position subspaces with full projections, with sampled elements and with projections of hrpd.
+"""Position subspaces with full projections, sampled elements, or interpolated projections (hrpd).
 
 The models of a large scene are made and run in one job together with its full-order runs, which no
-other job reads; `study.experiments.frame_times` times them. `live` writes a scene's models and
-joint rows to a file that a web page loads, to run them in the reader's browser.
+other job reads; `study.experiments.frame_times` times them. `live` writes a scene's models to a
+file that a web page loads, to run them in the reader's browser.
 """
 
 import json
@@ -63,13 +63,13 @@ Sampled = Mapping[str, subspace.Samples | Interpolation]
 
 
 class Hrpd(HrpdSpec):
-    """Sampled constraints with interpolation; ``sizes`` are numbers of modes k with such models."""
+    """Settings of models with interpolated projections, and numbers of modes k that have them."""
 
     sizes: tuple[kit.Modes, ...] = ()
 
 
 class SubspaceModels(ConfigModel):
-    """Position subspaces: kinds of basis, numbers of modes, tolerances of the sampling, its norm.
+    """Position subspaces: kinds of basis, numbers of modes; tolerances and norm of the sampling.
 
     ``hrpd`` adds models with interpolated projections; None adds none.
     """
@@ -108,7 +108,7 @@ class LargeModels(SubspaceModels):
 
 
 class Online(LargeModels):
-    """Section ``online``: the models, and the large ``scenes`` that are reduced by them."""
+    """Section ``online``: the models, and the large ``scenes`` that have them."""
 
     scenes: tuple[str, ...] = ()
 
@@ -136,7 +136,7 @@ def subspaces(
     blowup_extent: kit.BlowupExtent,
     **files: File,
 ) -> None:
-    """Build every model (bases, sizes, tolerances) and run all motions with it."""
+    """Build a model for every basis, size and sampling, and run all motions with each."""
     motions = {
         run["run"]: Yardstick(
             kit.scene_of(config, files["mesh"], run["run"]), kit.positions_of(run)
@@ -173,7 +173,7 @@ def online(
     out: File,
     models: File,
 ) -> None:
-    """Reduce a large scene by every model and run all motions with each model.
+    """Build every model of a large scene, and run all motions with each model.
 
     The mesh is built from the ``sources``; the full-order runs are made here and not stored.
     """
@@ -213,7 +213,7 @@ def _runs(
     ----------
     file : file that receives the models
     limit : extent relative to that of the rest shape above which a run ends as a blow-up
-    compared : whether coordinates and deviations of each run are stored in ``file``, too
+    compared : True to store coordinates and deviations of each run in ``file``, too
     """
     rows: list[dict[str, Any]] = []
     played = {
@@ -225,7 +225,7 @@ def _runs(
         subspace.store_columns(file.create_group(f"columns/{base}"), columns)
         spent: dict[str, float] = defaultdict(float)
         for of_model, (method, samples) in clocked(models):
-            # elements for all tolerances are sampled together, while the first model is made
+            # all tolerances share one sampling, whose time is part of the first model's
             family = subspace.ECSW if method.startswith(subspace.ECSW) else method
             spent[family] += of_model
             model = subspace.SubspaceModel(kind, columns, samples)
@@ -254,9 +254,9 @@ def _runs(
 def _subspaces(
     motion: Yardstick, settings: SubspaceModels
 ) -> Iterator[tuple[str, Columns, str, int, Iterator[tuple[str, Sampled]]]]:
-    """Yield name, columns, kind and size of every subspace, with the reduced models that use it.
+    """Yield name, columns, kind and size k of every subspace, and an iterator over its models.
 
-    The training frames of ``motion`` are the even ones, as for the bases of projections.
+    A model is a pair of method and samples. Training frames are even, as for projections' bases.
     """
     scene, points = motion.scene, motion.scene.mesh.points
     count = max(plan.train for plan in scene.config.reduce.values())
@@ -292,8 +292,8 @@ Labelled = tuple[dict[str, Any], subspace.SubspaceModel]
 
 
 class LiveModels(ConfigModel):
-    """Models of the page, as far as they exist in the study: numbers of modes k, tolerances of the
-    sampling, and the number of modes r of the joint rows."""
+    """Models on the web page, if the study has them: numbers of modes k, tolerances of sampling,
+    and number of modes r of models whose projections are interpolated from joint rows."""
 
     sizes: tuple[kit.Modes, ...] = (10, 20, 40)
     tolerances: tuple[kit.Tolerance, ...] = (3e-2, 1e-2, 1e-3)
@@ -301,7 +301,7 @@ class LiveModels(ConfigModel):
 
 
 class Live(LiveModels):
-    """Section ``live``: the models of the page, and the ``scenes`` that a reader chooses from.
+    """Section ``live``: models on the web page, and ``scenes`` from which a reader can choose.
 
     Scenes without models in the study (position subspaces, or ``online.scenes``) are left out.
     """
@@ -310,7 +310,7 @@ class Live(LiveModels):
 
 
 class JointRows(kit.OfScene):
-    """Joint rows of a group, which the study has samples of."""
+    """A group that the study samples by joint rows (x, y and z of a row together)."""
 
     group: str
     method: str = JOINT
@@ -318,7 +318,7 @@ class JointRows(kit.OfScene):
 
 
 class Options(ConfigModel):
-    """Settings of the models of a scene for the page."""
+    """Settings of the models of a scene for the web page."""
 
     scene: SceneConfig
     title: str
@@ -340,11 +340,11 @@ class Options(ConfigModel):
     writes={"out": paths.LIVE_MODEL},
 )
 def live(mesh: File, train: File, settings: Options, out: File, **files: list[File]) -> None:
-    """Write the models of a scene and its recorded full-order run to the file of the page.
+    """Write the models of a scene and its full-order run to the file that the web page loads.
 
     Parameters
     ----------
-    bases, samplings : files of the joint rows, in the order of the settings
+    bases, samplings : files of the groups sampled by joint rows, in the order of the settings
 
     Raises
     ------
@@ -359,14 +359,14 @@ def live(mesh: File, train: File, settings: Options, out: File, **files: list[Fi
     for file in (*files["subspaces"], *files["online"]):
         for own, model in subspace.load_models(file.path):
             method, kind, k = own["method"], own["position_basis"], own["k"]
-            # models with sampled elements on snapshot bases
+            # only models with sampled elements and POD bases
             if method in tolerances and kind == "pod" and k in asked.sizes:
                 labels = {"family": "elements", "k": k, "tau": tolerances[method]}
                 chosen.append((labels, model))
     given = (settings.joint_rows, files["bases"], files["samplings"])
     for case, file, sampling in zip(*given, strict=True):
         basis = load_basis(file.path)
-        # the requested size, or the largest that exists
+        # use the requested size, or the largest if that is smaller
         size = min(asked.joint_rows, basis.rank)
         reduction = runfiles.load_reduction(basis, sampling.path, case.spec, size)
         chosen += list(_joint(scene, case.group, reduction, chosen))
@@ -378,7 +378,7 @@ def live(mesh: File, train: File, settings: Options, out: File, **files: list[Fi
         "title": settings.title,
         **exported.export_scene(scene),
         **_models(scene, chosen),
-        # the surface, and positions of its vertices at every ``stride``-th full-order frame
+        # surface, and positions of its vertices in every ``stride``-th frame of full order
         "shown": {
             "vertices": pack_array(used, "u4"),
             "triangles": pack_array(triangles.reshape(-1, 3), "u4"),
@@ -400,7 +400,7 @@ def live(mesh: File, train: File, settings: Options, out: File, **files: list[Fi
 def _joint(
     scene: Scene, group: str, reduction: Reduction, beside: list[Labelled]
 ) -> Iterator[Labelled]:
-    """Joint rows of a group in each subspace of models ``beside``; other groups keep samples."""
+    """For each subspace of models ``beside``, yield one with joint rows for ``group`` only."""
     for model in {id(model.columns): model for _, model in beside}.values():
         joint = interpolation_of(scene.group(group), model.columns, reduction)
         labels = {"family": "joint", "k": model.columns.modes, "r": reduction.r}
@@ -409,7 +409,7 @@ def _joint(
 
 
 def _models(scene: Scene, chosen: list[Labelled]) -> dict[str, Any]:
-    """Bases and models for the page; a model has the index of its basis."""
+    """Contents of the file for the web page: bases, and models with the index of their basis."""
     by_basis: dict[int, list[subspace.SubspaceModel]] = {}
     for _, model in chosen:
         by_basis.setdefault(id(model.columns), []).append(model)

@@ -1,6 +1,6 @@
 """Milliseconds per frame of full-order and reduced runs, of single local steps, and of effects.
 
-`timing` measures on the mesh of a scene, `scaling` by iteration on growing meshes.
+`timing` measures on the mesh of a scene, `scaling` times iterations on meshes of several sizes.
 """
 
 import logging
@@ -38,7 +38,7 @@ from study.experiments.kit.measurement import Protocol, Variant, measure
 
 
 class NumpyLocalStep:
-    """Vectorised NumPy projections of all elements, with SciPy sparse products before and after.
+    """Local step by vectorised NumPy projections of all elements and SciPy sparse products.
 
     The time of the products with S^T is counted separately, as in `InterpretedLocalStep`.
     """
@@ -63,7 +63,7 @@ class NumpyLocalStep:
 
 
 class InterpretedLocalStep:
-    """Interpreted Python code that projects one element after the other, as in simple programs."""
+    """Local step by interpreted Python code that projects one element after the other."""
 
     def __init__(self, group: ConstraintGroup) -> None:
         self.name, self.group, self.begin_frame = group.name, group, group.begin_frame
@@ -88,7 +88,7 @@ class InterpretedLocalStep:
         return energy
 
 
-# Classes of local steps for the step loop, by name.
+# Implementations of local steps that are timed, by name.
 IMPLEMENTATIONS: dict[str, Callable[[ConstraintGroup], Any]] = {
     "numpy": NumpyLocalStep,
     "interpreted": InterpretedLocalStep,
@@ -111,11 +111,11 @@ TrainingFrames = Annotated[int, Field(ge=3, le=1000)]
 
 
 class Timing(Protocol):
-    """Section ``timing``: the protocol of the timing jobs.
+    """Section ``timing``: numbers of frames, iterations and repeats in timing jobs.
 
     The slow implementations of the full-order run are timed over fewer frames, the interpreted one
-    also over fewer iterations. ``breakeven`` are the sizes r of the reduced local steps that are
-    timed as single steps, with ``breakeven_repeats`` short repeats.
+    also over fewer iterations. ``breakeven`` are the sizes r of reduced local steps that are timed
+    outside of runs, with ``breakeven_repeats`` short repeats.
     """
 
     numpy_frames: kit.Count = 4
@@ -155,7 +155,7 @@ class Options(ConfigModel):
     alone=True,
 )
 def timing(mesh: File, fom: File, settings: Options, **files: Any) -> None:
-    """Measure frames (``out``), single local steps, effects, and frames ``without`` each effect."""
+    """Measure times of frames (``out``), local steps, effects, and frames ``without`` an effect."""
     scene, asked = kit.scene_of(settings.scene, mesh), settings.timing
     system, name = scene.system_with(settings.solver), scene.config.name
     frames = min(asked.frames, scene.config.frames)
@@ -166,7 +166,7 @@ def timing(mesh: File, fom: File, settings: Options, **files: Any) -> None:
     for sampling in files["samplings"]:
         spec = settings.methods[sampling["method"]]
         basis = load_basis(runfiles.basis_of(sampling, spec, files["bases"]).path)
-        with open_hdf5(sampling.path) as stored:  # sizes r in the file
+        with open_hdf5(sampling.path) as stored:  # find the sizes r in the file
             held = {int(key[1:]) for key in stored if key.startswith("r")}
         timed = held.intersection(kit.resolve_ranks(settings.ranks, basis.rank))
         sizes = held.intersection(kit.resolve_ranks(asked.breakeven, basis.rank))
@@ -207,7 +207,7 @@ def timing(mesh: File, fom: File, settings: Options, **files: Any) -> None:
 def _full_order(
     scene: Scene, system: GlobalSystem, frames: int, asked: Timing, common: dict[str, Any]
 ) -> tuple[Variant, list[Variant]]:
-    """Full-order runs: the slowest implementation with some iterations only, and the others."""
+    """Full-order runs to time: the slowest, with fewer iterations; and all others."""
     quick = variant(scene, system, scene.groups, frames, {**common, "implementation": "compiled"})
     made = [quick]
     for name, step in IMPLEMENTATIONS.items():
@@ -223,7 +223,7 @@ def _full_order(
 def _other_counts(
     scene: Scene, system: GlobalSystem, frames: int, asked: IterationCounts, common: dict[str, Any]
 ) -> list[Variant]:
-    """Compiled full-order runs with other numbers of iterations, plain and accelerated."""
+    """Compiled full-order runs with other numbers of iterations, also by Anderson acceleration."""
     variants = []
     counts = sorted({*asked.counts, scene.config.iterations})
     own = (scene.config.iterations, scene.config.anderson_window)
@@ -237,7 +237,7 @@ def _other_counts(
 
 
 class SizedBreakEven(ConfigModel):
-    """Single reduced local steps timed on every mesh size: methods, sizes r, short repeats.
+    """Reduced local steps timed on every mesh size: methods, basis sizes r, short repeats.
 
     Bases are computed from the first ``training_frames`` frames.
     """
@@ -251,8 +251,8 @@ class SizedBreakEven(ConfigModel):
 class Sized(Protocol):
     """Settings of the cost on one mesh size.
 
-    ``training_frames`` frames train ``method`` with r modes (only the local step reduced) and
-    energy-conserving sampling to ``tolerance`` with k modes; ``frames`` are timed.
+    Two reductions are trained on ``training_frames`` frames and timed over ``frames``: ``method``
+    (reduced local step, r modes), and energy-conserving sampling to ``tolerance`` with k modes.
     """
 
     method: str = "block-deim"
@@ -265,7 +265,7 @@ class Sized(Protocol):
 
 
 class Scaling(Sized):
-    """Section ``scaling``: factors on the vertices along a side for each of ``scenes``."""
+    """Section ``scaling``: ``scenes`` with factors for the number of vertices along a side."""
 
     scenes: kit.Sizes = Field(default_factory=dict)
 
@@ -286,7 +286,7 @@ class SizedOptions(ConfigModel):
     alone=True,
 )
 def scaling(sources: list[Path], settings: SizedOptions, iterations: File, breakeven: File) -> None:
-    """Measure a scene on one mesh with ``factor`` times the vertices along each side."""
+    """Time a scene on one mesh with ``factor`` times the vertices along each side."""
     config, sized = settings.scene, settings.scaling
     specs, alone = settings.scaled_methods, settings.scaling.breakeven
     factor = float(iterations["factor"])
@@ -336,10 +336,10 @@ def scaling(sources: list[Path], settings: SizedOptions, iterations: File, break
 
 
 def _training(scene: Scene, system: GlobalSystem, frames: int) -> tuple[np.ndarray, ...]:
-    """Positions (n, N, 3) m, projections and roundoff of the first n ``frames`` at full order.
+    """Positions (n, N, 3) m, projections and round-off of the first n ``frames`` in full order.
 
-    Projections (n, e p, 3) are of the first group of ``scene``, at the last local iterate of each
-    frame, with their roundoff (n,).
+    Projections (n, e p, 3) and their round-off (n,) are those of the first group of ``scene``, at
+    the last local iterate of each frame.
     """
     group = scene.groups[0]
     loop, state = scene.stepper(system, track_objective=False), scene.initial_state()

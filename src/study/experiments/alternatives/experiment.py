@@ -44,7 +44,7 @@ TRAINED: Final = (TWO_LEVEL, *REDUCTIONS)
 CONVERGED: Final = "converged"  # the implicit step solved to convergence
 TRAINING: Final = "training"  # the runs that a reduction is trained on
 
-# These columns together identify a candidate of a scene.
+# These columns together identify a candidate (method with its settings) of a scene.
 SETTING: Final = ["method", "substeps", "iterations", "training_motions", "k"]
 
 Factors = Annotated[tuple[Annotated[float, Field(gt=0.0, le=1e8)], ...], Field(min_length=1)]
@@ -74,7 +74,7 @@ def _methods(steps: dict[str, Any]) -> dict[str, Any]:
     return steps
 
 
-# One step with more iterations, and more steps with one iteration; other settings are slower.
+# (substeps, iterations) by method: one with many, and many with one. Other settings are slower.
 STEPS: dict[str, tuple[Steps, ...]] = {
     "projective": (
         (1, 1), (1, 2), (1, 3), (1, 4), (1, 5), (1, 10), (1, 20), (1, 40), (1, 80),
@@ -89,10 +89,10 @@ STEPS: dict[str, tuple[Steps, ...]] = {
 
 
 class ContinuousReference(ConfigModel):
-    """Motion in continuous time: explicit steps, ``substeps`` of them a frame in the first run.
+    """Motion in continuous time, by explicit steps; the first run has ``substeps`` per frame.
 
-    The step is halved until the estimated error is below ``tolerance``, as long as the product of
-    vertices and steps of a frame does not exceed ``limit``.
+    The step is halved until the estimated error is below ``tolerance``, but the product of vertices
+    and steps of a frame stays below ``limit``.
     """
 
     substeps: kit.Count = 40
@@ -102,8 +102,8 @@ class ContinuousReference(ConfigModel):
 
 class ImplicitReference(ConfigModel):
     """Implicit step, solved until one more local/global iteration of a frame moves no vertex by
-    more than ``tolerance`` times the extent; ``limit`` bounds the evaluations of a frame. Runs that
-    train a reduction stop at the larger ``training_tolerance``.
+    more than ``tolerance`` times the mesh size; ``limit`` is the largest number of evaluations of a
+    frame. Runs that train a reduction stop at the larger ``training_tolerance``.
     """
 
     tolerance: kit.Tolerance = 1e-7
@@ -115,13 +115,13 @@ class Comparison(Processes):
     """Comparison of methods on one scene and one mesh.
 
     ``steps`` has pairs (substeps of a frame, iterations of each substep) by method. Errors cover
-    all frames of each of the held-out ``motions``. On its own mesh a scene runs with each of its
-    factors on all weights in ``stiffness`` (1 if it has none). Each of ``processes`` new processes
-    times ``frames`` frames spread over the first motion. Reductions have each number of ``modes``,
-    sample to ``tau`` and are trained on each number of ``training_motions``, the first of which is
-    the scene's. The coarse level of two-level samples to ``coarse_tau`` and is trained on the
-    fewest. ``work`` bounds vertices x substeps x iterations of a frame of a method, and vertices x
-    motions of the ``training``; anything beyond it is left out.
+    all frames of each of the held-out ``motions``. On its own mesh a scene runs with all weights
+    times each of its factors in ``stiffness`` (1 if it has none). Each of ``processes`` new
+    processes times ``frames`` frames spread over the first motion. Reductions have each number of
+    ``modes``, sample elements to tolerance ``tau``, and are trained on each number of
+    ``training_motions``, the first of which is the scene's. The coarse level of the two-level
+    method has the tolerance ``coarse_tau`` and the fewest training motions. Runs with more ``work``
+    (vertices x substeps x iterations; for ``training`` vertices x motions) are left out.
     """
 
     stiffness: dict[str, Factors] = Field(default_factory=dict)
@@ -142,24 +142,24 @@ class Comparison(Processes):
     repeats: kit.Repeats = 1
 
     def factors(self, scene: str, size: float) -> tuple[float, ...]:
-        """Factors on all weights of ``scene`` with ``size`` times the vertices along a side."""
+        """Factors for all weights of ``scene``; only 1 if ``size`` refines or coarsens its mesh."""
         return self.stiffness.get(scene, (1.0,)) if size == 1.0 else (1.0,)
 
     def pairs(self, method: str, vertices: int) -> list[tuple[int, int]]:
-        """Pairs (substeps, iterations) of ``method`` on a mesh with this number of ``vertices``."""
+        """Pairs (substeps, iterations) of ``method`` within its ``work`` for so many vertices."""
         steps = self.steps.get(method, ())
         return [(n, k) for n, k in steps if self.affords(method, vertices * n * k)]
 
     def affords(self, method: str, work: int) -> bool:
-        """Whether ``method`` may do ``work``, vertices x substeps x iterations of a frame."""
+        """Whether ``work``, vertices x substeps x iterations, is within the method's limit."""
         return work <= self.work.get(method, work)
 
 
 class Alternatives(Comparison):
-    """Section ``alternatives``: factors on the vertices along a side for each of ``scenes``.
+    """Section ``alternatives``; ``scenes`` has mesh sizes (factors for vertices per side) by scene.
 
-    The total mass does not depend on the factor. The table of winners has a row for each error in
-    ``errors``.
+    The total mass does not depend on the factor. The table winners has a row for each allowed error
+    in ``errors``.
     """
 
     scenes: kit.Sizes = Field(default_factory=dict)
@@ -182,7 +182,7 @@ class Trained:
     """A reduced ``model`` for frames of ``substeps`` steps, trained on a number of ``motions``.
 
     seconds : processor time of the training with its full-order runs, s
-    coarse : whether it is the coarse level of the two-level method and not a reduction
+    coarse : True for the coarse level of the two-level method, False for a reduction
     """
 
     motions: int
@@ -197,7 +197,7 @@ class Candidate:
     """A method with its settings, ready to run on one scene.
 
     steps : number of steps of the loop in a frame
-    positions, output : map coordinates of the loop to vertex positions, ``output`` in float32
+    positions, output : functions of the loop's coordinates: vertex positions, and these in float32
     columns : columns of the loop's position subspace, None if its coordinates are positions
     """
 
@@ -210,7 +210,7 @@ class Candidate:
     columns: Columns | None = None
 
     def state(self, state: State, scene: Scene) -> State:
-        """State in coordinates of the loop for a ``state`` of the vertices of ``scene``."""
+        """Convert the ``state`` of all vertices of ``scene`` to coordinates of the loop."""
         if self.columns is None:
             return state
         own = (self.columns, scene.masses)
@@ -232,7 +232,7 @@ class Candidate:
 def candidates(
     scene: Scene, models: Sequence[Trained], settings: Comparison
 ) -> Iterator[Candidate]:
-    """Yield every method with each of its pairs in ``settings``, on the motion of ``scene``.
+    """Yield every method with each pair (substeps, iterations) in ``settings``, for ``scene``.
 
     ``models`` are results of `trained` for another motion.
     """
@@ -270,10 +270,10 @@ def candidates(
 def trained(training: Scene, settings: Comparison) -> Iterator[Trained]:
     """Yield position subspaces with sampled elements, trained on one or more training motions.
 
-    Training motions are that of ``training`` and further ones, which the scene draws by seeds. The
-    columns are modes of nearly converged frames: with n motions, every n-th frame of each. The
-    elements are sampled on iterates of these motions in these columns, for every number of substeps
-    that a reduction needs. With the fewest motions a coarse level is made, too.
+    Training motions are that of ``training`` and further ones drawn by seeds. The columns are modes
+    of nearly converged frames: with n motions, every n-th frame of each. The elements are sampled
+    on iterates of these motions in the subspace, for every number of substeps that a reduction
+    needs. With the fewest motions, a coarse level for the two-level method is made, too.
     """
     vertices, own = training.mesh.vertices, settings.implicit
     taken, coarse = (
@@ -315,7 +315,7 @@ def trained(training: Scene, settings: Comparison) -> Iterator[Trained]:
 def substepped(scene: Scene, substeps: int, iterations: int, window: int = 0) -> Scene:
     """Return the scene with each frame split into ``substeps`` frames of ``iterations`` each.
 
-    Effects keep their times in seconds. ``window`` is that of Anderson acceleration, 0 for none.
+    Effects keep their times in seconds. ``window``: iterates of Anderson acceleration, 0 for none.
     """
     config = scene.config
     changes = {
@@ -332,7 +332,7 @@ def substepped(scene: Scene, substeps: int, iterations: int, window: int = 0) ->
 
 @dataclass(frozen=True)
 class Timed:
-    """A scene in the motion that is timed, with the labels of its rows and its reductions."""
+    """A scene in the motion that is timed, with first columns of its rows, and its reductions."""
 
     labels: dict[str, object]
     scene: Scene
@@ -343,7 +343,7 @@ class Timed:
         """Loops of all candidates; a frame consists of ``steps`` steps of a loop."""
         scene, wanted = self.scene, min(self.settings.frames, self.scene.config.frames)
         places = np.linspace(0, scene.config.frames - 1, wanted).round().astype(int)
-        # this run makes the boundaries store their first positions, which later starts need
+        # in this run, boundaries store their first positions, which runs from later states need
         states = [
             scene.initial_state(),
             *(end for end, _ in simulate(scene, track_objective=False)),
@@ -372,13 +372,13 @@ class Options(ConfigModel):
     alone=True,
 )
 def alternatives(sources: list[Path], settings: Options, out: File, times: File) -> None:
-    """Compare all methods on one mesh: ``factor`` times the vertices along each side.
+    """Compare all methods on one mesh, with ``factor`` times the vertices along each side.
 
     Parameters
     ----------
     sources : files of the mesh; the job depends on them
     settings : scene, methods and limits
-    out, times : tables of errors and of times, with the factor among their labels
+    out, times : tables of errors and of times, with the factor in their paths
     """
     factor, section = float(out["factor"]), settings.alternatives
     rows, cases = [], []
@@ -402,7 +402,7 @@ def alternatives(sources: list[Path], settings: Options, out: File, times: File)
 
 
 def sized(config: SceneConfig, factor: float, stiffness: float) -> SceneConfig:
-    """``config`` on a ``factor`` times finer mesh of equal mass, weights times ``stiffness``."""
+    """Return ``config`` on a ``factor`` times finer mesh of equal mass, ``stiffness`` as stiff."""
     finer = config.coarsened(factor, 1.0)
     counts = [c.mesh.build(Path()).vertices for c in (config, finer)]
     effects = tuple(
@@ -418,9 +418,9 @@ def _rows(
 ) -> Iterator[dict[str, Any]]:
     """Errors of the references, then of every candidate, in the motion of ``scene``.
 
-    The first row is the converged implicit step, the second the playback of the ``recorded``
-    training motion. Errors against the implicit step are None where a frame of it did not converge
-    or it would be too expensive; all errors of a run that blew up are None.
+    The first row is the converged implicit step, the second shows the ``recorded`` training motion
+    in place of a solution. Errors against the implicit step are None if a frame of it did not
+    converge or if it would be too expensive; all errors of a run that blew up are None.
     """
     section, name, vertices = settings.alternatives, scene.config.name, scene.mesh.vertices
     frames, wanted, implicit = scene.config.frames, section.continuous, None

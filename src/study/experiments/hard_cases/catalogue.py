@@ -11,7 +11,7 @@ from pdrom.model.mesh.generators import bar, boundary, cloth
 from pdrom.model.mesh.types import Mesh
 from study.experiments.hard_cases import record
 
-# Files in config/scenes/meshes, which the experiment declares as its inputs.
+# Mesh files in config/scenes/meshes, which the experiment declares as its inputs.
 MESHES = ("hard_disc.obj", "hard_starfish_shell.obj", "hard_starfish.vtu", "hard_torus.vtu")
 
 GRAVITY = {"effect": "gravity"}
@@ -26,14 +26,14 @@ ROTATION = {"effect": "deformation_gradient", "weight": 1e8}
 VOLUME = {"effect": "volume", "weight": 1e6}
 AREA = {"effect": "area", "weight": 1e6}
 
-# Checks of free bodies without forces, of such bodies starting at rest, and of all other scenes.
+# Checks for free bodies without forces, for such bodies that start at rest, for all other scenes.
 FREE = ("finite", "bounded", "objective", "momentum", "determinism")
 CALM = (*FREE, "energy")
 FORCED = ("finite", "bounded", "objective", "determinism")
 
 
 def sheet(wave: float = 0.0) -> Mesh:
-    """A horizontal sheet of 36 vertices, with ``wave`` as in `cloth`."""
+    """A horizontal sheet of 36 vertices; ``wave`` is the height of its waves (`cloth`)."""
     return cloth(6, 6, "xz", wave=wave)
 
 
@@ -67,7 +67,7 @@ def shifted(mesh: Mesh, *offset: float) -> Mesh:
 def _case(
     name: str, why: str, holds: tuple[str, ...], mesh: record.Shape, *effects: dict, **rest: Any
 ) -> record.HardCase:
-    """Return a case; ``rest`` are its start, bound and slow, and settings of the scene."""
+    """Return a hard case; ``rest``: its ``start``, ``bound``, ``slow``, and scene settings."""
     own = {key: rest.pop(key) for key in ("start", "bound", "slow") if key in rest}
     return record.HardCase(name, why, holds, mesh, effects, rest, **own)
 
@@ -79,7 +79,7 @@ def _heavy_and_light(mesh: Mesh) -> np.ndarray:
 
 
 def _all_but(*free: int) -> dict:
-    """Pins on every vertex of the sheet except ``free``."""
+    """Pins on every vertex of `sheet` except the vertices ``free``."""
     held = tuple(int(v) for v in np.setdiff1d(np.arange(sheet().vertices), free))
     return {"effect": "pins", "select": held}
 
@@ -175,7 +175,7 @@ def _states() -> list[record.HardCase]:
 def _sizes() -> list[record.HardCase]:
     """Volume and area constraints, whose nearest shape is not unique."""
     lying = record.mapped((1, 0, 5), (0, 1, 0), (0, 0, 1))
-    # a body of constant volume or area may stretch without limit by its momentum
+    # large bound: a moving body of constant volume or area may stretch without limit
     loose, cases = 40.0, []
     for label, mesh, group, flat in (
         ("volume", small_bar, VOLUME, record.scales(1, 1, 0)),
@@ -234,7 +234,7 @@ def _meshes() -> list[record.HardCase]:
 
 
 def _settings() -> list[record.HardCase]:
-    """Extreme weights, masses, steps, forces."""
+    """Scenes with extreme weights, masses, time steps or forces."""
     held = (GRAVITY, LEFT)
     return [
         _case("stiffness_ratio", "stiffness of the groups differs by twelve decades", FORCED,
@@ -282,7 +282,7 @@ def _settings() -> list[record.HardCase]:
 
 
 def _boundaries() -> list[record.HardCase]:
-    """Pins, handles, floor."""
+    """Scenes with contradictory or extreme pins and handles, or with a floor."""
     tear = {"effect": "translate", "select": "right", "offset": [100, 0, 0], "over": 1, "until": 10}
     twist = {"effect": "rotate", "select": "right", "axis": "x", "degrees": 180, "over": 1}
     again = {"effect": "translate", "select": "left", "offset": [1, 0, 0], "over": 5}
@@ -307,7 +307,7 @@ def _boundaries() -> list[record.HardCase]:
 
 
 def _air() -> list[record.HardCase]:
-    """Drag and wind."""
+    """Scenes with extreme drag or wind."""
     storm = {"effect": "wind", "velocity": [3e3, 9e3, 3e3]}
     return [
         _case("storm", "wind of ten thousand metres a second, held on one side", FORCED, sheet,
@@ -321,7 +321,7 @@ def _air() -> list[record.HardCase]:
 
 
 def _obstacles() -> list[record.HardCase]:
-    """Obstacles: edges, tunnelling, starts inside one, zero and infinite friction."""
+    """Scenes with obstacles: edges, tunnelling, starts inside one, zero and infinite friction."""
     ball = {"effect": "sphere", "centre": [0, 1, 0], "radius": 0.4}
     edge = {"effect": "box", "lower": [-0.02, 1.0, -2], "upper": [0.03, 1.9, 2], "friction": 0.5}
     plate = {"effect": "box", "lower": [-9, 1, -9], "upper": [9, 1, 9]}
@@ -421,5 +421,5 @@ CASES: dict[str, record.HardCase] = {case.name: case for part in PARTS for case 
 
 
 def reducible_cases(slow: bool = False) -> list[str]:
-    """Names of the cases that are not expected to be refused: the slow ones, or all others."""
+    """Names of the hard cases that can be run, not refused: the slow ones, or all others."""
     return [name for name, c in CASES.items() if c.slow == slow and c.holds != ("refused",)]

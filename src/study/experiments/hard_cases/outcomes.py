@@ -37,9 +37,9 @@ FAILURES = ("refused", "singular", "blow-up", "distorted", "objective rises", "m
 R, K, TOLERANCE = 10, 6, 1e-2
 HRPD = HrpdSpec(dimension=20, samples=60)
 BASES = {"pod": ("full", "ecsw", "hrpd"), "skinning": ("full", "hrpd")}
-# Extents above these multiples of `Training.extent` are a blow-up, or a distorted shape.
+# A run with an extent above these multiples of `Training.extent` is a blow-up, or distorted.
 BLOWUP, DISTORTED = 100.0, 3.0
-# Bounded manifolds: the norm of any projection has a bound that is known before the run.
+# Kinds of constraint manifolds on which the norm of any projection has a bound known in advance.
 BOUNDED = ("clamped", "length", "half sphere")
 Methods = Mapping[str, MethodSpec]
 log = logging.getLogger(__name__)
@@ -60,10 +60,10 @@ ReducibleCase = Annotated[str, AfterValidator(lambda case: _known(case, reducibl
 
 
 class Expectation(ConfigModel):
-    """Cases in which a reduction fails, and the reason.
+    """Hard cases in which a reduction fails, and the reason.
 
-    fails : cases in which it must fail
-    may_fail : cases in which round-off decides whether it fails
+    fails : names of cases in which it must fail
+    may_fail : names of cases in which it may fail, depending on round-off
     """
 
     why: Annotated[str, Field(min_length=20)]
@@ -79,7 +79,7 @@ class Expectation(ConfigModel):
 
 
 def surprise(outcome: str, case: str, expected: Expectation | None) -> str:
-    """Describe how the ``outcome`` of ``case`` contradicts the ``expected`` one, else ""."""
+    """Text on how the ``outcome`` of ``case`` contradicts the ``expected`` one; empty if not."""
     must, may = (expected.fails, expected.may_fail) if expected else ((), ())
     if outcome in FAILURES:
         listed = case in (*must, *may)
@@ -88,7 +88,7 @@ def surprise(outcome: str, case: str, expected: Expectation | None) -> str:
 
 
 class Training:
-    """Full-order run of a case with snapshots of its first group, which is the one to reduce."""
+    """Full-order run of a hard case, with snapshots of its first group, the one to be reduced."""
 
     def __init__(self, case: record.HardCase) -> None:
         self.case = case
@@ -98,7 +98,7 @@ class Training:
         self._roundoff: list[float] = []
         self.run = record.full_order(case, self.scene, self._observe)
         self._bases: dict[str, Basis] = {}
-        # largest extent in m of the run, the rest shape, the start and the fixed vertices
+        # largest extent (m) of the run, the rest shape, the start and the fixed vertices
         self.extent = max(self.run.extent, record.reach(self.scene, self.run))
 
     def _observe(self, frame: int, y: np.ndarray) -> None:
@@ -107,7 +107,7 @@ class Training:
             self._roundoff.append(self.group.roundoff(y))
 
     def basis(self, spec: MethodSpec) -> Basis:
-        """Basis of the snapshots of the even frames, of the kind that ``spec`` requires."""
+        """Basis of the snapshots in even frames, with the centring, weights etc. of ``spec``."""
         if spec.basis_id not in self._bases:
             self._bases[spec.basis_id] = compute_basis(
                 np.stack(self._snapshots),
@@ -121,7 +121,7 @@ class Training:
 
 @dataclass(frozen=True)
 class ReducedRun:
-    """A reduced run; ``run`` is None if the basis is empty.
+    """A reduced run, None in ``run`` if the basis is empty, and sizes of the reduction.
 
     r : basis size; in a subspace the number of evaluated elements
     k : number of columns of the position subspace, None in vertex positions
@@ -148,7 +148,7 @@ class ReducedRun:
         # interpolated projections of unreduced positions do not guarantee it
         if self.k is not None and run.excess.max() > 0.0:
             return "objective rises"
-        # S^T W p sums to zero whatever p is
+        # internal forces S^T W p sum to zero for any p, so that reduction keeps the momentum
         case = training.case
         if "momentum" in case.holds and record.momentum(case, training.scene, run):
             return "momentum changes"
@@ -156,12 +156,12 @@ class ReducedRun:
 
 
 def names(methods: Methods) -> list[str]:
-    """Names of all reductions: the methods, then each position subspace with each sampling."""
+    """Names of all reductions: ``methods``, then ``BASIS-SAMPLING`` for position subspaces."""
     return [*methods, *(f"{basis}-{sampling}" for basis in BASES for sampling in BASES[basis])]
 
 
 def reduced_run(training: Training, name: str, methods: Methods, limit: float) -> ReducedRun:
-    """Run the case of ``training`` again with the reduction ``name``, one of `names`.
+    """Run the hard case of ``training`` again with the reduction ``name``, one of `names`.
 
     The run ends as a blow-up when its extent exceeds ``limit`` (m).
 
@@ -186,7 +186,7 @@ def reduced_run(training: Training, name: str, methods: Methods, limit: float) -
 
 
 def _subspace(training: Training, kind: str, sampling: str, limit: float) -> ReducedRun:
-    """Run in a position subspace; ECSW is trained on a run that begins at the start of the case."""
+    """Run in a position subspace of a ``kind``; ECSW is trained on a run from the case's start."""
     scene = training.scene
     columns = make_columns(scene, training.run.positions[1::2], kind, k=K)
     start = training.case.start(scene)
@@ -210,7 +210,7 @@ def _subspace(training: Training, kind: str, sampling: str, limit: float) -> Red
 def row(
     training: Training, name: str, methods: Methods, expected: Mapping[str, Expectation]
 ) -> dict[str, Any]:
-    """Table row of the reduction ``name``: sizes, measures, outcome, reason of a failure."""
+    """Table row of the reduction ``name``: sizes, gain, extent, outcome, reason of a failure."""
     try:
         reduced = reduced_run(training, name, methods, limit=BLOWUP * training.extent)
     except NotReducibleError as error:
@@ -232,7 +232,7 @@ def row(
 
 
 class HardCases(ConfigModel):
-    """Section ``hard_cases``: the cases; if empty, all that are not slow.
+    """Section ``hard_cases``: names of the cases; without names, all that are not slow.
 
     expected : failures by reduction, with their reason; a reduction without entry must never fail
     """
@@ -242,7 +242,7 @@ class HardCases(ConfigModel):
 
     @property
     def modules(self) -> list[str]:
-        """Classes of the effects of the cases, as "module:attribute", for the fingerprint."""
+        """Classes of the cases' effects as "module:attribute", of which jobs hash the code."""
         chosen = self.cases or reducible_cases()
         effects = {effect["effect"] for name in chosen for effect in CASES[name].effects}
         return sorted(EFFECTS[effect] for effect in effects)

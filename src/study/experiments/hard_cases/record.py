@@ -1,7 +1,7 @@
-"""Hard cases: starts, records of runs, bounds of their rounding errors, and checks.
+"""Hard cases: initial states, records of runs, bounds for rounding errors, and checks.
 
-In exact arithmetic 1/(2h^2) |M^1/2 (y - s)|^2 + sum_j W_j(y) falls in every iteration. Computed
-values differ for two reasons (u = eps, c a small constant for the length of the sums):
+In exact arithmetic the objective 1/(2h^2) |M^1/2 (y - s)|^2 + sum_j W_j(y) falls in every
+iteration. Computed values differ for two reasons (u = eps, c a constant for the length of sums):
 
 - evaluation: y - s and S y - p are wrong by c u (|y| + |s|) and c u (|S| |y| + |p|). With R the
   objective of these errors alone, a value E is wrong by at most 2 sqrt(E R) + R (Cauchy-Schwarz);
@@ -42,10 +42,10 @@ class HardCase:
     why : property that makes the scene hard
     holds : names of the checks that the full-order run must pass (`record.CHECKS`); a case with
         only "refused" must raise an error when its scene is built or run
-    mesh, effects, settings : arguments of `build`; the mesh as a function
-    start : function that makes the state before the first frame
+    mesh, effects, settings : arguments of `build`; ``mesh`` is a function that returns the mesh
+    start : function that returns the state before the first frame
     bound : largest allowed extent, relative to the largest extent of start, rest shape and handles
-    slow : whether only the slow tests run the case
+    slow : True if only the slow tests run the case
     """
 
     name: str
@@ -174,9 +174,9 @@ RECOVERED = 1e-2
 
 @dataclass(frozen=True)
 class Roundoff:
-    """Bound for rises of the objective by rounding alone, for one step loop.
+    """Bound for rises of the objective that rounding errors alone cause, for one step loop.
 
-    basis : B (N, K) of the positions B z; None if the coordinates of ``loop`` are the positions
+    basis : B (N, K) if positions are B z with coordinates z; None if coordinates are positions
     """
 
     scene: Scene
@@ -213,7 +213,7 @@ class Roundoff:
         return total
 
     def _residual(self, size: float) -> np.ndarray:
-        """Bound c u |A| |y| for the residual of the vertices, (N,), if ``size`` bounds all |y|."""
+        """Bound c u |A| |y| (N,) for the linear solver's residual, if no |y| exceeds ``size``."""
         rows = np.asarray(abs(self.scene.system.matrix).sum(axis=1)).ravel()
         return OPERATIONS * EPS * size * rows
 
@@ -221,7 +221,7 @@ class Roundoff:
         matrix = b.T @ (self.scene.masses[:, None] * b) / self.loop.time_step**2
         steps: Sequence[Any] = self.loop.local_steps  # in a subspace each has a matrix
         matrix = matrix + sum(step.matrix for step in steps)
-        # scaled columns of length one make the result independent of the units of coordinates
+        # scale columns to length one, so that the result does not depend on units of coordinates
         scale = np.sqrt(np.diag(matrix))
         eigenvalues = np.linalg.eigvalsh(matrix / np.outer(scale, scale))
         smallest, greatest = max(eigenvalues[0], EPS * eigenvalues[-1]), eigenvalues[-1]
@@ -264,7 +264,7 @@ class Watched:
         self._step, self._group = step, group
 
     def begin_frame(self, q: np.ndarray) -> None:
-        """Freeze frame-lagged data of the reduced step and of the group at ``q`` (N, 3) m."""
+        """Compute data that are constant during a frame, for both steps, at ``q`` (N, 3) m."""
         self._step.begin_frame(q)
         self._group.begin_frame(q)
 
@@ -330,7 +330,7 @@ def record(
 def full_order(
     case: HardCase, scene: Scene, observe: Callable[[int, np.ndarray], None] | None = None
 ) -> Record:
-    """Run ``scene`` at full order from the start of ``case``; ``observe`` as in `record`."""
+    """Run ``scene`` in full order from the start of ``case``; ``observe`` gets last iterates."""
     return record(scene, scene.stepper(), case.start(scene), observe=observe)
 
 

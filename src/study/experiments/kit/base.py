@@ -1,10 +1,10 @@
 """Declaration of experiments, settings that several of them share, and scenes from files.
 
-An experiment is a question that the study asks, with files as the answer.
+An experiment answers a question of the study by files.
 
-The sensitivity floor of a scene is the drift of its full-order run after a small displacement of
-the start, by frame, maximal over all seeds (`study.experiments.sensitivity`). At the horizon the
-floor exceeds a threshold; later differences between two runs say nothing about their methods.
+The sensitivity floor of a scene is the drift of its full-order run, by frame, after a small random
+displacement of the start: the largest over all seeds (`study.experiments.sensitivity`). The horizon
+is the first frame with a floor above a threshold: from it on, errors say nothing about a method.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -28,15 +28,15 @@ from study.artifact.reads import Read
 
 
 class Experiment(Artifact):
-    """An artifact whose function writes its files itself."""
+    """An artifact (declared function that makes files) whose function writes its files itself."""
 
 
 def experiment(
     title: str, *, reads: Mapping[str, Read], writes: Mapping[str, Place], alone: bool = False
 ) -> Callable[[Callable[..., None]], Experiment]:
-    """Declare the function below as an experiment, see `Artifact`.
+    """Return a decorator that declares a function as an experiment (`Artifact`).
 
-    ``title`` names its jobs; no other job runs at the same time as an ``alone`` one.
+    ``title`` is the message of its jobs. With ``alone``, no other job runs at the same time.
 
     Raises
     ------
@@ -59,7 +59,7 @@ def experiments() -> dict[str, Experiment]:
 FOM = "fom"  # full-order run with the scene's or another number of iterations
 ANDERSON = "fom-anderson"  # full-order run with Anderson acceleration
 
-# phases of a frame that belong to no effect
+# names of the phases of a frame that belong to no effect
 RIGHT, GLOBAL, REST = "right-hand side", "global solve", "rest of the frame"
 # a run ends as a blow-up when its bounding box exceeds this multiple of the rest extent
 BlowupExtent = Annotated[float, Field(gt=1.0, le=1e12)]
@@ -74,20 +74,20 @@ Rank = Annotated[int, Field(ge=1, le=100_000)] | Literal["full"]
 
 
 class OfScene(ConfigModel):
-    """Names files of a scene."""
+    """Base class of settings that identify files of a scene."""
 
     scene: SceneName
 
     @property
     def labels(self) -> dict[str, str]:
-        """Labels of the files: every text in these settings."""
+        """Scene, group ... in the paths of the files, by name: all text settings."""
         return {name: text for name, text in self if isinstance(text, str)}
 
 
 def floor_of(table: pd.DataFrame, scene: str, perturbation: float | str) -> np.ndarray:
-    """Sensitivity floor (F,) of a scene for one size (or one label) of the perturbation.
+    """Sensitivity floor (F,) of a scene: drift by frame for one size or name of perturbation.
 
-    Empty if the scene was not perturbed in this way.
+    The floor is empty if the scene was not perturbed in this way.
 
     Parameters
     ----------
@@ -101,13 +101,13 @@ def floor_of(table: pd.DataFrame, scene: str, perturbation: float | str) -> np.n
 
 
 def horizon(floor: np.ndarray, threshold: float) -> int:
-    """First frame at which the floor (F,) exceeds ``threshold``; F if it never does."""
+    """First frame in which the sensitivity floor (F,) exceeds ``threshold``; F if it never does."""
     above = np.flatnonzero(~(floor <= threshold))
     return int(above[0]) if len(above) else len(floor)
 
 
 def horizons(table: pd.DataFrame, perturbation: float | str, threshold: float) -> dict[str, int]:
-    """`horizon` of every scene of ``table``, by ``threshold`` and the floor of `floor_of`."""
+    """Horizon of every scene in ``table``: first frame with a floor above ``threshold``."""
     scenes = table.scene.unique()
     return {s: horizon(floor_of(table, s, perturbation), threshold) for s in scenes}
 
@@ -122,9 +122,9 @@ Solver = Annotated[str, AfterValidator(_known)]
 
 
 class Horizon(ConfigModel):
-    """Horizon of a scene, before which runs are compared, by its runs with this ``perturbation``.
+    """Settings of the horizon: runs of a scene are compared in earlier frames only.
 
-    It is the first frame at which the spread of these runs exceeds ``threshold``.
+    It is the first frame in which runs with this ``perturbation`` differ by over ``threshold``.
     """
 
     perturbation: Tolerance
@@ -137,7 +137,7 @@ class Horizon(ConfigModel):
 
 
 def resolve_ranks(ranks: Sequence[Rank], rank: int) -> list[int]:
-    """Sort ``ranks`` and replace "full" by the numerical ``rank`` (left out if 0)."""
+    """Sort basis sizes ``ranks``, with "full" replaced by the numerical ``rank`` (omitted if 0)."""
     full = [rank] if "full" in ranks and rank > 0 else []
     return sorted({*(int(r) for r in ranks if r != "full"), *full})
 
@@ -178,11 +178,11 @@ def varied(
     duration: float,
     frames: Sequence[int],
 ) -> SceneConfig:
-    """Return ``config`` with ``time_step`` (s), reduced groups' weights times ``stiffness_ratio``.
+    """Return ``config`` with another ``time_step`` (s) and other weights of reduced groups.
 
-    Schedules keep their times in seconds, so that their frame numbers change. The run lasts
-    ``duration`` seconds, but at least ``frames[0]`` and at most ``frames[1]`` frames. Groups that
-    are not reduced keep their weights.
+    The weights of reduced groups are multiplied by ``stiffness_ratio``. Schedules keep their times
+    in seconds, so that their frame numbers change. The run lasts ``duration`` seconds, but at least
+    ``frames[0]`` and at most ``frames[1]`` frames.
     """
     count = min(max(round(duration / time_step), frames[0]), frames[1])
     effects = []
@@ -191,6 +191,6 @@ def varied(
         if isinstance(effect, GroupConfig) and effect.effect in config.reduce:
             effect = effect.model_copy(update={"weight": stiffness_ratio * effect.weight})
         effects.append(effect)
-    # the settings of the reduction, with numbers of training snapshots, stay those of the scene
+    # settings of the reduction, such as the number of training snapshots, remain
     changes = {"time_step": time_step, "frames": count, "effects": tuple(effects)}
     return config.model_copy(update=changes)

@@ -1,4 +1,4 @@
-"""Times per frame of each effect and of a scene without it, and times of single local steps.
+"""Times per frame of each effect and of scenes without one, and times of single local steps.
 
 Effects are timed by wrappers, so that a normal run contains no timers.
 """
@@ -32,12 +32,12 @@ COLUMNS = [
 ]  # fmt: skip
 COSTS = ["scene", "effect", "elements", "ms_per_frame", "share"]
 LEFT_OUT = ["scene", "left_out", "groups", "elements", "ms_per_frame", "own_ms"]
-# Methods of an effect that the step loop calls, for each role of `_roles`.
+# Methods of effects that the step loop calls: of groups, forces, boundaries, contacts (`_roles`).
 _QUESTIONS = (
     ("begin_frame", "accumulate"), ("acceleration",), ("active", "held", "takes_hold", "path"),
     ("apply",),
 )  # fmt: skip
-# Entries of the record of a timed kernel: address and record of the kernel itself, and addresses of
+# Entries of a timed kernel's record: address and record of the untimed kernel, then addresses of
 # the seconds and clocks of its two parts and of its preparation.
 KERNEL, RECORD, SECONDS, CLOCKS, SIZE = range(OWN, OWN + 5)
 
@@ -45,7 +45,7 @@ KERNEL, RECORD, SECONDS, CLOCKS, SIZE = range(OWN, OWN + 5)
 def variant(
     scene: Scene, system: GlobalSystem, steps: Sequence[LocalStep], frames: int, labels: dict
 ) -> Variant:
-    """Loop of a ``scene`` with these local ``steps`` and no objective, from the scene's start."""
+    """Step loop to time: ``scene`` with these local ``steps``, from its start, no objective."""
     loop = scene.stepper(system, steps, track_objective=False)
     return Variant(labels, loop, scene.initial_state(), frames)
 
@@ -53,10 +53,10 @@ def variant(
 def local_costs(
     scene: Scene, reduced: Mapping[tuple, ReducedLocalStep], states: np.ndarray, **often: int
 ) -> pd.DataFrame:
-    """Milliseconds of one local step, mean over some states.
+    """Milliseconds of one evaluation of each local step, as the mean over some states.
 
-    For reduced local steps, also the time of the dense product that solves for the coefficients and
-    of the reconstruction, each measured separately.
+    Rows of reduced local steps also have the times of the dense product that solves for the
+    coefficients, and of the reconstruction, each measured separately.
 
     All steps are measured in turn.
 
@@ -64,7 +64,7 @@ def local_costs(
     ----------
     often : ``warmup``, ``repeats``: numbers of unmeasured and of measured evaluations
     reduced : local steps by group, method and r, bound to the groups of ``scene``
-    states : (n, N, 3) positions in m; frame-lagged data are frozen at the first
+    states : (n, N, 3) positions in m; data that are constant during a frame are those of the first
     """
     groups = {name: scene.group(name) for name, _, _ in reduced}
     rhs, iterates = vertices(len(states[0])), [as_vertices(y) for y in states]
@@ -117,12 +117,12 @@ class Timed:
 
     @property
     def seconds(self) -> float:
-        """Time since `reset`."""
+        """Seconds spent in the effect since `reset`."""
         return self._asked + self.kernel_seconds
 
     @property
     def kernel_seconds(self) -> float:
-        """The share of `seconds` that is spent inside the compiled loop."""
+        """Part of `seconds` that is spent inside the compiled loop."""
         return float(self._kernel.sum())
 
     def reset(self) -> None:
@@ -143,11 +143,11 @@ class Timed:
 def effect_costs(
     scene: Scene, system: GlobalSystem, frames: int, warmup: int, repeats: int
 ) -> pd.DataFrame:
-    """Table of `COSTS` of the full-order run: effects, right-hand side, global solve, the rest.
+    """Times per frame of the full-order run: effects, right-hand side, global solve, the rest.
 
-    An effect that a scene lists several times has one row. ``elements`` is the number of elements
-    of a group, of vertices that a hold may ever fix, else of all vertices. The shares add up to
-    one. The right-hand side is the time of the compiled local pass outside of the groups.
+    The table has the columns `COSTS`. An effect listed several times has one row. ``elements`` is
+    the number of elements of a group, of vertices that pins or handles may fix, else of all
+    vertices. The right-hand side is the time of the compiled local pass outside of the groups.
 
     Parameters
     ----------
@@ -176,7 +176,7 @@ def _roles(scene: Scene) -> tuple[Sequence[Effect], ...]:
 def _profile(
     loop: Stepper, scene: Scene, frames: int, stands: list[Timed], names: list[str]
 ) -> list[list[float]]:
-    """Milliseconds of each frame: first the total, then all phases."""
+    """Milliseconds of each frame: the total, effects, right-hand side, global solve, the rest."""
     state, rows = scene.initial_state(), []
     for frame in range(frames):
         for stand in stands:
@@ -185,7 +185,7 @@ def _profile(
         own = [sum(stand.seconds for stand in stands if stand.name == name) for name in names]
         inside = sum(stand.kernel_seconds for stand in stands)
         total, (_, local, solve, _) = float(report.seconds.sum()), report.seconds.tolist()
-        # without compiled local pass the groups are called directly: no time outside of them
+        # without a compiled local pass, groups assemble the right-hand side themselves
         right = local - inside if inside > 0.0 else 0.0
         parts = [*own, right, solve, total - sum(own) - right - solve]
         rows.append([1e3 * part for part in (total, *parts)])
@@ -193,7 +193,7 @@ def _profile(
 
 
 def _elements(scene: Scene, name: str) -> int:
-    """Number of elements (or vertices) of the effects called ``name``, see `effect_costs`."""
+    """Number of elements of the group ``name``, or of vertices that another effect concerns."""
     for group in scene.groups:
         if group.name == name:
             return group.elements
@@ -202,10 +202,10 @@ def _elements(scene: Scene, name: str) -> int:
 
 
 def left_out_sets(scene: Scene) -> list[tuple[str, ...]]:
-    """Sets of effects to leave out: none, each effect on its own, all groups but one.
+    """Sets of effects to leave out: none, each single effect, all groups but one.
 
-    Empty for a scene with a single group, which cannot be left out. Effects of the start, such as a
-    kick, cost no time in a frame and are never left out.
+    The list is empty for a scene with a single group, which cannot be left out. Effects of the
+    start, such as a kick, cost no time in a frame and are never left out.
     """
     groups = scene.config.groups
     if len(groups) < 2:
@@ -220,10 +220,10 @@ def left_out_sets(scene: Scene) -> list[tuple[str, ...]]:
 def left_out(
     scene: Scene, costs: pd.DataFrame, frames: int, warmup: int, repeats: int, solver: str
 ) -> pd.DataFrame:
-    """Table of `LEFT_OUT`: times of the scene built without some of its effects.
+    """Times per frame of the scene built without some of its effects; columns are `LEFT_OUT`.
 
-    ``own_ms`` is the time of these effects in the complete scene (``costs``, see `effect_costs`).
-    ``frames``, ``warmup`` and ``repeats`` as there; ``solver`` names the linear solver.
+    ``own_ms`` is the time of these effects in the complete scene, from ``costs`` by `effect_costs`.
+    ``frames``, ``warmup`` and ``repeats`` are as there; ``solver`` names the linear solver.
     """
     sets = left_out_sets(scene)
     if not sets:

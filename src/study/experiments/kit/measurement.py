@@ -1,8 +1,8 @@
 """Timings in one process, after a warm-up, with the compared variants in turn.
 
 A variant has a step loop and its initial state. Every repeat runs each variant once from there, so
-that changes of the processor's clock rate affect all variants alike. For each frame the repeat with
-the median time counts, which excludes interruptions: each affects one frame of one repeat.
+that changes of the processor's clock rate affect all variants alike. For each frame, the time of
+the median repeat is used: an interruption by other programs affects one frame of one repeat.
 
 The addresses of arrays and code in a process change its times by more than its repeats scatter.
 Only new processes show that (`in_processes`); a fork would inherit the addresses.
@@ -32,9 +32,9 @@ T = TypeVar("T")
 log = logging.getLogger(__name__)
 
 # Times of a frame, in this order: total; prediction, contacts and velocities; projections of all
-# groups, and coefficients of reduced ones; product with S^T W, if an implementation separates it
-# from the projections; right-hand side from coefficients; global step; positions of all vertices
-# if the loop has other coordinates.
+# groups, and coefficients of reduced groups; product with S^T W, if it is separate from the
+# projections; right-hand side from coefficients; global step; positions of all vertices, if the
+# loop has other coordinates.
 PHASES = (
     "ms_per_frame", "inertia_ms", "local_ms", "assembly_ms", "lift_ms", "global_ms", "vertices_ms",
 )  # fmt: skip
@@ -42,7 +42,7 @@ _INNER = ("assembly_seconds", "lift_seconds")
 
 
 class Protocol(ConfigModel):
-    """``repeats`` measured runs of ``frames`` frames each, after ``warmup`` unmeasured runs."""
+    """Settings: ``repeats`` timed runs of ``frames`` frames each, after ``warmup`` untimed runs."""
 
     frames: Count = 10
     warmup: Annotated[int, Field(ge=0, le=1000)] = 1
@@ -50,7 +50,7 @@ class Protocol(ConfigModel):
 
 
 class Processes(Protocol):
-    """``processes`` that each time every run, with ``frames``, ``warmup`` and ``repeats``."""
+    """Settings: ``processes`` time every run, each with ``frames``, ``warmup`` and ``repeats``."""
 
     frames: Count = 4
     repeats: Repeats = 3
@@ -59,7 +59,7 @@ class Processes(Protocol):
 
 @dataclass(frozen=True)
 class Variant:
-    """A loop to time: labels for the table, the loop with its first state, and number of frames.
+    """A loop to time: first columns of its row, the loop with its first state, number of frames.
 
     ``share`` is the fraction of a frame's iterations that the loop does; the times of phases inside
     the iterations are divided by it. ``output`` computes the positions of all vertices from the
@@ -79,10 +79,10 @@ class Variant:
 
 
 def measure(variants: Sequence[Variant], warmup: int, repeats: int) -> list[dict[str, Any]]:
-    """Time all variants; their first run, a warm-up, also factorises and caches matrices.
+    """Time all variants; the first of ``warmup`` runs also factorises and caches matrices.
 
-    Returns the labels of each variant with its times by phase (`PHASES`): means over the frames, in
-    ms, each frame from its median repeat.
+    Returns a row per variant: its labels, and times by phase (`PHASES`) in ms, as means over the
+    frames, each frame from its median repeat.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ def measure(variants: Sequence[Variant], warmup: int, repeats: int) -> list[dict
 def measure_calls(
     calls: Mapping[Hashable, Callable[[], object]], warmup: int, repeats: int
 ) -> dict[Hashable, float]:
-    """Median time in ms of each of ``calls``, made in turn: ``warmup`` rounds, then repeats."""
+    """Median time of each of ``calls``, ms; calls alternate, the first ``warmup`` are untimed."""
     samples: dict[Hashable, list[float]] = {key: [] for key in calls}
     for _ in range(warmup + repeats):
         for key, call in calls.items():
@@ -114,7 +114,7 @@ def measure_calls(
 
 
 def clocked(made: Iterable[T]) -> Iterator[tuple[float, T]]:
-    """Yield every item of ``made`` with the processor time for making it, s."""
+    """Yield (processor time in s to make it, item) for every item of ``made``."""
     items = iter(made)
     while True:
         before = process_time()
@@ -155,10 +155,10 @@ def _time_once(variant: Variant) -> np.ndarray:
 
 
 def median_frames(samples: np.ndarray) -> np.ndarray:
-    """Mean over the frames of ``samples`` (repeats, frames, phases), each in its median repeat.
+    """Mean over frames of ``samples`` (repeats, frames, phases), each from its median repeat.
 
-    The median repeat of a frame is that of the total, the first phase. All phases of a frame are
-    from one repeat; medians of each phase would not add up to the total.
+    The median repeat of a frame is the one with the median total, the first phase. All phases are
+    from this repeat, since medians of single phases would not add up to the total.
     """
     order = np.argsort(samples[:, :, 0], axis=0, kind="stable")[len(samples) // 2]
     return samples[order, np.arange(samples.shape[1])].mean(axis=0)
@@ -167,10 +167,10 @@ def median_frames(samples: np.ndarray) -> np.ndarray:
 def in_processes(
     cases: Sequence[Callable[[], Iterable[Variant]]], asked: Processes
 ) -> list[dict[str, Any]]:
-    """Labels of all variants of ``cases`` with their times in each of the new processes, in order.
+    """Rows of all variants (labels and times) for each of several new processes, in order.
 
-    One process after the other times all of them, in a random order of its own. A case makes its
-    variants there, with all labels; it is pickled for that.
+    One process after the other times all variants, in a random order of its own. Each of ``cases``
+    is pickled and called in the process, where it makes its variants.
 
     Raises
     ------
@@ -197,7 +197,7 @@ def in_processes(
 
 
 def _in_this_process(given: str, answer: str, process: str) -> None:
-    """Time the cases of the file ``given`` and write the rows to ``answer``."""
+    """Time the pickled cases in the file ``given`` and write the rows to the file ``answer``."""
     with damaged_set_aside():  # the process is part of a job
         cases, asked = pickle.loads(Path(given).read_bytes())
         variants = [variant for case in cases for variant in case()]

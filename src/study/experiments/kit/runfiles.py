@@ -19,7 +19,7 @@ from study.artifact.paths import File
 def load_reduction(
     basis: Basis, sampling: str | os.PathLike[str], method: MethodSpec, r: int
 ) -> Reduction:
-    """Reduction of size r by ``method`` on ``basis``; StorageError if ``sampling`` lacks it."""
+    """Reduction of size r by ``method`` and ``basis``; StorageError if ``sampling`` has no r."""
     with open_hdf5(sampling) as file:
         store = file[f"r{r:04d}"]
         stored = Sampling(store["entries"][...], store["elements"][...])
@@ -27,7 +27,7 @@ def load_reduction(
 
 
 def basis_of(sampling: File, method: MethodSpec, bases: Sequence[File]) -> File:
-    """Return the one of ``bases`` that ``method`` needs for ``sampling``; else StorageError."""
+    """Basis file of a ``sampling`` by ``method``; StorageError if it is not among ``bases``."""
     wanted = {"scene": sampling["scene"], "group": sampling["group"], "basis": method.basis_id}
     for basis in bases:
         if basis.labels == wanted:

@@ -1,4 +1,4 @@
-"""Projective dynamics in substeps: K iterations in each of n steps (Macklin et al. 2019: K = 1).
+"""Projective dynamics with n substeps of K iterations per frame (Macklin et al. 2019: K = 1).
 
 Methods: plain, Anderson acceleration (`pdrom.model.dynamics.acceleration`), the same with a coarse
 level, Chebyshev's semi-iteration (Wang 2015, alg. 1), and explicit integration.
@@ -88,14 +88,14 @@ def _anderson(
             objective = add_projections(tables, y, rhs) + inertia_energy(y, s, inertia)
             if not refuse(history, y, objective):
                 sweep(panels, vertices, loads, work, rhs, y)
-                # the last image is not extrapolated, so that its objective cannot rise
+                # not after the last iteration: an extrapolation could raise the objective
                 if k < iterations - 1:
                     combine(history, y)
         end(y, before, step, v)
 
 
 class Chebyshev(Alternative):
-    """Chebyshev's semi-iteration: extrapolates from the second-last iterate by varying weights."""
+    """Chebyshev's semi-iteration: extrapolation from the second-last iterate, varying weights."""
 
     name = "chebyshev"
 
@@ -207,7 +207,7 @@ def _two_level(
         for k in range(iterations):
             rhs[:] = base
             objective = add_projections(tables, y, rhs) + inertia_energy(y, s, inertia)
-            # even the first corrected image may raise the objective
+            # also check the first corrected iterate, which may raise the objective
             if refuse(history, y, objective, 0):
                 y[:] = plain
                 continue
@@ -221,7 +221,7 @@ def _two_level(
 
 @compiled(nogil=True)
 def _correct(coarse, start, image):
-    """Replace the component of ``image - start`` in the span by the step to the sampled minimum."""
+    """Replace the part of ``image - start`` in the span by the step to the sampled minimum."""
     span, duals, rows, steps, inverse, vertices, tables, history = coarse
     size, sampled = WIDTH * span.shape[1], WIDTH * len(vertices)
     step, x, at_start = np.zeros(size), np.empty(sampled), np.zeros(sampled)
@@ -234,7 +234,7 @@ def _correct(coarse, start, image):
     z[:] = first
     forget(history)
     for _ in range(INNER):
-        refuse(history, z, np.nan)  # accepts the iterate, since its objective is unknown
+        refuse(history, z, np.nan)  # nan: accept the iterate, whose objective is unknown
         moved[:] = x
         _add_product(rows, z, moved)
         forces[:] = 0.0
@@ -249,11 +249,11 @@ def _correct(coarse, start, image):
 
 @compiled(nogil=True)
 def _add_product(matrix, x, out):
-    """Add ``matrix`` (m, n) times ``x`` (n rows of four) to ``out`` (m rows of four), both flat."""
+    """Add ``matrix`` (m, n) times ``x`` (n, 4) to ``out`` (m, 4); both are flat arrays."""
     m, n = matrix.shape
     numbers = matrix.reshape(-1)
     for i in range(m):
-        # two independent sums, which the processor overlaps
+        # two independent sums, which the processor computes in parallel
         even, odd = load(out, WIDTH * i), constant(0.0)
         for k in range(0, n - 1, 2):
             even = add_scaled(even, at(numbers, n * i + k), load(x, WIDTH * k))
@@ -263,11 +263,11 @@ def _add_product(matrix, x, out):
         store(out, WIDTH * i, add(even, odd))
 
 
-UNSTABLE = 1e100  # m; a run that is larger, or not finite, is called unstable
+UNSTABLE = 1e100  # a run with larger coordinates (m), or with values not finite, is unstable
 
 
 class Explicit(Alternative):
-    """Position Verlet for all groups: half a drift, a kick, half a drift; ``iterations`` is unused.
+    """Position Verlet for all groups: half a drift, a kick, half a drift; ignores ``iterations``.
 
     Second order and symplectic (Tuckerman et al. 1992), with one force evaluation per substep.
     Stable while the substep is shorter than 2 / omega of the stiffest mode.
@@ -280,7 +280,7 @@ class Explicit(Alternative):
         for group in scene.groups:
             total = total + group.system_matrix()
         total.sort_indices()
-        # sum of S^T W S over all groups, as CSR arrays for `_multiply`
+        # stiffness matrix: sum of S^T W S over all groups, as CSR arrays for `_multiply`
         self._stiffness = *(i.astype(np.int32) for i in (total.indptr, total.indices)), total.data
 
     def _advance(self, part: Substeps) -> None:
@@ -314,7 +314,7 @@ def _explicit(y, v, acceleration, step, substeps, inverse, tables, stiffness):
 
 @compiled(nogil=True)
 def _multiply(matrix, y, out):
-    """Write the product of the ``matrix`` (CSR) and ``y`` to ``out``, both padded vectors, flat."""
+    """Write ``matrix`` (N, N; CSR) times ``y`` (N, 4) to ``out`` (N, 4); both are flat arrays."""
     indptr, indices, data = matrix
     for i in range(len(indptr) - 1):
         total = constant(0.0)
@@ -353,8 +353,8 @@ def continuous(
         if before is not None:
             change = _change(before, after)
             # Richardson's estimate of the remaining error: a third of the last change if changes
-            # fall to a quarter, as in a method of second order; the whole change if they do not
-            # even fall to a half, because the motion is not smooth or not yet resolved
+            # fall to a quarter, as in a method of second order. If they do not even fall to a half,
+            # the motion is not smooth or not yet resolved, and the estimate is the whole change.
             ratio = last / change if change > 0.0 and np.isfinite(last) else 1.0
             error = change / min(max(ratio - 1.0, 1.0), 3.0)
             if error <= tolerance or 2 * substeps > limit:

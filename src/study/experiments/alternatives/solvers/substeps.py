@@ -38,7 +38,7 @@ METHODS = Registry(
 class Substeps(NamedTuple):
     """Arguments of the compiled loops over substeps of a frame, in the order of their signatures.
 
-    y, v : positions m and velocities m/s as padded vectors, flat; changed in place
+    y, v : (4 N,) positions m and velocities m/s, changed in place: x, y, z and 0 of each vertex
     acceleration : (3,) m/s^2
     time_step : length of a substep, s
     substeps, iterations : number of substeps, and number of iterations in each of them
@@ -58,15 +58,15 @@ class Substeps(NamedTuple):
 class Alternative(Stepper):
     """Base class of methods that divide a frame into ``substeps`` steps of ``iterations`` each.
 
-    A handle moves at constant speed during a frame, whatever the number of substeps; contacts act
-    at the end of the frame, as in the step loop. Groups freeze their data when a frame begins.
+    A handle moves at constant speed during a frame, whatever the number of substeps. As in the step
+    loop, contacts act at the end of a frame, and groups compute data for the frame at its begin.
     Loops with equal substeps may share a factored ``system``. `METHODS` lists all classes.
 
     Raises
     ------
     SceneError
-        A force other than gravity (if it depends on the motion, every substep would have to
-        evaluate it), or a group without a compiled local step.
+        The scene has a force other than gravity (every substep would have to evaluate it if it
+        depends on the motion), or a group without a compiled local step.
     """
 
     name: ClassVar[str]
@@ -88,7 +88,7 @@ class Alternative(Stepper):
         self.substeps = substeps
         self.masses = scene.masses
         kernels = [group.local_kernel for group in scene.groups if group.local_kernel is not None]
-        # the tables point to memory of the kernels, which must therefore stay alive
+        # the tables point to memory of the kernels, so that the kernels must not be freed
         self._kernels = local = LocalPass(kernels)
         self.tables = local.first, local.preparing, local.second
         self._prepare(scene)
@@ -99,7 +99,7 @@ class Alternative(Stepper):
     def step(
         self, state: State, frame: int, on_last_iterate: Callable[[np.ndarray], None] | None = None
     ) -> tuple[State, FrameReport]:
-        """Compute ``frame`` from ``state``; no objective, no call of ``on_last_iterate``."""
+        """Compute ``frame`` from ``state``, without objective; ``on_last_iterate`` is ignored."""
         started = perf_counter()
         q = state.positions
         fixed, targets = self.space.fixed(frame, q)
@@ -118,7 +118,7 @@ class Alternative(Stepper):
                     *(self.iterations, fixed, now),
                 )
             )
-        # vertices moved by a contact get their mean velocity over the frame
+        # vertices that a contact moves get their mean velocity over the frame
         free = positions.copy()
         self.space.correct(positions, q, frame)
         moved = (positions != free).any(axis=1)
@@ -132,10 +132,10 @@ class Alternative(Stepper):
 
     @abstractmethod
     def _advance(self, part: Substeps) -> None:
-        """Advance positions and velocities over these substeps, in place."""
+        """Advance positions and velocities in ``part`` over its substeps, in place."""
 
     def _factor(self, part: Substeps) -> Factor:
-        """Factor of the system matrix without the fixed vertices, in the format of `sweep`."""
+        """Cholesky factor of the system matrix without fixed vertices, as the solver needs it."""
         elimination = self.space.eliminate(part.fixed, part.targets)
         assert isinstance(elimination, Elimination)
         assert elimination.factor is not None
@@ -150,7 +150,7 @@ def begin(y, v, acceleration, step, fixed, targets, before, s):
 
     Parameters
     ----------
-    y, v : positions m and velocities m/s of all vertices, one after the other in a vector
+    y, v : (4 N,) positions m and velocities m/s: x, y, z and 0 of each vertex
     acceleration : (3,) m/s^2
     step : length of the substep, s
     fixed, targets : fixed vertices (n,) and their positions (n, 3) m at the end of the substep
@@ -169,16 +169,16 @@ def begin(y, v, acceleration, step, fixed, targets, before, s):
 
 @compiled(nogil=True)
 def end(y, before, step, v):
-    """Set velocities ``v`` from ``before`` and ``y``, positions at both ends of a ``step``."""
+    """Set velocities ``v`` by positions ``before`` and ``y`` at begin and end of a ``step`` (s)."""
     for k in range(len(y)):
         v[k] = (y[k] - before[k]) / step
 
 
 @compiled(nogil=True)
 def add_projections(tables, y, rhs):
-    """Add S^T W p(y) of all groups to ``rhs`` (padded and flat, as ``y``); return the energy W(y).
+    """Add S^T W p(y) of all groups to ``rhs`` and return the energy W(y), J.
 
-    ``tables`` are `first`, `preparing` and `second` of a `LocalPass` of the groups.
+    ``y`` and ``rhs`` (4 N,) have x, y, z and 0 of each vertex; ``tables`` are from `LocalPass`.
     """
     first, preparing, second = tables
     y_place, rhs_place = y.ctypes.data, rhs.ctypes.data
