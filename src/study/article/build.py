@@ -158,11 +158,11 @@ def claims_page(
     pages: Mapping[str, str],
     template: str,
 ) -> str:
-    """HTML page by ``template`` of all ``claims``, given as rules by name.
+    """HTML page by ``template`` of all ``claims`` (rules by name), their tests and verdicts.
 
     Parameters
     ----------
-    pages : page of each figure that the documents contain, by the figure's name
+    pages : file name of the page with each figure, by the figure's name
     """
     found, body = verdicts.set_index("claim"), ""
     for name, rule in claims.items():
@@ -345,7 +345,7 @@ WRITES = {
     **{f"table_{name}": f"tables/{name}.html" for name in FACTS},
     **{f"picture_{name}": f"figures/{name}.webp" for name in declarations()},
 }  # fmt: skip
-LIMIT = 300.0  # s, for pandoc, which never ends for a definition that expands to itself
+LIMIT = 300.0  # time limit of pandoc, s: it would never end if a definition expands to itself
 
 
 def parsed(text: str, files: Mapping[str, str], references: Path) -> Node:
@@ -371,7 +371,7 @@ def parsed(text: str, files: Mapping[str, str], references: Path) -> Node:
 
 
 def page(tree: Node, template: Path, variables: Mapping[str, str]) -> str:
-    """Return the HTML of ``tree`` by ``template`` and ``variables``; errors as in `parsed`.
+    """Return the HTML of ``tree`` by pandoc's ``template`` and ``variables``, or PaperError.
 
     Formulas become MathML, and a table of contents comes first.
     """

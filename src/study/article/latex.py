@@ -42,7 +42,7 @@ REPLACED = r"""
 def prepared(source: str, document: str, origins: Mapping[str, Any], facts: Facts) -> str:
     """Return the ``source`` of a ``document`` for pandoc, with numbers as links to tables.
 
-    ``origins`` is the content of numbers.json, see `study.paper.build.write_inputs`.
+    ``origins`` is the content of numbers.json: table cells of numbers, and which blocks are shown.
     """
     preamble, begin, text = source.partition(r"\begin{document}")
     left_out = rf"\emph{{[{note(facts.part, facts.full_study)}]}}"
@@ -70,7 +70,7 @@ def _title(preamble: str) -> str:
 
 
 def _decided(source: str, known: Sequence[str], left_out: str) -> str:
-    r"""Return ``source`` with its ``\known`` and ``\row`` blocks shown, noted or dropped."""
+    r"""Return ``source`` with each ``\known`` or ``\row`` block kept, removed, or ``left_out``."""
     pieces, start = [], 0
     for sentence, decision in zip(sentences(source), known, strict=True):
         shown = {SHOWN: sentence.text, NOTED: left_out}.get(decision, "")

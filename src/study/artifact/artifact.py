@@ -76,7 +76,7 @@ class Artifact:
 
     @cached_property
     def types(self) -> dict[str, TypeAdapter[Any]]:
-        """Pydantic type adapters of the settings, by parameter name."""
+        """Pydantic type adapters that validate the settings, by parameter name."""
         hints = get_type_hints(self.function, include_extras=True)
         settings = [name for name, read in self.reads.items() if isinstance(read, SettingRead)]
         return {name: TypeAdapter(hints[name]) for name in settings}

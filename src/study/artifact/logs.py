@@ -25,7 +25,7 @@ from pdrom.core.store.checksum import damaged_set_aside
 
 PACKAGES = ("pdrom", "study")
 MB = 1e6
-_PEAK = 1.0 if sys.platform == "darwin" else 1024.0  # bytes per unit of ru_maxrss
+_PEAK = 1.0 if sys.platform == "darwin" else 1024.0  # bytes per unit of getrusage's ru_maxrss
 _WORDS = re.compile(
     r"used (?P<wall>[0-9.]+) s, (?P<processor>[0-9.]+) s of processor time, "
     r"(?P<memory>[0-9.]+) MB of memory$"

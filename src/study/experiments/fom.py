@@ -53,7 +53,7 @@ def fom(mesh: File, config: SceneConfig, solver: Solver, **runs: File) -> None:
     writes={"out": SNAPSHOTS},
 )
 def snapshots(mesh: File, train: File, heldout: File, config: SceneConfig, out: File) -> None:
-    """Select the projections of a group from the two runs that store them; save them to ``out``."""
+    """Select a group's projections from the runs ``train`` and ``heldout``; save to ``out``."""
     group = out["group"]
     scene = scene_of(config, mesh)
     frames = sets.training_frames(scene.config.frames, scene.config.reduce[group].train)

@@ -141,7 +141,7 @@ class TimedScene:
     alone=True,
 )
 def frame_times(settings: Options, times: File, seconds: File, **files: list[File]) -> None:
-    """Run the timing processes one after the other; write times of frames and of reductions."""
+    """Run the timing processes one by one; write frame times, and times to make reductions."""
     asked = settings.frame_times
     scenes: dict[str, TimedScene] = {}
     for named, file in zip(settings.timed_scenes, files["meshes"], strict=True):

@@ -141,7 +141,7 @@ def stepper_of(scene: Scene, system: GlobalSystem, iterations: int, window: int)
 
 
 MEMORY = 8
-SUFFICIENT = 1e-4  # Armijo's constant
+SUFFICIENT = 1e-4  # constant of Armijo's condition: least decrease relative to slope times step
 SHORTEST = 1e-4  # shorter steps are replaced by a plain iteration, which cannot raise the objective
 
 Evaluate = Callable[[np.ndarray], tuple[float, np.ndarray]]
@@ -218,7 +218,7 @@ class _Pair(NamedTuple):
 
 
 def _direction(d: np.ndarray, pairs: list[_Pair]) -> np.ndarray:
-    """Direction by the two-loop recursion (Nocedal 1980), with q = A^-1 gradient as input."""
+    """L-BFGS direction by the two-loop recursion (Nocedal 1980); ``d`` is -A^-1 gradient."""
     q, alphas = d.copy(), []
     for pair in reversed(pairs):
         alpha = np.vdot(pair.a_step, q) / pair.curvature
@@ -244,7 +244,7 @@ class ConvergedStepper(Stepper):
 
     @property
     def converged(self) -> bool:
-        """Whether every frame reached the tolerance."""
+        """Whether every frame computed so far reached the tolerance."""
         return all(change <= self._tolerance for change in self.changes)
 
     def step(

@@ -21,7 +21,7 @@ from pdrom.model.compiled.rows import WIDTH, load
 from study.artifact.paths import MACHINE, File
 from study.experiments.kit.base import experiment
 
-AT_ONCE = 8  # independent vectors, enough to hide the latency of sums and products
+AT_ONCE = 8  # number of independent vectors: enough to hide the latency of sums and products
 SCALAR_STEPS, VECTOR_TIMES = 10**7, 10**6
 MEMORY_BYTES = 2**28  # read in one call, larger than any cache
 REPEATS = 15
@@ -48,7 +48,7 @@ def units() -> Units:
         (1e-9 * numbers.nbytes, lambda _: _read(numbers)),
     ]
     for _, run in trials:
-        run(1000)  # compiles
+        run(1000)  # the first call compiles the kernel
     found = [[_seconds(run) / amount for amount, run in trials] for _ in range(REPEATS)]
     scalar, vector, memory = np.min(found, axis=0).tolist()
     return Units(unit_scalar_s=scalar, unit_vector_s=vector, unit_memory_s=memory)

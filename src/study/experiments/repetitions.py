@@ -52,7 +52,7 @@ NOISE_COLUMNS = [
 ]  # fmt: skip
 ALL, PLANE, VERTEX = "all", "plane", "vertex"
 Methods = Mapping[str, MethodSpec]
-Runs = list[tuple[dict[str, Any], Rerun | None]]  # table rows of one start, each with its run
+Runs = list[tuple[dict[str, Any], Rerun | None]]  # (table row, run) of all runs from one start
 Rungs = Annotated[tuple[MethodSpec, ...], Field(min_length=1)]
 
 
@@ -108,13 +108,13 @@ class ReducedRuns:
         return self._bases[key]
 
     def run(self, reduction: Reduction, offset: np.ndarray | None = None) -> Rerun:
-        """Run with ``reduction`` from the scene's start, displaced by ``offset`` (N, 3) m."""
+        """Run with ``reduction``, with initial positions displaced by ``offset`` (N, 3) m."""
         return rerun_reduced(
             self.scene, self.group, reduction, self.reference, self.blowup_extent, offset=offset
         )
 
     def error(self, outcome: Rerun) -> float | None:
-        """Relative error before ``end``; None for a run that stopped earlier."""
+        """Relative error of a run over frames before ``end``; None if it stopped earlier."""
         return error_within(outcome.difference, self.displacement, self.end)
 
     def repeat(

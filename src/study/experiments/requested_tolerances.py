@@ -115,7 +115,7 @@ def _rows(
 
 
 def _error(motion: Motion, reached: np.ndarray, end: int, quantity: Quantity) -> float | None:
-    """Error of ``reached`` (F + 1, N, 3) m over the first ``end`` frames; None if ``end`` is 0."""
+    """Error of positions ``reached`` (F + 1, N, 3) m over ``end`` frames; None for no frames."""
     if not end:
         return None
     differences = reached[1:] - motion.reference[1:]

@@ -60,7 +60,7 @@ class Sweep(ConfigModel):
 
 
 class Options(ConfigModel):
-    """Settings of samplings and reruns by one method."""
+    """Settings of samplings and reduced runs of a scene by one method."""
 
     scene: SceneConfig
     method: MethodSpec

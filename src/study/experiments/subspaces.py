@@ -266,7 +266,7 @@ def _subspaces(
         spaces = {g.name: sampled_space(g, points, settings.hrpd) for g in scene.groups}
 
     def samplings(columns: Columns, methods: list[str]) -> Iterator[tuple[str, Sampled]]:
-        """(method, samples) pairs of the ``methods``."""
+        """Yield (method, samples) of the models with these ``columns``."""
         if FULL in methods:
             yield FULL, {}
         if any(method.startswith(subspace.ECSW) for method in methods):
@@ -284,8 +284,8 @@ def _subspaces(
             yield f"{kind}_k{k:03d}", columns, kind, k, models
 
 
-LARGEST = 3_000_000  # limit of the size of a file, bytes
-GHOST = 250_000  # approximate number of positions of the full-order run in a file
+LARGEST = 3_000_000  # largest size of a file of models, bytes
+GHOST = 250_000  # approximate number of vertex positions of the full-order run in such a file
 JOINT = "deim-joint"
 FORMAT = 1
 Labelled = tuple[dict[str, Any], subspace.SubspaceModel]

@@ -126,7 +126,7 @@ class Timing(Protocol):
 
 
 class Options(ConfigModel):
-    """Settings of the timings of a scene."""
+    """Settings of the experiment `timing` for one scene."""
 
     scene: SceneConfig
     methods: dict[str, MethodSpec]
@@ -271,7 +271,7 @@ class Scaling(Sized):
 
 
 class SizedOptions(ConfigModel):
-    """Settings of the costs on one mesh size."""
+    """Settings of the experiment `scaling` for one scene and mesh size."""
 
     scene: SceneConfig
     scaled_methods: dict[str, MethodSpec]
@@ -362,7 +362,7 @@ def _reductions(
     spec: MethodSpec,
     asked: Sequence[int],
 ) -> list[Reduction]:
-    """Reductions of the first group at each size in ``asked``, limited by the numerical rank."""
+    """Reductions of the first group at the sizes ``asked``, which the numerical rank limits."""
     group = scene.groups[0]
     basis = compute_basis(
         projections,

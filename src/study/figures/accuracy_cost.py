@@ -18,7 +18,7 @@ from study.tables.accuracy_cost import FEWER, pareto
 
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "*")
 ERROR, TIME = "relative_error_within_horizon", "ms_per_frame"
-LOW, HIGH = 1e-3, 1e2  # limits of the error axis; errors outside are arrows at its ends
+LOW, HIGH = 1e-3, 1e2  # limits of the error axis; errors outside are drawn as arrows at its ends
 ABOVE, BELOW, BLOWN_UP = 6, 7, "x"  # Matplotlib markers of errors off the axis, and of blow-ups
 OWN = {"color": style.GREY, "linewidth": 1.2}
 BLIND = {"color": style.FAILED, "linewidth": 0.9, "linestyle": "-."}
@@ -215,7 +215,7 @@ def accuracy_cost(
     group.
     """
     found, (first, *rest) = trade_offs(drawn, table, runs)
-    groups = {}  # scene -> group in words
+    groups = {}  # text that names the reduced groups, by scene
     for scene in (first, *rest):
         own = [each.group for each in drawn.of(scene)]
         groups[scene] = style.words(own[0]) if len(own) == 1 else "several groups"
@@ -273,7 +273,7 @@ def _label(ax: Axes, x: float, text: str) -> None:
 LEAST, MOST = 1e-4, 1.0  # limits of the error axis; errors outside are drawn on them
 BESIDE = 4  # largest number of panels in a row
 TOLERANCES, TIMES, REACHED = (5e-3, 2e-1), (1e-2, 1e1), (1e-4, 1e0)
-# Colour of each outcome of a request, and a factor that shifts its dots along the tolerance axis.
+# Kinds of runs with a requested tolerance: colour, and a factor that shifts dots along that axis.
 KINDS = {
     "reduction": (style.BLUE, 0.85),
     "full order": (style.VERMILLION, 1.0),

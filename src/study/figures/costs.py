@@ -31,7 +31,7 @@ CURVES = {
 }
 NAMES = {"fom": "full order", "ecsw": "POD subspace, ecsw"}  # methods with a printed exponent
 SCALED = {"fom": (style.BLACK, "o"), "ecsw": ("#1B6E6E", ">")}
-ROOM = 2.6  # factor from the largest mesh to the end of the axis; leaves space for exponents
+ROOM = 2.6  # end of the axis over the largest mesh size; leaves space for printed exponents
 FRAMES = ["effect", "frame", "force"]
 SHOWN = 3  # number of scenes whose forces are drawn
 LOW, HIGH = 1e-12, 1e2

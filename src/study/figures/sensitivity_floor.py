@@ -15,7 +15,7 @@ from study.experiments.kit.base import Horizon, floor_of, horizon
 from study.figures.kit.declaration import Columns, Drawn, NothingToDraw, Scenes, figure
 from study.tables.kit.results import TWIN
 
-# Inputs of a figure that needs sensitivity floors.
+# Inputs of figures that use sensitivity floors (drift of perturbed runs).
 FLOORS: dict[str, Read] = {
     "sensitivity": EachOf(SENSITIVITY, "experiments"),
     "horizon": Setting("horizon"),

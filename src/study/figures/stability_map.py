@@ -55,7 +55,7 @@ class Block:
 
 @dataclass(frozen=True)
 class Strip:
-    """A row of blocks with common rows; ``rows`` maps (scene, group) to a label."""
+    """Blocks side by side, with the same rows of cells: ``rows`` maps (scene, group) to a label."""
 
     rows: dict[tuple[str, str], str]
     blocks: Sequence[Block]

@@ -174,7 +174,7 @@ paper_inputs = Artifact(
     {Path(name).stem: PAPER_INPUT.where(name=name) for name in FILES},
     write_inputs,
 )
-# the output paths depend on the configuration, see `study.pipeline.folders`
+# `Plan.fixed` replaces the output paths of this artifact, which depend on the configuration
 paper = Artifact(
     "paper",
     "Manuscript",

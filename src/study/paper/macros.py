@@ -105,7 +105,7 @@ def number_of(key: str, tables: Mapping[str, pd.DataFrame]) -> Number:
         value = AGGREGATES[aggregate](cells) if aggregate else cells.iloc[0]
         text = str(value) if counts else format_number(value)
         value = value if isinstance(value, str) else float(value)
-        value = value if isinstance(value, str) or np.isfinite(value) else str(value)  # JSON
+        value = value if isinstance(value, str) or np.isfinite(value) else str(value)  # for JSON
     held = [int(row) for row in np.flatnonzero(tables[table].index.isin(cells.index))]
     return Number(text, value, table, held, column, aggregate)
 

@@ -118,7 +118,7 @@ _RUNS = (("fom", 1), ("fom", 5), ("fom", 10), ("fom", 40), ("fom-anderson", 10))
 
 
 def iterations(accuracy_cost: pd.DataFrame) -> Rows:
-    """Full-order runs: error against the converged run, and time per frame."""
+    """Full-order runs by number of iterations: error against the converged run, time per frame."""
 
     def text(run: pd.Series) -> str:
         error, time = map(format_number, (run.relative_error_within_horizon, run.ms_per_frame))
@@ -174,7 +174,7 @@ _METHODS = ("deim-joint", "block-deim", "gappy")
 
 
 def break_even(breakeven: pd.DataFrame) -> Rows:
-    """Smallest size r from which a reduced local step takes longer than the full local step."""
+    """Smallest size r from which a reduced local step takes longer than the full one, by scene."""
 
     def text(part: pd.DataFrame) -> str:
         crossed = part.breakeven_r.dropna()
@@ -268,7 +268,7 @@ def training(alternatives: pd.DataFrame) -> Rows:
 
 
 def scenes(reduced_reruns: pd.DataFrame, scenes: pd.DataFrame) -> Rows:
-    """Scenes with their constraint groups, sizes and horizons."""
+    """Scenes with their constraint groups, sizes, and horizon (end of the frames compared)."""
     horizon = trained(reduced_reruns).groupby("scene").horizon_frame.first()
     header = ["scene", "groups (weight)", "vertices", "elements", "frames", "horizon"]
     yield rf"l{LEFT}p{{5.2cm}}rrrr", header
@@ -306,7 +306,7 @@ def ranks(singular_values: pd.DataFrame) -> Rows:
 
 
 def reruns(reduced_reruns: pd.DataFrame, methods: pd.DataFrame) -> Rows:
-    """Error within the horizon of every method at the largest size r that has a run."""
+    """Error before the horizon of every method, at the largest size r with a run."""
 
     def text(run: pd.Series) -> str:
         if not pd.isna(run.relative_error_within_horizon):

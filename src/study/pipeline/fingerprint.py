@@ -93,14 +93,14 @@ def _read(module: str) -> tuple[list[str], str]:
     for parts in [name.split(".") for name in found]:
         found |= {".".join(parts[:i]) for i in range(1, len(parts))}
     known = {name for name in found if _locate(name) is not None}
-    # the __init__ files of the top-level packages contain the version only
+    # leave out the __init__ files of top-level packages, which contain the version only
     return sorted(known - {*PACKAGES, module} - LAYOUT), digest_of_code(tree, module)
 
 
 def _statements(tree: ast.AST) -> list[ast.AST]:
     """Return ``tree`` and all statements in it; expressions are not visited, which saves time."""
     found = [tree]
-    for node in found:  # the list grows
+    for node in found:  # the list grows during the loop
         for field in ("body", "handlers", "orelse", "finalbody", "cases"):
             found += getattr(node, field, ())
     return found
@@ -114,7 +114,7 @@ def digest_of_code(tree: ast.Module, module: str = "") -> str:
     for node in _statements(tree):
         if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef)):
             texts = [s for s in node.body if isinstance(getattr(s, "value", None), ast.Constant)]
-            texts = [s for s in texts if isinstance(s, ast.Expr)]  # docstrings, without effect
+            texts = [s for s in texts if isinstance(s, ast.Expr)]  # docstrings
             node.body = [s for s in node.body if s not in texts] or [ast.Pass()]
         elif isinstance(node, ast.Assign):
             match node.value:

@@ -18,8 +18,8 @@ from study.pipeline.commandline import CommandLine, check_files, recall
 from study.pipeline.folders import folders
 from study.pipeline.running import end_at_sigterm
 
-# Snakemake's default scheduler solves an integer program whenever it chooses jobs; as the jobs are
-# short, this costs more time than it saves.
+# The greedy scheduler: Snakemake's default one solves an integer program whenever it chooses jobs,
+# which costs more time than it saves, since jobs are short.
 OPTIONS = ("--scheduler", "greedy", "--rerun-incomplete")
 
 LINES = ("--logger", "pdrom")

@@ -37,7 +37,7 @@ log = logging.getLogger(__name__)
 
 
 def check_subspaces(study: Study) -> None:
-    """Warn of scenes without position subspaces; ConfigurationError if the settings need them."""
+    """Warn of scenes whose effects allow no position subspace; ConfigurationError if required."""
     outside = {
         name: effects
         for name, config in {**study.scenes, **study.online}.items()
@@ -243,7 +243,7 @@ class Plan:
             )
         return self._jobs[key]
 
-    # Methods of the protocol `Sources`, used by declarations -------------------------------------
+    # Methods of the protocol `Sources`: paths and values for the inputs that artifacts declare ---
 
     def file(self, place: Place, labels: Labels) -> str:
         """Path of the file of the kind ``place`` for scene, group ... of a job in ``labels``.

@@ -10,7 +10,7 @@ from snakemake_interface_logger_plugins.common import LogEvent
 
 # An estimate is shown after at least so many finished jobs and this share of the expected work.
 ENOUGH_JOBS, ENOUGH = 2, 0.05
-# Least remaining time of an unfinished job, as a share of its expected time.
+# Least expected remaining time of an unfinished job, as a fraction of its expected duration.
 REST = 0.1
 # Beginnings of Snakemake's reasons for running a job, with shorter texts. The reason `FOLLOWS` is
 # a consequence of other jobs, and is left out if there is another reason.

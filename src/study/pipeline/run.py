@@ -82,7 +82,7 @@ def tell_expectation(workflow: Any, plan: Plan) -> None:
 
 # Folders of files whose dates Snakemake compares; future dates in them are replaced.
 DATED = ("results", "paper", "config", "workflow")
-# Snakemake's executor that runs the jobs of a batch on a node of a cluster.
+# Name of the Snakemake executor that runs the jobs of a batch on a node of a cluster.
 JOBSTEP = "slurm-jobstep"
 
 

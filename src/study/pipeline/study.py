@@ -75,7 +75,7 @@ class StudySettings(scene_kit.GivenOnce):
 
 
 class Study:
-    """A study: its checked settings with the scenes and methods that they name."""
+    """A study: checked settings, with the scenes and methods that the settings name."""
 
     def __init__(
         self,
@@ -296,7 +296,7 @@ SCENES: dict[paths.Place, Callable[[Study], Iterable[str]]] = {
         if scene in (study.settings.requested_tolerances.scenes or (*study.scenes, *study.online))
     ],
 }
-# Functions of study, scene and group: True if the reduced group has files of a kind.
+# Functions of study, scene and group that return whether the reduced group has files of a kind.
 GROUPS: dict[paths.Place, Callable[[Study, str, str], bool]] = {
     paths.REPETITIONS: lambda study, scene, group: any(
         scene in cell.scenes for cell in study.settings.repetitions.cells

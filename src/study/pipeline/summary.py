@@ -29,7 +29,7 @@ from study.tables import declared
 from study.tables.claims.rules import load_claims
 from study.tables.kit.declaration import Table
 
-# Load average per core, over five minutes, above which other programs must have been running.
+# Limit of the load average per core over five minutes; above it, other programs must have run.
 BUSY = 1.7
 LISTED = 8  # largest number of targets that the summary names
 TABLES_HEAD = """# Tables

@@ -105,7 +105,7 @@ def _sweep(errors: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
 
 
 def reference_of(points: pd.DataFrame) -> pd.Series:
-    """Reference of the error in each row of ``points``: `CONVERGED` or `OWN`."""
+    """Reference run of each error in ``points``: `CONVERGED` frames, or the scene's `OWN` run."""
     return points.method.isin([FOM, ANDERSON]).map({True: CONVERGED, False: OWN})
 
 
@@ -160,7 +160,7 @@ def requested_tolerances(runs: list[paths.File]) -> pd.DataFrame:
     )
 
 
-# Columns that identify a curve, the rows that differ only in size r.
+# Columns that identify a curve; the rows of a curve differ only in size r.
 CURVE = ["scene", "group", "method", "factor"]
 OWN_MESH = "1"  # value of the column ``factor`` for a scene's configured mesh
 SHARE = 1e-3  # groups with at most this share of the force of a scene are negligible

@@ -203,7 +203,7 @@ def _best(rows: pd.DataFrame, limit: float, processes: list[int]) -> dict[str, o
 
 
 def _pays(curve: pd.DataFrame) -> dict[str, object]:
-    """Mesh sizes from which a reduction is faster in every motion (or None), and its speed-ups."""
+    """Numbers of vertices from which a reduction is faster in all motions, and its speed-ups."""
     # speed-ups are NaN where a method misses the error limit in one of the motions
     every = curve.assign(plain=curve.plain_ms / curve.reduced_ms)
     worst = every.groupby("vertices")[["plain", "reduced_speedup"]].agg(

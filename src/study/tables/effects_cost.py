@@ -117,7 +117,7 @@ def _acting(frames: pd.DataFrame, sensitivity: pd.DataFrame, horizon: Horizon) -
         energy=("energy", lambda of: float(of.max() - of.min() if len(of) > 1 else of.iloc[0])),
     )
     length = frames.groupby("scene").frame.max() + 1
-    # an effect with role "start" has a row in the first frame only; its RMS is over all frames
+    # effects of the start have a row in the first frame only, but the RMS is over all frames
     starts = made.role == "start"
     made.loc[starts, "force"] /= np.sqrt(made.scene[starts].map(length).to_numpy(float))
     made["force_share"] = made.force / made.groupby("scene").force.transform("sum")
@@ -396,7 +396,7 @@ def online(parts: list[File], measured: list[File], times: pd.DataFrame) -> pd.D
         return rows
     found = pd.DataFrame(list(timed_reductions(results.joined(measured), times)))
     made = rows[rows.motion == results.TRAIN].rename(columns={"r": "elements_sampled"})
-    made = made.drop(columns="playback_error")  # of the training motion itself
+    made = made.drop(columns="playback_error")  # these are errors for the training motion itself
     made = made.merge(large_errors(rows).rename(columns=_ERRORS), on=_MODEL, how="left")
     made = made.merge(found[[*_MODEL, *_TIMES]], on=_MODEL, how="left")
     return made.assign(ms_per_iteration=made.ms_per_frame / made.iterations)

@@ -185,8 +185,8 @@ STEPS = {
     "whole elements for single entries": ("deim", "block-deim"),
     "three elements a mode for one": ("block-deim", "gappy"),
 }
-# Steps between the four combinations of coefficients and samples in table ladder. Steps from single
-# rows to whole elements are compared only if an element has more than one row.
+# Pairs of methods in table ladder that differ in the coefficients or in the samples only. Pairs of
+# single rows and whole elements are compared only if an element has more than one row.
 SQUARE = {
     "shared coefficients, single rows": ("single rows, separate", "single rows, shared"),
     "shared coefficients, whole elements": ("whole elements, separate", "whole elements, shared"),
@@ -280,7 +280,7 @@ def _square(ladder: pd.DataFrame, runs: pd.DataFrame) -> pd.DataFrame:
 
 
 def _pairs(runs: pd.DataFrame, before: str, after: str) -> pd.DataFrame:
-    """Scene, group, errors, and ratios of gain and error (after over before) of pairs of runs."""
+    """Pairs of runs by two methods: scene, group, errors, ratios (after/before) of gain, error."""
     error = np.maximum(runs.error, runs.sensitivity_floor)
     runs = runs[[*_PLACE, "method", "gain"]].assign(error=error)
     one, other = (runs[runs.method == m].drop(columns="method") for m in (before, after))

@@ -243,7 +243,7 @@ def _full_order_rows(files: list[File]) -> pd.DataFrame:
 def _rerun_rows(
     reruns: list[File], subspaces: list[File], reduced_reruns: pd.DataFrame
 ) -> pd.DataFrame:
-    """Reduced runs of the training motion, with their error within the horizon as the error."""
+    """Reduced runs of the training motion; ``relative_error`` is the error before the horizon."""
     local = joined(reruns).assign(position_basis="full", k=np.nan)
     runs = pd.concat([local, joined(subspaces)], ignore_index=True)
     runs = runs.drop(columns="relative_error")

@@ -30,7 +30,7 @@ RUNS, SPECTRA, RECONSTRUCTION = "reduced_reruns", "singular_values", "reconstruc
 WRONG = 0.1
 # Columns with the error of a run; the first one that a table has decides if the run is wrong.
 OF_RUN = ("relative_error_within_horizon", "relative_error")
-# Columns that identify the samples of a reduction; below, columns that identify a run.
+# Columns that identify the samples of a reduction (`SAMPLES`) or a run (`RUN`).
 SAMPLES = ("scene", "group", "method", "r")
 RUN = (*SAMPLES, "position_basis", "k")
 # Largest number of cells that describe a row in a message.
@@ -46,11 +46,11 @@ CLOSE, OWN, LONE = 1e-5, 50, 0.01
 LOOSE = ((0.1, 1 - 1 / 10, ("scene", "noisy_axes", "method")), (0.5, 1 - 1 / 2, ("scene",)))
 # A text or flag column with a tolerance may have this number of differing cells in any case.
 FEW = 3
-Difference = tuple[float, str]  # distance of the cells (inf without a measure), text of a message
+Difference = tuple[float, str]  # (distance of two cells, inf if not a number; text of a message)
 
 
 def kept(table: Table) -> dict[str, Column]:
-    """Columns of ``table`` that are stored in its reference and compared, by name."""
+    """Columns of ``table`` that the expected table stores and that are compared, by name."""
     return {c.name: c for c in table.columns if c.quantity in TOLERANCES}
 
 
@@ -105,7 +105,7 @@ class Context:
     def __init__(
         self, tables: Mapping[str, pd.DataFrame], found: pd.DataFrame | None = None
     ) -> None:
-        """Context from expected ``tables`` by name, and from the ``found`` table of runs."""
+        """Read the facts from expected ``tables`` by name, and from the ``found`` table of runs."""
         runs, spectra, errors = (
             tables[name] if name in tables else declared()[name].checked(pd.DataFrame())
             for name in (RUNS, SPECTRA, RECONSTRUCTION)
@@ -133,7 +133,7 @@ class Comparison:
         self.pairs = pairs(table, expected, found)
         self.e = expected.iloc[[i for i, _ in self.pairs]].reset_index(drop=True)
         self.f = found.iloc[[j for _, j in self.pairs]].reset_index(drop=True)
-        self.loose = cache(self._loose)  # function of a column
+        self.loose = cache(self._loose)  # cells of a column that depend on rounding errors
         self._timed: Sequence = [()] * len(self.e)  # names of timed columns, for each row
         if table.timed_cells is not None:
             reads = table.reads.items()
@@ -164,7 +164,7 @@ class Comparison:
         }
 
     def _of_round_off(self) -> np.ndarray:
-        """Boolean array of rows whose r includes, or nearly includes, all modes above round-off."""
+        """Boolean array of rows whose r is at least the number of modes above round-off, minus 1."""
         rows, modes = self.e, self.context.modes
         if "noisy_axes" in rows or not {"scene", "group", "r"} <= set(rows.columns):
             return np.full(len(rows), "noisy_axes" in rows)

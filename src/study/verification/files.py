@@ -92,7 +92,7 @@ def made(job: Job) -> Iterator[dict[str, Path]]:
         The job fails on the existing input files.
     """
     parents = [os.path.dirname(path) or os.curdir for path in job.outputs.values()]
-    root = os.path.commonpath(parents)  # two pages may have the same name in different folders
+    root = os.path.commonpath(parents)  # keep subfolders: two pages may have the same name
     with TemporaryDirectory(prefix="pdrom-again-") as folder:
         inside = {name: os.path.relpath(path, root) for name, path in job.outputs.items()}
         outputs = {name: os.path.join(folder, path) for name, path in inside.items()}

@@ -45,7 +45,7 @@ def folder_of(results: str) -> Path:
 
 
 def write_reference(table: Table, frame: pd.DataFrame, folder: Path) -> None:
-    """Write the reference of ``table``, from its content ``frame``, into ``folder``."""
+    """Write ``frame``, the content of ``table``, as the expected table into ``folder``."""
     stored, form = frame[list(kept(table))], f"%.{DIGITS}g"
     content = stored.to_csv(index=False, float_format=form, lineterminator="\n").encode()
     path, other = _paths(table.name, folder)
@@ -56,7 +56,7 @@ def write_reference(table: Table, frame: pd.DataFrame, folder: Path) -> None:
 
 
 def read_reference(table: Table, folder: Path) -> Reference | None:
-    """Return the reference of ``table`` in ``folder``; None if there is none.
+    """Return the expected ``table`` in ``folder``; None if there is none.
 
     Raises
     ------

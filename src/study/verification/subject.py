@@ -31,7 +31,7 @@ class Subject:
 
     @classmethod
     def of(cls, configfiles: Sequence[str], settings: Sequence[str]) -> "Subject":
-        """Subject of the configuration given by files and settings, else that of the last run.
+        """Results of the configuration given by files and settings, by default of the last run.
 
         Raises
         ------

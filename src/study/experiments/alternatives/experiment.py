@@ -38,11 +38,11 @@ from study.experiments.kit import runfiles
 from study.experiments.kit.base import experiment
 from study.experiments.kit.measurement import Processes, Variant, in_processes
 
-REDUCED, ACCELERATED = REDUCTIONS = "ecsw", "ecsw-anderson"  # all other methods are full-order
+REDUCED, ACCELERATED = REDUCTIONS = "ecsw", "ecsw-anderson"  # names of the reduced methods
 TWO_LEVEL: Final = "two-level"  # full order, with a trained subspace for its coarse level
 TRAINED: Final = (TWO_LEVEL, *REDUCTIONS)
 CONVERGED: Final = "converged"  # the implicit step solved to convergence
-TRAINING: Final = "training"  # the runs that a reduction is trained on
+TRAINING: Final = "training"  # key for the runs on which reductions are trained
 
 # These columns together identify a candidate (method with its settings) of a scene.
 SETTING: Final = ["method", "substeps", "iterations", "training_motions", "k"]
@@ -358,7 +358,7 @@ class Timed:
 
 
 class Options(ConfigModel):
-    """Settings of the comparison on one mesh size."""
+    """Settings of the comparison of methods on one scene and mesh size."""
 
     scene: SceneConfig
     alternatives: Comparison

@@ -102,7 +102,7 @@ def _one_bad_element() -> Mesh:
 
 
 def _squashed() -> list[record.HardCase]:
-    """Sheets and bars flattened to a plane, a line, a point; needles and merged vertices."""
+    """Sheets and bars that start flattened to a plane, line or point, as needles, or merged."""
     bar = "every tetrahedron is flattened to a {}: F is singular"
     flat = "every triangle is collinear: the sheet is a {}"
     kinds = (
@@ -118,7 +118,7 @@ def _squashed() -> list[record.HardCase]:
         )
         for target, sides in to.items()
         for name, mesh, group, why in kinds
-        if mesh is not sheet or target != "plane"  # a sheet is a plane already
+        if mesh is not sheet or target != "plane"  # a sheet is flat without being flattened
     ]
 
 
@@ -173,7 +173,7 @@ def _states() -> list[record.HardCase]:
 
 
 def _sizes() -> list[record.HardCase]:
-    """Volume and area constraints, whose nearest shape is not unique."""
+    """Scenes with volume or area constraints, for which the nearest shape is not unique."""
     lying = record.mapped((1, 0, 5), (0, 1, 0), (0, 0, 1))
     # large bound: a moving body of constant volume or area may stretch without limit
     loose, cases = 40.0, []

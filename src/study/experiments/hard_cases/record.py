@@ -59,7 +59,7 @@ class HardCase:
     slow: bool = False
 
     def scene(self) -> Scene:
-        """Build the scene; raise PdromError if it is refused."""
+        """Build the scene of this hard case; raise PdromError if it is refused."""
         return build(self.mesh(), *self.effects, **self.settings)
 
 
@@ -103,7 +103,7 @@ def scales(x: float, y: float, z: float) -> Start:
 
 
 def scrambled(size: float = 1.0) -> Start:
-    """Start at rest: vertices at random in a box of ``size`` rest extents."""
+    """Start at rest: vertices at random in a cube of ``size`` times the rest shape's extent."""
 
     def start(scene: Scene) -> State:
         points = scene.mesh.points
@@ -114,7 +114,7 @@ def scrambled(size: float = 1.0) -> Start:
 
 
 def noisy(start: Start, size: float) -> Start:
-    """Return ``start`` with normal noise of ``size`` rest extents, at rest."""
+    """Return ``start`` at rest, with normal noise of ``size`` times the rest shape's extent."""
 
     def moved(scene: Scene) -> State:
         noise = np.random.default_rng(SEED).standard_normal(scene.mesh.points.shape)
@@ -131,7 +131,7 @@ def pairs_merged(scene: Scene) -> State:
 
 
 def folded(scene: Scene) -> State:
-    """Start with the half x > 0 mirrored onto the half x < 0, where vertices coincide."""
+    """Start folded: the half with larger x is mirrored onto the other, where vertices coincide."""
     points = scene.mesh.points.copy()
     centre = 0.5 * (points[:, 0].min() + points[:, 0].max())
     points[:, 0] = centre - np.abs(points[:, 0] - centre)
@@ -184,7 +184,7 @@ class Roundoff:
     basis: np.ndarray | None = None
 
     def allowance(self, before: State, after: State, first: float) -> float:
-        """Largest rise by rounding in a frame whose first objective is ``first``, both J.
+        """Bound for the objective's rise by rounding in a frame that starts at ``first``, both J.
 
         The size of the iterates is estimated from the states ``before`` and ``after`` the frame.
         """
@@ -350,7 +350,7 @@ def bounded(case: HardCase, scene: Scene, run: Record) -> str:
 
 
 def reach(scene: Scene, run: Record) -> float:
-    """Largest extent of the rest shape, the start and the held vertices, m."""
+    """Largest extent of the rest shape, the start, and the fixed vertices in all frames, m."""
     sizes = [scene.mesh.extent, float(np.ptp(run.positions[0], axis=0).max())]
     held = np.unique(np.concatenate([[], *(b.vertices for b in scene.boundaries)]).astype(int))
     if len(held):
@@ -397,7 +397,7 @@ def momentum(case: HardCase, scene: Scene, run: Record) -> str:
 
 
 def determinism(case: HardCase, scene: Scene, run: Record) -> str:
-    """Check that a second run gives the same bits."""
+    """Check that a second run gives bitwise equal results."""
     again = full_order(case, case.scene())
     same = np.array_equal(run.positions, again.positions)
     return "" if same and np.array_equal(run.rise, again.rise) else "a second run differs"
@@ -411,7 +411,7 @@ def recovers(case: HardCase, scene: Scene, run: Record) -> str:
 
 
 def still(case: HardCase, scene: Scene, run: Record) -> str:
-    """Check that nothing moves."""
+    """Check that no vertex moves during the run."""
     moved = float(np.abs(run.positions - run.positions[0]).max())
     allowed = 1e-9 * float(np.abs(run.positions[0]).max())
     return "" if moved <= allowed else f"moves by {moved:.1e} m"

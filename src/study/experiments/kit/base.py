@@ -61,13 +61,13 @@ ANDERSON = "fom-anderson"  # full-order run with Anderson acceleration
 
 # names of the phases of a frame that belong to no effect
 RIGHT, GLOBAL, REST = "right-hand side", "global solve", "rest of the frame"
-# a run ends as a blow-up when its bounding box exceeds this multiple of the rest extent
+# A run ends as a blow-up when its bounding box exceeds this multiple of the rest shape's extent.
 BlowupExtent = Annotated[float, Field(gt=1.0, le=1e12)]
 Count = Annotated[int, Field(ge=1, le=100_000)]
 Repeats = Annotated[int, Field(ge=1, le=1000)]
 Modes = Annotated[int, Field(ge=1, le=1000)]
 Tolerance = Annotated[float, Field(gt=0.0, lt=1.0)]
-# factors on the number of vertices along a side, by name of the scene
+# Factors for the number of vertices along each side of the mesh, by name of the scene.
 Sizes = dict[str, tuple[Annotated[float, Field(gt=0.0, le=100.0)], ...]]
 PositionBasis = Literal["pod", "skinning"]
 Rank = Annotated[int, Field(ge=1, le=100_000)] | Literal["full"]

@@ -103,7 +103,7 @@ class Timed:
 
     Attributes
     ----------
-    local_kernel : kernel of a group, timed inside the compiled loop; None for other effects
+    local_kernel : kernel of a constraint group, with timers in compiled code; else None
     """
 
     def __init__(self, effect: Effect, questions: Sequence[str]) -> None:
@@ -254,7 +254,7 @@ def _timed(y, rhs, record, part):
 
 
 def timed(kernel: LocalKernel) -> tuple[LocalKernel, np.ndarray]:
-    """Return ``kernel`` with timers, and the seconds (3,) of its parts and its preparation."""
+    """Return ``kernel`` with timers, and the array (3,) of seconds of two parts and preparation."""
     seconds, clocks = np.zeros(PREPARE + 1), np.stack([clock() for _ in range(PREPARE + 1)])
     arrays = (seconds, clocks)
     places = [kernel.address, kernel.record.ctypes.data, *(array.ctypes.data for array in arrays)]

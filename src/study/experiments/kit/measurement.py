@@ -198,7 +198,7 @@ def in_processes(
 
 def _in_this_process(given: str, answer: str, process: str) -> None:
     """Time the pickled cases in the file ``given`` and write the rows to the file ``answer``."""
-    with damaged_set_aside():  # the process is part of a job
+    with damaged_set_aside():  # rename damaged files, as the job does that started this process
         cases, asked = pickle.loads(Path(given).read_bytes())
         variants = [variant for case in cases for variant in case()]
         order = np.random.default_rng(int(process)).permutation(len(variants))

@@ -47,7 +47,7 @@ class NothingToDraw(Exception):
 
 
 class Options(ConfigModel):
-    """Options that all figures have: none; subclasses add keys.
+    """Base class of the options of figures in config/figures.yaml; subclasses add keys.
 
     Chosen names that the configuration lacks are not drawn. An empty list of names, or a list whose
     names are all absent, selects everything in the configuration.
@@ -101,7 +101,7 @@ class Beside(Scenes):
 
 
 class ReducedRuns(View):
-    """Options: basis sizes and instants at which full-order and reduced runs are drawn."""
+    """Options: basis sizes of the reduced runs, and instants (fractions of the run) to draw."""
 
     ranks: Ranks = ()
     frames: Instants = (0.1, 0.5, 0.9)
@@ -189,7 +189,7 @@ class Drawn(_Plain):
         return {group: looks[place % len(looks)] for place, group in enumerate(self.groups)}
 
     def of(self, scene: str) -> list[Experiment]:
-        """Experiments in ``scene``, one per reduced constraint group."""
+        """Experiments in ``scene``: one for each of its reduced constraint groups."""
         return [experiment for experiment in self.experiments if experiment.scene == scene]
 
     def title(self, method: str) -> str:

@@ -52,7 +52,7 @@ class Server:
         self._libc = ctypes.CDLL(None)
 
     def serve(self) -> str | None:
-        """Serve requests; return the script in a fork, None in the server when its owner ends."""
+        """Serve requests; return the script's path in a fork, None in the server at its end."""
         signal.set_wakeup_fd(self._waker, warn_on_full_buffer=False)
         signal.signal(signal.SIGCHLD, lambda number, frame: None)
         while True:
@@ -114,9 +114,9 @@ class Server:
         return None
 
     def _become_job(self, client: socket.socket, streams: list[int]) -> str:
-        """Turn a fork into the job and return its script; close the descriptors of the server."""
+        """Set up a fork as the job and return its script; close the server's file descriptors."""
         os.setpgid(0, 0)
-        # ask to be killed when the server ends; the server may already have ended before this call
+        # let the system kill this job when the server ends, which may have happened before this
         self._libc.prctl(_DIES_WITH_PARENT, signal.SIGKILL)
         if os.getppid() != self._process:
             os._exit(1)

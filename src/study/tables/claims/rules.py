@@ -21,7 +21,7 @@ _NAMED = "@"  # in ``where``, the prefix of the name of a set of values
 Added = Mapping[str, Sequence[Value]]
 NONE_ADDED: Added = MappingProxyType({})
 MARGIN = 1.5  # default margin of tests that compare times
-PARTS = {"published": "", "beyond": "_beyond"}  # verdict -> suffix of its columns
+PARTS = {"published": "", "beyond": "_beyond"}  # names of verdicts -> suffix of their columns
 # Inputs of the tables of the claims: rules file, setting and tables.
 READS: dict[str, Read] = {
     "rules": ProjectFile("config/claims.yaml"),

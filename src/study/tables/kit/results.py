@@ -28,12 +28,12 @@ COLUMNS = (
     integer(COUNT, "held-out motions that were run, can be judged and are far enough"),
     number("playback_error", "median error of playback on these motions, see reduced_reruns"),
 )
-# A held-out motion is used as a test only if the error of playback exceeds this value.
+# A held-out motion is used as a test only if showing the training motion has a larger error.
 FAR = 0.3
 _WHOLE = {"k": "Int64", "r": "Int64"}
 EXPERIMENT = ["scene", "group"]
-ORTHOGONAL = "pod"  # orthogonal projection, which evaluates all elements
-FAILED = 0.1  # error within the horizon above which a run counts as failed
+ORTHOGONAL = "pod"  # method of orthogonal projection, which evaluates all elements
+FAILED = 0.1  # error before the horizon above which a run counts as failed
 TWIN = "_twin"
 
 
@@ -61,7 +61,7 @@ def in_one_time(
 
 
 def timings_in_one_time(timings: Sequence[File], times: pd.DataFrame) -> pd.DataFrame:
-    """Rows of the files ``timings``, scaled to the table ``times`` by `in_one_time`."""
+    """Rows of the files ``timings``, with times scaled to the table frame_times (``times``)."""
     rows = joined(timings)
     if rows.empty:
         return rows
@@ -134,7 +134,7 @@ def over_motions(reruns: pd.DataFrame, keys: Sequence[str] = KEYS) -> pd.DataFra
 
 
 def with_held_out(runs: pd.DataFrame, reruns: pd.DataFrame) -> pd.DataFrame:
-    """Join ``runs`` with the columns of `over_motions` of ``reruns``, empty for runs it lacks."""
+    """Join ``runs`` with their errors over held-out motions, as `over_motions` computes them."""
     own = runs.astype(_WHOLE).drop(columns="playback_error", errors="ignore")
     return own.merge(over_motions(reruns), on=KEYS, how="left")
 

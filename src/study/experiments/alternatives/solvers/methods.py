@@ -28,7 +28,7 @@ from study.experiments.alternatives.solvers.substeps import (
 )
 from study.experiments.kit.base import followed
 
-WINDOW = 5  # number of differences of earlier iterates, as in Peng et al. 2018
+WINDOW = 5  # number of earlier iterates in Anderson acceleration, as in Peng et al. 2018
 # Estimated convergence rate of the plain iteration, and number of plain iterations before the
 # extrapolation. Both are set by hand, as in Wang 2015: of five rates this is best on both sheets
 # of the comparison, which favours the method. A rate measured from the first iterates is worse.
@@ -138,18 +138,18 @@ class TwoLevel(Alternative):
     """Anderson acceleration with a coarse level: the subspace of a ``model`` of the scene.
 
     The plain iteration converges slowly for deformations that are stiff in the system matrix A and
-    soft in the objective. Its image G(y) is therefore corrected in the span of columns V with
-    V^T A V = 1: the component g = V^T A (G(y) - y) of its step is replaced by the step z that
+    soft in the objective. Its result G(y) is therefore corrected in the span of columns V with
+    V^T A V = 1: the component g = V^T A (G(y) - y) of the step is replaced by the step z that
     minimises the objective of y + V z, in which sampled elements represent all elements. This is
     the full approximation scheme (Brandt 1977) with one additive smoothing step: -g is the exact
     gradient in the span, so that z = g = 0 where y solves the frame, whatever the samples are. The
-    corrected map is accelerated; an iterate that raises the objective is replaced by the last image
-    without correction.
+    corrected iteration is accelerated; an iterate that raises the objective is replaced by the last
+    G(y) without correction.
 
     Raises
     ------
     SceneError
-        The scene has several groups, or `Alternative` refuses it.
+        The scene has several groups, or is refused by `Alternative`.
     """
 
     name = "two-level"

@@ -108,7 +108,7 @@ class Alternative(Stepper):
             local.begin_frame(q)
         positions, velocities = as_vertices(q), as_vertices(state.velocities)
         y, v = flat(positions), flat(velocities)
-        # fixed vertices that do not move have the same targets in all substeps
+        # if fixed vertices do not move, all substeps have the same targets and form one part
         parts = 1 if np.array_equal(q[fixed], targets) else self.substeps
         for part in range(1, parts + 1):
             now = targets + (1.0 - part / parts) * (q[fixed] - targets)
