@@ -114,7 +114,7 @@ class Settings:
         return self.model.model_validate({key: sources.value(key, labels) for key in fields})
 
 
-# A `Place` as an input is the one file of this kind with the job's own scene, group ....
+# A `Place` (kind of file) as an input is its file for the scene, group ... of the job.
 FileRead = Every | TableOf | ProjectFile | ProjectFiles | SourcesOf | Place
 SettingRead = Setting | Settings
 Read = FileRead | SettingRead

@@ -362,7 +362,7 @@ def _ladder(runs: ReducedRuns, short: ReducedRuns, ladder: Ladder) -> Iterator[d
         if direction == "square" and r > basis.rank:
             continue
         size = min(r, basis.rank)
-        # a group whose projections are round-off has no modes and no reduction
+        # without modes (projections that are only round-off) there is no reduction
         for reduction in reductions(basis, method, [size] if size else []).values():
             outcome = runs.run(reduction)
             row |= {**outcome.row(runs.displacement), "r": size}
@@ -448,7 +448,7 @@ def roundoff_field(scene: Scene, axes: str, size: float, seed: int) -> np.ndarra
 def _noisy(
     scene: Scene, name: str, start: np.ndarray, sizes: Sequence[int], methods: Methods, limit: float
 ) -> Iterator[tuple[dict[str, Any], Rerun | None]]:
-    """Rows and runs from one ``start`` (N, 3) m, a displacement of the initial positions.
+    """Yield (row, run) of all reductions, with initial positions displaced by ``start`` (N, 3) m.
 
     The reductions are trained on all projections of its full-order run, even if they are round-off:
     there is no cutoff, and no axis is left out. A method with separate systems has, as published,

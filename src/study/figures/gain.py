@@ -63,7 +63,7 @@ def error_against_gain(options: kit.Methods, drawn: Drawn, **tables: pd.DataFram
 def _draw_method(
     ax: Axes, runs: pd.DataFrame, ranges: pd.DataFrame, colour: str, marker: str
 ) -> None:
-    """Draw runs as dots on ``ax``, and ranges of gain and error over repetitions as crosses."""
+    """Draw runs as dots by gain (error amplification) and error; crosses: ranges of repetitions."""
     x, y = runs.gain.to_numpy(float), runs.error.to_numpy(float)
     multiples.rim_arrows(ax, x, y, colour=colour, across=GAINS, along=ERRORS)
     ax.plot(
@@ -78,7 +78,7 @@ def _draw_method(
 
 
 def _draw_decades(ax: Axes, runs: pd.DataFrame) -> None:
-    """Draw the share of failed runs by decade of the gain, with the number of runs per bar."""
+    """Draw the share of failed runs per decade of the gain (error amplification), with counts."""
     # the last decade also counts all larger gains, including infinite ones
     upper = np.ceil(np.log10(runs.gain.clip(upper=10.0**DECADES + 1.0))).clip(lower=1)
     decades = runs.groupby(upper.astype(int)).failed.agg(["size", "mean"])

@@ -215,7 +215,7 @@ def noise_rows(drawn: Drawn, shown: Shown, table: pd.DataFrame, path: str) -> li
     Parameters
     ----------
     table : rows of the table ``noise`` for the experiment in ``shown``
-    path : file of the experiment's runs on bases of round-off
+    path : file of the runs of this scene and group whose bases are round-off
     """
     shown, rows = replace(shown, bodies=None), []
     for method in drawn.methods:
@@ -233,7 +233,7 @@ def noise_rows(drawn: Drawn, shown: Shown, table: pd.DataFrame, path: str) -> li
 
 
 def _alike(table: pd.DataFrame) -> dict[tuple[tuple[int, str], ...], list[str]]:
-    """Kinds of start by their failures: a text with the number of failed starts for each size r."""
+    """Group kinds of perturbed start by the numbers of failed starts (as texts) at each size r."""
     table = table[table.r <= table["rank"]]
     failed = ~(table.relative_error <= WRONG)
     kinds: dict[tuple[tuple[int, str], ...], list[str]] = {}

@@ -22,7 +22,7 @@ LOOKS_ONLY = (
     "list_input_changes", "list_params_changes", "list_untracked", "summary", "detailed_summary",
     "archive", "generate_unit_tests",
 )  # fmt: skip
-# Options that choose Snakemake's own output; if one is given, it is shown in place of our progress.
+# Options for Snakemake's own output: if one is given, this project's progress lines are not shown.
 OWN_OUTPUT = ("logger", "quiet", "verbose", "printshellcmds", "debug_dag")
 YAML = (".yaml", ".yml", ".json")
 TEMPLATE_KEY = "__use_yte__"

@@ -1,6 +1,6 @@
 """Scenes of config/scenes, changed as a study configures, and built to detect faults before a run.
 
-A configuration can also derive variants of scenes: finer meshes, other weights, other starts.
+A configuration can also derive variants of scenes: other meshes, weights and initial velocities.
 """
 
 from collections.abc import Callable, Iterable, Iterator
@@ -165,7 +165,7 @@ class Variants(GivenOnce):
         """Yield every variant of the scenes; ``read`` returns the configuration of a scene by name.
 
         The variant's name contains its factors: ``strain_oop_m1p5_w0p01_s3`` has 1.5 times the
-        vertices along a side, 0.01 times the weight, and a random start with seed 3.
+        vertices along a side, 0.01 times the weight, and random initial velocities with seed 3.
         """
         lists = (self.resolutions, self.stiffness_ratios, self.seeds)
         for scene, factor, ratio, seed in product(map(read, self.scenes), *lists):

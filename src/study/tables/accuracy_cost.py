@@ -1,6 +1,6 @@
 """Tables of error against time: each method and size, requested tolerances, and where methods pay.
 
-The error of a point has one of two references; only rows with the same reference are comparable.
+The error of a row has one of two reference runs; only rows with the same one are comparable.
 For ``fom`` and ``fom-anderson`` it is a full-order run with converged frames (K -> infinity local/
 global iterations), for all other methods the scene's own full-order run with its finite number K.
 

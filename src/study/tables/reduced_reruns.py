@@ -200,7 +200,7 @@ def stability(
     """Rows of the study's reduced runs (experiment "rerun"), then of short runs ("sweep").
 
     Method "full" with position basis "full" is the full-order run. The error of a "rerun" row is
-    computed within the horizon, the error of a "sweep" row over the whole run.
+    computed before the horizon, the error of a "sweep" row over the whole run.
 
     Parameters
     ----------

@@ -164,7 +164,7 @@ class Comparison:
         }
 
     def _of_round_off(self) -> np.ndarray:
-        """Boolean array of rows whose r is at least the number of modes above round-off, minus 1."""
+        """Boolean array of rows whose r is at least the number of modes above round-off minus 1."""
         rows, modes = self.e, self.context.modes
         if "noisy_axes" in rows or not {"scene", "group", "r"} <= set(rows.columns):
             return np.full(len(rows), "noisy_axes" in rows)

@@ -116,7 +116,7 @@ class Examination:
             return compare.Context(tables)
 
     def _again(self, name: str) -> pd.DataFrame | None:
-        """Return the table ``name`` made again from existing tables, if it reads tables only.
+        """Return the table ``name``, computed again from existing tables, if it reads tables only.
 
         None for tables that read other files, or if an input is missing or damaged.
         """

@@ -21,7 +21,7 @@ from study.pipeline.plan import Plan, load_plan
 
 @dataclass(frozen=True)
 class Subject:
-    """Results of one configuration, and the command that makes them.
+    """Results folder of one configuration, and the command that makes the results.
 
     options : command-line options that name the configuration
     """

@@ -1,4 +1,4 @@
-"""Catalogue of the hard cases, by name."""
+"""Catalogue of the hard cases (scenes with extreme meshes, states or settings), by name."""
 
 from functools import partial
 from typing import Any
@@ -123,7 +123,7 @@ def _squashed() -> list[record.HardCase]:
 
 
 def _states() -> list[record.HardCase]:
-    """Regular scenes that start in irregular states."""
+    """Regular scenes whose initial positions are irregular, such as inverted elements."""
     three = (BENDING, SPRING, STRAIN)
     turn = record.mapped((-1, 0, 0), (0, -1, 0), (0, 0, 1))
     cases = [

@@ -125,7 +125,7 @@ class ReducedRun:
 
     r : basis size; in a subspace the number of evaluated elements
     k : number of columns of the position subspace, None in vertex positions
-    gain : gain of the interpolation, None without interpolation
+    gain : amplification of errors by the interpolation, None without interpolation
     """
 
     run: record.Record | None

@@ -1,7 +1,7 @@
 """Hard cases: initial states, records of runs, bounds for rounding errors, and checks.
 
-In exact arithmetic the objective 1/(2h^2) |M^1/2 (y - s)|^2 + sum_j W_j(y) falls in every
-iteration. Computed values differ for two reasons (u = eps, c a constant for the length of sums):
+In exact arithmetic the objective 1/(2h^2) |M^1/2 (y - s)|^2 + sum_j W_j(y) (positions y, prediction
+s) falls in every iteration. Computed values differ for two reasons (u: `EPS`, c: `OPERATIONS`):
 
 - evaluation: y - s and S y - p are wrong by c u (|y| + |s|) and c u (|S| |y| + |p|). With R the
   objective of these errors alone, a value E is wrong by at most 2 sqrt(E R) + R (Cauchy-Schwarz);
@@ -43,7 +43,7 @@ class HardCase:
     holds : names of the checks that the full-order run must pass (`record.CHECKS`); a case with
         only "refused" must raise an error when its scene is built or run
     mesh, effects, settings : arguments of `build`; ``mesh`` is a function that returns the mesh
-    start : function that returns the state before the first frame
+    start : function of the scene that returns the state before the first frame
     bound : largest allowed extent, relative to the largest extent of start, rest shape and handles
     slow : True if only the slow tests run the case
     """
@@ -114,7 +114,7 @@ def scrambled(size: float = 1.0) -> Start:
 
 
 def noisy(start: Start, size: float) -> Start:
-    """Return ``start`` at rest, with normal noise of ``size`` times the rest shape's extent."""
+    """Start at rest: positions of ``start`` with normal noise of ``size`` times the rest extent."""
 
     def moved(scene: Scene) -> State:
         noise = np.random.default_rng(SEED).standard_normal(scene.mesh.points.shape)

@@ -45,7 +45,7 @@ KERNEL, RECORD, SECONDS, CLOCKS, SIZE = range(OWN, OWN + 5)
 def variant(
     scene: Scene, system: GlobalSystem, steps: Sequence[LocalStep], frames: int, labels: dict
 ) -> Variant:
-    """Step loop to time: ``scene`` with these local ``steps``, from its start, no objective."""
+    """Step loop to time: ``scene`` with local ``steps`` from its initial state; no objective."""
     loop = scene.stepper(system, steps, track_objective=False)
     return Variant(labels, loop, scene.initial_state(), frames)
 

@@ -1,9 +1,8 @@
 """Server process from which jobs are forked.
 
-It has one thread. It loads third-party libraries and the modules that every job imports first; it
-does not load modules of effects, which only some scenes list.
-It ends, together with its jobs, when the process that started it has ended. A client that is killed
-or sends an invalid request is disconnected; other clients are not affected.
+It has one thread. It loads third-party libraries and the modules that every job imports first, not
+modules of effects, which only some scenes list. It ends, together with its jobs, when the process
+that started it has ended. A client that is killed or sends an invalid request is disconnected.
 """
 
 import atexit

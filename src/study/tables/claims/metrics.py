@@ -1,4 +1,4 @@
-"""Metrics of claims: functions that return a number for each selected row of a table, or group."""
+"""Metrics of claims: functions that return a number for each selected row of a table or group."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace

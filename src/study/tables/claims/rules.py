@@ -107,7 +107,7 @@ class ClaimRule(ConfigModel):
     paper : the statement of the preprint, in a few words
     section, shown : section and figures of the preprint
     qualifiers : conditions that a fair test has to respect
-    published : tests on the preprint's own variants and scenes
+    published : tests on the preprint's variants of the method and on its scenes
     beyond : tests on sound variants and well-posed scenes; if none of them decides, the verdict
         beyond the preprint is "not tested"
     changes : history of the rules, oldest first

@@ -145,8 +145,8 @@ def judged_runs(reruns: pd.DataFrame, reconstruction: pd.DataFrame) -> pd.DataFr
     A basis suffices if the run with orthogonal projection has an error of at most `FAILED`. The
     result has the columns of ``reruns`` and
 
-    gain : gain of the reduction
-    error : error of the run within the horizon; inf if it blew up before
+    gain : amplification of errors by the samples of the reduction
+    error : error of the run before the horizon; inf if it blew up before
     orthogonal_error : error of orthogonal projection at its largest size up to r; other methods may
         have one mode more, if their bases are not centred
     failed : whether the error exceeds `FAILED`
