@@ -28,7 +28,7 @@ _NUMBER = re.compile(
     r"(?:[^A-Za-z]|\\(?:ensuremath|cdot|infty|times|ge|le)(?![A-Za-z])|\b(?:to|of)\b)*\d"
     r"(?:[^A-Za-z]|\bloses\b)*"
 )
-_TAIL = re.compile(r"(\(|, )(\d[\d/, ]*)([)}]?)$")  # last number, as in "holds (20/20)"
+_TAIL = re.compile(r"(\(|, )(\d[\d/, ]*)([)}]?)$")  # number at the end, as in "holds (20/20)"
 _FIGURE = r"\begin{figure}\includegraphics{%s.pdf}\caption{%s}\label{fig:%s}\end{figure}"
 # One-line definitions of the preamble, which pandoc can read. Definitions of layout are replaced.
 _SHORT = re.compile(r"(?m)^\\(?:newcommand\{\\(?!longtableof|tablefile)\w+\}.*\}|newtheorem.*)$")

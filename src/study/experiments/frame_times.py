@@ -72,7 +72,7 @@ class NamedScene(OfScene):
 
 
 class Options(ConfigModel):
-    """Settings of the frame times."""
+    """Settings of the experiment `frame_times`."""
 
     frame_times: Processes
     timed_scenes: tuple[NamedScene, ...]

@@ -128,7 +128,7 @@ def iterations(
 
 
 def accelerated(counts: list[int], window: int) -> list[tuple[int, int]]:
-    """(iterations, window) of all runs: plain ones, then accelerated ones with more than 2."""
+    """Pairs (iterations, window) of all runs: plain ones, then accelerated ones of more than 2."""
     plain = [(count, 0) for count in counts]
     return plain + [(count, window) for count in counts if window and count > 2]
 

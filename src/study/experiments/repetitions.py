@@ -244,7 +244,7 @@ class Ladder(Repetitions):
     sizes: tuple[kit.Modes, ...] = ()
 
     def rungs(self, p: int) -> list[tuple[str, MethodSpec, int | None, int]]:
-        """List (direction, method, seed of signs, basis size) of all runs; ``p``: element rows."""
+        """List (direction, method, seed of signs, size r) of all runs; ``p``: rows per element."""
         rows: list[tuple[str, MethodSpec, int | None, int]] = []
         rows += [("up", method, None, self.r) for method in self.up]
         rows += [("down", method, None, self.r) for method in self.down]

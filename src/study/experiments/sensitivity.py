@@ -99,7 +99,7 @@ def contributions(scene: Scene) -> pd.DataFrame:
     without all other forces; that of initial velocities v is M v / h in the first frame.
 
     The energy is W_j for a group, the potential with an arbitrary zero for a force, and the added
-    kinetic energy for a start. It is nan for effects without an energy.
+    kinetic energy for initial velocities. It is nan for effects without an energy.
     """
     watched = [_Watched(contact) for contact in scene.contacts]
     space = VertexSpace(scene.system, scene.forces, scene.boundaries, contacts=watched)  # type: ignore[arg-type]

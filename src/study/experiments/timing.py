@@ -192,7 +192,7 @@ def timing(mesh: File, fom: File, settings: Options, **files: Any) -> None:
     write_table(pd.DataFrame(results, columns=COLUMNS), files["out"].path)
     log.info("%s: %d reduced local steps alone", name, len(alone))
     often = {"warmup": asked.warmup, "repeats": asked.breakeven_repeats}
-    with open_hdf5(fom.path) as file:  # states spread over the run
+    with open_hdf5(fom.path) as file:  # read states spread over the run
         positions = file["positions"]
         ends = [positions[i * (len(positions) - 1) // STATES] for i in range(STATES)]
     times = local_costs(scene, alone, np.stack(ends), **often)

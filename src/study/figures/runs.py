@@ -101,7 +101,7 @@ class Runs:
 
     @cached_property
     def floors(self) -> Floors:
-        """Sensitivity floors and horizons of the scenes."""
+        """Drift of perturbed runs (sensitivity floor) and horizon of each scene."""
         return Floors(self.sensitivity, self.horizon)
 
     def shown(self, experiment: Experiment) -> Shown:

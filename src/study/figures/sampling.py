@@ -150,7 +150,7 @@ def iterations(
         raise StorageError(f"{len(entries)} sampled entries do not fit a basis of {len(V)} rows")
     residual_of = _joint_residual if rows == "joint" else _shared_residual
     per_element = 3 * rows_per_element
-    length = {"scalar": 1, "joint": 3, "element": per_element}[rows]  # entries in a norm
+    length = {"scalar": 1, "joint": 3, "element": per_element}[rows]  # number of entries per norm
     steps = []
     for k in range(min(count, len(entries) // per_step, V.shape[1])):
         residual = residual_of(V, entries[: k * per_step], k)

@@ -195,7 +195,7 @@ def speedups(speedups: pd.DataFrame) -> Rows:
     ]  # fmt: skip
     for row in speedups.itertuples():
         size = f"r = {int(row.r)}" if row.position_basis == FULL else f"k = {int(row.k)}"
-        frames = row.frames_to_break_even  # shown with two significant digits
+        frames = row.frames_to_break_even  # a float is shown with two significant digits
         yield [
             _name(row.scene),
             _name(f"{row.method}, {size}"),

@@ -42,7 +42,7 @@ def completed(arguments: Sequence[str]) -> list[str]:
         option, or a figure does not exist.
     """
     if arguments[:1] == ["figure"]:
-        from study.pipeline.targets import figure_arguments  # late: it imports the whole package
+        from study.pipeline.targets import figure_arguments  # here: it imports the whole package
 
         arguments = figure_arguments(arguments[1:])
     command = CommandLine(arguments)
@@ -55,7 +55,7 @@ def completed(arguments: Sequence[str]) -> list[str]:
     lines = LINES if replaced and not command.own_output else ()
     own, made = folders(command.configfiles, command.settings), {}
     if command.targets:
-        from study.pipeline.targets import described, files  # late: it imports the whole package
+        from study.pipeline.targets import described, files  # here: it imports the whole package
 
         made = {target: files(target, own) for target in command.targets}
         # print the files if a target is a name and not a path

@@ -273,7 +273,7 @@ class Plan:
         return TABLE.at(self.results, name=name)
 
     def value(self, key: str, labels: Labels) -> Any:
-        """Configuration value of ``key``, or a value derived for a job (`DERIVED`)."""
+        """Configuration value of ``key``, or the value that a function in `DERIVED` computes."""
         head, *parts = key.split(".")
         if head not in DERIVED:
             return self.study.value(key)

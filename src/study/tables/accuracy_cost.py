@@ -88,7 +88,7 @@ def accuracy_cost(
 
 
 def _sweep(errors: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
-    """Full-order runs by number of iterations; those with fewer than the scene also as `FEWER`."""
+    """Full-order runs by number of iterations; with fewer than the scene's also as `FEWER`."""
     full = times[times.method.isna() | times.method.isin([FOM, ANDERSON])]
     cost = full[["scene", "method", "iterations", "ms_per_frame"]]
     cost = cost.fillna({"method": FOM})

@@ -396,7 +396,7 @@ def online(parts: list[File], measured: list[File], times: pd.DataFrame) -> pd.D
         return rows
     found = pd.DataFrame(list(timed_reductions(results.joined(measured), times)))
     made = rows[rows.motion == results.TRAIN].rename(columns={"r": "elements_sampled"})
-    made = made.drop(columns="playback_error")  # these are errors for the training motion itself
+    made = made.drop(columns="playback_error")  # zero for the training motion
     made = made.merge(large_errors(rows).rename(columns=_ERRORS), on=_MODEL, how="left")
     made = made.merge(found[[*_MODEL, *_TIMES]], on=_MODEL, how="left")
     return made.assign(ms_per_iteration=made.ms_per_frame / made.iterations)

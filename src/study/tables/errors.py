@@ -271,7 +271,7 @@ def _steps(
 
 
 def _square(ladder: pd.DataFrame, runs: pd.DataFrame) -> pd.DataFrame:
-    """Runs of table ladder by coefficients and samples (`SQUARE`), for groups and sizes in runs."""
+    """Runs of table ladder with direction "square", for scenes, groups and sizes in ``runs``."""
     chosen = ladder[(ladder.direction == "square") & ladder.gain.notna()]
     chosen = chosen.rename(columns={"rung": "method"})
     error = chosen.relative_error_within_horizon.astype(float).fillna(np.inf)

@@ -332,7 +332,7 @@ def substepped(scene: Scene, substeps: int, iterations: int, window: int = 0) ->
 
 @dataclass(frozen=True)
 class Timed:
-    """A scene in the motion that is timed, with first columns of its rows, and its reductions."""
+    """A scene in the motion that is timed, its reductions, and ``labels``: its first columns."""
 
     labels: dict[str, object]
     scene: Scene

@@ -207,7 +207,7 @@ def _sizes() -> list[record.HardCase]:
 
 
 def _meshes() -> list[record.HardCase]:
-    """Irregular meshes in regular scenes."""
+    """Scenes with irregular meshes, such as needles and slivers."""
     three = (BENDING, SPRING, STRAIN)
     return [
         _case("needles", "needle triangles, ten thousand times longer than wide", FORCED,

@@ -144,8 +144,8 @@ class ReducedRun:
             return "blow-up"
         if run.extent > DISTORTED * training.extent:
             return "distorted"
-        # in a position subspace the objective has to fall in every iteration, as in the full order;
-        # interpolated projections of unreduced positions do not guarantee it
+        # in a position subspace the objective must fall in every iteration, as in full order; with
+        # interpolated projections and unreduced positions it may rise
         if self.k is not None and run.excess.max() > 0.0:
             return "objective rises"
         # internal forces S^T W p sum to zero for any p, so that reduction keeps the momentum
