@@ -169,7 +169,7 @@ def _side(mesh: "Mesh", axis: int) -> str:
 
 
 def _floor(mesh: "Mesh", axis: int) -> str:
-    """YAML of a floor below the mesh along ``axis``, by half the mesh's extent, rounded."""
+    """YAML of a floor that is half the mesh's extent below the mesh along ``axis``, rounded."""
     lowest = float(mesh.points[:, axis].min())
     step = 10.0 ** math.floor(math.log10(mesh.extent))
     height = math.floor((lowest - mesh.extent / 2.0) / step) * step

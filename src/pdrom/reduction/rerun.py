@@ -45,7 +45,7 @@ class Rerun:
         return float(self.extent.max(initial=0.0))
 
     def row(self, displacement: np.ndarray) -> dict[str, Any]:
-        """Table row: result and error of the run; ``displacement`` (F,) m as in `error`."""
+        """Table row of the run; ``displacement`` (F,) m is the norm of the full-order motion."""
         return {
             "frames": self.frames,
             "finite": self.finite,

@@ -99,7 +99,7 @@ def rerun_positions(path: str, info: RerunInfo, frame: int) -> tuple[int, np.nda
 
     The run is read from the file ``path``, where ``info`` describes it.
 
-    A run that blew up holds fewer entries than the full-order run.
+    A run that blew up has fewer frames than the full-order run.
     """
     with open_hdf5(path) as file:
         data = file[info.label]["positions"] if info.entries else ()

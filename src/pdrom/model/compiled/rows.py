@@ -74,19 +74,19 @@ def write(numbers, to):
 
 
 def vertices(count: int) -> np.ndarray:
-    """Return zeros (count, 3) as a view of a padded array (count, 4)."""
+    """Return zeros (count, 3), a view of an array (count, 4) whose last column is padding."""
     return unflat(zeros(WIDTH * count))
 
 
 def as_vertices(values: np.ndarray) -> np.ndarray:
-    """Return a copy of the values (N, 3) as a view of a padded array (N, 4)."""
+    """Return a copy of ``values`` (N, 3), a view of an array (N, 4) with a last column of zeros."""
     copy = vertices(len(values))
     copy[...] = values
     return copy
 
 
 def flat(values: np.ndarray) -> np.ndarray:
-    """Return ``values`` (N, 3) as a padded flat array (4 N,), without a copy if possible."""
+    """Return ``values`` (N, 3) flat, (4 N,), with a zero after each row; no copy if possible."""
     rows = values.base
     if (
         isinstance(rows, np.ndarray)
@@ -103,7 +103,7 @@ def flat(values: np.ndarray) -> np.ndarray:
 
 
 def unflat(rows: np.ndarray) -> np.ndarray:
-    """Return the view (N, 3) of a padded flat array ``rows`` (4 N,); inverse of `flat`."""
+    """Return a view (N, 3), without the padding zeros, of the flat array ``rows`` (4 N,)."""
     return rows.reshape(-1, WIDTH)[:, :3]
 
 

@@ -17,7 +17,7 @@ from pdrom.model.constraints.base import ConstraintGroup, GroupConfig, direction
 from pdrom.model.constraints.local_kernel import FIRST, OWN, VERTICES, LocalKernel
 from pdrom.model.mesh.types import Mesh, barycentric_areas, boundary_edges
 
-# A projection of a unit vector onto the plane of the rim (equator) that is shorter is round-off.
+# If a unit vector has a shorter projection on the plane of the rim (equator), that is round-off.
 RIM = 1e-15
 # A longer projection is orthogonal to the normal up to 2e-12. A shorter one has lost digits by
 # cancellation and is orthogonalised again.

@@ -29,7 +29,7 @@ _SIGNATURE = types.float64(types.intp, types.intp, types.intp, types.intp)
 def local_kernel(function):
     """Compile ``function(y, rhs, record, part) -> energy``; y, rhs and record are addresses.
 
-    y, rhs : padded vectors (N, 4); the kernel adds S^T W p(y) of the units of its part to rhs
+    y, rhs : (N, 4), a column of zeros last; S^T W p(y) of the units of the part is added to rhs
     record : int64 array with the data of the kernel, see `VERTICES`, `FIRST`, `OWN`
     part : one of `PARTS`, or `PREPARE`
     """
@@ -49,7 +49,7 @@ def call(address, y, rhs, record, part):
 def add_part(table, y, rhs):
     """Call all kernels of a ``table``, each of which adds to ``rhs``; return their energy in J.
 
-    ``y`` and ``rhs`` are addresses of padded vectors (N, 4).
+    ``y`` and ``rhs`` are addresses of arrays (N, 4) with a last column of zeros.
     """
     addresses, records, part = table
     energy = 0.0

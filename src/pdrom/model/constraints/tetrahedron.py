@@ -128,7 +128,7 @@ def _nearest(work, low, high):
 def forces(work, geometry, block):
     """Write the forces S^T W p on the corners to ``work`` and add w |S q - p|^2 to its energy.
 
-    ``block`` and ``geometry`` are as in `gradients`.
+    ``geometry`` has the packed numbers of all blocks, ``block`` is the index of one.
     """
     weight, start = block * GEOMETRY + WEIGHT, block * GEOMETRY + OPERATOR
     for lane in range(LANES):

@@ -91,7 +91,7 @@ def gradients(work, geometry, block):
 def forces(work, geometry, block):
     """Write the forces S^T W p on the corners to ``work`` and add w |S q - p|^2 to its energy.
 
-    ``block`` and ``geometry`` are as in `gradients`.
+    ``geometry`` has the packed numbers of all blocks, ``block`` is the index of one.
     """
     weight = (block * GEOMETRY + WEIGHT) * LANES
     first = (block * GEOMETRY + OPERATOR) * LANES

@@ -157,5 +157,5 @@ class Anderson:
 
 
 def _numbers(y: np.ndarray) -> np.ndarray:
-    """Return a flat view of y; if rows of y are padded to four numbers, it includes the zeros."""
+    """Return a flat view of y; it includes a zero after each row if y is stored as (n, 4)."""
     return y.reshape(-1) if y.flags.c_contiguous else flat(y)

@@ -117,7 +117,7 @@ class CompiledIterations:
         Parameters
         ----------
         objective : (K,) receives the objective at the iterates, J; empty if it is not tracked
-        y, base : iterate and (M/h^2) s, (N, 3) views of padded arrays (N, 4)
+        y, base : iterate and (M/h^2) s, (N, 3) views of arrays (N, 4) with a column of zeros
         s : (N, 3) prediction
         elimination : the factored system, accepted by `takes`
         seconds : (4,) s; the times of local and global steps are added to entries 1 and 2

@@ -151,7 +151,7 @@ NOTHING_FREE: Factor = (
     np.zeros(0),
     np.zeros(0),
 )
-# First arguments of `sweeps.load` (module `sweeps`) if no unknown is coupled to a held vertex.
+# Coupling in the form of `sweeps.load`, if no unknown is coupled to a held (prescribed) vertex.
 NO_COUPLING = (np.zeros(0, np.int64), np.zeros(1, np.int32), np.zeros(0, np.int32), np.zeros(0))
 
 

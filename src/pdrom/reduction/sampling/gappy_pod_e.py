@@ -38,8 +38,8 @@ def bound_gain(v: np.ndarray, size: int, elements: np.ndarray, bound: float) -> 
     """Extend ``elements`` until the gain || (P^T V)^+ ||_2 of their rows is at most ``bound``.
 
     Return all elements if even these do not meet the bound. With orthonormal columns all elements
-    have the gain 1, so that every bound of at least 1 can be met. ``v``, ``size`` and the errors
-    raised are as in `oversample`.
+    have the gain 1, so that every bound of at least 1 can be met. Arguments ``v``, ``size`` and
+    errors raised are those of `oversample`.
     """
     growing = _Growing(v, size, elements)
     while len(growing.picked) < growing.total and growing.gain > bound:

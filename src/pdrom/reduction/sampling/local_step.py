@@ -44,7 +44,7 @@ class Lift:
     coefficients : (sets, r) coefficients of the last evaluation
     axes, own_sets : (c,) axis to which each column adds, and set whose coefficients it uses
     lifted : (c, N, r) S^T W V of each column
-    offset : (4 N,) S^T W mean, each vector padded to four numbers
+    offset : (4 N,) S^T W mean, flat, with a zero after the three numbers of each vertex
     seconds : (2,) s, accumulated time of the two parts of the lift
     """
 
@@ -121,7 +121,7 @@ def lift(values, axes, own_sets, lifted, offset, first, last, rhs):
     ----------
     values : (sets, r) coefficients
     axes, own_sets, lifted, offset : see `Lift`
-    rhs : (4 N,) right-hand side, padded vectors
+    rhs : (4 N,) right-hand side, flat, with a zero after the three numbers of each vertex
     """
     for i in range(WIDTH * first, WIDTH * last):
         rhs[i] += offset[i]

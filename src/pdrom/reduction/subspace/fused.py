@@ -203,7 +203,7 @@ TALL = 8
 
 
 def blocks(matrix: np.ndarray) -> np.ndarray:
-    """Arrange ``matrix`` (m, n) as a flat array of blocks for `product`, padded with zero rows."""
+    """Arrange ``matrix`` (m, n) in blocks for `product`, flat; zero rows fill the last block."""
     m, n = matrix.shape
     whole = np.zeros((-(-m // TALL) * TALL, n))
     whole[:m] = matrix
