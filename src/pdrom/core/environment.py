@@ -48,7 +48,7 @@ def settled(
     Parameters
     ----------
     kernels : OpenBLAS's name of the kernels to use; None leaves the choice to OpenBLAS
-    target : variables that set the compiler's target processor, see `compiled_for`
+    target : variables that set the compiler's target processor, from `compiled_for`
     """
     asked = environment.get(KEEP, "").split()
     kept = {

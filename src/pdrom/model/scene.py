@@ -217,7 +217,7 @@ class Scene:
         Raises
         ------
         MeshError, SceneError
-            The mesh is faulty, a selection empty, frames too many, or two effects hold one vertex.
+            The mesh is faulty, a selection empty, frames too many, or effects are in conflict.
         """
         check_mesh(mesh, config.name)
         if config.frames * mesh.vertices > MAX_VERTEX_FRAMES:
@@ -322,7 +322,7 @@ class Scene:
         return self.system_with(DEFAULT_SOLVER)
 
     def system_with(self, solver: str) -> GlobalSystem:
-        """Return the global system with the ``solver`` of this name, see `solvers.SOLVERS`."""
+        """Return the global system with the ``solver`` of this name (`solvers.SOLVERS`)."""
         return GlobalSystem(self.masses, self.config.time_step, self.groups, solver=solver)
 
     def initial_state(self, perturbation: np.ndarray | None = None) -> State:
@@ -365,7 +365,7 @@ class Scene:
 
 
 def _place(boundary: base.Boundary) -> base.EffectConfig:
-    """Configuration of ``boundary`` without vertices and end, so that equal motions are equal."""
+    """Configuration of ``boundary`` without vertices and end, to find out if motions are equal."""
     return boundary.config.model_copy(update={"select": None, "until": None})
 
 

@@ -164,7 +164,7 @@ def basis_of(
 ) -> Basis:
     """Compute the POD basis of the training snapshots of ``data``, by the recipe ``spec``.
 
-    Snapshots ``train`` (n, e p, 3) replace them if given. For ``signs`` see `compute_basis`.
+    Snapshots ``train`` (n, e p, 3) replace them if given; ``signs`` are those of `compute_basis`.
     """
     snapshots, p = data.train if train is None else train, data.rows_per_element
     return compute_basis(snapshots, data.row_mass, data.roundoff, p, spec, signs)

@@ -60,14 +60,14 @@ class ConstraintGroup(Effect):
 
     rows_per_element: int
     split_from: int
-    """Number of elements from which the local step is computed in two parts (see module
+    """With at least this many elements, the local step is computed in two parts (see module
     `local_kernel`); a group that is always computed in one part does not set it."""
     S: sparse.csr_array
     weights: np.ndarray
     gradient_kernel: Any = None
-    """Compiled function from S q to projections, see `local_kernel.gradient_kernel`; or None."""
+    """Compiled function that maps S q to projections (`local_kernel.gradient_kernel`), or None."""
     local_kernel: LocalKernel | None = None
-    """Compiled `accumulate` for compiled loops; a group without one overrides `accumulate`."""
+    """Compiled form of `accumulate` for compiled loops; without it, override `accumulate`."""
     _pass: LocalPass | None = None
     manifold: ClassVar[str | None] = None
     """Set onto which elements are projected: "clamped" (signed singular values in the range

@@ -152,7 +152,7 @@ def project_vertices(y_place, p_place, record, part):
 def accumulate_vertices(y_place, rhs_place, record, part):
     """Add S^T W p of one ``part`` of the blocks to the right-hand side; return its energy in J.
 
-    ``y_place``, ``rhs_place`` and ``record`` are addresses, see `local_kernel`.
+    ``y_place``, ``rhs_place``, ``record`` are addresses of positions, right-hand side and record.
     """
     entries = rows.indices(record, ARRAYS)
     y, start, indices, data = _operator(y_place, record)

@@ -21,7 +21,7 @@ VERTICES, FIRST, OWN = 0, 1, 4
 PARTS, PREPARE = (0, 1), 2
 
 Table = tuple[np.ndarray, np.ndarray, int]
-"""Addresses of kernels, addresses of their records, and the request that all of them get."""
+"""Addresses of kernels, addresses of their records, and the argument ``part`` of all calls."""
 
 _SIGNATURE = types.float64(types.intp, types.intp, types.intp, types.intp)
 

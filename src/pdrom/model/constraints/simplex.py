@@ -34,12 +34,12 @@ TAKEN, TAKEN_GEOMETRY, ARRAYS = range(OWN + 7, OWN + 10)
 
 
 class SimplexGroup(StencilGroup):
-    """A group of simplices whose kernels work on packed blocks.
+    """A group of simplices whose kernels work on packed blocks of elements.
 
     A subclass sets two kernels and overrides `_extra` if its elements have other packed numbers:
 
     accumulate_kernel : a `pdrom.model.constraints.local_kernel.local_kernel` whose units are blocks
-    project_kernel : another local kernel, which writes projections of some elements, see `samples`
+    project_kernel : local kernel that writes the projections of some elements, see `samples`
     """
 
     accumulate_kernel: Any

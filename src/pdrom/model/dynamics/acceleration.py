@@ -102,7 +102,7 @@ def combine(history, image):
 
 
 History = tuple[np.ndarray, ...]
-"""Arrays with the iterates of a frame, see `_history`."""
+"""Arrays with the iterates of a frame, in the order that `_history` describes."""
 
 
 def _history(window: int, n: int) -> History:

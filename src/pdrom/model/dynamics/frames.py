@@ -147,7 +147,7 @@ def all_iterations(
     y, s, base, rhs : iterate, prediction, (M/h^2) s, working array; flat rows of four numbers
     inertia : (N,) M/h^2, kg/s^2
     tables, second : tables of the local kernels; array for their second parts, and its range
-    factor : factor of the global system, see `pdrom.model.dynamics.solvers.Factor`
+    factor : triangular factor of the global system (`pdrom.model.dynamics.solvers.Factor`)
     history : history of the acceleration; with `NO_HISTORY` its code is not compiled
     objective, seconds : objective and times, written as in `CompiledIterations.run`
     watch : buffer for the clock, from `pdrom.model.compiled.functions.clock`

@@ -167,9 +167,9 @@ class SuperLUSolver:
 
     ordering = "MMD_AT_PLUS_A"
     factor: Factor | None = None
-    """Arguments of `sweep` in a compiled loop; None if the solver is not compiled."""
+    """First arguments of `sweeps.sweep` in compiled loops; None if the solver is not compiled."""
     coupling = NO_COUPLING
-    """Arguments of `load` in a compiled loop, the coupling to the held vertices."""
+    """Matrix entries between unknowns and held vertices, in the form of `sweeps.load`."""
 
     def __init__(
         self,

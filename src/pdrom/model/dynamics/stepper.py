@@ -17,7 +17,7 @@ from pdrom.model.dynamics.space import Solve, Space
 
 PHASES = ("inertia", "local", "global", "finish")
 Observer = Callable[[np.ndarray], None] | None
-"""Called with the iterate y at which the last local step of a frame is computed."""
+"""Function that is called with the iterate y of the last local step of a frame, or None."""
 
 
 Vectors = tuple[np.ndarray, np.ndarray, np.ndarray]

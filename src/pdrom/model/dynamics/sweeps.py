@@ -198,7 +198,7 @@ def sweep(panels, vertices, loads, x, rhs, y):
 
     Parameters
     ----------
-    panels : see `pdrom.model.dynamics.solvers.panels`
+    panels : the factored matrix A, from `pdrom.model.dynamics.solvers.panels`
     vertices : (n,) row of ``rhs`` and ``y`` of each unknown, in the order of the factor
     loads : (4 n,) rows that are subtracted from the right-hand side, in the order of the factor
     x : (4 n,) working array

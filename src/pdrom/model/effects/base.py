@@ -110,7 +110,7 @@ class Force(Effect):
     """
 
     time_step: float
-    """Time step h of the run in seconds, set by the scene; some forces are limited by it."""
+    """Time step h of the run in seconds, set by the scene; some forces depend on it."""
 
     rate: float | np.ndarray | None = None
     """Rate c, a number or (N,) 1/s, if the acceleration is -c v plus a term that does not depend on
@@ -135,7 +135,7 @@ class Boundary(Effect):
     """All vertices that the effect holds in any frame, ascending (n,) int64."""
 
     side: str | None = None
-    """Side of the rest shape if the vertices were selected as a side of it; else None."""
+    """Name of the side of the rest shape if the vertices were selected by one; else None."""
 
     moves: bool
     """Whether the targets change from frame to frame."""
@@ -179,7 +179,7 @@ class Contact(Effect):
     """Whether the correction of a vertex does not depend on other vertices."""
 
     height: float | None = None
-    """Height y in metres if the contact only lifts lower vertices to this height; else None."""
+    """Height y, m, for a floor: a contact that only moves lower vertices up to y; else None."""
 
     def gaps(self, points: np.ndarray) -> np.ndarray:
         """Return distances (n,) m of ``points`` (n, 3) m to the obstacle; inf if there is none."""

@@ -80,11 +80,11 @@ class Obstacle(Contact):
 
     @abstractmethod
     def entries(self, start: np.ndarray, end: np.ndarray) -> Entries:
-        """Return where straight paths from ``start`` (n, 3) m (outside) to ``end`` enter."""
+        """Return where paths from ``start`` (n, 3) m (outside) to ``end`` enter the body."""
 
 
 class Plane(Obstacle):
-    """The half space behind a plane, which vertices cannot enter; see `Obstacle`."""
+    """Obstacle: the half space behind a plane, which vertices cannot enter."""
 
     class Config(ObstacleConfig):
         """``point`` on the plane in metres, ``normal`` of any length."""
@@ -120,7 +120,7 @@ UP = np.array([0.0, 1.0, 0.0])
 
 
 class Sphere(Obstacle):
-    """A sphere, which vertices cannot enter; see `Obstacle`."""
+    """Obstacle: a sphere, which vertices cannot enter."""
 
     class Config(ObstacleConfig):
         """``centre`` and ``radius`` in metres."""
@@ -157,7 +157,7 @@ class Sphere(Obstacle):
 
 
 class Box(Obstacle):
-    """A box (possibly a thin plate), which vertices cannot enter; see `Obstacle`."""
+    """Obstacle: a box, possibly as thin as a plate, which vertices cannot enter."""
 
     class Config(ObstacleConfig):
         """Corners ``lower`` and ``upper`` in metres."""

@@ -37,7 +37,7 @@ def check_mesh(mesh: Mesh, name: str) -> Mesh:
 
 
 def mesh_of(points: np.ndarray, cells: np.ndarray, name: str) -> Mesh:
-    """Return a mesh of points (N, 3) m and ``cells``: triangles (T, 3) or tetrahedra (E, 4).
+    """Return a mesh of points (N, 3) m and triangles (T, 3) or tetrahedra (E, 4), then oriented.
 
     Raises
     ------

@@ -39,7 +39,7 @@ Quantity = Literal["position", "velocity"]
 QUANTITIES: tuple[Quantity, ...] = get_args(Quantity)
 
 OnFrame = Callable[[str], None]
-"""Callback that gets the title of a level after each frame that the level has computed."""
+"""Callback, called with the title of a level after each frame that the level has computed."""
 
 
 def silent(title: str) -> None:

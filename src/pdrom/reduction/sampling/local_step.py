@@ -89,7 +89,7 @@ def coefficients(sampled, starts, positions, packed, operators, shifts, result):
     Parameters
     ----------
     sampled : flat array of projections of the sampled elements, one element after the other
-    starts, positions, packed, operators, shifts : see `Lift`
+    starts, positions, packed, operators, shifts : arrays of `Lift`
     result : (sets, r) output
     """
     sets, modes = shifts.shape
@@ -120,7 +120,7 @@ def lift(values, axes, own_sets, lifted, offset, first, last, rhs):
     Parameters
     ----------
     values : (sets, r) coefficients
-    axes, own_sets, lifted, offset : see `Lift`
+    axes, own_sets, lifted, offset : arrays of `Lift`
     rhs : (4 N,) right-hand side, flat, with a zero after the three numbers of each vertex
     """
     for i in range(WIDTH * first, WIDTH * last):

@@ -323,9 +323,9 @@ def run_frames(
     fixed, free : (m,), (K',) indices of the fixed coordinates and of the free ones
     targets : (F, m, 3) values of the fixed coordinates in each frame
     begun : matrices for the start of a frame, see `_Operators`
-    count, rows, operators, sampled, history : see `run_iterations`
+    count, rows, operators, sampled, history : arguments of `run_iterations`
     seconds : (F, 4) s, times of the phases of each frame, written
-    watch : clock, see `pdrom.model.compiled.functions`
+    watch : buffer for the clock, from `pdrom.model.compiled.functions.clock`
     """
     response, coupling, nothing, s, held = begun
     offset, constant, z = operators[2:5]
