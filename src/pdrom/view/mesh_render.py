@@ -29,7 +29,7 @@ def face_normals(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 
 def smooth_normals(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Unit normals (T, 3) of faces, averaged over neighbouring faces; zero for a face without area.
+    """Unit normals (T, 3) of faces, averaged over neighbouring faces; zero if without area.
 
     ``points`` are (N, 3), ``triangles`` (T, 3).
     """

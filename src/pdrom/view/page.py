@@ -49,7 +49,7 @@ class ViewedScene:
     positions : (F + 1, N, 3) m of the full-order run
     ms : milliseconds per frame of the full-order run, None if not measured
     floor : (F,) relative error that perturbations by round-off cause, empty if unknown
-    horizon : frame after which round-off makes errors meaningless; None if no such frame is known
+    horizon : frame from which on no run can be judged, due to round-off; None if none is known
     runs : reduced runs, by group, method and ascending size
     effects : effects of the scene; obstacles among them are drawn
     velocities : (F + 1, N, 3) m/s of the full-order run, None if they were not stored

@@ -174,7 +174,7 @@ def handles(looks: Mapping[str, tuple[str, str]], **common: Any) -> list[Line2D]
 
 
 def split_handles(splits: Iterable[str]) -> list[Line2D]:
-    """Legend entries for ``splits`` of the snapshots (training, test), each by its line style."""
+    """Legend entries for sets of snapshots, ``splits`` (training, test, ...), by line style."""
     return [handle(SPLIT_NAMES[s], color="#555555", linestyle=SPLITS[s]) for s in splits]
 
 

@@ -159,7 +159,7 @@ def skinning_weights(points: np.ndarray, handles: int) -> np.ndarray:
 
     Handles are vertices from farthest-point sampling. At distance d a handle has Wendland's kernel
     (1 - d/R)^4 (4 d/R + 1), zero for d > R. R is three times the largest distance of a vertex from
-    its nearest handle, so that a kernel is positive at every vertex; the kernels' sum divides them.
+    its nearest handle: at every vertex a kernel is positive. Kernels are divided by their sum.
     """
     chosen = farthest_points(points, np.arange(len(points)), handles)
     distance = np.linalg.norm(points[:, None, :] - points[chosen][None], axis=2)
