@@ -17,7 +17,7 @@ KNOTS = (0.0, -1.0, 1.0, -1.0, 0.0)
 
 
 class Poke(Boundary):
-    """Moves single vertices along an axis by 0 -> -a -> a -> -a -> 0 and releases them, in turn.
+    """Moves vertices in turn by 0 -> -a -> a -> -a -> 0 on an axis (amplitude a), then frees them.
 
     Vertices, without those in ``avoid``, are chosen by farthest-point sampling from the centre. The
     reproduced preprint gives no speeds; amplitude, frames and order are choices of this study.
