@@ -1,4 +1,4 @@
-"""pdrom from Python: a scene, its run, a basis of projections, the run with them reduced, pictures.
+"""pdrom from Python: build a scene, run it, make a basis, run it reduced, draw the results.
 
 docs/library.md has a worked example.
 """

@@ -1,4 +1,4 @@
-"""Arguments of the functions of `pdrom.api`: a wrong one is named before anything is computed."""
+"""Checks of arguments of `pdrom.api` before anything is computed; errors name the argument."""
 
 import os
 from pathlib import Path
@@ -11,7 +11,7 @@ T = TypeVar("T")
 
 
 def require(kind: type[T] | tuple[type[T], ...], value: Any, name: str, source: str) -> T:
-    """Return ``value`` if it is a ``kind``, else raise an error with ``name`` and ``source``."""
+    """Return ``value``; ConfigurationError with ``name`` and ``source`` if it is no ``kind``."""
     if isinstance(value, kind):
         return value
     kinds = " or ".join(k.__name__ for k in (kind if isinstance(kind, tuple) else (kind,)))

@@ -1,4 +1,4 @@
-"""Scenes from files or keys, and runs in files, which ``pdrom show`` and ``pdrom view`` open."""
+"""Scenes from YAML files or keywords, and runs saved to HDF5 files and loaded from them."""
 
 import json
 import os
@@ -24,7 +24,7 @@ from pdrom.reduction.rerun import Rerun, displacement_norms
 def load_scene(path: str | os.PathLike[str]) -> Scene:
     """Scene of a YAML file, bound to its mesh.
 
-    A mesh file is looked for from the folder of the scene's file on.
+    A relative path of a mesh file starts at the folder of the YAML file.
 
     Parameters
     ----------
@@ -41,15 +41,15 @@ def load_scene(path: str | os.PathLike[str]) -> Scene:
 
 
 def build_scene(folder: str | os.PathLike[str] = ".", mesh: Any = None, **keys: Any) -> Scene:
-    """Scene of the keys that a scene's file has, bound to its mesh.
+    """Scene from keywords, which are the keys of a scene's YAML file, bound to its mesh.
 
     Parameters
     ----------
-    folder : where a mesh file is looked for
+    folder : folder at which a relative path of a mesh file starts
     mesh : a mapping, as in a scene's file; or a pair of arrays: points (N, 3) m with triangles
-        (T, 3) or tetrahedra (E, 4), which name points from 0 on
+        (T, 3) or tetrahedra (E, 4) of indices of points, from 0
     keys : ``effects`` and ``frames`` are required, see config/README.md; ``name`` and ``title``
-        are given ones without them
+        have default values
 
     Raises
     ------
@@ -68,7 +68,7 @@ def build_scene(folder: str | os.PathLike[str] = ".", mesh: Any = None, **keys: 
 
 
 def bound(config: SceneConfig, folder: Path, source: str) -> Scene:
-    """Bind ``config`` to its mesh, read below ``folder``; errors begin with ``source``."""
+    """Scene of ``config`` with its mesh, read from ``folder``; errors begin with ``source``."""
     try:
         return Scene.build(config, config.mesh.build(folder))
     except PdromError as error:
@@ -76,9 +76,9 @@ def bound(config: SceneConfig, folder: Path, source: str) -> Scene:
 
 
 def save(reduced: ReducedRun | RequestedRun, path: str | os.PathLike[str]) -> None:
-    """Write a reduced run with its full-order run, as positions in single precision.
+    """Write a reduced run and its full-order run to one file, positions in single precision.
 
-    A run within a requested tolerance is written alone, in double precision.
+    A run within a requested tolerance is written without a full-order run, in double precision.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ def save(reduced: ReducedRun | RequestedRun, path: str | os.PathLike[str]) -> No
     Raises
     ------
     ConfigurationError, StorageError
-        No reduced run; the file cannot be written.
+        ``reduced`` is no reduced run; the file cannot be written.
     """
     require((ReducedRun, RequestedRun), reduced, "reduced", source="pdrom.api.reduce makes one")
     path = file_path(path)
@@ -127,19 +127,19 @@ def _save_requested(run: RequestedRun, path: Path) -> None:
 
 
 def load(path: str | os.PathLike[str], unchecked: bool = False) -> AnyRun:
-    """A run that `save`, `pdrom.api.run` or the pipeline wrote.
+    """Read a run that `save`, `pdrom.api.run` or the pipeline wrote.
 
     Parameters
     ----------
-    path : file (HDF5); it is only read, whatever is wrong with it
-    unchecked : whether a file without a checksum inside is read if it is sound: complete, of the
-        shapes that its scene gives, finite. A wrong checksum is never accepted.
+    path : file (HDF5); it is never changed or renamed, even if it is damaged
+    unchecked : whether to read a file without a checksum if its arrays are complete, finite and of
+        the shapes that its scene gives. A wrong checksum is never accepted.
 
     Raises
     ------
     StorageError
-        The file is missing, damaged, has no checksum, holds no run of a scene or not all that its
-        scene gives, or leads to other files.
+        The file is missing, damaged, without a checksum, or has links to other files; it has no
+        run of a scene, or lacks data that its scene requires.
     """
     path = file_path(path)
     try:
@@ -165,7 +165,7 @@ def load(path: str | os.PathLike[str], unchecked: bool = False) -> AnyRun:
 
 
 def _require_sound(found: AnyRun) -> None:
-    """ValueError for arrays of other shapes than the scene's, or what is no finite number."""
+    """Raise ValueError if an array of the run is not finite or not of the shape of its scene."""
     if isinstance(found, RequestedRun):
         full = FullRun(found.scene, found.outcome.positions, found.ms, {})
         if not 0 <= found.outcome.frames <= len(found.ms):
@@ -196,7 +196,7 @@ def _store(file: h5py.File, name: str, values: np.ndarray, unit: str) -> None:
 
 
 def _requested(scene: Scene, file: h5py.File) -> RequestedRun:
-    """Load a run within a requested tolerance; the cost of its calibration is not stored."""
+    """Load a run within a requested tolerance; its calibration time, not stored, is NaN."""
     kept, timings = file.attrs, file["timings"][...].sum(axis=1)
     request = Request(error=float(kept["requested_error"]), quantity=str(kept["quantity"]))
     estimate = kept.get("estimate")
@@ -221,13 +221,13 @@ def _reduced(scene: Scene, file: h5py.File) -> ReducedRun:
 
 
 def _scene(file: h5py.File, path: Path) -> Scene:
-    """The scene of a run; its mesh from the file, where it was stored."""
+    """Scene of a run, with the mesh that is stored in ``file``, else read from its mesh file."""
     settings = json.loads(file.attrs["configuration"])
-    # a run of the pipeline holds the scene under the key `config`
+    # the pipeline stores the scene under the key "config", `save` and `run` under "scene"
     scene = validate(SceneConfig, settings.get("config") or settings["scene"], str(path))
     if "mesh" in file:
         return Scene.build(scene, stored_mesh(file["mesh"]))
-    # a mesh file is named from one of the folders above the run's
+    # a relative path of a mesh file may start at any folder above the file of the run
     mesh, above = scene.mesh, path.resolve().parents
     named = [f for f in above if isinstance(mesh, MeshFile) and (f / mesh.path).is_file()]
     return bound(scene, [*named, Path()][0], str(path))

@@ -1,4 +1,4 @@
-"""Pictures of runs, and a page to look at them."""
+"""Plots of errors, and HTML pages that show runs."""
 
 import os
 from typing import get_args
@@ -16,11 +16,11 @@ from pdrom.view.artists import Figure
 from pdrom.view.multiples import clipped, log_axis
 from pdrom.view.page import ViewedRun, ViewedScene, write_page
 
-LOW, HIGH = 1e-7, 1e3  # errors outside are drawn on the limit
+LOW, HIGH = 1e-7, 1e3  # limits of the error axis; errors outside are drawn on the limit
 
 
 def plot(*runs: ReducedRun) -> Figure:
-    """Errors of reduced runs against time; a cross ends a run that blew up.
+    """Plot errors of reduced runs against time; a cross marks the end of a run that blew up.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ def plot(*runs: ReducedRun) -> Figure:
     Raises
     ------
     ConfigurationError, SceneError
-        An argument is no reduced run; there is none.
+        An argument is no reduced run; there is no argument.
     """
     if not runs:
         raise SceneError("plot: at least one run is required")
@@ -61,8 +61,8 @@ def plot(*runs: ReducedRun) -> Figure:
 def view(path: str | os.PathLike[str], *runs: AnyRun) -> None:
     """Write a page (HTML, one file) that shows runs; a browser opens it without a network.
 
-    Reduced runs are shown with their full-order run, as are runs within a requested tolerance if
-    that run is there; runs with equal scenes become one scene.
+    A reduced run is shown with its full-order run; a run within a requested tolerance, too, if that
+    is among ``runs``. Runs with equal scenes are shown together.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def view(path: str | os.PathLike[str], *runs: AnyRun) -> None:
     Raises
     ------
     ConfigurationError, SceneError, StorageError
-        An argument is no run; none is given, or two scenes that differ have the same name; the page
+        An argument is no run; no run is given, or two different scenes have one name; the page
         would be too large, or cannot be written.
     """
     require_place(file_path(path))
@@ -81,11 +81,11 @@ def view(path: str | os.PathLike[str], *runs: AnyRun) -> None:
 
 
 def viewed_scenes(*runs: AnyRun) -> list[ViewedScene]:
-    """Collect runs by scene, for pictures and pages; the errors are those of `view`.
+    """Collect runs by scene, for pictures and pages; it raises the errors that `view` raises.
 
     Parameters
     ----------
-    runs : those with equal scenes become one scene
+    runs : runs of any kind; runs with equal scenes become one scene
     """
     if not runs:
         raise SceneError("view: at least one run is required")
@@ -104,7 +104,7 @@ def _scene(run: AnyRun) -> Scene:
 
 
 def _alike(scene: Scene) -> SceneConfig:
-    """Configuration without the tolerance that its file may request: runs do not depend on it."""
+    """Configuration of ``scene`` without a requested tolerance, on which runs do not depend."""
     return scene.config.model_copy(update={"requested_error": None})
 
 
@@ -131,7 +131,7 @@ def _viewed(runs: list[AnyRun]) -> ViewedScene:
 
 
 def _shown(run: AnyRun, positions: np.ndarray) -> ViewedRun:
-    """A ``run`` with its distance to the first one's ``positions`` (F + 1, N, 3) m."""
+    """``run`` for a page, with its errors against the reference's ``positions`` (F + 1, N, 3) m."""
     if isinstance(run, ReducedRun):
         names, blowup = (run.group, run.method, run.method), run.outcome.blowup_frame
         moved, ms = np.asarray(run.outcome.positions), run.ms if np.isfinite(run.ms) else None

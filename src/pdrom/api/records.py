@@ -1,4 +1,4 @@
-"""Records that `run` and `reduce` return."""
+"""Records that `pdrom.api.run` and `pdrom.api.reduce` return."""
 
 from dataclasses import dataclass
 
@@ -14,7 +14,7 @@ from pdrom.reduction.rerun import Rerun, mean_motion
 
 @dataclass(frozen=True, eq=False)
 class Snapshots:
-    """Projections p (n, e p, 3) of a group at the training frames, and their round-off (n,)."""
+    """n training snapshots of a group: projections p (n, rows, 3) and their round-off (n,)."""
 
     p: np.ndarray
     roundoff: np.ndarray
@@ -26,9 +26,9 @@ class Snapshots:
 class FullRun:
     """A full-order run.
 
-    positions : (F + 1, N, 3) m, the initial ones first
+    positions : (F + 1, N, 3) m; entry 0 is the initial state
     ms : (F,) milliseconds of each frame
-    snapshots : of every constraint group, for a basis
+    snapshots : training snapshots of every constraint group, by its name
     """
 
     scene: Scene
@@ -47,7 +47,7 @@ class ReducedRun:
 
     gain : norm of the sampled equations' solution operator; 1 if every projection is evaluated
     outcome : positions (F' + 1, N, 3) m, differences, and whether it blew up
-    ms : milliseconds a frame (median)
+    ms : median milliseconds per frame
     """
 
     full: FullRun
@@ -66,15 +66,15 @@ class ReducedRun:
 
     @property
     def error(self) -> np.ndarray:
-        """Error of each frame (F',) relative to the root mean square displacement of the run."""
+        """Error of each frame (F',), relative to the RMS displacement of the full-order run."""
         return self.outcome.difference / mean_motion(self.full.positions)
 
     @property
     def errors(self) -> dict[str, float | None]:
         """Errors of the whole run: positions, velocities, shape, energy, first contact.
 
-        By the names of the table reduced_reruns; None if the run ended early, or where the
-        full-order run has nothing to compare with.
+        Keys are column names of the table reduced_reruns. A value is None if the run ended early,
+        or if the full-order run lacks the quantity, such as a first contact.
         """
         return Yardstick(self.full.scene, self.full.positions).errors(self.outcome)
 
@@ -88,13 +88,13 @@ class ReducedRun:
 class RequestedRun:
     """A run within a requested tolerance.
 
-    scene : its motion
-    request : the tolerance
-    outcome : positions (F + 1, N, 3) m, for how many frames the tolerance counts as met, what ran
-    ms : (F,) milliseconds a frame, all checks and levels that failed shared out evenly
-    offline_s : seconds that the calibration took before the run
-    error : true error over these frames against the converged implicit step, if the motion is that
-        of the calibration; None on another one, where it is not known
+    scene : scene that was run
+    request : requested tolerance and the quantity that it bounds
+    outcome : positions (F + 1, N, 3) m, number of frames that meet the tolerance, level that ran
+    ms : (F,) milliseconds per frame; checks and failed levels are spread evenly over the frames
+    offline_s : seconds of the calibration before the run
+    error : true error over these frames against the converged implicit step; None if the scene is
+        not the one of the calibration, since the error is then unknown
     """
 
     scene: Scene
@@ -106,7 +106,7 @@ class RequestedRun:
 
     @property
     def title(self) -> str:
-        """The request, and for how long it is met."""
+        """Text: the requested tolerance, and for how many frames it is met."""
         done = self.outcome
         if not done.met:
             return f"{self.request} requested, refused"

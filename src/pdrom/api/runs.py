@@ -33,8 +33,8 @@ from pdrom.reduction.sampling import Reduction, select
 from pdrom.reduction.sampling.local_step import ReducedLocalStep, replace_group
 from pdrom.reduction.snapshots import row_masses, training_frames
 
-SNAPSHOTS = 100  # training snapshots of a group, at most, where the scene gives no number
-# A reduced run ends when its bounding box exceeds this multiple of the mesh's.
+SNAPSHOTS = 100  # default of the largest number of training snapshots of a group
+# A reduced run ends when its bounding box is larger than that of the mesh at rest by this factor.
 BLOWUP_EXTENT = 100.0
 GROUP = "the name of a constraint group"
 FULL_RUN = "pdrom.api.run makes one, load reads one"
@@ -45,13 +45,13 @@ def run(
     out: str | os.PathLike[str] | None = None,
     on_frame: Callable[[int, FrameReport], None] = lambda frame, report: None,
 ) -> FullRun:
-    """Run a scene in full order; every group stores the snapshots that train a basis.
+    """Run a scene in full order; snapshots of every group are stored for the training of a basis.
 
     Parameters
     ----------
-    scene : what is run, by `build_scene` or `load_scene`
-    out : file (HDF5) to write; none without it
-    on_frame : called after each frame with its number, from 0, and what it did
+    scene : scene made by `build_scene` or `load_scene`
+    out : file (HDF5) to write; None writes no file
+    on_frame : called after each frame with its number, from 0, and the solver's report
 
     Returns
     -------
@@ -61,7 +61,7 @@ def run(
     Raises
     ------
     ConfigurationError, StorageError
-        No scene; ``out`` cannot be written, which is found before anything runs.
+        ``scene`` is no scene; ``out`` cannot be written, which is checked before the run.
     """
     arguments.require(Scene, scene, "scene", source="build_scene and load_scene make one")
     if out is not None:
@@ -76,7 +76,7 @@ def run(
     config = scene.config.model_dump(mode="json")
     reported = {"scene": config, "run": "train", "solver": DEFAULT_SOLVER}
     with made_by("pdrom.api.run", reported), ExitStack() as kept:
-        # without a file to write, a temporary one that is deleted afterwards
+        # without ``out``, the run is written to a temporary folder that is deleted afterwards
         folder = "" if out else kept.enter_context(TemporaryDirectory(prefix="pdrom-"))
         path = Path(out or Path(folder, "run.h5"))
         run_full_order(scene, path, frames, with_mesh=True, on_frame=on_frame)
@@ -85,25 +85,25 @@ def run(
 
 
 def basis(full: FullRun, group: str, method: str | MethodSpec = "pod") -> Basis:
-    """Basis of a group's projections, as a method asks for it.
+    """Basis of the projections of a constraint group, as a reduction method requires it.
 
     Parameters
     ----------
-    full : run whose snapshots it is made of
+    full : full-order run that has the training snapshots
     group : name of a constraint group of its scene
-    method : name in config/methods.yaml, or a specification; it says how the snapshots are centred
-        and weighted, and whether the axes share their coefficients
+    method : name in config/methods.yaml, or a specification; it sets how the snapshots are centred
+        and weighted, and whether the axes x, y, z have coefficients in common
 
     Returns
     -------
     Basis
-        Modes ``V`` (3 e p, rank), ``mean`` (3 e p,), all ``singular_values``, the ``rank`` above
-        round-off; e elements of p rows, entries in the order element, row, axis.
+        Modes ``V`` (3 e p, rank), ``mean`` (3 e p,), all ``singular_values``, and the ``rank``:
+        modes above round-off. Entries: e elements, p rows of each, 3 axes, the axis fastest.
 
     Raises
     ------
     ConfigurationError, SceneError, SnapshotError
-        No run, no such method, no such group, or its snapshots are too few or not finite.
+        ``full`` is no run; the method or group is unknown; snapshots are too few or not finite.
     """
     arguments.require(FullRun, full, "full", source=FULL_RUN)
     chosen = full.scene.group(arguments.require(str, group, "group", source=GROUP))
@@ -151,7 +151,7 @@ def reduce(
     scene: Scene | None = None,
     on_frame: OnFrame = silent,
 ) -> ReducedRun | RequestedRun:
-    """The scene again, with the projections of one group reduced to r modes.
+    """Run the scene of ``full`` again, with the projections of one group reduced to r modes.
 
     A run that blows up ends there and is a result like any other.
 
@@ -161,12 +161,12 @@ def reduce(
     group : name of the constraint group whose projections are reduced
     method : name in config/methods.yaml, or a specification
     r : number of modes, from 1 to the rank of the basis
-    basis_of_group : of the group, by `basis` for the same method; made of ``full`` without it
-    error : in place of all these: largest relative error that is allowed, 0.01 or "velocity=0.05",
+    basis_of_group : basis of the group by `basis` for this method; None makes one from ``full``
+    error : instead of the four above: largest relative error allowed, 0.01 or "velocity=0.05",
         against the implicit step solved to convergence. The whole scene is reduced as far as that
         allows, or not at all.
-    scene : with ``error``, another motion of the same mesh that is run; ``full`` has trained it
-    on_frame : with ``error``, told what level of accuracy has just done a frame
+    scene : with ``error``, another scene with the same mesh to run; ``full`` is the training run
+    on_frame : with ``error``, called after each frame with the title of the level of accuracy
 
     Returns
     -------
@@ -177,8 +177,8 @@ def reduce(
     Raises
     ------
     ConfigurationError, SceneError, SnapshotError
-        An argument of another kind, no such method or group, a basis of another scene, too few
-        snapshots.
+        An argument has a wrong type; the method or group is unknown; the basis belongs to another
+        scene; snapshots are too few.
     RankError
         The snapshots have fewer than r modes above round-off.
     """
@@ -223,7 +223,7 @@ def reduce(
 
 
 def _method_spec(method: str | MethodSpec) -> MethodSpec:
-    """Return the method of that name in config/methods.yaml; a specification as it is."""
+    """Return the method of this name in config/methods.yaml; a specification is not changed."""
     if isinstance(method, MethodSpec):
         return method
     known = methods()
@@ -254,9 +254,9 @@ def _fitting_basis(made: Any, group: ConstraintGroup, spec: MethodSpec) -> Basis
 
 
 def _within(full: FullRun, error: Wish, scene: Scene, on_frame: OnFrame) -> RequestedRun:
-    """Calibrate on the motion of ``full``, then run ``scene``, which has the same mesh.
+    """Calibrate levels of accuracy on the run ``full``, then run ``scene``, which has its mesh.
 
-    The calibration has the material, the masses, the step and the frames of ``scene``.
+    The calibration uses the material, masses, time step and number of frames of ``scene``.
     """
     request = requested.read_request(error)
     arguments.require(Scene, scene, "scene", source="load_scene makes one")

@@ -1,4 +1,4 @@
-"""``pdrom new SCENE``: the file of a scene to begin with."""
+"""``pdrom new SCENE``: write a commented scene file as a starting point."""
 
 import argparse
 import json
@@ -58,7 +58,7 @@ VOLUME = """\
   - {effect: tetrahedron_strain, weight: 1.0e+6}
   # - {effect: volume, weight: 1.0e+6}
 """
-KILOGRAMS = 10.0  # of a vertex of the study's scenes, for which the weights are meant
+KILOGRAMS = 10.0  # mass of a vertex in the study's scenes, for which constraint weights are set
 ENOUGH = 3  # fewest held vertices with which a body cannot turn about a line
 
 
@@ -82,9 +82,9 @@ def perform(arguments: argparse.Namespace) -> Status:
 
 
 def template(stem: str, file: str | None = None, mesh: "Mesh | None" = None, up: str = "y") -> str:
-    """Text of a scene called as ``stem`` allows, on a generated sheet or the ``mesh`` of a file.
+    """Text of a scene file; the scene has a generated sheet, or the ``mesh`` read from ``file``.
 
-    ``up`` is the axis that points up there.
+    The scene is named after ``stem``, the name of its file; ``up`` is the upward axis of the mesh.
     """
     from pdrom.core.yamlfile import named
     from pdrom.model.mesh.types import vertex_measures
@@ -113,7 +113,7 @@ def template(stem: str, file: str | None = None, mesh: "Mesh | None" = None, up:
 
 
 def _read(file: str, scene: Path) -> "tuple[str, Mesh]":
-    """Path of the mesh file, from the folder of the scene's file on, and its mesh."""
+    """Path of the mesh ``file`` relative to the folder of the ``scene`` file, and its mesh."""
     from pdrom.core.errors import ConfigurationError
     from pdrom.core.yamlfile import validate
     from pdrom.model.mesh.config import MeshFile
@@ -130,7 +130,7 @@ def _read(file: str, scene: Path) -> "tuple[str, Mesh]":
 
 
 def _about(mesh: "Mesh") -> str:
-    """Comments: how large the mesh is, where it lies, and how many vertices its sides have."""
+    """YAML comments with the size and position of the mesh, and the vertex counts of its sides."""
     low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
     places = (
         f"{axis} from {a:.3g} to {b:.3g}" for axis, a, b in zip("xyz", low, high, strict=True)
@@ -146,7 +146,7 @@ def _about(mesh: "Mesh") -> str:
 
 
 def _sides(mesh: "Mesh") -> dict[str, int]:
-    """The sides that the mesh has, and how many vertices lie on each."""
+    """Number of vertices on each side of the mesh (left, top, ...), by the name of the side."""
     from pdrom.core.errors import SceneError
     from pdrom.model.mesh.selection import SIDES, select_vertices
 
@@ -154,13 +154,13 @@ def _sides(mesh: "Mesh") -> dict[str, int]:
     for side in SIDES:
         try:
             found[side] = len(select_vertices(mesh, side))
-        except SceneError:  # the mesh is flat in this direction
+        except SceneError:  # a mesh that is flat in this direction has no such side
             continue
     return found
 
 
 def _side(mesh: "Mesh", axis: int) -> str:
-    """A selection of enough vertices to hold the mesh by: its first such side, or a few on top."""
+    """Selection of `ENOUGH` vertices to fix the mesh: its first such side, or a few at the top."""
     for side, count in _sides(mesh).items():
         if count >= ENOUGH:
             return side
@@ -169,7 +169,7 @@ def _side(mesh: "Mesh", axis: int) -> str:
 
 
 def _floor(mesh: "Mesh", axis: int) -> str:
-    """A floor half an extent below the mesh along ``axis``, at a height of few digits."""
+    """YAML of a floor that is half the mesh's extent below the mesh along ``axis``, rounded."""
     lowest = float(mesh.points[:, axis].min())
     step = 10.0 ** math.floor(math.log10(mesh.extent))
     height = math.floor((lowest - mesh.extent / 2.0) / step) * step

@@ -8,20 +8,20 @@ from typing import Self, TextIO
 
 from pdrom.model.dynamics.stepper import FrameReport
 
-WIDTH = 24
-EVERY = 0.2  # seconds between two lines on a terminal
-PAUSE = 2.0  # seconds between two lines about levels where there is no terminal
+WIDTH = 24  # characters of the bar
+EVERY = 0.2  # seconds between two updates of the line on a terminal
+PAUSE = 2.0  # seconds between two lines of `LevelProgress` where stderr is no terminal
 
 
 class _Line:
-    """Progress line of the run ``name`` on ``stream``; the first announces any compilation."""
+    """Progress line of the run ``name`` on ``stream``; it first announces a compilation, if any."""
 
     def __init__(self, name: str, stream: TextIO | None = None) -> None:
         self._name, self._stream = name, stream or sys.stderr
         self._terminal = self._stream.isatty()
         self._began = self._shown = monotonic()
         folder = os.environ.get("NUMBA_CACHE_DIR")
-        # a step loop in the folder of compiled kernels; where no folder is known, nothing is said
+        # without a compiled step loop in the cache folder, compilation is announced
         if folder is not None and not any(Path(folder).glob("dynamics*/*.nbi")):
             self._stream.write(f"{name}: compiling kernels (once, up to a minute)\n")
             self._stream.flush()
@@ -37,9 +37,9 @@ class _Line:
 
 
 class Progress(_Line):
-    """Frame, milliseconds of a frame and the time that is left.
+    """Line with the number of the frame, milliseconds per frame and the estimated time left.
 
-    Where the stream is no terminal there is a line each tenth of the run.
+    If the stream is no terminal, a new line is written after each tenth of the run.
     """
 
     def __init__(self, name: str, frames: int, stream: TextIO | None = None) -> None:
@@ -53,7 +53,7 @@ class Progress(_Line):
         early = now - self._shown < EVERY if self._terminal else done % max(1, self._frames // 10)
         if early and done < self._frames:
             return
-        # estimated by the later half: kernels are compiled in the first frames and between them
+        # the time left is estimated from the later half, since early frames include compilation
         half = done // 2
         left = (now - self._ends[half]) / (done - half) * (self._frames - done)
         full, ms = WIDTH * done // self._frames, 1e3 * float(report.seconds.sum())
@@ -65,7 +65,7 @@ class Progress(_Line):
 
 
 class LevelProgress(_Line):
-    """Write the level of accuracy that runs and the time so far, every few seconds."""
+    """Line with the level of accuracy that is running and the time so far, every few seconds."""
 
     def __enter__(self) -> Self:
         return self

@@ -1,4 +1,4 @@
-"""``pdrom reduce SCENE.yaml``: a run with one group reduced, or within a tolerance."""
+"""``pdrom reduce SCENE.yaml``: run with one group reduced, or within a requested tolerance."""
 
 import argparse
 import sys
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from pdrom.model.scene import Scene
 
 WRONG = 0.1  # relative error above which the study calls a run wrong
-PICTURES = {"pdf": "Creator", "png": "Software", "svg": "Creator"}  # key of its maker
+PICTURES = {"pdf": "Creator", "png": "Software", "svg": "Creator"}  # metadata key of the program
 
 
 def _size(text: str) -> int:
@@ -23,7 +23,7 @@ def _size(text: str) -> int:
 
 
 def perform(arguments: argparse.Namespace) -> Status:
-    """Run the full order unless a run is given, reduce, run the reduction, print the result."""
+    """Run in full order unless a run is given, then run reduced; print errors and times."""
     if arguments.group is None:
         return _perform_request(arguments)
     from pdrom.api import FullRun, load, load_scene, plot, reduce, run, save
@@ -91,7 +91,7 @@ def _told(reduced: "ReducedRun") -> str:
 
 
 def _perform_request(arguments: argparse.Namespace) -> Status:
-    """Calibrate on the training run, run within the tolerance, print level, error and cost."""
+    """Calibrate on the training run, run within the tolerance; print level, error and time."""
     from pdrom.api import FullRun, load, load_scene, reduce, save
     from pdrom.command.progress import LevelProgress
     from pdrom.core.errors import ConfigurationError, StorageError
@@ -142,7 +142,7 @@ def _answer(made: "RequestedRun") -> str:
 
 
 def _done(made: "RequestedRun") -> list[str]:
-    """Lines of text with level, estimated error and cost of the run ``made``."""
+    """Lines of text about the run ``made``: level of accuracy, estimated error and time."""
     outcome, ms = made.outcome, made.ms[0]
     tried = f", after {', '.join(outcome.failed)}" if outcome.failed else ""
     known = [f"expected at most {outcome.expected:.2g}"]

@@ -1,4 +1,4 @@
-"""``pdrom show FILE``: what a result is."""
+"""``pdrom show FILE``: print the kind, origin and contents of a result file."""
 
 import argparse
 import json
@@ -13,7 +13,7 @@ LONGEST = 100  # characters of an attribute's value
 
 
 def perform(arguments: argparse.Namespace) -> Status:
-    """Say what the file of ``arguments`` holds; nothing is changed."""
+    """Print the contents of the file of ``arguments``; no file is changed."""
     from pdrom.core.provenance import RECORD
     from pdrom.core.store import check_file, provenance_of
 

@@ -1,4 +1,4 @@
-"""``pdrom view RESULT ...``: a page to look at runs, a picture, files for ParaView."""
+"""``pdrom view RESULT ...``: show runs in an HTML page, a picture or files for ParaView."""
 
 import argparse
 import sys
@@ -9,7 +9,7 @@ from pdrom.command.base import UNCHECKED, Command, Status, require_output
 
 
 def perform(arguments: argparse.Namespace) -> Status:
-    """Write what shows the runs in ``arguments`` and say where it is."""
+    """Write the page, picture or ParaView files of the runs in ``arguments``; print their paths."""
     from pdrom.api import load
     from pdrom.api.pictures import viewed_scenes
     from pdrom.core.errors import ConfigurationError

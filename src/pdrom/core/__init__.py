@@ -1,6 +1,6 @@
-"""Shared code of all packages; here the project's folder, and the configuration that it reads.
+"""Code that all packages share; this module finds the project's folder and configuration files.
 
-A wheel carries these files below ``pdrom/config`` (pyproject.toml says which), so that an installed
+A wheel contains these files in ``pdrom/config`` (listed in pyproject.toml), so that an installed
 package needs no checkout.
 """
 

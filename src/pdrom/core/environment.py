@@ -6,8 +6,8 @@ A user who wants to study the influence of a variable names it in ``PDROM_KEEP``
 OpenBLAS has kernels for many processors, which round differently, and selects the newest that the
 processor supports. ``OPENBLAS_CORETYPE`` fixes the selection; OpenBLAS does not check that the
 processor has the instructions, without which the process would crash. Kernels of this project are
-compiled on the machine; a variable makes their target a family of processors instead of the exact
-one (docs/decisions/0015-one-target.md). The variables must be set before NumPy is loaded.
+compiled on the machine, by a variable for a family of processors instead of the exact one
+(docs/decisions/0015-one-target.md). The variables must be set before NumPy is loaded.
 """
 
 import os
@@ -28,7 +28,7 @@ KEEP = "PDROM_KEEP"
 # Fixed date in the manuscript and figures, for reproducible files: 1 January 2026.
 DATE = "1767225600"
 CPUINFO = Path("/proc/cpuinfo")
-# instruction sets that OpenBLAS's Haswell kernels use beyond those that NumPy requires
+# instruction sets that OpenBLAS's Haswell kernels need in addition to those that NumPy needs
 HASWELL = {"avx2", "fma"}
 # instruction sets of the compiler's Haswell target: Linux's name of each -> the compiler's name
 COMPILED_HASWELL = {
@@ -48,7 +48,7 @@ def settled(
     Parameters
     ----------
     kernels : OpenBLAS's name of the kernels to use; None leaves the choice to OpenBLAS
-    target : variables that set the compiler's target processor, see `compiled_for`
+    target : variables that set the compiler's target processor, from `compiled_for`
     """
     asked = environment.get(KEEP, "").split()
     kept = {
@@ -83,11 +83,11 @@ def settle() -> None:
 
 
 def core_type(system: str, machine: str, features: set[str]) -> str | None:
-    """Return OpenBLAS kernels that a whole processor family supports; None without a choice.
+    """OpenBLAS's name of kernels that a whole processor family supports; None to set no kernels.
 
-    Haswell (2013; also AMD's Zen) where the processor has its instructions, otherwise Nehalem,
-    whose instructions NumPy demands anyway; on ARM those of the architecture itself. None on other
-    systems: their library is not OpenBLAS, or they do not say what the processor has.
+    Haswell (2013; also AMD's Zen) if the processor has its instructions, otherwise Nehalem, whose
+    instructions NumPy requires anyway; on ARM the kernels of the base architecture. None on other
+    systems: their library is not OpenBLAS, or they do not list the processor's instructions.
 
     Parameters
     ----------
@@ -104,12 +104,13 @@ def core_type(system: str, machine: str, features: set[str]) -> str | None:
 def compiled_for(machine: str, features: set[str]) -> dict[str, str]:
     """Variables that set a compiler target common to a whole family of processors.
 
-    Haswell where an x86-64 processor has what the compiler draws on for it, on ARM what the
-    architecture itself has. Empty elsewhere: the compiler then takes the machine's own.
+    Haswell if an x86-64 processor has the instruction sets that the compiler uses for it; on ARM
+    the base architecture. Otherwise empty: the compiler then targets the machine's own processor.
 
     Parameters
     ----------
-    machine, features : as in `core_type`
+    machine : processor architecture, as `platform.machine` names it
+    features : flags of the processor, as Linux names them
     """
     if machine in ("aarch64", "arm64"):
         return {TARGET: "generic", FEATURES: ""}
@@ -119,7 +120,7 @@ def compiled_for(machine: str, features: set[str]) -> dict[str, str]:
 
 
 def processor_features(cpuinfo: str) -> set[str]:
-    """Flags that all processors in the text ``cpuinfo`` of /proc/cpuinfo share; perhaps none."""
+    """Flags that all processors in ``cpuinfo`` (text of /proc/cpuinfo) share; may be empty."""
     flags = [
         set(line.partition(":")[2].split())
         for line in cpuinfo.splitlines()
@@ -129,7 +130,7 @@ def processor_features(cpuinfo: str) -> set[str]:
 
 
 def features_here() -> set[str]:
-    """`processor_features` of this machine; empty if /proc/cpuinfo cannot be read."""
+    """Flags that all processors of this machine share; empty if /proc/cpuinfo cannot be read."""
     try:
         return processor_features(CPUINFO.read_text(encoding="utf-8", errors="replace"))
     except OSError:

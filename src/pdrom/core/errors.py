@@ -1,4 +1,4 @@
-"""Error classes; a message is one line: file or object, key, value, and allowed values."""
+"""Error classes; a message is one line: file or object, key, value and allowed values."""
 
 import errno
 import os
@@ -10,19 +10,19 @@ INTERRUPTED = 130  # exit status of a program that ends by Ctrl-C
 
 
 def choices(value: object, allowed: Iterable[object]) -> str:
-    """End of a message about an invalid ``value``: the ``allowed`` names and the closest one."""
+    """End of a message about an invalid ``value``: all ``allowed`` names and the closest one."""
     names = [str(name) for name in allowed]
     return f" (allowed: {', '.join(names)}){suggestion(value, names)}"
 
 
 def suggestion(value: object, allowed: Iterable[str]) -> str:
-    """End of a message about an invalid ``value``: the closest of the ``allowed`` names, if any."""
+    """End of a message about an invalid ``value``: the closest ``allowed`` name, if any."""
     close = get_close_matches(str(value), list(dict.fromkeys(allowed)), n=1)
     return f", did you mean '{close[0]}'?" if close else ""
 
 
 def reason(error: OSError) -> str:
-    """Operating system's message for ``error``, whose number HDF5 puts into a longer text."""
+    """Operating system's message for ``error``; HDF5 hides its number in a longer text."""
     hidden = re.search(r"errno = (\d+)", str(error))
     number = error.errno or (int(hidden[1]) if hidden else 0)
     return os.strerror(number) if number in errno.errorcode else " ".join(str(error).split())[:200]
@@ -31,7 +31,7 @@ def reason(error: OSError) -> str:
 class PdromError(Exception):
     """Base of every error that a user's input can cause; shown to the user without a traceback.
 
-    Its text is one line, whatever names it quotes: other separators of lines are escaped, and
+    Its text is one line, whatever user input it quotes: line separators are escaped, and
     a word of a thousand letters is cut.
     """
 
@@ -51,7 +51,7 @@ class MeshError(PdromError):
 
 
 class DegenerateElementError(MeshError):
-    """A rest element has no length, area or volume, so that its operator does not exist."""
+    """An element at rest has zero length, area or volume, so that its operator does not exist."""
 
 
 class SceneError(PdromError):
@@ -71,7 +71,7 @@ class SnapshotError(PdromError):
 
 
 class RankError(PdromError):
-    """More basis vectors were requested than the snapshots hold above round-off."""
+    """More modes were requested than the snapshots have singular values above round-off."""
 
 
 class SamplingError(PdromError):

@@ -1,4 +1,4 @@
-"""Record of the machine of a study: processor, linear algebra kernels, libraries, code."""
+"""Record of the machine that runs a study: processor, linear algebra kernels, libraries, code."""
 
 import os
 import platform
@@ -12,16 +12,16 @@ from pdrom import __version__
 from pdrom.core.provenance import library_versions
 from pdrom.core.yamlfile import ConfigModel
 
-# modules whose import loads the linear algebra libraries; NumPy and SciPy have one each
+# modules whose import loads the linear algebra libraries; NumPy and SciPy each bring their own
 LINEAR_ALGEBRA = ("numpy.linalg", "scipy.linalg")
 
 
 class Kernels(ConfigModel):
-    """A library of linear algebra, or of threads, as it is loaded.
+    """A linear algebra or threading library that is loaded in this process.
 
     file : name of the shared library
     kind : "blas" or "openmp"
-    architecture : processor that its kernels are written for; None where it does not report it
+    architecture : processor that its kernels are written for; None if the library does not tell
     """
 
     file: str
@@ -33,7 +33,7 @@ class Kernels(ConfigModel):
 
 
 class Units(ConfigModel):
-    """Seconds of three loops that anyone can measure, see `study.experiments.machine`."""
+    """Seconds of three benchmark loops: scalar, vector and memory (`study.experiments.machine`)."""
 
     unit_scalar_s: float
     unit_vector_s: float
@@ -41,16 +41,16 @@ class Units(ConfigModel):
 
     @property
     def unit_s(self) -> float:
-        """Geometric mean of the three, by which times of two machines are compared."""
+        """Geometric mean of the three times, s; times of two machines are compared by it."""
         return (self.unit_scalar_s * self.unit_vector_s * self.unit_memory_s) ** (1 / 3)
 
 
 class Machine(ConfigModel):
-    """The machine that timings and last digits belong to, and the code that ran on it.
+    """Machine and code that produced the results; timings and last digits depend on both.
 
-    threads : the most that one of the libraries would use
+    threads : largest number of threads that one of the libraries would use
     target : processor that the project's code is compiled for; empty leaves it to the compiler
-    units : None where they were not measured
+    units : times of the benchmark loops; None if they were not measured
     """
 
     cpu: str
@@ -85,7 +85,7 @@ def machine(units: Units | None = None) -> Machine:
 
 
 def loaded_kernels() -> tuple[Kernels, ...]:
-    """Libraries of linear algebra and of threads in this process, sorted by file."""
+    """Linear algebra and threading libraries in this process, sorted by file."""
     for module in LINEAR_ALGEBRA:
         import_module(module)
     found = [
@@ -112,7 +112,7 @@ def _cpu_model() -> str:
 
 
 def _commit() -> str:
-    """Commit of the checkout that the package lies in; "unknown" outside one."""
+    """Git commit of the checkout that contains the package; "unknown" without a checkout."""
     command = ["git", "rev-parse", "--short=12", "HEAD"]
     try:
         done = subprocess.run(

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-LEVELS = 65535  # steps of a quantised coordinate from end to end of the run's bounding box
+LEVELS = 65535  # steps of a quantised coordinate across the bounding box of the run
 
 
 def pack_text(values: np.ndarray) -> str:
@@ -16,15 +16,15 @@ def pack_text(values: np.ndarray) -> str:
 
 
 def pack_array(values: np.ndarray, kind: str) -> dict[str, Any]:
-    """Pack ``values`` of any shape; ``kind`` is "f8", "f4", "u4" or "u1", little-endian."""
+    """Pack ``values`` of any shape as JSON; number type ``kind`` is "f8", "f4", "u4" or "u1"."""
     shape, data = list(np.shape(values)), np.asarray(values).astype(f"<{kind}")
     return {"kind": kind, "shape": shape, "data": pack_text(data)}
 
 
 def pack_positions(positions: np.ndarray) -> dict[str, Any]:
-    """Quantise ``positions`` (F, N, 3) in their bounding box; pack changes between frames.
+    """Quantise ``positions`` (F, N, 3) m in their bounding box; pack changes between frames.
 
-    A coordinate is wrong by half a step at most; changes from frame to frame, modulo 2^16, compress
+    A coordinate is wrong by at most half a step; changes from frame to frame, modulo 2^16, compress
     better than the positions.
     """
     low, high = positions.min(axis=(0, 1)), positions.max(axis=(0, 1))

@@ -31,11 +31,11 @@ _JOB: ContextVar[Mapping[str, str]] = ContextVar("job", default=MappingProxyType
 
 @contextmanager
 def made_by(name: str, configuration: Any, code: str = "") -> Iterator[None]:
-    """Record the job ``name`` in all files that are written meanwhile.
+    """Context in which the job ``name`` is recorded in all files that are written.
 
     Parameters
     ----------
-    name : a rule of the workflow, or a function of the package
+    name : name of a rule of the workflow, or of a function of the package
     configuration : all settings of the job, hashed as JSON
     code : fingerprint of the code that it runs; empty outside of the workflow
     """
@@ -62,7 +62,7 @@ def library_versions() -> dict[str, str]:
 
 
 def attributes() -> dict[str, str]:
-    """`provenance` with the whole configuration of the job, for attributes of HDF5 files."""
+    """Attributes of an HDF5 file: its provenance and the whole configuration of the job."""
     return {
         **_JOB.get(),
         "pdrom_version": __version__,
@@ -73,6 +73,6 @@ def attributes() -> dict[str, str]:
 
 
 def provenance() -> dict[str, str]:
-    """Record for a file that is written now; outside a job it has no entries about the job."""
+    """Provenance of a file that is written now; without a running job it names no job."""
     everything = attributes()
     return {name: everything[name] for name in RECORD if name in everything}

@@ -15,7 +15,7 @@ class Registry(Mapping[str, str]):
     """Read-only map from a name to its implementation, given as "module:attribute"."""
 
     def __init__(self, kind: str, entries: Mapping[str, str]) -> None:
-        """Store ``entries``, "module:Class" by name; messages call an entry a ``kind``."""
+        """Store ``entries`` (name -> "module:Class"); ``kind`` is the noun in error messages."""
         self.kind = kind
         self._entries = dict(entries)
 
@@ -36,7 +36,7 @@ class Registry(Mapping[str, str]):
         return len(self._entries)
 
     def module(self, name: str) -> str:
-        """Module that implements ``name``; ConfigurationError for an unknown name."""
+        """Name of the module that implements ``name``; ConfigurationError for an unknown name."""
         return self[name].partition(":")[0]
 
     def load(self, name: str) -> Any:

@@ -24,7 +24,7 @@ class ConfigModel(BaseModel):
     @model_validator(mode="before")
     @classmethod
     def _no_truth_value_for_a_number(cls, data: Any) -> Any:
-        """Refuse truth values for numbers: YAML's yes, on and true would count as 1."""
+        """Refuse booleans where numbers are required: YAML's yes, on and true would count as 1."""
         for key, value in data.items() if isinstance(data, dict) else ():
             field = cls.model_fields.get(key)
             entries = value if isinstance(value, (list, tuple)) else [value]
@@ -35,7 +35,7 @@ class ConfigModel(BaseModel):
 
 
 class _PlainLoader(yaml.CSafeLoader):
-    """Safe loader (no tag runs code) that refuses a key given twice."""
+    """YAML loader that runs no code of tags and refuses a key that is given twice."""
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
         seen = set()
@@ -52,7 +52,7 @@ class _PlainLoader(yaml.CSafeLoader):
 
 
 def _require_plain(text: str) -> None:
-    """Refuse deep nesting and aliases, since a few aliases can expand to billions of entries."""
+    """Refuse YAML with deep nesting or aliases: a few aliases can expand to billions of entries."""
     depth, fault = 0, ""
     events: Iterator[Any] = yaml.parse(text, Loader=yaml.CSafeLoader)
     for event in events:
@@ -99,15 +99,15 @@ def validate(model: type[M], data: Any, source: str) -> M:
 
 
 def describe(error: ValidationError, model: type[BaseModel]) -> str:
-    """First fault of ``error``, from a validation by ``model``, as ``key = value: allowed``."""
-    # a misspelt key also causes a fault "missing", which is less informative
+    """Text of the first fault of a validation by ``model``: ``key = value: allowed``."""
+    # faults "missing" come last: a misspelt key causes one, too, which is less informative
     faults = sorted(error.errors(), key=lambda fault: fault["type"] == "missing")
     fault = faults[0]
     location = fault["loc"]
     names = [str(part) for part in location if part != "constrained-int"]
     key = " ".join(".".join(names).split()) or model.__name__
     message = fault["msg"].removeprefix("Value error, ")
-    # a tuple in Python is a list in YAML
+    # users write a list in YAML where Python has a tuple
     message = message.replace("valid tuple", "valid list").replace("Tuple should", "List should")
     if fault["type"] == "extra_forbidden":
         owner = _model_at(model, location[:-1])
@@ -138,7 +138,7 @@ def keys_of(model: type[BaseModel]) -> list[str]:
 
 
 def _model_at(model: type[BaseModel], location: tuple[int | str, ...]) -> type[BaseModel] | None:
-    """Model found by following ``location`` from ``model``; None where it is not one model."""
+    """Model of the value at ``location`` (keys, indices) in ``model``; None if it has no model."""
     current: type[BaseModel] | None = model
     for part in location:
         if isinstance(part, int) or current is None:

@@ -11,16 +11,16 @@ STRIDE = 4
 
 
 def energies(scene: Scene, positions: np.ndarray) -> np.ndarray:
-    """Return the sum of kinetic energy and potentials of groups and forces, J, at n frames (n,).
+    """Return total energies (n,), J, of a run: kinetic, of constraint groups, potential of forces.
 
     Parameters
     ----------
     positions : (F + 1, N, 3) m of a run of ``scene``, initial positions first. The velocities are
         (q_f - q_{f-1}) / h as in the step loop; the initial velocities come from the scene.
 
-    The frames are every `STRIDE`-th and the last; this costs a fraction 1 / (STRIDE K) of the local
-    steps of the run. The projections are always the full-order ones, also for reduced runs. The
-    potential of the forces is defined up to a constant, so that only differences are meaningful.
+    They are those of the initial state, of every `STRIDE`-th frame and of the last. All projections
+    are evaluated, also for reduced runs; with K iterations this costs 1 / (STRIDE K) of the local
+    steps of a run. The potential of forces has an arbitrary constant: only differences matter.
     """
     frames = sorted({*range(0, len(positions), STRIDE), len(positions) - 1})
     with np.errstate(over="ignore", invalid="ignore"):
@@ -34,9 +34,9 @@ class EnergyScale:
     The potential of the forces is measured from its smallest value in the full-order run, so that
     the total energy of this run is never negative.
 
-    zero : this smallest potential, J
+    zero : smallest potential of the forces in the full-order run, J
     peak : largest total energy of the full-order run, J, minus ``zero``
-    own : energies of the full-order run minus ``zero``, divided by ``peak``, see `energies`
+    own : `energies` of the full-order run, minus ``zero``, divided by ``peak``
     """
 
     scene: Scene
@@ -46,7 +46,7 @@ class EnergyScale:
 
     @classmethod
     def of(cls, scene: Scene, reference: np.ndarray) -> "EnergyScale":
-        """Return the scale for the full-order ``reference`` (F + 1, N, 3) m, a run of ``scene``."""
+        """Return the scale of the full-order run ``reference`` (F + 1, N, 3) m of ``scene``."""
         zero = min(_force_potential(scene, q) for q in reference)
         own = energies(scene, reference) - zero
         peak, rest = float(own.max()), scene.mesh.points
@@ -54,10 +54,10 @@ class EnergyScale:
         return cls(scene, zero, peak, own / peak if peak > roundoff else np.empty(0))
 
     def relative(self, positions: np.ndarray) -> np.ndarray:
-        """Return energies of a run, ``positions`` (F' + 1, N, 3) m, over the full-order peak.
+        """Return energies of a run, ``positions`` (F' + 1, N, 3) m, minus `zero`, over `peak`.
 
-        They are (n,) at the frames of `energies`; inf where the energy overflows. Empty (0,) if the
-        energy of the full-order run is only round-off.
+        The n values are those of every `STRIDE`-th frame and the last; inf if the energy overflows.
+        The result is empty (0,) if the energy of the full-order run is only round-off.
         """
         if not len(self.own):
             return self.own
@@ -65,17 +65,17 @@ class EnergyScale:
         return np.where(np.isfinite(own), own, np.inf)
 
     def ratio(self, positions: np.ndarray) -> float | None:
-        """Return the largest energy of a run, ``positions`` (F' + 1, N, 3) m, over the peak.
+        """Return a run's largest energy over the full-order one's; ``positions`` (F' + 1, N, 3) m.
 
-        It is one for the full-order run. Above one, the run has gained energy that did not come
-        from the initial state or the handles of the full-order run. None if `relative` returns an
-        empty array.
+        Above one, the run has gained energy that did not come from the initial state or the handles
+        of the full-order run. The result is None if the energy of the full-order run is only
+        round-off.
         """
         return largest(self.relative(positions))
 
 
 def largest(energy: np.ndarray) -> float | None:
-    """Return the largest value of ``energy`` (n,), a result of `EnergyScale.relative`, or None."""
+    """Return the largest of relative energies ``energy`` (n,); None if there are none."""
     return float(energy.max()) if len(energy) else None
 
 
@@ -88,7 +88,7 @@ def _energy(scene: Scene, positions: np.ndarray, frame: int) -> float:
     kinetic = 0.5 * float(scene.masses @ np.einsum("ij,ij->i", v, v))
     unused, potential = np.zeros_like(q), 0.0
     for group in scene.groups:
-        group.begin_frame(q)  # data that are frozen in a frame are computed at q
+        group.begin_frame(q)  # data that are computed once per frame
         potential += group.accumulate(q, unused)
     return kinetic + potential + _force_potential(scene, q)
 

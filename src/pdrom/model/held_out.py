@@ -1,8 +1,8 @@
-"""Held-out motions of a scene, which test a reduction, and further ones that may train it.
+"""Variations of a scene's motion: held-out motions test a reduction, further ones may train it.
 
-Three held-out motions differ from the training motion. The rule is the same for all scenes. It was
-fixed by looking at one quantity only: the error of playback, which shows the recorded training
-motion in place of the held-out one. No run of a reduced model was looked at.
+Three held-out motions differ from the training motion by the same rule for all scenes. It was
+chosen with one quantity only: the error of "playback", in which the recorded training motion stands
+for the held-out one. No run of a reduced model was looked at.
 """
 
 from collections.abc import Sequence
@@ -19,25 +19,25 @@ from pdrom.model.mesh.types import Length
 HeldOutMotion = Literal["heldout", "kick", "stiffness"]
 MOTIONS: tuple[HeldOutMotion, ...] = get_args(HeldOutMotion)
 FIRST = MOTIONS[0]
-PLAYBACK = "playback"  # name in tables of the recorded training motion, shown without any solver
-FASTER = 0.75  # duration of the handles' motion in `kick`, relative to the training motion
-# Degrees by which gravity is turned, and the axis (the first or the last of those allowed).
+PLAYBACK = "playback"  # name, in tables, of the recorded training motion used as a result
+FASTER = 0.75  # duration of handle motions in "kick", relative to the training motion
+# Degrees by which gravity is turned, and the axis: 0 is the first of the allowed axes, -1 the last.
 TILTS = {"heldout": (-20.0, 0), "kick": (30.0, 0), "stiffness": (20.0, -1)}
-# Direction in which pins are carried, and the axis.
+# Direction (sign) in which pins are moved, and the axis: 0 is the first allowed one, -1 the last.
 CARRIED = {"heldout": (1.0, 0), "stiffness": (-1.0, -1)}
-CARRY_S = 0.5  # duration of that motion, s
+CARRY_S = 0.5  # duration of the motion of pins, s
 FURTHER = 20261125  # first part of the seeds of further training motions
 
 
 class HeldOut(ConfigModel):
-    """Held-out motions of a scene; all changes keep to the axes ``kick_axes``.
+    """Settings of the held-out motions of a scene; all changes are along the axes ``kick_axes``.
 
-    ``heldout`` stretches all schedules in time by ``frames_factor``, moves pinned vertices by
-    ``carry`` (m) and turns gravity. ``kick`` adds a random initial velocity of ``kick`` (m/s, by
-    ``seed``), makes handles faster (`FASTER`) and turns gravity further to the other side.
-    ``stiffness`` multiplies the weights of all groups, moves handles in another direction and pins
-    to another side, turns gravity towards another axis and adds an initial velocity of another
-    seed. Where a scene has no gravity, handles or pins, there is nothing of them to change.
+    Motion "heldout" multiplies frame numbers by ``frames_factor``, moves pins by ``carry`` (m) and
+    turns gravity. Motion "kick" adds a random initial velocity of ``kick`` (m/s, by ``seed``),
+    makes handles faster (`FASTER`) and turns gravity further to the other side. Motion "stiffness"
+    multiplies the weights of all groups by ``stiffness``, moves handles and pins in other
+    directions, turns gravity towards another axis and adds an initial velocity by another seed.
+    Changes of gravity, handles or pins do not apply to scenes without them.
     """
 
     frames_factor: Annotated[float, Field(ge=1e-3, le=1e3)] = 1.25
@@ -61,7 +61,7 @@ class HeldOut(ConfigModel):
     def further(
         self, effects: Sequence[EffectConfig], seed: int, time_step: float
     ) -> tuple[EffectConfig, ...]:
-        """Effects of another training motion, drawn with ``seed``, of which none is held out.
+        """Effects of a further training motion, random by ``seed``; it is no held-out motion.
 
         It has an initial velocity of 0.5 to 2 times ``kick``, gravity turned by up to 45 degrees,
         0.7 to 1.4 times the duration of all schedules, 0.4 to 2.7 times the weights, and pins that
@@ -97,7 +97,7 @@ class HeldOut(ConfigModel):
             effect = redirected
             if isinstance(effect, GroupConfig):
                 return effect.model_copy(update={"weight": self.stiffness * effect.weight})
-        elif redirected != effect:  # a handle
+        elif redirected != effect:  # the effect is a handle
             effect = effect.with_frames_scaled(FASTER)
         degrees, place = TILTS[motion]
         effect = effect.tilted(degrees, axes, place)

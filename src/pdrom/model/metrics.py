@@ -4,20 +4,20 @@ import numpy as np
 
 
 def squared_norms(p: np.ndarray) -> np.ndarray:
-    """Return squared Frobenius norms (4,) of p (n, rows, 3): of all entries, only x, y, z."""
+    """Return squared Frobenius norms (4,) of p (n, rows, 3): of all entries, of x, of y, of z."""
     axes = np.einsum("nra,nra->a", p, p)
     return np.concatenate([[axes.sum()], axes])
 
 
 def relative_errors(p: np.ndarray, p_hat: np.ndarray, roundoff: float) -> list[float | None]:
-    """Return || p - p_hat ||_F / || p ||_F over all frames: of all entries, only x, y, z.
+    """Return four || p - p_hat ||_F / || p ||_F over n frames: of all entries, of x, of y, of z.
 
     An error is None if || p ||_F is at round-off level (a relative error is then meaningless) or if
     p_hat is not finite.
 
     Parameters
     ----------
-    p, p_hat : (n, rows, 3)
+    p, p_hat : (n, rows, 3) projections and their approximations
     roundoff : estimated Frobenius norm of the rounding errors in p
     """
     norm = np.sqrt(squared_norms(p))
@@ -31,7 +31,7 @@ def relative_errors(p: np.ndarray, p_hat: np.ndarray, roundoff: float) -> list[f
 
 
 def shape_residuals(positions: np.ndarray, reference: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the differences R q + t - q_ref of each frame after rigid alignment, over a scale.
+    """Return differences R q + t - q_ref in each frame after the best rigid motion, over a scale.
 
     R is the optimal rotation, never a reflection (Kabsch 1976), t aligns the centroids.
 
@@ -44,7 +44,7 @@ def shape_residuals(positions: np.ndarray, reference: np.ndarray) -> tuple[np.nd
     residuals, scale
         (F, N, 3) without unit, and (F,) m, because squares in metres may overflow.
     """
-    # a common scale, as products of positions in an unstable run would overflow
+    # scale both runs, since products of positions in an unstable run would overflow
     largest = np.abs(positions).max(initial=0.0, axis=(1, 2), keepdims=True)
     scale = np.maximum(np.maximum(largest, np.abs(reference).max(initial=0.0)), 1.0)
     a, b = positions / scale, reference / scale
@@ -56,7 +56,7 @@ def shape_residuals(positions: np.ndarray, reference: np.ndarray) -> tuple[np.nd
 
 
 def shape_differences(positions: np.ndarray, reference: np.ndarray) -> np.ndarray:
-    """Return the Frobenius norm (F,) m of the differences after rigid alignment in each frame.
+    """Return norms (F,) m of the differences in each frame after the best rigid motion.
 
     Parameters
     ----------
@@ -67,13 +67,13 @@ def shape_differences(positions: np.ndarray, reference: np.ndarray) -> np.ndarra
 
 
 def trajectory_error(difference: np.ndarray, displacement: np.ndarray) -> float | None:
-    """Return || Q_red - Q_fom ||_F / || Q_fom - rest ||_F of a run from the norms of its F frames.
+    """Return the relative error || Q_red - Q_fom || / || Q_fom - Q_0 || over F frames of a run.
 
-    Return None if the full-order run never leaves its initial state, or if F = 0.
+    Q are positions, Q_0 initial ones. None if the full-order run never leaves these, or if F = 0.
 
     Parameters
     ----------
-    difference, displacement : (F,) m, norms of Q_red - Q_fom and of Q_fom - rest in each frame
+    difference, displacement : (F,) m, Frobenius norms of Q_red - Q_fom, Q_fom - Q_0 in each frame
     """
     moved = float(np.linalg.norm(displacement))
     return float(np.linalg.norm(difference)) / moved if moved > 0.0 else None

@@ -1,4 +1,4 @@
-"""Full-order runs, written to HDF5 frame by frame, and runs that end when they become unstable."""
+"""Full-order runs, written to HDF5 frame by frame, and runs that end if they become unstable."""
 
 import logging
 import os
@@ -57,12 +57,12 @@ def run(
 
     Parameters
     ----------
-    snapshot_frames : group name -> frames (ascending) in which the projections p of the group in
+    snapshot_frames : name of a constraint group -> frames (ascending) in which its projections p in
         the last local step are stored
-    with_mesh : whether the file also contains the mesh, so that it can be used without the scene
+    with_mesh : whether the mesh is written, too, so that the file can be used without the scene
     on_frame : called after each frame with its number and report
     path : HDF5 file that is written
-    solver : name of a sparse solver, see `pdrom.model.dynamics.solvers`
+    solver : name of a sparse solver of `pdrom.model.dynamics.solvers`
     """
     frames = scene.config.frames
     system = scene.system_with(solver)
@@ -118,7 +118,7 @@ class _SnapshotRecorder:
             self._targets.append((group, position, data, roundoff))
 
     def observer(self, frame: int) -> Callable[[np.ndarray], None] | None:
-        """Return a function of the last local iterate; None if no snapshot is requested here."""
+        """Return a function that stores snapshots at the last iterate; None if not in ``frame``."""
         wanted = [t for t in self._targets if frame in t[1]]
         if not wanted:
             return None
@@ -137,7 +137,7 @@ Run = Callable[[State, range], Iterator[tuple[State, FrameReport]]]
 
 
 def frame_by_frame(advance: Advance) -> Run:
-    """Return a `Run` that calls ``advance`` for each frame when the iterator is advanced."""
+    """Return a `Run` that calls ``advance`` once for each frame that is requested."""
 
     def run(state: State, frames: range) -> Iterator[tuple[State, FrameReport]]:
         for frame in frames:
@@ -165,12 +165,12 @@ class Frame:
 
 @dataclass
 class BoundedRun:
-    """Iterator over the frames of a run, up to and including the first that exceeds a limit.
+    """Iterator over the frames of a run, which ends with the first that exceeds a limit.
 
-    run : computes the frames, perhaps some more than are yielded
-    limit : the run ends when the extent of the mesh, divided by ``unit`` (m), exceeds this number
-    positions : function from the coordinates of ``run`` to vertex positions (N, 3) m
-    blowup_frame : first frame that is not finite (not yielded) or exceeds the limit; None before
+    run : function that computes frames, possibly more than are yielded
+    limit : the run ends if the longest side of the bounding box over ``unit`` (m) exceeds this
+    positions : function that maps the coordinates of ``run`` to vertex positions (N, 3) m
+    blowup_frame : first frame that is not finite (not yielded) or exceeds the limit, else None
     """
 
     run: Run

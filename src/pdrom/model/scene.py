@@ -1,7 +1,7 @@
 """Scenes: a mesh and a list of effects, their typed configuration, and their step loop.
 
-Effects that prescribe contradictory positions raise an error; doubtful ones cause a logged warning.
-Masses are lumped: one mass for all vertices, or masses of selected vertices."""
+Effects that prescribe contradictory positions raise an error; implausible ones are logged as
+warnings. Masses are lumped: one mass for all vertices, or masses of selected vertices."""
 
 import logging
 from collections.abc import Sequence
@@ -30,9 +30,9 @@ from pdrom.model.mesh.types import Mesh, vertex_measures
 
 log = logging.getLogger(__name__)
 
-# A body that is held at fewer vertices can rotate about a line.
+# A body held at fewer vertices can rotate about a line.
 FEW = 3
-# Targets inside an obstacle by at most this fraction of the mesh extent count as on its surface.
+# A target inside an obstacle by at most this fraction of the mesh extent counts as on its surface.
 SLACK = 1e-9
 # Largest number of vertices that are listed in a message.
 NAMED = 10
@@ -42,8 +42,8 @@ Mass = Annotated[float, Field(ge=1e-150, le=1e150)]
 class MassConfig(ConfigModel):
     """Mass of the vertices of ``select`` (all if it is left out), given in one of two ways.
 
-    vertex_mass : kg a vertex
-    density : kg/m^2 of a surface, kg/m^3 of a volume; a vertex has its share of the rest shape
+    vertex_mass : mass of each vertex, kg
+    density : kg/m^2 of a surface, kg/m^3 of a volume; times the rest area or volume of a vertex
     """
 
     select: Selection | None = None
@@ -58,7 +58,7 @@ class MassConfig(ConfigModel):
 
 
 class ReductionPlan(ConfigModel):
-    """Experiments on one group: how many training snapshots its basis gets."""
+    """Settings of the reduction of one group: number ``train`` of its training snapshots."""
 
     train: Annotated[int, Field(ge=2, le=100_000)]
 
@@ -75,14 +75,14 @@ def with_requested_error(keys: Any) -> Any:
     return {**keys, "reduce": groups, "requested_error": plans["error"]}
 
 
-# Limit on disk and memory for positions and velocities: 1600 vertices in 100,000 frames.
+# Limit of vertices times frames, for disk and memory: 1600 vertices in 100,000 frames.
 MAX_VERTEX_FRAMES = 160_000_000
 
 
 class SceneConfig(ConfigModel):
     """Configuration of a scene (config/scenes/*.yaml). Units: seconds, metres, kilograms.
 
-    ``requested_error`` is the error that ``pdrom reduce`` keeps to, also written ``reduce.error``.
+    ``requested_error``, also written ``reduce.error``, is the tolerance of ``pdrom reduce``.
     """
 
     name: SceneName
@@ -131,7 +131,7 @@ class SceneConfig(ConfigModel):
         Raises
         ------
         SceneError
-            A selection that does not exist on ``mesh``.
+            A selection contains no vertex of ``mesh``, or does not exist on it.
         """
         masses = np.full(mesh.vertices, self.vertex_mass)
         for number, entry in enumerate(self.masses):
@@ -153,11 +153,11 @@ class SceneConfig(ConfigModel):
 
     @property
     def modules(self) -> list[str]:
-        """Import paths "module:attribute" of all effects, for the checksum of the code in use."""
+        """Import paths "module:attribute" of all effects, for a checksum of the code in use."""
         return sorted({EFFECTS[e.effect] for e in self.effects})
 
     def coarsened(self, resolution: float, frames: float) -> Self:
-        """Return the scene with mesh size, frames and frame numbers scaled by these two factors."""
+        """Return the scene with mesh sizes times ``resolution``, frame numbers times ``frames``."""
         count = max(4, round(self.frames * frames))
         even = (count + 1) // 2
         plans = {
@@ -174,12 +174,12 @@ class SceneConfig(ConfigModel):
         )
 
     def heldout_variant(self, motion: HeldOutMotion = FIRST) -> Self:
-        """The scene of the held-out ``motion`` (see `HeldOut`)."""
+        """Configuration of the scene with the held-out ``motion`` (see `HeldOut`)."""
         effects = self.held_out.variant(self.effects, motion, self.time_step)
         return self.model_copy(update={"effects": effects})
 
     def training_variant(self, seed: int) -> Self:
-        """The scene of a further training motion (see `HeldOut.further`)."""
+        """Configuration of the scene with a further training motion, random by ``seed``."""
         effects = self.held_out.further(self.effects, seed, self.time_step)
         return self.model_copy(update={"effects": effects})
 
@@ -203,7 +203,7 @@ class Scene:
         return f"Scene('{self.config.name}', {size}: {effects})"
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Rebuild the scene when it is copied or unpickled; kernels cannot be pickled."""
+        """Copy and unpickle by building the scene anew, since kernels cannot be pickled."""
         return Scene.build, (self.config, self.mesh, self.masses)
 
     @classmethod
@@ -217,7 +217,7 @@ class Scene:
         Raises
         ------
         MeshError, SceneError
-            Faulty mesh, empty selection, too many frames, or a vertex held by conflicting effects.
+            The mesh is faulty, a selection empty, frames too many, or effects are in conflict.
         """
         check_mesh(mesh, config.name)
         if config.frames * mesh.vertices > MAX_VERTEX_FRAMES:
@@ -253,18 +253,18 @@ class Scene:
         return scene
 
     def changed(self, **keys: Any) -> "Scene":
-        """Return the scene with other ``keys`` of its configuration, with equal mesh and masses.
+        """Return the scene with ``keys`` of its configuration changed; mesh and masses are kept.
 
         Raises
         ------
         MeshError, SceneError
-            Faulty effects, as in `build`.
+            The changed effects are faulty.
         """
         config = self.config.model_copy(update=keys)
         return self._bound(config, self.mesh, self.masses)
 
     def _check_holds(self) -> None:
-        """Raise SceneError if two effects, one of them moving, hold a vertex in the same frame."""
+        """Raise SceneError if two effects hold a vertex in one frame and one of them moves it."""
         for first, second in combinations(self.boundaries, 2):
             shared = np.intersect1d(first.vertices, second.vertices)
             if len(shared) == 0 or not (first.moves or second.moves):
@@ -281,7 +281,7 @@ class Scene:
     def log_holds(self) -> None:
         """Log how many vertices each effect holds; warn if targets are inside an obstacle.
 
-        Also warn of a selected side with fewer than `FEW` vertices: on an unstructured mesh a side
+        Also warn if a selected side has fewer than `FEW` vertices: on an unstructured mesh the side
         is often a single vertex.
         """
         for boundary in self.boundaries:
@@ -298,7 +298,7 @@ class Scene:
         log_obstructed(self)
 
     def log_contacts(self) -> None:
-        """Log a warning for each contact that does not fit the rest shape, see `Contact.doubt`.
+        """Log a warning for each contact that does not suit the rest shape, see `Contact.doubt`.
 
         Vertices that are held in the first frame are ignored.
         """
@@ -318,15 +318,15 @@ class Scene:
 
     @cached_property
     def system(self) -> GlobalSystem:
-        """Global system with the default solver, computed at the first access."""
+        """Global system with the default solver, made at the first access."""
         return self.system_with(DEFAULT_SOLVER)
 
     def system_with(self, solver: str) -> GlobalSystem:
-        """Return the global system with the ``solver`` of this name, see `solvers.SOLVERS`."""
+        """Return the global system with the ``solver`` of this name (`solvers.SOLVERS`)."""
         return GlobalSystem(self.masses, self.config.time_step, self.groups, solver=solver)
 
     def initial_state(self, perturbation: np.ndarray | None = None) -> State:
-        """Return the state before the first frame, with ``perturbation`` (N, 3) m of positions."""
+        """Return the initial state, with ``perturbation`` (N, 3) m added to the positions."""
         positions = self.mesh.points.copy()
         if perturbation is not None:
             positions += perturbation
@@ -341,9 +341,9 @@ class Scene:
         local_steps: Sequence[LocalStep] | None = None,
         track_objective: bool = True,
     ) -> Stepper:
-        """Return the step loop; ``local_steps`` are used instead of the groups of the scene.
+        """Return the step loop, with ``local_steps`` in place of the groups if given.
 
-        ``system`` is used instead of `system`; ``track_objective``: reports have the objective.
+        ``system`` replaces the scene's own; ``track_objective`` puts the objective into reports.
         """
         return Stepper(
             self.space(system or self.system),
@@ -360,24 +360,24 @@ class Scene:
         return Anderson(window) if window else None
 
     def space(self, system: GlobalSystem) -> VertexSpace:
-        """Return the vertex positions as coordinates of the step loop, with a global ``system``."""
+        """Return the space of the step loop whose unknowns are positions, with this ``system``."""
         return VertexSpace(system, self.forces, self.boundaries, contacts=self.contacts)
 
 
 def _place(boundary: base.Boundary) -> base.EffectConfig:
-    """Configuration of ``boundary`` without the vertices and the end, which do not move it."""
+    """Configuration of ``boundary`` without vertices and end, to find out if motions are equal."""
     return boundary.config.model_copy(update={"select": None, "until": None})
 
 
 def log_obstructed(scene: Scene) -> None:
-    """Log a warning if targets of held vertices, which contacts cannot move, are in an obstacle.
+    """Log a warning if targets of held vertices are inside an obstacle: contacts cannot move them.
 
-    For a hold that begins in a later frame, the vertices are assumed to be at their rest positions
-    after the correction by obstacles.
+    If a hold begins in a later frame, its vertices are assumed to be at rest until then, except for
+    corrections by obstacles.
     """
     obstacles = [contact for contact in scene.contacts if contact.each_alone]
     inside, blocked = np.zeros(scene.mesh.vertices, dtype=bool), dict[str, None]()
-    # boundaries store positions at the beginning of a hold, hence the copy
+    # a copy, since boundary conditions store positions when a hold begins
     boundaries, positions = deepcopy(scene.boundaries), scene.mesh.points.copy()
     slack = SLACK * scene.mesh.extent
     for frame in range(scene.config.frames if obstacles and boundaries else 0):

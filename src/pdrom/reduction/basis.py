@@ -15,18 +15,18 @@ from pdrom.reduction.snapshots import SnapshotSet
 
 @dataclass(frozen=True, eq=False)
 class Basis:
-    """Affine space mean + span V of vectorised projections.
+    """POD basis of a constraint group: affine space mean + span V of vectorised projections.
 
-    Entry i of a vector is axis i % 3 of row i // 3, which belongs to element i // (3 p); p is the
-    number of rows per element.
+    The group has e elements with p rows of three numbers (x, y, z) each. Entry i of a vector is
+    axis i % 3 of row i // 3, which belongs to element i // (3 p).
 
     V : (3 e p, rank); orthonormal (in the weighted inner product), or orthonormal axis by axis if
         ``separate_axes``
-    mean : (3 e p,)
+    mean : (3 e p,), zero unless the snapshots are centred
     singular_values : all singular values of the weighted, centred train matrix
-    rank : number of singular values above round-off; V has no further columns
+    rank : number of singular values above round-off, which is the number of columns of V
     roundoff : singular values up to this absolute size are noise
-    active_axes : for each axis, whether its snapshots exceed round-off
+    active_axes : for each axis x, y, z, whether its snapshots exceed round-off
     origin : name of the basis in error messages: the path of its file
     """
 
@@ -96,18 +96,18 @@ def compute_basis(
 
     Parameters
     ----------
-    snapshots : (n, e p, 3) projections
+    snapshots : (n, e p, 3) projections of e elements with p rows each
     row_mass : (e p,) kg, used by mass weighting
     roundoff : Frobenius norm of the rounding errors in ``snapshots``
     rows_per_element : p
-    signs : generator of random signs for the modes, applied before "mean-in-modes" adds the first
-        snapshot to them (with that centring the span depends on the signs); None: no flips
+    signs : generator of random signs by which modes are multiplied before centring "mean-in-modes"
+        adds the first snapshot to them, so that their span depends on the signs; None: no changes
     spec : weighting, centring and layout
 
     Raises
     ------
     SnapshotError
-        Fewer than two snapshots, a wrong shape, NaN or Inf, a row without mass if masses weigh.
+        Fewer than two snapshots, a wrong shape, NaN or Inf, or mass weighting with a zero mass.
     """
     _check(snapshots, row_mass, rows_per_element, spec)
     matrix = snapshots.reshape(len(snapshots), -1).T
@@ -116,19 +116,19 @@ def compute_basis(
         scale = np.repeat(np.sqrt(row_mass), 3)
     mean, error, shown = np.zeros(len(matrix)), roundoff, matrix
     if spec.centring == "affine":
-        # A sum of n terms is wrong by at most n eps/2 times the sum of their magnitudes (Higham
-        # 2002, section 4.2), the same in every column. Without this bound on the Frobenius norm,
-        # constant snapshots, whose centred matrix contains only that error, would get a basis
-        # of round-off. Subtracting the first snapshot makes no such error.
+        # The mean of n snapshots has a rounding error of at most n eps/2 times the sum of the
+        # terms' magnitudes (Higham 2002, section 4.2). The error is equal in all columns, and this
+        # bounds its Frobenius norm. Otherwise constant snapshots would get modes of round-off.
+        # Subtracting the first snapshot makes no such error.
         rounded = 0.5 * np.finfo(float).eps * matrix.shape[1] * float(np.linalg.norm(matrix))
         mean, error = matrix.mean(axis=1), max(roundoff, rounded)
-        # the mean contains a constant axis, which is thus inactive, unlike with "mean-in-modes"
+        # an axis whose snapshots are constant is inactive here, but active with "mean-in-modes"
         shown = matrix - mean[:, None]
     elif spec.centring == "mean-in-modes":
         mean = matrix[:, 0].copy()
     centred = (matrix - mean[:, None]) * scale[:, None]
     noise = error * float(scale.max())
-    # axes whose norm exceeds the data's round-off and is not round-off of the largest axis
+    # an axis is active if its norm exceeds the round-off of the data and of the largest axis
     norms = np.array([np.linalg.norm(shown[axis::3]) for axis in range(3)])
     least = max(error, max(shown.shape) * np.finfo(float).eps * norms.max())
     active = tuple(bool(norm > least) for norm in norms)
@@ -141,7 +141,7 @@ def compute_basis(
         rank = numerical_rank(sigma, centred.shape, noise)
     v = modes[:, : rank if any(active) else 0]
     if spec.centring == "mean-in-modes":
-        # modes that are orthonormal on each axis cannot outnumber the rows
+        # no more modes than rows per axis can be orthonormal on each axis
         v = _mean_in_modes(v[:, : len(row_mass)], centred, mean * scale, active, signs)
         mean = np.zeros_like(mean)
     return Basis(
@@ -162,9 +162,9 @@ def basis_of(
     train: np.ndarray | None = None,
     signs: np.random.Generator | None = None,
 ) -> Basis:
-    """Compute the basis ``spec`` of the training snapshots of ``data`` by `compute_basis`.
+    """Compute the POD basis of the training snapshots of ``data``, by the recipe ``spec``.
 
-    ``train`` (n, e p, 3), if given, replaces these snapshots. ``signs``: see `compute_basis`.
+    Snapshots ``train`` (n, e p, 3) replace them if given; ``signs`` are those of `compute_basis`.
     """
     snapshots, p = data.train if train is None else train, data.rows_per_element
     return compute_basis(snapshots, data.row_mass, data.roundoff, p, spec, signs)
@@ -194,7 +194,7 @@ def _check(
 def _per_axis(centred: np.ndarray, noise: float) -> tuple[np.ndarray, np.ndarray, list[int]]:
     """Return one POD basis per axis as (modes, singular values, rank of each axis).
 
-    Modes beyond an axis's rank are zero; singular value k is the norm of the axes' k-th values.
+    Modes beyond an axis's rank are zero. Singular value k is the norm of the three k-th values.
     """
     n, m = centred.shape
     modes = np.zeros((n, min(n // 3, m)))
@@ -215,7 +215,7 @@ def _mean_in_modes(
     active: tuple[bool, ...],
     signs: np.random.Generator | None,
 ) -> np.ndarray:
-    """Return the published code's modes: rescaled, plus the first snapshot, then QR on each axis.
+    """Return modes by the published code: rescaled, plus the snapshot ``first``, then QR per axis.
 
     As in that code, an axis with fewer independent columns than modes is completed by arbitrary
     Householder vectors, which are orthonormal but do not come from the data.
@@ -249,18 +249,18 @@ def pod(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def fix_signs(u: np.ndarray) -> np.ndarray:
-    """Return ``u`` (n, m), each column's sign chosen so that its largest entry is positive.
+    """Return ``u`` (n, m) with the sign of each column changed so that its largest entry is > 0.
 
-    Magnitudes are compared after rounding to single precision, so that entries which are equal up
-    to round-off tie and the first of them decides.
+    Magnitudes are rounded to single precision before they are compared. Of several entries that are
+    equal up to round-off, the first thus decides.
     """
     largest = [np.argmax(np.abs(mode).astype(np.float32)) for mode in u.T]
     signs = np.sign(u[largest, np.arange(u.shape[1])])
     return u * np.where(signs == 0.0, 1.0, signs)
 
 
-# Largest |Q_1^T Q_1 - I| at which `thin_qr` accepts Q_1 as orthonormal. Round-off alone gives
-# 1e-14 to 1e-13, an LU factor L with condition number 1e2 gives about 1e-12.
+# `thin_qr` accepts Q_1 as orthonormal if |Q_1^T Q_1 - I| is at most this. Round-off alone gives
+# 1e-14 to 1e-13; an LU factor L with condition number 1e2 gives about 1e-12.
 DEPARTURE = 1e-12
 
 
@@ -301,7 +301,7 @@ def _by_reflections(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndar
 
 
 def numerical_rank(singular_values: np.ndarray, shape: tuple[int, int], roundoff: float) -> int:
-    """Count the ``singular_values`` (n,) of a matrix of ``shape`` above both round-off levels.
+    """Number of ``singular_values`` (n,) of a matrix of ``shape`` that exceed two round-off levels.
 
     The relative level max(shape) eps sigma_1 is the backward error of the SVD. The absolute level
     ``roundoff`` is the error of the data themselves: if a projection is the difference of

@@ -1,4 +1,4 @@
-"""Deviations of a run from the full-order run: norms for each frame, and errors over the run.
+"""Deviations of a run from the full-order run: norms in each frame, and errors over all frames.
 
 Positions, velocities, shapes (the difference after the best rigid motion of each frame, Kabsch
 1976), the total energy, and the frame of first contact with an obstacle are compared.
@@ -17,11 +17,11 @@ from pdrom.reduction.rerun import Rerun, displacement_norms, step_norms
 
 # Number of frames compared at a time, so that the memory used does not grow with the run.
 BLOCK = 32
-# A vertex closer to an obstacle than this fraction of the mesh extent touches it: a subspace
-# does not place vertices exactly on the surface.
+# A vertex touches an obstacle if it is closer than this fraction of the mesh extent, since a
+# subspace model does not place vertices exactly on the surface.
 TOUCH = 1e-3
 
-# Names of the series that are stored for the full-order run, and for each other run.
+# Names of the per-frame series of the full-order run (REFERENCE) and of other runs (DEVIATIONS).
 REFERENCE = ("displacement", "step", "energy", "contact")
 DEVIATIONS = ("difference", "shape_difference", "step_difference", "energy", "contact")
 ERRORS = (
@@ -35,7 +35,7 @@ class Yardstick:
     """A full-order run with which other runs of its scene are compared.
 
     scene : scene of the full-order run
-    reference : (F + 1, N, 3) m, positions of the full-order run, the initial ones first
+    reference : (F + 1, N, 3) m, positions of the full-order run; entry 0 is the initial state
     """
 
     def __init__(self, scene: Scene, reference: np.ndarray) -> None:
@@ -43,19 +43,19 @@ class Yardstick:
 
     @cached_property
     def displacement(self) -> np.ndarray:
-        """Displacement norm of each frame, (F,) m, see `displacement_norms`."""
+        """Frobenius norm (F,) m of the displacements from the initial state in each frame."""
         return displacement_norms(self.reference)
 
     @cached_property
     def scale(self) -> EnergyScale:
-        """Energy scale by which the energies of runs are divided."""
+        """Zero and largest energy of the full-order run, by which energies of runs are scaled."""
         return EnergyScale.of(self.scene, self.reference)
 
     @cached_property
     def series(self) -> dict[str, np.ndarray]:
         """Per-frame series of the full-order run for the argument ``reference`` of `errors_within`.
 
-        ``displacement`` and ``step`` (F,) m, the latter the time step times the velocities;
+        ``displacement`` (F,) m; ``step`` (F,) m, norm of the time step times the velocities;
         ``energy`` and ``contact`` as in `deviations`.
         """
         blocks = [q for q, _ in _blocks(self.reference, self.reference)]
@@ -70,7 +70,7 @@ class Yardstick:
     def units(self) -> dict[str, float]:
         """Extent norm, m, and time step, s: keyword arguments of `errors_within`.
 
-        The extent norm, sqrt(N) times the mesh extent, is that of a shift by the extent.
+        The extent norm, sqrt(N) times the mesh extent, is the norm of a shift by the mesh extent.
         """
         norm = self.scene.mesh.extent * float(np.sqrt(self.reference.shape[1]))
         return {"extent_norm": norm, "time_step": self.scene.config.time_step}
@@ -80,9 +80,9 @@ class Yardstick:
 
         Returns
         -------
-        ``difference``, ``shape_difference`` and ``step_difference`` (F',) m of positions, shapes
-        and steps; ``energy`` of every `STRIDE`-th frame divided by `scale`, empty if the scene has
-        no energy; ``contact`` (F',), 1 where an obstacle is touched.
+        ``difference``, ``shape_difference``, ``step_difference`` : (F',) m, for positions, shapes
+        and steps; ``energy`` : of every `STRIDE`-th frame relative to `scale`, empty if the scene
+        has no energy; ``contact`` : (F',), 1 in frames in which an obstacle is touched.
         """
         steps, shapes, contacts = [], [], []
         with np.errstate(over="ignore", invalid="ignore"):
@@ -99,14 +99,14 @@ class Yardstick:
         }
 
     def errors(self, outcome: Rerun) -> dict[str, float | None]:
-        """Errors of the whole run ``outcome`` by column name, see `errors_within`."""
+        """Errors over all frames of the run ``outcome``, by column name of the tables."""
         end = len(self.displacement)
         return errors_within(self.deviations(outcome), self.series, end, **self.units)
 
     def _touched(self, positions: np.ndarray) -> np.ndarray:
-        """Array (f,): 1 if a frame of ``positions`` (f, N, 3) m touches an obstacle, else 0.
+        """Array (f,): 1 if a vertex touches an obstacle in a frame of ``positions`` (f, N, 3) m.
 
-        Vertices that touch the obstacle at the start are ignored.
+        Vertices that touch the obstacle in the initial state are ignored.
         """
         near = TOUCH * self.scene.mesh.extent
         touched = np.zeros(len(positions), dtype=np.uint8)
@@ -126,23 +126,23 @@ def errors_within(
 
     Parameters
     ----------
-    run, reference : series of `Yardstick.deviations` and `Yardstick.series`
-    extent_norm, time_step : see `Yardstick.units`
+    run, reference : per-frame series from `Yardstick.deviations` and `Yardstick.series`
+    extent_norm, time_step : norm of a shift by the mesh extent, m, and time step, s
     """
     if len(run["difference"]) < end:
         return dict.fromkeys(ERRORS)
     displacement, shape = reference["displacement"], run["shape_difference"]
-    drift, count = None, end // STRIDE + 1  # the first energy belongs to the start
+    drift, count = None, end // STRIDE + 1  # entry 0 is the initial energy
     if count > 1 and len(reference["energy"]):
         drift = float(np.abs(run["energy"][:count] - reference["energy"][:count]).max())
-    # delay of the first contact; inf: only the full-order run has one, -inf: only the other run
+    # delay of the first contact; inf if only the full-order run has one, -inf if only this run has
     first, wanted = (
         float(np.argmax(touched)) if np.any(touched) else np.inf
         for touched in (run["contact"][:end], reference["contact"][:end])
     )
 
     def over_extent(difference: np.ndarray) -> float | None:
-        """Root mean square over the extent norm."""
+        """Root mean square of ``difference`` before ``end``, divided by ``extent_norm``."""
         return float(np.sqrt(np.mean(np.square(difference[:end] / extent_norm)))) if end else None
 
     found = (
@@ -162,7 +162,7 @@ def error_within(difference: np.ndarray, displacement: np.ndarray, end: int) -> 
 
     Parameters
     ----------
-    difference, displacement : (F',) m norms, see `pdrom.model.metrics.trajectory_error`
+    difference, displacement : (F',) m, norms of the difference of two runs and of the displacement
     """
     if len(difference) < end:
         return None
@@ -170,7 +170,7 @@ def error_within(difference: np.ndarray, displacement: np.ndarray, end: int) -> 
 
 
 def _blocks(positions: np.ndarray, reference: np.ndarray) -> list[tuple[Any, Any]]:
-    """Split both runs into blocks of the same frames; a block repeats its predecessor's last."""
+    """Split both runs into blocks of frames; each begins with the last frame of the one before."""
     starts = range(0, max(len(positions) - 1, 1), BLOCK)
     ends = (min(start + BLOCK + 1, len(positions)) for start in starts)
     return [(positions[s:e], reference[s:e]) for s, e in zip(starts, ends, strict=True)]

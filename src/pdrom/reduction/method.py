@@ -1,6 +1,6 @@
-"""Reduction methods as combinations of ingredients; the presets are named combinations.
+"""Reduction methods, each a combination of basis, sampled rows, selection and solution.
 
-The module of a sample selection is imported only when a method uses it.
+The presets are combinations with a name. The module of a selection is imported on first use.
 """
 
 import re
@@ -30,12 +30,12 @@ Solve = Literal["square", "qr", "tikhonov"]
 class BasisSpec(ConfigModel):
     """Recipe of a basis from snapshots.
 
-    weighting : "mass" makes the modes orthonormal in the lumped-mass inner product of the rows
+    weighting : "mass" makes modes orthonormal in the inner product with the lumped mass of each row
     centring : "affine" subtracts the mean and adds it back online; "mean-in-modes" follows the
         published code: it subtracts the first snapshot, rescales the modes, adds that snapshot to
         every mode and orthogonalises the modes again per axis
-    layout : "vectorised" has one column per snapshot with coefficients shared by x, y, z;
-        "per-axis" has one basis for each axis
+    layout : "vectorised" stacks x, y, z of a snapshot in one column, so that they share the
+        coefficients; "per-axis" makes one basis for each of x, y, z
     """
 
     weighting: Literal["none", "mass"] = "none"
@@ -44,7 +44,7 @@ class BasisSpec(ConfigModel):
 
     @property
     def basis_id(self) -> str:
-        """Name of the basis file."""
+        """Name of the file of the basis."""
         return f"{self.weighting}-{self.centring}-{self.layout}"
 
     @property
@@ -54,19 +54,19 @@ class BasisSpec(ConfigModel):
 
 
 class MethodSpec(BasisSpec):
-    """A reduction of one group's projections.
+    """A method that reduces the projections of one constraint group.
 
-    rows : "all" is the orthogonal projection, "scalar" samples single entries (classical DEIM),
-        "joint" one row for x, y and z with separate coefficients (the preprint's variant),
-        "element" all 3p entries of an element
-    selection : name in `SELECTIONS`, such as "greedy" (the residual, DEIM)
+    rows : "all" samples nothing (orthogonal projection), "scalar" samples single entries (classical
+        DEIM), "joint" samples rows, with separate coefficients for x, y and z (the preprint's
+        variant), "element" samples all 3p entries of an element of p rows
+    selection : name in `SELECTIONS`, such as "greedy" (largest residual, as in DEIM)
     solve : solution of the sampled equations: "square", least squares by "qr", or normal equations
         with Tikhonov term ("tikhonov", the published code)
-    oversampling : samples per mode; additional ones by S-OPT after selection "s-opt", otherwise by
-        GappyPOD+E
-    gain_bound : samples are added (GappyPOD+E) until the gain is at most this, so that the error of
-        a projection is at most this multiple of the best approximation's; None: no bound
-    coefficients : "shared" by the axes or "per-axis"; None: as ``rows`` and the basis imply
+    oversampling : samples per mode; those in excess of one are selected by S-OPT if that is the
+        ``selection``, otherwise by GappyPOD+E
+    gain_bound : samples are added (GappyPOD+E) until the gain is at most this: the largest ratio of
+        the error to that of the best approximation in the basis; None: no bound
+    coefficients : "shared" by x, y, z or "per-axis"; None: as ``rows`` and the basis imply
     repeat_rows : whether the greedy selection may repeat a row, as in the published code
     title : name of the method in figures and tables
     """
@@ -122,7 +122,7 @@ class MethodSpec(BasisSpec):
 
     @property
     def modules(self) -> list[str]:
-        """Selections that the method uses, as "module:attribute", for fingerprints of the code."""
+        """Import paths "module:attribute" of the selections in use, for the code's fingerprint."""
         selects = self.rows in ("scalar", "element") or self.oversampling > 1
         return [SELECTIONS[self.selection]] if selects else []
 
@@ -133,7 +133,7 @@ class MethodSpec(BasisSpec):
 
     @property
     def per_axis(self) -> bool:
-        """Whether each axis has its own coefficients."""
+        """Whether each of x, y, z has its own coefficients."""
         if self.coefficients is not None:
             return self.coefficients == "per-axis"
         return self.rows == "joint" or self.separate_axes

@@ -14,11 +14,11 @@ from pdrom.model.runs import BoundedRun
 class Rerun:
     """Result of a reduced run; a run that blows up ends in that frame and is also a result.
 
-    positions : (F' + 1, N, 3) m, the initial ones first; only finite frames
-    difference : (F',) || Q_red - Q_fom ||_F of each frame, m
-    extent : (F',) longest side of each frame's bounding box divided by the rest shape's
+    positions : (F' + 1, N, 3) m, initial state first; F' finite frames
+    difference : (F',) m, || Q_red - Q_fom ||_F in each frame, of positions reduced and full-order
+    extent : (F',) longest side of the bounding box in each frame over that of the rest shape
     blowup_frame : first frame whose extent exceeds the limit or is not finite, else None
-    coordinates : (F' + 1, K, 3) unknowns of the step loop; without a subspace, the positions
+    coordinates : (F' + 1, K, 3) K unknowns of the step loop: subspace coordinates, or positions
     """
 
     positions: np.ndarray
@@ -45,7 +45,7 @@ class Rerun:
         return float(self.extent.max(initial=0.0))
 
     def row(self, displacement: np.ndarray) -> dict[str, Any]:
-        """Table row with the result of the run and its error; ``displacement`` as in `error`."""
+        """Table row of the run; ``displacement`` (F,) m is the norm of the full-order motion."""
         return {
             "frames": self.frames,
             "finite": self.finite,
@@ -59,7 +59,7 @@ class Rerun:
 
         Parameters
         ----------
-        displacement : (F,) m, `displacement_norms` of the full-order run
+        displacement : (F,) m, displacement norm of the full-order run in each frame
         """
         if not self.finite or self.frames < len(displacement):
             return None
@@ -67,7 +67,7 @@ class Rerun:
 
 
 def compare(run: BoundedRun, reference: np.ndarray) -> Rerun:
-    """Execute ``run`` and compare it with the full-order positions ``reference`` (F + 1, N, 3)."""
+    """Execute ``run``; compare it with full-order positions ``reference`` (F + 1, N, 3) m."""
     coordinates = [run.state.positions]
     positions = [run.positions(run.state.positions)]
     difference, extents = [], []
@@ -82,19 +82,19 @@ def compare(run: BoundedRun, reference: np.ndarray) -> Rerun:
 
 
 def displacement_norms(reference: np.ndarray) -> np.ndarray:
-    """|| Q_fom - Q_0 ||_F of each frame after the first of ``reference`` (F + 1, N, 3), (F,) m."""
+    """Norms (F,) m of the displacements from ``reference[0]`` in the frames after it."""
     return np.linalg.norm((reference[1:] - reference[0]).reshape(len(reference) - 1, -1), axis=1)
 
 
 def step_norms(positions: np.ndarray) -> np.ndarray:
-    """|| Q^(n + 1) - Q^n ||_F of each frame of ``positions`` (F + 1, N, 3) m, (F,) m.
+    """Norms (F,) m of the steps between successive frames of ``positions`` (F + 1, N, 3) m.
 
-    A step is the velocity times the time step h. For the difference of the positions of two
-    runs, the result is the norm of the difference of their velocities times h.
+    A step is the velocity times the time step h. Given the difference of the positions of two
+    runs, the result is h times the norm of the difference of their velocities.
     """
     return np.linalg.norm(np.diff(positions, axis=0), axis=(1, 2))
 
 
 def mean_motion(reference: np.ndarray) -> float:
-    """Root mean square over frames, m, of `displacement_norms` of ``reference`` (F + 1, N, 3)."""
+    """Root mean square over frames, m, of the displacement norms of ``reference`` (F + 1, N, 3)."""
     return float(np.sqrt(np.mean(displacement_norms(reference) ** 2)))

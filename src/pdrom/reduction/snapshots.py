@@ -1,4 +1,4 @@
-"""Snapshots of a group's projections: choice of training and test frames, reading and storing."""
+"""Snapshots of projections of a constraint group: training and test frames, reading, storing."""
 
 import os
 from dataclasses import dataclass
@@ -14,13 +14,13 @@ SPLITS = ("train", "test", "heldout")
 
 
 def training_frames(frames: int, count: int) -> np.ndarray:
-    """Numbers (count,) int64 of ``count`` even frames, spread evenly over ``frames`` frames."""
+    """Training frames (count,) int64: even frame numbers, spread evenly over ``frames`` frames."""
     even = np.arange(0, frames, 2)
     return even[np.round(np.linspace(0, len(even) - 1, count)).astype(np.int64)]
 
 
 def test_frames(frames: int) -> np.ndarray:
-    """Numbers (n,) int64 of the odd frames among ``frames`` frames."""
+    """Test frames (n,) int64: all odd numbers among ``frames`` frames."""
     return np.arange(1, frames, 2)
 
 
@@ -30,7 +30,7 @@ def stored_frames(frames: int, count: int) -> np.ndarray:
 
 
 def row_masses(group: ConstraintGroup, masses: np.ndarray) -> np.ndarray:
-    """Lumped mass (e p,) kg of each operator row of ``group``, from vertex ``masses`` (N,) kg.
+    """Lumped mass (e p,) kg of each operator row: e elements of p rows, vertex ``masses`` (N,) kg.
 
     Every vertex divides its mass equally among the elements that touch it, so that the element
     masses sum to the mass of the touched vertices; each row has the mass of its element.
@@ -50,10 +50,10 @@ def touched_vertices(group: ConstraintGroup) -> sparse.csr_array:
 
 @dataclass(frozen=True)
 class SnapshotSet:
-    """Training, test and held-out snapshots (n, e p, 3) of one group, and their round-off.
+    """Training, test and held-out snapshots (n, e p, 3) of a group of e elements with p rows.
 
-    ``roundoff`` is the Frobenius norm of the rounding errors of the train matrix: a singular value
-    below it is noise.
+    ``roundoff`` is the Frobenius norm of the rounding errors of the training snapshots: their
+    singular values below it are noise.
     """
 
     train: np.ndarray
@@ -73,18 +73,18 @@ def collect(
     masses: np.ndarray,
     train: np.ndarray,
 ) -> SnapshotSet:
-    """Read the snapshots of ``group`` from two runs and split them.
+    """Read snapshots of ``group`` from two runs: training and test frames of one, held-out run.
 
     Parameters
     ----------
     training_run, heldout_run : files of the two full-order runs
-    masses : (N,) kg
+    masses : (N,) kg, masses of the vertices
     train : (n,) numbers of the training frames, ascending
 
     Raises
     ------
     SnapshotError
-        A split is empty, lacks a training frame, or contains NaN or Inf.
+        A set of snapshots is empty, lacks a training frame, or contains NaN or Inf.
     """
     p, frames, roundoff = _read(training_run, group.name)
     held, held_frames, _ = _read(heldout_run, group.name)

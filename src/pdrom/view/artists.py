@@ -1,7 +1,7 @@
 """Matplotlib types for annotations of figures; at run time they are placeholders.
 
-Every plan imports every figure, and only a job that draws one needs the library: modules of figures
-take its types from here, and import what they call inside the function that calls it.
+Every run of the workflow imports all modules of figures, but only a job that draws one needs
+Matplotlib. Such modules import its types from here, and its functions inside their own functions.
 """
 
 from typing import TYPE_CHECKING, Any

@@ -11,8 +11,8 @@ from pdrom.model.effects.base import EffectConfig
 from pdrom.model.effects.forces import Gravity
 from pdrom.model.mesh.types import Mesh
 
-ROOM = 0.2  # margin around a run, relative to its longest side
-Y = np.array([0.0, 1.0, 0.0])
+ROOM = 0.2  # margin around the bounding box of a run, relative to its longest side
+Y = np.array([0.0, 1.0, 0.0])  # default upward direction
 
 
 class Window(NamedTuple):
@@ -39,7 +39,7 @@ class Window(NamedTuple):
         return (x >= self.left) & (x <= self.right) & (y >= self.bottom) & (y <= self.top)
 
     def resized(self, width: float, height: float) -> "Window":
-        """Window of another ``width`` and ``height`` about the same centre."""
+        """Window with the same centre and the given ``width`` and ``height``, m."""
         x, y = 0.5 * (self.left + self.right), 0.5 * (self.bottom + self.top)
         return Window(x - 0.5 * width, x + 0.5 * width, y - 0.5 * height, y + 0.5 * height)
 
@@ -48,7 +48,7 @@ class Window(NamedTuple):
 class Camera:
     """Parallel projection.
 
-    azimuth : degrees about the upward axis; where that is y, 0 looks along -z and 90 along -x
+    azimuth : degrees about the upward axis; if that is y, 0 looks along -z and 90 along -x
     elevation : degrees above the horizon
     up : unit vector that points up in the picture
     """
@@ -59,7 +59,7 @@ class Camera:
 
     @cached_property
     def basis(self) -> np.ndarray:
-        """Rows: right, up, towards the eye; a rotation matrix (3, 3)."""
+        """Rotation matrix (3, 3); its rows are the directions right, up and towards the eye."""
         a, e = np.radians([self.azimuth, self.elevation])
         right = np.array([np.cos(a), 0.0, -np.sin(a)])
         eye = np.array([np.cos(e) * np.sin(a), np.sin(e), np.cos(e) * np.cos(a)])
@@ -82,7 +82,7 @@ def bounds(flat: np.ndarray, margin: float = 0.08) -> Window:
 
 
 def window_of(camera: Camera, clouds: Iterable[np.ndarray], margin: float = 0.08) -> Window:
-    """Window in which ``camera`` sees all points of ``clouds`` (n, 3) m; ``margin``: `bounds`."""
+    """Window of all points of ``clouds``, (n, 3) m each, by ``camera``; ``margin`` is relative."""
     return bounds(np.concatenate([camera.project(cloud) for cloud in clouds]), margin)
 
 
@@ -105,17 +105,17 @@ def rotation_to(up: np.ndarray) -> np.ndarray:
     if square == 0.0:
         return np.eye(3)
     turn = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    # 1 + cosine as a divisor would lose all digits near half a turn
+    # not divided by 1 + cosine: near half a turn that difference has no correct digits
     return np.eye(3) + turn + turn @ turn * ((1.0 - cosine) / square)
 
 
 def shown_region(
     positions: np.ndarray, effects: Sequence[EffectConfig]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Corners of a cube about ``positions`` (F, N, 3) of a run, with room around it, m.
+    """Low and high corner, m, of a cube with a margin around ``positions`` (F, N, 3) m of a run.
 
-    Obstacles that the run comes near to are shown whole, unless they are larger than the run; runs
-    and bodies that leave the cube are cut off. Obstacles are among the ``effects``.
+    An obstacle among the ``effects`` that is near the run is inside as a whole, unless it is larger
+    than the run. Parts of runs and bodies outside the cube are not shown.
     """
     low, high = positions.min(axis=(0, 1)), positions.max(axis=(0, 1))
     size = float((high - low).max())
@@ -131,7 +131,7 @@ def shown_region(
 
 
 def obstacles(positions: np.ndarray, effects: Sequence[EffectConfig]) -> list[Mesh]:
-    """Surfaces of obstacles in the `shown_region` of a run, largest first (to be drawn behind)."""
+    """Surfaces of obstacles in the `shown_region` of a run, the largest first (drawn behind)."""
     region = shown_region(positions, effects)
     found = [body for effect in effects if (body := effect.body(*region))]
     return sorted(found, key=lambda body: -float(np.ptp(body.points, axis=0).max()))

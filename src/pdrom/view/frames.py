@@ -21,11 +21,11 @@ from pdrom.view.panels import Row, RunPanel, draw_rows, shared_window
 from pdrom.view.read import frame_numbers
 from pdrom.view.text import plain_words
 
-INSTANTS = (0.25, 0.5, 0.75, 1.0)  # fractions of the run
+INSTANTS = (0.25, 0.5, 0.75, 1.0)  # times of the pictures, as fractions of the run
 CAMERA = Camera(30.0, 20.0)
 NO_LIMIT = 100.0  # inches, largest height of the picture
 NAME = "frame_{:05d}.vtu"
-SHOWN = 20  # largest number of modes r that a picture shows
+SHOWN = 20  # a picture shows runs with at most this many modes r
 
 
 def write_frames(scene: ViewedScene, png: Path) -> None:
@@ -36,7 +36,7 @@ def write_frames(scene: ViewedScene, png: Path) -> None:
 
 
 def shown_runs(scene: ViewedScene) -> list[ViewedRun]:
-    """One run per group and method of ``scene``: the largest with r <= `SHOWN`, or the smallest."""
+    """One run per group and method: with the largest r <= `SHOWN`, else with the smallest r."""
     pairs = dict.fromkeys((run.group, run.method) for run in scene.runs)
     every = [scene.sizes(*pair) for pair in pairs]
     return [([run for run in sizes if run.r <= SHOWN] or sizes[:1])[-1] for sizes in every]
@@ -44,7 +44,7 @@ def shown_runs(scene: ViewedScene) -> list[ViewedRun]:
 
 def _draw(scene: ViewedScene) -> Figure:
     """Draw one row per run; the grey outline in reduced rows is the full-order run."""
-    # the scene and its obstacles, the largest first, are turned so that y is up
+    # rotation of the scene and its obstacles after which y points up
     turn, found = rotation_to(up_of(scene.effects)), obstacles(scene.positions, scene.effects)
     bodies = [replace(body, points=body.points @ turn) for body in found]
     runs = tuple(replace(run, positions=run.positions @ turn) for run in scene.runs)
@@ -72,7 +72,7 @@ def _draw(scene: ViewedScene) -> Figure:
 
 
 def _panel(run: ViewedRun, frame: int) -> RunPanel:
-    """Panel of ``run`` at ``frame``; of a run that ended earlier, its last frame and the reason."""
+    """Panel of ``run`` at ``frame``; if it ended earlier, of its last frame with the reason."""
     last, failure, remark = len(run.positions) - 1, None, None
     if frame > last:
         failure = "ended" if run.blowup_frame is None else f"blew up at frame {run.blowup_frame}"
@@ -80,7 +80,7 @@ def _panel(run: ViewedRun, frame: int) -> RunPanel:
     elif frame:
         remark = f"relative error {run.error[frame - 1]:.1g}"
     positions = run.positions[min(frame, last)].astype(float)
-    # the colour of a constraint group by its index in `EFFECTS`; the first for unknown names
+    # index in `EFFECTS` sets the colour of a constraint group; unknown names get the first colour
     groups = [name for name in EFFECTS if issubclass(EFFECTS.load(name), ConstraintGroup)]
     looks, place = style.GROUP_LOOKS, groups.index(run.group) if run.group in groups else 0
     colour = style.surface_colour(looks[place % len(looks)][0])
@@ -88,7 +88,7 @@ def _panel(run: ViewedRun, frame: int) -> RunPanel:
 
 
 def vtk(scene: ViewedScene, collection: Path) -> None:
-    """Write the frames of ``scene`` into the folder of the PVD file ``collection``, then that file.
+    """Write ``scene`` for ParaView: the PVD file ``collection``, frames as VTU files in its folder.
 
     Raises
     ------
@@ -109,7 +109,7 @@ def vtk(scene: ViewedScene, collection: Path) -> None:
             written = meshio.Mesh(scene.positions[frame], cells, point_data=data)
             written.write(temporary, file_format="vtu")
             _mark(temporary)
-    for path in earlier:  # of a longer run
+    for path in earlier:  # remove surplus frames of a longer run written earlier
         if path.name not in names:
             path.unlink()
     root = ElementTree.Element("VTKFile", type="Collection", version="0.1")
@@ -126,9 +126,9 @@ def vtk(scene: ViewedScene, collection: Path) -> None:
 def point_data(scene: ViewedScene, frame: int) -> dict[str, np.ndarray]:
     """Data of each vertex of ``scene`` in a ``frame``, (N, 3) float32 each.
 
-    Velocity (m/s, where it was stored) and displacement from the start (m) of the full-order run;
-    for each reduced run the difference of its positions from the full order (m), by which ParaView
-    can warp the full-order mesh, NaN after the run's end.
+    Velocity (m/s, if stored) and displacement from the initial state (m) of the full-order run;
+    for each reduced run its positions minus those of the full order (m), by which ParaView
+    can warp the full-order mesh, and NaN after the end of the reduced run.
     """
     now = scene.positions[frame]
     data = {} if scene.velocities is None else {"velocity": scene.velocities[frame]}

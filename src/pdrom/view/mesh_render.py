@@ -10,10 +10,10 @@ from pdrom.model.mesh.types import Mesh
 from pdrom.view.artists import Axes, PolyCollection
 from pdrom.view.camera import Camera, Window
 
-AMBIENT = 0.45
-RASTER_ABOVE = 1000  # number of faces above which they are rasterised, to keep the PDF small
-SHARP = np.cos(np.radians(80.0))  # cosine of the dihedral turn above which an edge is outlined
-# directions towards the lights in the camera's frame, and their strengths
+AMBIENT = 0.45  # least brightness of a face
+RASTER_ABOVE = 1000  # surfaces with more faces are rasterised, to keep the PDF small
+SHARP = np.cos(np.radians(80.0))  # edges whose faces' normals have a smaller cosine are outlined
+# lights: (direction towards the light in camera coordinates, strength)
 LIGHTS = (((-0.35, 0.45, 0.82), 0.85), ((0.80, -0.10, 0.59), 0.30))
 BACK = 0.78  # factor that darkens the back of an open surface
 FLOOR, FLOOR_LINE, SHADOW = "#F4F2EE", "#DEDAD2", "#D3CFC6"
@@ -23,13 +23,13 @@ Colour = str | tuple[float, float, float]
 
 
 def face_normals(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Unit normals (T, 3) of ``triangles`` (T, 3) of ``points`` (N, 3); zero for no area."""
+    """Unit normals (T, 3) of ``triangles`` (T, 3) of ``points`` (N, 3); zero if without area."""
     a, b, c = (points[triangles[:, i]] for i in range(3))
     return _unit(np.cross(b - a, c - a))
 
 
 def smooth_normals(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Unit normals (T, 3) of faces, averaged over the neighbouring faces; zero for no area.
+    """Unit normals (T, 3) of faces, averaged over neighbouring faces; zero if without area.
 
     ``points`` are (N, 3), ``triangles`` (T, 3).
     """
@@ -71,7 +71,7 @@ def draw_surface(
     points : (N, 3) m, finite, positions of the vertices
     colour : one colour, or one RGB row per face (T, 3)
     wire : opacity of the wireframe, 0 for none
-    contrast : 1 for the full shading, less where colours carry numbers
+    contrast : 1 for the full shading; smaller where colours represent numbers
     """
     from matplotlib.collections import PolyCollection
     from matplotlib.colors import to_rgb
@@ -137,15 +137,15 @@ def outline_edges(
 ) -> np.ndarray:
     """Edges (n, 2) on the boundary of the surface, or between faces that meet sharply at rest.
 
-    A round body has none of its own: then those between a face that ``camera`` sees from the front
-    and one from behind. ``rest`` and ``points`` are (N, 3) m, ``triangles`` (T, 3).
+    A round body has no such edges: its silhouette edges are returned, between a face turned to the
+    ``camera`` and one turned away. ``rest`` and ``points`` are (N, 3) m, ``triangles`` (T, 3).
     """
     pairs = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     owner = np.repeat(np.arange(len(triangles)), 3)
     edges, inverse, count = np.unique(pairs, axis=0, return_inverse=True, return_counts=True)
     owner = owner[np.argsort(inverse.ravel(), kind="stable")]
     start = np.concatenate([[0], np.cumsum(count)[:-1]])
-    # the two triangles of each edge; a boundary edge has the same one twice
+    # indices of the two triangles at each edge; at a boundary edge both are the same triangle
     first, second = owner[start], owner[start + np.minimum(count - 1, 1)]
     normals = face_normals(rest, triangles)
     turn = np.einsum("ij,ij->i", normals[first], normals[second])

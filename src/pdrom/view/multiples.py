@@ -8,7 +8,7 @@ from pdrom.view import style
 from pdrom.view.artists import Axes, Axis, Figure, SubFigure
 
 PANEL_HEIGHT = 1.45  # inches
-NEAR = 0.05  # of the axis: markers closer than this share a label
+NEAR = 0.05  # markers closer than this fraction of the axis share a label
 
 
 def small_multiples(
@@ -16,7 +16,7 @@ def small_multiples(
 ) -> tuple[Figure, list[Axes]]:
     """Create a figure with ``count`` panels in ``columns`` columns that share the y axis.
 
-    A row is ``height`` inches high; ``legend_rows`` are left for a legend.
+    A row of panels is ``height`` inches high; space for ``legend_rows`` lines of a legend is left.
     """
     rows = rows_of(count, columns)
     figure = style.new_figure(rows * height + 0.2 * legend_rows + 0.35)
@@ -33,7 +33,7 @@ def panels(
 ) -> list[Axes]:
     """Add ``count`` panels to ``figure`` row by row in ``columns``, the last row perhaps shorter.
 
-    A shared y axis (``sharey``) has numbers on the left.
+    With ``sharey`` the panels share the y axis, whose numbers stand at the left only.
     """
     columns = min(columns, count)
     grid = figure.subplots(rows_of(count, columns), columns, squeeze=False, sharey=sharey)
@@ -74,7 +74,7 @@ def log_axes(ax: Axes, across: tuple[float, float], along: tuple[float, float]) 
 
 
 def time_axis(ax: Axes, times: np.ndarray) -> None:
-    """Make x of ``ax`` logarithmic around ``times``, with plain numbers as there is room."""
+    """Make x of ``ax`` logarithmic with ``times`` inside; plain numbers at ticks that fit."""
     ax.set_xscale("log")
     low, high = np.log10(np.nanmin(times)), np.log10(np.nanmax(times))
     pad = max(0.1, 0.08 * (high - low))
@@ -83,7 +83,7 @@ def time_axis(ax: Axes, times: np.ndarray) -> None:
 
 
 def plain_ticks(axis: Axis, decades: float) -> None:
-    """Put at least two plain numbers on a logarithmic ``axis`` that spans ``decades``."""
+    """Label at least two ticks of a logarithmic ``axis`` over ``decades`` with plain numbers."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
     steps = [(0.4, (1, 1.5, 2, 3, 5, 7)), (0.7, (1, 2, 3, 5)), (1.3, (1, 2, 5)), (2.0, (1, 3))]
@@ -93,7 +93,7 @@ def plain_ticks(axis: Axis, decades: float) -> None:
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
 
 
-ARROWS = {"left": 4, "right": 5, "up": 6, "down": 7}  # carets
+ARROWS = {"left": 4, "right": 5, "up": 6, "down": 7}  # Matplotlib's numbers of arrow markers
 
 
 def rim_arrows(
@@ -104,9 +104,9 @@ def rim_arrows(
     across: tuple[float, float],
     along: tuple[float, float],
 ) -> None:
-    """Draw arrows on the rim of ``ax`` for points outside limits ``across`` x and ``along`` y.
+    """Draw arrows on the border of ``ax`` for points outside its x limits ``across``, y ``along``.
 
-    Points are at ``x``, ``y`` and have one ``colour``.
+    Arrays ``x``, ``y`` (n,) are the coordinates of the points, ``colour`` that of the arrows.
     """
     inside_x, inside_y = clipped(x, *across), clipped(y, *along)
     outside = {
@@ -124,14 +124,14 @@ def rim_arrows(
 
 
 def clipped(values: np.ndarray, low: float, high: float) -> np.ndarray:
-    """``values`` (n,) moved to the nearest limit, ``low`` or ``high``; NaN stays NaN."""
+    """Return ``values`` (n,) limited to the interval [``low``, ``high``]; NaN stays NaN."""
     return np.clip(values, low, high)
 
 
 def label_counts(
     ax: Axes, x: Iterable[float], y: Iterable[float], counts: Iterable[float], prefix: str = ""
 ) -> None:
-    """Write a number at each marker, below and to its left; near markers share a label.
+    """Write a number below and to the left of each marker; markers close together share a label.
 
     ``ax`` has markers at ``x``, ``y``; a label is ``prefix`` with its number of ``counts``.
 

@@ -1,6 +1,6 @@
 """HTML page that shows scenes with their runs: scripts and data in one file.
 
-It contains surface vertices only, a selection of frames, and positions quantised to 16 bits."""
+It contains only surface vertices and a selection of frames, positions quantised to 16 bits."""
 
 import json
 import os
@@ -25,9 +25,9 @@ class ViewedRun:
     """A reduced run.
 
     group, method, title : names of the reduced group and of the method, title of the method
-    positions : (F' + 1, N, 3) m, finite, the initial ones first; it may have ended early
+    positions : (F' + 1, N, 3) m, finite, the initial state first; F' < F if the run ended early
     error : (F',) relative error of each frame
-    blowup_frame : None for a run that reached its end
+    blowup_frame : frame in which the run blew up; None if it reached its end
     ms : milliseconds per frame, None if not measured
     """
 
@@ -43,16 +43,16 @@ class ViewedRun:
 
 @dataclass(frozen=True)
 class ViewedScene:
-    """A scene with its full-order run and the reduced ones.
+    """A scene with its full-order run and its reduced runs.
 
     time_step : time step of a frame, s
-    positions : (F + 1, N, 3) m of the full order
-    ms : milliseconds per frame of the full order, None if not measured
+    positions : (F + 1, N, 3) m of the full-order run
+    ms : milliseconds per frame of the full-order run, None if not measured
     floor : (F,) relative error that perturbations by round-off cause, empty if unknown
-    horizon : frame from which on no run can be judged, None if there is none or it is not known
+    horizon : frame from which on no run can be judged, due to round-off; None if none is known
     runs : reduced runs, by group, method and ascending size
     effects : effects of the scene; obstacles among them are drawn
-    velocities : (F + 1, N, 3) m/s of the full order, None where they were not stored
+    velocities : (F + 1, N, 3) m/s of the full-order run, None if they were not stored
     first : kind of the run that the others are compared with
     """
 
@@ -74,16 +74,16 @@ class ViewedScene:
         return [run for run in self.runs if (run.group, run.method) == (group, method)]
 
 
-LARGEST = 25_000_000  # bytes
+LARGEST = 25_000_000  # bytes of a page, at most
 
 
 def write_page(scenes: Sequence[ViewedScene], path: str | os.PathLike[str]) -> None:
-    """Write the viewer of some ``scenes`` to ``path``.
+    """Write an HTML page that shows ``scenes`` to ``path``.
 
     Raises
     ------
     StorageError
-        The page would be larger than a browser opens with ease.
+        The page would have more than `LARGEST` bytes, too many for a browser.
     """
     parts = {
         "STYLE": _read("viewer.css"),
@@ -125,7 +125,7 @@ FRAMES = 75  # largest number of frames of a run on the page
 
 
 def pack_scene(scene: ViewedScene) -> dict[str, Any]:
-    """Data of ``scene`` for the page, without vertices that belong to no triangle."""
+    """JSON data of ``scene`` for the page, without vertices that belong to no surface triangle."""
     used, triangles = np.unique(scene.mesh.triangles, return_inverse=True)
     stride = max(1, ceil((len(scene.positions) - 1) / FRAMES))
     full = scene.positions[::stride, used]

@@ -1,4 +1,4 @@
-"""Panels that show the mesh of a run in one frame, or a message, and figures of their rows."""
+"""Panels that show the mesh of a run in one frame or a message; figures of rows of panels."""
 
 import textwrap
 from collections.abc import Sequence
@@ -15,16 +15,16 @@ from pdrom.view.camera import Camera, Window, bounds, window_of
 from pdrom.view.read import RerunInfo, rerun_positions
 from pdrom.view.style import FAILED
 
-SAME_SCALE = 1.25  # limit of the ratio of a run's size to the window; a larger run is drawn smaller
-SLACK = 1.05  # ratio of scales up to which a smaller picture gets no remark
-SHORTEST, TALLEST = 0.35, 1.5  # allowed heights of a panel over its width
+SAME_SCALE = 1.25  # a run larger than the reference by more than this factor is drawn smaller
+SLACK = 1.05  # a picture smaller by at most this factor gets no remark about its scale
+SHORTEST, TALLEST = 0.35, 1.5  # least and largest ratio of height to width of a panel
 
 
 @dataclass(frozen=True)
 class RunPanel:
     """Picture of one run in one frame.
 
-    colour : one for all, or one for each triangle (T, 3), which then carries a number
+    colour : one colour, or RGB colours (T, 3) of the triangles, which then represent numbers
     positions : (N, 3) m, finite; None if there is nothing to draw
     failure : reason of the failure, drawn in red; None for a run without failure
     remark : one line below the picture
@@ -41,7 +41,7 @@ class RunPanel:
     obstacles: Sequence[Mesh] | None = None
 
     def zoomed(self, window: Window, camera: Camera) -> Window:
-        """``window`` of ``camera``, enlarged in the same aspect ratio if the run leaves it."""
+        """Return ``window`` of ``camera``, enlarged in its aspect ratio if the run exceeds it."""
         flat = None if self.positions is None else camera.project(self.positions)
         if flat is None or window.contains(flat).all():
             return window
@@ -54,7 +54,7 @@ class RunPanel:
 def shared_window(
     camera: Camera, reference: np.ndarray, panels: list[RunPanel], margin: float = 0.1
 ) -> Window:
-    """Window by ``camera`` of ``reference`` (N, 3) m, widened for ``panels`` of about its size."""
+    """Window of ``reference`` (N, 3) m and of ``panels`` of about its size, seen by ``camera``."""
     base = window_of(camera, [reference], margin)
     size = SAME_SCALE * max(base.width, base.height)
     clouds = [reference]
@@ -68,16 +68,16 @@ def shared_window(
 
 
 def fit_aspect(window: Window) -> Window:
-    """The window made taller or wider until its shape is allowed for a panel."""
+    """Enlarge ``window`` in one direction until its aspect ratio is allowed for a panel."""
     height = np.clip(window.height, SHORTEST * window.width, None)
     width = max(window.width, height / TALLEST)
     return window.resized(width, height)
 
 
 def draw_run(ax: Axes, row: "Row", i: int) -> None:
-    """Draw run ``i`` of a ``row`` in its window on ``ax``; one that left it smaller, with a remark.
+    """Draw run ``i`` of a ``row`` on ``ax``; a run that exceeds its window at a smaller scale.
 
-    The outline of the row's ghost is drawn for comparison, unless the run is the reference.
+    The outline of the reference shape is drawn for comparison, unless the run is the reference.
     """
     from matplotlib.collections import LineCollection
 
@@ -133,15 +133,15 @@ def centre_note(ax: Axes, text: str, colour: str = "#666666") -> None:
     )  # fmt: skip
 
 
-HEIGHT_LIMIT = 9.3  # inches, a page
-LEFT = 1.0  # inches, for the row labels
-ABOVE, LINE, BELOW = 0.19, 0.13, 0.07  # inches: title, a line of remarks, gap
+HEIGHT_LIMIT = 9.3  # inches, text height of a page
+LEFT = 1.0  # inches, width of the row labels
+ABOVE, LINE, BELOW = 0.19, 0.13, 0.07  # inches: heights of title, line of remarks, gap
 NOTHING_RAN = "not run: the projections are round-off, there is nothing to reduce"
 
 
 @dataclass(frozen=True)
 class Row:
-    """Panels of one row; ``ghosts`` (n, N, 3) m are outlined behind the reduced runs.
+    """Row of n panels; shapes ``ghosts`` (n, N, 3) m are outlined behind the reduced runs.
 
     camera : camera of all panels of the row
     note : text in place of the reduced runs, for an experiment in which none ran
@@ -162,12 +162,12 @@ class Row:
 
     @property
     def aspect(self) -> float:
-        """Height over width of the tallest picture; flat for a row without any."""
+        """Largest ratio of height to width of the row's pictures; 0.28 without pictures."""
         return max((w.height / w.width for _, w in self._pictures), default=0.28)
 
     @property
     def lines(self) -> int:
-        """Lines of text below the pictures."""
+        """Number of lines of text below the pictures."""
         counts = [0]
         for panel, window in self._pictures:
             smaller = panel.zoomed(window, self.camera).width / window.width > SLACK
@@ -180,7 +180,7 @@ def run_panel(
 ) -> RunPanel:
     """Panel of a reduced run at ``frame``, with a message if the run failed or never began.
 
-    The run is ``info`` in the file ``path``; ``colour`` and ``title`` are those of the panel.
+    The run is read from the file ``path``, where ``info`` describes it.
     """
     if info.marked:
         return RunPanel(title, colour, None, remark="not run: r exceeds\nthe numerical rank")

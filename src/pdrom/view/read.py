@@ -1,4 +1,4 @@
-"""Readers of result files for figures: positions of runs and samplings."""
+"""Readers of result files for figures: positions of runs, and sampled entries of methods."""
 
 from dataclasses import dataclass
 
@@ -9,19 +9,19 @@ from pdrom.core.store import open_hdf5
 
 
 def frame_numbers(fractions: tuple[float, ...], frames: int) -> list[int]:
-    """Entries of ``positions`` (0 .. frames) at fractions of a run, without repetition."""
+    """Indices of frames (0 to ``frames``) at ``fractions`` of a run, without repetition."""
     return list(dict.fromkeys(round(fraction * frames) for fraction in fractions))
 
 
 def positions_at(
     path: str, fractions: tuple[float, ...], end: int | None = None
 ) -> tuple[list[int], np.ndarray]:
-    """Frame numbers and positions (n, N, 3) m of a run at fractions of it, or of its first frames.
+    """Frame numbers and positions (n, N, 3) m of a run at ``fractions`` of its frames.
 
     Parameters
     ----------
     path : file of the run
-    end : last of these frames; None for all
+    end : frame that counts as the end of the run; None for its last frame
 
     Raises
     ------
@@ -40,11 +40,11 @@ def positions_at(
 
 @dataclass(frozen=True)
 class RerunInfo:
-    """One basis size of a file of reduced runs.
+    """Reduced run of one basis size r in a result file.
 
-    marked : the size exceeds the numerical rank, nothing ran
+    marked : whether r exceeds the numerical rank of the snapshots, so that nothing ran
     blowup_frame : frame at which the run blew up, -1 if it did not
-    entries : stored positions, the initial ones included
+    entries : number of stored frames, including the initial state
     """
 
     label: str
@@ -61,7 +61,7 @@ class RerunInfo:
 
 
 def rerun_infos(path: str, inside: str = "") -> list[RerunInfo]:
-    """Basis sizes in a file ``path`` of reduced runs, or in its group ``inside``, ascending."""
+    """Reduced runs in the HDF5 file ``path``, or in its group ``inside``, ascending in r."""
     with open_hdf5(path) as file:
         infos = []
         for label, group in file[f"/{inside}"].items():
@@ -85,7 +85,7 @@ def _is_size(label: str) -> bool:
 
 
 def choose_ranks(infos: list[RerunInfo], asked: tuple[int | str, ...]) -> list[RerunInfo]:
-    """Select the runs of ``infos`` with the sizes ``asked``, in this order; all if none match."""
+    """Select runs with the basis sizes ``asked``, in that order; all runs if none match."""
     chosen: dict[str, RerunInfo] = {}
     for rank in asked:
         for info in infos:
@@ -95,11 +95,11 @@ def choose_ranks(infos: list[RerunInfo], asked: tuple[int | str, ...]) -> list[R
 
 
 def rerun_positions(path: str, info: RerunInfo, frame: int) -> tuple[int, np.ndarray] | None:
-    """Last finite positions (N, 3) m up to entry ``frame``, and their entry; None without any.
+    """Index and positions (N, 3) m of the last finite frame up to ``frame``; None without any.
 
-    The run is ``info`` in the file ``path``.
+    The run is read from the file ``path``, where ``info`` describes it.
 
-    A run that blew up holds fewer entries than the full-order run.
+    A run that blew up has fewer frames than the full-order run.
     """
     with open_hdf5(path) as file:
         data = file[info.label]["positions"] if info.entries else ()

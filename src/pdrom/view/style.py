@@ -10,10 +10,10 @@ import numpy as np
 from pdrom.view.artists import Artist, Axes, Figure, Line2D, Patch
 
 WIDTH = 7.0  # inches, text width of the manuscript
-DIGITS = 6  # decimals of positions in a layout, which are fractions of the figure
+DIGITS = 6  # decimals of the positions of axes, which are fractions of the figure
 NOTE = 100  # characters per line in a figure that contains only text
 
-# Palette of Okabe and Ito (2008), distinguishable with every common colour deficiency.
+# Palette of Okabe and Ito (2008), distinguishable with every common colour vision deficiency.
 BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
 YELLOW, BLUE, VERMILLION, PURPLE = "#F0E442", "#0072B2", "#D55E00", "#CC79A7"
 GREY = "#8C8C8C"
@@ -85,7 +85,7 @@ RC: dict[str, Any] = {
 
 @contextmanager
 def look() -> Iterator[None]:
-    """Context with this style on top of matplotlib's own defaults, whatever the user has set."""
+    """Context with this style over matplotlib's defaults; the user's settings are ignored."""
     import matplotlib as mpl
 
     with mpl.rc_context():
@@ -95,7 +95,7 @@ def look() -> Iterator[None]:
 
 
 def method_styles(names: Iterable[str]) -> dict[str, tuple[str, str]]:
-    """(colour, marker) of methods; names that are not preset share a reserve, in sorted order."""
+    """(colour, marker) of each method; others than the presets get spare styles in sorted order."""
     names = list(names)
     others = sorted(set(names) - set(METHODS))
     spare = {name: _RESERVE[i % len(_RESERVE)] for i, name in enumerate(others)}
@@ -103,7 +103,7 @@ def method_styles(names: Iterable[str]) -> dict[str, tuple[str, str]]:
 
 
 def scene_style(index: int) -> tuple[str, str]:
-    """(colour, marker) of the ``index``-th scene of a figure that tells scenes apart."""
+    """(colour, marker) of the ``index``-th scene in a figure with a style per scene."""
     return CYCLE[index % len(CYCLE)], SCENE_MARKERS[index % len(SCENE_MARKERS)]
 
 
@@ -114,7 +114,7 @@ def scene_handles(scenes: Iterable[str]) -> list[Line2D]:
 
 
 def surface_colour(colour: str) -> tuple[float, float, float]:
-    """``colour`` on a shaded surface: lightened, so that the shading has room."""
+    """RGB of ``colour``, lightened for a shaded surface so that shadows stay visible."""
     from matplotlib.colors import to_rgb
 
     red, green, blue = (0.72 * c + 0.28 for c in to_rgb(colour))
@@ -145,7 +145,7 @@ def new_figure(height: float, layout: Literal["constrained"] | None = "constrain
                 kept = ax.get_in_layout()
                 place = np.round(ax.get_position(original=True).extents, DIGITS)
                 ax.set_position(Bbox.from_extents(*place), which="original")
-                ax.set_in_layout(kept)  # `set_position` has reset it
+                ax.set_in_layout(kept)  # `set_position` has changed this flag
             return grids
 
     return Figure(figsize=(WIDTH, height), layout=RoundedLayout() if layout else None)
@@ -166,7 +166,7 @@ def patch(label: str, **look: Any) -> Patch:
 
 
 def handles(looks: Mapping[str, tuple[str, str]], **common: Any) -> list[Line2D]:
-    """Entries of a legend by their labels, each with its (colour, marker) of ``looks``.
+    """Legend entries from ``looks``: label -> (colour, marker).
 
     ``common`` are keywords of `handle` for all entries.
     """
@@ -174,7 +174,7 @@ def handles(looks: Mapping[str, tuple[str, str]], **common: Any) -> list[Line2D]
 
 
 def split_handles(splits: Iterable[str]) -> list[Line2D]:
-    """Entries of a legend: sets of snapshots, ``splits``, by their lines."""
+    """Legend entries for sets of snapshots, ``splits`` (training, test, ...), by line style."""
     return [handle(SPLIT_NAMES[s], color="#555555", linestyle=SPLITS[s]) for s in splits]
 
 

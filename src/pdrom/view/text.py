@@ -1,7 +1,7 @@
-"""Text that a user wrote, in figures and in the manuscript: what can be typeset, and how.
+"""Typesetting of texts that a user wrote, in figures and in the manuscript.
 
 The manuscript is typeset by pdfTeX with T1 fonts: Latin letters stand as they are, Greek letters
-and signs go through mathematics. Figures are drawn with DejaVu Sans, which has all of them.
+and signs become formulas. Figures are drawn with DejaVu Sans, which has all of them.
 """
 
 import unicodedata
@@ -31,7 +31,7 @@ _LATIN_CAPITALS = dict(zip("ΑΒΕΖΗΙΚΜΝΟΡΤΧ", "ABEZHIKMNOPTX", strict
 
 
 def escape(text: str) -> str:
-    """Plain text for TeX; PaperError, naming the character, for one that cannot be typeset."""
+    """TeX code of a plain ``text``; PaperError for a character that cannot be typeset."""
     pieces = []
     for character in unicodedata.normalize("NFC", text):
         piece = _typeset(character)

@@ -2,9 +2,9 @@
 
 A result is written to a temporary file beside its target and renamed when complete, so that an
 interrupted job never leaves a half-written file and never damages an older one. An HDF5 file has
-its checksum inside, every other result in a hidden file beside it; every reader compares them. A
-job of the workflow sets a damaged one aside: the next run finds it missing and makes it again.
-Nobody else moves a file that it reads.
+its checksum inside, every other result in a hidden file next to it; every reader checks it. A
+job of the workflow renames a damaged file, so that the next run finds it missing and makes it
+again. Other readers never rename a file.
 """
 
 import hashlib
@@ -40,7 +40,7 @@ from pdrom.core.store.checksum import (
     write_block,
 )
 
-if TYPE_CHECKING:  # a run without tables does not load it
+if TYPE_CHECKING:  # pandas is not loaded by a run that writes no table
     import pandas as pd
 
 __all__ = [
@@ -49,22 +49,22 @@ __all__ = [
     "require_intact", "require_own", "require_place", "require_self_contained", "write_hdf5",
     "write_table", "write_text",
 ]  # fmt: skip
-# Text in the first or last MARKED bytes of every page, picture and ParaView file of this package.
+# Every page, picture and ParaView file of pdrom has this text in its first or last MARKED bytes.
 MARK, MARKED = b"made by pdrom, which may replace this file", 65_536
-# Hash in names of temporary files, so that a machine does not remove another machine's files.
+# Hash of the machine in names of temporary files: leftovers of other machines are not removed.
 _MACHINE = hashlib.blake2b(platform.node().encode(), digest_size=2).hexdigest()
 
 
 @contextmanager
 def atomic_path(path: str | os.PathLike[str], with_checksum: bool = True) -> Iterator[Path]:
-    """Yield a temporary path next to ``path``; checksum and rename it on success, else remove it.
+    """Yield a temporary path; on success it is renamed to ``path`` with a checksum, else removed.
 
-    Temporary files that killed processes of this machine left for the same target are removed.
+    Temporary files of ``path`` that killed processes of this machine have left are removed.
 
     Parameters
     ----------
-    with_checksum : whether to write a checksum file next to it; False for a file that contains its
-        checksum or is written to a user's folder
+    with_checksum : whether to write a checksum file next to ``path``; False for a file that has
+        its checksum inside or is written to a user's folder
 
     Raises
     ------
@@ -90,7 +90,7 @@ def atomic_path(path: str | os.PathLike[str], with_checksum: bool = True) -> Ite
             os.replace(temporary, target)
             place = checksum_path(target)
             content = place.read_bytes() if place.is_file() else b""
-            if content and Checksum.parse(content).content == content:  # of an earlier file
+            if content and Checksum.parse(content).content == content:  # of an older file
                 place.unlink()
     except OSError as error:
         raise StorageError(f"{target}: cannot be written ({reason(error)})") from error
@@ -152,7 +152,7 @@ def _require_file(target: Path) -> None:
 
 
 def _remove_leftovers(target: Path) -> None:
-    """Remove temporary files of processes of this machine that have ended."""
+    """Remove temporary files of ``target`` from processes of this machine that have ended."""
     stem, suffix, checksum = map(re.escape, (target.stem, target.suffix, CHECKSUM_SUFFIX))
     name = re.compile(rf"\.{stem}\.{_MACHINE}([0-9a-f]{{8}})[0-9a-f]{{4}}{suffix}({checksum})?")
     for path in target.parent.iterdir():
@@ -177,11 +177,11 @@ def _bring_to_disk(path: Path) -> None:
 
 
 def _rename(temporary: Path, checksum: Path, target: Path) -> None:
-    """Give both files their names, the checksum first.
+    """Rename the ``temporary`` result and its ``checksum`` file to their names, the checksum first.
 
-    A process killed in between leaves no file, or an older one that its checksum does not fit: both
-    are made again. In the other order it would leave a good file without a checksum. Where the
-    second name is refused, the older file keeps its own checksum.
+    A process killed in between leaves no file, or an older one that the checksum does not match:
+    both are made again. In the other order it would leave a good file without a checksum. If the
+    second renaming fails, the older file keeps its own checksum.
     """
     place = checksum_path(target)
     previous = place.read_bytes() if place.is_file() else None
@@ -197,7 +197,7 @@ def _rename(temporary: Path, checksum: Path, target: Path) -> None:
 
 
 def write_text(text: str, path: str | os.PathLike[str], with_checksum: bool = True) -> None:
-    """Write ``text`` as UTF-8 to ``path``; ``with_checksum`` as in `atomic_path`."""
+    """Write ``text`` as UTF-8 to ``path``; ``with_checksum`` writes a checksum file, too."""
     with atomic_path(path, with_checksum) as temporary:
         temporary.write_text(text, encoding="utf-8", newline="\n")
 
@@ -209,7 +209,7 @@ def read_text(path: str | os.PathLike[str]) -> str:
 
 
 def write_table(table: "pd.DataFrame", path: str | os.PathLike[str]) -> None:
-    """Write a table as CSV to ``path``: fixed float format, an empty cell for no value."""
+    """Write ``table`` as CSV to ``path``: floats with 10 digits, an empty cell if missing."""
     with atomic_path(path) as temporary:
         table.to_csv(temporary, index=False, float_format="%.10g", lineterminator="\n")
 
@@ -219,7 +219,7 @@ def read_table(
 ) -> "pd.DataFrame":
     """Read the CSV table ``path``; StorageError if missing, damaged or without one of ``columns``.
 
-    ``result`` marks a table that a run wrote, with a checksum; other tables have none.
+    ``result`` tells that the pipeline wrote the table with a checksum, which is then checked.
     """
     import pandas as pd
 
@@ -244,7 +244,7 @@ def read_table(
 
 
 def require_finite(name: str, array: np.ndarray, error: type[Exception]) -> np.ndarray:
-    """Return ``array``, or raise ``error`` with ``name`` and its first entry that is not finite."""
+    """Return ``array``; raise ``error`` with ``name`` and the first entry that is not finite."""
     finite = np.isfinite(array)
     if not finite.all():
         first = tuple(int(i) for i in np.argwhere(~finite)[0])
@@ -254,9 +254,9 @@ def require_finite(name: str, array: np.ndarray, error: type[Exception]) -> np.n
 
 @contextmanager
 def write_hdf5(path: str | os.PathLike[str]) -> Iterator[h5py.File]:
-    """Yield a new HDF5 file; it takes its name ``path`` when complete, with a checksum.
+    """Yield a new HDF5 file; when complete it gets a checksum and is renamed to ``path``.
 
-    No time stamps are inside.
+    It contains no time stamps.
     """
     with atomic_path(path, with_checksum=False) as temporary:
         with open(temporary, "w+b", buffering=0) as handle:
@@ -309,7 +309,7 @@ class _Sink:
 def open_hdf5(path: str | os.PathLike[str], unchecked: bool = False) -> Iterator[h5py.File]:
     """Open the HDF5 file ``path`` of the results for reading.
 
-    Its checksum is compared before HDF5 sees the file, so that damage is no error of HDF5.
+    Its checksum is checked first, so that a damaged file is reported before HDF5 fails on it.
 
     Parameters
     ----------
@@ -332,12 +332,12 @@ def open_hdf5(path: str | os.PathLike[str], unchecked: bool = False) -> Iterator
 
 
 def require_self_contained(file: h5py.File, path: str | os.PathLike[str]) -> None:
-    """Refuse a ``file`` from elsewhere, at ``path``, that would read other files.
+    """Refuse an HDF5 ``file``, at ``path``, that refers to data in other files.
 
     Raises
     ------
     StorageError
-        It has a soft or an external link, external storage or a virtual dataset.
+        The file has a soft or an external link, external storage or a virtual dataset.
     """
     groups: list[h5py.Group] = [file]
     seen: set[int] = set()

@@ -1,18 +1,16 @@
 """Checksums of results, stored with their provenance, and comparison of files with them.
 
-An HDF5 file has its checksum inside, in its first bytes, which HDF5 leaves to its users (the user
-block): a line that names the format, the checksum of all bytes behind the block, and zeros. So a
-copy of the file, wherever it lies, shows by itself whether it is whole, before HDF5 reads any of
-it; every reader of HDF5 skips the block.
+An HDF5 file has its checksum in the user block, its first bytes, which readers of HDF5 skip: a
+line that names the format, the checksum of all bytes after the block, and zeros. So a copy of the
+file, in any folder, can be checked for damage before HDF5 reads it.
 
-Beside every other result lies a hidden checksum file: that of ``t.csv`` is ``.t.csv.blake2b``, in
-the format of the program ``b2sum``: the BLAKE2b digest of the file's bytes and the file's name. The
-line before it is a comment to that program; it holds the provenance (`pdrom.core.provenance`) with
-a digest of its own.
+Every other result has a hidden checksum file next to it: that of ``t.csv`` is ``.t.csv.blake2b``,
+in the format of the program ``b2sum``: the BLAKE2b digest of the file's bytes and the file's name.
+The line before it is a comment to that program; it contains the provenance
+(`pdrom.core.provenance`) with a digest of its own.
 
-The checksum is compared whole with the one that the file's bytes give now. Whatever differs, in the
-file or in its checksum, is damage; a changed file whose checksum changed with it would have to meet
-a digest of 512 bits.
+The stored checksum is compared with that of the file's bytes. Any difference, in the file or in its
+checksum, counts as damage. A change of both could match only by a collision of 512 bits.
 """
 
 import errno
@@ -34,10 +32,10 @@ _ASIDE: ContextVar[bool] = ContextVar("damaged results are set aside", default=F
 
 @contextmanager
 def damaged_set_aside() -> Iterator[None]:
-    """Inside this context a damaged result that is read is renamed to ``NAME.damaged``.
+    """Context in which a damaged result that is read is renamed to ``NAME.damaged``.
 
-    Only jobs of the workflow do it, whose next run makes them again. Nobody else renames a file
-    that it reads: it may be the only copy of somebody's run.
+    Only jobs of the workflow use it: the next run makes the missing result again. Other readers
+    never rename a file, since it may be a user's only copy of a run.
     """
     previous = _ASIDE.set(True)
     try:
@@ -47,23 +45,23 @@ def damaged_set_aside() -> Iterator[None]:
 
 
 def sets_aside() -> bool:
-    """Whether reading a damaged result renames it, see `damaged_set_aside`."""
+    """Whether a damaged result is renamed when read: inside the context `damaged_set_aside`."""
     return _ASIDE.get()
 
 
 CHECKSUM_SUFFIX = ".blake2b"
-_SHORT = 16  # hexadecimal digits of the checksum of a comment
+_SHORT = 16  # hexadecimal digits of the digest of the provenance comment
 SUFFIXES = (".h5", ".hdf5")
-BLOCK = 2048  # bytes; HDF5 allows powers of two from 512 on
+BLOCK = 2048  # bytes of the user block; HDF5 allows powers of two, at least 512
 _LINE = b"pdrom: BLAKE2b of the bytes behind the first 2048, and what made them\n"
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
-BLOCK_NAME = "-"  # of what `tail -c +2049 FILE | b2sum` reads
+BLOCK_NAME = "-"  # file name that `tail -c +2049 FILE | b2sum` prints for standard input
 UNCHECKED = "--unchecked (in Python unchecked=True) reads it if it is sound"
 
 
 @dataclass(frozen=True)
 class Checksum:
-    """Content of a checksum file: digest and name of the result, provenance as JSON or empty."""
+    """Content of a checksum file: digest, name and provenance (JSON, may be empty) of a result."""
 
     digest: str
     name: str
@@ -79,7 +77,7 @@ class Checksum:
 
     @classmethod
     def parse(cls, content: bytes) -> "Checksum":
-        """Parse the bytes ``content``; damaged bytes give a checksum that fits no file."""
+        """Parse the bytes ``content``; damaged bytes give a checksum that matches no file."""
         first, _, rest = content.partition(b"\n")
         commented = first.startswith(b"# ")
         words = (rest if commented else content).decode(errors="replace").split()
@@ -100,12 +98,12 @@ def digest_of(path: Path, start: int = 0) -> str:
 
 
 def new_checksum(digest: str, name: str) -> Checksum:
-    """Checksum of a file ``name`` that is made now, with the ``digest`` of its bytes."""
+    """Checksum of the file ``name`` with the ``digest`` of its bytes and the current provenance."""
     return Checksum(digest, name, json.dumps(provenance(), sort_keys=True))
 
 
 def is_hdf5(path: Path) -> bool:
-    """Whether ``path`` is an HDF5 file, by its name or first bytes, with a user block or not."""
+    """Whether suffix or first bytes of ``path`` are those of HDF5, with or without user block."""
     with open(path, "rb") as handle:
         head = handle.read(BLOCK + len(_SIGNATURE))
     named = path.suffix in SUFFIXES or head.startswith((_SIGNATURE, _LINE))
@@ -113,7 +111,7 @@ def is_hdf5(path: Path) -> bool:
 
 
 def write_block(path: Path) -> None:
-    """Write the checksum of the HDF5 file ``path`` into its first ``BLOCK`` unused bytes."""
+    """Write the checksum of the HDF5 file ``path`` into its user block of `BLOCK` bytes."""
     content = _LINE + new_checksum(digest_of(path, start=BLOCK), BLOCK_NAME).content
     if len(content) > BLOCK:
         raise ValueError(f"{path}: a checksum of {len(content)} bytes, allowed: at most {BLOCK}")
@@ -164,24 +162,24 @@ def check_file(path: str | os.PathLike[str]) -> Condition:
         fits = told and (told.digest, told.name) == (digest_of(path, start), name)
         return Condition.INTACT if fits else Condition.DAMAGED
     except OSError as error:
-        if error.errno == errno.EIO:  # the disk cannot read a part of it
+        if error.errno == errno.EIO:  # the disk cannot read a part of the file
             return Condition.DAMAGED
         raise StorageError(f"{path}: cannot be read ({reason(error)})") from error
 
 
 def require_intact(path: str | os.PathLike[str], unchecked: bool = False) -> None:
-    """Refuse a result ``path`` that is not what was written; every reader calls this first.
+    """Refuse a result ``path`` that does not match its checksum; every reader calls this first.
 
     Parameters
     ----------
-    unchecked : whether a file without a checksum will do
+    unchecked : whether a file without a checksum is accepted
 
     Raises
     ------
     StorageError
-        The file is missing or may not be read; or it is damaged or has no checksum. In a job of the
-        workflow it was then set aside as ``*.damaged``, so that the next run finds it missing and
-        makes it again; everywhere else it stays where it is.
+        The file is missing, cannot be read, is damaged or has no checksum. In the two latter cases
+        a job of the workflow has renamed it to ``*.damaged``, so that the next run finds it missing
+        and makes it again; other readers leave it unchanged.
     """
     path = Path(path)
     condition = check_file(path)
@@ -200,7 +198,7 @@ def require_intact(path: str | os.PathLike[str], unchecked: bool = False) -> Non
 
 
 def _checksum_bytes(path: Path) -> bytes | None:
-    """Checksum's bytes inside the file ``path`` or beside it, b"" if damaged; None without any."""
+    """Bytes of the checksum in or next to ``path``: b"" if damaged, None if there is none."""
     if not is_hdf5(path):
         place = checksum_path(path)
         return place.read_bytes() if place.is_file() else None

@@ -1,8 +1,8 @@
 """Inner products in compiled code.
 
-Products of three matrix rows with a vector read the vector only once, and the processor prefetches
-three rows. The order of summation does not depend on the processor: sixteen partial sums are added
-to four, these to one, and the remaining terms one by one."""
+For three matrix rows at a time, the vector is read only once, and the processor prefetches three
+rows. The order of summation does not depend on the processor: sixteen partial sums are reduced to
+four, these to one, and then the remaining terms are added one by one."""
 
 from pdrom.model.compiled import arithmetic
 from pdrom.model.compiled.arithmetic import add, add_product, constant, of_three
@@ -12,14 +12,14 @@ from pdrom.model.compiled.rows import WIDTH, at, load
 
 @compiled(forceinline=True)
 def _summed(a, b, c):
-    """Return the sums of the components of three SIMD vectors as three numbers."""
+    """Return three numbers: the sums of the lanes of three SIMD vectors."""
     first, second, third, fourth = arithmetic.transposed(a, b, c, c)
     return arithmetic.first_three(add(add(first, third), add(second, fourth)))
 
 
 @compiled(forceinline=True)
 def _products(matrix, i, j, k, vector, p, sums):
-    """Return three ``sums`` plus the products of four numbers of each row, from index ``p`` on."""
+    """Return three ``sums``, to which products of four numbers from index ``p`` on are added."""
     v = load(vector, p)
     return (
         add_product(sums[0], load(matrix, i + p), v),
@@ -34,7 +34,7 @@ def dots(matrix, i, j, k, count, vector, starts):
 
     Parameters
     ----------
-    matrix : flat array; the rows have ``count`` numbers each and begin at indices i, j and k
+    matrix : flat array; three rows of ``count`` numbers begin at the indices i, j and k
     """
     x, y, z = starts
     blocks, vectors = count - count % (4 * WIDTH), count - count % WIDTH

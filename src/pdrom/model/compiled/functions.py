@@ -11,7 +11,7 @@ from numba import cfunc, njit, types
 from numba.extending import intrinsic
 
 _INTEGER = ir.IntType(types.intp.bitwidth)
-KERNELS = ("compiled", "constraints", "dynamics")  # folders with functions that may be inlined
+KERNELS = ("compiled", "constraints", "dynamics")  # folders of functions that may be inlined
 
 
 @cache
@@ -23,10 +23,10 @@ def _checksum(folders: tuple[str, ...]) -> str:
 
 
 def _mark(function):
-    """Append to the name of a function a checksum of all source files it may inline code from.
+    """Append to the name of ``function`` a checksum of all files whose code it may inline.
 
-    Numba's cache checks only the file of the function itself. Without the checksum, it would return
-    outdated machine code after an edit of a file whose functions are inlined.
+    Numba's cache checks only the file of the function itself. Without the checksum in the name, it
+    would return outdated machine code after an edit of a file whose functions are inlined.
     """
     own = function.__module__.removeprefix("pdrom.model.").split(".")[0]
     beside = own if (Path(__file__).parents[1] / own).is_dir() else KERNELS[0]
@@ -34,10 +34,10 @@ def _mark(function):
 
 
 def compiled(function=None, **options):
-    """Compile a ``function``, cached on disk, without division checks and, by default, fast-math.
+    """Compile ``function``, cached on disk, without checks for division by zero or fast-math.
 
-    ``options`` are passed to Numba's ``njit``; without a function, return a decorator.
-    Numba's wrapper for callers in C is left out, as there are no such callers.
+    ``options`` are passed to Numba's ``njit`` and may enable fast-math; without a function, a
+    decorator is returned. Numba's wrapper for callers in C is left out, as there are none.
     """
     if function is None:
         return lambda wrapped: compiled(wrapped, **options)
@@ -46,7 +46,7 @@ def compiled(function=None, **options):
 
 
 def inner(function=None, **options):
-    """Compile a ``function`` that only compiled functions call; it has no cache of its own.
+    """Compile ``function``, which only compiled functions call, without a cache of its own.
 
     No wrapper for callers in Python is made: it takes longer to compile than a short function.
     """
@@ -57,15 +57,15 @@ def inner(function=None, **options):
 
 
 def template(function):
-    """Compile a function that has functions as arguments; it is inlined into each caller.
+    """Compile ``function``, whose arguments may be functions; it is inlined into each caller.
 
-    It is not cached: Numba identifies function arguments by a number that differs per process.
+    It has no cache: Numba identifies function arguments by a number that changes with the process.
     """
     return njit(error_model="numpy", forceinline=True)(function)
 
 
 class Callback:
-    """A function that compiled code calls by address; it is compiled when `address` is first read.
+    """Function that compiled code calls by its `address`; it is compiled when that is first read.
 
     Attributes
     ----------
@@ -78,13 +78,13 @@ class Callback:
 
     @cached_property
     def address(self):
-        """Address of the compiled function, which lives as long as the object."""
+        """Address of the compiled function, valid as long as this object exists."""
         self._compiled = cfunc(self.signature, cache=True, error_model="numpy")(self.function)
         return self._compiled.address
 
 
 def caller(result):
-    """Return an intrinsic (address, integers) that calls a `Callback` of return type ``result``."""
+    """Return an intrinsic (address, integers) that calls a `Callback` with this ``result`` type."""
 
     def typed(_context, address, arguments):
         def generate(context, builder, _signature, values):

@@ -1,14 +1,14 @@
-"""Rows of four numbers, one per vertex, which compiled code loads with a single instruction.
+"""Rows of four numbers, one row per vertex, which compiled code loads with one instruction.
 
 The step loop stores positions and right-hand sides as (N, 4) arrays with a last column of zeros;
-other code sees (N, 3) views of these "padded" arrays. Compiled code takes the flat array (4 N,) and
+other code uses (N, 3) views of these "padded" arrays. Compiled code uses the flat array (4 N,) and
 loads a row into a register of four lanes. A row may also hold one number of each of four elements
 (`pdrom.model.compiled.arithmetic.transposed` converts between the two).
 
-Arrays of this module begin at multiples of the size of a row. NumPy's arrays may not, and every
-second row would then lie in two cache lines.
+Arrays of this module begin at multiples of the size of a row in memory. NumPy's arrays may not, so
+that every second row may lie in two cache lines.
 
-Loads and stores do not check indices, which must be neither negative nor too large.
+Loads and stores do not check indices; callers must not pass negative or too large ones.
 """
 
 import numpy as np
@@ -43,7 +43,7 @@ def empty(numbers: int, dtype: type = np.float64) -> np.ndarray:
     """Return an uninitialised array (numbers,) of ``dtype``, aligned to the size of a row."""
     kind = np.dtype(dtype)
     memory = np.empty(numbers * kind.itemsize + ROW_BYTES, np.uint8)
-    # the memoryview makes the returned array, not ``memory``, the base of its views
+    # with the memoryview, views of the returned array have it, not ``memory``, as their base
     start = -memory.ctypes.data % ROW_BYTES
     return np.frombuffer(memory.data, kind, numbers, start)
 
@@ -66,27 +66,27 @@ def copied(numbers: np.ndarray) -> np.ndarray:
 def write(numbers, to):
     """Copy the flat array ``numbers`` into ``to``, which is at least as long.
 
-    The compiled step loop uses this function, as the assignment to a slice takes seconds to compile
-    (because of its error message).
+    The compiled step loop uses this function, since an assignment to a slice (with its error
+    message) takes seconds to compile.
     """
     for i in range(len(numbers)):
         to[i] = numbers[i]
 
 
 def vertices(count: int) -> np.ndarray:
-    """Return zeros (count, 3) as a view of a padded array (count, 4)."""
+    """Return zeros (count, 3), a view of an array (count, 4) whose last column is padding."""
     return unflat(zeros(WIDTH * count))
 
 
 def as_vertices(values: np.ndarray) -> np.ndarray:
-    """Return a copy of the values (N, 3) as a view of a padded array (N, 4)."""
+    """Return a copy of ``values`` (N, 3), a view of an array (N, 4) with a last column of zeros."""
     copy = vertices(len(values))
     copy[...] = values
     return copy
 
 
 def flat(values: np.ndarray) -> np.ndarray:
-    """Return ``values`` (N, 3) as a padded flat array (4 N,); no copy if they are a view of one."""
+    """Return ``values`` (N, 3) flat, (4 N,), with a zero after each row; no copy if possible."""
     rows = values.base
     if (
         isinstance(rows, np.ndarray)
@@ -103,12 +103,12 @@ def flat(values: np.ndarray) -> np.ndarray:
 
 
 def unflat(rows: np.ndarray) -> np.ndarray:
-    """Return a padded flat array ``rows`` (4 N,) as a view (N, 3), the inverse of `flat`."""
+    """Return a view (N, 3), without the padding zeros, of the flat array ``rows`` (4 N,)."""
     return rows.reshape(-1, WIDTH)[:, :3]
 
 
 def shares(values: np.ndarray, rows: np.ndarray) -> bool:
-    """Return whether ``rows``, the result of `flat` for ``values`` (N, 3), has the same memory."""
+    """Return whether ``values`` (N, 3) is a view of ``rows``, which `flat` returned for it."""
     return len(values) > 0 and _same_start(values, rows)
 
 

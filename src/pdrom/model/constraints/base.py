@@ -19,7 +19,7 @@ from pdrom.model.effects.base import Effect, EffectConfig
 from pdrom.model.mesh.selection import Selection, select_vertices
 from pdrom.model.mesh.types import Mesh
 
-# Kind of mesh cell on which constraints are defined -> function: mesh -> vertices of all cells.
+# Kind of mesh cell that has constraints -> function that returns the vertices of all such cells.
 CELLS: dict[str, Callable[[Mesh], np.ndarray]] = {
     "vertex": lambda mesh: np.arange(mesh.vertices)[:, None],
     "edge": lambda mesh: mesh.edges(),
@@ -30,16 +30,16 @@ Weight = Annotated[float, Field(gt=0.0, le=1e16, allow_inf_nan=False)]
 
 
 class WeightFactor(ConfigModel):
-    """Factor on the weight of the elements inside a selection (with all their vertices)."""
+    """Factor on the weight of elements all of whose vertices are in a selection."""
 
     select: Selection
     factor: Weight
 
 
 class GroupConfig(EffectConfig):
-    """``weight`` w of the group; the element weights are w times the rest measure where stated.
+    """``weight`` w of the group; some kinds multiply it by rest area or volume of the element.
 
-    ``factors`` change the weight of some elements, one after the other.
+    ``factors`` multiply the weights of some elements, one factor after the other.
     """
 
     weight: Weight
@@ -47,7 +47,7 @@ class GroupConfig(EffectConfig):
 
 
 class ConstraintGroup(Effect):
-    """A set of constraints of one kind, one per mesh element, which are evaluated in batches.
+    """A set of constraints of one kind, one per mesh element, which are evaluated together.
 
     Attributes
     ----------
@@ -55,19 +55,19 @@ class ConstraintGroup(Effect):
     elements : number e of elements
     rows_per_element : number p of rows of each element's operator
     S : (e p, N) CSR, the unweighted differential operator on N vertices
-    weights : (e,) element weights, multiplied by the rest area or volume where the group says so
+    weights : (e,) weights of the elements, including rest area or volume if the kind has it
     """
 
     rows_per_element: int
     split_from: int
-    """Number of elements from which the local step is computed in two parts (see module
+    """With at least this many elements, the local step is computed in two parts (see module
     `local_kernel`); a group that is always computed in one part does not set it."""
     S: sparse.csr_array
     weights: np.ndarray
     gradient_kernel: Any = None
-    """Compiled function from S q to projections, see `local_kernel.gradient_kernel`; or None."""
+    """Compiled function that maps S q to projections (`local_kernel.gradient_kernel`), or None."""
     local_kernel: LocalKernel | None = None
-    """Compiled `accumulate` for compiled loops; a group without one overrides `accumulate`."""
+    """Compiled form of `accumulate` for compiled loops; without it, override `accumulate`."""
     _pass: LocalPass | None = None
     manifold: ClassVar[str | None] = None
     """Set onto which elements are projected: "clamped" (signed singular values in the range
@@ -82,16 +82,16 @@ class ConstraintGroup(Effect):
 
     @classmethod
     def element_vertices(cls, mesh: Mesh) -> np.ndarray:
-        """Return the m vertices of each of the e elements on a mesh, (e, m)."""
+        """Return the vertex indices (e, m) of the e elements that the group has on ``mesh``."""
         return CELLS[cls.cells](mesh)
 
     def element_weights(self, mesh: Mesh) -> float | np.ndarray:
-        """Return the weights (e,) of the elements of ``mesh`` per rest measure, or one for all.
+        """Return the weights (e,) of the elements, or one number, without the rest area or volume.
 
         Raises
         ------
         SceneError
-            A selection contains no element of the group.
+            A selection of ``factors`` contains no element of the group.
         """
         if not self.config.factors:
             return self.config.weight
@@ -113,16 +113,16 @@ class ConstraintGroup(Effect):
 
     @property
     def row_weights(self) -> np.ndarray:
-        """Diagonal (e p,) of the weight matrix W."""
+        """Diagonal (e p,) of the weight matrix W: the element weight of each row."""
         return np.repeat(self.weights, self.rows_per_element)
 
     def begin_frame(self, q: np.ndarray, elements: np.ndarray | None = None) -> None:
-        """Compute data of a frame from its first ``q`` (N, 3) m, for ``elements`` (m,) or all."""
+        """Compute once-per-frame data at ``q`` (N, 3) m, for ``elements`` (m,) or all if None."""
 
     def kernel_parameters(self) -> np.ndarray:
         """Return the numbers that ``gradient_kernel`` needs in addition to S q, in its order.
 
-        Numbers that are computed once per frame come from the last call of ``begin_frame``.
+        Once-per-frame numbers are those of the last call of ``begin_frame``.
         """
         raise NotImplementedError(f"{self.name} has no gradient kernel")
 
@@ -133,7 +133,7 @@ class ConstraintGroup(Effect):
     def sampler(self, elements: np.ndarray) -> LocalKernel:
         """Return a kernel that writes the projections of ``elements`` (m,) int64 to a flat array.
 
-        Callers pass the address of this array instead of the address of the right-hand side.
+        Callers pass the address of that array in place of the address of the right-hand side.
         """
         raise NotImplementedError(f"{self.name} has no sampler")
 
@@ -152,13 +152,13 @@ class ConstraintGroup(Effect):
 
     @abstractmethod
     def reference_project(self, d: np.ndarray, elements: np.ndarray) -> np.ndarray:
-        """Return p_e (m, p, 3) of ``elements`` (m,) from ``d`` = S_e q (m, p, 3), by NumPy."""
+        """Return p_e (m, p, 3) of ``elements`` (m,) from ``d`` = S_e q (m, p, 3), by NumPy only."""
 
     @abstractmethod
     def restricted(
         self, elements: np.ndarray, factors: np.ndarray
     ) -> tuple["ConstraintGroup", np.ndarray]:
-        """Return a group of some elements only, defined on the vertices that these elements use.
+        """Return a group of some ``elements`` only, on a smaller set of vertices: those they use.
 
         Parameters
         ----------
@@ -214,7 +214,7 @@ class StencilGroup(ConstraintGroup):
 
 
 def require_cells(mesh: Mesh, kind: str, effect: str) -> np.ndarray:
-    """Return the cells of ``kind`` that an ``effect`` needs; SceneError if a mesh has none."""
+    """Return the cells of ``kind``; SceneError, naming ``effect``, if ``mesh`` has none."""
     cells = getattr(mesh, kind)
     if kind == "triangles" and len(mesh.tetrahedra):
         raise SceneError(f"effect '{effect}' needs a surface mesh, this mesh is a volume")
@@ -224,7 +224,7 @@ def require_cells(mesh: Mesh, kind: str, effect: str) -> np.ndarray:
 
 
 def directions(a: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return unit vectors and lengths (..., 1) of vectors ``a`` (..., 3); zero for zero vectors."""
+    """Return unit vectors, or zero vectors, and lengths (..., 1) of vectors ``a`` (..., 3)."""
     # scale the vectors so that their squares neither overflow nor underflow
     largest = np.abs(a).max(axis=-1, keepdims=True)
     part = a / np.where(largest > 0.0, largest, 1.0)

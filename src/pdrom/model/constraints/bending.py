@@ -17,24 +17,24 @@ from pdrom.model.constraints.base import ConstraintGroup, GroupConfig, direction
 from pdrom.model.constraints.local_kernel import FIRST, OWN, VERTICES, LocalKernel
 from pdrom.model.mesh.types import Mesh, barycentric_areas, boundary_edges
 
-# A direction to the rim (equator) with a smaller norm consists of round-off.
+# If a unit vector has a shorter projection on the plane of the rim (equator), that is round-off.
 RIM = 1e-15
-# A rim direction with a larger norm is orthogonal to the normal up to 2e-12. A smaller one has lost
-# digits by cancellation and is orthogonalised again.
+# A longer projection is orthogonal to the normal up to 2e-12. A shorter one has lost digits by
+# cancellation and is orthogonalised again.
 NEAR_POLE = 1e-4
 
-# Packed numbers of an element: weight, rest magnitude, rest curvature vector, side times normal
+# Offsets of the packed numbers: weight, rest magnitude, rest curvature, side times normal; count
 WEIGHT, MAGNITUDE, REST, POLE, MANIFOLD = 0, 1, 2, 5, 8
-# Offsets in the working array: curvature, projection p, height of its direction above the equator
+# Offsets in the working array: curvature, projection p, height of its direction over the equator
 H, P, HEIGHT, SIZE = 0, 3, 6, 7
-# Entries of a kernel's record: number of elements, number of elements to project; addresses of the
-# CSR operator, the packed numbers, the working arrays, the elements to project, and their numbers.
+# Indices into a kernel's record: number of elements, number of elements to project; addresses of
+# CSR operator, the packed numbers, working arrays, elements to project and their packed numbers.
 ELEMENTS, COUNT, START, INDICES, DATA, SPHERES, WORK, SAMPLED, TAKEN, ARRAYS = range(OWN, OWN + 10)
 
 
 @lanes.kernel
 def put_poles(manifold, elements, side, normals):
-    """Write ``side`` (m,) times ``normals`` (m, 3) of some elements to the packed ``manifold``."""
+    """Write ``side`` (m,) times ``normals`` (m, 3) of ``elements`` to the packed ``manifold``."""
     for e in elements:
         place = (e // lanes.LANES * MANIFOLD + POLE) * lanes.LANES + e % lanes.LANES
         lanes.save(
@@ -53,7 +53,7 @@ def _curvature(y, e, start, indices, data):
 
 @lanes.lane_function
 def _without(a, part, n):
-    """Return the direction and the length of the vector a - part n."""
+    """Return direction and length of the vector a - part n (``part`` is a number)."""
     rest = lanes.mix(1.0, a, -part, n)
     length = np.sqrt(lanes.dot(rest, rest))
     return lanes.scaled(1.0 / length, rest), length
@@ -89,13 +89,13 @@ def _half_spheres(work, manifold, block):
 
 @lanes.lane_function
 def _to_rims(work, manifold, first):
-    """Replace each direction below the equator by the nearest direction on the equator (rim)."""
+    """Replace directions below the equator of the half sphere by the nearest ones on it (rim)."""
     for lane in range(lanes.LANES):
         n, unit = lanes.load(manifold, first + POLE, lane), lanes.load(work, P, lane)
         height = work[HEIGHT * lanes.LANES + lane]
         rim, length = _without(unit, height, n)
         again, left = _without(rim, lanes.dot(rim, n), n)
-        # a difference of unit vectors that is mostly parallel to n consists of round-off
+        # a tiny difference, or one mostly parallel to n, is round-off: take any rim direction
         again = lanes.choose(length > RIM and left > 0.5, again, lanes.perpendicular(n))
         rim = lanes.choose(length > NEAR_POLE, rim, again)
         lanes.save(work, P, lane, lanes.choose(height < 0.0, rim, unit))
@@ -103,7 +103,7 @@ def _to_rims(work, manifold, first):
 
 @lanes.lane_function
 def _operator(y_place, record):
-    """Return the positions y and the three CSR arrays of S, from their addresses."""
+    """Return the positions y and the three arrays of S (CSR) from the addresses in the record."""
     entries = rows.indices(record, ARRAYS)
     y = rows.doubles(y_place, WIDTH * entries[VERTICES])
     start = rows.integers(entries[START], entries[ELEMENTS] + 1)
@@ -123,7 +123,7 @@ def _spheres(record, part):
 
 @kernels.local_kernel
 def project_vertices(y_place, p_place, record, part):
-    """Write the projections p (m, 3) of the sampled elements of the record; return 0.
+    """Write the projections p (m, 3) of the elements to project of a ``record``; return 0.
 
     ``y_place``, ``p_place``, ``record`` are addresses; ``part`` selects the working array.
     """
@@ -150,9 +150,9 @@ def project_vertices(y_place, p_place, record, part):
 
 @kernels.local_kernel
 def accumulate_vertices(y_place, rhs_place, record, part):
-    """Add S^T W p of the blocks of a ``part`` to the right-hand side; return their energy in J.
+    """Add S^T W p of one ``part`` of the blocks to the right-hand side; return its energy in J.
 
-    ``y_place``, ``rhs_place`` and ``record`` are addresses, see `local_kernel`.
+    ``y_place``, ``rhs_place``, ``record`` are addresses of positions, right-hand side and record.
     """
     entries = rows.indices(record, ARRAYS)
     y, start, indices, data = _operator(y_place, record)
@@ -190,7 +190,7 @@ def accumulate_vertices(y_place, rhs_place, record, part):
 def project_gradients(d_pointer, manifold_pointer, p_pointer, m):
     """Write the projections p (m, 3) of the curvature vectors S q (m, 3) onto the half spheres.
 
-    ``p_pointer``, ``d_pointer`` and ``manifold_pointer`` are explained at `gradient_kernel`.
+    ``manifold_pointer`` points to the packed numbers; see `gradient_kernel` for all arguments.
     """
     d, p = carray(d_pointer, (m, 3)), carray(p_pointer, (m, 3))
     blocks = (m + lanes.LANES - 1) // lanes.LANES
@@ -207,7 +207,7 @@ def project_gradients(d_pointer, manifold_pointer, p_pointer, m):
 
 
 def interior_vertices(triangles: np.ndarray, vertices: int) -> np.ndarray:
-    """Return the indices (n,) < ``vertices`` on no boundary edge of ``triangles`` (T, 3)."""
+    """Return the indices (n,) of vertices on no boundary edge of ``triangles`` (T, 3)."""
     inside = np.ones(vertices, dtype=bool)
     inside[boundary_edges(triangles)] = False
     return np.flatnonzero(inside)
@@ -234,7 +234,7 @@ def cotangent_laplacian(points: np.ndarray, triangles: np.ndarray) -> sparse.csr
 
 
 def vertex_fans(triangles: np.ndarray, vertices: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return (start, fan): ``triangles`` at v < ``vertices`` are fan[start[v]:start[v + 1]]."""
+    """Return (start, fan): indices of triangles at vertex v are fan[start[v]:start[v + 1]]."""
     order = np.argsort(triangles.ravel(), kind="stable")
     counts = np.bincount(triangles.ravel(), minlength=vertices)
     start = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
@@ -243,7 +243,7 @@ def vertex_fans(triangles: np.ndarray, vertices: int) -> tuple[np.ndarray, np.nd
 
 @lanes.lane_function
 def _sides(q, triangle):
-    """Return the two edge vectors of a triangle that begin at its first corner."""
+    """Return the two edge vectors of ``triangle`` from its first corner."""
     a, b, c = triangle[0], triangle[1], triangle[2]
     return (
         (q[b, 0] - q[a, 0], q[b, 1] - q[a, 1], q[b, 2] - q[a, 2]),
@@ -253,9 +253,9 @@ def _sides(q, triangle):
 
 @lanes.kernel
 def fan_normals(q, vertices, elements, start, fan, triangles, normals):
-    """Write the area-weighted unit normals of the vertices of some elements to ``normals``.
+    """Write area-weighted unit normals at the vertices of ``elements`` to ``normals``.
 
-    The normal is zero where the triangles around a vertex have no area.
+    The normal is zero if the triangles around the vertex have no area.
 
     Parameters
     ----------
@@ -263,7 +263,7 @@ def fan_normals(q, vertices, elements, start, fan, triangles, normals):
     vertices : (m,) vertex of each element
     elements : indices of the elements whose row of ``normals`` (m, 3) is written
     start, fan : the triangles at vertex v are ``fan[start[v]:start[v + 1]]``
-    triangles : (T, 3) vertices
+    triangles : (T, 3) vertex indices
     """
     for i in elements:
         first, last = start[vertices[i]], start[vertices[i] + 1]
@@ -271,7 +271,7 @@ def fan_normals(q, vertices, elements, start, fan, triangles, normals):
         for k in range(first, last):
             u, v = _sides(q, triangles[fan[k]])
             largest = max(largest, lanes.absolute_sum(u), lanes.absolute_sum(v))
-        # scale by a power of two: no rounding, and products neither overflow nor underflow
+        # scale by a power of two, without rounding: products neither overflow nor underflow
         power = 2.0 ** min(-math.frexp(largest)[1], 1000)
         nx, ny, nz = 0.0, 0.0, 0.0
         for k in range(first, last):
@@ -285,25 +285,24 @@ def fan_normals(q, vertices, elements, start, fan, triangles, normals):
         normals[i, 0], normals[i, 1], normals[i, 2] = nx, ny, nz
 
 
-# A rest curvature below this part of its summands is round-off: the vertex counts as flat.
+# A vertex is flat if its rest curvature is below this fraction of the summands, i.e. round-off.
 FLAT = 1e-9
 
 
 class VertexBending(ConstraintGroup):
     """One constraint per interior vertex, weight w A_v (barycentric area).
 
-    S q is the mean-curvature vector H(q) = 1/(2 A_v) sum_j (cot a_j + cot b_j)(q_v - q_j). With
-    the rest magnitude m and the side s of the rest vector against the vertex normal, the manifold
-    is the half sphere { |p| = m, s p.n >= 0 }; n is the normal at the beginning of the frame, so
-    that the manifold is fixed during the iterations and the objective cannot rise. On the right
-    side p has the direction of H; on the wrong side p is the nearest point of the rim, which pulls
-    the vertex back so that it does not flip. A flat rest shape has m = 0 up to round-off and s = 0.
-    Where H = 0, p is the pole (m s n); where the triangles around the vertex also have no area,
-    there is no normal, and p is the rest vector.
+    S q is the mean-curvature vector H(q) = 1/(2 A_v) sum_j (cot a_j + cot b_j)(q_v - q_j). Its rest
+    value has the magnitude m and lies on side s = +1 or -1 of the surface. p is the point nearest
+    to H on the half sphere { |p| = m, s p.n >= 0 }. The vertex normal n is that at the beginning of
+    the frame: the half sphere is fixed during iterations, so that the objective cannot rise. If H
+    is on the other side, p is on the rim of the half sphere and pulls the vertex back, so that it
+    does not flip. A flat rest shape has m = 0 up to round-off and s = 0. If H = 0, p is the pole
+    m s n; if moreover the triangles around the vertex have no area, p is the rest vector.
     """
 
     class Config(GroupConfig):
-        """Weight w per area."""
+        """Weight w, divided by area, and the fields of `GroupConfig`."""
 
         effect: Literal["bending"] = "bending"
 
@@ -346,7 +345,7 @@ class VertexBending(ConstraintGroup):
         return interior_vertices(mesh.triangles, mesh.vertices)[:, None]
 
     def begin_frame(self, q: np.ndarray, elements: np.ndarray | None = None) -> None:
-        """Compute vertex normals at ``q`` (N, 3) m, for ``elements`` (m,) with rest curvature."""
+        """Compute vertex normals at ``q`` (N, 3) m for curved elements among ``elements`` (m,)."""
         curved = self._curved
         if elements is not None:
             curved = elements[self.side[elements] != 0.0]
@@ -360,7 +359,7 @@ class VertexBending(ConstraintGroup):
         return self._kernel(project_vertices, elements)
 
     def _kernel(self, function: Any, elements: np.ndarray, touched: Any = None) -> LocalKernel:
-        """Return the kernel of a ``function`` that projects ``elements``, or accumulates all."""
+        """Return the kernel of ``function``, which projects ``elements`` or accumulates all."""
         operator = self.S.indptr, self.S.indices, self.S.data
         arrays = (*operator, self._manifold, self._work, elements, self._taken)
         numbers, count = (self.elements, len(elements)), lanes.blocks(self.elements)
@@ -420,7 +419,7 @@ class VertexBending(ConstraintGroup):
 
 
 def _crossing(n: np.ndarray) -> np.ndarray:
-    """Return a unit vector orthogonal to each row of n, as a deterministic function of n."""
+    """Return a unit vector orthogonal to each row of n; equal rows give equal vectors."""
     k = np.argmin(np.abs(n), axis=1)
     i, j = (k + 1) % 3, (k + 2) % 3
     rows = np.arange(len(n))

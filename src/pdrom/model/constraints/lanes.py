@@ -1,10 +1,11 @@
-"""Elements packed in blocks of `LANES` (structure of arrays), so that compiled loops vectorise.
+"""Elements packed in blocks of `LANES` elements (structure of arrays) for vectorised loops.
 
-The k numbers of each element lie in a flat array as [block][number][lane]: number i of element e is
-entry ``(e // LANES * k + i) * LANES + e % LANES``. The last block is filled up with copies of the
-last element. A working array of a kernel has the same form with a single block. A lane is the place
-of one element in a block. Functions of one lane are inlined into the loop over the lanes; they have
-no branches, only selections. Without fast-math the result of an element is the same in every lane.
+A lane is the place of one element in a block. The k numbers of each element are stored in a flat
+array as [block][number][lane]: number i of element e is entry
+``(e // LANES * k + i) * LANES + e % LANES``. The last block is filled up with copies of the last
+element. The working array of a kernel has this layout with a single block. Functions of one lane
+are inlined into the loop over lanes and have selections instead of branches. Fast-math is off, so
+that the result of an element does not depend on its lane.
 """
 
 import numpy as np
@@ -15,12 +16,12 @@ from pdrom.model.compiled.rows import at
 
 LANES = 32
 
-# added to a scale so that its reciprocal does not overflow
+# SMALLEST is added to a scale so that its reciprocal does not overflow
 SMALLEST = 1e-300
 
 
 def lane_function(function):
-    """Compile a function of one lane, to be inlined and without checks for division by zero."""
+    """Compile a ``function`` of one lane: inlined, without checks for division by zero."""
     return inner(function, forceinline=True)
 
 
@@ -30,7 +31,7 @@ def kernel(function):
 
 
 def blocks(elements: int) -> int:
-    """Return the number of blocks of `LANES` elements that a number of ``elements`` fills."""
+    """Return the number of blocks of `LANES` elements for this number of ``elements``."""
     return -(-elements // LANES)
 
 
@@ -48,13 +49,13 @@ def workspace(numbers: int) -> np.ndarray:
 
 
 def workspaces(numbers: int) -> np.ndarray:
-    """Return a `workspace` for each of the two parts of a local kernel, (2, LANES numbers)."""
+    """Return two working arrays, one per part of a local kernel, as rows (2, LANES * numbers)."""
     return workspace(2 * numbers).reshape(2, -1)
 
 
 @lane_function
 def take(packed, numbers, elements, start, out):
-    """Copy one block of ``elements[start:]``, filled up with copies of the last one, to ``out``.
+    """Copy the block of ``elements[start:]`` to ``out``, filled up with copies of the last one.
 
     ``packed`` is an array from `pack` with k = ``numbers`` per element.
     """
@@ -100,7 +101,7 @@ def save_matrix(work, first, lane, matrix):
 
 @lane_function
 def unmarked(work, mark):
-    """Return how many lanes of ``work`` have the value zero at offset ``mark``, as a float."""
+    """Return the number of lanes of ``work`` with the value zero at offset ``mark``, as float."""
     left = 0.0
     for lane in range(LANES):
         left += 1.0 if work[mark * LANES + lane] == 0.0 else 0.0
@@ -155,7 +156,7 @@ def square_distance(a, b):
 
 @lane_function
 def absolute_sum(a):
-    """Return |a_0| + |a_1| + |a_2|; not finite if a component is not finite or it overflows."""
+    """Return |a_0| + |a_1| + |a_2|; not finite if a component is not, or if it overflows."""
     return abs(a[0]) + abs(a[1]) + abs(a[2])
 
 
@@ -168,7 +169,7 @@ def clamp(x, low, high):
 
 @lane_function
 def perpendicular(a):
-    """Return a unit vector orthogonal to the unit vector a, as a deterministic function of a."""
+    """Return a unit vector orthogonal to the unit vector a; equal a give equal results."""
     x, y, z = abs(a[0]), abs(a[1]), abs(a[2])
     first = x <= y and x <= z
     second = not first and y <= z

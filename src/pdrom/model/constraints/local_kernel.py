@@ -1,9 +1,9 @@
 """Local steps as compiled functions that the compiled step loop calls by address.
 
 A local kernel reads its data from a record (an array of addresses and numbers), so that one loop
-serves every mix of groups and reduced local steps. The work units (blocks of elements or rows) of a
-large local step are divided into two fixed parts: the first adds to the right-hand side itself, the
-second to a separate array that is added afterwards.
+can call any combination of constraint groups and reduced local steps. The units of work (blocks of
+elements or rows) of a large local step are divided into two fixed parts. The first part adds to the
+right-hand side, the second to a separate array that is added afterwards.
 """
 
 from collections.abc import Callable, Sequence
@@ -14,14 +14,14 @@ from numba import types
 from pdrom.model.compiled import rows
 from pdrom.model.compiled.functions import Callback, caller, compiled, inner
 
-# Entries of every record: the number of vertices; at FIRST + k the first unit of part k, at
-# FIRST + k + 1 the end of its units. Entries that depend on the kernel begin at OWN.
+# Indices into every record: the number of vertices; FIRST + k is the first unit of part k, and
+# FIRST + k + 1 the end of its units. Entries that differ between kernels begin at OWN.
 VERTICES, FIRST, OWN = 0, 1, 4
-# Requests to a kernel: compute one of the two parts, or prepare data that both parts need.
+# Values of the argument `part` of a kernel: one of two parts, or preparation of data for both.
 PARTS, PREPARE = (0, 1), 2
 
 Table = tuple[np.ndarray, np.ndarray, int]
-"""Addresses of kernels, addresses of their records, and the request that all of them get."""
+"""Addresses of kernels, addresses of their records, and the argument ``part`` of all calls."""
 
 _SIGNATURE = types.float64(types.intp, types.intp, types.intp, types.intp)
 
@@ -29,8 +29,8 @@ _SIGNATURE = types.float64(types.intp, types.intp, types.intp, types.intp)
 def local_kernel(function):
     """Compile ``function(y, rhs, record, part) -> energy``; y, rhs and record are addresses.
 
-    y, rhs : padded vectors (N, 4); S^T W p(y) of the units of the part is added to rhs
-    record : int64 array with the data of the kernel, see `VERTICES`
+    y, rhs : (N, 4), a column of zeros last; S^T W p(y) of the units of the part is added to rhs
+    record : int64 array with the data of the kernel, see `VERTICES`, `FIRST`, `OWN`
     part : one of `PARTS`, or `PREPARE`
     """
     return Callback(function, _SIGNATURE)
@@ -47,9 +47,9 @@ def call(address, y, rhs, record, part):
 
 @compiled(nogil=True)
 def add_part(table, y, rhs):
-    """Call all kernels of a ``table``, which add S^T W p(y) to ``rhs``; return their energy in J.
+    """Call all kernels of a ``table``, each of which adds to ``rhs``; return their energy in J.
 
-    ``y`` and ``rhs`` are addresses of padded vectors (N, 4).
+    ``y`` and ``rhs`` are addresses of arrays (N, 4) with a last column of zeros.
     """
     addresses, records, part = table
     energy = 0.0
@@ -65,15 +65,15 @@ class LocalKernel:
     ----------
     function : result of `local_kernel`; it is compiled when its address is first needed
     vertices, units : number of vertices and number of units (blocks of elements or rows)
-    arrays, numbers : the record has from `OWN` on the numbers, then the addresses of the arrays
-    touched : function that returns the vertices of all units from a given unit on; the kernel is
-        then divided into two parts, without it there is one part
+    arrays, numbers : the record contains, from `OWN` on, the numbers and the arrays' addresses
+    touched : function that maps a unit to the vertices of all units from it on; a kernel with this
+        function is divided into two parts, others have one part
     prepares : whether the kernel must be called with `PREPARE` before its parts
 
     Attributes
     ----------
-    record : int64 array; the ``arrays`` to which it points live as long as the object
-    touched : range of vertices to which the second part adds; empty if there is one part
+    record : int64 array; the ``arrays`` to which it points exist as long as this object
+    touched : range of vertices to which the second part adds; empty without a second part
     """
 
     def __init__(
@@ -107,7 +107,7 @@ def _call(address, y, out, record):
 
 
 def projections(sampler: LocalKernel, y: np.ndarray, count: int) -> np.ndarray:
-    """Return the projections (count, 3) that a ``sampler`` computes at the positions y (N, 3)."""
+    """Return projections (count, 3) that the kernel ``sampler`` writes at positions y (N, 3)."""
     p, places = np.empty((count, 3)), rows.flat(y)
     _call(sampler.address, places.ctypes.data, p.ctypes.data, sampler.record.ctypes.data)
     return p
@@ -118,7 +118,7 @@ class LocalPass:
 
     Attributes
     ----------
-    first, second, preparing : tables for `add_part`: the two parts, and data that both parts need
+    first, second, preparing : tables for `add_part`: first parts, second parts, preparation
     """
 
     def __init__(self, kernels: Sequence[LocalKernel]) -> None:
@@ -167,11 +167,11 @@ _GRADIENTS = types.void(*3 * [types.CPointer(types.float64)], types.intp)
 
 
 def gradient_kernel(function):
-    """Compile ``function(d, parameters, p, m)``, which projects m elements from their S q.
+    """Compile ``function(d, parameters, p, m)``, which computes projections of m elements from S q.
 
     In a position subspace S q is computed by a small dense product, not from vertices. The compiled
-    loop of a subspace calls the result by its attribute ``address``, so that one loop serves every
-    mix of groups.
+    loop of a subspace calls the result by its attribute ``address``, so that one loop can call any
+    combination of groups.
 
     d : pointer to (m, rows, 3) values of S q
     parameters : pointer to the numbers of `ConstraintGroup.kernel_parameters`

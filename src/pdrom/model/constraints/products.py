@@ -1,36 +1,36 @@
-"""Nearest singular values whose product lies in a range, for volume and area constraints.
+"""Nearest singular values with a product in a range, for volume and area constraints.
 
-Given s_1 >= s_2 >= |s_3|, the nearest t_i > 0 with product c satisfy t_i (t_i - s_i) = m with one
-Lagrange multiplier m. With the unknown t = t_3 we have m = t (t - s_3), t_1 and t_2 are the larger
-roots of their equations, and one equation remains (for areas without t_2):
+Given s_1 >= s_2 >= |s_3|, the nearest t_i > 0 with product c satisfy t_i (t_i - s_i) = m with a
+Lagrange multiplier m. With the unknown t = t_3, m = t (t - s_3), t_1 and t_2 are the larger roots
+of their equations, and a single equation remains (for areas without t_2):
 
     f(t) = t t_1(t) t_2(t) - c = 0
 
 If the product of the s_i is below c, there is one solution. If it is far above c (more than six
-times for three equal values), there are several: at the largest t all values shrink, at the
-smallest t mainly the last value shrinks. f is convex near the largest and concave near the smallest
-solution, so that Newton's iteration converges monotonically to each from its outer side, and the
-nearer solution is taken. Bouaziz et al. 2014, appendix A, iterate on these equations from s only.
+times for three equal values), there are several: for the largest t all values shrink, for the
+smallest t mainly the last value. f is convex near the largest and concave near the smallest
+solution. Newton's iteration thus converges monotonically to each from outside, and the nearer of
+the two is the result. Bouaziz et al. 2014, appendix A, iterate on these equations from s only.
 
-Values are scaled by the larger of s_1 and c^(1/3), so that neither huge nor tiny ones overflow.
+Values are divided by the larger of s_1 and c^(1/3), so that neither huge nor tiny ones overflow.
 """
 
 import numpy as np
 
 from pdrom.model.constraints.lanes import LANES, SMALLEST, lane_function, load, save
 
-# offsets in the working array: the values (input and output), then intermediate numbers
+# offsets in the working array: the values (input, then result), and intermediate numbers
 VALUES, SCALE, TARGET, LARGEST, LEAST, MARK, SIZE = 0, 3, 4, 5, 6, 7, 8
 STEPS = 60
-# state of a lane: still iterating; converged or diverged; product in the range from the start
+# state of a lane: still iterating; converged or diverged; initial product already in the range
 _OPEN, _CLOSED, _INSIDE = 1.0, 0.0, 2.0
-# Newton steps below LAST_STEP t, and residuals of f below ROUNDOFF c, are round-off
+# Newton steps below LAST_STEP * t and residuals of f below ROUNDOFF * c are round-off
 LAST_STEP, ROUNDOFF = 1e-15, 1e-10
 
 
 @lane_function
 def _partner(t, s, last):
-    """Return the larger root x of x (x - s) = t (t - last), and its derivative by t."""
+    """Return the larger root x of x (x - s) = t (t - last), ``last`` s_3, and dx/dt."""
     square = s * s + 4.0 * t * (t - last)
     root = np.sqrt(square if square > 0.0 else 0.0)
     return 0.5 * (s + root), (2.0 * t - last) / root if root > 0.0 else 1.0
@@ -38,7 +38,7 @@ def _partner(t, s, last):
 
 @lane_function
 def _product(t, values, solid):
-    """Return the product of t, t_1(t) and t_2(t), its derivative by t, and t_1(t) and t_2(t)."""
+    """Return the product t t_1(t) t_2(t), its derivative by t, t_1(t) and t_2(t)."""
     first, first_slope = _partner(t, values[0], values[2])
     second, second_slope = _partner(t, values[1], values[2])
     second = second if solid else 1.0
@@ -49,7 +49,7 @@ def _product(t, values, solid):
 
 @lane_function
 def _start(work, low, high, solid):
-    """Scale the values and set starting points; return how many lanes need a second one."""
+    """Scale the values and set starting points; return the number of lanes with two solutions."""
     low_root = low ** (1.0 / 3.0) if solid else np.sqrt(low)
     high_root = high ** (1.0 / 3.0) if solid else np.sqrt(high)
     several = 0.0
@@ -61,10 +61,10 @@ def _start(work, low, high, solid):
         scale = s[0] if s[0] > root else root
         inverse = 1.0 / scale
         target = bound * inverse * inverse * (inverse if solid else 1.0)
-        # a smaller target would be negligible relative to the scaled values
+        # not smaller: such a target is negligible compared with the scaled values
         target = target if target > SMALLEST else SMALLEST
         first, second = s[0] * inverse, s[1] * inverse if solid else 1.0
-        # bounds on t where the values grow: t_1 >= s_1, t_2 >= s_2, t_1 >= t_2 >= t
+        # bounds on t if the values must grow: t_1 >= s_1, t_2 >= s_2, t_1 >= t_2 >= t
         least = target / (first * second)
         largest = root * inverse
         other = np.sqrt(target / first) if solid else least
@@ -83,7 +83,7 @@ def _start(work, low, high, solid):
 
 @lane_function
 def _advance(work, place, side, solid):
-    """Do a Newton step from above (side 1) or below (-1); return how many lanes still iterate."""
+    """Do a Newton step from above (side 1) or below (-1); return the number of iterating lanes."""
     left = 0.0
     for lane in range(LANES):
         t, target = work[place * LANES + lane], work[TARGET * LANES + lane]
@@ -103,7 +103,7 @@ def _advance(work, place, side, solid):
 
 @lane_function
 def _distance(t, values, target, solid):
-    """Return the squared distance of s to t_1(t), t_2(t), t; infinite where t is no solution."""
+    """Return the squared distance of s from (t_1(t), t_2(t), t); inf if t is no solution."""
     product, _, first, second = _product(t, values, solid)
     m = t * (t - values[2])
     a, b = m / (first + SMALLEST), m / (second + SMALLEST) if solid else 0.0
@@ -113,7 +113,7 @@ def _distance(t, values, target, solid):
 
 @lane_function
 def _finish(work, solid):
-    """Write the nearer of the two solutions, scaled back, to the values in ``work``."""
+    """Write the nearer of two solutions, in the original scale, to the values in ``work``."""
     for lane in range(LANES):
         values, target = load(work, VALUES, lane), work[TARGET * LANES + lane]
         t, other = work[LARGEST * LANES + lane], work[LEAST * LANES + lane]
@@ -135,7 +135,7 @@ def _finish(work, solid):
 
 @lane_function
 def nearest_block(work, low, high, solid):
-    """Replace the values of a block by the nearest ones with a product in [low, high], 0 < low.
+    """Replace the values of a block by the nearest ones with a product in [low, high], low > 0.
 
     Parameters
     ----------
@@ -150,7 +150,7 @@ def nearest_block(work, low, high, solid):
         if _advance(work, LARGEST, 1.0, solid) == 0.0:
             break
     if several > 0.0:
-        # iterate again in the lanes that may have a second solution, from below
+        # in the lanes that may have a second solution, iterate again, from below
         for lane in range(LANES):
             mark = work[MARK * LANES + lane]
             again = mark == _CLOSED and work[LEAST * LANES + lane] > 0.0
@@ -162,9 +162,9 @@ def nearest_block(work, low, high, solid):
 
 
 def reference_nearest(values: np.ndarray, low: float, high: float) -> np.ndarray:
-    """Return the nearest values (e, 2 or 3) as `nearest_block`, by bisection with NumPy.
+    """Return nearest values (e, 2 or 3) like `nearest_block`, but by bisection with NumPy.
 
-    Where several solutions are possible, each is bracketed on a grid, and the nearest is returned.
+    If several solutions are possible, each is bracketed on a grid, and the nearest is returned.
 
     Parameters
     ----------
@@ -192,7 +192,7 @@ def _values_at(t: np.ndarray, values: np.ndarray) -> np.ndarray:
 def _bisected(
     below: np.ndarray, above: np.ndarray, values: np.ndarray, target: np.ndarray
 ) -> np.ndarray:
-    """Bisect t between ``below`` (product too small) and ``above`` (n,); return the values."""
+    """Return values at t, bisected between ``below`` (n,) (product too small) and ``above``."""
     for _ in range(120):
         middle = 0.5 * (below + above)
         small = _values_at(middle, values).prod(axis=1) < target
@@ -205,7 +205,7 @@ def _nearest_of_several(values: np.ndarray, target: float) -> np.ndarray:
     smallest = min(target / values[:-1].prod(), last)
     grid = np.union1d(np.geomspace(smallest, last, 500), np.linspace(smallest, last, 500))
     same = np.tile(values, (len(grid), 1))
-    # the first grid point is no larger than any solution, up to round-off
+    # no solution is smaller than the first grid point, up to round-off
     small = _values_at(grid, same).prod(axis=1) < target
     small[0] = True
     crossed = np.flatnonzero(small[:-1] & ~small[1:])

@@ -1,12 +1,12 @@
 """Groups on simplices: springs (1 row), triangles (2 rows), tetrahedra (3 rows).
 
 An element with p rows has p + 1 vertices, S q = D^-T [q_1 - q_0, ..., q_p - q_0]^T with the edge
-matrix D of the rest shape (1 for springs). The groups differ in the projection of a block; this
-module gathers and scatters blocks of elements (see `pdrom.model.constraints.lanes`).
+matrix D of the rest shape (1 for springs). This module reads positions and adds forces of blocks of
+elements (see `pdrom.model.constraints.lanes`); the groups differ in the projection of a block.
 
-A block takes an expensive branch as soon as one of its elements needs it. Neighbouring elements are
-in similar states and share vertices in the cache, so that blocks of neighbours are cheap. Meshers
-often list neighbours far apart, so that kernels visit the elements in another order. The public
+A whole block computes an expensive case if one of its elements requires it. Neighbouring elements
+are in similar states and share vertices in the cache, so that blocks of neighbours are cheap. As
+mesh files often list neighbours far apart, kernels visit the elements in another order. The public
 arrays of a group (S, weights, projections) keep the order of the mesh.
 """
 
@@ -25,21 +25,21 @@ from pdrom.model.constraints.local_kernel import FIRST, OWN, VERTICES, LocalKern
 
 # offsets in the working array: edges, S q, p, forces on all corners except corner 0, energy
 EDGE, F, P, FORCE, ENERGY, SIZE = 0, 9, 18, 27, 36, 37
-# offsets in the packed geometry: weight, then the operator or other numbers of the group
+# offsets in the packed geometry: weight, then the operator or other numbers of an element
 WEIGHT, OPERATOR = 0, 1
-# Entries of a kernel's record: size of a working array, number of elements to project; addresses of
-# corners, geometry, constants, working arrays, elements to project, and their corners and geometry.
+# Indices into a kernel's record: size of a working array, number of elements to project; addresses
+# of corners, geometry, constants, working arrays, elements to project, their corners and geometry.
 WORK_SIZE, COUNT, CORNERS, GEOMETRY, CONSTANTS, WORK, ELEMENTS = range(OWN, OWN + 7)
 TAKEN, TAKEN_GEOMETRY, ARRAYS = range(OWN + 7, OWN + 10)
 
 
 class SimplexGroup(StencilGroup):
-    """A group of simplices whose kernels work on packed blocks.
+    """A group of simplices whose kernels work on packed blocks of elements.
 
     A subclass sets two kernels and overrides `_extra` if its elements have other packed numbers:
 
     accumulate_kernel : a `pdrom.model.constraints.local_kernel.local_kernel` whose units are blocks
-    project_kernel : another local kernel, which writes projections of some elements, see `samples`
+    project_kernel : local kernel that writes the projections of some elements, see `samples`
     """
 
     accumulate_kernel: Any
@@ -62,7 +62,7 @@ class SimplexGroup(StencilGroup):
         self._corners = pack(visited)
         numbers = self._visited(np.column_stack([self.weights, *self._extra()]))
         self._geometry = pack(numbers)
-        # the copies that fill up the last block get weight 0, hence no force and no energy
+        # copies that fill up the last block have the weight 0, hence no force and no energy
         by_lane = self._geometry.reshape(blocks(e), numbers.shape[1], LANES)
         by_lane[-1:, WEIGHT, e - LANES * (blocks(e) - 1) :] = 0.0
         self._work = workspaces(self.work_size)
@@ -80,7 +80,7 @@ class SimplexGroup(StencilGroup):
         return self._kernel(self.project_kernel, places)
 
     def _kernel(self, function: Any, elements: np.ndarray, touched: Any = None) -> LocalKernel:
-        """Return the kernel of a ``function`` that projects ``elements``, or accumulates all."""
+        """Return the kernel of ``function``, which projects ``elements`` or accumulates all."""
         data = (self._corners, self._geometry, np.array(self.allowed), self._work)
         arrays = (*data, elements, *self._taken, *self._own_arrays)
         numbers = self._work.shape[1], len(elements)
@@ -88,16 +88,16 @@ class SimplexGroup(StencilGroup):
         return LocalKernel(function, self.S.shape[1], count, arrays, numbers, touched)
 
     def _extra(self) -> list[np.ndarray]:
-        """Return packed numbers after the weight: the operator without the column of corner 0."""
+        """Return the packed numbers after the weight: the operator without corner 0's column."""
         return [self.operator[:, :, 1:].reshape(self.elements, self.rows_per_element**2)]
 
 
 @lane_function
 def arguments(y, rhs, record, part, corners, numbers):
-    """Return (y, rhs, corners, geometry, constants, work, first block, end of the blocks).
+    """Return y, rhs, corners, geometry, constants, work, first block and end of the blocks.
 
-    ``y``, ``rhs``, ``record`` and ``part`` are the arguments of a `local_kernel`; ``corners`` and
-    ``numbers`` count the vertices and the packed numbers of an element.
+    They are arrays from addresses ``y``, ``rhs``, ``record`` of a `local_kernel`. An element has
+    ``corners`` vertices and ``numbers`` packed numbers.
     """
     entries = rows.indices(record, ARRAYS)
     count = WIDTH * entries[VERTICES]
@@ -117,7 +117,7 @@ def arguments(y, rhs, record, part, corners, numbers):
 
 @lane_function
 def samples(record, corners, numbers):
-    """Return the elements to project of a ``record``, and memory for their corners and geometry.
+    """Return the elements to project, from a ``record``, and memory for their corners and geometry.
 
     The memory is for one block, see `pdrom.model.constraints.lanes.take`, with ``corners`` vertices
     and ``numbers`` packed numbers per element.
@@ -143,7 +143,7 @@ def corner_rows(y, corners, place):
 
 @lane_function
 def edge_columns(start, end):
-    """Return x, y and z of four edges from the rows ``start`` and ``end`` of their vertices."""
+    """Return rows x, y, z of four edges, from rows ``start``, ``end`` of their four vertices."""
     return transposed(
         subtract(end[0], start[0]),
         subtract(end[1], start[1]),
@@ -169,7 +169,7 @@ def gather_edges(y, corners, block, edges, work):
 
 @lane_function
 def copy_rows(d, count, start, work, first):
-    """Copy S q = ``d`` (m count, 3) of a block from element ``start`` on to offset ``first``."""
+    """Copy S q of a block, ``d`` (m count, 3) from element ``start`` on, to offset ``first``."""
     last = d.shape[0] // count - 1
     for lane in range(LANES):
         base = count * min(start + lane, last)
@@ -179,7 +179,7 @@ def copy_rows(d, count, start, work, first):
 
 @lane_function
 def add_to(rhs, corners, place, forces):
-    """Add four ``forces`` to ``rhs`` at ``corners[place:place + 4]``, where corners may repeat."""
+    """Add four ``forces`` to ``rhs`` at ``corners[place:place + 4]``; corners may repeat."""
     for lane in range(WIDTH):
         v = WIDTH * at(corners, place + lane)
         rows.store(rhs, v, add(rows.load(rhs, v), forces[lane]))
@@ -187,7 +187,7 @@ def add_to(rhs, corners, place, forces):
 
 @lane_function
 def take_from(rhs, corners, place, forces):
-    """Subtract four ``forces`` from ``rhs`` at ``corners[place:place + 4]``, as `add_to` adds."""
+    """Subtract four ``forces`` from ``rhs`` at ``corners[place:place + 4]``; they may repeat."""
     for lane in range(WIDTH):
         v = WIDTH * at(corners, place + lane)
         rows.store(rhs, v, subtract(rows.load(rhs, v), forces[lane]))
@@ -195,7 +195,7 @@ def take_from(rhs, corners, place, forces):
 
 @lane_function
 def scatter(work, corners, block, edges, rhs):
-    """Add the forces of a block in ``work`` to ``rhs``, a flat array of rows of four numbers.
+    """Add the forces of a block, in ``work``, to ``rhs``, a flat array of rows of four numbers.
 
     ``work`` has the forces on corners 1, ..., ``edges``; corner 0 gets minus their sum.
     """
@@ -215,7 +215,7 @@ def scatter(work, corners, block, edges, rhs):
 
 @lane_function
 def store_projections(work, count, start, p):
-    """Copy the projections of a block in ``work`` to ``p``, from element ``start`` on.
+    """Copy the projections of a block, in ``work``, to ``p`` from element ``start`` on.
 
     p : flat array with three numbers per row and ``count`` rows per element
     """
@@ -225,13 +225,13 @@ def store_projections(work, count, start, p):
             p[at_p], p[at_p + 1], p[at_p + 2] = load(work, P + 3 * i, lane)
 
 
-# The order of the mesh is used if its blocks have at most KEPT times as many vertices as blocks in
-# the sorted order. This holds for grids.
+# Elements are visited in the order of the mesh if its blocks have at most KEPT times as many
+# vertices as blocks in the sorted order, as is the case for grids.
 KEPT = 1.5
 
 
 def visiting_order(stencil: np.ndarray, vertices: int) -> np.ndarray | None:
-    """Return the elements (e,) in the order to visit them; None for the order of the mesh.
+    """Return element indices (e,) in the order of visits; None for the order of the mesh.
 
     Elements are sorted by their vertices, which the reverse Cuthill-McKee algorithm (Cuthill and
     McKee 1969) numbers such that neighbours have similar numbers.
@@ -254,7 +254,7 @@ def visiting_order(stencil: np.ndarray, vertices: int) -> np.ndarray | None:
 
 
 def _corners(stencil: np.ndarray) -> int:
-    """Return the sum of the numbers of distinct vertices over all blocks."""
+    """Return the number of distinct vertices of a block, summed over all blocks."""
     blocks = np.arange(len(stencil)) // LANES
     pairs = blocks[:, None] * (int(stencil.max()) + 1) + stencil
     return len(np.unique(pairs))

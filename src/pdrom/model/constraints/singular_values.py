@@ -1,14 +1,14 @@
-"""Groups on triangles and tetrahedra that project F by its singular values.
+"""Groups on triangles and tetrahedra that project the deformation gradient F.
 
-S q = F^T of an element is projected onto the matrices whose singular values, or the product of all
-singular values, lie in a range. Groups differ in three compiled functions of a block:
+S q = F^T of an element is projected onto the matrices whose singular values, or their product, lie
+in a range. Groups differ in three compiled functions of a block of elements:
 
 gradients(work, geometry, block) : compute S q from the edges
 nearest(work, low, high) : compute the projections p
 forces(work, geometry, block) : compute the forces S^T W p on the corners, and w |S q - p|^2
 
-The loops over blocks are in this module. Each group calls them, with its functions, in kernels of
-its own: Numba caches these kernels on disk, but no closures and no functions of functions.
+The loops over blocks are in this module. Each group has its own kernels, which call the loops with
+its functions: Numba caches such kernels on disk, but neither closures nor functions of functions.
 """
 
 from typing import Annotated, Self
@@ -27,13 +27,13 @@ from pdrom.model.mesh.types import Mesh
 
 @template
 def project(y_place, p_place, record, part, rows, gradients, nearest):
-    """Write projections of some elements, whose S_e has ``rows`` rows; see `local_kernel`.
+    """Write projections of some elements, whose S_e has ``rows`` rows, to memory at ``p_place``.
 
     Parameters
     ----------
-    y_place, p_place, record : addresses
+    y_place, p_place, record : addresses of positions, projections and record of a local kernel
     part : 0 or 1, selects the working array
-    gradients, nearest : functions of a block, see the module
+    gradients, nearest : functions of a block, see the module's docstring
     """
     corners, numbers = rows + 1, 1 + rows * rows
     y, _, packed, geometry, allowed, work, _, _ = simplex.arguments(
@@ -58,7 +58,7 @@ def accumulate(y_place, rhs_place, record, part, rows, gradients, nearest, force
 
     Parameters
     ----------
-    y_place, rhs_place, record : addresses
+    y_place, rhs_place, record : addresses of positions, right-hand side and record
     rows, gradients, nearest, forces : number of rows of S_e; functions of a block, see the module
     """
     y, rhs, corners, geometry, allowed, work, first, last = simplex.arguments(
@@ -81,7 +81,7 @@ def accumulate(y_place, rhs_place, record, part, rows, gradients, nearest, force
 
 @template
 def project_gradients(d_pointer, range_pointer, p_pointer, m, rows, work_size, nearest):
-    """Write the projections of m elements from S q; ``work_size`` is the working array per lane.
+    """Write projections of m elements from their S q; working memory has ``work_size`` per lane.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ def project_gradients(d_pointer, range_pointer, p_pointer, m, rows, work_size, n
 
 
 class StrainConfig(GroupConfig):
-    """Allowed singular values [``minimum``, ``maximum``]; ``minimum`` > 0."""
+    """Range [``minimum``, ``maximum``] of the allowed values; ``minimum`` > 0."""
 
     minimum: Annotated[float, Field(gt=0.0, le=1.0)] = 0.99
     maximum: Annotated[float, Field(ge=1.0, le=1e3)] = 1.01
@@ -112,13 +112,13 @@ class StrainConfig(GroupConfig):
 
 
 class SingularValueGroup(simplex.SimplexGroup):
-    """A group on triangles or tetrahedra that projects F by its singular values, see the module."""
+    """Group on triangles or tetrahedra that projects F by its singular values."""
 
     manifold = "clamped"
 
     @property
     def allowed(self) -> tuple[float, float]:
-        """Least and largest allowed singular value."""
+        """Least and largest allowed singular value, or product of them."""
         return self.config.minimum, self.config.maximum
 
     def _set_up(self, mesh: Mesh, inverse: np.ndarray) -> None:
@@ -134,7 +134,7 @@ class SingularValueGroup(simplex.SimplexGroup):
     def reference_project(self, d: np.ndarray, elements: np.ndarray) -> np.ndarray:
         u, sigma, vt = np.linalg.svd(d, full_matrices=False)
         if self.rows_per_element == 3:
-            # the smallest singular value carries the sign of the determinant
+            # the smallest singular value gets the sign of the determinant
             turned = np.sign(np.linalg.det(u) * np.linalg.det(vt))
             sigma[:, 2] *= turned
             u[:, :, 2] *= turned[:, None]

@@ -14,12 +14,12 @@ from pdrom.model.constraints.lanes import LANES, SMALLEST, lane_function, pack, 
 from pdrom.model.constraints.local_kernel import gradient_kernel, local_kernel
 from pdrom.model.mesh.types import Mesh
 
-# packed numbers per edge: weight and rest length in the geometry, 3 in the array of rest edges
+# packed numbers of an edge: weight and rest length; in another array the 3 of the rest edge
 LENGTH, GEOMETRY = 1, 2
 REST = 3
-# further entries of the record: addresses of all rest edges, and of memory for one block of them
+# further indices into the record: addresses of all rest edges, and of memory for a block of them
 REST_EDGES, TAKEN_REST = simplex.ARRAYS, simplex.ARRAYS + 1
-# range of squared lengths that neither overflow nor lose digits
+# squared lengths in this range neither overflow nor lose digits
 LOW, HIGH = 1e-280, 1e280
 
 
@@ -30,13 +30,13 @@ def _squares(x, y, z):
 
 @lane_function
 def _rest_lengths(x, y, z, length, rest, place):
-    """Return four edges, scaled to their rest ``length``; zero edges become ``rest[place:]``."""
+    """Return four edges scaled to their rest ``length``; rest edges if they have length zero."""
     square = _squares(x, y, z)
     factor = divide(length, arithmetic.square_root(square))
     px, py, pz = multiply(factor, x), multiply(factor, y), multiply(factor, z)
     if arithmetic.all_within(square, LOW, HIGH):
         return px, py, pz
-    # scale so that squares neither overflow nor underflow; edges that are not finite stay so
+    # scaled, so that squares neither overflow nor underflow; edges that are not finite stay so
     scale = add(add(arithmetic.magnitude(x), arithmetic.magnitude(y)), arithmetic.magnitude(z))
     inverse = divide(arithmetic.constant(1.0), add(scale, arithmetic.constant(SMALLEST)))
     ux, uy, uz = multiply(inverse, x), multiply(inverse, y), multiply(inverse, z)
@@ -145,7 +145,7 @@ class EdgeSpring(simplex.SimplexGroup):
     unit = "m"
     rows_per_element = 1
     per_element = ("rest",)
-    reordered = False  # edges are already sorted by vertices, and all are equally expensive
+    reordered = False  # edges are sorted by vertices already, and all cost the same
     split_from = 8192
     project_kernel = _project
     accumulate_kernel = _accumulate
@@ -161,7 +161,7 @@ class EdgeSpring(simplex.SimplexGroup):
         self._assemble(mesh.vertices)
 
     def _assemble(self, vertices: int) -> None:
-        # an array apart from the geometry, as only edges of length zero need their rest edge
+        # not part of the geometry, since only edges of length zero need their rest edge
         self._own_arrays = pack(self.rest), np.empty(REST * LANES)
         super()._assemble(vertices)
 

@@ -1,9 +1,9 @@
-"""Compiled singular value decomposition of 3 x 3 matrices with signed values, for blocks of them.
+"""Compiled singular value decomposition, with signed values, of blocks of 3 x 3 matrices.
 
 One-sided Jacobi (Hestenes 1958; Demmel and Veselic 1992): rotations V make the columns of B = F V
-orthogonal, their norms are the singular values. It works on F, never on F^T F, so that small
-singular values and their directions keep their relative accuracy. Matrices are stored as in
-S q = F^T: vector k of a matrix is column k of F. See module `lanes` for the layout.
+orthogonal, and their norms are the singular values. F^T F is never formed, so that small singular
+values and their directions keep their relative accuracy. Matrices are stored as S q = F^T: vector k
+of a matrix is column k of F. See module `lanes` for the layout of blocks.
 """
 
 import numpy as np
@@ -12,16 +12,16 @@ from pdrom.model.constraints import lanes, simplex
 from pdrom.model.constraints.lanes import LANES, absolute_sum, choose, dot, load, mix, save, scaled
 
 SWEEPS = 12
-# two columns with a smaller cosine count as orthogonal
+# two columns count as orthogonal if the cosine of their angle is smaller
 ORTHOGONAL = 1e-15
-# if all tangents of a sweep are smaller, the remaining cosines are of the size of their square
+# if all tangents of rotations in a sweep are smaller, the remaining cosines are about their squares
 LAST_TANGENT = 1e-8
-# a second singular value below this fraction of the first has no accurate singular vector
+# if the second singular value is below this fraction of the first, its vector is inaccurate
 RANK = 1e-15
 
 
 # further offsets in the working array: B, V, scale, DONE (1: columns are orthogonal), the signed
-# singular values, FOUND (1: a cheaper method has already computed the projection)
+# singular values, FOUND (1: a cheaper method has already computed this lane's projection)
 B, V, SCALE, DONE, SIGMA, FOUND, SIZE = np.add(simplex.SIZE, [0, 9, 18, 19, 20, 23, 24]).tolist()
 
 
@@ -29,7 +29,7 @@ B, V, SCALE, DONE, SIGMA, FOUND, SIZE = np.add(simplex.SIZE, [0, 9, 18, 19, 20, 
 def jacobi_rotation(a, b, done):
     """Return cosine, sine and |tangent| of the rotation that makes columns a and b orthogonal.
 
-    The rotation is the identity where the lane is ``done``.
+    The rotation is the identity if the lane is ``done``.
     """
     alpha, beta, gamma = dot(a, a), dot(b, b), dot(a, b)
     half = 0.5 * (beta - alpha)
@@ -43,7 +43,7 @@ def jacobi_rotation(a, b, done):
 
 @lanes.lane_function
 def _sweep(work):
-    """Rotate each pair of columns once; return how many lanes are not yet orthogonal."""
+    """Rotate each pair of columns once; return the number of lanes not yet orthogonal."""
     for lane in range(LANES):
         b0, b1, b2 = lanes.load_matrix(work, B, lane)
         v0, v1, v2 = lanes.load_matrix(work, V, lane)
@@ -66,9 +66,9 @@ def _sweep(work):
 
 @lanes.lane_function
 def _larger_first(a, v, b, w):
-    """Return columns a, b with right singular vectors v, w as (a, v, b, w), longer column first.
+    """Return (a, v, b, w) with the longer of the columns a, b first; v, w are singular vectors.
 
-    If they are swapped, one pair changes sign, so that V stays a rotation.
+    If the pairs are swapped, one of them changes its sign, so that V stays a rotation.
     """
     swap = dot(a, a) < dot(b, b)
     return (
@@ -87,7 +87,7 @@ def orthonormal_pair(b0, b1):
     """
     s0 = np.sqrt(dot(b0, b0))
     u0 = choose(s0 > 0.0, scaled(1.0 / s0, b0), (1.0, 0.0, 0.0))
-    # remove the round-off component along the large column, which would tilt the small one
+    # remove the round-off along the long column, which would change the direction of the short one
     b1 = mix(1.0, b1, -dot(u0, b1), u0)
     s1 = np.sqrt(dot(b1, b1))
     u1 = choose(s1 > RANK * s0, scaled(1.0 / s1, b1), lanes.perpendicular(u0))
@@ -96,11 +96,11 @@ def orthonormal_pair(b0, b1):
 
 @lanes.lane_function
 def rotated_pair(f0, f1, sign):
-    """Decompose two columns into singular values and vectors by one rotation, without F^T F.
+    """Singular value decomposition of two columns by one rotation, without forming F^T F.
 
-    Return the scale, cosine and sine of the rotation, whether the second rotated column is longer,
-    and the directions and norms (divided by the scale), longer column first. If they are swapped,
-    the first column is multiplied by ``sign``.
+    Return a scale, cosine and sine of the rotation, whether the rotated columns were swapped since
+    the second is longer, and their directions and norms (over the scale), longer column first. If
+    they are swapped, the first column is multiplied by ``sign``.
     """
     scale = absolute_sum(f0) + absolute_sum(f1) + lanes.SMALLEST
     f0, f1 = scaled(1.0 / scale, f0), scaled(1.0 / scale, f1)
@@ -115,7 +115,7 @@ def rotated_pair(f0, f1, sign):
 def factor_block(work):
     """Write U to `B`, V to `V` and the signed singular values of F, largest first, to `SIGMA`.
 
-    The results are meaningless in lanes that are marked `FOUND`.
+    Lanes with `FOUND` = 1, whose projection is already known, get meaningless results.
     """
     for lane in range(LANES):
         f0, f1, f2 = lanes.load_matrix(work, simplex.F, lane)
@@ -144,7 +144,7 @@ def factor_block(work):
 
 @lanes.lane_function
 def compose_block(work):
-    """Write U diag(sigma) V^T of `factor_block` to P, except where P is known already (`FOUND`)."""
+    """Write U diag(sigma) V^T of `factor_block` to P, except in lanes with a known P (`FOUND`)."""
     for lane in range(LANES):
         u, v = lanes.load_matrix(work, B, lane), lanes.load_matrix(work, V, lane)
         sigma, found = load(work, SIGMA, lane), work[FOUND * LANES + lane] != 0.0

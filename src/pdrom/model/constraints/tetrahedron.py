@@ -1,8 +1,8 @@
-"""Groups on tetrahedra: the operator S q = F^T and kernels that clamp singular values.
+"""Groups on tetrahedra: operator S q = F^T (deformation gradient) and kernels that clamp it.
 
-X <- (X + X^-T) / 2 converges quadratically to the orthogonal polar factor (Higham 1986). It is used
-for well-conditioned matrices with positive determinant; module `svd3` projects all others. A matrix
-with all singular values in the range is its own projection.
+The iteration X <- (X + X^-T) / 2 converges quadratically to the orthogonal polar factor (Higham
+1986). It is used for well-conditioned matrices with positive determinant, the decomposition of
+module `svd3` for others. A matrix with all singular values in the range is its own projection.
 """
 
 from typing import Literal
@@ -19,10 +19,10 @@ from pdrom.model.constraints.svd3 import FOUND
 from pdrom.model.mesh.types import Mesh
 
 STEPS = 16
-# bound of det F over the cube of the root mean square of the singular values; below it the SVD is
-# used
+# the SVD is used if det F over the cube of the root mean square of the singular values is below
+# this
 WELL_CONDITIONED = 1e-2
-# squared norm of the last Newton step: by quadratic convergence it leaves an error of 1e-18
+# the iteration ends if a step has a smaller squared norm, which leaves an error of about 1e-18
 LAST_STEP = 1e-18
 
 _OPEN, _FOUND, _UNSUITED = 0.0, 1.0, 2.0
@@ -34,8 +34,8 @@ def _start(work):
         f0, f1, f2 = lanes.load_matrix(work, F, lane)
         square = (dot(f0, f0) + dot(f1, f1) + dot(f2, f2)) / 3.0
         inverse = 1.0 / np.sqrt(square)
-        # scale before the determinant, whose products could overflow; if the mean square overflows
-        # or vanishes, F does not suit the iteration
+        # scaled first, since products in the determinant could overflow; if the mean square itself
+        # overflows or vanishes, the SVD is used
         x0, x1, x2 = scaled(inverse, f0), scaled(inverse, f1), scaled(inverse, f2)
         suited = square > lanes.SMALLEST and dot(x0, cross(x1, x2)) > WELL_CONDITIONED
         lanes.save_matrix(work, P, lane, (x0, x1, x2))
@@ -44,7 +44,7 @@ def _start(work):
 
 @lanes.lane_function
 def _advance(work):
-    """Do one Newton step in the lanes that still iterate; the other lanes do not change."""
+    """Do one step of the iteration in lanes that still iterate; the others do not change."""
     for lane in range(LANES):
         x0, x1, x2 = lanes.load_matrix(work, P, lane)
         c0, c1, c2 = cross(x1, x2), cross(x2, x0), cross(x0, x1)
@@ -60,7 +60,7 @@ def _advance(work):
 
 @lanes.lane_function
 def _rotations(work):
-    """Write the nearest rotations of well-conditioned F to P; set FOUND to 1 there, else to 0."""
+    """Write nearest rotations to P and 1 to FOUND in lanes of well-conditioned F; 0 in others."""
     _start(work)
     for _ in range(STEPS):
         _advance(work)
@@ -73,9 +73,9 @@ def _rotations(work):
 
 @lanes.lane_function
 def _within_range(work, low, high):
-    """Copy F to P; set FOUND to 1 where the singular values are proven to lie in [low, high].
+    """Copy F to P; set FOUND to 1 in lanes whose singular values are certainly in [low, high].
 
-    The sufficient condition is det F > 0 and a small |F^T F - I|_F, which bounds the distance of
+    A sufficient condition is det F > 0 and a small |F^T F - I|_F, an upper bound of the distance of
     every squared singular value from 1.
     """
     slack = min(1.0 - low * low, high * high - 1.0)
@@ -89,7 +89,7 @@ def _within_range(work, low, high):
         work[FOUND * LANES + lane] = 1.0 if inside else 0.0
 
 
-# packed numbers per element: the weight and 9 entries of the operator
+# number of packed numbers of an element: the weight and 9 entries of the operator
 GEOMETRY = 10
 
 
@@ -106,9 +106,9 @@ def gradients(work, geometry, block):
 
 @lanes.lane_function
 def _nearest(work, low, high):
-    """Write the projections of a block: cheap cases first, the SVD if any lane remains.
+    """Write the projections of a block; compute the SVD only if cheaper methods do not suffice.
 
-    A matrix with an entry that is not finite is projected to nan.
+    The projection of a matrix with an entry that is not finite is nan.
     """
     if low == high == 1.0:
         _rotations(work)
@@ -128,7 +128,7 @@ def _nearest(work, low, high):
 def forces(work, geometry, block):
     """Write the forces S^T W p on the corners to ``work`` and add w |S q - p|^2 to its energy.
 
-    ``block`` and ``geometry`` are as in `gradients`.
+    ``geometry`` has the packed numbers of all blocks, ``block`` is the index of one.
     """
     weight, start = block * GEOMETRY + WEIGHT, block * GEOMETRY + OPERATOR
     for lane in range(LANES):
@@ -160,7 +160,7 @@ def _project_gradients(d, allowed, p, m):
 
 
 class TetrahedronGroup(singular_values.SingularValueGroup):
-    """One constraint per tetrahedron on the signed singular values of F, weight w V_t."""
+    """One constraint per tetrahedron on F; weight w V_t with the rest volume V_t."""
 
     cells = "tetrahedron"
     rows_per_element = 3
@@ -180,7 +180,7 @@ class TetrahedronGroup(singular_values.SingularValueGroup):
 
 
 class TetrahedronStrain(TetrahedronGroup):
-    """Clamping of singular values to [minimum, maximum] > 0; projections have a positive det."""
+    """Strain of tetrahedra: singular values are clamped to [minimum, maximum] > 0, det p > 0."""
 
     class Config(singular_values.StrainConfig):
         """Weight w per volume, N/m^2."""
@@ -189,7 +189,7 @@ class TetrahedronStrain(TetrahedronGroup):
 
 
 class DeformationGradient(TetrahedronGroup):
-    """Projection of F to the nearest rotation U V^T, det +1: singular values in [1, 1]."""
+    """Projection of F to the nearest rotation U V^T with determinant +1 (singular values 1)."""
 
     class Config(GroupConfig):
         """Weight w per volume, N/m^2."""

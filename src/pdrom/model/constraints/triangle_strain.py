@@ -3,11 +3,11 @@
 Bouaziz et al. 2014, sect. 5.1. F maps the 2-D rest frame in the plane of the triangle to space, so
 that the constraint is invariant under rotations in space. S q = F^T has two rows per element.
 
-The singular values of F are the roots of the eigenvalues m +- h of F^T F, and the nearest matrix is
-F (g_1 v_1 v_1^T + g_2 v_2 v_2^T) with g_i = clamp(sigma_i) / sigma_i, where v_1 v_1^T - v_2 v_2^T
-is the traceless part of F^T F over h, so that no v_i is computed. This closed form is used unless F
-is nearly rank deficient ("flat"); the smaller singular value comes from the cross product of the
-columns, without cancellation. Flat matrices use a one-sided Jacobi rotation (module `svd3`). Vector
+The singular values sigma_i of F are square roots of the eigenvalues m +- h of F^T F. The nearest
+matrix is F (g_1 v_1 v_1^T + g_2 v_2 v_2^T) with g_i = clamp(sigma_i) / sigma_i and eigenvectors
+v_i; they are not computed, since v_1 v_1^T - v_2 v_2^T is the traceless part of F^T F over h. The
+smaller singular value comes from the cross product of the columns, without cancellation. If F is
+nearly rank deficient ("flat"), a one-sided Jacobi rotation is used instead (module `svd3`). Vector
 k of a stored matrix is column k of F (S q = F^T). See module `lanes` for the layout.
 """
 
@@ -24,24 +24,24 @@ from pdrom.model.constraints.simplex import EDGE, ENERGY, FORCE, OPERATOR, SIZE,
 from pdrom.model.constraints.svd3 import rotated_pair
 from pdrom.model.mesh.types import Mesh
 
-# bound of sigma_1 sigma_2 over the mean of their squares; below it F is nearly rank deficient
+# F is nearly rank deficient if sigma_1 sigma_2 over the mean of their squares is below this
 FLAT = 1e-2
-# range of the mean square in which the closed form neither overflows nor loses digits
+# if the mean square is in this range, the closed form neither overflows nor loses digits
 LOW, HIGH = 1e-60, 1e60
-# added to h, relative to m: avoids the division by zero where sigma_1 = sigma_2 up to round-off
+# EQUAL m is added to h: no division by zero if sigma_1 = sigma_2 up to round-off
 EQUAL = 1e-17
 
 
 @lanes.lane_function
 def _closed_form(f0, f1, low, high):
-    """Return the columns of the nearest matrix, and whether the closed form is accurate for F."""
+    """Return the columns of the nearest matrix, and whether this closed form is accurate."""
     a, b, off = dot(f0, f0), dot(f1, f1), dot(f0, f1)
     mean, half = 0.5 * (a + b), 0.5 * (a - b)
     h = np.sqrt(half * half + off * off) + EQUAL * mean
     normal = lanes.cross(f0, f1)
     product = np.sqrt(dot(normal, normal))
     large = np.sqrt(mean + h)
-    # compute three reciprocals with one division
+    # three reciprocals from one division
     inverse = 1.0 / (large * product * h)
     of_large, of_product, of_h = (
         inverse * product * h,
@@ -69,9 +69,9 @@ def _rotated(f0, f1, low, high):
     return mix(c, a, s, b), mix(c, b, -s, a)
 
 
-# packed numbers per element: the weight and 4 entries of the operator
+# number of packed numbers of an element: the weight and 4 entries of the operator
 GEOMETRY = 5
-# offset in the working array of the flag that the closed form is accurate; size of this array
+# offset of the flag "closed form is accurate" in the working array; size of this array
 FOUND, WORK = SIZE, SIZE + 1
 
 
@@ -91,7 +91,7 @@ def gradients(work, geometry, block):
 def forces(work, geometry, block):
     """Write the forces S^T W p on the corners to ``work`` and add w |S q - p|^2 to its energy.
 
-    ``block`` and ``geometry`` are as in `gradients`.
+    ``geometry`` has the packed numbers of all blocks, ``block`` is the index of one.
     """
     weight = (block * GEOMETRY + WEIGHT) * LANES
     first = (block * GEOMETRY + OPERATOR) * LANES
@@ -140,12 +140,12 @@ def _project_gradients(d, allowed, p, m):
 
 
 def rest_frames(points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return inverse rest edge matrices D^-1 (T, 2, 2) in 2-D frames, and the areas (T,) m^2.
+    """Return inverse rest edge matrices D^-1 (T, 2, 2), in 2-D frames, and rest areas (T,) m^2.
 
     Parameters
     ----------
-    points : (N, 3) m
-    triangles : (T, 3)
+    points : (N, 3) m, rest shape
+    triangles : (T, 3) vertex indices
     """
     first = points[triangles[:, 1]] - points[triangles[:, 0]]
     second = points[triangles[:, 2]] - points[triangles[:, 0]]
@@ -164,7 +164,7 @@ class TriangleStrain(singular_values.SingularValueGroup):
     """One constraint per triangle on the singular values of F; weight w A_t with the rest area."""
 
     class Config(singular_values.StrainConfig):
-        """Weight w per area, N/m (times the clamped strain)."""
+        """Weight w per area, N/m, and the range of singular values."""
 
         effect: Literal["strain"] = "strain"
 

@@ -1,7 +1,7 @@
 """Volume constraints of tetrahedra: det F lies in a range (Bouaziz et al. 2014, 5.1).
 
-Area constraints of triangles: the product of the two singular values of F lies in a range. Both
-sets of matrices are unbounded, as an element may become arbitrarily long and thin; there is thus no
+In area constraints of triangles, the product of the two singular values of F lies in a range. As an
+element may become arbitrarily long and thin, both sets of matrices are unbounded, and there is no
 bound of the projections.
 """
 
@@ -15,13 +15,13 @@ from pdrom.model.constraints.simplex import SIZE, F, P
 from pdrom.model.constraints.svd3 import FOUND, SIGMA, rotated_pair
 from pdrom.model.constraints.tetrahedron import TetrahedronGroup, forces, gradients
 
-# offset of the working array of module `products`, and total size
+# offset of module `products`' part of the working array, and total size
 VALUES, WORK = svd3.SIZE, svd3.SIZE + products.SIZE
 
 
 @lanes.lane_function
 def _nearest(work, low, high):
-    """Write the projections of a block to ``work``; F is its own projection if det F is allowed."""
+    """Write the projections of a block to ``work``; it is F itself if det F is in the range."""
     for lane in range(lanes.LANES):
         f0, f1, f2 = lanes.load_matrix(work, F, lane)
         volume = lanes.dot(f0, lanes.cross(f1, f2))
@@ -55,13 +55,13 @@ def _project_gradients(d, allowed, p, m):
 
 
 class TetrahedronVolume(TetrahedronGroup):
-    """One constraint per tetrahedron on det F, the volume over the rest volume V_t; weight w V_t.
+    """One constraint per tetrahedron on det F = volume / rest volume V_t, with the weight w V_t.
 
     The projection of an inverted tetrahedron has a positive volume.
     """
 
     class Config(singular_values.StrainConfig):
-        """Weight w per volume, N/m^2; allowed volumes [minimum, maximum] over that at rest."""
+        """Weight w per volume, N/m^2; allowed range [minimum, maximum] of volume / rest volume."""
 
         effect: Literal["volume"] = "volume"
 
@@ -75,8 +75,8 @@ class TetrahedronVolume(TetrahedronGroup):
         return products.reference_nearest(sigma, *self.allowed)
 
 
-# further offsets in the working array of areas: columns of U, cosine and sine of the rotation V;
-# then the working array of module `products`
+# further offsets in the working array of areas: columns of U, cosine and sine of the rotation V,
+# followed by the part of module `products`
 U, COSINE, SINE = SIZE, SIZE + 6, SIZE + 7
 AREA_VALUES, AREA_WORK = SIZE + 8, SIZE + 8 + products.SIZE
 
@@ -91,7 +91,7 @@ def _nearest_area(work, low, high):
         u0, u1, s0, s1 = pair
         lanes.save(work, U, lane, u0)
         lanes.save(work, U + 3, lane, u1)
-        # rotating by another 90 degrees puts the longer column first
+        # a further rotation by 90 degrees puts the longer column first
         work[COSINE * lanes.LANES + lane] = s if swapped else c
         work[SINE * lanes.LANES + lane] = -c if swapped else s
         lanes.save(values, products.VALUES, lane, (scale * s0, 1.0, scale * s1))
@@ -122,10 +122,10 @@ def _project_area_gradients(d, allowed, p, m):
 
 
 class TriangleArea(triangle_strain.TriangleStrain):
-    """One constraint per triangle on its area over the rest area A_t, with the weight w A_t."""
+    """One constraint per triangle on area / rest area A_t, with the weight w A_t."""
 
     class Config(singular_values.StrainConfig):
-        """Weight w per area, N/m; allowed areas [minimum, maximum] over that at rest."""
+        """Weight w per area, N/m; allowed range [minimum, maximum] of area / rest area."""
 
         effect: Literal["area"] = "area"
 

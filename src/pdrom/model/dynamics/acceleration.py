@@ -1,10 +1,10 @@
 """Anderson acceleration of the local/global iteration (Peng et al. 2018, section 3).
 
 One local and one global step define a map G of the positions; its fixed point solves the frame.
-Instead of y <- G(y), the next iterate is the affine combination of the last few images G(y) with
-the smallest combined residual f = G(y) - y. An iterate with a larger objective than the last one is
-rejected and replaced by the last plain image G(y), whose objective cannot be larger. The objective
-thus decreases monotonically, and the fixed point is the same.
+Instead of y <- G(y), the next iterate is the affine combination of the last few images G(y) for
+which the same combination of the residuals f = G(y) - y is smallest. An iterate whose objective is
+larger than that of the last one is rejected and replaced by the last image G(y), whose objective
+cannot be larger. The objective thus never rises, and the fixed point is the same.
 """
 
 import numpy as np
@@ -13,17 +13,17 @@ from pdrom.model.compiled.dots import dot
 from pdrom.model.compiled.functions import compiled, inner
 from pdrom.model.compiled.rows import flat, write
 
-# Relative Tikhonov term of the small least-squares problem: keeps the weights bounded if residual
-# differences are nearly parallel (close to convergence).
+# Relative Tikhonov term of the small least-squares problem. It bounds the weights if residual
+# differences are nearly parallel, as they are close to convergence.
 REGULARISATION = 1e-14
-# Index into the counters of a history: the number of stored differences (-1: no iterate yet).
+# Index, in the counters of a history, of the number of stored differences; -1: no iterate yet.
 DIFFERENCES = 0
 
 
 @inner
 def _weights(gram, projection, count):
-    """Return the weights (count,) that solve the regularised normal equations, by Cholesky; zeros
-    (the plain image) if the matrix ``gram`` is not positive definite."""
+    """Return the weights (count,) that solve the regularised normal equations, by Cholesky; zeros,
+    so that the next iterate is G(y), if the matrix ``gram`` is not positive definite."""
     factor, weights = np.zeros((count, count)), np.zeros(count)
     for i in range(count):
         for j in range(i + 1):
@@ -59,10 +59,10 @@ def forget(history):
 
 @compiled
 def refuse(history, y, objective, plain=1):
-    """Compiled `Anderson.refuse` for a ``history``; the iterate ``y`` (n,) has this ``objective``.
+    """Reject iterate ``y`` (n,) if its ``objective`` has risen; compiled form of `Anderson.refuse`.
 
-    The first ``plain`` iterates after a start or a rejection are not compared: they are images of
-    the local/global iteration, whose objective cannot rise.
+    The first ``plain`` iterates after a start or a rejection are not tested: they are images G(y),
+    whose objective cannot rise. ``history`` has the earlier iterates.
     """
     start, _, image, _, _, _, numbers, last = history
     if numbers[DIFFERENCES] >= plain and objective > last[0]:
@@ -76,7 +76,7 @@ def refuse(history, y, objective, plain=1):
 
 @compiled
 def combine(history, image):
-    """Compiled `Anderson.combine` for a ``history``; ``image`` (n,) is the flat array G(y)."""
+    """Overwrite ``image`` G(y), (n,), by the next iterate; compiled form of `Anderson.combine`."""
     start, residual, last_image, residuals, images, gram, numbers, _ = history
     numbers[DIFFERENCES] += 1
     differences, window = numbers[DIFFERENCES], len(gram)
@@ -102,23 +102,23 @@ def combine(history, image):
 
 
 History = tuple[np.ndarray, ...]
-"""Arrays with the iterates of a frame, see `_history`."""
+"""Arrays with the iterates of a frame, in the order that `_history` describes."""
 
 
 def _history(window: int, n: int) -> History:
-    """Return the arrays with the iterates, of n numbers each, of a frame.
+    """Return an empty history: arrays for the iterates of a frame, which have n numbers each.
 
-    They are: the accepted iterate, residual and image of the last iterate (n,); ``window``
-    differences of residuals and of images (window, n); Gram matrix of the residual differences; the
-    number of `DIFFERENCES` (1,); the objective of the accepted iterate (1,).
+    They are: the last accepted iterate, its residual and image (n,); ``window`` differences of
+    residuals and of images (window, n); Gram matrix of the residual differences; the number of
+    stored differences (1,); the objective of the accepted iterate (1,).
     """
     vectors = [np.empty(n) for _ in range(3)]
     differences = [np.empty((window, n)) for _ in range(2)]
     return (*vectors, *differences, np.empty((window, window)), np.zeros(1, np.int64), np.empty(1))
 
 
-# The history of iterations without acceleration. Compiled loops distinguish it by its type and then
-# do not compile the acceleration.
+# Value in place of a history for iterations without acceleration. Compiled loops recognise it by
+# its type and then do not compile the acceleration.
 NO_HISTORY = None
 
 
@@ -139,23 +139,23 @@ class Anderson:
         self.history = _history(window, 0)
 
     def begin_frame(self, y: np.ndarray) -> None:
-        """Delete the iterates of the last frame; ``y`` (n, 3) is the first one of a new frame."""
+        """Delete the iterates of the last frame; ``y`` (n, 3) is the first iterate of a new one."""
         n = _numbers(y).size
         if n != len(self.history[0]):
             self.history = _history(self._window, n)
         forget(self.history)
 
     def refuse(self, y: np.ndarray, objective: float) -> bool:
-        """Return whether the iterate ``y`` raises the ``objective`` (J) and is rejected: it is then
-        overwritten by the last plain image G(y), and the history is deleted. Never for nan.
+        """Return whether iterate ``y`` is rejected, as its ``objective``, J, has risen. It is then
+        overwritten by the last image G(y) and the history is deleted. If nan, it is not rejected.
         """
         return refuse(self.history, _numbers(y), objective)
 
     def combine(self, image: np.ndarray) -> None:
-        """Overwrite ``image`` = G(y), with the last accepted iterate y, by the next iterate."""
+        """Overwrite the ``image`` G(y) of the last accepted iterate y by the next iterate."""
         combine(self.history, _numbers(image))
 
 
 def _numbers(y: np.ndarray) -> np.ndarray:
-    """Return a flat view of y; for a view of padded rows of four numbers, with the zeros."""
+    """Return a flat view of y; it includes a zero after each row if y is stored as (n, 4)."""
     return y.reshape(-1) if y.flags.c_contiguous else flat(y)

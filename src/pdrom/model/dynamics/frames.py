@@ -1,12 +1,12 @@
-"""Compiled frames of the full-order step loop: begin, iterate, end, and several frames per call.
+"""Compiled frames of the full-order step loop: start, iterations, end; several frames per call.
 
 The iterate ``y`` and the prediction ``s`` are flat arrays of rows of four numbers (x, y, z, 0).
 ``inertia`` (N,) is M/h^2 in kg/s^2, ``time_step`` is h in s.
 
 If local steps and solver are compiled, one compiled loop runs the iterations of a frame. One call
 runs several whole frames in scenes that need no Python code between two frames: forces are
-constant or proportional to the velocity, local steps are compiled without frame-lagged data, and
-all contacts are floors. A call ends before a later frame in which the set of held (prescribed)
+constant or proportional to the velocity, local steps are compiled and need no data once per frame,
+and all contacts are floors. A call ends before a later frame in which the set of held (prescribed)
 vertices changes or a hold begins, because the targets of the vertices are known only then."""
 
 from collections.abc import Sequence
@@ -42,7 +42,7 @@ def predict(positions, velocities, acceleration, time_step):
 
 @compiled(nogil=True)
 def weighted(inertia, s):
-    """Return (M/h^2) s as a flat array of rows of four numbers, like s; ``inertia`` is M/h^2."""
+    """Return (M/h^2) s; ``s`` and the result are flat arrays of rows of four numbers."""
     result = np.empty(len(s))
     for i in range(len(inertia)):
         for lane in range(WIDTH):
@@ -81,11 +81,11 @@ class CompiledIterations:
     ----------
     local_steps : objects with an attribute ``local_kernel``
     inertia : (N,) M / h^2
-    acceleration : the step loop calls its ``begin_frame`` in each frame
+    acceleration : Anderson acceleration; the step loop calls its ``begin_frame`` in each frame
 
     Attributes
     ----------
-    compiled_arguments : arguments of `all_iterations` that are the same for all frames
+    compiled_arguments : those arguments of `all_iterations` that are equal in all frames
     """
 
     def __init__(
@@ -98,7 +98,7 @@ class CompiledIterations:
         self.compiled_arguments = inertia, tables, second, clock()
 
     def takes(self, elimination: object) -> TypeGuard[Elimination]:
-        """Return whether compiled code can solve the system of an ``elimination``."""
+        """Return whether compiled code can solve the linear system of an ``elimination``."""
         return isinstance(elimination, Elimination) and elimination.factor is not None
 
     def run(
@@ -117,9 +117,9 @@ class CompiledIterations:
         Parameters
         ----------
         objective : (K,) receives the objective at the iterates, J; empty if it is not tracked
-        y, base : iterate and (M/h^2) s, (N, 3) views of padded arrays (N, 4)
+        y, base : iterate and (M/h^2) s, (N, 3) views of arrays (N, 4) with a column of zeros
         s : (N, 3) prediction
-        elimination : the factored system, for which `takes` is true
+        elimination : the factored system, accepted by `takes`
         seconds : (4,) s; the times of local and global steps are added to entries 1 and 2
         """
         history = NO_HISTORY if self._acceleration is None else self._acceleration.history
@@ -146,11 +146,11 @@ def all_iterations(
     which : (first, end, K): compute iterations first, ..., end - 1 of the K iterations of a frame
     y, s, base, rhs : iterate, prediction, (M/h^2) s, working array; flat rows of four numbers
     inertia : (N,) M/h^2, kg/s^2
-    tables, second : arrays of the local steps, see `CompiledIterations.compiled_arguments`
-    factor : factor of the global system, see `pdrom.model.dynamics.solvers.Factor`
+    tables, second : tables of the local kernels; array for their second parts, and its range
+    factor : triangular factor of the global system (`pdrom.model.dynamics.solvers.Factor`)
     history : history of the acceleration; with `NO_HISTORY` its code is not compiled
-    objective, seconds : as in `CompiledIterations.run`
-    watch : a buffer from `pdrom.model.compiled.functions.clock`
+    objective, seconds : objective and times, written as in `CompiledIterations.run`
+    watch : buffer for the clock, from `pdrom.model.compiled.functions.clock`
     """
     first, end, iterations = which
     local, preparing, kernels = tables
@@ -183,7 +183,7 @@ def all_iterations(
                 objective[k] = objective[k - 1]
         else:
             sweep(panels, vertices, loads, work, rhs, y)
-            # the last image is not accelerated: its objective cannot be larger
+            # the last iterate of a frame is the image G(y) itself, whose objective cannot be larger
             if history is not None and k < iterations - 1:
                 combine(history, y)
         seconds[2] += now(watch) - between
@@ -225,7 +225,7 @@ class WholeFrames:
         ).reshape(-1, vertices, 3)
         rates = [np.broadcast_to(np.asarray(f.rate, float), vertices) for f in forces]
         self._rates = np.array(rates).reshape(-1, vertices)
-        # a single row for all vertices if all forces are uniform
+        # if all forces are uniform, one row of accelerations serves all vertices
         alike = not self._rates.any() and bool((self._constants == self._constants[:, :1]).all())
         self._acceleration = np.zeros((1 if alike else vertices, 3))
         self._floors = np.array([contact.height for contact in contacts], dtype=float)
@@ -241,7 +241,7 @@ class WholeFrames:
     ) -> bool:
         """Return whether compiled code supports all local ``steps`` and effects of a scene.
 
-        It does not support ``forces``, ``boundaries`` or ``contacts`` that other objects wrap.
+        Objects that wrap ``forces``, ``boundaries`` or ``contacts`` are not supported.
         """
         return (
             all(isinstance(force, Force) and force.rate is not None for force in forces)
@@ -253,7 +253,7 @@ class WholeFrames:
     def run(
         self, q: np.ndarray, v: np.ndarray, frames: range, h: float, iterations: int, track: bool
     ) -> Blocks | None:
-        """Run as many of ``frames`` as one call can do; return None if the solver is not compiled.
+        """Run as many first ``frames`` as one call can; return None if the solver is not compiled.
 
         Parameters
         ----------
@@ -290,7 +290,7 @@ def _accelerate(constants, rates, velocities, result):
         for axis in range(3):
             total = 0.0
             for k in range(len(constants)):
-                # no product with a zero rate: it would be nan for a velocity that is not finite
+                # a zero rate is not multiplied: the product is nan if the velocity is not finite
                 own = -rates[k, i] * velocities[i, axis] if rates[k, i] else constants[k, i, axis]
                 total += own
             result[i, axis] = total

@@ -1,10 +1,10 @@
 """Factorisations of the global system: factor once, solve often.
 
 Panels (supernodes) are consecutive columns of a factor that substitution ("sweep") treats together.
-A panel stores all rows below its columns in which at least one of its columns has an entry, with
-explicit zeros in the other columns. In a wider panel, fewer numbers are read twice and substitution
-waits less often for the preceding column, but more zeros are stored. Dynamic programming finds the
-partition of the columns with the smallest estimated number of processor cycles.
+A panel stores all rows below its columns in which one of them has an entry, with explicit zeros in
+the others. With wider panels, fewer numbers are read twice and substitution waits less often for
+the preceding column, but more zeros are stored. Dynamic programming finds the partition of the
+columns with the smallest estimated number of processor cycles.
 """
 
 from typing import Any
@@ -20,8 +20,8 @@ from pdrom.model.compiled.functions import compiled
 from pdrom.model.compiled.rows import WIDTH
 from pdrom.model.dynamics.sweeps import SWEEP, WIDTHS, load, sweep
 
-# Processor cycles of a panel (a mispredicted branch, its dependent columns), of each row below it,
-# and of each entry in such a row; fitted to sheets and bars of 400 to 10,000 vertices.
+# Estimated processor cycles of a panel (a mispredicted branch, dependent columns), of a row below
+# it and of an entry of that row; fitted to sheets and bars of 400 to 10,000 vertices.
 PANEL, ROW, ENTRY = 20.0, 1.0, 0.5
 
 
@@ -38,8 +38,8 @@ def panels(lower: sparse.csc_array, diagonal: np.ndarray) -> tuple[Any, ...]:
     first : (P + 1,) first column of each panel
     row_start, value_start : (P + 1,) first index of each panel in ``rows`` and in ``values``
     rows : rows below each panel, times `pdrom.model.compiled.rows.WIDTH`
-    values : for each panel with w columns and m rows below: 1 / D (w), the strict lower triangle of
-        L row by row, then the rows below (m, w)
+    values : for each panel of w columns with m rows below: 1 / D (w,), the strict lower triangle of
+        its part of L row by row, then its rows below (m, w)
     """
     n = lower.shape[0]
     below = np.zeros((max(WIDTHS) + 1, n), np.int64)
@@ -66,10 +66,10 @@ def panels(lower: sparse.csc_array, diagonal: np.ndarray) -> tuple[Any, ...]:
 
 @compiled
 def _count_rows_below(indptr, indices, seen, below):
-    """Write to below[w, j] the number of rows below the panel of the w columns up to column j.
+    """Write to below[w, j] the number of rows below a panel of w columns that ends with column j.
 
-    ``seen`` (n,) is working memory, filled with -1. The caller allocates arrays in Python, because
-    each allocation in compiled code takes a tenth of a second to compile.
+    ``seen`` (n,) is working memory, filled with -1. Python allocates all arrays, because an
+    allocation in compiled code takes a tenth of a second to compile.
     """
     for j in range(len(seen)):
         count = 0
@@ -110,7 +110,7 @@ def _fill(indptr, indices, data, inverse, first, row_start, value_start, rows, v
             row = indices[k]
             if row >= b and place[row] < 0:
                 place[row] = 0
-                # insertion sort: most rows belong at the end (compiling a sort takes a second)
+                # insertion sort: most rows belong at the end, and a sort takes a second to compile
                 new = start + count
                 while new > start and rows[new - 1] > row:
                     rows[new] = rows[new - 1]
@@ -143,7 +143,7 @@ SOLVERS = Registry(
     },
 )
 
-# First arguments of `pdrom.model.dynamics.sweeps.sweep`: panels, vertices, loads, working array.
+# A factor is the first arguments of `sweeps.sweep`: panels, vertices, loads, working array.
 Factor = tuple[tuple[Any, ...], np.ndarray, np.ndarray, np.ndarray]
 NOTHING_FREE: Factor = (
     (np.zeros(1, np.int32), *(np.zeros(1, np.int64),) * 2, np.zeros(0, np.int32), np.zeros(0), 0),
@@ -151,7 +151,7 @@ NOTHING_FREE: Factor = (
     np.zeros(0),
     np.zeros(0),
 )
-# First arguments of `pdrom.model.dynamics.sweeps.load` if no unknown is coupled to a held vertex.
+# Coupling in the form of `sweeps.load`, if no unknown is coupled to a held (prescribed) vertex.
 NO_COUPLING = (np.zeros(0, np.int64), np.zeros(1, np.int32), np.zeros(0, np.int32), np.zeros(0))
 
 
@@ -161,15 +161,15 @@ class SuperLUSolver:
     Parameters
     ----------
     matrix : (n, n)
-    vertices : (n,) vertex of each unknown, which is its row in the arrays (N, 3)
+    vertices : (n,) vertex index of each unknown: its row in arrays (N, 3)
     coupling : (n, m) matrix entries between the unknowns and m held vertices; None if m = 0
     """
 
     ordering = "MMD_AT_PLUS_A"
     factor: Factor | None = None
-    """Arguments of `sweep` in a compiled loop; None if the solver is not compiled."""
+    """First arguments of `sweeps.sweep` in compiled loops; None if the solver is not compiled."""
     coupling = NO_COUPLING
-    """Arguments of `load` in a compiled loop, the coupling to the held vertices."""
+    """Matrix entries between unknowns and held vertices, in the form of `sweeps.load`."""
 
     def __init__(
         self,
@@ -196,7 +196,7 @@ class SuperLUSolver:
 
 
 class ColumnOrderedSolver(SuperLUSolver):
-    """SuperLU with another column ordering, to measure the effect of the order of summation."""
+    """SuperLU with the column ordering COLAMD, to measure the effect of the summation order."""
 
     ordering = "COLAMD"
 
@@ -204,7 +204,7 @@ class ColumnOrderedSolver(SuperLUSolver):
 class SupernodalSolver(SuperLUSolver):
     """SuperLU's factor stored by panels, with compiled substitution of x, y and z in one pass.
 
-    factor : first arguments of `sweep`
+    factor : first arguments of `pdrom.model.dynamics.sweeps.sweep`
     """
 
     factor: Factor
@@ -218,7 +218,7 @@ class SupernodalSolver(SuperLUSolver):
         self.factor = panels(lower, factor.U.diagonal()), order, loads, work
         if self._held is not None:
             own = sparse.csr_array(self._held[unknowns])
-            # only the few unknowns that are coupled to held vertices
+            # rows of the few unknowns that are coupled to held vertices
             beside = np.flatnonzero(np.diff(own.indptr))
             self.coupling = beside, own.indptr, own.indices, own.data
 
@@ -234,7 +234,7 @@ class SupernodalSolver(SuperLUSolver):
 
 
 def factored(matrix: sparse.csr_array, ordering: str) -> SuperLU:
-    """Factor a matrix (n, n) by SuperLU without pivoting; ``ordering`` is its ``permc_spec``.
+    """Factor ``matrix`` (n, n) by SuperLU without pivoting, with the column ordering ``ordering``.
 
     Raises
     ------

@@ -17,11 +17,11 @@ class Solve(Protocol):
     """A factored system with the fixed coordinates eliminated."""
 
     def solve(self, rhs: np.ndarray, y: np.ndarray) -> None:
-        """Overwrite the coordinates of ``y`` (n, 3) that are not fixed, from ``rhs`` (n, 3)."""
+        """Overwrite the free coordinates of ``y`` (n, 3) by the solution for ``rhs`` (n, 3)."""
 
 
 class Space(ABC):
-    """Interface of the step loop to its coordinates.
+    """Interface of the step loop to its unknowns (coordinates).
 
     Arrays are (n, 3) for n coordinates: ``positions`` and their ``velocities`` at the beginning of
     a frame, the iterate ``y``, the prediction ``s``. ``h`` is the time step in seconds.
@@ -36,13 +36,13 @@ class Space(ABC):
         return s.copy()
 
     def end(self, y: np.ndarray, before: np.ndarray, h: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return coordinates and velocities at the end of a frame from ``y`` and ``before``."""
+        """Return coordinates and velocities at a frame's end; ``before`` are those at its start."""
         return y, (y - before) / h
 
     def compiled(
         self, local_steps: Sequence[Any], acceleration: Anderson | None = None
     ) -> tuple[CompiledIterations | None, WholeFrames | None]:
-        """Return compiled iterations with ``local_steps`` and ``acceleration``, and whole frames.
+        """Return compiled iterations of ``local_steps``, with ``acceleration``, and whole frames.
 
         Each of the two is None if it is not available in these coordinates.
         """
@@ -50,14 +50,14 @@ class Space(ABC):
 
     @abstractmethod
     def acceleration(self, positions: np.ndarray, velocities: np.ndarray) -> np.ndarray:
-        """Return the acceleration by all forces, broadcastable to (n, 3), m/s^2.
+        """Return the acceleration by all forces, m/s^2, of a shape that broadcasts to (n, 3).
 
         ``positions`` (m) and ``velocities`` (m/s) are those at the beginning of the frame.
         """
 
     @abstractmethod
     def fixed(self, frame: int, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the fixed coordinates of ``frame``, ascending (m,), and their values (m, 3).
+        """Return the coordinates (m,) fixed in ``frame``, ascending, and their values (m, 3).
 
         ``positions`` (n, 3) are the coordinates at the beginning of the frame.
         """
@@ -68,15 +68,15 @@ class Space(ABC):
 
     @abstractmethod
     def inertia(self, s: np.ndarray) -> np.ndarray:
-        """Return (M / h^2) s."""
+        """Return (M / h^2) s for a prediction ``s`` (n, 3)."""
 
     @abstractmethod
     def inertia_energy(self, difference: np.ndarray) -> float:
-        """Return 1/(2 h^2) |M^1/2 difference|^2 in joule; ``difference`` (n, 3) is y - s."""
+        """Return 1/(2 h^2) |M^1/2 difference|^2, J, for the ``difference`` (n, 3) y - s."""
 
     @abstractmethod
     def correct(self, y: np.ndarray, before: np.ndarray, frame: int) -> None:
-        """Apply all contacts to ``y`` at the end of ``frame``; ``before`` are its first values."""
+        """Apply all contacts to ``y`` at the end of ``frame``; ``before`` is y at its beginning."""
 
 
 class VertexSpace(Space):
@@ -104,7 +104,7 @@ class VertexSpace(Space):
     def held_path(self, frames: range, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the vertices (m,) held in the first n ``frames``, and their targets (n, m, 3) m.
 
-        ``positions`` (N, 3) m are those at the beginning of the first frame; see `base.held_path`.
+        ``positions`` (N, 3) m are those at the beginning of the first frame.
         """
         return base.held_path(self._boundaries, frames, positions)
 
@@ -132,7 +132,7 @@ class VertexSpace(Space):
             return None, None
         loop = CompiledIterations(local_steps, self.system.inertia, acceleration)
         effects = self._forces, self._boundaries, self._contacts
-        # a subclass may override any part of a frame
+        # not for subclasses, which may override any part of a frame
         if type(self) is not VertexSpace or not WholeFrames.suits(local_steps, *effects):
             return loop, None
         return loop, WholeFrames(self, loop, self._forces, self._contacts, acceleration)

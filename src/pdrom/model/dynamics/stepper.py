@@ -1,8 +1,8 @@
 """The step loop of projective dynamics, shared by the full-order model and every reduced run.
 
-One frame (Bouaziz et al. 2014, alg. 1): y <- s = q + h v + h^2 a, then K times a local step
-p_j = p_j(y) and a global step (M/h^2 + sum S^T W S) y = (M/h^2) s + sum S^T W p; finally
-v = (y - q) / h and q = y. A `LocalStep` computes or approximates the local step of one group.
+A frame (Bouaziz et al. 2014, alg. 1) begins with y = s = q + h v + h^2 a. Each of K iterations has
+a local step p_j = p_j(y) per constraint group j (`LocalStep`) and a global step
+(M/h^2 + sum S^T W S) y = (M/h^2) s + sum S^T W p. The frame ends with v = (y - q) / h and q = y.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -17,16 +17,16 @@ from pdrom.model.dynamics.space import Solve, Space
 
 PHASES = ("inertia", "local", "global", "finish")
 Observer = Callable[[np.ndarray], None] | None
-"""Called with the iterate y at which the last local step of a frame is computed."""
+"""Function that is called with the iterate y of the last local step of a frame, or None."""
 
 
 Vectors = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 class LocalStep(Protocol):
-    """Contribution of one group to the right-hand side. A constraint group is a local step itself.
+    """Local step of one constraint group, or its approximation; every group is a local step.
 
-    In a position subspace y and rhs are coordinates (k, 3) instead of vertex positions (N, 3).
+    In a position subspace y and rhs have the shape (k, 3) of k coordinates instead of (N, 3).
     Compiled iterations need an attribute ``local_kernel`` in every local step.
     """
 
@@ -41,7 +41,7 @@ class LocalStep(Protocol):
 
 @dataclass(frozen=True)
 class State:
-    """Positions (N, 3) m and velocities (N, 3) m/s; in a subspace their coordinates (k, 3)."""
+    """Positions (N, 3) m and velocities (N, 3) m/s, or their coordinates (k, 3) in a subspace."""
 
     positions: np.ndarray
     velocities: np.ndarray
@@ -51,9 +51,9 @@ class State:
 class FrameReport:
     """Objective and computation times of a frame.
 
-    objective : (K,) value of 1/(2 h^2) |M^1/2 (y - s)|^2 + sum_j W_j(y) at the K local iterates
-        (for a rejected iterate the value of the last accepted one), nan if a local step does not
-        know its energy; empty if it was not tracked
+    objective : (K,) J, 1/(2 h^2) |M^1/2 (y - s)|^2 + sum_j W_j(y) with energies W_j of groups, at
+        the iterates y of K local steps (last accepted iterate if one is rejected); nan if an energy
+        is unknown, empty if it was not tracked
     seconds : (4,) time of each of `PHASES`
     """
 
@@ -79,14 +79,14 @@ class Stepper:
         self.local_steps = list(local_steps)
         self._acceleration = acceleration
         self._track = track_objective
-        # a subclass may set another object that has the method `run` of `WholeFrames`
+        # a subclass may set another object with a method `run` like that of `WholeFrames`
         self._whole: Any
         self._compiled, self._whole = space.compiled(self.local_steps, acceleration)
 
     def step(
         self, state: State, frame: int, on_last_iterate: Observer = None
     ) -> tuple[State, FrameReport]:
-        """Compute ``frame`` (0-based) from ``state``; ``on_last_iterate`` gets the last local y."""
+        """Compute ``frame`` (0-based); call ``on_last_iterate`` with y of the last local step."""
         if on_last_iterate is None:
             for done in self._at_once(state, range(frame, frame + 1)):
                 return done
@@ -106,7 +106,7 @@ class Stepper:
         Changes that the caller makes between two frames do not affect the following frames.
         """
         while frames:
-            # a subclass may override `step`
+            # a subclass may override `step`, which is then called
             own = type(self).step is not Stepper.step
             done = () if own else self._at_once(state, frames)
             for after in done or (self.step(state, frames.start),):
@@ -114,7 +114,7 @@ class Stepper:
                 yield after
 
     def _at_once(self, state: State, frames: range) -> Sequence[tuple[State, FrameReport]]:
-        """Compute as many first frames as one compiled call can; return their results or ()."""
+        """Compute as many of the first ``frames`` as one compiled call can; () if it cannot."""
         if self._whole is None:
             return ()
         q, v, h = state.positions, state.velocities, self.time_step
@@ -122,7 +122,7 @@ class Stepper:
         done = self._whole.run(q, v, frames, h, self.iterations, self._track)
         if done is None:
             return ()
-        # the time outside compiled code is divided equally among the frames, as phase 0
+        # time outside compiled code counts as phase 0, divided equally among the frames
         beside = perf_counter() - started - float(done[3].sum())
         done[3][:, 0] += max(beside, 0.0) / len(done[3])
         return [
@@ -131,7 +131,7 @@ class Stepper:
         ]
 
     def _begin(self, state: State, frame: int) -> tuple[np.ndarray, Solve, np.ndarray]:
-        """Return the prediction s with fixed coordinates at targets, the system, (M/h^2) s."""
+        """Return the prediction s, its fixed coordinates at targets; the system; (M/h^2) s."""
         space, h = self.space, self.time_step
         s = space.predict(state.positions, state.velocities, h)
         fixed, targets = space.fixed(frame, state.positions)
@@ -193,7 +193,7 @@ class Stepper:
             objective[k : k + 1] = objective[k - 1 : k]
         else:
             system.solve(rhs, y)
-            # the last image is not accelerated: its objective cannot be larger
+            # the last iterate of a frame is the image G(y) itself, whose objective cannot be larger
             if k < self.iterations - 1:
                 acceleration.combine(y)
         seconds[2] += perf_counter() - before

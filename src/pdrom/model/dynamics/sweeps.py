@@ -1,6 +1,6 @@
 """Forward and backward substitution by panels, for three right-hand sides (x, y, z) at once.
 
-A row of the right-hand side is a register of four lanes (`pdrom.model.compiled.rows`), so that an
+A row of the right-hand side fills a register of four numbers ("lanes"), so that an
 entry of the factor is read once for x, y and z. The instructions of each panel width are unrolled,
 so that the panel's columns stay in registers during the loop over the rows below.
 """
@@ -44,19 +44,19 @@ class _Panel:
         return spread(self.builder, self.builder.load(self.builder.gep(pointer, [offset])))
 
     def inverse(self, column):
-        """Return 1 / D of a column, in all lanes."""
+        """Return 1 / D of a ``column`` of the panel, in all lanes."""
         return self._spread(self._own, self._index(column))
 
     def triangle(self, row, column):
-        """Return an entry of L in the triangle of the panel, in all lanes."""
+        """Return an entry of L in the strict lower triangle of the panel, in all lanes."""
         return self._spread(self._own, self._index(self.width + row * (row - 1) // 2 + column))
 
     def pointer(self, offset):
-        """Return the address of the row of the right-hand side at an ``offset`` in numbers."""
+        """Return the address of the right-hand side's row that begins at number ``offset``."""
         return self.builder.bitcast(self.builder.gep(self._x, [offset]), NUMBERS.as_pointer())
 
     def column(self, k):
-        """Return the address of the row of the right-hand side for column k of the panel."""
+        """Return the address of the right-hand side's row that belongs to column k of the panel."""
         return self.pointer(self.builder.add(self._first, self._index(WIDTH * k)))
 
     def load(self, pointer):
@@ -66,11 +66,11 @@ class _Panel:
         self.builder.store(row, pointer, align=8)
 
     def less(self, a, entry, b):
-        """Return a - entry b, lane by lane."""
+        """Return a - entry * b, lane by lane."""
         return multiply_add(self.builder, self.builder.fneg(entry), b, a)
 
     def rows_below(self):
-        """Loop over the rows below; yield their pointers, with a function: column -> entry of L."""
+        """Loop over the rows below; yield the address and a function: column -> entry of L."""
         builder = self.builder
         with cgutils.for_range_slice(builder, self._start, self._stop, self._index(1)) as (k, _):
             row = builder.sext(builder.load(builder.gep(self._rows, [k])), _INDEX)
@@ -80,7 +80,7 @@ class _Panel:
 
 
 def _panel_intrinsic(write):
-    """Return an intrinsic (width, x, first, rows, start, stop, values, value_start)."""
+    """Return an intrinsic whose LLVM instructions for a panel the function ``write`` generates."""
 
     def typed(_context, width, x, first, rows, start, stop, values, value_start):
         def generate(context, builder, signature, arguments):
@@ -103,7 +103,7 @@ def _panel_intrinsic(write):
 
 
 def _write_forward(panel):
-    """Generate x <- L^-1 x: solve for the panel's columns, then update the rows below."""
+    """Generate the panel's part of x <- L^-1 x: solve for its columns, update the rows below."""
     columns: list[ir.Value] = []
     for row in range(panel.width):
         value = panel.load(panel.column(row))
@@ -113,7 +113,7 @@ def _write_forward(panel):
             panel.store(value, panel.column(row))
         columns.append(value)
     for pointer, entry in panel.rows_below():
-        # two partial sums halve the chain of dependent additions
+        # with two partial sums, the chain of dependent additions is half as long
         sums = [panel.load(pointer), None]
         for k, column in enumerate(columns):
             if sums[k % 2] is None:
@@ -125,7 +125,7 @@ def _write_forward(panel):
 
 
 def _write_backward(panel):
-    """Generate x <- L^-T D^-1 x: subtract the rows below, then solve for the panel's columns."""
+    """Generate the panel's part of x <- L^-T D^-1 x: subtract rows below, solve for its columns."""
     builder = panel.builder
     slots = []
     for k in range(panel.width):
@@ -150,7 +150,7 @@ _backward = _panel_intrinsic(_write_backward)
 
 @compiled(nogil=True)
 def load(beside, indptr, indices, data, targets, loads):
-    """Write the product coupling times ``targets`` to ``loads``, only in the rows ``beside``.
+    """Write the product of coupling and ``targets`` to ``loads``, only in the rows ``beside``.
 
     The coupling is a CSR matrix (``indptr``, ``indices``, ``data``), ``targets`` are (m, 3) m,
     ``loads`` is a flat array of rows of four numbers, whose other rows are zero.
@@ -166,7 +166,7 @@ def load(beside, indptr, indices, data, targets, loads):
 def _sweep(
     count, first, row_start, value_start, rows, values, size, vertices, loads, x, rhs, y
 ):  # fmt: skip
-    """Compute `sweep` for ``count`` panels and ``size`` unknowns; other arguments: addresses."""
+    """`sweep` of ``count`` panels and ``size`` unknowns; the other arguments are addresses."""
     first, vertices = integers(first, count + 1), integers(vertices, size)
     row_start, value_start = indices(row_start, count + 1), indices(value_start, count + 1)
     rows, values = integers(rows, row_start[count]), doubles(values, value_start[count])
@@ -187,7 +187,7 @@ def _sweep(
         store(y, WIDTH * at(vertices, i), load_row(x, WIDTH * i))
 
 
-# Loops call it by its address, so that it is not compiled again with each of them.
+# Compiled loops call it by address; otherwise it would be compiled again with each of them.
 SWEEP = Callback(_sweep, types.void(*(types.intp,) * 12))
 _call = caller(types.void)
 
@@ -198,7 +198,7 @@ def sweep(panels, vertices, loads, x, rhs, y):
 
     Parameters
     ----------
-    panels : see `pdrom.model.dynamics.solvers.panels`
+    panels : the factored matrix A, from `pdrom.model.dynamics.solvers.panels`
     vertices : (n,) row of ``rhs`` and ``y`` of each unknown, in the order of the factor
     loads : (4 n,) rows that are subtracted from the right-hand side, in the order of the factor
     x : (4 n,) working array

@@ -12,12 +12,12 @@ from pdrom.model.dynamics import solvers
 
 DEFAULT_SOLVER = "supernodal"
 
-# Largest allowed error of a solve; a larger one would move a body on which no force acts.
+# Largest relative error of a solve; with a larger one, a body would move without any force.
 ACCURACY = 1e-6
 
 
 class Elimination:
-    """The system without the vertices ``fixed``; one factorisation serves x, y and z.
+    """The system with the vertices ``fixed`` eliminated; x, y, z have the same factorisation.
 
     Attributes
     ----------
@@ -59,9 +59,9 @@ class Elimination:
 def require_accurate(matrix, solve: Callable[[np.ndarray, np.ndarray], object]) -> None:
     """Raise SolverError if ``solve`` does not reproduce a known solution for a ``matrix`` (n, n).
 
-    ``solve`` takes a right-hand side (n, 3) and the array that receives the solution. The known
-    solution is a translation, for which the terms of all elements cancel. Only the terms of inertia
-    (and pins) remain, which rounding errors in the matrix destroy first.
+    ``solve`` gets a right-hand side (n, 3) and the array for the solution. The known solution is a
+    translation: the terms of all elements cancel, and those of inertia (and pins) remain. They are
+    the first to be lost if the matrix has large rounding errors.
     """
     if matrix.shape[0] == 0:
         return
@@ -97,11 +97,11 @@ class GlobalSystem:
 
     @property
     def factorisations(self) -> int:
-        """Number of factorisations that have been computed."""
+        """Number of factorisations computed so far."""
         return len(self._cache)
 
     def eliminate(self, fixed: np.ndarray) -> Elimination:
-        """Return the system without the vertices ``fixed`` (ascending), factored or cached."""
+        """Return the factored system without the vertices ``fixed`` (ascending), cached."""
         key = np.ascontiguousarray(fixed, dtype=np.int64).tobytes()
         if key not in self._cache:
             self._cache[key] = Elimination(self.matrix, fixed, self._solver)

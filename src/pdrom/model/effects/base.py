@@ -1,8 +1,8 @@
 """Base classes of effects, one for each role, and the configuration of a scene's effects.
 
-A scene is a mesh and a list of effects. Each effect is one class with one typed configuration,
-registered under the name that the configuration uses. An effect has exactly one role, in which the
-step loop calls it:
+A scene is a mesh and a list of effects. Each effect is a class with a typed configuration, listed
+by the name that scene files use. An effect has exactly one role, which determines what the step
+loop uses of it:
 
 =============  ===================================================  =========================
 role           result that the step loop uses                       examples
@@ -28,12 +28,12 @@ from pdrom.core.yamlfile import ConfigModel, describe, shown
 from pdrom.model.effects import EFFECTS
 from pdrom.model.mesh.types import Length, Mesh
 
-# A vertex up to this deep inside an obstacle, relative to the mesh extent, counts as touching it.
+# A vertex inside an obstacle by at most this depth, relative to the mesh extent, only touches it.
 TOUCHING = 1e-6
 
 
 class ScaledWithFrames:
-    """Marker of configuration fields that are scaled if the frame count of a scene changes."""
+    """Marker of configuration fields that scale with the number of frames of a scene."""
 
 
 FrameNumber = Annotated[int, Field(ge=0, le=1_000_000), ScaledWithFrames()]
@@ -47,7 +47,7 @@ class EffectConfig(ConfigModel):
     effect: str
 
     def with_frames_scaled(self, factor: float) -> Self:
-        """Return the effect with all frame numbers times ``factor``; nonzero ones stay >= 1."""
+        """Return the effect with frame numbers times ``factor``; nonzero ones become at least 1."""
         changes: dict[str, Any] = {}
         for name, field in type(self).model_fields.items():
             value = getattr(self, name)
@@ -59,25 +59,25 @@ class EffectConfig(ConfigModel):
         return self.model_copy(update=changes)
 
     def check_step(self, time_step: float) -> None:
-        """Raise ValueError if the effect is unstable with a step of ``time_step`` s."""
+        """Raise ValueError if the effect is unstable with a time step of ``time_step`` s."""
 
     def redirected(self, axes: Sequence[int]) -> Self:
-        """Return the effect; for a handle, with another direction of motion in ``axes``."""
+        """Return the effect; a handle gets another direction of motion within ``axes``."""
         return self
 
     def tilted(self, degrees: float, axes: Sequence[int], place: int) -> Self:
-        """Return gravity turned by ``degrees``, any other effect unchanged.
+        """Return the effect; gravity is turned by ``degrees``, other effects do not change.
 
-        It turns towards ``axes[place]`` (of 0, 1, 2), counted without an axis along gravity.
+        It turns towards the entry ``place`` of ``axes`` (0, 1, 2) without an axis along gravity.
         """
         return self
 
     def carried(self, offset: Sequence[float], over: int) -> "EffectConfig":
-        """Return the effect; for pins, a handle that moves by ``offset`` m in ``over`` frames."""
+        """Return the effect; pins become a handle that moves by ``offset`` m in ``over`` frames."""
         return self
 
     def body(self, low: np.ndarray, high: np.ndarray) -> Mesh | None:
-        """Return the surface to draw in the region from ``low`` to ``high`` (3,) m, or None."""
+        """Return a surface that shows the effect between ``low`` and ``high`` (3,) m, or None."""
         return None
 
 
@@ -106,11 +106,11 @@ class Start(Effect):
 class Force(Effect):
     """Effect that accelerates the vertices.
 
-    A position subspace supports forces that are affine in the velocity, with a rate per vertex.
+    A position subspace supports accelerations a + c v with velocity v and rate c of each vertex.
     """
 
     time_step: float
-    """Time step h of the run in seconds, set by the scene; some forces are limited by it."""
+    """Time step h of the run in seconds, set by the scene; some forces depend on it."""
 
     rate: float | np.ndarray | None = None
     """Rate c, a number or (N,) 1/s, if the acceleration is -c v plus a term that does not depend on
@@ -118,10 +118,10 @@ class Force(Effect):
 
     @abstractmethod
     def acceleration(self, positions: np.ndarray, velocities: np.ndarray) -> np.ndarray:
-        """Return (3,) or (N, 3) m/s^2 at ``positions`` (N, 3) m and ``velocities`` (N, 3) m/s."""
+        """Return the acceleration (3,) or (N, 3) m/s^2 at ``positions`` m, ``velocities`` m/s."""
 
     def potential(self, positions: np.ndarray, masses: np.ndarray) -> float:
-        """Return the potential energy, J, at ``positions`` (N, 3) m of ``masses`` (N,) kg.
+        """Return the potential energy, J, of ``masses`` (N,) kg at ``positions`` (N, 3) m.
 
         It is defined up to a constant, and zero for a force without potential (damping).
         """
@@ -129,24 +129,24 @@ class Force(Effect):
 
 
 class Boundary(Effect):
-    """Effect that holds vertices: prescribes their positions, by elimination, not by a penalty."""
+    """Boundary condition: "holds" vertices, by elimination, at prescribed positions."""
 
     vertices: np.ndarray
     """All vertices that the effect holds in any frame, ascending (n,) int64."""
 
     side: str | None = None
-    """Side of the rest shape if the vertices were selected as a side of it; else None."""
+    """Name of the side of the rest shape if the vertices were selected by one; else None."""
 
     moves: bool
     """Whether the targets change from frame to frame."""
 
     @abstractmethod
     def active(self, frame: int) -> bool:
-        """Return whether vertices are held in ``frame`` f (0-based: step from state f to f + 1)."""
+        """Return whether vertices are held in ``frame`` f, the step from state f to f + 1."""
 
     @abstractmethod
     def held(self, frame: int) -> np.ndarray:
-        """Return the vertices (n,) int64 that are held in ``frame``, if it is `active`."""
+        """Return the vertices (n,) int64 that are held in ``frame``, in which it is `active`."""
 
     @abstractmethod
     def targets(self, frame: int, current: np.ndarray) -> np.ndarray:
@@ -157,11 +157,11 @@ class Boundary(Effect):
         """
 
     def takes_hold(self, frame: int) -> bool:
-        """Return whether a hold begins in ``frame``: targets depend on the positions then."""
+        """Return whether a hold begins in ``frame``; its targets depend on the positions then."""
         return True
 
     def path(self, frames: range, current: np.ndarray) -> np.ndarray:
-        """Return targets (f, n, 3) m of f ``frames``; a hold may begin in the first only."""
+        """Return targets (f, n, 3) m in f ``frames``, of which only the first may begin a hold."""
         first = self.targets(frames.start, current)
         if not self.moves:
             return np.broadcast_to(first, (len(frames), *first.shape))
@@ -179,16 +179,16 @@ class Contact(Effect):
     """Whether the correction of a vertex does not depend on other vertices."""
 
     height: float | None = None
-    """Height y in metres if the contact only lifts lower vertices to this height; else None."""
+    """Height y, m, for a floor: a contact that only moves lower vertices up to y; else None."""
 
     def gaps(self, points: np.ndarray) -> np.ndarray:
-        """Return distances (n,) m of ``points`` (n, 3) m to the obstacle; inf without obstacle."""
+        """Return distances (n,) m of ``points`` (n, 3) m to the obstacle; inf if there is none."""
         return np.full(len(points), np.inf)
 
     def apply(self, positions: np.ndarray, before: np.ndarray, held: np.ndarray) -> None:
         """Correct all vertices except the ``held`` ones (n,), in place.
 
-        A contact that divides a correction between several vertices overrides this method.
+        A contact that moves several vertices together (self-collision) overrides this method.
 
         Parameters
         ----------
@@ -200,15 +200,15 @@ class Contact(Effect):
 
     @abstractmethod
     def correct(self, positions: np.ndarray, before: np.ndarray) -> None:
-        """Change ``positions`` (N, 3) m in place; ``before`` (N, 3) m are those before the frame.
+        """Correct ``positions`` (N, 3) m in place; ``before`` (N, 3) m are those before the frame.
 
         Contacts are applied in the order of the scene's effects.
         """
 
     def doubt(self, rest: np.ndarray, free: np.ndarray) -> str:
-        """Return a warning about positions ``rest`` (N, 3) m of ``free`` vertices (n,), or "".
+        """Return a warning if the contact does not suit the rest shape ``rest`` (N, 3) m, else "".
 
-        By default it warns of vertices that the contact moves in the first frame.
+        By default it warns if the contact moves vertices of ``free`` (n,) in the first frame.
         """
         moved = rest.copy()
         self.correct(moved, rest)
@@ -223,7 +223,7 @@ class Contact(Effect):
 
 
 def effect_config(entry: Any, index: int) -> EffectConfig:
-    """Return the typed configuration of ``entry``, effects[``index``]; ValueError for a fault."""
+    """Return the typed configuration of ``entry`` ``index`` in effects; ValueError if invalid."""
     if isinstance(entry, EffectConfig):
         return entry
     if not isinstance(entry, dict) or not isinstance(entry.get("effect"), str):
@@ -268,10 +268,10 @@ def held_targets(
 def held_path(
     boundaries: Sequence[Boundary], frames: range, positions: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the held vertices (m,) and their targets (n, m, 3) m in the first n >= 1 ``frames``.
+    """Return held vertices (m,) and their targets (n, m, 3) m in the first n >= 1 ``frames``.
 
-    The n frames end before the first one in which other vertices are held or a hold begins, as the
-    targets of this hold are not yet known.
+    They end before the first frame in which the set of held vertices changes or a hold begins,
+    since targets of that hold depend on positions that are not yet known.
 
     Parameters
     ----------

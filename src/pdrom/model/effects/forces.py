@@ -1,4 +1,4 @@
-"""Forces: gravity, damping, drag on the surface, and wind."""
+"""Forces on vertices: gravity, damping, drag on the surface, and wind."""
 
 from collections.abc import Sequence
 from functools import cached_property
@@ -24,7 +24,7 @@ class Gravity(Force):
             own = np.array(self.acceleration)
             size = float(np.linalg.norm(own))
             free = [axis for axis in axes if abs(own[axis]) < size]
-            if not free:  # nothing to turn, or no other axis
+            if not free:  # gravity is zero, or there is no axis to turn to
                 return self
             axis = free[place]
             side = size * np.eye(3)[axis] - own[axis] / size * own
@@ -43,10 +43,10 @@ class Gravity(Force):
 
 
 class Damping(Force):
-    """Acceleration -c v with the velocity v at the beginning of the frame (explicit)."""
+    """Acceleration -c v, with the velocity v at the beginning of the frame (explicit)."""
 
     class Config(EffectConfig):
-        """``rate`` c in 1/s; explicit treatment requires c h < 2, larger time steps are refused."""
+        """``rate`` c in 1/s; stability requires a time step h with c h < 2, others are refused."""
 
         effect: Literal["damping"] = "damping"
         rate: Annotated[float, Field(ge=0.0, le=1e3, allow_inf_nan=False)]
@@ -67,14 +67,14 @@ class Damping(Force):
 
 
 class Drag(Force):
-    """Force -c A_v v on each vertex, where A_v is a third of the rest area of its triangles.
+    """Force -c A_v v on a vertex with velocity v; A_v is a third of the rest area around it.
 
-    Over a frame a free vertex has the exact decay v exp(-c A_v h / m_v), so that the velocity never
-    changes its sign. Interior vertices of a volume have A_v = 0.
+    In a frame the velocity of a free vertex of mass m_v decays exactly, to v exp(-c A_v h / m_v),
+    so that it never changes its sign. Interior vertices of a volume have A_v = 0.
     """
 
     class Config(EffectConfig):
-        """``coefficient`` c in N s/m^3: force per area and speed."""
+        """``coefficient`` c in N s/m^3: force divided by area and speed."""
 
         effect: Literal["drag"] = "drag"
         coefficient: Annotated[float, Field(ge=0.0, le=1e12)]
@@ -100,11 +100,11 @@ class Wind(Force):
     component of the wind velocity minus the triangle's mean velocity; a triangle parallel to the
     wind has no force.
 
-    An explicit step would overshoot in strong wind. The force is divided by 1 + h kappa |w_n|, with
-    kappa the largest value of rho C A_v / (2 m_v) at the corners and A_v a third of the area around
-    a vertex. This is exact for a free flat sheet. Otherwise velocities relative to the wind are
+    As an explicit step would overshoot in strong wind, the force is divided by 1 + h kappa |w_n|.
+    kappa is the largest rho C A_v / (2 m_v) of the corners, and A_v a third of the area around a
+    vertex. This is exact for a free flat sheet. In general, velocities relative to the wind are
     multiplied by the identity minus a symmetric positive matrix smaller than one (in the inner
-    product of the masses), so that their energy never grows, for any wind, step and masses.
+    product of the masses). Their energy thus never grows, for any wind, time step and masses.
     """
 
     class Config(EffectConfig):
@@ -137,6 +137,6 @@ class Wind(Force):
         )
 
     def _at_vertices(self, values: np.ndarray) -> np.ndarray:
-        """Return the sums (N,) of triangle ``values`` over the triangles around each vertex."""
+        """Return sums (N,) of ``values`` (T,) over the triangles around each vertex."""
         corners = np.repeat(values, 3)
         return np.bincount(self._triangles.ravel(), corners, minlength=len(self._masses))

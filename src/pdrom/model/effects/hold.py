@@ -1,4 +1,4 @@
-"""Boundary effects that hold vertices for a range of frames, at rest or in motion (handles)."""
+"""Boundary conditions that prescribe vertices in some frames: pins at rest, moving handles."""
 
 from abc import abstractmethod
 from collections.abc import Sequence
@@ -13,7 +13,7 @@ from pdrom.model.mesh.types import Mesh
 
 
 class HoldConfig(EffectConfig):
-    """Held vertices, and frames ``start`` <= f < ``until`` of the hold (None: to the end)."""
+    """Vertices held in the frames ``start`` <= f < ``until`` (None: to the end of the run)."""
 
     select: Selection
     start: FrameNumber = 0
@@ -27,7 +27,7 @@ class HoldConfig(EffectConfig):
 
 
 class Hold(Boundary):
-    """Base class of pins and handles, which stores the positions at the beginning of the hold."""
+    """Base class of pins and handles; it stores the vertices' positions when the hold begins."""
 
     def __init__(self, config: HoldConfig, mesh: Mesh, masses: np.ndarray) -> None:
         super().__init__(config, mesh, masses)
@@ -55,14 +55,14 @@ class Hold(Boundary):
 
     @abstractmethod
     def _moved(self, anchor: np.ndarray, frame: int) -> np.ndarray:
-        """Return targets (n, 3) m of ``frame``; ``anchor`` are the positions before the hold."""
+        """Return targets (n, 3) m in ``frame``; ``anchor`` (n, 3) m is where the hold began."""
 
 
 class Pins(Hold):
     """Vertices that are fixed at their positions at the beginning of the hold."""
 
     class Config(HoldConfig):
-        """See `HoldConfig`."""
+        """Pinned vertices and frames; fields are those of `HoldConfig`."""
 
         effect: Literal["pins"] = "pins"
 
@@ -77,12 +77,12 @@ class Pins(Hold):
 
 
 class HandleConfig(HoldConfig):
-    """A motion that lasts ``over`` frames from ``start``; then the vertices are held at rest."""
+    """Motion of ``over`` frames from frame ``start``; then the vertices are held at rest."""
 
     over: Annotated[FrameNumber, Field(ge=1)]
 
     def progress(self, frame: int) -> float:
-        """Return the fraction in [0, 1] of the motion that is done at the end of ``frame``."""
+        """Return the fraction of the motion, 0 to 1, completed at the end of ``frame``."""
         return min(1.0, (frame + 1 - self.start) / self.over)
 
 
@@ -90,13 +90,13 @@ class Translate(Hold):
     """Held vertices that move by an offset at constant speed."""
 
     class Config(HandleConfig):
-        """``offset`` in metres."""
+        """Displacement ``offset`` in metres, and the fields of `HandleConfig`."""
 
         effect: Literal["translate"] = "translate"
         offset: Vector
 
         def redirected(self, axes: Sequence[int]) -> Self:
-            """Turn the offset by a right angle from the first of ``axes`` to the second."""
+            """Turn the offset by 90 degrees, from the first of ``axes`` (0, 1, 2) to the second."""
             offset = list(self.offset)
             first, second = axes[0], axes[min(1, len(axes) - 1)]
             offset[first], offset[second] = offset[second], -offset[first]
@@ -121,7 +121,7 @@ class Rotate(Hold):
     """Held vertices that rotate at constant speed about an axis through the rest shape's centre."""
 
     class Config(HandleConfig):
-        """``degrees`` counted right-handed about ``axis``."""
+        """Angle ``degrees``, right-handed about the direction ``axis``."""
 
         effect: Literal["rotate"] = "rotate"
         axis: Literal["x", "y", "z"]

@@ -15,11 +15,11 @@ Degrees = Annotated[float, Field(ge=-1e6, le=1e6)]
 
 
 class Key(ConfigModel):
-    """Pose of a handle, ``at`` this number of frames after ``start``.
+    """Pose of a handle ``at`` this number of frames after the hold begins.
 
     offset : displacement since the beginning of the hold, m
-    turn : degrees about x, y and z as a rotation vector (its direction is the axis, its length the
-        angle), right-handed about the centre of the bounding box when the hold begins
+    turn : rotation vector in degrees (its direction is the axis, its length the angle),
+        right-handed about the centre of the bounding box when the hold begins
     """
 
     at: Annotated[int, Field(ge=1, le=1_000_000)]
@@ -28,15 +28,15 @@ class Key(ConfigModel):
 
 
 class Keyframes(Hold):
-    """Held vertices that move as a rigid body from key to key and stay in place after the last key.
+    """Held vertices that move as a rigid body from pose to pose and stay in the last one.
 
-    Offsets and rotation vectors are interpolated: ``linear``, with a kink at each key, or
-    ``smooth``, by monotone cubics without overshoot (Fritsch and Butland 1984). Angles above 180
-    degrees are possible, since rotation vectors are interpolated, not rotations.
+    Offsets and rotation vectors are interpolated: ``linear``, with a kink at each pose, or
+    ``smooth``, by monotone cubics without overshoot (Fritsch and Butland 1984). As these vectors,
+    not rotations, are interpolated, angles above 180 degrees are possible.
     """
 
     class Config(HoldConfig):
-        """``keys`` in the order of time; at ``start``, before them, offset and turn are zero."""
+        """Poses ``keys`` in the order of time; at ``start``, offset and turn are zero."""
 
         effect: Literal["keyframes"] = "keyframes"
         keys: Annotated[tuple[Key, ...], Field(min_length=1, max_length=10_000)]
@@ -50,7 +50,7 @@ class Keyframes(Hold):
             return self
 
         def with_frames_scaled(self, factor: float) -> Self:
-            """Return the effect with key frames times ``factor``, at least one frame apart."""
+            """Return the effect with frames of poses times ``factor``, at least one frame apart."""
             keys: list[Key] = []
             for key in self.keys:
                 first = keys[-1].at + 1 if keys else 1

@@ -10,7 +10,7 @@ from pdrom.model.mesh.types import Mesh
 
 
 class Kick(Start):
-    """Initial velocity: seeded random combination of 1, x, y, z, xy, yz, zx (scaled coordinates).
+    """Random initial velocity: combination of 1, x, y, z, xy, yz, zx in scaled coordinates, seeded.
 
     Low-degree polynomials excite slow motions of the whole body, without noise at the scale of
     elements.

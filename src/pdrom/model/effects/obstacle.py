@@ -10,7 +10,7 @@ from pdrom.model.effects.base import Contact, EffectConfig, Vector
 from pdrom.model.mesh.selection import require_direction, require_ordered
 from pdrom.model.mesh.types import Length, Mesh, PositiveLength
 
-# A vertex up to this deep inside, relative to the mesh extent, counts as outside.
+# A vertex inside by at most this depth, relative to the mesh extent, counts as outside.
 SLACK = 1e-9
 
 Entries = tuple[np.ndarray, np.ndarray, np.ndarray]
@@ -19,19 +19,19 @@ Entries = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 class ObstacleConfig(EffectConfig):
-    """``friction`` coefficient mu: 0 for no friction, ``.inf`` for sticking."""
+    """Coefficient mu of ``friction``: 0 for none, ``.inf`` (infinity) for sticking."""
 
     friction: Annotated[float, Field(ge=0.0)] = 0.0
 
 
 class Obstacle(Contact):
-    """A fixed convex body that vertices cannot enter; edges and triangles can.
+    """A fixed convex body that vertices cannot enter; edges and faces of the mesh can.
 
-    A vertex whose straight path of a frame enters the body continues in the tangent plane at the
-    entry point, even if the path leaves the body again, so that fast vertices do not pass through.
-    A vertex that is inside at the beginning of a frame moves to the nearest surface point. Both
-    corrections move it by a depth d along the normal and shorten its tangential motion by mu d, to
-    not less than zero: Coulomb's law for the impulse m d / h of the frame. Impacts are inelastic.
+    If the straight path of a vertex in a frame enters the body, the vertex continues in the tangent
+    plane at the entry point, even if the path leaves the body again: fast vertices do not pass
+    through. A vertex that is inside at the beginning of a frame moves to the nearest surface
+    point. Both corrections move it by a depth d along the normal and shorten its tangential motion
+    by mu d (at most to zero): Coulomb's law for the impulse m d / h. Impacts are inelastic.
     """
 
     def __init__(self, config: ObstacleConfig, mesh: Mesh, masses: np.ndarray) -> None:
@@ -61,7 +61,7 @@ class Obstacle(Contact):
             positions[inside] = lifted - along + self._braked(along, depth)
 
     def _braked(self, along: np.ndarray, depth: np.ndarray) -> np.ndarray:
-        """Return the tangential motion ``along`` (n, 3) m after friction at ``depth`` (n,) m."""
+        """Return tangential motion ``along`` (n, 3) m, shortened by friction; ``depth`` (n,) m."""
         mu = self.config.friction
         if mu == 0.0:
             return along
@@ -76,15 +76,15 @@ class Obstacle(Contact):
 
     @abstractmethod
     def normals(self, points: np.ndarray) -> np.ndarray:
-        """Return outward unit normals (n, 3) at the surface points nearest to inner ``points``."""
+        """Return outward unit normals (n, 3) at the surface points nearest to ``points`` inside."""
 
     @abstractmethod
     def entries(self, start: np.ndarray, end: np.ndarray) -> Entries:
-        """Return the entries of straight paths from ``start`` (n, 3) m, outside, to ``end``."""
+        """Return where paths from ``start`` (n, 3) m (outside) to ``end`` enter the body."""
 
 
 class Plane(Obstacle):
-    """The half space behind a plane, which vertices cannot enter; see `Obstacle`."""
+    """Obstacle: the half space behind a plane, which vertices cannot enter."""
 
     class Config(ObstacleConfig):
         """``point`` on the plane in metres, ``normal`` of any length."""
@@ -120,7 +120,7 @@ UP = np.array([0.0, 1.0, 0.0])
 
 
 class Sphere(Obstacle):
-    """A sphere, which vertices cannot enter; see `Obstacle`."""
+    """Obstacle: a sphere, which vertices cannot enter."""
 
     class Config(ObstacleConfig):
         """``centre`` and ``radius`` in metres."""
@@ -136,20 +136,20 @@ class Sphere(Obstacle):
         return self.config.radius - np.linalg.norm(points - self.config.centre, axis=1)
 
     def normals(self, points: np.ndarray) -> np.ndarray:
-        """Return outward unit normals (n, 3) at ``points`` (n, 3) m; at the centre: upwards."""
+        """Return outward unit normals (n, 3) at ``points`` (n, 3) m; upwards at the centre."""
         arm = points - self.config.centre
         length = np.linalg.norm(arm, axis=1)[:, None]
         return np.where(length > 0.0, arm / np.where(length > 0.0, length, 1.0), UP)
 
     def entries(self, start: np.ndarray, end: np.ndarray) -> Entries:
-        """Return entries at the smaller root t in [0, 1] of |start + t (end - start) - c| = r."""
+        """Return `Entries` at the smaller root t in [0, 1] of |start + t (end - start) - c| = r."""
         arm, path = start - self.config.centre, end - start
         square = np.einsum("ij,ij->i", path, path)
         inwards = -np.einsum("ij,ij->i", arm, path)
         outside = np.einsum("ij,ij->i", arm, arm) - self.config.radius**2
         root = inwards**2 - square * outside
         meets = (inwards > 0.0) & (root >= 0.0)
-        # this form of the root avoids the cancellation of inwards - sqrt(root) near the surface
+        # inwards - sqrt(root), the usual form, would cancel near the surface
         divisor = np.where(meets, inwards + np.sqrt(np.where(meets, root, 0.0)), 1.0)
         fraction = np.clip(np.where(meets, outside / divisor, 0.0), 0.0, None)
         points = start + fraction[:, None] * path
@@ -157,7 +157,7 @@ class Sphere(Obstacle):
 
 
 class Box(Obstacle):
-    """A box, possibly as thin as a plate, which vertices cannot enter; see `Obstacle`."""
+    """Obstacle: a box, possibly as thin as a plate, which vertices cannot enter."""
 
     class Config(ObstacleConfig):
         """Corners ``lower`` and ``upper`` in metres."""
@@ -178,18 +178,18 @@ class Box(Obstacle):
         return self._to_faces(points).min(axis=1)
 
     def _to_faces(self, points: np.ndarray) -> np.ndarray:
-        """Return distances (n, 6) m to lower x, y, z and upper x, y, z faces; negative outside."""
+        """Return distances (n, 6) m to the lower x, y, z and upper x, y, z faces; < 0 outside."""
         return np.hstack([points - self.config.lower, self.config.upper - points])
 
     def normals(self, points: np.ndarray) -> np.ndarray:
-        """Return normals (n, 3) of the faces nearest to ``points``, the first if equally near."""
+        """Return normals (n, 3) of the faces nearest to ``points``; ties: the first face."""
         face = self._to_faces(points).argmin(axis=1)
         return _axis_vectors(face % 3, np.where(face < 3, -1.0, 1.0))
 
     def entries(self, start: np.ndarray, end: np.ndarray) -> Entries:
         """Return the `Entries` of straight paths from ``start`` to ``end`` (n, 3) m.
 
-        A path enters the box at the last of its crossings with the nearer faces of the three axes.
+        A path enters the box at the last of its crossings with the nearer face of each axis.
         """
         path, rows = end - start, np.arange(len(start))
         lower, upper = np.array(self.config.lower), np.array(self.config.upper)
@@ -203,7 +203,7 @@ class Box(Obstacle):
             far = np.where(path != 0.0, far, np.inf)
             axis = near.argmax(axis=1)
             fraction, moved = near[rows, axis], path[rows, axis]
-            # a start that is inside the face by round-off counts as on the face
+            # a start that is inside a face by round-off counts as a point on it
             on_face = fraction * np.abs(moved) >= -self._slack
         hits = (moved != 0.0) & on_face & (fraction <= 1.0) & (far.min(axis=1) >= fraction)
         points = start + np.clip(np.where(hits, fraction, 0.0), 0.0, None)[:, None] * path
@@ -216,13 +216,13 @@ def _axis_vectors(axes: np.ndarray, signs: np.ndarray) -> np.ndarray:
     return np.eye(3)[axes] * signs[:, None]
 
 
-RINGS = 24  # intervals of a drawn sphere from pole to pole; it has twice as many around
-# Corners of the faces of a drawn box; bits of a corner's number are 1 on its upper sides x, y, z.
+RINGS = 24  # number of intervals of a drawn sphere from pole to pole, half of those around it
+# Corners of the faces of a drawn box; the bits of a corner's number are 1 on upper sides x, y, z.
 FACES = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
 
 
 def square(point: np.ndarray, normal: np.ndarray, low: np.ndarray, high: np.ndarray) -> Mesh:
-    """Return a square in a plane, to draw the plane near the box from ``low`` to ``high`` (3,) m.
+    """Return a square to draw a plane near the box from ``low`` to ``high`` (3,) m.
 
     Its centre is the centre of the box projected onto the plane, its side the box diagonal.
 
@@ -262,10 +262,10 @@ def ball(centre: np.ndarray, radius: float) -> Mesh:
 
 
 class Floor(Contact):
-    """A contact that lifts vertices below a horizontal floor onto it at the end of a frame.
+    """Horizontal floor: at the end of a frame, vertices below it are moved up onto it.
 
     Velocities are computed from the corrected positions, so that impacts are inelastic. As the
-    floor acts after the iterations, it does not change the objective of the local/global loop.
+    floor acts after the iterations, it does not change the objective of the local/global steps.
     """
 
     class Config(EffectConfig):

@@ -1,4 +1,4 @@
-"""A boundary effect that moves single vertices back and forth, one after the other."""
+"""A boundary condition that moves single vertices back and forth, one after the other."""
 
 from collections.abc import Sequence
 from typing import Annotated, Literal, Self
@@ -12,15 +12,15 @@ from pdrom.model.effects.hold import AXES
 from pdrom.model.mesh.selection import Selection, farthest_points, select_vertices
 from pdrom.model.mesh.types import Length, Mesh
 
-# displacement divided by amplitude, at equally spaced times: 0 -> -z -> +z -> -z -> 0
+# displacement over amplitude at equally spaced times
 KNOTS = (0.0, -1.0, 1.0, -1.0, 0.0)
 
 
 class Poke(Boundary):
-    """Boundary that moves a vertex 0 -> -z -> +z -> -z -> 0, releases it, and moves the next one.
+    """Moves vertices in turn by 0 -> -a -> a -> -a -> 0 on an axis (amplitude a), then frees them.
 
-    Vertices are chosen by farthest-point sampling from the centre, except those in ``avoid``. The
-    reproduced preprint gives no speeds; amplitude, frames and order are chosen by this study.
+    Vertices, without those in ``avoid``, are chosen by farthest-point sampling from the centre. The
+    reproduced preprint gives no speeds; amplitude, frames and order are choices of this study.
     """
 
     class Config(EffectConfig):

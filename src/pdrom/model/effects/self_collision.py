@@ -9,27 +9,27 @@ from pydantic import Field
 from pdrom.model.effects.base import Contact, EffectConfig
 from pdrom.model.mesh.types import MAX_LENGTH, MIN_LENGTH, Mesh
 
-# Largest number of searches for close pairs per frame, and of sweeps over the pairs per search.
+# Largest number of searches for close pairs per frame, and of passes over the pairs per search.
 SEARCHES, SWEEPS = 20, 100
-# Radius of the search for pairs, relative to the thickness; sweeps may bring such pairs closer.
+# Radius of the search for pairs, relative to the thickness; passes may bring such pairs closer.
 REACH = 1.25
-# Sweeps end when no pair is closer than this fraction of the thickness.
+# Passes end when no pair is closer than this fraction of the thickness.
 ENOUGH = 0.95
-# Largest distance of a point of an equilateral triangle with unit edges to its nearest vertex.
+# Largest distance of a point of an equilateral triangle with unit edges from its nearest corner.
 COVER = 1.0 / np.sqrt(3.0)
 
 
 class SelfCollision(Contact):
-    """Contact that separates vertices closer than the thickness, except pairs that are so at rest.
+    """Separates vertices closer than the thickness, except pairs that are as close at rest.
 
     Close pairs (found by a k-d tree) are moved apart along their connecting line, in proportion to
-    their inverse masses (zero for held vertices); momentum is conserved if none is held. Sweeps
+    their inverse masses (zero for held vertices); momentum is conserved if none is held. Passes
     over the pairs, in the order of their vertices, are repeated until all distances are at least
     `ENOUGH` times the thickness; for many pairs in a small region this may take several frames.
 
-    A pair that changed sides during the frame is moved back. Only vertices collide: no vertex can
-    pass between others if the thickness is above 0.58 edge lengths and no pair approaches by more
-    than the thickness in a frame.
+    A pair that changed sides (its connecting line reversed) in the frame is moved back. Only
+    vertices collide: none can pass between others if the thickness is above 0.58 edge lengths and
+    no pair approaches by more than the thickness in a frame.
     """
 
     class Config(EffectConfig):
@@ -51,7 +51,7 @@ class SelfCollision(Contact):
     def doubt(self, rest: np.ndarray, free: np.ndarray) -> str:
         """Return a warning with the required thickness, or "" if that of the scene is sufficient.
 
-        ``rest`` and ``free`` are as in `Contact.doubt`.
+        The result depends only on the edges of the rest shape, not on ``rest`` and ``free``.
         """
         if self._thickness >= self._needed:
             return ""
@@ -78,7 +78,7 @@ class SelfCollision(Contact):
                 return
 
     def _pairs(self, positions: np.ndarray) -> np.ndarray:
-        """Return vertex pairs (n, 2) that are close, but not at rest, in lexicographic order."""
+        """Return vertex pairs (n, 2) that are close now but not at rest, in lexicographic order."""
         if not np.isfinite(positions).all():
             return np.empty((0, 2), dtype=np.int64)
         from scipy.spatial import cKDTree
@@ -91,7 +91,7 @@ class SelfCollision(Contact):
 
 @njit(cache=True)
 def _separate(q, before, pairs, inverse_masses, thickness, enough, sweeps):
-    """Move close ``pairs`` of q apart in place; return the smallest distance in the first sweep."""
+    """Move close ``pairs`` of q apart in place; return the smallest distance in the first pass."""
     first = thickness
     for sweep in range(sweeps):
         closest = thickness
@@ -107,7 +107,7 @@ def _separate(q, before, pairs, inverse_masses, thickness, enough, sweeps):
             length = np.sqrt(ex * ex + ey * ey + ez * ez)
             gap = thickness - distance
             if length > 0.0 and dx * ex + dy * ey + dz * ez <= 0.0:
-                # the pair changed sides, or its side is undefined: move it back to its old side
+                # the connecting line has reversed or has no direction: restore the old direction
                 along = (dx * ex + dy * ey + dz * ez) / length
                 dx, dy, dz, distance, gap = ex, ey, ez, length, thickness - along
             elif distance == 0.0:

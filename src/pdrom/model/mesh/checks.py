@@ -9,12 +9,12 @@ from pdrom.core.store import require_finite
 from pdrom.model.mesh.generators import boundary, orient
 from pdrom.model.mesh.types import MAX_LENGTH, MIN_LENGTH, Mesh
 
-# An element is degenerate if its measure is below this times the power 2 or 3 of its longest edge.
+# An element is degenerate if its area is below this times its longest edge^2 (volume: edge^3).
 RELATIVE_MEASURE = 1e-12
 
 
 def check_mesh(mesh: Mesh, name: str) -> Mesh:
-    """Return ``mesh``, or raise an error at its first fault; ``name`` begins the message.
+    """Return ``mesh``; raise an error for its first fault, with ``name`` in front of the message.
 
     Raises
     ------
@@ -37,28 +37,28 @@ def check_mesh(mesh: Mesh, name: str) -> Mesh:
 
 
 def mesh_of(points: np.ndarray, cells: np.ndarray, name: str) -> Mesh:
-    """Return a mesh of points (N, 3) m and triangles (T, 3), or tetrahedra (E, 4), then oriented.
+    """Return a mesh of points (N, 3) m and triangles (T, 3) or tetrahedra (E, 4), then oriented.
 
     Raises
     ------
     MeshError, DegenerateElementError
-        See `check_indices`; ``name`` begins the message.
+        An index is out of range, or repeated in a cell; ``name`` begins the message.
     """
     if cells.shape[1] == 3:
         check_indices(cells, len(points), "triangle", name=name)
         return Mesh(points, cells.astype(np.int32))
     check_indices(cells, len(points), "tetrahedron", name=name)
-    # formats number the corners of a tetrahedron differently
+    # make volumes positive: file formats order the corners of a tetrahedron differently
     tetrahedra = orient(points, cells)
     return Mesh(points, boundary(tetrahedra), tetrahedra)
 
 
 def check_indices(cells: np.ndarray, vertices: int, kind: str, name: str) -> None:
-    """Raise MeshError for an index out of range, DegenerateElementError for a repeated one.
+    """Raise MeshError for an index out of range, DegenerateElementError if repeated in a cell.
 
     Parameters
     ----------
-    cells : (E, corners) vertex indices, allowed from 0 to ``vertices`` - 1
+    cells : (E, corners) vertex indices; 0 to ``vertices`` - 1 are allowed
     kind, name : kind of the cells and name of the mesh, for messages
     """
     outside = np.flatnonzero(((cells < 0) | (cells >= vertices)).any(axis=1))
@@ -76,9 +76,9 @@ def check_indices(cells: np.ndarray, vertices: int, kind: str, name: str) -> Non
 
 
 def check_range(points: np.ndarray, scale: float, name: str) -> None:
-    """Raise MeshError if coordinates or the extent, times ``scale``, are out of range.
+    """Raise MeshError if coordinates or the extent, times ``scale``, are too large or too small.
 
-    Out of the range squares of lengths would overflow or lose all digits.
+    Squares of such lengths would overflow or lose all digits.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def check_range(points: np.ndarray, scale: float, name: str) -> None:
 
 
 def _check_neighbours(cells: np.ndarray, kind: str, name: str) -> None:
-    """Raise MeshError for a repeated cell, or an edge or face that more than two cells share."""
+    """Raise MeshError for a repeated cell, or an edge or face of more than two cells."""
     twice = _largest_group(np.sort(cells, axis=1))
     if len(twice) > 1:
         first, again = twice[:2]
@@ -122,7 +122,7 @@ def _check_neighbours(cells: np.ndarray, kind: str, name: str) -> None:
 
 
 def _largest_group(rows: np.ndarray) -> np.ndarray:
-    """Return the indices, ascending, of the most frequent row, the smallest one of several."""
+    """Return indices, ascending, of all copies of the most frequent row; ties: the smallest row."""
     order = np.lexsort(rows.T[::-1])
     ordered = rows[order]
     new = (ordered[1:] != ordered[:-1]).any(axis=1)
@@ -151,8 +151,8 @@ def _check_measures(mesh: Mesh, cells: np.ndarray, kind: str, name: str) -> None
     corner = mesh.points[cells]
     edges = corner[:, 1:] - corner[:, :1]
     longest = np.linalg.norm(edges, axis=2).max(axis=1)
-    # scale edges to length one and compute the measure itself, not a Gram determinant, which is its
-    # square and consists of round-off below 1e-8
+    # scale edges to length one, then compute area or volume, not the Gram determinant: that is the
+    # square, and consists of round-off for values below 1e-8
     edges = edges / longest[:, None, None]
     normal = np.cross(edges[:, 0], edges[:, 1])
     if kind == "triangle":
@@ -168,10 +168,10 @@ def _check_measures(mesh: Mesh, cells: np.ndarray, kind: str, name: str) -> None
 
 
 def turned_alike(mesh: Mesh, name: str) -> tuple[Mesh, np.ndarray]:
-    """Return the surface with consistently oriented triangles, and the reversed triangles (n,).
+    """Return the surface with consistent orientation, and the indices (n,) of reversed triangles.
 
     In each connected part of ``mesh`` the smaller number of triangles is reversed. A graph has two
-    nodes per triangle, as given and reversed, and edges to the nodes of neighbours with consistent
+    nodes per triangle (as given, reversed), joined to the nodes of neighbours with consistent
     orientation. A part is orientable if its nodes form two connected components.
 
     Raises
@@ -185,7 +185,7 @@ def turned_alike(mesh: Mesh, name: str) -> tuple[Mesh, np.ndarray]:
     ends = np.sort(edges, axis=1)[order]
     second = 1 + np.flatnonzero((ends[1:] == ends[:-1]).all(axis=1))
     a, b = order[second - 1] // 3, order[second] // 3
-    # consistently oriented neighbours have opposite directions of their common edge
+    # neighbours are consistent if they traverse their common edge in opposite directions
     opposite = edges[order[second - 1], 0] == edges[order[second], 0]
     pairs = np.concatenate(
         [np.column_stack([a, b + t * opposite]), np.column_stack([a + t, b + t * ~opposite])]

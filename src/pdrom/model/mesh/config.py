@@ -1,4 +1,4 @@
-"""Typed configuration of meshes from a generator with parameters, from a file, or from arrays."""
+"""Typed configuration of meshes: a generator with parameters, a file, or arrays."""
 
 import hashlib
 import json
@@ -22,7 +22,7 @@ log = logging.getLogger(__name__)
 
 
 class MeshModel(ConfigModel):
-    """A generator with its parameters, or a file."""
+    """Base class of the configurations of a mesh."""
 
     @property
     def label(self) -> str:
@@ -41,16 +41,16 @@ class MeshModel(ConfigModel):
         return []
 
     def coarsened(self, factor: float) -> Self:
-        """Return the mesh for any ``factor``, as files and given arrays have one resolution."""
+        """Return the mesh unchanged: files and given arrays have a single resolution."""
         return self
 
 
-_DIGITS = 32  # length of a hexadecimal digest
+_DIGITS = 32  # number of hexadecimal digits of a digest
 Count = Annotated[int, Field(ge=2, le=2000)]
 
 
 class GeneratedMesh(MeshModel):
-    """Vertices in rows along two or three sides, whose keys are `sides`."""
+    """Mesh of a regular grid; `sides` are the keys with the numbers of vertices along its sides."""
 
     sides: ClassVar[tuple[str, ...]]
     least: ClassVar[int]
@@ -66,7 +66,7 @@ class GeneratedMesh(MeshModel):
         return self
 
     def coarsened(self, factor: float) -> Self:
-        """Return the shape with ``factor`` times the vertices along each side, at least `least`."""
+        """Return the mesh with ``factor`` times the vertices along each side, at least `least`."""
         sizes = {name: max(self.least, round(getattr(self, name) * factor)) for name in self.sides}
         return self.model_copy(update=sizes)
 
@@ -117,9 +117,9 @@ class BarMesh(GeneratedMesh):
 
 
 class MeshFile(MeshModel):
-    """A mesh file, of a format that keeps it in one file, in the folder of its scene or below.
+    """A mesh file, in the folder of its scene or below; formats with several files are excluded.
 
-    path : relative to that folder; `below` makes it relative to another one
+    path : path relative to that folder, see also `below`
     """
 
     kind: Literal["file"]
@@ -137,7 +137,7 @@ class MeshFile(MeshModel):
         return value
 
     def below(self, folder: str) -> Self:
-        """Return the mesh with ``folder``, the folder of its scene, prepended to the path."""
+        """Return the mesh with ``folder``, that of its scene, in front of the path."""
         return self.model_copy(update={"path": f"{folder}/{self.path}"})
 
     def build(self, root: Path) -> Mesh:
@@ -146,8 +146,8 @@ class MeshFile(MeshModel):
         Raises
         ------
         MeshError, DegenerateElementError
-            An unreadable or faulty file, see `read_mesh_file` and `check_mesh`, or a surface which
-            is not orientable.
+            The file is unreadable or the mesh faulty, see `read_mesh_file` and `check_mesh`, or a
+            surface is not orientable.
         """
         mesh = read_mesh_file(self.file(root))
         check_range(mesh.points, self.scale, self.path)
@@ -185,9 +185,9 @@ class MeshFile(MeshModel):
 
 
 class GivenMesh(MeshModel):
-    """Arrays that were given from Python; the file of a run holds them with the configuration.
+    """Mesh given as arrays from Python, which files of runs contain next to the configuration.
 
-    blake2b : digest of the arrays, so that two meshes have two configurations
+    blake2b : digest of the arrays, by which configurations of different meshes differ
     """
 
     kind: Literal["given"]
@@ -203,7 +203,7 @@ class GivenMesh(MeshModel):
         return cls(kind="given", blake2b=digest.hexdigest())
 
     def build(self, root: Path) -> Mesh:
-        """Raise MeshError for any ``root``, as the configuration does not contain the arrays."""
+        """Raise MeshError: the mesh cannot be built, as the configuration contains no arrays."""
         raise MeshError("mesh.kind = 'given': its arrays come from Python (pdrom.api.build_scene)")
 
     @property
@@ -214,8 +214,8 @@ class GivenMesh(MeshModel):
 def given_mesh(points: Any, cells: Any, name: str) -> Mesh:
     """Return the mesh of points (N, 3) m and cells; error messages begin with ``name``.
 
-    Triangles are oriented consistently, tetrahedra with positive volume. All other conditions on a
-    mesh are checked when a scene is built.
+    Triangles are oriented consistently, tetrahedra with positive volume. All other conditions
+    are checked when a scene is built.
 
     Parameters
     ----------
@@ -224,7 +224,7 @@ def given_mesh(points: Any, cells: Any, name: str) -> Mesh:
     Raises
     ------
     MeshError
-        Arrays of wrong shape or type, an index out of range, a surface that is not orientable.
+        An array has a wrong shape or type, an index is out of range, a surface not orientable.
     """
     points = _array(points, f"{name}: points", np.float64, (3,))
     cells = _array(cells, f"{name}: cells", np.int64, (3, 4))
@@ -236,7 +236,7 @@ def given_mesh(points: Any, cells: Any, name: str) -> Mesh:
 
 
 def _array(values: Any, name: str, kind: type[np.generic], widths: tuple[int, ...]) -> np.ndarray:
-    """Return a copy of ``values`` as an array of type ``kind`` with a row length in ``widths``."""
+    """Return ``values`` as a new array of type ``kind``, with one of ``widths`` as row length."""
     required = " or ".join(f"(n, {width})" for width in widths)
     try:
         array = np.array(values)

@@ -19,7 +19,7 @@ from pdrom.model.mesh import reader
 from pdrom.model.mesh.checks import mesh_of
 from pdrom.model.mesh.types import Mesh
 
-# The operators of a cloth with this number of vertices need about 1 GB to compute.
+# The computation of the operators of a cloth with this many vertices needs about 1 GB.
 MAX_VERTICES = 1_000_000
 VARIABLE = "PDROM_MESH_LIMITS"
 MAX_FACTOR = 1000.0
@@ -27,15 +27,15 @@ MAX_FACTOR = 1000.0
 
 @dataclass(frozen=True)
 class MeshLimits:
-    """Limits for reading one mesh file; `mesh_limits` returns the limits in force.
+    """Limits for reading one mesh file; `mesh_limits` returns those that apply.
 
     file_bytes : size of the file
     seconds : processor time of the process that reads the file
-    deadline : elapsed seconds after which this process is ended, for processes that wait and for
-        platforms without limits of processor time. Much larger than ``seconds``, so that the result
-        does not depend on the load of the machine.
+    deadline : elapsed seconds after which this process is ended, if it waits or the platform has no
+        limits of processor time. Much larger than ``seconds``, so that the result does not depend
+        on the load of the machine.
     memory : bytes of address space of this process
-    vertices, cells : largest numbers in the mesh
+    vertices, cells : largest numbers of vertices and of cells in the mesh
     """
 
     file_bytes: int = 500_000_000
@@ -68,11 +68,11 @@ def mesh_limits() -> MeshLimits:
     return MeshLimits(**{f.name: int(factor * getattr(plain, f.name)) for f in fields(plain)})
 
 
-# File extension -> readers, one of which is chosen by the first byte of the file. Each reader opens
-# only the mesh file, so that the hash of this file covers all inputs. Formats are excluded if they
-# store data in further files (.xdmf, .pvd, .ele and .node, dolfin's .xml), include files (.inp), or
-# can link to files (HDF5 and netCDF: .med, .h5m, .hmf, .cgns, .e). Kratos's .mdpa is excluded
-# because meshio reads its quadrilaterals as tetrahedra.
+# File extension -> possible readers; the first byte of the file selects one. No reader opens other
+# files, so that the hash of the mesh file covers all inputs. Formats are excluded if they store
+# data in further files (.xdmf, .pvd, .ele and .node, dolfin's .xml), include files (.inp), or can
+# link to files (HDF5 and netCDF: .med, .h5m, .hmf, .cgns, .e). Kratos's .mdpa is excluded because
+# meshio reads its quadrilaterals as tetrahedra.
 FORMATS = {
     ".avs": ("avsucd",),
     ".bdf": ("nastran",),
@@ -97,19 +97,19 @@ FORMATS = {
     ".vtu": ("vtu",),
     ".wkt": ("wkt",),
 }
-# A copy, because the workflow changes `sys.executable` to a shell command.
+# A copy of the path of Python, since the workflow changes `sys.executable` to a shell command.
 PYTHON = sys.executable
 ADVICE = f"{VARIABLE}=2 in the environment doubles the limits"
 
 
 def read_mesh_file(path: Path) -> Mesh:
-    """Return the mesh of triangles or tetrahedra in the file ``path``, in one of `FORMATS`.
+    """Return the mesh of triangles or tetrahedra in the file ``path``, in a format of `FORMATS`.
 
     Raises
     ------
     MeshError
-        The file is missing or unreadable, of another format, needs more time or memory than
-        `mesh_limits` allows, holds other cells, or mixes triangles and tetrahedra.
+        The file is missing, unreadable, of another format, or exceeds a limit of `mesh_limits`; it
+        has other cells, or both triangles and tetrahedra.
     """
     try:
         there = path.is_file()
@@ -137,12 +137,12 @@ def read_mesh_file(path: Path) -> Mesh:
 
 @lru_cache(maxsize=8)
 def _arrays(path: Path, digest: str, limits: MeshLimits) -> tuple[np.ndarray, np.ndarray]:
-    """Return points and cells of a file, cached for the same path, ``digest`` and ``limits``."""
+    """Return points and cells of a file; cached, with ``digest`` and ``limits`` in the key."""
     numbers = (limits.seconds, limits.memory, limits.vertices, limits.cells)
     # -P: modules in the folder of the script must not shadow the standard library
     command = [PYTHON, "-P", "-X", "utf8", "-W", "ignore", reader.__file__, str(path)]
     command += [",".join(FORMATS[path.suffix.lower()]), *map(str, numbers)]
-    # each thread of the linear algebra libraries, unused here, would reserve memory
+    # one thread each: threads of the linear algebra libraries, unused here, would reserve memory
     single = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
     try:
         ended = subprocess.run(
@@ -165,7 +165,7 @@ def _arrays(path: Path, digest: str, limits: MeshLimits) -> tuple[np.ndarray, np
 
 
 def _fault(ended: subprocess.CompletedProcess[bytes], limits: MeshLimits) -> str:
-    """Return a message that says why a reading process ``ended`` without a mesh."""
+    """Return a message with the reason why the reading process ``ended`` without a mesh."""
     status = ended.returncode
     if status == reader.REFUSED:
         return ended.stdout.decode(errors="replace")

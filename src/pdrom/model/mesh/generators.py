@@ -47,7 +47,7 @@ def cloth(
     return Mesh(points, pairs.reshape(-1, 3).astype(np.int32))
 
 
-# Five tetrahedra of a cell, the inner one first; bits of a corner number are its (di, dj, dk).
+# Five tetrahedra of a cell, the inner one first; the bits of a corner's number are (di, dj, dk).
 _EVEN = ((0, 3, 5, 6), (1, 0, 3, 5), (2, 0, 6, 3), (4, 0, 5, 6), (7, 3, 6, 5))
 _ODD = ((1, 2, 4, 7), (0, 1, 2, 4), (3, 1, 7, 2), (5, 1, 4, 7), (6, 2, 7, 4))
 
@@ -79,7 +79,7 @@ def bar(nx: int, ny: int, nz: int, extent: float = 1.0, lift: float = 2.0) -> Me
 
 
 def orient(points: np.ndarray, tetrahedra: np.ndarray) -> np.ndarray:
-    """Return ``tetrahedra`` (E, 4) on ``points`` (N, 3) m with positive volumes, int32."""
+    """Return ``tetrahedra`` (E, 4), int32, reordered so that their volumes are positive."""
     a, b, c, d = (points[tetrahedra[:, i]] for i in range(4))
     negative = np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a) < 0.0
     oriented = tetrahedra.astype(np.int32)
@@ -88,11 +88,11 @@ def orient(points: np.ndarray, tetrahedra: np.ndarray) -> np.ndarray:
 
 
 def boundary(tetrahedra: np.ndarray) -> np.ndarray:
-    """Return the faces (T, 3) int32 of only one of ``tetrahedra`` (E, 4), oriented outwards."""
+    """Return boundary faces (T, 3) int32 of ``tetrahedra`` (E, 4), oriented outwards."""
     faces = tetrahedra[:, [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]]].reshape(-1, 3)
     ordered = np.sort(faces, axis=1).astype(np.int64)
     size = int(faces.max()) + 1
-    # one integer per face, 64 bits for up to a million vertices: faster to sort than rows
+    # one 64-bit integer per face, enough for a million vertices, is faster to sort than rows
     keys = (ordered[:, 0] * size + ordered[:, 1]) * size + ordered[:, 2]
     _, first, count = np.unique(keys, return_index=True, return_counts=True)
     return faces[np.sort(first[count == 1])].astype(np.int32)

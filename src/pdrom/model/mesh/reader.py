@@ -1,12 +1,12 @@
 """Script that reads one mesh file in a separate process, started by `pdrom.model.mesh.files`.
 
 meshio does not validate its input: truncated files cause endless loops, and a few megabytes of
-compressed zeros unpack to gigabytes. Limits on time and memory end only this process. The script
-imports nothing else of the package, so that it starts in a fraction of a second.
+compressed zeros unpack to gigabytes. Limits on time and memory therefore end only this process.
+The script imports nothing else of the package, so that it starts in a fraction of a second.
 
 Files from which meshio would read a wrong mesh are rejected by checks before and after its call.
-Where meshio accepts a truncated file as a complete one, the end of the file is checked first. This
-module reads .obj files itself (Advanced Visualizer manual, appendix B1, Alias/Wavefront).
+If meshio accepts truncated files of a format, the end of the file is checked first. This module
+reads .obj files itself (Advanced Visualizer manual, appendix B1, Alias/Wavefront).
 
 usage: reader.py FILE FORMATS SECONDS MEMORY VERTICES CELLS
 
@@ -30,7 +30,7 @@ import numpy as np
 
 REFUSED = 3
 NO_MEMORY = 4
-# First byte of a file, by format, where two formats have the same extension.
+# Format -> first byte of its files, for formats with a common extension.
 OPENINGS = {"ansys": b"(", "gmsh": b"$"}
 
 
@@ -45,16 +45,16 @@ def main(path: str, formats: str, *numbers: str) -> int:
     _limit("RLIMIT_AS", memory)
     _limit("RLIMIT_CORE", 0)
     try:
-        # some readers print warnings and faults, and end the process
+        # catch what readers print; some end the process after printing the fault
         with redirect_stdout(io.StringIO()) as said, redirect_stderr(said):
             arrays = read(path, formats.split(","), vertices, cells)
-        # np.save would ask a file object for its position, which a pipe does not have
+        # np.save asks a file object for its position, which a pipe lacks
         pipe = SimpleNamespace(write=sys.stdout.buffer.write)
         for array in arrays:
             np.save(pipe, array, allow_pickle=False)
         sys.stdout.flush()
     except MemoryError:
-        os._exit(NO_MEMORY)  # a normal exit would need memory
+        os._exit(NO_MEMORY)  # end at once: a normal exit would need memory
     except ValueError as error:
         sys.stdout.buffer.write(str(error).encode())
         return REFUSED
@@ -80,7 +80,7 @@ def read(path: str, formats: list[str], max_vertices: int, max_cells: int) -> tu
     Parameters
     ----------
     formats : meshio's names of possible formats, the most likely one first
-    max_vertices, max_cells : largest allowed numbers
+    max_vertices, max_cells : largest allowed numbers of vertices and cells
 
     Raises
     ------
@@ -92,7 +92,7 @@ def read(path: str, formats: list[str], max_vertices: int, max_cells: int) -> tu
     name = next((name for name in formats if OPENINGS.get(name) == begins), formats[0])
     try:
         points, cells = read_obj(Path(path)) if name == "obj" else _by_meshio(path, name)
-        # a damaged file may give other objects than arrays, which the conversion rejects
+        # for a damaged file a reader may return no arrays, which the conversion rejects
         _check_size("vertices", len(np.atleast_1d(points)), max_vertices)
         _check_size("cells", len(cells), max_cells)
         points = np.ascontiguousarray(points, dtype=np.float64)
@@ -116,7 +116,7 @@ def read(path: str, formats: list[str], max_vertices: int, max_cells: int) -> tu
 
 
 def _by_meshio(path: str, name: str) -> tuple:
-    """Return points and cells from meshio's reader ``name``, after checks that they are correct."""
+    """Return points and cells from meshio's reader ``name``, with checks before and after it."""
     import meshio
     from meshio.gmsh import _gmsh40
     from meshio.gmsh import main as gmsh
@@ -142,7 +142,7 @@ def _by_meshio(path: str, name: str) -> tuple:
 
 
 def _last_line(path: str) -> str:
-    """Return a hint for the message if the text file does not end with an end of line, else ""."""
+    """Return a hint for a message if the last line of a text file has no end of line, else ""."""
     end = Path(path).read_bytes()[-80:]
     cut = end and b"\0" not in end and not end.endswith((b"\n", b"\r"))
     return "; cut off? The last line has no end" if cut else ""
@@ -174,7 +174,7 @@ class CutError(UnreadableError):
 
 
 def only_kind(kinds: Iterable[str]) -> str:
-    """Return the only one of ``kinds`` of cells; `RefusedError` if none, several or not allowed."""
+    """Return the kind of all cells; `RefusedError` if ``kinds`` has none, several or others."""
     found = list(dict.fromkeys(kinds))
     if len(found) != 1 or found[0] not in CORNERS:
         raise RefusedError(
@@ -186,8 +186,8 @@ def only_kind(kinds: Iterable[str]) -> str:
 def check_last_number(content: bytes, vertices: int) -> None:
     """Raise `CutError` if the text ``content`` ends with a number that may be truncated.
 
-    Without an end of line, ``12`` may be the first digits of ``123``. An index that cannot have
-    more digits, because there are not so many ``vertices``, is accepted.
+    Without an end of line, ``12`` may be the first digits of ``123``. A last index is accepted if
+    one more digit would exceed the number of ``vertices``.
     """
     last = _LAST_NUMBER.search(content[-64:])
     if last is None:
@@ -210,21 +210,21 @@ def reason(error: BaseException) -> str:
     return f"{type(error).__name__}: {text}"
 
 
-# Reads of less than PIECE bytes past the end of a file are counted; more than PATIENCE mean a loop.
+# More than PATIENCE reads, of less than PIECE bytes, past the end of a file mean an endless loop.
 PIECE, PATIENCE = 4096, 100
-# Format -> pattern that only a complete file matches; other formats state their numbers of items.
+# Format -> pattern that only complete files match; files of other formats state their item counts.
 ENDS = {
     "ansys": rb"\)\s*\Z",
     "gmsh": rb"^\$End\w+\s*\Z",
     "medit": rb"\A\x01\0\0\0|^\s*End\s*\Z",  # a binary file has no end mark
     "nastran": rb"^ENDDATA",
-    "netgen": rb"^\s*endmesh\s*$",  # a section with the geometry may follow
+    "netgen": rb"^\s*endmesh\s*$",  # a section with the geometry may follow it
     "permas": rb"^\s*\$FIN",
     "stl": rb"^\s*endsolid[^\n]*\s*\Z",
     "vtu": rb"</VTKFile>\s*\Z",
     "wkt": rb"\)\s*\Z",
 }
-# Format -> pattern of lines that meshio ignores although they change the mesh, and a message.
+# Format -> pattern of lines that meshio ignores though they change the mesh, and error message.
 PASSED_OVER = {
     "nastran": (
         rb"^[ \t]*(GRDSET|INCLUDE|(?:CTRI|CTETRA)\w*\*)",
@@ -242,21 +242,21 @@ PASSED_OVER = {
 
 
 def check_before(name: str, content: bytes) -> None:
-    """Raise an error for ``content`` that meshio's reader ``name`` would read incorrectly.
+    """Raise an error if meshio's reader ``name`` would read ``content`` incorrectly.
 
     Raises
     ------
     CutError
         The end mark of this format is missing.
     UnreadableError
-        A line that the reader ignores although it changes the mesh, or vertices that are listed in
-        an order different from their numbers, if the reader ignores the numbers.
+        The reader would ignore a line that changes the mesh, or the numbers of vertices that are
+        listed in another order.
     """
     binary = name == "stl" and 84 + 50 * int.from_bytes(content[80:84], "little") == len(content)
     if name in ENDS and not binary and not re.search(ENDS[name], content, re.M):
         raise CutError("the file does not end as this format does")
     if name == "wkt" and content.count(b"(") != content.count(b")"):
-        raise CutError("brackets that are not closed")  # the reader would take hours
+        raise CutError("brackets that are not closed")  # the reader would run for hours
     if name in PASSED_OVER:
         pattern, why = PASSED_OVER[name]
         found = re.search(pattern, content, re.M | re.S | re.I)
@@ -272,9 +272,9 @@ def check_after(name: str, content: bytes, mesh: Any) -> None:
     Raises
     ------
     CutError
-        Fewer elements than announced, or a last number that may be truncated.
+        There are fewer elements than announced, or the last number may be truncated.
     UnreadableError
-        Vertices in a coordinate system other than the basic one.
+        Vertices are given in a coordinate system other than the basic one.
     """
     if name == "nastran" and np.any(mesh.point_data.get("nastran:ref", 0)):
         raise UnreadableError("GRID with a coordinate system (CP): only the basic one is read")
@@ -284,7 +284,7 @@ def check_after(name: str, content: bytes, mesh: Any) -> None:
         counts = re.findall(rb"^[ \t]*(?:NELEM|MARKER_ELEMS)[ \t]*=[ \t]*(\d+)", content, re.M)
         announced = {sum(map(int, counts))}
     elif name == "vtk":
-        offsets = content.startswith(b"# vtk DataFile Version 5")  # it counts one offset too many
+        offsets = content.startswith(b"# vtk DataFile Version 5")  # counts one offset too many
         counts = re.findall(rb"^(CELLS|CELL_TYPES)[ \t]+(\d+)", content, re.M)
         announced = {int(count) - (offsets and word == b"CELLS") for word, count in counts}
     if announced - {there}:
@@ -294,7 +294,7 @@ def check_after(name: str, content: bytes, mesh: Any) -> None:
 
 
 def _check_order(content: bytes) -> None:
-    """Raise UnreadableError for .su2 vertices not numbered in order: meshio ignores numbers."""
+    """Raise UnreadableError if .su2 vertices are not numbered in order, as meshio assumes."""
     dimension = re.search(rb"^[ \t]*NDIME[ \t]*=[ \t]*(\d+)", content, re.M)
     points = re.search(rb"^[ \t]*NPOIN[ \t]*=[ \t]*(\d+)[^\n]*\n", content, re.M)
     if dimension is None or points is None:
@@ -307,9 +307,9 @@ def _check_order(content: bytes) -> None:
 
 
 def without_faces(cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Return ``cells`` (by kind) without the triangles if all are faces of its tetrahedra.
+    """Return ``cells`` (kind -> array) without triangles if all are faces of its tetrahedra.
 
-    Meshers write the boundary of a volume mesh, which follows from the tetrahedra.
+    Mesh generators often also write the boundary faces, which follow from the tetrahedra.
     """
     if cells.keys() != {"triangle", "tetra"}:
         return cells
@@ -318,7 +318,7 @@ def without_faces(cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
 
     def number(triangles: np.ndarray) -> np.ndarray:
         a, b, c = np.sort(triangles.astype(np.int64), axis=1).T
-        return (a * size + b) * size + c  # fits in 64 bits for a million vertices
+        return (a * size + b) * size + c  # 64 bits are enough for a million vertices
 
     known = np.isin(number(cells["triangle"]), number(faces)).all()
     return {"tetra": cells["tetra"]} if known else cells
@@ -326,10 +326,10 @@ def without_faces(cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
 
 @contextmanager
 def ends_noticed() -> Iterator[None]:
-    """Make a reader fail if its file is truncated, instead of looping or returning less.
+    """Context in which a reader fails on a truncated file, instead of looping or reading less.
 
-    In this context opened files record reads past their end, and ``numpy.fromfile`` raises
-    `CutError` if there are fewer numbers than requested.
+    Files opened in it record reads past their end. ``numpy.fromfile`` raises `CutError` if there
+    are fewer numbers than requested.
     """
     opened, fromfile = builtins.open, np.fromfile
     ends: list[int] = []
@@ -346,7 +346,7 @@ def ends_noticed() -> Iterator[None]:
 
     def whole(file: Any, *more: Any, **named: Any) -> np.ndarray:
         count = named.get("count", more[1] if len(more) > 1 else -1)
-        if count > os.fstat(file.fileno()).st_size:  # before so much memory is allocated
+        if count > os.fstat(file.fileno()).st_size:  # checked before NumPy allocates so much memory
             raise CutError(f"{count} numbers that follow each other, the file is shorter")
         array = fromfile(file, *more, **named)
         if len(array) < count:
@@ -367,7 +367,7 @@ def ends_noticed() -> Iterator[None]:
 
 
 class _Noticing:
-    """Mixin of a file that appends to ``ends`` at each read past its end."""
+    """Mixin for file classes: each read past the end of the file is recorded in ``ends``."""
 
     ends: list[int]
 
@@ -392,14 +392,14 @@ class _Bytes(_Noticing, io.BufferedReader):
 
     def read(self, size: int | None = -1, /) -> bytes:
         content = super().read(size)
-        # a read of the whole file or of a large piece may reach past the end
+        # not for reads of the whole file or of large pieces, which may reach past the end
         if size and len(content) < size < PIECE:
             self.note()
         return content
 
 
-# Statements of .obj files without effect on vertex positions and faces. All other statements (free-
-# form surfaces, `call` of another file) are rejected, because a part of the mesh would be missing.
+# Statements of .obj files that do not change vertex positions or faces. Others (free-form surfaces,
+# `call` of another file) are rejected, because a part of the mesh would be missing.
 IGNORED = frozenset(
     b"vt vn vp g o s l p mg usemtl mtllib usemap maplib bevel c_interp d_interp lod shadow_obj "
     b"trace_obj".split()
@@ -407,18 +407,18 @@ IGNORED = frozenset(
 
 
 def read_obj(path: Path) -> tuple[np.ndarray, np.ndarray]:
-    """Return points (N, 3), triangles (E, 3) from 0 of the .obj file ``path``; ignore weights w.
+    """Return points (N, 3), without weights w, and triangles (E, 3), from 0, of the file ``path``.
 
     Raises
     ------
     UnreadableError
-        An unknown statement, corners of faces that are not integers, or an invalid number.
+        A statement is unknown, a corner of a face no integer, or a number invalid.
     """
-    # remove comments first: a backslash at their end does not continue the line
+    # comments are removed first, as a backslash at their end does not continue the line
     content = re.sub(rb"#[^\n]*", b"", path.read_bytes())
     vertices: list[bytes] = []
     faces: list[bytes] = []
-    before: list[int] = []  # number of vertices before each face, to which negative indices refer
+    before: list[int] = []  # number of vertices before each face; negative indices count from it
     whole_lines = re.sub(rb"\\[ \t]*\r?\n", b" ", content)
     for line in whole_lines.splitlines():
         words = line.split(None, 1)

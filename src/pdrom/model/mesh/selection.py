@@ -1,4 +1,4 @@
-"""Selections of vertices of the rest shape: their configuration and the selected vertices."""
+"""Selections of mesh vertices by the rest shape: their configuration, and selected vertices."""
 
 from abc import abstractmethod
 from functools import reduce
@@ -33,15 +33,15 @@ def require_direction(plane: Any) -> Any:
 
 
 class Shape(ConfigModel):
-    """Vertices by where they lie."""
+    """Base class of selections by position or connection."""
 
     @abstractmethod
     def chosen(self, mesh: Mesh) -> np.ndarray:
-        """Return the selected vertices (n,) of ``mesh``, ascending, possibly none."""
+        """Return the indices (n,) of the selected vertices of ``mesh``, ascending, may be empty."""
 
 
 class Box(Shape):
-    """Vertices in the box from ``lower`` to ``upper`` (m), its surface included."""
+    """Vertices in or on the box with corners ``lower`` and ``upper`` (m)."""
 
     kind: Literal["box"] = "box"
     lower: Point
@@ -68,7 +68,7 @@ class Sphere(Shape):
 
 
 class Plane(Shape):
-    """Vertices on the plane through ``point`` (m) and on the side that ``normal`` points to."""
+    """Vertices on the plane through ``point`` (m) or on the side to which ``normal`` points."""
 
     kind: Literal["plane"] = "plane"
     point: Point
@@ -83,7 +83,7 @@ class Plane(Shape):
 
 
 class Nearest(Shape):
-    """The ``count`` vertices nearest to ``point`` (m); of equally near ones the first."""
+    """The ``count`` vertices nearest to ``point`` (m); ties: the first vertices."""
 
     kind: Literal["nearest"] = "nearest"
     point: Point
@@ -97,7 +97,7 @@ class Nearest(Shape):
 
 
 class BoundaryLoop(Shape):
-    """Vertices of a closed line of boundary edges; loop 0 is the longest at rest."""
+    """Vertices of loop ``index`` of boundary edges; loop 0 is the longest at rest."""
 
     kind: Literal["boundary_loop"] = "boundary_loop"
     index: Index = 0
@@ -105,13 +105,13 @@ class BoundaryLoop(Shape):
     def chosen(self, mesh: Mesh) -> np.ndarray:
         border = boundary_edges(mesh.triangles)
         lengths = np.linalg.norm(mesh.points[border[:, 0]] - mesh.points[border[:, 1]], axis=1)
-        # half of the length of each edge for each of its two vertices
+        # each vertex gets half of the lengths of its edges
         shares = np.bincount(border.ravel(), np.repeat(lengths / 2.0, 2), minlength=mesh.vertices)
         return _part(mesh, border, np.unique(border), shares, "boundary loop", self.index)
 
 
 class Component(Shape):
-    """Vertices of a connected part of the mesh; part 0 has the most vertices."""
+    """Vertices of connected part ``index`` of the mesh; part 0 has the most vertices."""
 
     kind: Literal["component"] = "component"
     index: Index = 0
@@ -122,7 +122,7 @@ class Component(Shape):
 
 
 class Union(Shape):
-    """Vertices in any of the selections ``of``."""
+    """Vertices in at least one of the selections ``of``."""
 
     kind: Literal["union"] = "union"
     of: Annotated[tuple["Selection", ...], Field(min_length=1)]
@@ -200,18 +200,18 @@ SIDES = {
     "back": (2, -1),
     "front": (2, 1),
 }
-TOLERANCE = 1e-6  # on coordinates, relative to the mesh extent
+TOLERANCE = 1e-6  # tolerance of coordinates of a side, relative to the mesh extent
 
 
 def select_vertices(mesh: Mesh, selection: Selection) -> np.ndarray:
-    """Return vertex indices (n,) int64, ascending, of a side (see `SIDES`), a list, or a shape.
+    """Return vertex indices (n,) int64, ascending, of a side (`SIDES`), a list, or a `Shape`.
 
     Raises
     ------
     SceneError
-        Unknown side, index out of range, a side in a direction in which the mesh is flat (every
-        vertex would be selected), a boundary loop or component that does not exist, or an empty
-        selection.
+        The selection is empty; a side, boundary loop or component does not exist; the mesh is flat
+        in the direction of a side, so that every vertex would be selected; an index is out of
+        range.
     """
     chosen = _chosen(mesh, selection)
     if len(chosen) == 0:
@@ -221,7 +221,7 @@ def select_vertices(mesh: Mesh, selection: Selection) -> np.ndarray:
 
 
 def _chosen(mesh: Mesh, selection: Selection) -> np.ndarray:
-    """Return the result of `select_vertices`, without an error for an empty selection."""
+    """Return the vertices that `select_vertices` returns; an empty selection is no error."""
     if isinstance(selection, str):
         return _side(mesh, selection)
     if isinstance(selection, Shape):
@@ -247,13 +247,13 @@ def _part(
 ) -> np.ndarray:
     """Return the vertices of connected component ``index`` of a graph on the vertices ``among``.
 
-    Components are sorted by their sum of ``sizes`` (N,), largest first, then by smallest vertex.
+    Components are sorted by the sum of their ``sizes`` (N,), largest first; ties: smallest vertex.
     """
     n = mesh.vertices
     graph = sparse.coo_array((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(n, n))
     labels = csgraph.connected_components(graph, directed=False)[1][among]
     parts = [among[labels == label] for label in np.unique(labels)]
-    # round, so that sizes that are equal by symmetry are equal on every machine
+    # rounded, so that sizes that are equal by symmetry are equal on every machine
     parts.sort(key=lambda part: (-round(float(sizes[part].sum()) / mesh.extent, 9), part[0]))
     if index >= len(parts):
         raise SceneError(f"selection {what}: index = {index}, the mesh has {len(parts)}")
@@ -263,7 +263,7 @@ def _part(
 def farthest_points(points: np.ndarray, candidates: np.ndarray, count: int) -> np.ndarray:
     """Return ``count`` of ``candidates`` (n,) by farthest-point sampling from the centre.
 
-    The first point is nearest to the centre of the bounding box. Ties: the first candidate.
+    The first point is nearest to the centre of the bounding box. Ties: the first of ``candidates``.
 
     Parameters
     ----------
@@ -279,5 +279,5 @@ def farthest_points(points: np.ndarray, candidates: np.ndarray, count: int) -> n
 
 
 def _distance(points: np.ndarray, point: np.ndarray) -> np.ndarray:
-    # round, so that distances that are equal by symmetry are equal on every machine
+    # rounded, so that distances that are equal by symmetry are equal on every machine
     return np.round(np.linalg.norm(points - point, axis=1), 12)

@@ -1,4 +1,4 @@
-"""The mesh data type, its HDF5 storage, allowed lengths, vertex measures and boundary edges."""
+"""The mesh data type, its HDF5 storage, areas and volumes of vertices, boundary edges."""
 
 import os
 from dataclasses import dataclass, field
@@ -11,7 +11,7 @@ from pydantic import Field
 from pdrom.core.packed import brief
 from pdrom.core.store import open_hdf5, write_hdf5
 
-# Sums and squares of lengths within these limits, in metres, neither overflow nor lose all digits.
+# Allowed lengths, m: their sums and squares neither overflow nor lose all digits.
 MIN_LENGTH, MAX_LENGTH = 1e-6, 1e6
 Length = Annotated[float, Field(ge=-MAX_LENGTH, le=MAX_LENGTH)]
 PositiveLength = Annotated[float, Field(ge=MIN_LENGTH, le=MAX_LENGTH)]
@@ -46,7 +46,7 @@ class Mesh:
         return float(np.ptp(self.points, axis=0).max())
 
     def edges(self) -> np.ndarray:
-        """Return all edges (n, 2) int32 once, as (a, b) with a < b, in lexicographic order."""
+        """Return each edge (a, b), a < b, once: (n, 2) int32, in lexicographic order."""
         cells = self.tetrahedra if len(self.tetrahedra) else self.triangles
         corners = cells.shape[1]
         pairs = [cells[:, [i, j]] for i in range(corners) for j in range(i + 1, corners)]
@@ -79,16 +79,16 @@ def stored_mesh(group: h5py.Group) -> Mesh:
 
 
 def barycentric_areas(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Return 1/3 of the area of ``triangles`` (T, 3) at each of ``points`` (N, 3) m: (N,) m^2."""
+    """Return areas (N,) m^2 of ``points`` (N, 3) m: a third of the triangles around each."""
     a, b, c = (points[triangles[:, i]] for i in range(3))
     area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
     return np.bincount(triangles.ravel(), np.repeat(area / 3.0, 3), minlength=len(points))
 
 
 def vertex_measures(mesh: Mesh) -> np.ndarray:
-    """Return the rest volume, m^3, or the rest area, m^2, of a surface mesh, per vertex, (N,).
+    """Return the volume, m^3, or in a surface mesh the area, m^2, of each vertex at rest, (N,).
 
-    It is a quarter of all adjacent tetrahedra, or a third of all adjacent triangles.
+    It is a quarter of the tetrahedra, or a third of the triangles, around the vertex.
     """
     if len(mesh.tetrahedra) == 0:
         return barycentric_areas(mesh.points, mesh.triangles)
@@ -98,9 +98,9 @@ def vertex_measures(mesh: Mesh) -> np.ndarray:
 
 
 def boundary_edges(triangles: np.ndarray) -> np.ndarray:
-    """Return the edges (n, 2) of only one of ``triangles`` (T, 3), in lexicographic order."""
+    """Return edges (n, 2) that belong to a single triangle (T, 3), in lexicographic order."""
     edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    # one integer per edge: sorting rows would be twenty times slower
+    # one integer per edge, since sorting rows would be twenty times slower
     size = int(edges.max()) + 1
     unique, count = np.unique(edges[:, 0] * np.int64(size) + edges[:, 1], return_counts=True)
     return np.column_stack(np.divmod(unique[count == 1], size)).astype(edges.dtype)

@@ -1,8 +1,8 @@
-"""Levels of accuracy (full-order and reduced solvers with K iterations), their runs and errors.
+"""Levels of accuracy, their runs and errors: full-order or reduced solvers with K iterations.
 
-The reference of a motion solves the implicit step by accelerated iterations. Their number is large
-enough if a run with half of them differs by less than the tolerance. The error of that run is used
-as the error of the reference.
+The reference run of a motion solves the implicit step by accelerated iterations. Their number is
+large enough if a run with half as many differs from it by less than the tolerance. This difference
+is used as the error of the reference.
 
 The cost of a frame is computed from operation counts, not timed, so that the choice of a level is
 reproducible. The constants were measured on one thread of a 2024 processor; only ratios matter.
@@ -23,36 +23,36 @@ from pdrom.reduction.subspace.model import SubspaceModel
 from pdrom.reduction.subspace.space import projector
 
 WINDOW = 5  # number of differences of iterates that Anderson acceleration combines
-# Full-order cost in ns: per projection and squared number of rows, per entry of the factor, per
-# vertex of an accelerated iteration; per compiled frame, and extra per frame computed in Python.
+# Full-order cost in ns: of a projection over its squared number of rows, of an entry of the factor,
+# of acceleration per vertex and iteration; of a compiled frame, and extra if computed in Python.
 PROJECTION, ENTRY, ACCELERATED = 5.0, 0.9, 6.5
 FRAME, IN_PYTHON = 2.3e4, 1.2e5
-# Reduced cost in ns: per projection, per entry of a dense product, other work of an iteration.
+# Reduced cost in ns: of a projection, of an entry of a dense product, of the rest of an iteration.
 SAMPLED, DENSE, ITERATION = 12.5, 0.23, 1.2e3
 REDUCED_FRAME, REDUCED_IN_PYTHON = 4e4, 2.3e5
-# Estimated entries of the Cholesky factor of a matrix with n entries and N rows: FILL n log2 N.
+# A Cholesky factor is estimated to have FILL n log2 N entries; the matrix has n, in N rows.
 FILL = 0.35
 # Size of the random shift of a perturbed start, relative to the mesh extent, and its seed.
 MOVED, SEED = 1e-10, 0
-CONVERGED, MOST = 80, 320  # iterations of a reference: first number, doubled up to MOST
+CONVERGED, MOST = 80, 320  # iterations of a reference: CONVERGED at first, doubled up to MOST
 Quantity = Literal["position", "velocity"]
 QUANTITIES: tuple[Quantity, ...] = get_args(Quantity)
 
 OnFrame = Callable[[str], None]
-"""Callback that gets the title of a level after each frame that the level has computed."""
+"""Callback, called with the title of a level after each frame that the level has computed."""
 
 
 def silent(title: str) -> None:
-    """Report no progress of ``title``."""
+    """Do nothing: default of the callback that receives the ``title`` of a level."""
 
 
 @dataclass(frozen=True)
 class Level:
     """A level of accuracy: a full-order or reduced solver with a number of iterations.
 
-    iterations, window : iterations of a frame, and Anderson window (0: no acceleration)
+    iterations, window : iterations per frame; window of Anderson acceleration (0: none)
     model : position subspace with sampled elements; None for a full-order level
-    tau : tolerance of the sampling
+    tau : tolerance at which the elements of ``model`` were sampled
     """
 
     iterations: int
@@ -70,16 +70,16 @@ class Level:
 
     @property
     def exact(self) -> "Level":
-        """More accurate full-order level by which frames of this level are checked."""
+        """More accurate full-order level with which frames of this level are compared."""
         return Level(CONVERGED if self.model is not None else 2 * self.iterations, WINDOW)
 
     def scene(self, scene: Scene) -> Scene:
-        """Return ``scene`` with the iterations and Anderson window of the level."""
+        """Return ``scene`` with the number of iterations and the Anderson window of the level."""
         changes = {"iterations": self.iterations, "anderson_window": self.window}
         return replace(scene, config=scene.config.model_copy(update=changes))
 
     def work(self, scene: Scene) -> float:
-        """Estimated cost of a frame of ``scene``, ns; a reduction resolves contacts in Python."""
+        """Estimated cost, ns, of a frame of ``scene``; reduced models treat contacts in Python."""
         effects = scene.groups, scene.forces, scene.boundaries, scene.contacts
         slow = not WholeFrames.suits(*effects)
         if self.model is None:
@@ -97,20 +97,20 @@ class Level:
 
 
 class Trajectory:
-    """A run of ``level`` on the motion of ``scene``, frame by frame.
+    """Run of ``scene`` by a ``level`` of accuracy, computed frame by frame.
 
-    Only one run of a scene may be active: its boundaries store positions when a hold begins.
+    Only one run of a scene may be active, since its boundary conditions store positions of the run.
 
     Parameters
     ----------
-    moved : whether the start is perturbed by `MOVED` times the mesh extent
+    moved : whether the initial positions are perturbed by `MOVED` times the mesh extent
     on_frame : callback after each frame
 
     Attributes
     ----------
-    ends : positions (N, 3) m at the start and at the end of every computed frame
-    defects : frame -> defect of each checked frame, m, see `check`
-    seconds : processor time of the frames, s
+    ends : positions (N, 3) m, initial ones and those at the end of every computed frame
+    defects : number of a checked frame -> its defect, m: distance to a more accurate solution
+    seconds : processor time of all computed frames, s
     """
 
     def __init__(
@@ -137,22 +137,22 @@ class Trajectory:
 
     @property
     def positions(self) -> np.ndarray:
-        """Positions (F + 1, N, 3) m of all computed frames, the initial ones first."""
+        """Positions (F + 1, N, 3) m of the initial state and all computed frames."""
         return np.stack(self.ends)
 
     def to(self, frame: int) -> "Trajectory":
-        """Compute all frames before number ``frame`` and return the trajectory itself."""
+        """Compute all frames before number ``frame`` (0-based); return this object."""
         for after in self._run(self._state, range(self.frames, frame)):
             self._state = after
             self.ends.append(self._of_vertices(after.positions))
         return self
 
     def check(self, exact: "Trajectory") -> float:
-        """Compute the next frame, and again from the same state by the loop of the run ``exact``.
+        """Compute the next frame twice from the same state, by this level and by that of ``exact``.
 
         Returns
         -------
-        The defect of the frame: the distance, m, between both results.
+        The defect of the frame: the distance, m, between the two results.
         """
         frame = self.frames
         before = State(self.ends[-1], self._of_vertices(self._state.velocities))
@@ -177,14 +177,14 @@ class Trajectory:
 def relative_errors(
     differences: np.ndarray, reference: np.ndarray, quantity: Quantity
 ) -> np.ndarray:
-    """Return errors (F',) over the first 1, 2, ... F' frames, relative to their motion.
+    """Return relative errors (F',) over the first 1, 2, ..., F' frames of a run.
 
-    Velocities are finite differences of positions between frames. An error is infinite where the
-    run is not finite, or where the reference does not move but the run differs from it.
+    They are relative to the norm of the reference's displacement. Velocities are differences of
+    frames. An error is infinite if the run is not finite, or differs from a reference at rest.
 
     Parameters
     ----------
-    differences : (F', N, 3) m, positions minus the ``reference`` (F + 1, N, 3) m, without its start
+    differences : (F', N, 3) m, positions minus ``reference`` (F + 1, N, 3) m, initial ones left out
     """
     moved = reference[1 : len(differences) + 1] - reference[0]
     with np.errstate(over="ignore", invalid="ignore"):
@@ -199,13 +199,13 @@ def relative_errors(
 
 
 def last_within(errors: np.ndarray, tolerance: float) -> int:
-    """Largest n for which the error of the first n frames, errors[n - 1], is within tolerance."""
+    """Largest n with errors[n - 1], the error over the first n frames, at most ``tolerance``."""
     within = np.flatnonzero(errors <= tolerance)
     return int(within[-1]) + 1 if len(within) else 0
 
 
 class Motion:
-    """Reference run of ``scene``, solved to an error of ``tolerance``, and its accuracy.
+    """Reference run of ``scene``, converged to the error ``tolerance``, and its accuracy.
 
     Parameters
     ----------
@@ -215,9 +215,9 @@ class Motion:
     ----------
     reference : (F + 1, N, 3) m, positions
     iterations : number of iterations in each frame of the reference
-    unconverged : errors (F,) of a run with half the iterations
-    sensitivity : relative differences (F,) of a run whose start is perturbed, see `MOVED`
-    unit : root mean square displacement of a frame, m
+    unconverged : relative errors (F,) of a run with half the iterations
+    sensitivity : relative errors (F,) of a run with initial positions perturbed by `MOVED`
+    unit : root mean square over frames of the displacement norm, m
     """
 
     def __init__(
@@ -243,6 +243,6 @@ class Motion:
         self.unit = mean_motion(self.reference)
 
     def errors(self, positions: np.ndarray) -> np.ndarray:
-        """Errors (F',) of a run with ``positions`` (F' + 1, N, 3) m, see `relative_errors`."""
+        """Relative errors (F',) over the first 1, ..., F' frames of a run (F' + 1, N, 3) m."""
         differences = positions[1:] - self.reference[1 : len(positions)]
         return relative_errors(differences, self.reference, self.quantity)

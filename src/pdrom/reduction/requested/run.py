@@ -1,15 +1,15 @@
-"""Runs within a requested tolerance by the cheapest sufficient level of accuracy (`Level`).
+"""Runs within a requested tolerance by the cheapest level of accuracy (`Level`) that suffices.
 
-Calibration runs every level on two motions with known converged frames: the training motion and a
+Calibration runs every level on two motions with converged reference runs: the training motion and a
 variation of it. The scene is run by the cheapest level whose error on both, times a safety factor,
 is within the tolerance.
 
 The defect of a frame is the distance to the result of a more accurate level from the same state. A
-run accumulates defects and amplifies them. The error of the run is estimated as the error in the
-calibration, times the ratio of the defects in checked frames (run / calibration) or the ratio of
-the distances to the run of a second level with a perturbed start, if these exceed 1. The tolerance
-counts as met for the frames over which the estimate is within it. A failed reduction is replaced by
-a full-order level, a failed full order by the most accurate level. Timings decide nothing.
+run accumulates defects and amplifies them. The error of the run is estimated as its error in the
+calibration times a ratio (run / calibration), if that exceeds 1: of the defects in checked frames,
+or of the distances to the run of a second level with a perturbed initial state. The tolerance
+counts as met for the first frames over which the estimate is within it. A reduction that fails is
+replaced by a full-order level, and that by the most accurate one. No decision depends on timings.
 """
 
 import logging
@@ -32,15 +32,15 @@ log = logging.getLogger(__name__)
 
 Count = Annotated[int, Field(ge=1, le=10_000)]
 
-# Seed of the further motion (`HeldOut.further`) on which levels are calibrated, too. The motions
-# that train reductions have smaller seeds.
+# Seed of the second motion on which levels are calibrated, a random variation of the training one
+# (`HeldOut.further`). The motions that train reductions have smaller seeds.
 CALIBRATED = 100
-# An error counts as unknown if it can be computed for less than this fraction of the frames.
+# An error counts as unknown if the frames in which it is known are fewer than this fraction.
 JUDGED = 0.1
-PROBED = 6  # number of frames of a calibration run whose defects are computed
+PROBED = 6  # number of frames of a calibration run in which the defect is computed
 CHECKS = 2  # smallest number of checked frames of a run
-# A reduction is run only if its estimated work, with checks, is less than this fraction of the full
-# order's: the estimate is not more accurate than that.
+# A reduction is run only if its estimated cost, with checks, is less than this fraction of the full
+# order's cost. A larger fraction would be within the error of the estimates.
 WORTH = 2.0 / 3.0
 # A run whose extent exceeds this multiple of the mesh extent counts as blown up.
 BLOWUP_EXTENT = 100.0
@@ -52,8 +52,8 @@ AMPLIFIED = "a second run, of another accuracy and moved by round-off, departs a
 class Request(ConfigModel):
     """Largest relative error of a run against its implicit step, solved to convergence.
 
-    error : largest error, such as 0.01 for one per cent
-    quantity : quantity, position or velocity, whose error over all frames is limited
+    error : largest relative error, such as 0.01 for one per cent
+    quantity : "position" or "velocity", whose error over all frames is limited
     """
 
     error: Annotated[float, Field(gt=0.0, lt=1.0)]
@@ -70,7 +70,7 @@ def read_request(wish: object, source: str = "error") -> Request:
     Raises
     ------
     ConfigurationError
-        If ``wish`` has an unknown quantity or no number between 0 and 1; names ``source``.
+        ``wish`` has an unknown quantity or no number between 0 and 1; the message names ``source``.
     """
     if isinstance(wish, Request):
         return wish
@@ -91,7 +91,7 @@ def read_request(wish: object, source: str = "error") -> Request:
 
 
 class ToleranceSettings(ConfigModel):
-    """Levels that are calibrated, and the safety factor of their errors.
+    """Levels of accuracy that are calibrated, and the safety factor of their errors.
 
     modes, tolerances : numbers of modes k and sampling tolerances tau of the reductions
     frames : largest number of frames of the training motions for which elements are sampled
@@ -99,7 +99,7 @@ class ToleranceSettings(ConfigModel):
     plain, accelerated : numbers of full-order iterations, without and with acceleration
     iterations : numbers of iterations of the reductions, all accelerated
     factor : safety factor by which estimated errors are multiplied
-    every : number of frames of a reduction for each checked frame
+    every : a reduction is checked in one of this many frames
     """
 
     modes: tuple[Count, ...] = (20, 40)
@@ -115,10 +115,10 @@ class ToleranceSettings(ConfigModel):
 
 @dataclass(frozen=True)
 class Calibrated:
-    """A level with its cost and its errors on the motions of the calibration.
+    """A level of accuracy with its cost and its errors on the motions of the calibration.
 
     work : estimated cost of a frame, ns
-    errors : for each motion, errors (F,) over the first 1, ..., F frames
+    errors : for each motion, relative errors (F,) over the first 1, ..., F frames
     defect : largest defect of a frame, relative to the root mean square displacement of the motion
     ms : processor time of a frame of the first motion, ms
     """
@@ -139,15 +139,15 @@ class Calibrated:
 class Outcome:
     """Result of a run within a requested tolerance.
 
-    positions : (F + 1, N, 3) m, the initial ones first
-    frames : number of first frames for which the estimated error is within the tolerance; 0 if the
-        request is refused, in which case the most accurate full order has run
+    positions : (F + 1, N, 3) m; entry 0 is the initial state
+    frames : number of first frames over which the estimated error is within the tolerance; 0 if no
+        level can meet it: the most accurate full-order level has run instead
     limit : reason why later frames are not within the tolerance; empty if all frames are
     expected : error of the chosen level on the motions of the calibration, times the factor
-    estimate : estimated error over these frames, times the factor; None if the request is refused
+    estimate : estimated error over these frames, times the factor; None if ``frames`` is 0
     level : title of the level that computed the positions
     reduced : whether that level is a reduced model
-    failed : titles of the levels that were tried before
+    failed : titles of the levels that were run before and did not meet the tolerance
     checks : numbers of the frames that were checked
     seconds : processor time of all computed frames, without preparations before the first one
     full_ms : processor time of a frame of the cheapest full order that meets the tolerance in the
@@ -176,7 +176,7 @@ class Outcome:
 class Calibration:
     """Calibrated ``levels``, ordered by work, and the reference ``motions`` they were run on.
 
-    All errors are those of one quantity. Valid for tolerances not below that of the calibration.
+    All errors are those of one quantity. Tolerances may not be below that of the calibration.
     """
 
     levels: list[Calibrated]
@@ -190,16 +190,16 @@ class Calibration:
         return max(full, key=lambda each: (each.level.iterations, each.level.window))
 
     def horizon(self, error: float) -> tuple[int, str]:
-        """Number of first frames with errors known to ``error``, and the reason for this limit."""
+        """Number of first frames in which ``error`` can be judged, and the reason of the limit."""
         least = error / self.settings.factor
         converged = min(levels.last_within(motion.unconverged, least) for motion in self.motions)
         sharp = min(levels.last_within(motion.sensitivity, least) for motion in self.motions)
         return min(converged, sharp), ROUNDOFF if sharp < converged else SLOW
 
     def expected(self, level: Calibrated, error: float) -> float:
-        """Largest error of ``level`` on the motions before `horizon`, times the safety factor.
+        """Largest error of ``level`` on all motions before `horizon`, times the safety factor.
 
-        It is at least the error of the references, and infinite if the horizon is too short.
+        It is at least the error of the reference runs, and infinite if the horizon is too short.
         """
         end, _ = self.horizon(error)
         if end < max(JUDGED * self.motions[0].scene.config.frames, 1):
@@ -208,7 +208,7 @@ class Calibration:
         return self.settings.factor * float(max(errors[end - 1] for errors in known))
 
     def admissible(self, error: float) -> list[Calibrated]:
-        """Levels with an expected error of at most ``error``; none if all are reductions."""
+        """Levels with an expected error of at most ``error``; none if no full-order level is."""
         good = [each for each in self.levels if self.expected(each, error) <= error]
         return good if any(not each.reduced for each in good) else []
 
@@ -218,7 +218,7 @@ class Calibration:
         return next(full, self.most_accurate)
 
     def second(self, level: Calibrated, error: float) -> Calibrated:
-        """Cheapest other level of the same kind, expected error at most ``error`` times the factor.
+        """Cheapest other level of this kind, expected error at most ``error`` times the factor.
 
         Return ``level`` itself if there is none.
         """
@@ -228,10 +228,10 @@ class Calibration:
         return next(others, level)
 
     def attempts(self, error: float) -> list[Calibrated]:
-        """Levels to run in turn until one meets the tolerance; only the last if none is admissible.
+        """Levels to run in turn until one meets the tolerance ``error``.
 
-        These are the cheapest reduction, if it saves work with its second run and checks, the
-        cheapest full-order level, and the most accurate one.
+        These are the cheapest reduction, if it is cheaper in spite of its second run and checks,
+        the cheapest full-order level, and the most accurate one; only this if none is admissible.
         """
         full = self.full_order(error)
         most = WORTH * (full.work + self.second(full, error).work)
@@ -286,10 +286,10 @@ class CheckedRun:
         return self._started[-1]
 
     def _estimated(self, level: Calibrated) -> tuple[Trajectory, np.ndarray]:
-        """Run ``level`` to its end or the first failed check; return it and estimated errors (F,).
+        """Run ``level`` until it ends or a check fails; return the run and estimated errors (F,).
 
-        The expected error is multiplied by the ratio of defects (root mean square of the run over
-        calibration) if above 1. All errors are inf if none is known, or if a check or run failed.
+        The expected error is multiplied by the ratio of the run's root mean square defect to that
+        of the calibration, if above 1. All errors are inf if none is known or a check failed.
         """
         own, frames, full = self._own, self._frames, self._own.full_order(self._error).level
         largest = BLOWUP_EXTENT * self._scene.mesh.extent
@@ -311,9 +311,9 @@ class CheckedRun:
         return run, np.maximum(estimate, self._amplified(level, run))
 
     def _amplified(self, level: Calibrated, run: Trajectory) -> np.ndarray:
-        """Estimate errors (F,) over the first frames of ``run`` from the run of a second level.
+        """Estimate errors (F,) over the first frames of ``run`` by comparison with a second level.
 
-        The expected error is multiplied by the ratio of the runs' distance to its expected value.
+        The expected error is multiplied by the distance of the two runs over its expected value.
         """
         own, second = self._own, self._own.second(level, self._error)
         other = self._start(second.level, moved=True).to(self._frames)
@@ -326,7 +326,7 @@ class CheckedRun:
 
 
 def check_frames(frames: int, count: int) -> list[int]:
-    """Numbers of ``count`` checked frames, at least `CHECKS`, spread over all ``frames``."""
+    """Numbers of the checked frames: ``count``, at least `CHECKS`, spread over all ``frames``."""
     count = min(max(CHECKS, count), frames)
     return sorted({int(f) for f in (np.arange(count) + 0.5) * frames / count})
 
@@ -338,14 +338,14 @@ def calibrate(
 
     Parameters
     ----------
-    request : smallest error that will be requested
+    request : quantity, and smallest error for which the calibration will be used
     on_frame : callback after each frame
     """
     far = training.config.training_variant(CALIBRATED).effects
     scenes, least = (training, training.changed(effects=far)), request.error / settings.factor
     motions = [Motion(scene, least, request.quantity, on_frame) for scene in scenes]
     most = max(motion.iterations for motion in motions)
-    # full-order levels with the iterations of a reference, and with half of them
+    # full-order levels with the iterations of the reference runs, and with half of them
     many = [Level(count, levels.WINDOW) for count in {most, max(most // 2, levels.CONVERGED)}]
     plain = [Level(count) for count in settings.plain]
     full = [*many, *plain, *(Level(count, levels.WINDOW) for count in settings.accelerated)]
@@ -361,12 +361,12 @@ def calibrate(
 
 
 def _reduced(training: Scene, motion: Motion, settings: ToleranceSettings) -> Iterator[Level]:
-    """Reduced levels trained on converged frames of ``motion`` and on nearly converged ones of
-    further motions; none if the scene is not reducible.
+    """Yield reduced levels, trained on the converged reference of ``motion`` and on runs of other
+    motions with 20 accelerated iterations; none if the scene is not reducible.
     """
     frames = np.arange(0, training.config.frames, 2)
     few = frames[:: -(-len(frames) // settings.frames)]
-    # the elements are trained on iterates of a run in the subspace
+    # the sampling of elements is trained on 20 iterations per frame of a run in the subspace
     scene, config = Level(20).scene(training), training.config
     try:
         seeds = range(1, settings.training_motions)
@@ -407,13 +407,13 @@ def _calibrated(level: Level, motions: Sequence[Motion], on_frame: OnFrame) -> C
 def transferred(trained: Scene, scene: Scene) -> Scene:
     """Return ``trained`` with the material, masses, step, frames and obstacles of ``scene``.
 
-    Errors measured in a calibration depend on all of these. Held vertices, their paths and the
-    start remain as in ``trained``.
+    Errors of levels depend on these, so that the calibration uses those of the scene to be run.
+    Held vertices, their paths and the initial velocity remain those of ``trained``.
 
     Raises
     ------
     ConfigurationError
-        If ``scene``, which the message names, has another mesh or other constraint groups.
+        ``scene``, which the message names, has another mesh or other constraint groups.
     """
     mesh, own = trained.mesh, scene.mesh
     alike = [

@@ -1,8 +1,8 @@
-"""Interface of sample selections, and greedy discrete empirical interpolation (DEIM).
+"""Interface of all selections of samples, and greedy discrete empirical interpolation (DEIM).
 
 DEIM (Chaturantabut and Sorensen 2010, algorithm 1) selects single entries or whole elements (all
-3p entries of an element at once). The preprint's variant selects rows, one for x, y and z, by the
-residual norm over the three axes.
+3p entries of an element of p rows). The preprint's variant selects whole rows of three entries
+(x, y, z), by the residual norm over the three axes.
 """
 
 from abc import ABC, abstractmethod
@@ -15,19 +15,19 @@ from pdrom.reduction.sampling.gappy_pod_e import oversample
 
 
 class Selection(ABC):
-    """A rule that picks blocks of rows: entries (blocks of one row) or whole elements.
+    """A rule that selects blocks of rows of a basis: entries (blocks of one row) or whole elements.
 
-    A subclass is named in `pdrom.reduction.method`.
+    Subclasses are listed by name in `pdrom.reduction.method`.
     """
 
     @abstractmethod
     def one_a_mode(self, v: np.ndarray, size: int, ranks: Sequence[int]) -> dict[int, np.ndarray]:
-        """For every r of ``ranks``, select r distinct blocks (all blocks, if fewer exist).
+        """Select r distinct blocks (all, if fewer exist) for each number r of modes in ``ranks``.
 
         Parameters
         ----------
-        v : (size e, r) modes, ``size`` consecutive rows for each of the e blocks; at least as many
-            columns as the largest of ``ranks``
+        v : (size e, R) modes, ``size`` consecutive rows for each of e blocks; R is at least the
+            largest of ``ranks``
         """
 
     def extend(self, v: np.ndarray, size: int, chosen: np.ndarray, count: int) -> np.ndarray:
@@ -35,24 +35,24 @@ class Selection(ABC):
 
         Parameters
         ----------
-        v : (rows, r) basis
-        chosen : (m,) blocks to start with
-        size : rows of a block
+        v : (size e, r) modes
+        chosen : (m,) blocks that are already selected
+        size : number of rows of a block
         """
         return oversample(v, size, chosen, count=count)
 
 
-# Relative difference below which two residuals may count as equal, see `tie_weights`.
+# Residuals with a relative difference below this may count as equal, see `tie_weights`.
 TIE = 1e-6
 
 
 def deim_entries(v: np.ndarray) -> np.ndarray:
-    """Greedy interpolation entries of the basis ``v`` (n, r), min(n, r) of them, nested in r.
+    """Greedy DEIM entries of the basis ``v`` (n, r): min(n, r) indices, nested in r.
 
     The k-th residual v_k - V_{k-1} (P^T V_{k-1})^-1 P^T v_k vanishes at all earlier entries; the
     entry where its magnitude, times `tie_weights`, is largest comes next. These are the pivots of
     an LU factorisation of diag(w) V with partial pivoting (Sorensen and Embree 2016, section 3),
-    which LAPACK does in blocks. Scaling rows scales the residuals and changes nothing else.
+    which LAPACK does in blocks. Multiplying row i by w_i multiplies its residuals by w_i only.
 
     The entries are always distinct. For a mode that depends on the earlier ones, the residual is
     round-off and its entry is arbitrary.
@@ -67,11 +67,11 @@ def deim_entries(v: np.ndarray) -> np.ndarray:
 
 
 def tie_weights(n: int) -> np.ndarray:
-    """Factors (n,), falling from 1 to almost 1 - TIE, that break ties between n magnitudes.
+    """Factors w (n,), falling from 1 to almost 1 - TIE, that break ties between n magnitudes.
 
-    A symmetric motion has residuals that are equal up to round-off, and the largest of them would
-    depend on the order of operations. Multiplied by the factors, the first of them is largest; an
-    entry d places later is selected only if it is larger by more than the fraction TIE d / n.
+    In a symmetric motion residuals are equal up to round-off, and the largest of them would depend
+    on the order of operations. After multiplication by the factors, the first one is the largest. A
+    later entry, by d places, is selected only if it is larger by more than the fraction TIE d / n.
     """
     return 1.0 - TIE * np.arange(n) / n
 
@@ -82,11 +82,11 @@ BLOCK = 16  # columns that LAPACK eliminates at a time
 class GrowingFit:
     """Least-squares fit of each mode by the earlier modes at a growing set of sampled rows.
 
-    The coefficients c of mode v_k solve (S V_k) c = S v_k, where S selects the sampled rows.
+    The coefficients c of mode v_k in the earlier modes V_k solve (S V_k) c = S v_k; S selects rows.
 
-    The triangular factor R (r, r) of the sampled rows of all modes is stored, and further rows are
-    rotated into it. R[:k, :k] c = R[:k, k] has the same least-squares solutions as the sampled
-    equations. Adding s rows costs O(s r^2); factoring all m rows again would cost O(m k^2).
+    The triangular QR factor R (r, r) of the sampled rows of all modes is stored and updated when s
+    rows are added, at a cost O(s r^2) instead of O(m k^2) for factoring all m rows again.
+    R[:k, :k] c = R[:k, k] has the same least-squares solutions as the sampled equations.
     """
 
     def __init__(self, modes: int) -> None:
@@ -98,11 +98,11 @@ class GrowingFit:
         self._factor = linalg.lapack.dtpqrt(0, block, self._factor, rows, overwrite_a=True)[0]
 
     def triangle(self, k: int) -> np.ndarray:
-        """R (k, k) of the first k modes: R^T R is the Gram matrix of their sampled rows."""
+        """Factor R (k, k) of the first k modes; R^T R is the Gram matrix of their sampled rows."""
         return self._factor[:k, :k]
 
     def coefficients(self, k: int) -> np.ndarray:
-        """Coefficients c (k,) of mode k; the solution of minimal norm if it is not unique."""
+        """Coefficients c (k,) of mode k in the modes before it; of minimal norm if not unique."""
         factor, target = self.triangle(k), self._factor[:k, k]
         if linalg.lapack.dtrcon(factor)[0] > k * np.finfo(float).eps:
             return linalg.solve_triangular(factor, target, check_finite=False)
@@ -110,24 +110,24 @@ class GrowingFit:
 
 
 def block_elements(v: np.ndarray, size: int) -> np.ndarray:
-    """Greedy element indices for the basis ``v`` (size e, r), min(e, r) of them, nested in r.
+    """Greedy DEIM elements of the basis ``v`` (size e, r): min(e, r) indices, nested in r.
 
-    Mode k is fitted by the earlier modes on the entries of the elements selected so far (least
-    squares, more equations than unknowns); the element with the largest residual norm (times
-    `tie_weights`) is selected next.
+    Each of the e elements has ``size`` rows. Mode k is fitted by the earlier modes on the rows of
+    the elements selected so far, by least squares. The element with the largest residual norm,
+    times `tie_weights`, is selected next.
     """
     total = len(v) // size
     return _greedy([v], total, min(total, v.shape[1]), repeat=False)
 
 
 def joint_rows(v: np.ndarray, active: tuple[bool, ...], repeat: bool) -> np.ndarray:
-    """Greedy row indices (r,) for the basis ``v`` (3 rows, r), nested in r.
+    """Greedy row indices (r,) for the basis ``v`` (3 rows, r), nested in r; a row has x, y and z.
 
-    For mode k each axis a has its own system (P^T V_a) c_a = P^T v_{k,a}; the row with the largest
-    sum of squared residuals of the three axes (times `tie_weights`) is selected for all axes. A
-    singular system is solved in the least-squares sense: the row was chosen for the joint norm and
-    may be useless for one axis. With ``repeat`` a row may be picked again, as in the published
-    code; without it, the result has at most as many entries as the basis has rows.
+    For mode k each axis a has its own system (P^T V_a) c_a = P^T v_{k,a}, where P^T selects rows.
+    The row with the largest sum of squared residuals of the axes (times `tie_weights`) is selected
+    for all axes. As it may be useless for one axis, that system may be singular: it is solved in
+    the least-squares sense. With ``repeat`` a row may be selected again, as in the published code;
+    without it, the result has at most as many entries as the basis has rows.
 
     Parameters
     ----------
@@ -139,9 +139,9 @@ def joint_rows(v: np.ndarray, active: tuple[bool, ...], repeat: bool) -> np.ndar
 
 
 def _greedy(parts: Sequence[np.ndarray], total: int, count: int, repeat: bool) -> np.ndarray:
-    """Pick ``count`` of ``total`` blocks of rows by the residuals of ``parts`` of the modes.
+    """Select ``count`` of ``total`` blocks of rows by residuals of the modes, the largest first.
 
-    Each part has its own coefficients; all of its blocks have the same number of rows.
+    Each of ``parts`` of the modes, such as one axis, has its own coefficients and equal blocks.
     """
     fits = [(np.asfortranarray(part), GrowingFit(part.shape[1])) for part in parts]
     weights = tie_weights(total) ** 2

@@ -1,9 +1,9 @@
-"""GappyPOD+E: more samples than modes, each where it raises sigma_min most.
+"""GappyPOD+E: more samples than modes, each selected to raise sigma_min(P^T V) the most.
 
 B. Peherstorfer, Z. Drmac, S. Gugercin, Stability of discrete empirical interpolation and gappy
 proper orthogonal decomposition with randomized and deterministic sampling points, SIAM J. Sci.
-Comput. 42 (2020), section 4. Points are generalised to blocks of rows (the elements), and their
-number is either given or follows from a bound on the gain.
+Comput. 42 (2020), section 4. Points are generalised to blocks of rows (elements). Their number
+is given or follows from a bound on the gain 1 / sigma_min(P^T V) of the sampled rows of modes V.
 """
 
 import numpy as np
@@ -21,7 +21,7 @@ def oversample(v: np.ndarray, size: int, elements: np.ndarray, count: int) -> np
     Parameters
     ----------
     v : (size e, r) basis, ``size`` consecutive rows for each of the e elements
-    elements : distinct elements to start from, usually one for each mode
+    elements : distinct elements that are already selected, usually one for each mode
 
     Raises
     ------
@@ -35,11 +35,11 @@ def oversample(v: np.ndarray, size: int, elements: np.ndarray, count: int) -> np
 
 
 def bound_gain(v: np.ndarray, size: int, elements: np.ndarray, bound: float) -> np.ndarray:
-    """Extend ``elements`` until the gain || (P^T V)^+ ||_2 is at most ``bound``.
+    """Extend ``elements`` until the gain || (P^T V)^+ ||_2 of their rows is at most ``bound``.
 
     Return all elements if even these do not meet the bound. With orthonormal columns all elements
-    have the gain 1, so that every bound of at least 1 can be met. ``v``, ``size`` and the errors
-    raised are as in `oversample`.
+    have the gain 1, so that every bound of at least 1 can be met. Arguments ``v``, ``size`` and
+    errors raised are those of `oversample`.
     """
     growing = _Growing(v, size, elements)
     while len(growing.picked) < growing.total and growing.gain > bound:
@@ -57,7 +57,7 @@ class _Growing:
     def __init__(self, v: np.ndarray, size: int, elements: np.ndarray) -> None:
         self._rows = np.ascontiguousarray(v)
         self._blocks = self._rows.reshape(-1, size, v.shape[1])
-        # these products, a tenth as large as the blocks, give close bounds, see `_growth_at_most`
+        # these products B B^T, a tenth as large as the blocks B, give bounds in `_growth_at_most`
         self._squares = self._blocks @ self._blocks.transpose(0, 2, 1)
         self._sizes = np.trace(self._squares, axis1=1, axis2=2)
         self.picked, self.total = [int(e) for e in elements], len(self._blocks)
@@ -74,19 +74,19 @@ class _Growing:
 
     @property
     def gain(self) -> float:
-        """Gain 1 / sigma_min(P^T V); inf where the smallest eigenvalue of G is round-off."""
+        """Gain 1 / sigma_min(P^T V); inf if the smallest eigenvalue of G is round-off."""
         roundoff = len(self._gram) * np.finfo(float).eps * np.trace(self._gram)
         return 1.0 / np.sqrt(self._smallest) if self._smallest > roundoff else np.inf
 
     def add(self) -> None:
-        """Sample the element with the largest bound on the growth of the smallest eigenvalue."""
+        """Add the element with the largest lower bound on the growth of G's smallest eigenvalue."""
         self.picked.append(self._strongest())
         block = self._blocks[self.picked[-1]]
         self._gram += block.T @ block
         self._decompose()
 
     def _decompose(self) -> None:
-        """Set G's smallest eigenvalue, its eigenvector, and the gap to the next (inf if r = 1)."""
+        """Set G's smallest eigenvalue, its eigenvector, the gap to the next one (inf if r = 1)."""
         last = min(1, len(self._gram) - 1)
         values, vectors = linalg.eigh(
             self._gram, subset_by_index=(0, last), check_finite=False, driver="evr"
@@ -97,10 +97,10 @@ class _Growing:
     def _strongest(self) -> int:
         """Return the unsampled element with the largest `eigenvalue_growth`.
 
-        Two upper bounds exclude elements before their growth is computed. |B u|^2 must exceed the
-        growth of the element with the largest |B u|^2, which wins ties (all growths are zero if the
-        smallest eigenvalue is double). `_growth_at_most` must not be below the growth of the
-        element for which it is largest.
+        Two upper bounds, for rows B and eigenvector u, exclude elements before their growth is
+        computed. |B u|^2 must exceed the growth of the element with the largest |B u|^2, which wins
+        ties (all growths are zero if the smallest eigenvalue is double). `_growth_at_most` must not
+        be below the growth of the element for which it is largest.
         """
         products = (self._rows @ self._weakest).reshape(self.total, -1)
         strength = np.einsum("es,es->e", products, products)
@@ -118,7 +118,7 @@ class _Growing:
         return int(others[np.argmax(growth)]) if growth.max(initial=0.0) > bound else first
 
     def _growth_at_most(self, elements: np.ndarray, products: np.ndarray) -> np.ndarray:
-        """Upper bounds on `_growth` of ``elements``, computed without reading the blocks."""
+        """Upper bounds on `eigenvalue_growth` of ``elements``, from small products only."""
         products = products[elements]
         squared = np.einsum("es,es->e", products, products)
         stretched = np.einsum("est,et->es", self._squares[elements], products)
@@ -140,16 +140,16 @@ def eigenvalue_growth(
 
         t = 2 g |b|^2 / (g + n + sqrt((g - n)^2 + 4 g c)),   c = |C^T b|^2 / |b|^2,   n = |b|^2 + c,
 
-    with C = B - b u^T, the part of B orthogonal to u. It is the smaller root of
-    t^2 - (g + n) t + g |b|^2 without a difference that cancels: next to a double root (g = n,
-    c = 0) it has all its digits, where n = |B^T b|^2 / |b|^2 and the square root of
-    (g + n)^2 - 4 g |b|^2 keep half of them.
+    with C = B - b u^T, the part of B orthogonal to u. t is the smaller root of
+    t^2 - (g + n) t + g |b|^2, in a form without cancellation. Near a double root (g = n, c = 0)
+    it is accurate to all digits, while the usual form, with n = |B^T b|^2 / |b|^2 and the square
+    root of (g + n)^2 - 4 g |b|^2, loses half of them.
 
-    For a single row n = |B|^2: the bound of Ipsen and Nadler (2009) in the paper's equation (4.3).
-    For blocks: with all other eigenvalues lowered to the second smallest, the growth is the root of
-    t = sum_i beta_i^2 f(mu_i), f(mu) = (g - t) / (g - t + mu), where mu_i are the eigenvalues of
-    C C^T and beta_i the components of b in its eigenvectors. f is convex, so that by Jensen's
-    inequality the mean of mu, c, gives a lower bound. An infinite gap gives |b|^2.
+    For a single row n = |B|^2 and t is the bound of Ipsen and Nadler (2009), the paper's eq. (4.3).
+    For blocks: if all other eigenvalues are lowered to the second smallest, the growth is the root
+    of t = sum_i beta_i^2 f(mu_i), f(mu) = (g - t) / (g - t + mu), where mu_i are the eigenvalues of
+    C C^T and beta_i the components of b in its eigenvectors. As f is convex, Jensen's inequality
+    gives a lower bound with the mean c of all mu_i. An infinite gap gives t = |b|^2.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
-"""The reduced local step: S^T W p(y) is replaced by S^T W (mean + V c(y)).
+"""The reduced local step: S^T W p(y) is replaced by S^T W (mean + V c(y)), with r modes V.
 
-Compiled code computes the coefficients from sampled entries and the reconstruction ("lift"). There
-is one set of coefficients that all axes share, or one set for each axis. A column of the lift adds
-the reconstruction by one set of coefficients to one axis of the right-hand side."""
+Compiled code computes the coefficients c from sampled entries of p(y), then the reconstruction
+("lift"). All axes x, y, z share one set of coefficients, or each has its own set. A column of the
+lift adds the reconstruction by one set of coefficients to one axis of the right-hand side."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -23,10 +23,10 @@ from pdrom.model.scene import Scene
 from pdrom.reduction.rerun import Rerun, compare
 from pdrom.reduction.sampling.reduction import Reduction
 
-SPLIT_FROM = 1 << 17  # size N r of a lift from which its rows are divided into two parts
+SPLIT_FROM = 1 << 17  # a lift with N r at least this large is computed in two parts of its rows
 
-# Entries of the kernel's record of integers: numbers of modes, sets, columns and sampled values,
-# address and record of the sampler; then addresses of the arrays of `Lift` and of the clocks.
+# Indices into the kernel's record, an array of integers: numbers of modes, sets, columns, sampled
+# values; addresses of the sampler and of its record, then of the arrays of `Lift` and the clocks.
 MODES, SETS, COLUMNS, SAMPLED, SAMPLER, SAMPLER_RECORD = range(OWN, OWN + 6)
 STARTS, POSITIONS, PACKED, OPERATORS, SHIFTS, COEFFICIENTS = range(OWN + 6, OWN + 12)
 AXES, OWN_SETS, LIFTED, OFFSET, SECONDS, PROJECTIONS, CLOCK, SIZE = range(OWN + 12, OWN + 20)
@@ -34,18 +34,18 @@ AXES, OWN_SETS, LIFTED, OFFSET, SECONDS, PROJECTIONS, CLOCK, SIZE = range(OWN + 
 
 @dataclass(frozen=True)
 class Lift:
-    """Arrays of a reduced local step, for r modes, N vertices and c columns.
+    """Arrays of a reduced local step, for r modes, N vertices, c columns; "set": of coefficients.
 
     starts : (sets + 1,) index at which the sampled entries of each set begin
     positions : index of each sampled entry in the projections of the sampled elements
     packed : working memory for the sampled entries of one set
     operators : solution operators (r, m) of all sets, flattened, one after the other
-    shifts : (sets, r) operator times the mean at the entries, subtracted from the coefficients
+    shifts : (sets, r) operator times the mean at sampled entries, subtracted from coefficients
     coefficients : (sets, r) coefficients of the last evaluation
-    axes, own_sets : (c,) axis to which a column adds, and the set whose coefficients it uses
-    lifted : (c, N, r) S^T W V
-    offset : (4 N,) S^T W mean, each vector padded to four numbers
-    seconds : (2,) s, accumulated time of the two halves of the lift
+    axes, own_sets : (c,) axis to which each column adds, and set whose coefficients it uses
+    lifted : (c, N, r) S^T W V of each column
+    offset : (4 N,) S^T W mean, flat, with a zero after the three numbers of each vertex
+    seconds : (2,) s, accumulated time of the two parts of the lift
     """
 
     starts: np.ndarray
@@ -61,14 +61,14 @@ class Lift:
     seconds: np.ndarray
 
     def kernel(self, sampler: LocalKernel, sampled: int) -> LocalKernel:
-        """Local kernel that samples by ``sampler``, which writes ``sampled`` numbers, and lifts."""
+        """Local kernel that calls ``sampler``, which writes ``sampled`` numbers, and then lifts."""
         columns, vertices, modes = self.lifted.shape
         split = vertices * modes >= SPLIT_FROM
         numbers = (
             modes, len(self.shifts), columns, sampled, sampler.address, sampler.record.ctypes.data
         )  # fmt: skip
         clocks = np.stack([clock(), clock()])
-        # the arrays of `Lift` are passed in the order in which the kernel's record lists them
+        # the kernel's record lists the arrays of `Lift` in the order of its fields
         own = vars(self).values()
         arrays = (*own, np.empty(sampled), clocks, sampler.record, *sampler.arrays)
         return LocalKernel(
@@ -88,19 +88,19 @@ def coefficients(sampled, starts, positions, packed, operators, shifts, result):
 
     Parameters
     ----------
-    sampled : projections of the sampled elements, one after the other
-    starts, positions, packed, operators, shifts : see `Lift`
+    sampled : flat array of projections of the sampled elements, one element after the other
+    starts, positions, packed, operators, shifts : arrays of `Lift`
     result : (sets, r) output
     """
     sets, modes = shifts.shape
     for k in range(sets):
         first, last = starts[k], starts[k + 1]
-        # the set's entries are made contiguous for the products with the operator's rows
+        # copy the set's sampled entries to contiguous memory, for products with the operator
         for j in range(last - first):
             packed[j] = at(sampled, at(positions, first + j))
         size = last - first
         for i in range(0, modes, 3):
-            # three modes at a time; the last mode is repeated where fewer than three are left
+            # three modes at a time; if fewer than three are left, the last mode is repeated
             a, b, c = i, min(i + 1, modes - 1), min(i + 2, modes - 1)
             result[k, a], result[k, b], result[k, c] = dots(
                 operators,
@@ -120,8 +120,8 @@ def lift(values, axes, own_sets, lifted, offset, first, last, rhs):
     Parameters
     ----------
     values : (sets, r) coefficients
-    axes, own_sets, lifted, offset : see `Lift`
-    rhs : (4 N,) right-hand side, padded vectors
+    axes, own_sets, lifted, offset : arrays of `Lift`
+    rhs : (4 N,) right-hand side, flat, with a zero after the three numbers of each vertex
     """
     for i in range(WIDTH * first, WIDTH * last):
         rhs[i] += offset[i]
@@ -180,16 +180,16 @@ def _accumulate(y, rhs_place, record, part):
 
 
 class ReducedLocalStep:
-    """Local step that evaluates sampled elements and adds their reconstruction to the rhs.
+    """Local step that evaluates sampled elements and adds the reconstruction of all to the rhs.
 
-    Precomputed: the offset S^T W mean (N, 3), the reconstruction S^T W V for each coefficient
-    block, and the solution operators. Online: the projections of the sampled elements, a small
-    dense product for c, and the dense reconstruction.
+    Before the run, the offset S^T W mean (N, 3), the reconstruction S^T W V for each set of
+    coefficients and the solution operators are computed. Online steps are the projections of the
+    sampled elements, a small dense product for c, and the dense reconstruction.
 
     Attributes
     ----------
-    local_kernel : compiled form of the online part; None for a group without a sampling kernel
-    frame_lagged : whether the group has data that ``begin_frame`` freezes for a frame
+    local_kernel : compiled online steps; None if the group has no kernel for sampled elements
+    frame_lagged : whether the group has data that are computed once per frame (``begin_frame``)
     """
 
     def __init__(self, group: ConstraintGroup, reduction: Reduction) -> None:
@@ -207,7 +207,7 @@ class ReducedLocalStep:
             self._pass = LocalPass([self.local_kernel])
 
     def begin_frame(self, q: np.ndarray) -> None:
-        """Freeze frame-lagged data of the sampled elements at positions ``q`` (N, 3) m."""
+        """Compute the once-per-frame data of sampled elements at positions ``q`` (N, 3) m."""
         self._group.begin_frame(q, None if self._everything else self._elements)
 
     def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
@@ -255,7 +255,7 @@ def _lift(group: ConstraintGroup, reduction: Reduction) -> Lift:
     mean, blocks, r = reduction.basis.mean, reduction.blocks, reduction.r
     operator = group.S.T.multiply(group.row_weights[None, :]).tocsr()
     vertices = operator.shape[0]
-    # map entries of the full projection to entries of the sampled elements' projections
+    # map indices of the full projection vector to indices of the sampled elements' projections
     size = 3 * reduction.basis.rows_per_element
     entries = np.concatenate([np.empty(0, np.int64), *(block.entries for block in blocks)])
     element, inside = np.divmod(entries, size)
@@ -282,7 +282,7 @@ def _lift(group: ConstraintGroup, reduction: Reduction) -> Lift:
 
 
 def replace_group(scene: Scene, group: str, replacement: LocalStep) -> list[LocalStep]:
-    """Local steps of ``scene``, the step of ``group`` replaced by ``replacement``."""
+    """Local steps of ``scene``, with ``replacement`` for the constraint group named ``group``."""
     scene.group(group)
     return [replacement if g.name == group else g for g in scene.groups]
 
@@ -300,10 +300,10 @@ def rerun(
     Parameters
     ----------
     reference : (F + 1, N, 3) positions of the full-order run
-    blowup_extent : the run ends when the extent exceeds this multiple of the rest extent
+    blowup_extent : the run ends if its bounding box exceeds this multiple of that at rest
     offset : (N, 3) m, added to the initial positions
     system : factored system of the scene's global step
-    local_steps : local steps that replace the steps of the scene's groups
+    local_steps : local steps that are used instead of the groups of the scene
     """
     loop = scene.stepper(system, local_steps, track_objective=False)
     start, frames, unit = scene.initial_state(offset), scene.config.frames, scene.mesh.extent
@@ -319,9 +319,9 @@ def rerun_reduced(
     system: GlobalSystem | None = None,
     offset: np.ndarray | None = None,
 ) -> Rerun:
-    """Run a scene, evaluating the projections of ``group`` by ``reduction``; see `rerun`.
+    """Run a scene with the projections of ``group`` reduced; arguments as in `rerun`.
 
-    ``system`` defaults to the scene's own.
+    ``reduction`` evaluates the projections; ``system`` defaults to the scene's own.
     """
     steps = replace_group(scene, group, ReducedLocalStep(scene.group(group), reduction))
     return rerun(scene, system or scene.system, steps, reference, blowup_extent, offset)

@@ -7,19 +7,19 @@ import numpy as np
 from pdrom.reduction.sampling.deim import Selection, tie_weights
 
 EPS = np.finfo(float).eps
-# Candidate rows for each mode; if fewer than FEW pivots are found among them, they are doubled.
+# Number of candidate rows per mode; it is doubled if fewer than FEW pivots are found among them.
 ROWS_A_MODE, FEW = 2, 8
 
 
 def qdeim_elements(v: np.ndarray, size: int) -> np.ndarray:
-    """Q-DEIM element indices for the basis ``v`` (size e, r), min(e, r) of them.
+    """Q-DEIM elements of the basis ``v`` (size e, r): min(e, r) indices.
 
-    Candidates for pivots are the columns of V^T, in groups of ``size`` that belong to one element.
+    Pivots are chosen among the columns of V^T, in groups of the ``size`` columns of an element.
     The group with the largest Frobenius norm (times `tie_weights`) is selected, and the direction
-    in R^r that dominates it is removed from all groups. For ``size`` 1 this is the method of the
-    paper. With larger sizes, removing the whole group would exhaust R^r after about r / size
-    elements; one direction per element gives as many elements as modes, the same cost as the greedy
-    selection. The removed directions are orthonormal and lie in the span of the selected groups, so
+    in R^r that dominates it is projected out of all groups. For ``size`` 1 this is the paper's
+    method. For larger sizes, projecting out the whole group would exhaust R^r after about r / size
+    elements; one direction per element gives as many elements as modes, like the greedy selection.
+    The removed directions are orthonormal and lie in the span of the selected groups, so
     that the sampled rows of V have full column rank.
 
     Selections are not nested in r. Cost O(n r^2), n = size e.
@@ -36,9 +36,9 @@ def qdeim_elements(v: np.ndarray, size: int) -> np.ndarray:
 class _Left:
     """Groups of columns after removal of the selected directions, with bounds on their norms.
 
-    Norms only decrease. A pivot among the groups with the largest bounds is therefore the pivot of
-    all groups as long as its norm exceeds the bounds of the others, which are updated only when it
-    does not. The matrix is thus read only a few times, where LAPACK reads it once per pivot.
+    Norms only decrease, so that old norms are upper bounds. The largest group among those with the
+    largest bounds is the pivot of all groups if its norm exceeds the other bounds; if not, all are
+    updated. The matrix is thus read only a few times, while LAPACK reads it once per pivot.
     """
 
     def __init__(self, v: np.ndarray, size: int) -> None:
@@ -65,7 +65,7 @@ class _Left:
                 break
             weights[best] = -1.0
             self.picked.append(int(candidates[best]))
-            # the dominant direction of the group; zero where dependent modes leave no remainder
+            # the dominant direction of the group; zero if dependent modes leave no remainder
             group = left[self._size * best : self._size * (best + 1)]
             direction = np.linalg.svd(group, full_matrices=False)[2][0] if group.any() else group[0]
             direction = direction - self._directions.T @ (self._directions @ direction)

@@ -1,4 +1,4 @@
-"""Reduced projections: p(q) is replaced by mean + V c, with c from sampled entries of p."""
+"""Reduced projections: p(q) is replaced by mean + V c; c is computed from sampled entries of p."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,12 +15,12 @@ from pdrom.reduction.sampling.gappy_pod_e import bound_gain
 
 
 def solution_operator(a: np.ndarray, solve: Solve, tikhonov: float) -> np.ndarray:
-    """Matrix (r, m) that maps values b sampled by ``a`` (m, r) to coefficients c, by ``solve``.
+    """Matrix (r, m) that maps m sampled values b to coefficients c with A c = b, A = ``a`` (m, r).
 
-    square : A^-1; nan where A is singular to working precision or not square: the interpolation
-        does not exist, a run with it ends in its first frame
-    qr : least squares A^+ by a QR factorisation; nan where A has no full column rank
-    tikhonov : (A^T A + t I)^-1 A^T, the normal equations of the published code
+    ``solve`` is one of these methods:
+    square : A^-1; nan if A is not square or singular to working precision, so that a run blows up
+    qr : least squares A^+ by a QR factorisation; nan if A has not full column rank
+    tikhonov : (A^T A + t I)^-1 A^T, the normal equations of the published code; t is ``tikhonov``
     """
     if solve == "tikhonov":
         gram = a.T @ a + tikhonov * np.eye(a.shape[1])
@@ -39,12 +39,12 @@ def solution_operator(a: np.ndarray, solve: Solve, tikhonov: float) -> np.ndarra
 
 
 def _singular(diagonal: np.ndarray) -> bool:
-    """Whether the smallest entry of a factor's diagonal is round-off of the largest."""
+    """Whether the least entry of the ``diagonal`` of a triangular factor is round-off."""
     return bool(diagonal.min() <= np.finfo(float).eps * diagonal.max())
 
 
 def norm_and_condition(a: np.ndarray, operator: np.ndarray) -> tuple[float, float]:
-    """2-norm of ``operator`` (the gain) and condition number of ``a`` (m, r); inf if singular."""
+    """2-norm of ``operator`` (the gain), condition number of ``a`` (m, r); inf if singular."""
     if not np.isfinite(operator).all():
         return np.inf, np.inf
     sigma = linalg.svdvals(a, check_finite=False)
@@ -54,10 +54,10 @@ def norm_and_condition(a: np.ndarray, operator: np.ndarray) -> tuple[float, floa
 
 @dataclass(frozen=True)
 class Sampling:
-    """Entries and elements that a method evaluates online.
+    """Entries and elements of the projection that a method evaluates during a run.
 
     entries : indices into the vectorised projection (length 3 e p), in order of selection; for
-        "joint" rows the x entry of each row represents the row
+        "joint" sampling the x entry of each row stands for the row
     elements : unique indices of the elements of these entries, in the order of their first entries
     """
 
@@ -90,13 +90,13 @@ class Sampling:
 
     @classmethod
     def of_elements(cls, elements: np.ndarray, rows_per_element: int, total: int) -> "Sampling":
-        """Sampling of all 3p entries of ``elements`` (m,) of ``total``, p ``rows_per_element``."""
+        """Sampling of all 3p entries of ``elements`` (m,) of ``total`` elements of p rows."""
         entries = element_rows(np.asarray(elements, dtype=np.int64), 3 * rows_per_element)
         return cls.of_entries(entries, rows_per_element, total)
 
 
 def element_rows(elements: np.ndarray, size: int) -> np.ndarray:
-    """Rows (m size,) of ``elements`` (m,) with ``size`` rows each, in the order of the elements."""
+    """Indices (m size,) of all rows of ``elements`` (m,), which have ``size`` rows each."""
     return (elements[:, None] * size + np.arange(size)).ravel()
 
 
@@ -121,22 +121,22 @@ class Block:
 
 
 class Reduction:
-    """An interpolation (or projection) operator of a method at basis size r.
+    """Interpolation (or projection) of projections by a method with r modes.
 
-    An axis on which the training data are round-off has zero coefficients and does not enter the
-    gain. Methods with a separate system per axis, as published, would divide noise by noise there.
-    A singular system of any other axis is a failure of the method: the gain is inf and the
+    An axis whose training data are round-off has zero coefficients and does not enter the gain:
+    methods with a system per axis, as published, would divide round-off by round-off there. A
+    singular system of any other axis is a failure of the method: the gain is inf and the
     reconstruction nan.
 
     Attributes
     ----------
     v : (3 e p, r) modes
     elements : elements to evaluate, in the order of ``sampling.elements``
-    blocks : sets of coefficients, each with its entries and its operator
+    blocks : sets of coefficients, each with its sampled entries and its operator
     """
 
     def __init__(self, basis: Basis, sampling: Sampling, spec: MethodSpec, r: int) -> None:
-        """Build the operator from r modes of ``basis`` at the ``sampling``, by method ``spec``."""
+        """Build the operators of method ``spec`` from r modes of ``basis`` at ``sampling``."""
         self.basis, self.sampling, self.spec, self.r = basis, sampling, spec, r
         self.v, self.elements = basis.truncated(r), sampling.elements
         axes = [int(a) for a in np.flatnonzero(basis.active_axes)] if spec.per_axis else [None]
@@ -169,21 +169,21 @@ class Reduction:
 
     @property
     def gain(self) -> float:
-        """|| (P^T V)^+ ||_2, the largest over the coefficient blocks; inf if one is singular.
+        """|| (P^T V)^+ ||_2 with sampled rows P^T V, the largest of all blocks; inf if singular.
 
-        For orthonormal V: || p - p^ || <= gain || (I - V V^T)(p - mean) || (Chaturantabut and
-        Sorensen 2010, lemma 3.2). It holds for separate axes too, where the parts V_a of V have
-        norm at most 1. The Tikhonov solve is no projection: its gain is the norm of its operator,
-        its factor sqrt(1 + gain^2), and a bias is added. With mass weighting V is orthonormal in
-        the mass inner product and the factor of the error in that norm is
-        || (P^T V)^+ P^T M^(-1/2) ||_2 instead; the gain stays the amplification of sampled values,
-        as for the other methods.
+        For orthonormal V the reconstruction p^ of p satisfies || p - p^ || <= gain
+        || (I - V V^T)(p - mean) || (Chaturantabut and Sorensen 2010, lemma 3.2), also for separate
+        axes, where the parts V_a of V have norm at most 1. The Tikhonov solution is no projection:
+        its gain is the norm of its operator, the factor in the bound is sqrt(1 + gain^2), and a
+        bias is added. With mass weighting V is orthonormal in the mass inner product, and the
+        factor in that norm is || (P^T V)^+ P^T M^(-1/2) ||_2; the gain remains the amplification of
+        sampled values.
         """
         return self._norms[0]
 
     @property
     def condition(self) -> float:
-        """Condition number of P^T V, the largest over the coefficient blocks."""
+        """Condition number of the sampled rows P^T V, the largest of all blocks."""
         return self._norms[1]
 
     @property
@@ -192,7 +192,7 @@ class Reduction:
         return len(np.unique(self.sampling.entries // 3))
 
     def reconstruct(self, snapshots: np.ndarray) -> np.ndarray:
-        """Reduced version of ``snapshots`` (n, e p, 3), same shape; nan if it does not exist."""
+        """Reconstruct ``snapshots`` (n, e p, 3) from their sampled entries; nan if singular."""
         matrix = snapshots.reshape(len(snapshots), -1)
         result = np.tile(self.basis.mean, (len(matrix), 1))
         for block in self.blocks:
@@ -207,9 +207,9 @@ def select(basis: Basis, spec: MethodSpec, r: int) -> Sampling:
 
 
 def select_path(basis: Basis, spec: MethodSpec, ranks: Sequence[int]) -> dict[int, Sampling]:
-    """Select samples of ``basis`` by ``spec`` for each r of ``ranks``, nested where greedy.
+    """Select samples of ``basis`` by the method ``spec`` for each number r of modes in ``ranks``.
 
-    Samples in excess of the r modes are not nested: they depend on sigma_min of the first r modes.
+    Greedy samples are nested in r, except those in excess of r, which depend on all r modes.
 
     Raises
     ------
@@ -241,14 +241,14 @@ def select_path(basis: Basis, spec: MethodSpec, ranks: Sequence[int]) -> dict[in
         if spec.rows == "element":
             samplings[r] = Sampling.of_elements(chosen, *counts)
         else:
-            # the x entry of each row represents the row
+            # the x entry of each row stands for the row
             entries = 3 * chosen if spec.rows == "joint" else chosen
             samplings[r] = Sampling.of_entries(entries, *counts, repeats=spec.repeat_rows)
     return samplings
 
 
 def reductions(basis: Basis, spec: MethodSpec, sizes: Sequence[int]) -> dict[int, Reduction]:
-    """Reductions by ``spec`` for each r of ``sizes`` up to the rank of ``basis``, by r."""
+    """Map r -> reduction by method ``spec``, for each r of ``sizes`` up to the basis's rank."""
     known = [r for r in sizes if r <= basis.rank]
     path = select_path(basis, spec, known)
     return {r: Reduction(basis, path[r], spec, r=r) for r in known}

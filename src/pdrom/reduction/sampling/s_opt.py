@@ -13,16 +13,16 @@ from scipy import linalg
 from pdrom.core.errors import SamplingError
 from pdrom.reduction.sampling.deim import GrowingFit, Selection
 
-# A unit column depends on others if the norm of its part orthogonal to them is below this. For a
-# copied column round-off gives up to 1e-15 sqrt(r); an orthogonal part below 1e-10 at the samples
-# would amplify their errors by 1e10 and be useless as well.
+# A unit column counts as dependent on others if its part orthogonal to them has a norm below this.
+# For a copy of a column, round-off gives up to 1e-15 sqrt(r). A part below 1e-10 would be useless
+# as well, since it would amplify errors of samples by 1e10.
 DEPENDENT = 1e-12
 
 
 def s_opt_path(v: np.ndarray, size: int) -> np.ndarray:
-    """Greedy maximisation of the S-measure S(A) = (sqrt(det A^T A) / prod_j |A_j|)^(1/r).
+    """Elements for which S(A) = (sqrt(det A^T A) / prod_j |A_j|)^(1/r) is largest, by greedy steps.
 
-    Return min(e, r) elements, nested in r: step k maximises S of the first k modes at k elements.
+    Return min(e, r) indices, nested in r. In step k, A is the first k modes at k elements.
     In the first step S is 1 for every element; it selects the element with the largest norm of the
     first mode, as classical DEIM does.
 
@@ -43,7 +43,7 @@ def s_opt_path(v: np.ndarray, size: int) -> np.ndarray:
 
 
 class SOpt(Selection):
-    """S-OPT: one element per mode, nested in r; further elements by the same measure."""
+    """S-OPT: one element per mode, nested in r; further elements by the S-measure, too."""
 
     def one_a_mode(self, v: np.ndarray, size: int, ranks: Sequence[int]) -> dict[int, np.ndarray]:
         path = s_opt_path(v, size)
@@ -52,8 +52,8 @@ class SOpt(Selection):
     def extend(self, v: np.ndarray, size: int, chosen: np.ndarray, count: int) -> np.ndarray:
         """Extend ``chosen`` to ``count`` elements, each maximising the S-measure of all modes.
 
-        Returns all e elements if there are fewer. Raises SamplingError if the modes depend on each
-        other at the elements to start with.
+        Return all e elements if there are fewer. Raise SamplingError if the modes are linearly
+        dependent at the ``chosen`` elements.
         """
         count = min(count, len(v) // size)
         if count <= len(chosen):
@@ -65,7 +65,7 @@ class SOpt(Selection):
 
 
 class _Sampled:
-    """Sampled elements, with the data that give the S-measure after adding any other element.
+    """Sampled elements, with data from which the S-measure with one more element is computed.
 
     With G the Gram matrix of the sampled rows and B (s, k) the rows of a candidate,
     det(G + B^T B) = det G det(I + M), M = B G^-1 B^T. Sampling an element D updates all M at once
@@ -79,7 +79,7 @@ class _Sampled:
     """
 
     def __init__(self, v: np.ndarray, size: int, elements: Sequence[int] | np.ndarray = ()) -> None:
-        # scaling the columns to unit length does not change the measure but reduces round-off
+        # the S-measure does not depend on the length of columns; unit length reduces round-off
         norms = np.linalg.norm(v, axis=0)
         if not norms.all():
             raise SamplingError(f"S-OPT: mode {int(np.argmin(norms)) + 1} is zero")
@@ -95,13 +95,13 @@ class _Sampled:
             self._products = self._blocks @ self._inverse() @ self._blocks.transpose(0, 2, 1)
 
     def best(self, mode: int | None = None) -> int:
-        """Element that gives the largest S-measure of the columns, after ``mode`` is added to them.
+        """Element with the largest S-measure of the columns, to which ``mode`` is added if given.
 
         Ties go to the first element. SamplingError if no element makes the modes independent.
         """
         if not self.picked and mode is not None:
             return int(np.argmax(self._squares[:, mode]))
-        shifted = self._products + np.eye(self._products.shape[1])  # I + M, see the class
+        shifted = self._products + np.eye(self._products.shape[1])  # I + M of the class docstring
         modes, residual = self._modes, np.ones(self.total)
         if mode is not None:
             z, q = self._residual()
@@ -120,7 +120,7 @@ class _Sampled:
         return int(np.argmax(measure))
 
     def add(self, element: int, mode: int | None = None) -> None:
-        """Sample ``element`` and, if given, add ``mode`` to the columns."""
+        """Add ``element`` to the samples and ``mode``, if given, to the columns."""
         inverse, columns = self._inverse(), self._blocks[:, :, : self._modes]
         rows = columns[element]
         small = np.eye(len(rows)) + rows @ inverse @ rows.T
@@ -139,13 +139,13 @@ class _Sampled:
             self._modes = mode + 1
 
     def _residual(self) -> tuple[np.ndarray, float]:
-        """Residual (e, s) of the next mode fitted at the sampled rows, its squared norm there."""
+        """Residual (e, s) of the next mode, fitted at sampled rows; its squared norm there."""
         known, new = self._blocks[:, :, : self._modes], self._blocks[:, :, self._modes]
         z = new - known @ self._fit.coefficients(self._modes)
         return z, float(np.sum(z[self.picked] ** 2))
 
     def _inverse(self) -> np.ndarray:
-        """G^-1 (k, k) of the sampled rows."""
+        """Inverse (k, k) of the Gram matrix G of the sampled rows."""
         factor = self._fit.triangle(self._modes)
         diagonal, rows = np.abs(np.diag(factor)), len(self.picked) * self._blocks.shape[1]
         if rows < self._modes or diagonal.min(initial=1.0) <= DEPENDENT * diagonal.max(initial=0.0):

@@ -1,10 +1,10 @@
-"""Columns B (N, K) of a position subspace q = B z with coordinates z (K, 3); axes share B.
+"""Columns B (N, K) of a position subspace q = B z with coordinates z (K, 3); x, y, z share B.
 
-The free vertices get k modes and, always, the affine columns 1, x, y, z of the rest shape: the
-space contains the rest shape and every rigid motion. Vertices that a boundary condition holds at
-any time form atoms, sets that are held and released together. Each atom has its own columns: affine
-ones and POD modes of its released motion. While an atom is held its coordinates are fixed, so that
-pins and handles are met exactly; otherwise they are unknowns. The space never changes in a run.
+The free vertices have k modes and the affine columns 1, x, y, z of the rest shape, so that the
+space contains the rest shape and every rigid motion. Vertices that a boundary condition fixes at
+any time are divided into "atoms": sets that are fixed and released together. Each atom has its own
+columns: affine ones and POD modes of its motion after release. While an atom is fixed, its
+coordinates are prescribed, so that pins and handles are exact; otherwise they are unknowns.
 """
 
 from collections.abc import Sequence
@@ -17,25 +17,25 @@ from pdrom.model.effects.base import Boundary
 from pdrom.model.mesh.selection import farthest_points
 from pdrom.reduction.basis import fix_signs, pod
 
-# A column is dropped if its component orthogonal to the earlier ones is relatively below this.
+# A column is dropped if its part orthogonal to the earlier ones is below this fraction of it.
 DEPENDENT = 1e-9
 
 # Relative tolerance at which the POD modes of an atom's non-affine motion are truncated.
 OWN_MOTION = 1e-3
 
-# Motion below this fraction of the positions is round-off.
+# Motion smaller than this fraction of the positions counts as round-off.
 ROUNDOFF = 100.0 * np.finfo(float).eps
 
 
 @dataclass(frozen=True)
 class Columns:
-    """A position subspace.
+    """Columns of a position subspace.
 
-    B : (N, K) columns; the free ones are mass-orthonormal
+    B : (N, K) columns; those of the free vertices are mass-orthonormal
     free : indices of the columns of the free vertices
-    atoms : vertex sets that are held and released together
+    atoms : sets of vertices that boundary conditions fix and release together
     atom_columns : for each atom, the indices of its columns
-    modes : number k of modes, not counting the affine columns
+    modes : number k of modes of the free vertices, without the affine columns
     """
 
     B: np.ndarray
@@ -53,10 +53,10 @@ def affine_columns(points: np.ndarray) -> np.ndarray:
 def displacement_modes(
     trajectory: np.ndarray, points: np.ndarray, masses: np.ndarray, k: int
 ) -> np.ndarray:
-    """First k POD modes (N, k) of displacements, mass-weighted, without their affine part.
+    """First k mass-weighted POD modes (N, k) of displacements minus their affine part.
 
     Each axis of each frame of ``trajectory`` (n, N, 3) is one snapshot, so that x, y and z share
-    the modes (Monem et al. 2023). Fewer are returned if the data contain fewer.
+    the modes (Monem et al. 2023). If the data have fewer modes, all are returned.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def displacement_modes(
     rest = weight * displacements
     rest = rest - affine @ (affine.T @ rest)
     modes, sigma = pod(rest)
-    # the remainder of an entirely affine motion is round-off
+    # singular values up to this are round-off: those of an entirely affine motion, for example
     noise = ROUNDOFF * float(np.linalg.norm(weight[:, :, None] * trajectory.transpose(1, 0, 2)))
     useful = int(np.count_nonzero(sigma > max(DEPENDENT * sigma[0], noise)))
     return modes[:, : min(k, useful)] / weight
@@ -82,9 +82,9 @@ def build_columns(
     atoms: Sequence[np.ndarray],
     trajectory: np.ndarray,
 ) -> Columns:
-    """Build the space from ``modes`` (N, k) on the free vertices and columns of each atom.
+    """Build a subspace from ``modes`` (N, k) of the free vertices and own columns of each atom.
 
-    An atom has affine columns and, where its motion in ``trajectory`` (n, N, 3) is not affine, POD
+    An atom has affine columns and, if its motion in ``trajectory`` (n, N, 3) m is not affine, POD
     modes of the remainder, truncated at the relative error `OWN_MOTION`.
 
     Parameters
@@ -125,7 +125,7 @@ def orthonormal(columns: np.ndarray) -> np.ndarray:
     for column in columns.T:
         norm = np.linalg.norm(column)
         rest = column.copy()
-        for _ in range(2):  # twice is enough (Kahan and Parlett)
+        for _ in range(2):  # two passes suffice (Kahan and Parlett)
             for other in kept:
                 rest -= other * (other @ rest)
         if norm > 0.0 and np.linalg.norm(rest) > DEPENDENT * norm:
@@ -136,10 +136,10 @@ def orthonormal(columns: np.ndarray) -> np.ndarray:
 
 
 def atoms(boundaries: Sequence[Boundary], vertices: int) -> list[np.ndarray]:
-    """Disjoint sets of vertices whose union is all vertices that a boundary ever holds.
+    """Divide all vertices that boundary conditions ever fix into disjoint sets ("atoms").
 
-    Two vertices share an atom if the same units of the boundaries hold them; a unit is then a union
-    of atoms, and holding it fixes whole atoms.
+    A boundary condition fixes its vertices in units. Two vertices share an atom if they belong to
+    the same units, so that every unit is a union of atoms.
     """
     units = [unit for boundary in boundaries for unit in boundary.units()]
     if not units:
@@ -155,16 +155,16 @@ def atoms(boundaries: Sequence[Boundary], vertices: int) -> list[np.ndarray]:
 
 
 def skinning_weights(points: np.ndarray, handles: int) -> np.ndarray:
-    """Weights (N, handles) at ``points`` (N, 3) m: smooth, in [0, 1], summing to 1 at every vertex.
+    """Smooth weights (N, handles) in [0, 1] at ``points`` (N, 3) m, with sum 1 at every vertex.
 
-    Handles are vertices by farthest-point sampling. Each has the compactly supported kernel
-    (1 - d/R)^4 (4 d/R + 1) of Wendland with R three times the covering radius, so that every vertex
-    lies in the support of a kernel; dividing by the sum makes a partition of unity.
+    Handles are vertices from farthest-point sampling. At distance d a handle has Wendland's kernel
+    (1 - d/R)^4 (4 d/R + 1), zero for d > R. R is three times the largest distance of a vertex from
+    its nearest handle: at every vertex a kernel is positive. Kernels are divided by their sum.
     """
     chosen = farthest_points(points, np.arange(len(points)), handles)
     distance = np.linalg.norm(points[:, None, :] - points[chosen][None], axis=2)
     radius = 3.0 * distance.min(axis=1).max() if handles > 1 else 2.0 * distance.max()
-    # the covering radius is zero if every vertex is a handle; for one vertex all distances are
+    # the radius is zero if every vertex is a handle; for a single vertex all distances are zero
     radius = max(radius, np.finfo(float).eps * distance.max(), np.finfo(float).tiny)
     scaled = np.minimum(distance / radius, 1.0)
     kernel = (1.0 - scaled) ** 4 * (4.0 * scaled + 1.0)
@@ -172,10 +172,10 @@ def skinning_weights(points: np.ndarray, handles: int) -> np.ndarray:
 
 
 def skinning_modes(points: np.ndarray, masses: np.ndarray, k: int) -> np.ndarray:
-    """k mass-orthonormal columns (N, k) in the span of w_h [1, x, y, z], affine part removed.
+    """k mass-orthonormal columns (N, k) in the span of w_h [1, x, y, z], without affine part.
 
-    w_h are the `skinning_weights` of as many handles as k columns need. Of more than k columns
-    those with the largest singular values are kept, so that bases of equal size are compared.
+    w_h are the `skinning_weights` of handle h; there are as many handles as k columns require. Of
+    more than k columns, those with the largest singular values are returned.
 
     Parameters
     ----------

@@ -1,25 +1,26 @@
 """Energy-conserving sampling and weighting (Farhat et al. 2014) for projective dynamics.
 
-A few elements with non-negative factors xi represent all: sum_e xi_e g_e ~ sum_e g_e, where g_e is
-the contribution of an element to the reduced equations over the training iterates. The same factors
+A few elements e with factors xi_e >= 0 represent all: sum_e xi_e g_e ~ sum_e g_e, where g_e is the
+contribution of an element to the reduced equations in all training iterates. The same factors
 weight the element in the system matrix and in the right-hand side. The reduced problem is then
-again a projective-dynamics problem, with weights xi_e w_e >= 0: whatever the factors and the state,
-its objective cannot rise in an iteration. Their quality decides the accuracy, not the stability.
+again a projective-dynamics problem, with weights xi_e w_e >= 0. Whatever the factors, its objective
+cannot rise in an iteration: they affect the accuracy, not the stability.
 
-Training iterates come from a run in the position subspace with all projections. One iteration,
-A z' = (M/h^2) s + sum_e B^T S_e^T w_e p_e(B z), can be written as sum_e g_e = (M/h^2)(s - z') with
-g_e = B^T S_e^T w_e (S_e B z' - p_e(B z)). Sampled elements whose factors satisfy
-sum_e xi_e g_e = sum_e g_e map z to the same z', with their own matrix on the left. The factors must
-therefore reproduce the pairs (z, z') of a run. A residual r of the equations moves the next iterate
-by A^-1 r and misses the minimum of the iteration's quadratic objective by 1/2 r^T A^-1 r. `Norm`
-"energy" measures residuals by this loss: in the plain norm the stiff coordinates would hide errors
-of the soft ones, which determine the motion.
+Training iterates come from a run in the position subspace with all projections. One iteration from
+z to z', A z' = (M/h^2) s + sum_e B^T S_e^T w_e p_e(B z), can be written as
+sum_e g_e = (M/h^2)(s - z') with g_e = B^T S_e^T w_e (S_e B z' - p_e(B z)). Sampled elements whose
+factors satisfy sum_e xi_e g_e = sum_e g_e map z to the same z'. The factors are therefore fitted to
+the pairs (z, z') of a run. A residual r of the equations changes the next iterate by A^-1 r and
+raises the iteration's quadratic objective by 1/2 r^T A^-1 r above its minimum. The norm "energy"
+measures residuals by this amount: in the Euclidean norm the stiff coordinates would hide errors of
+the soft ones, which determine the motion.
 
-`Norm` "response" measures the effect of r on the run. In each mode of (K, M) the frame ends obey
-x_{n+1} / c^2 - 2 x_n + x_{n-1} = h^2 r_n with c^2 = 1 / (1 + h^2 omega^2). To an r_n that is new in
-every frame the mode responds with h^2 c^2 sqrt((1 + c^2) / (1 + 3 c^2)) / (1 - c^2) times the root
-mean square of r_n, between 0.7 and 1 of the static response 1 / omega^2. For a mode without
-stiffness, the response over a run of the scene's length is used.
+The norm "response" measures the effect of r on the run. In each eigenmode (frequency omega) of
+stiffness and mass, the positions x_n at the ends of frames obey x_{n+1} / c^2 - 2 x_n + x_{n-1} =
+h^2 r_n with c^2 = 1 / (1 + h^2 omega^2). If r_n is independent in every frame, the mode responds
+with h^2 c^2 sqrt((1 + c^2) / (1 + 3 c^2)) / (1 - c^2) times the root mean square of r_n, 0.7 to 1
+of the static response 1 / omega^2. For a mode without stiffness, the response over a run of the
+scene's length is used.
 
 The factors are found by sparse non-negative least squares, stopped early (`nnls_path`).
 """
@@ -46,13 +47,13 @@ Norm = Literal["energy", "response"]
 
 @dataclass(frozen=True)
 class TrainingFrame:
-    """A frame of the training run.
+    """Iterates of one frame of the training run.
 
-    start : (K, 3) coordinates at the frame's beginning, where frame-lagged data are evaluated
+    start : (K, 3) coordinates at the frame's beginning, for data computed once per frame
     pairs : (n, 2, K, 3) coordinates before and after each iteration
-    measure : (K', K) with |measure r| the size of a residual r of the equations in the chosen norm:
-        |measure r|^2 = r^T A^-1 r, J, or |M^1/2 x|^2 of the run's response x, kg m^2; held
-        coordinates have no equation
+    measure : (K', K) matrix; |measure r| is the size of a residual r in the chosen norm, "energy":
+        |measure r|^2 = r^T A^-1 r, J; "response": |M^1/2 x|^2 for the response x, kg m^2. The K'
+        free coordinates have equations, fixed ones have none
     """
 
     start: np.ndarray
@@ -70,7 +71,7 @@ def training_run(
     start: State | None = None,
     norm: Norm = "energy",
 ) -> list[TrainingFrame]:
-    """Run the scene in the subspace with all projections; return iterates of ``frames``.
+    """Run ``scene`` in a subspace with all projections; return the iterates of some ``frames``.
 
     ``frames`` are ascending. The run begins at ``start``, a state in coordinates (K, 3), or at the
     scene's initial state if that is None.
@@ -94,7 +95,7 @@ def training_run(
         first = state.positions
         state, _ = loop.step(state, frame)
         if frame in wanted:
-            # the last iterate is not the end of the frame if a contact has corrected this
+            # a single iterate is no pair: the end of the frame, after contacts, is the second one
             if len(iterates) == 1:
                 iterates.append(state.positions)
             pairs = np.stack([iterates[:-1], iterates[1:]], axis=1)
@@ -106,7 +107,7 @@ def training_run(
 
 
 class _Watched(SubspaceLocalStep):
-    """A local step that appends the coordinates of each evaluation to ``iterates``."""
+    """Local step that records the coordinates of each evaluation in ``iterates``."""
 
     def __init__(self, group: ConstraintGroup, columns: Columns) -> None:
         super().__init__(group, columns)
@@ -118,15 +119,15 @@ class _Watched(SubspaceLocalStep):
 
 
 def _measure(space: ReducedSpace, fixed: np.ndarray, norm: Norm, frames: int) -> np.ndarray:
-    """`TrainingFrame.measure` (K', K) with coordinates ``fixed`` held, for a run of ``frames``."""
+    """`TrainingFrame.measure` (K', K) for ``fixed`` coordinates and a run of ``frames`` frames."""
     size = len(space.matrix)
     free = np.setdiff1d(np.arange(size), fixed)
     block, inertia = (m[np.ix_(free, free)] for m in (space.matrix, space.inertia_matrix))
     measure = np.zeros((len(free), size))
-    if norm == "energy":  # a triangular R with R^T R = A^-1
+    if norm == "energy":  # the measure is a triangular R with R^T R = A^-1
         root = linalg.cholesky(block, lower=True)
         measure[:, free] = linalg.solve_triangular(root, np.eye(len(block)), lower=True)
-    else:  # root mean square response of each mode
+    else:  # the measure is the root mean square response of each mode
         values, modes = linalg.eigh(block, inertia)
         c2 = 1.0 / np.maximum(values, 1.0)
         beside = np.maximum(1.0 - c2, 1.0 / frames)
@@ -135,11 +136,11 @@ def _measure(space: ReducedSpace, fixed: np.ndarray, norm: Norm, frames: int) ->
     return measure
 
 
-# Rows to which the training equations are hashed, per coordinate of the subspace. Without several
-# times as many rows as selected elements, the factors would fit the hashing.
+# Training equations are hashed to SKETCH rows per coordinate of the subspace. There must be several
+# times more rows than selected elements, or the factors would fit the random hashing.
 SKETCH = 60
-# Numbers of candidate elements, initial and largest: the equations of all elements of a large mesh
-# would not fit the memory, and neighbouring elements are similar.
+# First and largest number of candidate elements. The equations of all elements of a large mesh
+# would not fit into memory, and neighbouring elements are similar.
 CANDIDATES, MOST = 5000, 20_000
 SEED = 0
 
@@ -149,12 +150,12 @@ def ecsw_elements(
 ) -> list[tuple[np.ndarray, np.ndarray]]:
     """Select elements (m,) and their factors xi > 0 (m,) for each tolerance.
 
-    In a large group, candidates are a random (seeded) subset. It is doubled, up to `MOST`, as long
-    as a tolerance is missed; the sum that the samples approximate is always that of all elements.
+    In a large group the candidates are a random (seeded) subset, which is doubled, up to `MOST`,
+    until all tolerances are met. They always approximate the sum over all elements.
 
     Parameters
     ----------
-    tolerances : relative residuals tau of the training equations at which NNLS stops
+    tolerances : relative residuals tau of the training equations, at which the fit stops
     """
     count = CANDIDATES
     while True:
@@ -165,7 +166,7 @@ def ecsw_elements(
         rows, total = training_equations(group, columns, training, eligible)
         solutions = nnls_path(rows, total, tolerances)
         left = [np.linalg.norm(rows[:, support] @ x - total) for support, x in solutions]
-        # largest residual of each solution, with a margin for round-off
+        # largest allowed residual of each solution, with a margin for round-off
         allowed = (1.0 + 1e-9) * np.linalg.norm(total) * np.array(tolerances)
         if count >= min(group.elements, MOST) or (np.array(left) <= allowed).all():
             return [(eligible[support], factors) for support, factors in solutions]
@@ -175,16 +176,15 @@ def ecsw_elements(
 def training_equations(
     group: ConstraintGroup, columns: Columns, training: Training, elements: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the equations of ``elements`` (m, len(elements)), Fortran order, and sums (m,).
+    """Return m equations, one column per element: (m, len(elements)); and sums over all (m,).
 
-    For each pair (z, z') of iterates and each coordinate there is one equation,
-    g_e = B^T S_e^T w_e (S_e B z' - p_e(B z)), in the norm of `TrainingFrame.measure`, all together
-    scaled so that the sum of all elements has norm 1. The share of the rest weight is one more
-    equation: a group at rest (no force at all) still keeps its stiffness.
+    For each pair (z, z') of iterates and each coordinate there is one equation with the entries
+    g_e = B^T S_e^T w_e (S_e B z' - p_e(B z)), multiplied by `TrainingFrame.measure`. All are scaled
+    so that the sums have norm 1. One more equation has the elements' fractions of the total weight,
+    so that a group without any force keeps its stiffness. The array is in Fortran order.
 
     Many equations are hashed to `SKETCH` K rows with random signs (seeded), which keeps norms of
-    combinations up to a few per cent (count sketch, Charikar et al. 2002) and never forms an e x e
-    matrix.
+    combinations to a few per cent (count sketch, Charikar et al. 2002).
     """
     strain = np.ascontiguousarray(group.S @ columns.B)
     weighted = strain * group.row_weights[:, None]
@@ -223,7 +223,7 @@ def training_equations(
 
 @njit(cache=True, error_model="numpy")
 def _hash_equations(lifted, differences, buckets, signs, out):
-    """Add each element's equations to the rows that they are hashed to.
+    """Add the equations of each element to the rows ``buckets`` of ``out``, times ``signs``.
 
     lifted : (m, p, K'), differences : (n, m, p, 3), buckets, signs : (n, K', 3), out : (m, size)
     """
@@ -239,10 +239,10 @@ def _hash_equations(lifted, differences, buckets, signs, out):
 
 log = logging.getLogger(__name__)
 
-# A unit column depends on the active columns if its orthogonal part is below this.
+# A unit column depends on the active columns if its part orthogonal to them is below this.
 DEPENDENT = 1e-7
 
-# A block of columns to add: correlations above CLOSE times the largest, at most BLOCK x the active.
+# Columns added at a time: correlation above CLOSE x the largest; at most BLOCK x the active ones.
 CLOSE = 0.7
 BLOCK = 0.2
 
@@ -250,27 +250,27 @@ BLOCK = 0.2
 def nnls_path(
     g: np.ndarray, b: np.ndarray, tolerances: Sequence[float]
 ) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Non-negative x with || G x - b || <= tolerance || b || for each of several tolerances.
+    """Find sparse x >= 0 with || G x - b || <= tolerance || b || for each of several tolerances.
 
-    The active-set method of Lawson and Hanson: the columns with the largest correlation are added,
-    the least-squares problem of the active columns is solved, columns that would turn negative are
-    removed. The search passes the tolerances from the coarsest to the finest and stores each
-    solution, so that the supports stay small. If many columns are active, several are added at a
-    time, which saves passes over G; if none of them stays, only one column is added next, as in the
-    original method, which ends at the minimum. The normal equations of the active columns grow by
-    rows of a Cholesky factor; with columns scaled to length one their accuracy suffices for
-    tolerances down to about 1e-6. Besides G, no array is larger than G's active columns.
+    In the active-set method of Lawson and Hanson, the columns with the largest correlation with the
+    residual are added, the least-squares problem of the active columns is solved, and columns whose
+    values would be negative are removed. One search stores a solution at each tolerance, from the
+    coarsest to the finest, so that few entries are positive. If many columns are active, several
+    are added at a time, to save passes over G. If all of these are removed again, a single column
+    is added next, as in the original method, which ends at the minimum. The Cholesky factor of the
+    normal equations is updated; with unit columns it is accurate enough for tolerances down to
+    about 1e-6. No further array is larger than the active columns of G.
 
     Parameters
     ----------
-    g : (m, e) columns, one per element; in Fortran order a pass reads memory in order
+    g : (m, e) matrix G, one column per element; Fortran order makes passes over it faster
     b : (m,)
-    tolerances : relative residuals; for 0 it is plain NNLS
+    tolerances : relative residuals; 0 gives the non-negative least-squares solution
 
     Returns
     -------
-    For each tolerance, in the order given: support, the indices of the positive entries, ascending
-    (n,), and their values (n,). If a tolerance cannot be reached, x is the best found.
+    For each tolerance, in the order given: indices (n,) of the positive entries, ascending, and
+    their values (n,). If a tolerance cannot be reached, x has the smallest residual found.
     """
     search = _ActiveSet(g, b)
     found: dict[float, tuple[np.ndarray, np.ndarray]] = {}
@@ -288,7 +288,7 @@ def nnls_path(
 
 
 class _ActiveSet:
-    """State of `nnls_path`: active columns, their values, Cholesky factor of their Gram matrix."""
+    """State of `nnls_path`: active columns, values, and Cholesky factor of their Gram matrix."""
 
     def __init__(self, g: np.ndarray, b: np.ndarray) -> None:
         self._g, self._b, self._size = g, b, float(np.linalg.norm(b))
@@ -319,7 +319,7 @@ class _ActiveSet:
         return active, self._values[order] / self._norms[active]
 
     def reach(self, tolerance: float) -> None:
-        """Add columns until the residual meets ``tolerance`` or no further column can be added."""
+        """Add columns until the relative residual is at most ``tolerance`` or none can be added."""
         while self.relative_residual > tolerance and len(self._active) < self._most:
             block = self._choose()
             if len(block) == 0:
@@ -328,13 +328,13 @@ class _ActiveSet:
             if joined:
                 self._solve()
             staying = set(self._active).intersection(joined)
-            # ban a column that is dependent or removed at once, or it would be picked again
+            # ban a single column that is dependent or at once removed: it would be chosen again
             if len(block) == 1 and not staying:
                 self._banned[block] = True
             self._alone = not staying and len(block) > 1
 
     def _choose(self) -> np.ndarray:
-        """Columns to add: those most correlated with the residual, the best one first."""
+        """Indices of the columns most correlated with the residual, the best first."""
         gradient = (self._residual @ self._g) / self._norms
         gradient[self._active] = -np.inf
         gradient[self._banned] = -np.inf
@@ -405,9 +405,9 @@ class _ActiveSet:
 
 @njit(cache=True, error_model="numpy")
 def _remove_row(factor, n, column):
-    """Remove row and column ``column`` from the matrix whose Cholesky factor (n, n) is given.
+    """Update the Cholesky ``factor`` (n, n) of a matrix that loses its row and column ``column``.
 
-    The rows below move up, and the rest of their factor absorbs the lost column by a rank-one
+    The rows below move up; the removed column is added to their part of the factor by a rank-one
     update (Gill, Golub, Murray, Saunders 1974, method C1).
     """
     lost = factor[column + 1 : n, column].copy()

@@ -22,18 +22,18 @@ from pdrom.reduction.subspace.interpolation import Interpolation
 from pdrom.reduction.subspace.model import Samples, SubspaceModel
 from pdrom.reduction.subspace.space import PROBES, ReducedSpace, probe_vertices, reduced_state
 
-# Entries of a basis above which only the rows used in an iteration are stored as doubles.
+# Of a basis with more entries, only the rows that iterations use are stored as doubles.
 DOUBLES = 60_000
 MANIFOLDS = ("clamped", "length")
 
 
 def export_scene(scene: Scene) -> dict[str, Any]:
-    """Export the data of a scene that all its models share.
+    """Export the data of ``scene`` that all its subspace models have in common.
 
     Raises
     ------
     SceneError
-        The engine has no kernel for a group, or does not know an effect.
+        The browser's simulation code lacks a constraint group or another effect of the scene.
     """
     require_known(scene.config)
     floors = [contact.config.height for contact in scene.contacts]
@@ -87,11 +87,11 @@ def require_known(config: SceneConfig) -> None:
 
 
 def export_basis(scene: Scene, columns: Columns, needed: np.ndarray) -> dict[str, Any]:
-    """Export ``columns`` of a subspace of ``scene`` and all data that do not depend on samples.
+    """Export ``columns`` of a subspace of ``scene`` and further data that samples do not affect.
 
     Parameters
     ----------
-    needed : vertices (n,) whose rows an iteration uses; these rows are always doubles
+    needed : (n,) vertices whose rows iterations use; these rows are always exported as doubles
     """
     space = ReducedSpace(scene, columns, [])
     start = reduced_state(scene, columns)
@@ -115,7 +115,7 @@ def export_basis(scene: Scene, columns: Columns, needed: np.ndarray) -> dict[str
 
 
 def export_model(scene: Scene, model: SubspaceModel) -> dict[str, Any]:
-    """Export the samples that ``model`` has for each group of ``scene``."""
+    """Export the sampled elements of ``model`` for each constraint group of ``scene``."""
     groups = {}
     for group in scene.groups:
         chosen = model.chosen(group)
@@ -130,7 +130,7 @@ def export_model(scene: Scene, model: SubspaceModel) -> dict[str, Any]:
 
 
 def _stencil(group: ConstraintGroup, chosen: Samples | Interpolation) -> np.ndarray:
-    """Vertices (m, corners) of the sampled elements."""
+    """Vertex indices (m, corners) of the m sampled elements of ``group``."""
     assert isinstance(group, StencilGroup)  # `require_known` refuses other groups
     return group.stencil[chosen.elements]
 

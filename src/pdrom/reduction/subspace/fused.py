@@ -1,20 +1,20 @@
-"""Frames in one compiled loop over the sampled elements.
+"""Iterations and frames of a subspace model in one compiled loop over the sampled elements.
 
-In the free coordinates z of a position subspace one iteration is
+In the K' free coordinates z of a position subspace one iteration is
 
-    d = D z + d_0        S q of the sampled elements, d_0 from the held coordinates
+    d = D z + d_0        S q of the m sampled elements, d_0 from the fixed coordinates
     p = p(d)             projections
-    z = c + L^T p        global solve, with c = A^-1 (M/h^2 s - load) and L = W D A^-1
+    z = c + L^T p        global step, with c = A^-1 (M/h^2 s - load) and L = W D A^-1
 
-D and L are (m p, K'). An iteration consists of two small dense products and the projections; it
-allocates nothing and no array grows with the mesh. Without frame-lagged groups, c is one product of
-a matrix with s, whose held coordinates are set to their targets, and one compiled call computes
-many frames, up to the first frame that meets a floor.
+D and L are (m p, K') for p rows per element. An iteration has two small dense products and the
+projections; it allocates nothing, and no array grows with the mesh. If no group has data that are
+computed once per frame, c is the product of a matrix with s, whose fixed coordinates are set to
+their targets, and one compiled call computes many frames, up to the first that meets a floor.
 
-The matrix of a product lies in blocks of `TALL` rows, column by column, so that the products of a
-column of a block with a vector do not wait for each other. Vectors are three numbers each, one
-after the other, but are read and written four numbers at a time; their arrays have space for the
-additional numbers (`vectors`). The order of every sum is that of the columns on all processors.
+The matrix of a product is stored in blocks of `TALL` rows, each column by column, so that the
+products of a column with a vector do not wait for each other. Vectors are stored as three numbers
+each, but read and written four numbers at a time; their arrays have space for the additional
+numbers (`vectors`). Every sum is in the order of the columns on all processors.
 """
 
 from collections.abc import Sequence
@@ -37,10 +37,10 @@ from pdrom.reduction.subspace.space import DenseElimination, ReducedSpace
 
 
 class FusedStepper(Stepper):
-    """The step loop with fused iterations; same results as the plain one up to round-off.
+    """Step loop with compiled, fused iterations; results equal those of `Stepper` up to round-off.
 
-    Its time counts as local: there is no separate global step. With a local step that is no
-    `SubspaceLocalStep`, or a group without a gradient kernel, it iterates as the plain loop does.
+    All its time counts as local step, as there is no separate global step. It iterates
+    like `Stepper` if a local step is no `SubspaceLocalStep` or a group has no gradient kernel.
     """
 
     def __init__(self, scene: Scene, space: ReducedSpace, local_steps: Sequence[LocalStep]) -> None:
@@ -67,7 +67,7 @@ class FusedStepper(Stepper):
 
 
 class _Fused:
-    """Iterations and frames in a space, with the operators for every set of held coordinates."""
+    """Fused iterations and frames, with operators for each set of fixed coordinates."""
 
     def __init__(
         self, space: ReducedSpace, sampled: "_Sampled", acceleration: Anderson | None
@@ -78,7 +78,7 @@ class _Fused:
         self._waiting = 0
 
     def _of(self, elimination: DenseElimination) -> "_Operators":
-        # the id is a valid key: the space never deletes its eliminations
+        # the id is a unique key, since the space never deletes its eliminations
         key = id(elimination)
         if key not in self._operators:
             inertia = self._space.inertia_matrix
@@ -88,7 +88,7 @@ class _Fused:
     def iterate(
         self, elimination: DenseElimination, s: np.ndarray, base: np.ndarray, iterations: int
     ) -> np.ndarray:
-        """Coordinates (K, 3) after the iterations of a frame that starts at s."""
+        """Coordinates (K, 3) after all iterations of a frame, which begin at the prediction s."""
         own, sampled, free = self._of(elimination), self._sampled, elimination.free
         sampled.refresh()
         targets = vectors(len(elimination.fixed))
@@ -105,7 +105,7 @@ class _Fused:
         return y
 
     def _history(self, free: np.ndarray) -> History | None:
-        """History of the Anderson acceleration for the ``free`` coordinates, reset for a frame."""
+        """Empty history of Anderson acceleration for a frame with these ``free`` coordinates."""
         if self._acceleration is None:
             return NO_HISTORY
         self._acceleration.begin_frame(np.empty((len(free), 3)))
@@ -114,9 +114,9 @@ class _Fused:
     def run(
         self, q: np.ndarray, v: np.ndarray, frames: range, h: float, iterations: int, track: bool
     ) -> Blocks | None:
-        """Run as many of ``frames`` as one call can do, see `WholeFrames.run`; no objective.
+        """Run as many of ``frames`` as one call can, see `WholeFrames.run`, without the objective.
 
-        Return None for a frame that meets a floor and some frames after it, as contact often lasts.
+        Return None for a frame that meets a floor and some frames after it, as contacts often last.
         """
         if self._waiting and frames.start:
             self._waiting -= 1
@@ -141,7 +141,7 @@ class _Fused:
 
 
 class _Sampled:
-    """Sampled elements of all groups, one after the other."""
+    """Arrays of the sampled elements of all groups, one group after the other."""
 
     def __init__(self, steps: Sequence[SubspaceLocalStep]) -> None:
         groups = [step.group for step in steps]
@@ -165,18 +165,18 @@ class _Sampled:
         """Addresses, elements, first rows, parameters and their starts, S q, projections."""
 
     def refresh(self) -> None:
-        """Copy the parameters that the groups froze at the beginning of the frame."""
+        """Copy the parameters that groups have computed at the beginning of the frame."""
         for i in self._lagged:
             start, stop = self._starts[i : i + 2]
             self._parameters[start:stop] = self._groups[i].kernel_parameters().ravel()
 
 
 class _Operators:
-    """Matrices of an iteration for one set of held coordinates, and its vectors.
+    """Matrices and vectors of an iteration for one set of fixed coordinates.
 
     iterated : D, L^T, d_0, c and z; for the objective: weights of the rows, M/h^2 of the free
         coordinates, and working memory
-    begun : product that gives c from s, coupling to the held coordinates, working vectors
+    begun : matrix that maps s to c, coupling to the fixed coordinates, working vectors
     """
 
     def __init__(
@@ -203,7 +203,7 @@ TALL = 8
 
 
 def blocks(matrix: np.ndarray) -> np.ndarray:
-    """Arrange ``matrix`` (m, n) in the blocks of `product`, flat, padded with rows of zeros."""
+    """Arrange ``matrix`` (m, n) in blocks for `product`, flat; zero rows fill the last block."""
     m, n = matrix.shape
     whole = np.zeros((-(-m // TALL) * TALL, n))
     whole[:m] = matrix
@@ -213,7 +213,7 @@ def blocks(matrix: np.ndarray) -> np.ndarray:
 
 
 def vectors(count: int) -> np.ndarray:
-    """Zeros for ``count`` vectors, to be read and written by `product`."""
+    """Flat array of zeros for ``count`` vectors, which `product` reads and writes."""
     return zeros(3 * (-(-count // TALL) * TALL) + WIDTH)
 
 
@@ -250,8 +250,8 @@ def run_iterations(count, size, rows, operators, sampled, history):
 
     Parameters
     ----------
-    rows : number of rows of the sampled strain D
-    operators : see ``iterated`` of `_Operators`
+    rows : number of rows of D
+    operators : matrices and vectors, see ``iterated`` of `_Operators`
     sampled : arrays of `_Sampled`
     history : arrays of the acceleration, see `Anderson`; `NO_HISTORY` without acceleration
     """
@@ -282,7 +282,7 @@ def run_iterations(count, size, rows, operators, sampled, history):
 
 @inner
 def _objective(weights, d, p, inertia, y, s):
-    """1/2 sum_i w_i |d_i - p_i|^2 + 1/2 (y - s)^T (M/h^2) (y - s)."""
+    """Objective, J: 1/2 sum_i w_i |d_i - p_i|^2 + 1/2 (y - s)^T (M/h^2) (y - s)."""
     total = 0.0
     for i in range(len(weights)):
         for axis in range(3):
@@ -299,7 +299,7 @@ def _objective(weights, d, p, inertia, y, s):
 
 @inner
 def _predict(z, v, acceleration, rate, rates, h, s):
-    """Write s = z + h v + h^2 (a + c v + C v)."""
+    """Write the prediction s = z + h v + h^2 (a + c v + C v); c is ``rate``, C is ``rates``."""
     for i in range(len(z)):
         for axis in range(3):
             total = acceleration[i, axis] + rate * v[i, axis]
@@ -318,14 +318,14 @@ def run_frames(
     Parameters
     ----------
     positions, velocities : (F + 1, K, 3) coordinates, the first ones given, the others written
-    acceleration, rate, rates : terms of all forces, see `ReducedSpace.affine`
+    acceleration, rate, rates : a, c, C of the acceleration a + c v + C v by all forces
     h : time step, s
-    fixed, free : (m,), (K',) held coordinates and the others
-    targets : (F, m, 3) values of the held coordinates
-    begun : see `_Operators`
-    count, rows, operators, sampled, history : see `run_iterations`
+    fixed, free : (m,), (K',) indices of the fixed coordinates and of the free ones
+    targets : (F, m, 3) values of the fixed coordinates in each frame
+    begun : matrices for the start of a frame, see `_Operators`
+    count, rows, operators, sampled, history : arguments of `run_iterations`
     seconds : (F, 4) s, times of the phases of each frame, written
-    watch : clock, see `pdrom.model.compiled.functions`
+    watch : buffer for the clock, from `pdrom.model.compiled.functions.clock`
     """
     response, coupling, nothing, s, held = begun
     offset, constant, z = operators[2:5]

@@ -1,12 +1,12 @@
 """Hyper-reduced projective dynamics: sampled constraints with interpolation.
 
-Brandt, Eisemann and Hildebrandt (2018, sect. 5): the projections of a group are confined to a
-smooth, low-dimensional space and fitted, in the weighted least-squares sense, to the projections of
-sampled constraints. The space needs no training: its functions are skinning weights on the elements
-times the rest vectors S q_rest, so that it contains every field of linear maps that varies slowly
-over the mesh. The source adds the weights themselves as further columns (the translations of a
-skinning space); they are left out, since S annihilates translations and their value depends on the
-arbitrary frame of each element.
+Brandt, Eisemann and Hildebrandt (2018, sect. 5) represent the projections of a group in a smooth,
+low-dimensional space, fitted to the projections of sampled constraints by weighted least squares.
+The space needs no training: its functions are skinning weights on the elements times the rest
+vectors S q_rest, so that it contains all linear maps of the rest shape that vary slowly over the
+mesh. The source adds the weights themselves as further columns (the translations of a skinning
+space). They are left out here, since S annihilates translations and such columns would depend on
+the arbitrary frame of each element.
 """
 
 from typing import Annotated
@@ -25,7 +25,7 @@ from pdrom.reduction.snapshots import touched_vertices
 from pdrom.reduction.subspace.columns import DEPENDENT, Columns, orthonormal, skinning_weights
 from pdrom.reduction.subspace.interpolation import Interpolation, reduced_strain
 
-# Condition number of the sampled equations above which their solution counts as noise.
+# If the condition number of the sampled equations is larger, their solution counts as noise.
 SINGULAR = 1e8
 
 
@@ -41,7 +41,7 @@ class HrpdSpec(ConfigModel):
 
 
 def hrpd(group: ConstraintGroup, columns: Columns, sampled: "SampledSpace | None") -> Interpolation:
-    """Interpolation of ``group`` in ``columns``; without projections if ``sampled`` is None."""
+    """Interpolation of ``group`` in ``columns``; projections are zero if ``sampled`` is None."""
     strain, stiffness = reduced_strain(group, columns)
     offset = np.zeros((len(stiffness), 3))
     if sampled is None:
@@ -52,12 +52,12 @@ def hrpd(group: ConstraintGroup, columns: Columns, sampled: "SampledSpace | None
 
 
 class SampledSpace:
-    """A space of projections and the operator that fits it to sampled elements.
+    """A space of projections, and the operator that fits its coefficients to sampled elements.
 
-    V : (e p, d), orthonormal in the inner product of the weights W; shared by x, y and z
+    V : (e p, d) basis, orthonormal in the inner product of the weights W; used for x, y and z
     elements : (m,) sampled elements, ascending
-    operator : (d, m p), weighted least squares
-    gain : || (P^T W^(1/2) V)^+ ||_2
+    operator : (d, m p) maps sampled projections to coefficients by weighted least squares
+    gain : || (P^T W^(1/2) V)^+ ||_2 with P^T the selection of sampled rows
     """
 
     def __init__(self, group: ConstraintGroup, V: np.ndarray, elements: np.ndarray) -> None:
@@ -77,7 +77,7 @@ class SampledSpace:
 def sampled_space(
     group: ConstraintGroup, points: np.ndarray, spec: HrpdSpec
 ) -> SampledSpace | None:
-    """Build space and samples of ``group`` by ``spec``; None if the rest vectors are round-off.
+    """Space and sampled elements of ``group`` by ``spec``; None if its rest vectors are round-off.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def sampled_space(
     Raises
     ------
     SamplingError
-        The sampled elements do not determine the space.
+        The sampled elements do not determine the coefficients.
     """
     rest = group.S @ points
     if np.linalg.norm(rest) <= group.roundoff(points):
@@ -103,15 +103,15 @@ def projection_space(
 ) -> np.ndarray:
     """W-orthonormal columns (e p, d) of the span of skinning weights times rest vectors.
 
-    The rest vectors themselves come first (one linear map for the whole mesh: the rest shape and
-    its rotations are exact), then the directions with the largest singular values.
+    The rest vectors themselves come first, so that the rest shape and its rotations are exact, then
+    the directions with the largest singular values.
 
     Parameters
     ----------
     rest : (e p, 3) rest vectors S q_rest
-    centres : (e, 3)
+    centres : (e, 3) m, centres of the elements
     weights : (e p,) diagonal of W
-    dimension : d
+    dimension : number d of columns, at most
     """
     root = np.sqrt(weights)[:, None]
     active = rest[:, np.linalg.norm(rest, axis=0) > DEPENDENT * np.linalg.norm(rest)]
@@ -130,6 +130,6 @@ def projection_space(
 
 
 def element_centres(group: ConstraintGroup, points: np.ndarray) -> np.ndarray:
-    """Mean (e, 3) m of the ``points`` (N, 3) m that each element of ``group`` touches."""
+    """Centres (e, 3) m of the elements: means of the ``points`` (N, 3) m at their vertices."""
     touched = touched_vertices(group)
     return (touched @ points) / np.asarray(touched.sum(axis=1)).reshape(-1, 1)

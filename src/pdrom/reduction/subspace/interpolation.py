@@ -1,8 +1,8 @@
 """Local steps in the coordinates of a position subspace, by sampling or by interpolation.
 
-Interpolation evaluates a few elements, computes coefficients c from their values, and from these
-the right-hand side B^T S^T W (mean + V c). Products over the length of the mesh are formed before
-the run; the system matrix is the same as with all projections.
+Interpolation evaluates a few elements, computes coefficients c from their projections, and from c
+the right-hand side B^T S^T W (mean + V c). Products of arrays as long as the mesh are computed
+before the run; the system matrix is the same as with all projections.
 """
 
 from dataclasses import dataclass
@@ -16,12 +16,12 @@ from pdrom.reduction.subspace.columns import Columns
 
 @dataclass(frozen=True)
 class Interpolation:
-    """Arrays that one group needs online, in a subspace of K coordinates.
+    """Arrays that one group needs during a run, in a subspace of K coordinates.
 
-    elements : (m,) sampled elements, ascending; none if the projections are constant
-    operator : (r, n), maps sampled values to coefficients; n is m p if the axes share one operator
-        (coefficients (r, 3)) and 3 m p if they share the coefficients (r, 1)
-    modes : (K, r) or (3 K, r), B^T S^T W V
+    elements : (m,) sampled elements of p rows, ascending; none if the projections are constant
+    operator : (r, n), maps sampled values to coefficients; n = m p if it is applied to each axis
+        (coefficients (r, 3)), n = 3 m p if the axes share the coefficients (r, 1)
+    modes : B^T S^T W V, (K, r) or (3 K, r) in these two cases
     offset : (K, 3) constant part of the right-hand side
     stiffness : (K, K) B^T S^T W S B of all elements
     gain : || operator ||_2
@@ -52,7 +52,7 @@ class InterpolatedLocalStep:
         self._rows = np.ascontiguousarray(columns.B[vertices])
 
     def begin_frame(self, q: np.ndarray) -> None:
-        """Freeze frame-lagged data of the sampled elements at the coordinates q (K, 3)."""
+        """Compute the once-per-frame data of sampled elements at the coordinates q (K, 3)."""
         if len(self._elements):
             self.group.begin_frame(self._rows @ q)
 
@@ -69,7 +69,7 @@ class InterpolatedLocalStep:
 
 
 def reduced_strain(group: ConstraintGroup, columns: Columns) -> tuple[np.ndarray, np.ndarray]:
-    """S B (e p, K) and the stiffness B^T S^T W S B (K, K) of ``group`` in ``columns``."""
+    """S B (e p, K) and stiffness B^T S^T W S B (K, K) of ``group``, B the subspace ``columns``."""
     strain = group.S @ columns.B
     return strain, strain.T @ (group.row_weights[:, None] * strain)
 
@@ -77,9 +77,9 @@ def reduced_strain(group: ConstraintGroup, columns: Columns) -> tuple[np.ndarray
 def interpolation_of(
     group: ConstraintGroup, columns: Columns, reduction: Reduction
 ) -> Interpolation:
-    """Interpolation in ``columns`` by a full-order ``reduction``, for example of joint rows.
+    """Interpolation in the subspace ``columns`` by a ``reduction`` made for vertex positions.
 
-    Coefficients of blocks that belong to single axes are stacked.
+    If each axis has its own coefficients, those of all axes are stacked.
     """
     strain, stiffness = reduced_strain(group, columns)
     weighted = group.row_weights[:, None] * strain
@@ -100,10 +100,10 @@ def interpolation_of(
 
 
 class SubspaceLocalStep:
-    """Weighted projections of some (or all) elements, B^T S^T W p(S B z).
+    """Local step in coordinates z: projections of some (or all) elements, B^T S^T W p(S B z).
 
-    With all elements and unit factors these are the full projections in the subspace; with few
-    elements and the factors of energy-conserving sampling the cost does not depend on the mesh.
+    With all elements and factors 1 it is exact in the subspace. With few elements and the factors
+    of energy-conserving sampling its cost does not depend on the size of the mesh.
     """
 
     def __init__(
@@ -133,11 +133,11 @@ class SubspaceLocalStep:
         return strain.T @ (self.group.row_weights[:, None] * strain)
 
     def begin_frame(self, q: np.ndarray) -> None:
-        """Freeze frame-lagged data at the coordinates q (K, 3)."""
+        """Compute the group's once-per-frame data at the coordinates q (K, 3)."""
         self.group.begin_frame(self._rows @ q)
 
     def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
-        """Add B^T S^T W p at ``y`` (K, 3) to ``rhs`` (K, 3); return the samples' energy."""
+        """Add B^T S^T W p at ``y`` (K, 3) to ``rhs`` (K, 3); return the energy of the samples."""
         self._rhs[...] = 0.0
         energy = self.group.accumulate(self._rows @ y, self._rhs)
         rhs += self._transposed @ self._rhs

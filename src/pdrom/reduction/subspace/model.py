@@ -22,19 +22,19 @@ from pdrom.reduction.subspace.fused import FusedStepper
 from pdrom.reduction.subspace.interpolation import Interpolation
 from pdrom.reduction.subspace.space import ReducedSpace, reduced_state
 
-# Largest number of training frames whose iterates train the element sampling.
+# Largest number of frames per training motion whose iterates are used to sample elements.
 FRAMES = 70
 ECSW = "ecsw"
 
 
 def ecsw_name(tolerance: float) -> str:
-    """Name in tables of a model whose energy-conserving samples have this ``tolerance`` tau."""
+    """Name in tables of a model with energy-conserving sampling at the ``tolerance`` tau."""
     return f"{ECSW}-{tolerance:.0e}"
 
 
 @dataclass(frozen=True)
 class Samples:
-    """Indices of sampled elements (m,) and their non-negative factors (m,)."""
+    """Indices (m,) of sampled elements and the factors (m,) >= 0 of their weights."""
 
     elements: np.ndarray
     factors: np.ndarray
@@ -42,7 +42,7 @@ class Samples:
 
 @dataclass(frozen=True)
 class SubspaceModel:
-    """Reduced model: kind of position basis (see `make_columns`), columns, samples by group.
+    """Reduced model: kind of its columns (see `make_columns`), columns, samples by group.
 
     A group without samples evaluates all elements with factor one.
     """
@@ -52,16 +52,16 @@ class SubspaceModel:
     samples: Mapping[str, Samples | Interpolation] = field(default_factory=dict)
 
     def elements_evaluated(self, scene: Scene) -> int:
-        """Number of elements that the local steps of ``scene`` evaluate in an iteration."""
+        """Number of elements of ``scene`` whose projections an iteration evaluates."""
         return sum(len(self.chosen(group).elements) for group in scene.groups)
 
     def chosen(self, group: ConstraintGroup) -> Samples | Interpolation:
-        """Samples or interpolation of ``group``; all its elements if it has neither."""
+        """Samples or interpolation of ``group``; all elements with factor 1 if it has neither."""
         every = Samples(np.arange(group.elements), np.ones(group.elements))
         return self.samples.get(group.name, every)
 
     def loop(self, scene: Scene) -> tuple[Stepper, State]:
-        """Step loop of ``scene`` in the coordinates of the subspace, and the initial state."""
+        """Step loop of ``scene`` in subspace coordinates, and the initial state in them."""
         steps: list[Any] = []
         for group in scene.groups:
             own = self.chosen(group)
@@ -78,7 +78,7 @@ class SubspaceModel:
         return self.columns.B @ z
 
     def output(self) -> "Output":
-        """Function like `positions`, faster and in single precision, for output of every frame."""
+        """Faster replacement of `positions` in single precision, for output of every frame."""
         return Output(self.columns.B)
 
 
@@ -88,8 +88,8 @@ PANEL, TERMS = 512, 4
 class Output:
     """Function of coordinates z (K, 3) that returns positions B z (N, 3) m in single precision.
 
-    The matrix ``B`` (N, K) is stored by panels of `PANEL` vertices, so that it is read once and in
-    order, and `TERMS` of its columns are added at a time. Every call overwrites the same result.
+    The matrix ``B`` (N, K) is stored in panels of `PANEL` rows, so that memory is read once and in
+    order, and `TERMS` of its columns are added at a time. Each call overwrites the last result.
     """
 
     def __init__(self, B: np.ndarray) -> None:
@@ -115,7 +115,7 @@ def _multiply(panels, z, sums, result):
         panel, first = panels[p], p * PANEL
         a[:], b[:], c[:] = 0.0, 0.0, 0.0
         for k in range(0, len(z), TERMS):
-            # in local variables, since the compiler would read z again for every vertex
+            # local variables, since the compiler would otherwise read z again for every vertex
             r, s, t, u = z[k], z[k + 1], z[k + 2], z[k + 3]
             r0, s0, t0, u0 = r[0], s[0], t[0], u[0]
             r1, s1, t1, u1 = r[1], s[1], t[1], u[1]
@@ -130,11 +130,11 @@ def _multiply(panels, z, sums, result):
 
 
 def make_columns(scene: Scene, training: np.ndarray, kind: str, k: int) -> spaces.Columns:
-    """Columns of a position subspace of ``kind`` with k modes, or all modes if fewer exist.
+    """Columns of a position subspace with k modes of a ``kind``, or all modes if fewer exist.
 
     Parameters
     ----------
-    training : (n, N, 3) positions of the training frames
+    training : (n, N, 3) m, positions in the training frames
     kind : "pod", "skinning", or "pod+skinning" with k modes of each
     scene : scene whose rest shape, masses and boundary conditions are used
     """
@@ -157,12 +157,12 @@ def sample_elements(
     norm: Norm = "energy",
     others: Sequence[Scene] = (),
 ) -> list[dict[str, Samples]]:
-    """Select energy-conserving samples of every group for each tolerance.
+    """Select energy-conserving samples of every constraint group for each of ``tolerances``.
 
-    They are trained on iterates of a run in the subspace with all projections, in some of the
-    training ``frames``. The run begins at ``start`` (coordinates), or at the scene's start if None.
-    Each of the ``others``, scenes of further training motions, adds as many frames. The samples
-    meet the tolerances in ``norm`` (see module `ecsw`).
+    They are trained on iterates of a run in the subspace with all projections, in up to `FRAMES` of
+    the training ``frames``. The run begins at ``start``, a state in subspace coordinates, or at the
+    scene's initial state if None. Each scene of ``others``, further training motions, adds as many
+    frames. Residuals are measured in ``norm`` (see module `ecsw`).
     """
     count = -(-FRAMES // (1 + len(others)))
     chosen = frames[np.unique(np.linspace(0, len(frames) - 1, count).round().astype(int))]
@@ -181,11 +181,12 @@ def sample_elements(
 def rerun_model(
     scene: Scene, model: SubspaceModel, reference: np.ndarray, blowup_extent: float = np.inf
 ) -> Rerun:
-    """Run ``scene`` with ``model`` and compare with ``reference``; a blow-up ends the run.
+    """Run ``scene`` with ``model`` and compare it with the full-order run ``reference``.
 
     Parameters
     ----------
-    reference, blowup_extent : see `pdrom.reduction.sampling.local_step`
+    reference : (F + 1, N, 3) m
+    blowup_extent : the run ends if its bounding box exceeds this multiple of that at rest
     """
     loop, start = model.loop(scene)
     frames, unit = scene.config.frames, scene.mesh.extent
@@ -204,7 +205,7 @@ def store_columns(store: h5py.Group, columns: spaces.Columns) -> None:
 def store_model(
     store: h5py.Group, labels: dict[str, Any], samples: Mapping[str, Samples | Interpolation]
 ) -> None:
-    """Write a model's ``labels`` and ``samples`` of each group to the HDF5 group ``store``."""
+    """Write ``samples`` of each group and attributes ``labels`` to the HDF5 group ``store``."""
     store.attrs.update(labels)
     for name, chosen in samples.items():
         kept = store.create_group(f"samples/{name}")
@@ -213,7 +214,7 @@ def store_model(
 
 
 def load_models(path: str | os.PathLike[str]) -> list[tuple[dict[str, object], SubspaceModel]]:
-    """Read the models in the file ``path``, each with labels (method, position_basis, k)."""
+    """Read the models in the file ``path``, with attributes: method, position_basis, k."""
     with open_hdf5(path) as file:
         columns = {base: _columns(store) for base, store in file["columns"].items()}
         models = []

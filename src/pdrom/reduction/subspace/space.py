@@ -1,8 +1,8 @@
 """The step loop in the coordinates of a position subspace, q = B z.
 
-Arrays that have the length of the mesh are used only once, before the run. During a run the
-arrays have the length of the subspace, of the held vertices, or (for a scene with contacts) of its
-probe vertices.
+Arrays with an entry per vertex are used only before the run. During a run, arrays have an entry per
+subspace coordinate, per vertex fixed by a boundary condition, or (in scenes with contacts) per
+"probe": one of some vertices at which contacts are detected.
 """
 
 from collections.abc import Sequence
@@ -22,12 +22,12 @@ from pdrom.reduction.subspace.columns import Columns
 
 
 class DenseElimination:
-    """Reduced system with fixed coordinates eliminated; the inverse is small and explicit.
+    """Reduced system without the fixed coordinates, solved by its explicit (small) inverse.
 
     Parameters
     ----------
     matrix : (K, K) matrix of the reduced system, kg/s^2
-    fixed : coordinates (m,) that have targets, ascending
+    fixed : (m,) indices of the coordinates with prescribed values, ascending
 
     Raises
     ------
@@ -62,16 +62,16 @@ class DenseElimination:
         return self._inverse @ (rhs[self.free] - self._load)
 
     def response(self, inertia: np.ndarray) -> np.ndarray:
-        """Matrix (K', K) that maps s, with fixed coordinates at their targets, to free coordinates.
+        """Matrix (K', K) that maps s, whose fixed coordinates are targets, to free coordinates.
 
-        It solves the system for the right-hand side ``inertia`` s; ``inertia`` is M/h^2 (K, K).
+        They solve the system for the right-hand side ``inertia`` s; ``inertia`` is M/h^2 (K, K).
         """
         result = self._inverse @ inertia[self.free]
         result[:, self.fixed] -= self._inverse @ self._coupling
         return result
 
     def lift(self, rows: np.ndarray) -> np.ndarray:
-        """Response (m, K') of the free coordinates to a unit force on each of ``rows`` (m, K)."""
+        """Rows (m, K') times the inverse: response to a unit force on each of ``rows`` (m, K)."""
         return rows[:, self.free] @ self._inverse
 
 
@@ -84,13 +84,13 @@ class ReducedSpace(Space):
 
     Parameters
     ----------
-    matrices : (K, K) stiffness B^T S^T W S B of each group, possibly with sampled weights
+    matrices : stiffness B^T S^T W S B (K, K) of each group, of all or of sampled elements
 
     Attributes
     ----------
     matrix : (K, K) system matrix A: inertia and stiffness
     inertia_matrix : (K, K) B^T M B / h^2
-    forces : constant (K, 3) and rate (number or (K, K)) of each acceleration constant + rate v
+    forces : (constant (K, 3), rate) of each force with acceleration constant + rate v
     """
 
     def __init__(self, scene: Scene, columns: Columns, matrices: Sequence[np.ndarray]) -> None:
@@ -103,7 +103,7 @@ class ReducedSpace(Space):
         self.matrix = mass / h**2 + sum(matrices, np.zeros_like(mass))
         self.inertia_matrix = mass / h**2
         self.forces = [_reduce_force(force, columns, scene) for force in scene.forces]
-        # objects with the interface of `Boundary`, for coordinates instead of vertices
+        # these objects act like a `Boundary`, with coordinates instead of vertices
         self._boundaries: Any = [_ReducedBoundary(b, columns) for b in scene.boundaries]
         self._contacts = [_ReducedContact(c, columns, scene) for c in scene.contacts]
         self._cache: dict[bytes, DenseElimination] = {}
@@ -117,7 +117,7 @@ class ReducedSpace(Space):
 
     @cached_property
     def affine(self) -> tuple[np.ndarray, float, np.ndarray]:
-        """Acceleration by all forces: constant (K, 3), rate, and rates (K, K) or unused (0, 0)."""
+        """Acceleration by all forces: constant (K, 3), rate, and rates (K, K), (0, 0) if zero."""
         constant, rate, rates = np.zeros((len(self.matrix), 3)), 0.0, np.zeros((0, 0))
         for own, factor in self.forces:
             constant += own
@@ -129,11 +129,11 @@ class ReducedSpace(Space):
 
     @property
     def whole_frames(self) -> bool:
-        """Whether only floors, and no other contacts, correct coordinates at the end of a frame."""
+        """Whether all contacts are floors, so that one call can compute several whole frames."""
         return all(contact.height is not None for contact in self._contacts)
 
     def free_frames(self, path: np.ndarray) -> int:
-        """Number of frames of ``path`` (n, K, 3) before the first that meets a floor."""
+        """Number of frames in ``path`` (n, K, 3) before the first with a probe below a floor."""
         first = len(path)
         for contact in self._contacts:
             first = contact.free_frames(path[:first])
@@ -143,11 +143,11 @@ class ReducedSpace(Space):
         return base.held_targets(self._boundaries, frame, positions)
 
     def held_path(self, frames: range, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Coordinates (m,) held in the first ``frames`` after ``positions``, values (n, m, 3)."""
+        """Coordinates (m,) fixed in the first n of ``frames``, and their values (n, m, 3)."""
         return base.held_path(self._boundaries, frames, positions)
 
     def elimination(self, fixed: np.ndarray) -> DenseElimination:
-        """System with the ``fixed`` coordinates (m,) eliminated; cached."""
+        """System without the ``fixed`` coordinates (m,), from a cache if possible."""
         key = fixed.tobytes()
         if key not in self._cache:
             self._cache[key] = DenseElimination(self.matrix, fixed)
@@ -178,14 +178,14 @@ def coordinates(columns: Columns, masses: np.ndarray, field: np.ndarray) -> np.n
 
 
 def projector(columns: Columns, masses: np.ndarray) -> np.ndarray:
-    """Matrix (K, N) of `coordinates` with ``columns`` and ``masses``."""
+    """Matrix (K, N) of the mass-orthogonal projection on ``columns``, with ``masses`` (N,) kg."""
     return _mass_solve(columns, masses, (columns.B * masses[:, None]).T)
 
 
 def _mass_solve(columns: Columns, masses: np.ndarray, rhs: np.ndarray) -> np.ndarray:
-    """Return (B^T M B)^-1 ``rhs``.
+    """Return (B^T M B)^-1 ``rhs`` with the matrix B of ``columns``.
 
-    The matrix is scaled to a unit diagonal: columns of held vertices are not mass-orthonormal, and
+    The matrix is scaled to a unit diagonal, since columns of atoms are not mass-orthonormal and
     masses far from 1 kg would make it ill-conditioned.
     """
     mass = columns.B.T @ (masses[:, None] * columns.B)
@@ -194,7 +194,7 @@ def _mass_solve(columns: Columns, masses: np.ndarray, rhs: np.ndarray) -> np.nda
 
 
 def reduced_state(scene: Scene, columns: Columns) -> State:
-    """Initial state of ``scene`` in coordinates of ``columns``; its rest shape is exact."""
+    """Initial state of ``scene`` in the coordinates of ``columns``; the rest shape is exact."""
     state = scene.initial_state()
     return State(
         coordinates(columns, scene.masses, state.positions),
@@ -203,10 +203,10 @@ def reduced_state(scene: Scene, columns: Columns) -> State:
 
 
 def _reduce_force(force: base.Force, columns: Columns, scene: Scene) -> tuple[np.ndarray, Any]:
-    """Project a force on the subspace: return (constant (K, 3), rate) of a = constant + rate v.
+    """Project ``force`` on the subspace: return constant (K, 3) and rate of its acceleration.
 
-    The force has to be affine in the velocity, with one rate for all vertices (a number) or one for
-    each of them (a matrix (K, K), also exact); other forces are refused, not approximated.
+    The acceleration must be constant + rate v with velocity v; the rate is a number, or (K, K) if
+    vertices have different rates (also exact). Other forces are refused, not approximated.
     """
     shape = scene.mesh.points.shape
     rng = np.random.default_rng(0)
@@ -224,7 +224,7 @@ def _reduce_force(force: base.Force, columns: Columns, scene: Scene) -> tuple[np
 
 
 class _ReducedBoundary:
-    """Dirichlet condition imposed exactly: each atom of held vertices has its own coordinates."""
+    """Boundary condition in the subspace; exact, as each atom of fixed vertices has coordinates."""
 
     def __init__(self, boundary: base.Boundary, columns: Columns) -> None:
         self.boundary = boundary
@@ -233,16 +233,16 @@ class _ReducedBoundary:
         self._columns = columns
 
     def held(self, frame: int) -> np.ndarray:
-        """Coordinates of the atoms that are held in ``frame``, ascending."""
+        """Indices of the coordinates of all atoms that are fixed in ``frame``, ascending."""
         return self._of(frame)[0]
 
     def path(self, frames: range, current: np.ndarray) -> np.ndarray:
-        """Values (n, m, 3) of the held coordinates, initially ``current``, see `Boundary`."""
+        """Values (n, m, 3) of the fixed coordinates in n ``frames``; they begin at ``current``."""
         _, rows, inverse = self._of(frames.start)
         return inverse @ self.boundary.path(frames, rows @ current)
 
     def _of(self, frame: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Coordinates held in ``frame``, the held vertices' rows of B, and the rows' inverse."""
+        """Coordinates fixed in ``frame``, rows of B at the fixed vertices, and their inverse."""
         vertices = self.boundary.held(frame)
         key = vertices.tobytes()
         if key not in self._parts:
@@ -256,12 +256,12 @@ class _ReducedBoundary:
 
 
 def probe_vertices(n: int) -> np.ndarray:
-    """Vertices of a mesh with n vertices at which contacts are detected, ascending."""
+    """Probes: vertices of a mesh with n vertices at which contacts are detected, ascending."""
     return np.unique(np.linspace(0, n - 1, min(PROBES, n)).round().astype(np.int64))
 
 
 class _ReducedContact:
-    """A contact that is detected at probe vertices and then resolved at all vertices."""
+    """Contact that is detected at probe vertices and then resolved at all vertices."""
 
     def __init__(self, contact: base.Contact, columns: Columns, scene: Scene) -> None:
         self._contact, self.height = contact, contact.height
@@ -271,9 +271,9 @@ class _ReducedContact:
         self._project = projector(columns, scene.masses)
 
     def free_frames(self, path: np.ndarray) -> int:
-        """Number of frames of ``path`` (n, K, 3) before the first with a probe in the floor."""
+        """Number of frames in ``path`` (n, K, 3) before the first with a probe below this floor."""
         lowest = (path[:, :, 1] @ self._probes.T).min(axis=1)
-        # a frame with non-finite coordinates counts as contact: the plain step computes it
+        # a frame with non-finite coordinates counts as one with contact
         above = lowest >= self.height
         return len(path) if above.all() else int(np.argmin(above))
 
@@ -284,7 +284,7 @@ class _ReducedContact:
         self._contact.apply(corrected, self._probes @ before, held_probes)
         if np.array_equal(probed, corrected):
             return
-        # columns of held vertices are zero elsewhere, so that their coordinates do not change
+        # columns of an atom are zero at other vertices, so that fixed coordinates do not change
         full = self._columns.B @ y
         self._contact.apply(full, self._columns.B @ before, held)
         y[...] = self._project @ full
