@@ -317,7 +317,7 @@ def alternatives(options: Scenes, table: pd.DataFrame) -> Figure:
 def _draw_case(ax: Axes, labels: tuple[str, int, float], case: pd.DataFrame) -> None:
     scene, vertices, stiffness = labels
     stiff = "" if stiffness == 1.0 else rf" $\times {stiffness:g}$"
-    ax.set_title(f"{style.words(scene)}{stiff}, {vertices:,} vertices", fontsize=7.5)
+    ax.set_title(f"{style.words(scene)}{stiff}, {vertices:,} vertices", fontsize=7.0)
     multiples.log_axis(ax, LEAST, MOST)
     multiples.time_axis(ax, case.ms_per_frame.to_numpy(float))
     rows = case.rename(columns={"error_implicit": "error"}).dropna(subset="error")
