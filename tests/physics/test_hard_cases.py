@@ -42,23 +42,19 @@ def test_the_checks_of_the_full_order_run_hold(name):
     assert faults(case) == []
 
 
-def pairs() -> list:
-    """Every case with every reduction.
-
-    The experiment `hard_cases` runs all pairs and `./reproduce verify` compares their table.
-    Therefore only one reduction for each case, another one for the next case, is not slow.
-    """
-    return [
-        pytest.param(
-            *(name, reduction),
-            marks=[pytest.mark.slow] if CATALOGUE[name].slow or (i - j) % len(REDUCTIONS) else [],
-        )
-        for i, name in enumerate(CASES)
-        for j, reduction in enumerate(REDUCTIONS)
-    ]
+# The experiment `hard_cases` runs all pairs and `./reproduce verify` compares their table: only one
+# reduction for each case, another one for the next case, is not slow.
+PAIRS = [
+    pytest.param(
+        *(name, reduction),
+        marks=[pytest.mark.slow] if CATALOGUE[name].slow or (i - j) % len(REDUCTIONS) else [],
+    )
+    for i, name in enumerate(CASES)
+    for j, reduction in enumerate(REDUCTIONS)
+]
 
 
-@pytest.mark.parametrize(("name", "reduction"), pairs())
+@pytest.mark.parametrize(("name", "reduction"), PAIRS)
 def test_outcome_is_as_expected(name, reduction):
     found = outcomes.row(training(name), reduction, METHODS, EXPECTED)
     assert outcomes.surprise(found["outcome"], name, EXPECTED.get(reduction)) == ""
@@ -85,7 +81,7 @@ def taken(name: str) -> bool:
     return all(effect.in_subspace for effect in listed)
 
 
-# Two thirds of the cases that a subspace takes are slow tests, since `pairs` runs them as well.
+# Two thirds of the cases that a subspace takes are slow tests, since `PAIRS` runs them as well.
 TAKEN = [name for name in reducible_cases() if taken(name)]
 SELDOM = {name for i, name in enumerate(TAKEN) if i % 3}
 

@@ -10,21 +10,13 @@ from pdrom.model.metrics import relative_errors, shape_differences, trajectory_e
 from strategies import SEEDS
 
 
-@given(SEEDS)
-def test_agrees_with_norms_of_matrices(seed):
-    rng = np.random.default_rng(seed)
-    p, p_hat = rng.standard_normal((2, 4, 5, 3))
-    axes = [np.linalg.norm(p[..., a] - p_hat[..., a]) / np.linalg.norm(p[..., a]) for a in range(3)]
-    total = np.linalg.norm(p - p_hat) / np.linalg.norm(p)
-    assert relative_errors(p, p_hat, 0.0) == pytest.approx([total, *axes])
-
-
 @given(SEEDS, st.floats(1e-6, 1e6))
-def test_relative_errors_have_no_unit(seed, unit):
-    rng = np.random.default_rng(seed)
-    p, p_hat = rng.standard_normal((2, 4, 5, 3))
-    expected = relative_errors(p, p_hat, 1e-9)
-    assert relative_errors(unit * p, unit * p_hat, unit * 1e-9) == pytest.approx(expected)
+def test_relative_errors_agree_with_norms_of_matrices_and_have_no_unit(seed, unit):
+    p, p_hat = np.random.default_rng(seed).standard_normal((2, 4, 5, 3))
+    axes = [np.linalg.norm(p[..., a] - p_hat[..., a]) / np.linalg.norm(p[..., a]) for a in range(3)]
+    expected = pytest.approx([np.linalg.norm(p - p_hat) / np.linalg.norm(p), *axes])
+    assert relative_errors(p, p_hat, 0.0) == expected
+    assert relative_errors(unit * p, unit * p_hat, unit * 1e-9) == expected
 
 
 @pytest.mark.parametrize(
@@ -59,11 +51,9 @@ def test_a_reconstruction_that_does_not_exist_has_no_error(rng, bad):
 def test_trajectory_error_weighs_frames_by_their_motion():
     assert trajectory_error(np.array([3.0, 4.0]), np.array([6.0, 8.0])) == 0.5
     assert trajectory_error(np.zeros(3), np.ones(3)) == 0.0
-
-
-@pytest.mark.parametrize("frames", [0, 3])
-def test_a_run_at_rest_has_no_trajectory_error(frames):
-    assert trajectory_error(np.ones(frames), np.zeros(frames)) is None
+    # a run at rest has none
+    for frames in (0, 3):
+        assert trajectory_error(np.ones(frames), np.zeros(frames)) is None
 
 
 @given(SEEDS)
@@ -80,16 +70,13 @@ def test_a_rigid_motion_leaves_the_shape(seed):
     assert shape_differences(other, shape) == pytest.approx(expected)
 
 
-def test_a_mirror_image_is_another_shape():
+def test_shapes_of_mirrored_flat_and_far_grown_frames():
+    """A mirror image is another shape; the others have finite differences."""
     shape = np.random.default_rng(1).normal(size=(1, 9, 3))
     assert shape_differences(shape * [1.0, 1.0, -1.0], shape)[0] > 0.1
-
-
-def test_shapes_of_flat_and_of_far_grown_frames_are_finite():
-    flat = np.random.default_rng(2).normal(size=(1, 9, 3)) * [1.0, 1.0, 0.0]
+    flat = shape * [1.0, 1.0, 0.0]
     assert shape_differences(flat, flat)[0] == pytest.approx(0.0, abs=1e-13)
-    assert shape_differences(np.zeros((1, 9, 3)), flat)[0] == pytest.approx(
-        np.linalg.norm(flat - flat.mean(axis=1))
-    )
+    size = np.linalg.norm(flat - flat.mean(axis=1))
+    assert shape_differences(np.zeros((1, 9, 3)), flat)[0] == pytest.approx(size)
     assert np.isfinite(shape_differences(1e200 * flat, flat)).all()
     assert len(shape_differences(np.zeros((0, 9, 3)), np.zeros((0, 9, 3)))) == 0

@@ -30,26 +30,24 @@ def errors(measure: Yardstick, positions: np.ndarray) -> dict:
 FLOOR = {"effect": "floor", "height": 1.5}
 
 
-def test_the_full_order_run_has_no_error():
+def test_the_full_order_run_has_no_error_and_one_that_ended_early_none_at_all():
     measure = yardstick(FLOOR)
     found = errors(measure, measure.reference)
     assert tuple(found) == ERRORS
     shapes = [found.pop("shape_error"), found.pop("relative_shape_error")]
     assert shapes == pytest.approx([0.0, 0.0], abs=1e-13)
     assert set(found.values()) == {0.0}
+    for left in (FRAMES, 1):
+        assert set(errors(measure, measure.reference[:left]).values()) == {None}
 
 
-def test_a_rigid_motion_is_an_error_of_positions_and_none_of_the_shape():
+def test_a_rigid_motion_is_an_error_of_positions_and_half_the_speed_one_of_velocities():
+    """Half the motion has half the norms of the full order; a rigid motion leaves the shape."""
     measure = yardstick()
     moved = measure.reference @ random_rotation(np.random.default_rng(3)).T + [0.3, 0.1, -0.2]
     found = errors(measure, moved)
     assert found["relative_error_within_horizon"] > 0.1
     assert found["relative_shape_error"] == pytest.approx(0.0, abs=1e-12)
-
-
-def test_a_run_at_half_the_speed_has_half_the_velocities():
-    """Position and velocity errors over the norms of the full order, as of any half motion."""
-    measure = yardstick()
     start = measure.reference[0]
     found = errors(measure, start + 0.5 * (measure.reference - start))
     assert found["velocity_error"] == pytest.approx(0.5)
@@ -65,28 +63,21 @@ def test_energy_drift_of_a_run_that_stands_still():
     assert found["energy_drift"] > 0.1
 
 
-@pytest.mark.parametrize("late", [3, -3])
-def test_first_contact_comes_late_by_the_frames_that_a_run_is_behind(late):
+def test_first_contact_is_late_missed_or_should_not_be():
+    """Late by the frames that a run is behind; vertices that touch at the start do not count."""
     measure = yardstick(FLOOR)
-    frames = np.clip(np.arange(FRAMES + 1) - late, 0, FRAMES)
-    found = errors(measure, measure.reference[frames])
-    assert found["contact_delay"] == pytest.approx(late * measure.scene.config.time_step)
-
-
-def test_contacts_that_are_missed_or_should_not_be():
-    measure = yardstick(FLOOR)
+    for late in (3, -3):
+        frames = np.clip(np.arange(FRAMES + 1) - late, 0, FRAMES)
+        delay = errors(measure, measure.reference[frames])["contact_delay"]
+        assert delay == pytest.approx(late * measure.scene.config.time_step)
     start = measure.reference[:1].repeat(FRAMES + 1, axis=0)
     assert errors(measure, start)["contact_delay"] == np.inf
     still = Yardstick(measure.scene, start)
     assert errors(still, measure.reference)["contact_delay"] == -np.inf
     assert errors(still, start)["contact_delay"] is None
     assert errors(yardstick(), measure.reference)["contact_delay"] is None
-
-
-def test_vertices_that_touch_at_the_start_do_not_count():
-    measure = yardstick({"effect": "floor", "height": 2.0}, mesh={"kind": "cloth", "rows": 6,
-                        "columns": 5, "plane": "xz"})  # fmt: skip
-    assert not measure.series["contact"].any()
+    lying = {"kind": "cloth", "rows": 6, "columns": 5, "plane": "xz"}
+    assert not yardstick({"effect": "floor", "height": 2.0}, mesh=lying).series["contact"].any()
 
 
 @pytest.mark.parametrize("name", OBSTACLES)
@@ -102,12 +93,6 @@ def test_gaps_to_an_obstacle_shrink_to_nothing_on_its_surface(name):
     if name != "plane":  # the point lies in the other two
         assert hits.all()
     np.testing.assert_allclose(obstacle.gaps(entries[hits]), 0.0, atol=1e-12)
-
-
-def test_a_run_that_ended_early_has_no_errors():
-    measure = yardstick(FLOOR)
-    for left in (FRAMES, 1):
-        assert set(errors(measure, measure.reference[:left]).values()) == {None}
 
 
 def test_blocks_of_frames_do_not_matter(monkeypatch):

@@ -6,14 +6,12 @@ from pydantic import ValidationError
 from pdrom.reduction.method import MethodSpec, load_methods
 from places import CONFIG
 
-PATH = CONFIG / "methods.yaml"
-
 
 def test_presets_are_the_methods_of_the_literature():
-    """The ingredients that each method is known by."""
+    methods = load_methods(CONFIG / "methods.yaml")
     chosen = {
         name: (m.weighting, m.centring, m.layout, m.rows, m.selection, m.solve, m.repeat_rows)
-        for name, m in load_methods(PATH).items()
+        for name, m in methods.items()
         if m.rows != "all"
     }
     affine = ("none", "affine", "vectorised")
@@ -32,14 +30,13 @@ def test_presets_are_the_methods_of_the_literature():
         "block-s-opt": (*affine, "element", "s-opt", "qr", False),
     }  # fmt: skip
     assert {name: chosen[name] for name in literature} == literature
-    assert load_methods(PATH)["pod"].rows == "all"
-    assert load_methods(PATH)["published"].tikhonov == 1e-8
-
-
-def test_methods_with_the_same_basis_share_its_name():
-    methods = load_methods(PATH)
+    assert methods["pod"].rows == "all"
+    assert methods["published"].tikhonov == 1e-8
+    # those with the same basis share its name
     assert methods["deim"].basis_id == methods["block-deim"].basis_id == "none-affine-vectorised"
     assert methods["published"].basis_id == "none-mean-in-modes-vectorised"
+    # more joint rows than modes are solved by least squares
+    assert MethodSpec(title="t", rows="joint", solve="qr", oversampling=2).oversampling == 2
 
 
 @pytest.mark.parametrize(
@@ -68,14 +65,3 @@ def test_methods_with_the_same_basis_share_its_name():
 def test_combinations_that_do_not_exist_are_refused(fault):
     with pytest.raises(ValidationError):
         MethodSpec(title="t", **fault)
-
-
-@pytest.mark.parametrize("rows", ["scalar", "joint", "element"])
-def test_more_samples_than_modes_are_solved_by_least_squares(rows):
-    assert MethodSpec(title="t", rows=rows, solve="qr", oversampling=2).oversampling == 2
-
-
-def test_a_method_cannot_be_changed():
-    method = MethodSpec(title="t", rows="all")
-    with pytest.raises(ValidationError, match="frozen"):
-        method.rows = "joint"

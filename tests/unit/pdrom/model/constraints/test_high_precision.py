@@ -77,6 +77,7 @@ MATRICES = {
     "random": lambda rng, rows: rng.standard_normal((rows, 3)),
     "member": with_singular_values(1.0, 1.0, 1.0),
     "in range": with_singular_values(1.005, 1.0, 0.995),
+    "of the same size": with_singular_values(2.0, 0.5, 1.0),
     "nearly singular (1e-8)": with_singular_values(1.0, 0.7, 1e-8),
     "nearly singular (1e-16)": with_singular_values(1.0, 0.7, 1e-16),
     "one row times 1e-100": one_row_times(1e-100),

@@ -8,32 +8,22 @@ from pdrom.model.dynamics.acceleration import Anderson
 from pdrom.model.runs import simulate, trajectory
 
 
-def affine_map(rng):
-    """(A, b) of y -> A y + b with a symmetric contraction."""
-    q, _ = np.linalg.qr(rng.standard_normal((12, 12)))
-    return q * np.linspace(0.3, 0.95, 12) @ q.T, rng.standard_normal((12, 3))
-
-
-def iterate(matrix, shift, window, iterations):
-    acceleration, y = Anderson(window), np.zeros_like(shift)
-    acceleration.begin_frame(y)
-    for _ in range(iterations):
-        assert not acceleration.refuse(y, float("nan"))
-        y = matrix @ y + shift
-        acceleration.combine(y)
-    return y
-
-
 def test_residual_is_that_of_gmres(rng):
     """With an unlimited window step m + 1 is the image of the m-th iterate of GMRES (here by dense
-    least squares over the Krylov space)."""
-    matrix, shift = affine_map(rng)
-    shift[:, 1:] = shift[:, :1]
+    least squares over the Krylov space), of a symmetric contraction."""
+    q, _ = np.linalg.qr(rng.standard_normal((12, 12)))
+    matrix = q * np.linspace(0.3, 0.95, 12) @ q.T
+    shift = np.repeat(rng.standard_normal((12, 1)), 3, axis=1)
     steps, operator = 5, np.eye(12) - matrix
     powers = [np.linalg.matrix_power(operator, i) @ shift[:, 0] for i in range(steps)]
     krylov, _ = np.linalg.qr(np.stack(powers, axis=1))
     found = krylov @ np.linalg.lstsq(operator @ krylov, shift[:, 0], rcond=None)[0]
-    y = iterate(matrix, shift, 20, steps + 1)
+    acceleration, y = Anderson(20), np.zeros_like(shift)
+    acceleration.begin_frame(y)
+    for _ in range(steps + 1):
+        assert not acceleration.refuse(y, float("nan"))
+        y = matrix @ y + shift
+        acceleration.combine(y)
     assert np.allclose(y[:, 0], matrix @ found + shift[:, 0], atol=1e-7 * np.abs(y).max())
 
 

@@ -46,9 +46,7 @@ def test_wind_accelerates_a_flat_sheet_as_the_differential_equation_does():
         v = kicked(scene, scene.mesh.points, v)
     expected = 40.0 - 40.0 / (1.0 + (1.5 / 0.3) * 40.0 * 5 * H)
     assert v == pytest.approx(np.tile([0.0, 0.0, expected], (16, 1)))
-
-
-def test_a_sheet_edge_on_feels_no_wind():
+    # a sheet edge on feels none
     scene = make_scene(SPRING, {"effect": "wind", "velocity": [300, 100, 0]})
     rest = np.zeros_like(scene.mesh.points)
     assert np.array_equal(kicked(scene, scene.mesh.points, rest), rest)

@@ -32,22 +32,20 @@ def warnings_of(scene, caplog) -> list[str]:
 
 
 @pytest.mark.parametrize("name", OBSTACLES)
-def test_pins_inside_an_obstacle_hold_and_let_go_at_rest(name):
+def test_pins_inside_an_obstacle_hold_are_named_and_let_go_at_rest(name, caplog):
+    """In all vertices and in a subspace."""
     scene = make_scene(*BASE, PINS, OBSTACLES[name], mesh=SHEET)
-    held = scene.boundaries[0].vertices
+    held, rest = scene.boundaries[0].vertices, scene.mesh.points
+    (message,) = warnings_of(scene, caplog)
+    start = f"scene 'test': 6 held vertices have targets inside '{name}' and stay there: "
+    assert message == start + ", ".join(str(i) for i in held)
     loop, state = scene.stepper(), scene.initial_state()
     for frame in range(12):
         state, _ = loop.step(state, frame)
-        assert np.array_equal(state.positions[held], scene.mesh.points[held])
+        assert np.array_equal(state.positions[held], rest[held])
         assert not state.velocities[held].any()
     state, _ = loop.step(state, 12)
-    assert (state.positions[held] != scene.mesh.points[held]).any()
-
-
-@pytest.mark.parametrize("name", OBSTACLES)
-def test_pins_hold_in_a_subspace(name):
-    scene = make_scene(*BASE, PINS, OBSTACLES[name], mesh=SHEET)
-    held, rest = scene.boundaries[0].vertices, scene.mesh.points
+    assert (state.positions[held] != rest[held]).any()
     model = SubspaceModel("pod", make_columns(scene, trajectory(scene)[1:], "pod", 4))
     loop, state = model.loop(scene)
     for frame in range(12):
@@ -74,34 +72,18 @@ def test_a_collision_moves_only_what_is_free(rng):
     assert not np.array_equal(ended[held], positions[held])
 
 
-@pytest.mark.parametrize("name", OBSTACLES)
-def test_targets_inside_an_obstacle_are_named_in_one_line(name, caplog):
-    scene = make_scene(*BASE, PINS, OBSTACLES[name], mesh=SHEET)
-    ids = ", ".join(str(i) for i in scene.boundaries[0].vertices)
-    (message,) = warnings_of(scene, caplog)
-    start = f"scene 'test': 6 held vertices have targets inside '{name}' and stay there: "
-    assert message == start + ids
-
-
-def test_a_handle_that_moves_into_an_obstacle_later_is_named(caplog):
-    down = {"effect": "translate", "select": "bottom", "offset": [0, -0.3, 0], "over": 9}
-    floor = {**FLOOR, "height": 0.5}
-    (message,) = warnings_of(make_scene(*BASE, {**down, "start": 3}, floor, mesh=SHEET), caplog)
-    assert "6 held vertices have targets inside 'floor'" in message
-
-
-@pytest.mark.parametrize(
-    "effects",
-    [
+def test_targets_are_named_where_something_obstructs_them_later_and_nowhere_else(caplog):
+    for effects in (
         [PINS, {**FLOOR, "height": 0.6}],
         [PINS, {**OBSTACLES["plane"], "point": [0, 0.6, 0], "normal": [0, 0.3, 0]}],
-        [{**PINS, "start": 2}, FLOOR],
+        [{**PINS, "start": 2}, FLOOR],  # pushed out before
         [PINS, {"effect": "self_collision", "thickness": 0.3}],
-    ],
-    ids=["on the floor", "on a plane", "pushed out before", "no obstacle"],
-)
-def test_targets_that_nothing_obstructs_are_not_named(effects, caplog):
-    assert warnings_of(make_scene(*BASE, *effects, mesh=SHEET), caplog) == []
+    ):
+        assert warnings_of(make_scene(*BASE, *effects, mesh=SHEET), caplog) == []
+    down = {"effect": "translate", "select": "bottom", "offset": [0, -0.3, 0], "over": 9}
+    obstructed = {**down, "start": 3}, {**FLOOR, "height": 0.5}
+    (message,) = warnings_of(make_scene(*BASE, *obstructed, mesh=SHEET), caplog)
+    assert "6 held vertices have targets inside 'floor'" in message
 
 
 def test_looking_for_obstacles_leaves_the_run_as_it_is():

@@ -160,7 +160,6 @@ def test_a_body_is_closed_and_turned_outwards(name):
 @pytest.mark.parametrize("name", ["floor", "plane"])
 @given(seed=SEEDS)
 def test_a_plane_covers_the_region(name, seed):
-    """Whatever lies in the region, its foot on the plane is inside the square."""
     made = body(name)
     point = np.random.default_rng(seed).uniform(LOW, HIGH)
     centre, sides = made.points.mean(axis=0), made.points[[1, 3]] - made.points[0]

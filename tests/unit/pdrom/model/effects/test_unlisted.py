@@ -151,12 +151,6 @@ def test_a_configuration_survives_the_way_to_a_job(effect):
     assert SceneConfig.model_validate(plain) == config
 
 
-def test_every_effect_says_how_it_does_nothing():
-    """A new effect needs a line in `IDLE`, a new group none."""
-    groups = {e for e in EFFECTS if issubclass(EFFECTS.load(e), ConstraintGroup)}
-    assert set(IDLE) == set(EFFECTS) - groups
-
-
 def test_an_idle_effect_is_not_idle_by_itself():
     """The comparison sees an effect that acts: the same entries, within reach."""
     for entry in ({"effect": "floor", "height": 2.2}, {"effect": "damping", "rate": 1.0}):

@@ -165,13 +165,6 @@ def test_what_meshio_would_read_wrong_is_refused(tmp_path, suffix, content, why)
     assert why in refusal(path)
 
 
-def test_the_first_zone_alone_is_read(tmp_path):
-    (tmp_path / "a.tec").write_text(TECPLOT)
-    points, triangles = read_here(tmp_path / "a.tec")
-    assert points.tolist() == [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
-    assert triangles.tolist() == [[0, 1, 2]]
-
-
 def test_text_is_read_in_double_precision(tmp_path):
     (tmp_path / "a.ugrid").write_text("3 1 0 0 0 0 0\n0.1 0 0\n1 0 0\n0 1 0\n1 2 3\n1\n")
     assert read_here(tmp_path / "a.ugrid")[0][0, 0] == 0.1

@@ -8,7 +8,7 @@ from pdrom.core.errors import ConfigurationError
 from pdrom.model.runs import trajectory
 from pdrom.model.scene import Scene
 from pdrom.reduction.requested import run as requested
-from pdrom.reduction.requested.levels import Level, Trajectory, last_within, relative_errors
+from pdrom.reduction.requested.levels import Trajectory, last_within, relative_errors
 
 SHEET = {"kind": "cloth", "rows": 7, "columns": 7, "plane": "xz"}
 SETTINGS = requested.ToleranceSettings(modes=(8,), tolerances=(1e-2,), iterations=(10,), factor=2.0)
@@ -70,8 +70,9 @@ def test_a_tolerance_below_the_reference_s_own_error_is_refused(own):
     done = requested.CheckedRun(own, sheet(KICK), 1e-14).outcome()
     assert (done.met, done.reduced) == (False, False)
     assert done.limit
-    assert done.level == own.most_accurate.level.title
-    expected = Trajectory(own.most_accurate.level, sheet(KICK)).to(FRAMES).positions
+    level = own.most_accurate.level
+    assert done.level == level.title == f"full order, Anderson, K = {level.iterations}"
+    expected = Trajectory(level, sheet(KICK)).to(FRAMES).positions
     assert np.array_equal(done.positions, expected)
 
 
@@ -123,9 +124,7 @@ def test_velocities_are_differences_of_positions():
     still = np.zeros((3, 2, 3))
     assert relative_errors(still[1:], still, "position").tolist() == [0.0, 0.0]
     assert relative_errors(still[1:] + 1.0, still, "position").tolist() == [np.inf, np.inf]
-
-
-def test_frames_within_a_tolerance_are_counted_to_the_last():
+    # frames within a tolerance are counted to the last
     assert last_within(np.array([0.1, 0.5, 0.2, 0.6]), 0.3) == 3
     assert last_within(np.array([0.5]), 0.3) == 0
 
@@ -150,9 +149,3 @@ def test_checks_are_spread_and_two_at_least(frames, count):
     found = requested.check_frames(frames, count)
     assert len(found) == min(max(2, count), frames)
     assert all(0 <= frame < frames for frame in found)
-
-
-def test_a_level_has_a_name_and_its_own_iterations():
-    level = Level(20, 5)
-    assert level.title == "full order, Anderson, K = 20"
-    assert level.scene(sheet()).config.iterations == 20

@@ -31,23 +31,15 @@ def s_opt(v: np.ndarray, size: int, count: int | None = None) -> np.ndarray:
     return extend(v, size, s_opt_path(v, size), v.shape[1] if count is None else count)
 
 
-def s_measure(a: np.ndarray) -> float:
-    """S(A) = (sqrt(det A^T A) / prod_j |A_j|)^(1/r) of A (m, r), columns A_j.
-
-    1 if and only if the columns are orthogonal, 0 if they depend on each other.
-    """
+def measure(v: np.ndarray, size: int, elements, columns: int | None = None) -> float:
+    """S(A) = (sqrt(det A^T A) / prod_j |A_j|)^(1/r) of the first columns A_j at the elements."""
+    a = v.reshape(-1, size, v.shape[1])[list(elements), :, :columns]
+    a = a.reshape(len(elements) * size, -1)
     norms = np.linalg.norm(a, axis=0)
     if a.shape[0] < a.shape[1] or not norms.all():
         return 0.0
     logarithm = np.linalg.slogdet((a / norms).T @ (a / norms))[1]
     return float(min(np.exp(0.5 * logarithm / a.shape[1]), 1.0))
-
-
-def measure(v: np.ndarray, size: int, elements, columns: int | None = None) -> float:
-    """S-measure of the first columns at the elements."""
-    return s_measure(v.reshape(-1, size, v.shape[1])[list(elements), :, :columns].reshape(
-        len(elements) * size, -1
-    ))  # fmt: skip
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -95,12 +87,11 @@ def test_updates_stay_accurate_over_many_steps():
 
 def test_hard_bases_are_named(rng):
     v = rng.standard_normal((30, 4))
-    for faulty, named in [(np.copy(v), "depend|independent"), (np.copy(v), "mode 3 is zero")]:
-        faulty[:, 2] = 0.0 if "zero" in named else faulty[:, 0]
-        with pytest.raises(SamplingError, match=named):
-            s_opt(faulty, 3)
     with pytest.raises(SamplingError, match="depend on each other at the 1 sampled"):
         extend(v, 3, np.array([0]), 6)
+    v[:, 2] = 0.0
+    with pytest.raises(SamplingError, match="mode 3 is zero"):
+        s_opt(v, 3)
 
 
 @pytest.mark.parametrize("rows", [1, 3, 6])

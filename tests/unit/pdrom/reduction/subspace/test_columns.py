@@ -50,12 +50,6 @@ def test_orthonormal_keeps_the_span(n, m, rank, seed):
     np.testing.assert_allclose(q @ (q.T @ columns), columns, atol=1e-7 * (1 + abs(columns).max()))
 
 
-def test_orthonormal_leaves_out_dependent_and_zero_columns():
-    e = np.eye(4)
-    columns = np.column_stack([np.zeros(4), e[0], 3 * e[0], e[1], e[0] - e[1], e[2]])
-    np.testing.assert_allclose(spaces.orthonormal(columns), e[:, :3], atol=1e-15)
-
-
 HELD = (
     TOP,
     {"effect": "translate", "select": "bottom", "offset": [0.0, -0.2, 0.1], "over": 5, "until": 8},
@@ -72,18 +66,16 @@ def moved():
     return scene, trajectory(scene)
 
 
-@pytest.fixture(params=[("pod", 3), ("pod", 8), ("skinning", 3), ("skinning", 10)], ids=str)
-def space(request, moved):
-    """Scene, trajectory and columns of each kind."""
+@pytest.mark.parametrize("kind", ["pod", "skinning"])
+@pytest.mark.parametrize("k", [3, 8])
+def test_columns_are_mass_orthonormal_apart_for_atoms_and_hold_affine_motions(moved, kind, k, rng):
+    """Coordinates are the best in the mass norm."""
     scene, run = moved
-    return scene, run, make_columns(scene, run[1:], *request.param), request.param
-
-
-def test_free_columns_are_mass_orthonormal_and_those_of_an_atom_live_on_it_only(space):
-    scene, _, columns, (_, k) = space
+    masses, points = scene.masses, scene.mesh.points
+    columns = make_columns(scene, run[1:], kind, k)
     block = columns.B[:, columns.free]
     np.testing.assert_allclose(
-        block.T @ (scene.masses[:, None] * block), np.eye(block.shape[1]), atol=1e-10
+        block.T @ (masses[:, None] * block), np.eye(block.shape[1]), atol=1e-10
     )
     assert columns.modes == k
     # the affine columns of a flat sheet are three
@@ -98,25 +90,16 @@ def test_free_columns_are_mass_orthonormal_and_those_of_an_atom_live_on_it_only(
     every = np.concatenate([columns.free, *columns.atom_columns])
     np.testing.assert_array_equal(np.sort(every), np.arange(columns.B.shape[1]))
     assert np.linalg.matrix_rank(columns.B) == columns.B.shape[1]
-
-
-def test_affine_motions_are_in_the_space_and_coordinates_the_best_in_the_mass_norm(space, rng):
-    scene, _, columns, _ = space
-    points = scene.mesh.points
-    fields = [
-        points,
-        points @ random_rotation(rng).T + rng.standard_normal(3),
-        points @ rng.standard_normal((3, 3)),
-    ]
-    for field in fields:
-        z = coordinates(columns, scene.masses, field)
+    moving = points @ random_rotation(rng).T + rng.standard_normal(3)
+    for field in (points, moving, points @ rng.standard_normal((3, 3))):
+        z = coordinates(columns, masses, field)
         np.testing.assert_allclose(columns.B @ z, field, atol=1e-11)
     field = rng.standard_normal(points.shape)
-    left = field - columns.B @ coordinates(columns, scene.masses, field)
-    np.testing.assert_allclose(columns.B.T @ (scene.masses[:, None] * left), 0.0, atol=1e-11)
+    left = field - columns.B @ coordinates(columns, masses, field)
+    np.testing.assert_allclose(columns.B.T @ (masses[:, None] * left), 0.0, atol=1e-11)
 
 
-def test_displacement_modes_are_the_mass_weighted_pod(moved):
+def test_displacement_modes_are_the_mass_weighted_pod_and_no_more_than_the_data_hold(moved):
     """Against a dense SVD of the snapshots that have lost their affine part."""
     scene, run = moved
     points, masses = scene.mesh.points, scene.masses
@@ -128,22 +111,11 @@ def test_displacement_modes_are_the_mass_weighted_pod(moved):
     mine = root * modes
     np.testing.assert_allclose(mine.T @ mine, np.eye(5), atol=1e-10)
     np.testing.assert_allclose(mine @ mine.T, u @ u.T, atol=1e-7)
-    np.testing.assert_allclose(
-        spaces.affine_columns(points).T @ (masses[:, None] * modes), 0.0, atol=1e-10
-    )
-
-
-def test_there_are_no_more_modes_than_the_data_hold(moved):
-    scene, _ = moved
-    points = scene.mesh.points
     bump = np.zeros_like(points)
     bump[7, 2] = 1.0
-    few = spaces.displacement_modes(
-        np.stack([points + bump, points + 3 * bump]), points, scene.masses, 9
-    )
-    assert few.shape[1] == 1
-    rigid = np.stack([points + 1.0, 2.0 * points])
-    assert spaces.displacement_modes(rigid, points, scene.masses, 9).shape[1] == 0
+    bent = np.stack([points + bump, points + 3 * bump])
+    for rank, few in enumerate((np.stack([points + 1.0, 2.0 * points]), bent)):
+        assert spaces.displacement_modes(few, points, masses, 9).shape[1] == rank
 
 
 def test_atoms_get_modes_for_what_they_do_when_released(moved):
@@ -210,7 +182,7 @@ def test_a_system_that_cannot_be_solved_is_a_named_error(matrix, words):
 @pytest.mark.parametrize("mass", [1e-100, 1e-6, 1.0, 1e100])
 def test_coordinates_do_not_depend_on_the_unit_of_mass(mass, rng):
     """With held vertices, whose columns are not mass-orthonormal; the rest shape is met exactly."""
-    scene = make_scene(TOP, {"effect": "spring", "weight": 1e5}, vertex_mass=mass)
+    scene = make_scene(TOP, SPRING, vertex_mass=mass)
     points = scene.mesh.points
     motion = points + 0.1 * rng.standard_normal((5, *points.shape))
     columns = make_columns(scene, motion, "pod", 4)

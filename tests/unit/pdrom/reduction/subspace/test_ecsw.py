@@ -36,7 +36,6 @@ def random_columns(scene, rng, k=5):
 @settings(max_examples=12, deadline=None)
 @given(seed=st.integers(0, 2**31), spread=st.floats(-2, 1.5))
 def test_objective_never_rises_whatever_the_factors(name, seed, spread):
-    """Random elements, random non-negative factors, random states."""
     scene, rng = SCENES[name], np.random.default_rng(seed)
     columns = random_columns(scene, rng)
     group = scene.groups[0]

@@ -23,17 +23,17 @@ from pdrom.reduction.subspace.model import SubspaceModel, make_columns, rerun_mo
 from pdrom.reduction.subspace.space import coordinates
 
 
-def test_centres_are_the_mean_of_the_elements_vertices(group_scene):
-    group, points = group_scene.groups[0], group_scene.mesh.points
-    centres, p = hrpd.element_centres(group, points), group.rows_per_element
-    dense = group.S.toarray().reshape(group.elements, p, -1)
-    for e in (0, group.elements // 2, group.elements - 1):
-        own = np.flatnonzero((dense[e] != 0.0).any(axis=0))
-        np.testing.assert_allclose(centres[e], points[own].mean(axis=0), atol=1e-14)
+def test_space_is_orthonormal_starts_with_the_rest_vectors_and_fits_by_least_squares(
+    group_scene, rng
+):
+    """In the weights of the elements; a space for which samples are too few is a named error.
 
-
-def test_space_is_orthonormal_in_the_weights_and_starts_with_the_rest_vectors(group_scene):
+    Centres of elements, by which they are chosen, are the means of their vertices.
+    """
     group, points = group_scene.groups[0], group_scene.mesh.points
+    centres = hrpd.element_centres(group, points)
+    touched = (group.S.toarray().reshape(group.elements, -1, len(points)) != 0.0).any(axis=1)
+    np.testing.assert_allclose(centres, [points[own].mean(axis=0) for own in touched], atol=1e-14)
     space = hrpd.sampled_space(group, points, hrpd.HrpdSpec(dimension=10, samples=40))
     V = space.V
     assert V.shape[1] == 10
@@ -41,6 +41,20 @@ def test_space_is_orthonormal_in_the_weights_and_starts_with_the_rest_vectors(gr
     rest = group.S @ points
     first = V[:, :3] @ (V[:, :3].T @ (group.row_weights[:, None] * rest))
     np.testing.assert_allclose(first, rest, atol=1e-10 * np.abs(rest).max())
+    rows = sampled_rows(group, space)
+    values = rng.standard_normal((len(rows), 3))
+    weighted = group.row_weights[rows, None] * V[rows]
+    left = values - V[rows] @ (space.operator @ values)
+    assert np.abs(weighted.T @ left).max() < 1e-9 * np.abs(weighted.T @ values).max()
+    words = f"'{group.name}': 2 samples .* allowed are more samples or a smaller dimension"
+    with pytest.raises(SamplingError, match=words):
+        hrpd.sampled_space(group, points, hrpd.HrpdSpec(dimension=12, samples=2))
+
+
+def sampled_rows(group, space) -> np.ndarray:
+    """Rows of the operator that belong to the samples of a space."""
+    p = group.rows_per_element
+    return (space.elements[:, None] * p + np.arange(p)).ravel()
 
 
 @pytest.mark.parametrize("name", sorted(GROUPS))
@@ -58,23 +72,9 @@ def test_blended_linear_maps_are_reproduced_exactly(name, seed, handles):
     active = int(np.linalg.matrix_rank(rest))
     spec = hrpd.HrpdSpec(dimension=active * handles, samples=20)
     space = hrpd.sampled_space(group, points, spec)
-    p = group.rows_per_element
-    rows = (space.elements[:, None] * p + np.arange(p)).ravel()
     assert len(space.elements) < group.elements or group.elements <= 20
-    again = space.V @ (space.operator @ field[rows])
+    again = space.V @ (space.operator @ field[sampled_rows(group, space)])
     np.testing.assert_allclose(again, field, atol=1e-7 * np.abs(field).max())
-
-
-def test_fit_is_weighted_least_squares(group_scene, rng):
-    group, points = group_scene.groups[0], group_scene.mesh.points
-    space = hrpd.sampled_space(group, points, hrpd.HrpdSpec(dimension=6, samples=12))
-    p = group.rows_per_element
-    rows = (space.elements[:, None] * p + np.arange(p)).ravel()
-    values = rng.standard_normal((len(rows), 3))
-    weights = group.row_weights[rows]
-    left = values - space.V[rows] @ (space.operator @ values)
-    scale = np.abs(space.V[rows].T @ (weights[:, None] * values)).max()
-    assert np.abs(space.V[rows].T @ (weights[:, None] * left)).max() < 1e-9 * scale
 
 
 def test_samples_spread_over_the_mesh():
@@ -93,59 +93,34 @@ def test_samples_spread_over_the_mesh():
     assert radius(10_000) == 0.0
 
 
-def test_too_few_samples_are_a_named_error(group_scene):
-    group, points = group_scene.groups[0], group_scene.mesh.points
-    words = f"'{group.name}': 2 samples .* allowed are more samples or a smaller dimension"
-    with pytest.raises(SamplingError, match=words):
-        hrpd.sampled_space(group, points, hrpd.HrpdSpec(dimension=12, samples=2))
-
-
 def test_a_group_without_rest_vectors_has_no_space():
     scene = make_scene({"effect": "bending", "weight": 1.0})
     assert hrpd.sampled_space(scene.groups[0], scene.mesh.points, hrpd.HrpdSpec()) is None
 
 
-R = 4
-HRPD = hrpd.HrpdSpec(dimension=8, samples=20)
-
-
-def right_hand_sides(scene, columns, interpolation, q, y):
-    """Of the interpolated and of the full projections, both (K, 3), at coordinates of q and y."""
-    group = scene.groups[0]
-    found = []
-    for step in (
-        InterpolatedLocalStep(group, columns, interpolation),
-        SubspaceLocalStep(group, columns),
-    ):
-        rhs = np.zeros((columns.B.shape[1], 3))
-        step.begin_frame(coordinates(columns, scene.masses, q))
-        step.accumulate(coordinates(columns, scene.masses, y), rhs)
-        found.append(rhs)
-    return found
-
-
-def test_hrpd_with_all_elements_and_dimensions_is_the_full_projection(group_scene, rng):
-    scene, group = group_scene, group_scene.groups[0]
-    spec = hrpd.HrpdSpec(dimension=group.elements * group.rows_per_element, samples=group.elements)
-    space = hrpd.sampled_space(group, scene.mesh.points, spec)
-    assert space.V.shape[1] == spec.dimension
-    columns = whole_space(scene)
-    y = scene.mesh.points + 0.1 * rng.standard_normal(scene.mesh.points.shape)
-    found = hrpd.hrpd(group, columns, space)
-    one, two = right_hand_sides(scene, columns, found, scene.mesh.points, y)
-    np.testing.assert_allclose(one, two, atol=1e-8 * np.abs(two).max())
-
-
-def test_hrpd_is_exact_for_the_rest_shape_in_every_orientation(group_scene, rng):
+def test_hrpd_is_exact_with_everything_and_for_a_turned_rest_shape(group_scene, rng):
     """One linear map for all elements is in the space, whatever its dimension and samples."""
-    scene, group = group_scene, group_scene.groups[0]
-    columns = make_columns(scene, scene.mesh.points[None], "skinning", 3)
-    found = hrpd.hrpd(group, columns, hrpd.sampled_space(group, scene.mesh.points, HRPD))
-    assert len(found.elements) == min(HRPD.samples, group.elements)
-    y = scene.mesh.points @ random_rotation(rng).T + rng.standard_normal(3)
-    one, two = right_hand_sides(scene, columns, found, y, y)
-    assert np.abs(two).max() > 0.0
-    np.testing.assert_allclose(one, two, atol=1e-9 * np.abs(two).max())
+    scene, group, rest = group_scene, group_scene.groups[0], group_scene.mesh.points
+    size = group.elements * group.rows_per_element
+    turned = rest @ random_rotation(rng).T + rng.standard_normal(3)
+    bent = rest + 0.1 * rng.standard_normal(rest.shape)
+    few = make_columns(scene, rest[None], "skinning", 3)
+    for dimension, samples, columns, q, y in (
+        (size, group.elements, whole_space(scene), rest, bent),
+        (8, 20, few, turned, turned),
+    ):
+        spec = hrpd.HrpdSpec(dimension=dimension, samples=samples)
+        space = hrpd.sampled_space(group, rest, spec)
+        assert space.V.shape[1] == dimension
+        found = hrpd.hrpd(group, columns, space)
+        assert len(found.elements) == min(samples, group.elements)
+        steps = InterpolatedLocalStep(group, columns, found), SubspaceLocalStep(group, columns)
+        sums = np.zeros((2, columns.B.shape[1], 3))
+        for step, rhs in zip(steps, sums, strict=True):
+            step.begin_frame(coordinates(columns, scene.masses, q))
+            step.accumulate(coordinates(columns, scene.masses, y), rhs)
+        assert np.abs(sums[1]).max() > 0.0
+        np.testing.assert_allclose(*sums, atol=1e-8 * np.abs(sums[1]).max())
 
 
 def test_projections_that_are_round_off_need_no_element():
@@ -178,7 +153,7 @@ def test_the_right_hand_side_by_a_reduction_is_that_of_its_reconstruction(choice
     snapshots = np.stack([group.project(q) for q in run])
     spec = MethodSpec(title="x", **choices)
     basis = compute_basis(snapshots, np.ones(len(group.row_weights)), 1e-12, 2, spec)
-    reduction = Reduction(basis, select(basis, spec, R), spec, R)
+    reduction = Reduction(basis, select(basis, spec, 4), spec, 4)
     columns = make_columns(scene, run, "pod", 3)
     step = InterpolatedLocalStep(group, columns, interpolation_of(group, columns, reduction))
     z = np.random.default_rng(0).standard_normal((columns.B.shape[1], 3))

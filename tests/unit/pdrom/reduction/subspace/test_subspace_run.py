@@ -178,21 +178,20 @@ def test_arrays_of_a_step_have_the_size_of_the_sample():
     sizes = []
     for rows in (32, 64):
         scene = make_scene(SPRING, TOP, mesh={"kind": "cloth", "rows": rows, "columns": 8})
-        run = trajectory(scene)
-        columns = models.make_columns(scene, run[1:], "skinning", 4)
+        columns = models.make_columns(scene, trajectory(scene)[1:], "skinning", 4)
         group, few, k = scene.groups[0], np.array([3, 11]), columns.B.shape[1]
         fit = interpolation.Interpolation(
             few, np.ones((1, 2)), np.ones((k, 1)), np.zeros((k, 3)), np.eye(k), gain=1.0
         )
-        sizes.append([])
-        for step in (
+        steps = (
             interpolation.SubspaceLocalStep(group, columns, few, np.ones(2)),
             interpolation.InterpolatedLocalStep(group, columns, fit),
-        ):
-            held = [v for v in vars(step).values() if isinstance(v, np.ndarray)]
-            held += [v for v in vars(step.group).values() if isinstance(v, np.ndarray)]
-            sizes[-1].append((step.group.S.shape, sorted(a.shape for a in held)))
-            assert len(held) >= 4
+        )
+        parts = [part for step in steps for part in (step, step.group)]
+        held = [[v for v in vars(x).values() if isinstance(v, np.ndarray)] for x in parts]
+        assert min(map(len, held)) > 0
+        shapes = [sorted(array.shape for array in arrays) for arrays in held]
+        sizes.append((shapes, [step.group.S.shape for step in steps]))
     assert sizes[0] == sizes[1]
 
 
@@ -250,5 +249,4 @@ def test_models_survive_a_file(tmp_path):
         pairs = [(columns, model.columns), *((chosen[n], model.samples[n]) for n in chosen)]
         for own, read in pairs:
             assert type(read) is type(own)
-            for key, value in vars(own).items():
-                np.testing.assert_equal(getattr(read, key), value)
+            np.testing.assert_equal(vars(read), vars(own))
