@@ -109,13 +109,8 @@ def ranks(payoff: pd.DataFrame) -> Iterator[Any]:
 
 
 INPUTS = (
-    "numbers.json",
-    "tab_ranks.tex",
-    "macros.tex",
-    "figures.tex",
-    "main.bbl",
-    "supplement.bbl",
-)
+    "numbers.json", "tab_ranks.tex", "macros.tex", "figures.tex", "main.bbl", "supplement.bbl",
+)  # fmt: skip
 
 
 def write_study(folder: Path) -> dict[str, object]:
@@ -165,7 +160,6 @@ def named(folder: Path, names: Iterable[str]) -> list[File]:
 
 
 def write_pages(given: dict[str, object], out: Path) -> Path:
-    """The article of a study, below ``out``."""
     outputs = {name: str(out / place.pattern) for name, place in article.writes.items()}
     article.function(**given, outputs=outputs)
     return out / "article"
@@ -233,12 +227,6 @@ def rows_at(path: Path, key: str) -> int:
     return len(matching(table_at(path), [part.groups() for part in parts if part]))
 
 
-def as_shown(text: str) -> str:
-    """TeX of a number as the words of its link."""
-    found = re.fullmatch(r"\\ensuremath\{(.*)\}", text)
-    return (found[1] if found else text).replace(r"\_", "_")
-
-
 def test_each_number_is_the_pdfs_and_leads_to_the_cells_that_it_was_rounded_from(small):
     """The numbers of the macros, in order, and the rows of the page that a link opens."""
     origins = json.loads((small.parent / "inputs" / "numbers.json").read_text(encoding="utf-8"))
@@ -250,7 +238,8 @@ def test_each_number_is_the_pdfs_and_leads_to_the_cells_that_it_was_rounded_from
                 continue
             number = origins["numbers"][key]
             seen.add(key)
-            assert words == as_shown(number["text"])
+            text = re.sub(r"^\\ensuremath\{(.*)\}$", r"\1", number["text"])
+            assert words == text.replace(r"\_", "_")
             table = table_at(small / "tables" / f"{number['table']}.html")
             cells = table[number["column"]].iloc[number["rows"]]
             value = AGGREGATES[number["take"]](cells) if number["take"] else cells.iloc[0]
@@ -316,7 +305,6 @@ def study_or_small(small: Path) -> list[Path]:
 
 
 def test_every_link_leads_somewhere(small):
-    """Every link of every page leads to a file, and to a name or rows in it."""
     for pages in study_or_small(small):
         found = {path: Links(path) for path in pages.resolve().rglob("*.html")}
         links = [(path, *link) for path, page in found.items() for link in page.links]
@@ -345,9 +333,8 @@ def numbers_of_tex(sources: Mapping[str, str], inputs: Path, folder: Path) -> di
         places = {**os.environ, "TEXINPUTS": f"{inputs.resolve()}:"}
         done = subprocess.run(command, cwd=folder, env=places, capture_output=True, check=False)
         assert done.returncode == 0, done.stdout[-500:]
-        labels = re.findall(
-            r"\\newlabel\{([^{}]+)\}\{\{([^{}]*)\}", (folder / f"{name}.aux").read_text("utf-8")
-        )
+        written = (folder / f"{name}.aux").read_text("utf-8")
+        labels = re.findall(r"\\newlabel\{([^{}]+)\}\{\{([^{}]*)\}", written)
         found |= {f"{PAGES[name]}#{label}": number for label, number in labels}
     return found
 
@@ -406,7 +393,6 @@ def test_the_same_bytes_again(small, tmp_path):
 @pytest.mark.slow
 @pytest.mark.parametrize(("width", "scheme"), [(1400, "light"), (390, "light"), (1400, "dark")])
 def test_pages_open_without_a_message_and_axe_finds_no_error(small, width, scheme):
-    """The small article, and that of the study where there is one."""
     for pages in study_or_small(small):
         for name in ("index", "claims", "tables", "tables/payoff"):
             with page_at((pages / f"{name}.html").as_uri(), width, 900) as page:
@@ -420,7 +406,6 @@ def test_pages_open_without_a_message_and_axe_finds_no_error(small, width, schem
 
 @pytest.mark.slow
 def test_a_link_opens_its_rows(small):
-    """The script of the page chooses the rows that the number was taken of."""
     for pages in study_or_small(small):
         inputs = pages.parent / ("inputs" if pages == small else "paper")
         numbers = json.loads((inputs / "numbers.json").read_text(encoding="utf-8"))["numbers"]

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from builders import frame, make_scene
+from builders import GRAVITY, LEFT, frame, make_scene
 from pdrom.core.errors import ConfigurationError
 from pdrom.core.store import read_table, write_table
 from pdrom.core.yamlfile import validate
@@ -13,11 +13,7 @@ from study.experiments.alternatives import experiment
 from study.experiments.alternatives.experiment import Alternatives, Comparison
 from study.tables.alternatives import _pays, alternatives, winners
 
-EFFECTS = (
-    {"effect": "gravity"},
-    {"effect": "pins", "select": "left"},
-    {"effect": "spring", "weight": 1e4},
-)
+EFFECTS = (GRAVITY, LEFT, {"effect": "spring", "weight": 1e4})
 STEPS = {
     "projective": ((1, 5), (1, 2000), (8, 1)),
     "anderson": ((1, 200),),
@@ -81,10 +77,9 @@ def test_rows_of_a_scene(written, table):
     stiffer = table[table.motion == "stiffness"].set_index(["method", "iterations"])
     own = table[table.motion == "heldout"].set_index(["method", "iterations"])
     # motions have the same times and different errors
-    assert (
-        stiffer.ms_per_frame["projective", 5].tolist() == own.ms_per_frame["projective", 5].tolist()
-    )
-    assert (stiffer.error_implicit["projective", 5] != own.error_implicit["projective", 5]).all()
+    stiff, soft = (rows.loc[("projective", 5)] for rows in (stiffer, own))
+    assert stiff.ms_per_frame.tolist() == soft.ms_per_frame.tolist()
+    assert (stiff.error_implicit != soft.error_implicit).all()
 
 
 def test_errors_of_a_scene(table):
@@ -106,10 +101,9 @@ def test_errors_of_a_scene(table):
 def test_a_finer_mesh_has_the_mass_of_the_scene():
     config = make_scene(*EFFECTS, mesh={"kind": "cloth", "rows": 6, "columns": 5}).config
     finer = experiment.sized(config, 2.0, 10.0)
-    mesh = finer.mesh.build(experiment.Path())
-    assert finer.vertex_mass * mesh.vertices == pytest.approx(30 * config.vertex_mass)
-    weights = [getattr(effect, "weight", None) for effect in finer.effects]
-    assert weights == [None, None, 1e5]
+    vertices = finer.mesh.build(experiment.Path()).vertices
+    assert finer.vertex_mass * vertices == pytest.approx(30 * config.vertex_mass)
+    assert [getattr(effect, "weight", None) for effect in finer.effects] == [None, None, 1e5]
 
 
 def test_tables_of_the_rows(written, table):
@@ -126,12 +120,9 @@ def test_tables_of_the_rows(written, table):
 def test_winners_are_the_cheapest_that_reach_the_error(tmp_path):
     labels = {"scene": "s", "factor": 1.0, "stiffness": 1.0, "substeps": 1, "iterations": 1}
     labels["k"] = np.nan
-    rows = pd.DataFrame(
-        [
-            ("a", 1.0, 0.05), ("b", 2.0, 0.005), ("ecsw", 0.5, 0.02), ("c", 0.1, np.nan),
-            ("converged", np.nan, 0.0),
-        ],
-        columns=["method", "ms_per_frame", "error_implicit"],
+    rows = frame(
+        "method ms_per_frame error_implicit", ("a", 1.0, 0.05), ("b", 2.0, 0.005),
+        ("ecsw", 0.5, 0.02), ("c", 0.1, np.nan), ("converged", np.nan, 0.0),
     ).assign(
         **labels, training_motions=lambda t: t.method.map({"ecsw": 4}), offline_s=3.0, vertices=9,
         vertices_ms=0.1, motion="heldout", error_continuous=lambda t: t.error_implicit,
@@ -170,19 +161,16 @@ def test_faulty_settings_are_refused(changes, message):
         validate(Alternatives, changes, "here")
 
 
-def test_steps_that_cost_too_much_are_left_out():
-    asked = Comparison(work={"anderson": 2000, "converged": 100, "training": 40}, steps=STEPS)
+def test_steps_that_cost_too_much_are_left_out_and_weights_vary_on_the_own_mesh_only():
+    asked = Comparison(
+        work={"anderson": 2000, "converged": 100, "training": 40}, steps=STEPS,
+        stiffness={"s": (1.0, 100.0)},
+    )  # fmt: skip
     assert asked.pairs("anderson", 10) == [(1, 200)]
-    assert asked.pairs("anderson", 11) == []
+    assert asked.pairs("anderson", 11) == asked.pairs("chebyshev", 1) == []
     assert asked.pairs("explicit", 10**6) == [(1, 1), (64, 1)]
-    assert asked.pairs("chebyshev", 1) == []
-    assert asked.affords("converged", 100)
-    assert not asked.affords("converged", 101)
+    assert [asked.affords("converged", cost) for cost in (100, 101)] == [True, False]
     assert [n for n in asked.training_motions if asked.affords("training", 10 * n)] == [1, 2, 4]
-
-
-def test_weights_vary_on_the_own_mesh_only():
-    asked = Comparison(stiffness={"s": (1.0, 100.0)})
     assert asked.factors("s", 1.0) == (1.0, 100.0)
     assert asked.factors("s", 2.0) == asked.factors("other", 1.0) == (1.0,)
 

@@ -5,19 +5,17 @@ import json
 import numpy as np
 import pytest
 
-from builders import GROUPS, make_scene
+from builders import GRAVITY, GROUPS, make_scene
 from node import RUN, evaluate
 from pdrom.core.errors import SceneError, StorageError
 from pdrom.model.scene import Scene
 from pdrom.reduction.subspace import exported
 from pdrom.reduction.subspace.exported import export_scene
-from pdrom.reduction.subspace.model import SubspaceModel
 from study.experiments import subspaces as module
 from study.experiments.kit.base import followed
 from written_models import write_models
 
 FRAMES = 24
-PULL = [{"effect": "gravity"}, {"effect": "damping", "rate": 0.5}]
 BELOW = 0.02  # distance of the floor below the rest shape, m
 WEIGHTS = {"spring": 1e3, "strain": 1e4, "tetrahedron_strain": 1e6, "deformation_gradient": 1e6}
 
@@ -29,22 +27,19 @@ def scene_with(group: str) -> Scene:
     settings = {"mesh": GROUPS[group], "frames": FRAMES, "iterations": 4}
     rest = make_scene(own, **settings).mesh.points
     floor = {"effect": "floor", "height": float(rest[:, 1].min()) - BELOW}
-    return make_scene(*PULL, floor, pins, own, **settings)
-
-
-def positions(scene: Scene, model: SubspaceModel) -> np.ndarray:
-    """Positions (F + 1, N, 3) of pdrom's own run."""
-    return np.stack([model.positions(z) for z in followed(*model.loop(scene), FRAMES)])
+    damping = {"effect": "damping", "rate": 0.5}
+    return make_scene(GRAVITY, damping, floor, pins, own, **settings)
 
 
 @pytest.mark.parametrize("group", WEIGHTS)
 def test_the_engine_runs_a_model_as_pdrom_does(group, tmp_path):
     scene = scene_with(group)
     file, model = write_models(scene, tmp_path)
-    (run,) = evaluate(RUN, file, frames=FRAMES)
-    assert run["elements"] == model.elements_evaluated(scene)
-    found = model.columns.B @ np.reshape(run["coordinates"], (FRAMES + 1, -1, 3))
-    own = positions(scene_with(group), model)
+    (made,) = evaluate(RUN, file, frames=FRAMES)
+    assert made["elements"] == model.elements_evaluated(scene)
+    found = model.columns.B @ np.reshape(made["coordinates"], (FRAMES + 1, -1, 3))
+    run = followed(*model.loop(scene_with(group)), FRAMES)
+    own = np.stack([model.positions(z) for z in run])
     floor = scene.mesh.points[:, 1].min() - BELOW
     assert own[-1][:, 1].min() == pytest.approx(floor, abs=0.02), "it fell on the floor"
     assert np.abs(found - own).max() < 1e-10
@@ -64,9 +59,14 @@ def test_a_large_basis_is_short_but_for_what_is_computed_with(tmp_path, monkeypa
     assert 0.0 <= apart.max() < 1e-6
 
 
-def test_a_handle_takes_its_vertices_where_the_reader_does(tmp_path):
+def test_the_file_says_what_it_is_and_a_handle_takes_its_vertices_where_the_reader_does(tmp_path):
     """Offsets are relative to the positions of the vertices when the handle was grasped."""
     file, model = write_models(scene_with("spring"), tmp_path)
+    text = file.read_text("utf-8")
+    assert text.startswith('pdromLive({"format":1,"scene":"test","title":"A title",')
+    content = json.loads(text.removeprefix("pdromLive(").removesuffix(");\n"))
+    assert {each["family"] for each in content["models"]} == {"elements"}
+    assert content["shown"]["full"]["frames"] == FRAMES + 1
     script = """
     const run = new engine.Run(data, data.models[0], new engine.Basis(data, data.bases[0]));
     for (let frame = 0; frame < 5; frame++) run.step(new Map([[0, [0, 0.1 * frame, 0.2]]]));
@@ -92,7 +92,7 @@ def test_a_file_that_is_too_large_names_the_keys(tmp_path, monkeypatch):
         ({"effect": "translate", "select": "right", "over": 3, "offset": [0, 1, 0]}, {},
          "no 'translate' .*allowed: spring"),
         ({"effect": "area", "weight": 1.0}, {}, "no 'area' .*allowed: spring"),
-        ({"effect": "gravity"}, {"anderson_window": 3}, "anderson_window = 3"),
+        (GRAVITY, {"anderson_window": 3}, "anderson_window = 3"),
     ],
 )  # fmt: skip
 def test_what_the_engine_does_not_know_is_refused(effect, settings, named):
@@ -127,12 +127,3 @@ def test_projections_are_the_nearest_matrices(name, rows, low, high):
     # the second direction of nearly collinear rows is ill-conditioned
     allowed = np.where((np.arange(60) >= 40) & (np.arange(60) < 50), 1e-5, 1e-11)
     assert (np.abs(found - expected).max(axis=(1, 2)) < allowed).all()
-
-
-def test_the_file_says_what_it_is(tmp_path):
-    file, _ = write_models(scene_with("spring"), tmp_path)
-    text = file.read_text("utf-8")
-    assert text.startswith('pdromLive({"format":1,"scene":"test","title":"A title",')
-    content = json.loads(text.removeprefix("pdromLive(").removesuffix(");\n"))
-    assert {model["family"] for model in content["models"]} == {"elements"}
-    assert content["shown"]["full"]["frames"] == FRAMES + 1

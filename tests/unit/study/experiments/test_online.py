@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from builders import make_scene
+from builders import TOP, make_scene
 from pdrom.core.errors import ConfigurationError, PdromError
 from pdrom.core.store import read_table, write_table
 from pdrom.core.yamlfile import validate
@@ -20,11 +20,6 @@ from study.experiments.kit.measurement import Processes, in_processes
 from study.experiments.subspaces import COLUMNS, LARGE_COLUMNS, Hrpd, LargeModels, Online
 from study.tables.effects_cost import frame_times, online, speedups
 
-EFFECTS = (
-    {"effect": "spring", "weight": 1e5},
-    {"effect": "gravity", "acceleration": [0.0, 0.0, -9.81]},
-    {"effect": "pins", "select": "top"},
-)
 JUDGED = ("motion", "relative_error_within_horizon", "horizon_frame", "playback_error")
 NO_RERUNS = pd.DataFrame(columns=[*COLUMNS, *JUDGED])
 ONCE = Processes(frames=3, repeats=1, processes=1)
@@ -33,7 +28,9 @@ CHANGES = {"reduce": {"spring": {"train": 5}}, "held_out": {"kick": 0.5}}
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
-    scene = make_scene(*EFFECTS, mesh={"kind": "cloth", "rows": 8, "columns": 7}, frames=10)
+    gravity = {"effect": "gravity", "acceleration": [0.0, 0.0, -9.81]}
+    effects = ({"effect": "spring", "weight": 1e5}, gravity, TOP)
+    scene = make_scene(*effects, mesh={"kind": "cloth", "rows": 8, "columns": 7}, frames=10)
     config = SceneConfig.model_validate(scene.config.model_dump(mode="json") | CHANGES)
     path = tmp_path_factory.mktemp("online") / "scene.csv"
     asked = LargeModels(
@@ -55,9 +52,9 @@ def written(tmp_path_factory):
     return scene, path, times[0]
 
 
-def test_rows_of_a_scene(written):
+def test_every_model_has_its_errors_and_its_time_in_a_fresh_process(written):
     scene, path, times = written
-    rows = read_table(path)
+    rows, timed = read_table(path), read_table(times.path)
     assert rows.columns.tolist() == LARGE_COLUMNS
     assert rows.motion.unique().tolist() == ["train", *MOTIONS]
     train = rows[rows.motion == "train"]
@@ -76,19 +73,14 @@ def test_rows_of_a_scene(written):
     # the held-out motion starts with a kick that the training has not seen
     assert (table.relative_error_heldout > table.relative_error_train).any()
 
-
-def test_a_fresh_process_times_every_model(written):
-    scene, path, times = written
-    rows = read_table(times.path)
-    assert rows.role.tolist() == ["full", "control", *4 * ["reduced"]]
-    assert (rows.ms_per_frame > 0.0).all()
-    assert (rows.vertices == scene.mesh.vertices).all()
-    table = online([File(str(path), {})], [times], frame_times([times]))
+    assert timed.role.tolist() == ["full", "control", *4 * ["reduced"]]
+    assert (timed.ms_per_frame > 0.0).all()
+    assert (timed.vertices == scene.mesh.vertices).all()
     np.testing.assert_allclose(table.ms_per_iteration, table.ms_per_frame / 10)
-    full = rows.ms_per_frame[rows.role == "full"].item()
+    full = timed.ms_per_frame[timed.role == "full"].item()
     np.testing.assert_allclose(table.speedup, full / table.ms_per_frame)
     # the files hold the same models
-    assert table.ms_per_frame.tolist() == rows.ms_per_frame[2:].tolist()
+    assert table.ms_per_frame.tolist() == timed.ms_per_frame[2:].tolist()
     files = {"parts": [times], "large": [File(str(path), {})], "projections": [], "subspaces": []}
     quoted = speedups(frame_times([times]), NO_RERUNS, **files)
     for column, own in (("error_train", "train"), ("error_heldout_high", "heldout_high")):
@@ -114,12 +106,6 @@ def test_a_motion_that_blows_up_has_an_infinite_error(written, tmp_path):
     (row,) = table.itertuples()
     found = (row.relative_error_heldout, row.relative_error_heldout_high)
     assert (row.relative_error_train, *found) == (0.1, 0.3, np.inf)
-
-
-def test_no_scene_leaves_an_empty_table():
-    empty = online([], [], frame_times([]))
-    assert tuple(empty.columns) == online.column_names
-    assert len(empty) == 0
 
 
 def test_faulty_settings_are_refused():

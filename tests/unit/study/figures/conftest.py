@@ -17,7 +17,7 @@ from pdrom.model.effects import EFFECTS
 from pdrom.model.mesh.generators import bar, cloth
 from pdrom.model.mesh.types import Mesh, save_mesh
 from pdrom.reduction.basis import Basis, save_basis
-from pdrom.reduction.method import MethodSpec, load_methods
+from pdrom.reduction.method import load_methods
 from pdrom.reduction.sampling import reductions
 from pdrom.reduction.snapshots import SPLITS, SnapshotSet, save_snapshots
 from places import CONFIG, ROOT
@@ -55,7 +55,6 @@ class Invented:
         make_results(self)
 
     def path(self, place: paths.Place, scene: str, group: str = "", method: str = "") -> str:
-        """Path of a file with these labels."""
         labels = {"scene": scene, "group": group, "method": method}
         return Plan(self.study, Folders(str(self.root))).file(place, labels)
 
@@ -77,19 +76,21 @@ class Invented:
 
 
 def mesh_of(scene: str) -> Mesh:
-    """Small mesh of a scene."""
     if scene.startswith("bar"):
         return bar(7, 3, 3)
     return cloth(7, 6, wave=0.1 if scene == "bend_curved" else 0.0)
 
 
 def make_results(results: Invented) -> None:
-    """Write the results of a study."""
     rng, effects = np.random.default_rng(7), reference("effects_cost")
     for scene, config in results.study.scenes.items():
         mesh = mesh_of(scene)
         save_mesh(mesh, results.path(paths.MESH, scene))
-        positions = _trajectory(mesh)
+        # the mesh bends more and more and sinks to the floor
+        t = np.linspace(0.0, 1.0, FRAMES + 1)[:, None]
+        positions = np.repeat(mesh.points[None], FRAMES + 1, axis=0)
+        positions[:, :, 2] += 0.4 * t * np.sin(4.0 * mesh.points[:, 0])
+        positions[:, :, 1] -= 1.5 * t**2
         with write_hdf5(results.path(paths.TRAIN, scene)) as file:
             file["positions"] = positions
         for group in config.reduce:
@@ -97,22 +98,17 @@ def make_results(results: Invented) -> None:
             count = len(EFFECTS.load(group).element_vertices(mesh))
             basis = _write_bases(results, scene, group, count, rank, rng)
             for method, spec in results.study.methods.items():
-                _write_sampling(results.path(paths.SAMPLING, scene, group, method), basis, spec)
+                chosen = reductions(basis, spec, range(1, rank + 1)) if rank else {}
+                with write_hdf5(results.path(paths.SAMPLING, scene, group, method)) as file:
+                    for r, reduction in chosen.items():
+                        store = file.create_group(f"r{r:04d}")
+                        store["entries"] = reduction.sampling.entries
+                        store["elements"] = reduction.sampling.elements
                 _write_reruns(results, scene, group, method, positions, rank, rng)
         if scene in FLAT:
             _write_noise_runs(results, scene)
-        _write_sensitivity(results, scene)
-        _write_contributions(results, scene, effects)
+        _write_series(results, scene, effects)
     _write_tables(results)
-
-
-def _trajectory(mesh: Mesh) -> np.ndarray:
-    """The mesh bends more and more and sinks to the floor."""
-    t = np.linspace(0.0, 1.0, FRAMES + 1)[:, None]
-    q = np.repeat(mesh.points[None], FRAMES + 1, axis=0)
-    q[:, :, 2] += 0.4 * t * np.sin(4.0 * mesh.points[:, 0])
-    q[:, :, 1] -= 1.5 * t**2
-    return q
 
 
 def _write_bases(results, scene, group, count, rank, rng) -> Basis:
@@ -129,15 +125,6 @@ def _write_bases(results, scene, group, count, rank, rng) -> Basis:
                        rows_per_element=rows, roundoff=1e-12)  # fmt: skip
     save_snapshots(made, results.path(paths.SNAPSHOTS, scene, group))
     return basis
-
-
-def _write_sampling(path: str, basis: Basis, spec: MethodSpec) -> None:
-    sizes = range(1, basis.rank + 1)
-    with write_hdf5(path) as file:
-        for r, reduction in reductions(basis, spec, sizes).items() if basis.rank else ():
-            store = file.create_group(f"r{r:04d}")
-            store["entries"] = reduction.sampling.entries
-            store["elements"] = reduction.sampling.elements
 
 
 def _write_reruns(results, scene, group, method, positions, rank, rng) -> None:
@@ -198,31 +185,26 @@ def _write_noise_runs(results, scene) -> None:
                 store.attrs["max_extent"] = 1.0
 
 
-def _write_contributions(results, scene, effects) -> None:
-    """Forces of the effects of a scene; a start acts once."""
-    rows = [
+def _write_series(results, scene, effects) -> None:
+    """Forces of the effects of a scene, of a start once; floors, which rise for springs only."""
+    forces = [
         (scene, row.effect, row.role, i, 1.0 + i, None)
         for row in effects[effects.force.notna() & (effects.scene == scene)].itertuples()
         for i in range(1 if row.role == "start" else FRAMES)
     ]
     names = "scene effect role frame force energy"
-    write_table(frame(names, *rows), results.path(paths.CONTRIBUTIONS, scene))
-
-
-def _write_sensitivity(results, scene) -> None:
-    """Floors of springs rise tenfold every other frame, others hardly."""
-    rows = [
+    write_table(frame(names, *forces), results.path(paths.CONTRIBUTIONS, scene))
+    floors = [
         (scene, label, i, 10.0 ** (-9 + (0.5 * i if "spring" in scene else 0.05)))
         for label in ("1e-10", "1e-08", "solver")
         for i in range(FRAMES)
     ]
     names = "scene perturbation frame relative_difference"
-    write_table(frame(names, *rows), results.path(paths.SENSITIVITY, scene))
+    write_table(frame(names, *floors), results.path(paths.SENSITIVITY, scene))
 
 
 @pytest.fixture(scope="session")
 def study(tmp_path_factory) -> Invented:
-    """An invented study with all methods."""
     return Invented(tmp_path_factory.mktemp("results"), SCENES, METHODS)
 
 
@@ -234,18 +216,15 @@ def small_study(tmp_path) -> Callable[[Sequence[str], Sequence[str]], Invented]:
 
 @pytest.fixture(scope="session")
 def strain_only(tmp_path_factory) -> Invented:
-    """A study without most scenes and methods."""
     return Invented(tmp_path_factory.mktemp("strain"), ["strain_oop"], ["deim", "block-deim"])
 
 
 @pytest.fixture(scope="session")
 def round_off_only(tmp_path_factory) -> Invented:
-    """A study of which the snapshots are round-off."""
     methods = ["deim", "deim-joint", "block-deim"]
     return Invented(tmp_path_factory.mktemp("flat"), ["bend_fall"], methods)
 
 
 @pytest.fixture(params=list(declarations()))
 def figure_name(request) -> str:
-    """Every figure in turn."""
     return request.param

@@ -40,7 +40,6 @@ PICTURES = ("snapshots_and_modes", "deim_iterations", "cloth_all_grid", "bending
 
 
 def texts(figure: Figure) -> list[str]:
-    """Every text of a figure."""
     found = [t.get_text() for t in figure.findobj(lambda artist: hasattr(artist, "get_text"))]
     return [text for text in found if text]
 
@@ -146,9 +145,7 @@ def test_a_run_that_ended_early_lies_on_the_rim(study):
     tables = {"reruns": reruns, "errors": errors, "repetitions": repeated}
     figure = study.draw("error_against_gain", tables, methods=("deim-joint",))
     left, right = figure.axes
-    (dots,) = (
-        line for line in left.lines if len(line.get_xdata()) > 0 and line.get_marker() == "D"
-    )
+    (dots,) = (each for each in left.lines if len(each.get_xdata()) and each.get_marker() == "D")
     assert (dots.get_ydata() == left.get_ylim()[1]).all()
     assert dots.get_xdata().tolist() == [24.0, 42.0]
     # gains from ten to a hundred, where all of the two runs failed
@@ -206,18 +203,16 @@ def test_a_note_fits_its_figure():
     assert text.get_text().splitlines()[-1] == "the full study draws it"
 
 
-def test_missing_scenes_and_methods_leave_their_panels_out(strain_only, figure_name):
-    figure = strain_only.draw(figure_name)
-    for ax in figure.axes:
-        assert "spring" not in ax.get_title()
-    noted = any("no data in this configuration" in text for text in texts(figure))
-    assert noted == (figure_name == "error_against_gain")
-
-
-def test_experiments_of_round_off_only(round_off_only, figure_name):
+def test_round_off_is_drawn_and_missing_scenes_and_methods_leave_their_panels_out(
+    round_off_only, strain_only, figure_name
+):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert texts(round_off_only.draw(figure_name, scenes=("bend_fall",)))
+    figure = strain_only.draw(figure_name)
+    assert not any("spring" in ax.get_title() for ax in figure.axes)
+    noted = any("no data in this configuration" in text for text in texts(figure))
+    assert noted == (figure_name == "error_against_gain")
 
 
 def test_the_teaser_shows_the_largest_size_where_a_study_has_none_that_is_chosen(study):
@@ -325,13 +320,6 @@ def test_rates_out_of_reach_are_named(study):
     assert ax.get_xlim()[1] < 1e3 / 60.0
 
 
-def test_break_even_has_a_panel_per_group(study):
-    figure = study.draw("break_even")
-    assert {ax.get_title() for ax in figure.axes} == {
-        "bending", "spring", "strain", "tetrahedron strain", "deformation gradient",
-    }  # fmt: skip
-
-
 def test_what_an_effect_moves_stands_beside_the_floor(study):
     """Below the floor the marker is open; a group that cannot be left out has none."""
     scenes, table = ("strain_oop", "cloth_all"), reference("effects_cost")
@@ -385,26 +373,18 @@ def test_dots_that_are_none_leave_the_axes_their_room():
 # Accuracy against time --------------------------------------------------------------------------
 
 
-@pytest.fixture
-def everything():
-    """Every method of the project, and no scene."""
+def test_methods_have_a_family_and_models_that_differ_by_tolerance_or_basis_share_a_marker():
     methods = load_methods(CONFIG / "methods.yaml")
     reductions = {m: Reduction(title=spec.title, rows=spec.rows) for m, spec in methods.items()}
-    return Drawn(experiments=(), reductions=reductions, groups=())
-
-
-def test_every_method_of_the_project_has_a_family(everything):
+    everything = Drawn(experiments=(), reductions=reductions, groups=())
     families = {name: view.look_of(name, "full", everything)[0] for name in everything.methods}
     assert set(families.values()) <= {*view.FAMILIES} - {view.ITERATIONS}
     assert {families[name] for name in ("deim", "deim-joint", "published")} == {view.ENTRIES}
-    assert view.look_of("ecsw-1e-02", "pod", everything)[0] == view.WEIGHTED
     assert view.look_of("full", "skinning", everything)[0] == view.WEIGHTED
     assert view.look_of("block-deim", "pod", everything)[0] == view.INTERPOLATED
     assert view.look_of("not drawn", "full", everything)[0] is None
-
-
-def test_models_that_differ_by_tolerance_or_basis_share_a_marker(everything):
     ecsw = view.look_of("ecsw-1e-02", "pod", everything)
+    assert ecsw[0] == view.WEIGHTED
     assert ecsw == view.look_of("ecsw-1e-03", "skinning", everything)
     assert view.look_of("full", "pod", everything) == view.look_of("full", "skinning", everything)
     names = [("full", "pod"), ("ecsw-1e-02", "pod"), ("deim", "full"), ("deim-joint", "full")]
@@ -430,7 +410,6 @@ def invented(errors, times, method="deim", blown_up=(), position_basis="full"):
 
 
 def drawn(ax, marker):
-    """Points with a marker."""
     lines = [line for line in ax.lines if line.get_marker() == marker]
     return [tuple(map(float, xy)) for line in lines for xy in line.get_xydata()]
 
@@ -457,10 +436,8 @@ def test_points_in_a_subspace_of_skinning_weights_are_hollow(basis, fill):
 def test_the_front_of_a_family_is_not_beaten():
     ax = Figure().subplots()
     view.draw_panel(ax, invented([0.5, 0.7, 0.1, 0.2], [1.0, 2.0, 3.0, 4.0]), "a")
-    (front,) = [
-        line for line in ax.lines if line.get_drawstyle() == "steps-post" and len(line.get_xdata())
-    ]
-    assert front.get_xydata().tolist() == [[1.0, 0.5], [3.0, 0.1]]
+    steps = [line.get_xydata() for line in ax.lines if line.get_drawstyle() == "steps-post"]
+    assert [front.tolist() for front in steps if len(front)] == [[[1.0, 0.5], [3.0, 0.1]]]
 
 
 def test_near_numbers_of_iterations_share_a_label():
@@ -471,9 +448,11 @@ def test_near_numbers_of_iterations_share_a_label():
     assert [text.get_text() for text in ax.texts] == ["K = 1, 2", "K = 3"]
 
 
-def test_one_scene_is_large_and_each_other_group_has_one(study):
-    figure = study.draw("accuracy_cost")
-    titles = [ax.get_title() for ax in figure.axes]
+def test_one_scene_is_large_and_each_other_group_has_a_panel(study):
+    titles = [ax.get_title() for ax in study.draw("accuracy_cost").axes]
     assert titles[0] == "deformation gradient: bar release"
     assert titles[1:] == ["strain:\nstrain oop", "bending:\nbend curved",
                           "tetrahedron strain:\nbar twist"]  # fmt: skip
+    assert {ax.get_title() for ax in study.draw("break_even").axes} == {
+        "bending", "spring", "strain", "tetrahedron strain", "deformation gradient",
+    }  # fmt: skip

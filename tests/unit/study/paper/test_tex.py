@@ -23,7 +23,6 @@ Section \ref{sec:one} and \cite{key}. \input{part}
 
 
 def project(folder, text=DOCUMENT):
-    """A source with a part in a folder of its own."""
     (folder / "generated").mkdir(parents=True)
     (folder / "generated" / "part.tex").write_text("Part.")
     source = folder / "main.tex"
@@ -105,10 +104,8 @@ def test_a_document_with_too_many_pages_is_refused_with_the_other(tmp_path):
 
 
 def test_the_shell_is_out_of_reach(tmp_path):
-    source = project(
-        tmp_path, DOCUMENT.replace("Section", rf"\immediate\write18{{touch {tmp_path}/made}}")
-    )
-    build_pdfs({source: tmp_path / "main.pdf"}, [tmp_path / "generated"])
+    text = DOCUMENT.replace("Section", rf"\immediate\write18{{touch {tmp_path}/made}}")
+    build_pdfs({project(tmp_path, text): tmp_path / "main.pdf"}, [tmp_path / "generated"])
     assert not (tmp_path / "made").exists()
 
 

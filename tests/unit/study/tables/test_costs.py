@@ -138,11 +138,9 @@ NO_RUNS = pd.DataFrame(columns=["scene", "perturbation", "frame", "relative_diff
 
 
 def test_effects_are_joined_in_one_time(tmp_path):
-    costs = pd.DataFrame(
-        {"effect": ["spring", "bending"], "elements": 3, "ms_per_frame": [2.0, 6.0]}
-    )
+    costs = frame("effect ms_per_frame", ("spring", 2.0), ("bending", 6.0))
     for name in "ab":
-        write_table(costs.assign(scene=name, share=0.5), tmp_path / f"{name}.csv")
+        write_table(costs.assign(scene=name, elements=3, share=0.5), tmp_path / f"{name}.csv")
     files = [File(str(tmp_path / f"{name}.csv"), {}) for name in "ab"]
     times = pd.DataFrame({"scene": ["b"], "ms_per_frame": [3.0]})
     nothing = dict.fromkeys(("parts", "left_out", "contributions"), ())
@@ -156,13 +154,10 @@ def test_effects_are_joined_in_one_time(tmp_path):
 
 def test_contributions_are_judged_before_the_horizon_and_bring_their_times(tmp_path):
     """Two frames count; bending moves less than the floor, the only group of b cannot go."""
+    forces = (("a", "spring", 3.0), ("a", "bending", 1.0), ("b", "strain", 4.0))
     rows = [
         (scene, effect, "constraint group", number, force, energy)
-        for scene, effect, force in (
-            ("a", "spring", 3.0),
-            ("a", "bending", 1.0),
-            ("b", "strain", 4.0),
-        )
+        for scene, effect, force in forces
         for number, energy in enumerate([1.0, 5.0, 2.0])
     ]
     rows.append(("b", "kick", "start", 0, 4.0 * np.sqrt(3.0), 7.0))
@@ -208,11 +203,9 @@ def test_contributions_are_judged_before_the_horizon_and_bring_their_times(tmp_p
 
 
 def test_fewer_iterations_are_the_first_opponent_and_groups_without_force_do_not_count():
-    early = [("a", "full", "full", 0.0, 6.0), ("b", "full", "full", 0.0, 4.0)]
-    early += [
-        ("a", "fewer-iterations", "full", error, ms) for error, ms in ((0.2, 1.0), (0.05, 2.0))
-    ]
-    early += [("b", "fewer-iterations", "full", 0.3, 1.0)]
+    fewer = [("a", 0.2, 1.0), ("a", 0.05, 2.0), ("b", 0.3, 1.0)]
+    early = [(scene, "fewer-iterations", "full", *rest) for scene, *rest in fewer]
+    early += [("a", "full", "full", 0.0, 6.0), ("b", "full", "full", 0.0, 4.0)]
     reruns = tables([("a", "deim", 0.01, 2.0, None), ("b", "deim", 0.01, 2.0, None)])
     shares = [("a", "spring", 1e-3), ("b", "spring", 2e-3)]  # the former counts for nothing
     first, own = paid(reruns, *early, shares=shares).itertuples()

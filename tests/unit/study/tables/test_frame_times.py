@@ -7,10 +7,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import binom
 
+from builders import frame
 from pdrom.core.store import write_table
 from study.artifact.paths import File
 from study.experiments.frame_times import COLUMNS
-from study.tables.effects_cost import frame_times, speedups
+from study.tables.effects_cost import frame_times, online, scaling, speedups
 from study.tables.errors import repetitions
 from study.tables.kit.results import in_words, median_interval
 
@@ -42,23 +43,21 @@ def test_words_show_the_median_and_its_interval():
 @pytest.fixture
 def measured(tmp_path) -> list[File]:
     """Three processes: scene a with its twin and two reductions; the machine's speed varies."""
-    rows = []
-    for process, speed in ((1, 1.0), (2, 2.0), (3, 1.5)):
-        times = {
-            ("a", "full"): 2.0, ("a", "control"): 2.02, ("a_twin", "full"): 2.2,
-            ("a_twin", "control"): 4.0, ("a", "ecsw"): 0.5, ("a", "deim"): 4.0,
-        }  # fmt: skip
-        for (scene, name), time in times.items():
-            role = name if name in ("full", "control") else "reduced"
-            row = {"process": process, "scene": scene, "vertices": 9, "frames": 100, "role": role}
-            if name == "ecsw":
-                row |= {"group": "all", "method": name, "position_basis": "pod", "k": 4, "r": 7}
-            if name == "deim":
-                row |= {"group": "spring", "method": name, "position_basis": "full", "r": 6}
-            rows.append(row | {"ms_per_frame": time * speed, "vertices_ms": 0.1 * time * speed})
+    full, control = (("full", *5 * [None]), ("control", *5 * [None]))
+    runs = frame(
+        "scene role group method position_basis k r ms_per_frame",
+        ("a", *full, 2.0), ("a", *control, 2.02), ("a_twin", *full, 2.2), ("a_twin", *control, 4.0),
+        ("a", "reduced", "all", "ecsw", "pod", 4, 7, 0.5),
+        ("a", "reduced", "spring", "deim", "full", None, 6, 4.0),
+    ).astype({"k": "Int64", "r": "Int64"})  # fmt: skip
+    runs = runs.assign(vertices=9, frames=100, vertices_ms=0.1 * runs.ms_per_frame)
+    times = ["ms_per_frame", "vertices_ms"]
+    processes = [
+        runs.assign(process=process, **speed * runs[times])
+        for process, speed in ((1, 1.0), (2, 2.0), (3, 1.5))
+    ]
     path = tmp_path / "times.csv"
-    table = pd.DataFrame(rows, columns=COLUMNS)
-    write_table(table.astype({"k": "Int64", "r": "Int64"}), path)
+    write_table(pd.concat(processes)[COLUMNS], path)
     return [File(str(path), {})]
 
 
@@ -75,7 +74,7 @@ def test_each_scene_has_one_time_and_its_control(measured):
 
 def test_a_speedup_stands_beside_its_costs_and_errors(measured, tmp_path):
     models = {"scene": ["a"], "position_basis": ["pod"], "k": [4], "method": ["ecsw"]}
-    write_table(pd.DataFrame({**models, "reduction_s": [0.15]}), tmp_path / "seconds.csv")
+    write_table(pd.DataFrame({**models, "reduction_s": [0.15]}), tmp_path / "subspaces.csv")
     steps = {"scene": ["a"], "group": ["spring"], "method": ["deim"], "r": [6]}
     write_table(pd.DataFrame({**steps, "reduction_s": [0.1]}), tmp_path / "projections.csv")
     runs = pd.concat([
@@ -85,8 +84,8 @@ def test_a_speedup_stands_beside_its_costs_and_errors(measured, tmp_path):
     unseen = runs[runs.method == "ecsw"].assign(motion="kick")
     runs = pd.concat([runs.assign(motion="train"), unseen])
     runs = runs.assign(frames=9, blowup_frame=None, horizon_frame=9, playback_error=0.5)
-    files = {name: [File(str(tmp_path / f"{name}.csv"), {})] for name in ("projections", "seconds")}
-    files = {"parts": measured, "large": [], "subspaces": files.pop("seconds"), **files}
+    files = {n: [File(str(tmp_path / f"{n}.csv"), {})] for n in ("projections", "subspaces")}
+    files |= {"parts": measured, "large": []}
     times = frame_times(measured)
     for uncertain in (times.assign(control_high=1.6), times.assign(control_low=0.6)):
         assert set(speedups(uncertain, runs, **files).shown) == {"not confirmed by its control"}
@@ -104,10 +103,11 @@ def test_a_speedup_stands_beside_its_costs_and_errors(measured, tmp_path):
     assert pd.isna(table.error_heldout["deim"])
 
 
-def test_no_process_leaves_empty_tables():
-    assert len(frame_times([])) == 0
-    empty = speedups(frame_times([]), pd.DataFrame(), parts=[])
-    assert tuple(empty.columns) == speedups.column_names
+def test_without_files_tables_are_empty():
+    times = frame_times([])
+    quoted = speedups(times, pd.DataFrame(), parts=[])
+    for empty in (times, quoted, online([], [], times), repetitions([]), scaling([])):
+        assert len(empty) == 0
 
 
 def test_repetitions_are_told_by_median_and_range(tmp_path):
@@ -120,4 +120,3 @@ def test_repetitions_are_told_by_median_and_range(tmp_path):
     assert (row.repetitions, row.ended) == (3, 1)
     assert (row.error_low, row.error_median, row.error_high) == (0.1, 0.2, np.inf)
     assert (row.gain_low, row.gain_median, row.gain_high) == (3.0, 4.0, 5.0)
-    assert len(repetitions([])) == 0

@@ -4,11 +4,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from builders import frame
 from study.tables.errors import gain_interventions
 from study.tables.kit.results import KEYS, TRAIN, judged_runs, over_motions, trained, with_held_out
 
-# scene, method, r, error within the horizon (None: ended before), gain, elements, frames
-RUNS = [
+# an error that is none: ended before
+RUNS = frame(
+    "scene method r relative_error gain elements_sampled frames",
     ("calm", "pod", 20, 1e-3, 1.0, 100, 50),
     ("calm", "block-deim", 20, 1e-2, 8.0, 20, 50),
     ("calm", "bounded", 20, 1.4e-3, 2.0, 25, 50),
@@ -20,36 +22,27 @@ RUNS = [
     ("wild", "deim", 20, 0.2, 9.0, 20, 50),
     ("hopeless", "pod", 20, 0.9, 1.0, 100, 50),
     ("hopeless", "deim", 20, 0.9, 5.0, 20, 50),
-]
+)
 HORIZONS = {"calm": 50, "quiet": 50, "wild": 30, "hopeless": 50}
 FLOORS = {"calm": 1e-8, "quiet": 1e-8, "wild": 1e-3, "hopeless": 1e-8}
 
 
 def tables() -> tuple[pd.DataFrame, pd.DataFrame]:
     """reduced_reruns and reconstruction_error with what the two tables read."""
-    reruns, reconstruction = [], []
-    for scene, method, r, error, gain, elements, frames in RUNS:
-        key = {"scene": scene, "group": "spring", "method": method, "r": r}
-        reruns.append(
-            key | {
-                "position_basis": "full", "motion": "train", "frames": frames,
-                "finite": error is not None,
-                "blowup_frame": None if error is not None else frames, "max_extent": 1.0,
-                "relative_error": error, "relative_error_within_horizon": error,
-                "horizon_frame": HORIZONS[scene], "sensitivity_floor": FLOORS[scene],
-            }
-        )  # fmt: skip
-        for split in ("train", "test"):
-            rec = 1e-4 * gain if split == "train" else 1.0
-            reconstruction.append(
-                key | {"split": split, "relative_error": rec, "gain": gain,
-                       "elements_sampled": elements}
-            )  # fmt: skip
-    marked = reruns[0] | {"r": 99, "frames": 0, "max_extent": None, "finite": None,
-                          "relative_error_within_horizon": None}  # fmt: skip
-    subspace = reruns[1] | {"position_basis": "pod"}
-    unseen = reruns[1] | {"motion": "kick"}
-    return pd.DataFrame([*reruns, marked, subspace, unseen]), pd.DataFrame(reconstruction)
+    runs = RUNS.assign(group="spring")
+    measured = runs.drop(columns="frames")
+    splits = (("train", 1e-4 * runs.gain), ("test", 1.0))
+    reconstruction = [measured.assign(split=split, relative_error=e) for split, e in splits]
+    finite = runs.relative_error.notna()
+    runs = runs.drop(columns=["gain", "elements_sampled"]).assign(
+        position_basis="full", motion="train", max_extent=1.0, finite=finite,
+        blowup_frame=runs.frames.mask(finite), relative_error_within_horizon=runs.relative_error,
+        horizon_frame=runs.scene.map(HORIZONS), sensitivity_floor=runs.scene.map(FLOORS),
+    )  # fmt: skip
+    nothing = dict.fromkeys(("max_extent", "finite", "relative_error_within_horizon"), np.nan)
+    marked = runs[:1].assign(r=99, frames=0, **nothing)
+    others = (marked, runs[1:2].assign(position_basis="pod"), runs[1:2].assign(motion="kick"))
+    return pd.concat([runs, *others], ignore_index=True), pd.concat(reconstruction)
 
 
 def test_only_runs_whose_basis_suffices_count():
@@ -63,8 +56,8 @@ def test_only_runs_whose_basis_suffices_count():
 
 def square(*runs: tuple) -> pd.DataFrame:
     """Rows of the ladder's two by two: scene, rung, rows of an element, gain and error."""
-    names = ["scene", "rung", "rows_per_element", "gain", "relative_error_within_horizon"]
-    return pd.DataFrame(runs, columns=names).assign(direction="square", group="spring", r=20)
+    names = "scene rung rows_per_element gain relative_error_within_horizon"
+    return frame(names, *runs).assign(direction="square", group="spring", r=20)
 
 
 def test_samples_and_coefficients_are_exchanged_at_equal_entries():
@@ -134,19 +127,14 @@ def test_scenes_count_once_however_many_sizes_they_have():
     assert step.error_ratio_low < 0.5 <= step.error_ratio_high
 
 
-RUN = {"scene": "a", "group": "g", "method": "pod", "position_basis": "full", "k": None}
-
-
-def rows(*runs: dict) -> pd.DataFrame:
-    """Table reduced_reruns, as far as it is read."""
-    usual = {"motion": "kick", "frames": 9, "blowup_frame": None, "horizon_frame": 9,
-             "playback_error": 0.5}  # fmt: skip
-    return pd.DataFrame([RUN | usual | run for run in runs])
-
-
 def test_an_error_is_the_median_over_the_motions_that_can_be_judged():
     error = "relative_error_within_horizon"
-    table = rows(
+    usual = {
+        "scene": "a", "group": "g", "method": "pod", "position_basis": "full", "k": None,
+        "motion": "kick", "frames": 9, "blowup_frame": None, "horizon_frame": 9,
+        "playback_error": 0.5,
+    }  # fmt: skip
+    runs = [
         {"r": 6, error: 0.1}, {"r": 6, error: 0.3}, {"r": 6, error: 0.2},
         # ended early; no frame before the horizon; beyond the rank
         {"r": 10, error: None, "frames": 3, "blowup_frame": 3}, {"r": 10, error: 0.5},
@@ -155,7 +143,8 @@ def test_an_error_is_the_median_over_the_motions_that_can_be_judged():
         # playback meets the motion: it tests nothing
         {"r": 6, error: 0.9, "playback_error": 0.3},
         {"r": 6, error: 0.7, "motion": TRAIN}, {"r": 20, error: 0.8, "motion": TRAIN},
-    )  # fmt: skip
+    ]  # fmt: skip
+    table = pd.DataFrame([usual | run for run in runs])
     found = over_motions(table).set_index("r")
     assert found.loc[6, "error_heldout"] == pytest.approx(0.2)
     assert tuple(found.loc[6, ["error_heldout_low", "error_heldout_high"]]) == (0.1, 0.3)

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pandas as pd
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -19,8 +18,7 @@ FULL = {
 }  # fmt: skip
 
 
-@pytest.fixture
-def read(tmp_path):
+def test_every_run_has_its_row_and_outcome(tmp_path):
     """One scene with three sizes of one method, two subspace runs, and a sweep of two rows."""
     positions = np.zeros((4, 2, 3))
     positions[:, 1, 0] = [1.0, 1.1, 1.2, 0.9]
@@ -50,11 +48,8 @@ def read(tmp_path):
     errors = [0.05, None, None, 0.01, 0.5]
     judged = judged.assign(relative_error_within_horizon=errors, motion="train")
     limits = {"time_steps": {"a": 0.016}, "wrong": 0.1, "departure": 2.0}
-    full_order = paths.TRAIN.files([str(fom)])
-    return {**written, **limits, "full_order": full_order, "reduced_reruns": judged}
-
-
-def test_every_run_has_its_row_and_outcome(read):
+    read = {**written, **limits, "full_order": paths.TRAIN.files([str(fom)])}
+    read["reduced_reruns"] = judged
     table = stability(**read)
     assert table.outcome.tolist() == [
         "accurate", "accurate", "blow-up", "not run", "accurate", "wrong", "accurate", "wrong",
@@ -72,7 +67,7 @@ def test_every_run_has_its_row_and_outcome(read):
     assert rerun.relative_error.tolist()[0] == 0.05
     assert rerun.relative_error.isna().tolist() == [False, True, True]
 
-    judged = read["reduced_reruns"].query("position_basis == 'full'")
+    judged = judged.query("position_basis == 'full'")
     table = stability(**{**read, "subspaces": [], "sweeps": [], "reduced_reruns": judged})
     assert table.outcome.tolist() == ["accurate", "accurate", "blow-up", "not run"]
 

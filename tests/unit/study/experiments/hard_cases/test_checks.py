@@ -1,6 +1,7 @@
 """Each check of a hard case fails for a run that violates it, and passes for one that does not."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -56,27 +57,17 @@ def test_a_case_that_is_not_refused_is_a_fault():
     assert faults(replace(CASE, holds=("refused",))) == ["was not refused"]
 
 
-class TooStrong:
-    """A group with a wrong right-hand side, so that the objective may rise."""
-
-    name = "wrong"
-
-    def __init__(self, group, factor):
-        self.group, self.factor = group, factor
-
-    def begin_frame(self, q):
-        self.group.begin_frame(q)
-
-    def accumulate(self, y, rhs):
-        part = np.zeros_like(rhs)
-        energy = self.group.accumulate(y, part)
-        rhs += self.factor * part
-        return energy
-
-
 @pytest.mark.parametrize(("error", "rises"), [(0.0, False), (1e-8, True)])
 def test_the_allowance_tells_a_wrong_projection_from_rounding(scene, error, rises):
     """At rest the objective is zero; a relative error of 1e-8 of the right-hand side raises it."""
-    loop = scene.stepper(local_steps=[TooStrong(scene.groups[0], 1.0 + error)])
-    found = record(scene, loop, scene.initial_state())
+    group = scene.groups[0]
+
+    def accumulate(y, rhs):
+        part = np.zeros_like(rhs)
+        energy = group.accumulate(y, part)
+        rhs += (1.0 + error) * part
+        return energy
+
+    wrong = SimpleNamespace(name="wrong", begin_frame=group.begin_frame, accumulate=accumulate)
+    found = record(scene, scene.stepper(local_steps=[wrong]), scene.initial_state())
     assert (found.excess.max() > 0.0) == rises

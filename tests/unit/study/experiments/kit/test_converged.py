@@ -4,35 +4,31 @@ import numpy as np
 import pytest
 from scipy import optimize, sparse
 
-from builders import make_scene
+from builders import GRAVITY, LEFT, make_scene
 from pdrom.model.dynamics.stepper import Stepper
 from study.experiments.iterations import ConvergedStepper, minimise
 
 SHEET = {"kind": "cloth", "rows": 6, "columns": 5, "plane": "xz"}
-EFFECTS = ({"effect": "gravity"}, {"effect": "floor"}, {"effect": "pins", "select": "left"})
 
 
 def sheet(group: str = "spring", **settings):
-    return make_scene(*EFFECTS, {"effect": group, "weight": 1e5}, mesh=SHEET, **settings)
-
-
-def positive(rng, n: int) -> sparse.csr_array:
-    a = rng.standard_normal((n, n))
-    return sparse.csr_array(a @ a.T + n * np.eye(n))
+    effects = (GRAVITY, {"effect": "floor"}, LEFT, {"effect": group, "weight": 1e5})
+    return make_scene(*effects, mesh=SHEET, **settings)
 
 
 def test_a_quadratic_ends_at_its_minimum(rng):
     """Hessian H = A + B differs from the metric A, as with any nonlinear projection."""
-    a, b = positive(rng, 8), positive(rng, 8)
-    hessian = (a + b).toarray()
+    roots = rng.standard_normal((2, 8, 8))
+    a, b = roots @ roots.transpose(0, 2, 1) + 8.0 * np.eye(8)
+    hessian = a + b
     load = rng.standard_normal((8, 3))
 
     def evaluate(y):
         gradient = hessian @ y - load
         value = 0.5 * float(np.vdot(y, hessian @ y)) - float(np.vdot(y, load))
-        return value, y - np.linalg.solve(a.toarray(), gradient)
+        return value, y - np.linalg.solve(a, gradient)
 
-    end = minimise(evaluate, a, np.zeros((8, 3)), 1e-10, 500)
+    end = minimise(evaluate, sparse.csr_array(a), np.zeros((8, 3)), 1e-10, 500)
     assert end.change <= 1e-10
     np.testing.assert_allclose(end.y, np.linalg.solve(hessian, load), rtol=0.0, atol=1e-8)
 

@@ -3,19 +3,13 @@
 import numpy as np
 import pytest
 
-from builders import make_scene
+from builders import GRAVITY, LEFT, make_scene
 from pdrom.model.constraints.local_kernel import LocalPass
 from study.experiments.kit import costs as module
 from study.experiments.kit.base import GLOBAL, REST, RIGHT
 
-EFFECTS = (
-    {"effect": "gravity"},
-    {"effect": "floor"},
-    {"effect": "pins", "select": "left"},
-    {"effect": "pins", "select": "right", "until": 2},
-    {"effect": "spring", "weight": 1e5},
-    {"effect": "strain", "weight": 1e4},
-)
+MOVING = (GRAVITY, {"effect": "floor"}, LEFT, {"effect": "pins", "select": "right", "until": 2})
+EFFECTS = (*MOVING, {"effect": "spring", "weight": 1e5}, {"effect": "strain", "weight": 1e4})
 
 
 def test_every_effect_has_a_row_and_the_shares_are_whole():
@@ -53,18 +47,7 @@ def test_a_stand_in_and_its_kernel_answer_as_the_effect_does(rng):
     assert space.compiled([module.Timed(g, ("begin_frame",)) for g in scene.groups])[0] is not None
 
 
-def test_effects_are_left_out_alone_and_groups_together():
-    effects = (*EFFECTS, {"effect": "bending", "weight": 1.0})
-    sets = module.left_out_sets(make_scene(*effects))
-    assert sets == [
-        (), ("gravity",), ("floor",), ("pins",), ("spring",), ("strain",), ("bending",),
-        ("spring", "strain"), ("spring", "bending"), ("strain", "bending"),
-    ]  # fmt: skip
-    assert module.left_out_sets(make_scene({"effect": "spring", "weight": 1.0})) == []
-
-
 def test_a_scene_without_an_effect_does_not_ask_it(monkeypatch):
-    """The projections of an effect that is left out are never called."""
     from pdrom.model.constraints.triangle_strain import TriangleStrain
 
     scene = make_scene(*EFFECTS)
@@ -85,13 +68,17 @@ def test_a_scene_without_an_effect_does_not_ask_it(monkeypatch):
     assert row.own_ms == costs.set_index("effect").ms_per_frame["strain"]
 
 
-def test_every_effect_of_a_frame_and_every_group_is_left_out():
+def test_effects_of_a_frame_are_left_out_alone_and_groups_together():
     # a kick is over before the first frame
-    scene = make_scene({"effect": "kick", "speed": 0.1, "seed": 1}, *EFFECTS)
+    bending = {"effect": "bending", "weight": 1.0}
+    scene = make_scene({"effect": "kick", "speed": 0.1, "seed": 1}, *EFFECTS, bending)
     costs = module.effect_costs(scene, scene.system, 2, 0, 1)
     table = module.left_out(scene, costs, 2, 0, 3, "splu")
-    assert table.left_out.tolist() == ["nothing", "gravity", "floor", "pins", "spring", "strain"]
-    assert table.groups.tolist() == [2, 2, 2, 2, 1, 1]
+    assert table.left_out.tolist() == [
+        "nothing", "gravity", "floor", "pins", "spring", "strain", "bending", "spring + strain",
+        "spring + bending", "strain + bending",
+    ]  # fmt: skip
+    assert table.groups.tolist() == [3, 3, 3, 3, 2, 2, 2, 1, 1, 1]
     single = make_scene({"effect": "spring", "weight": 1.0})
     costs = module.effect_costs(single, single.system, 1, 0, 1)
     assert len(module.left_out(single, costs, 1, 0, 1, "splu")) == 0

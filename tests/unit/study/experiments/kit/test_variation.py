@@ -3,41 +3,31 @@
 import numpy as np
 import pytest
 
-from builders import make_scene
+from builders import GRAVITY, make_scene
 from pdrom.model.runs import trajectory
 from pdrom.model.scene import Scene
 from study.experiments.kit.base import resolve_ranks, varied
 
-EFFECTS = (
-    {"effect": "gravity"},
-    {"effect": "pins", "select": "top", "until": 10},
-    {"effect": "spring", "weight": 1e4},
-    {"effect": "strain", "weight": 1e3},
-)
+SPRING = {"effect": "spring", "weight": 1e4}
 
 
-@pytest.fixture
-def scene():
-    return make_scene(*EFFECTS, frames=20, reduce={"spring": {"train": 4}})
-
-
-def weights(config):
-    return {e.effect: e.weight for e in config.effects if hasattr(e, "weight")}
-
-
-def test_schedules_keep_their_seconds_and_only_the_reduced_weight_changes(scene):
+def test_schedules_keep_their_seconds_and_only_the_reduced_weight_changes():
+    pins = {"effect": "pins", "select": "top", "until": 10}
+    effects = (GRAVITY, pins, SPRING, {"effect": "strain", "weight": 1e3})
+    scene = make_scene(*effects, frames=20, reduce={"spring": {"train": 4}})
     assert varied(scene.config, 0.016, 1.0, 0.32, (2, 100)) == scene.config
     config = varied(scene.config, 0.004, 100.0, 0.32, (2, 100))
     assert (config.time_step, config.frames) == (0.004, 80)
     assert config.effects[1].until == 40
-    assert weights(config) == {"spring": 1e6, "strain": 1e3}
+    weights = {e.effect: e.weight for e in config.effects if hasattr(e, "weight")}
+    assert weights == {"spring": 1e6, "strain": 1e3}
     for h, frames in ((1e-3, 50), (0.016, 20), (0.2, 5)):  # within their limits
         assert varied(scene.config, h, 1.0, 0.32, (5, 50)).frames == frames
 
 
 def test_a_smaller_step_converges_to_the_same_motion():
     """Implicit Euler is of first order: the difference to h / 4 is about a third of that to h."""
-    scene = make_scene({"effect": "gravity"}, EFFECTS[2], frames=20, iterations=5)
+    scene = make_scene(GRAVITY, SPRING, frames=20, iterations=5)
     ends = {}
     for h in (0.016, 0.004, 0.001):
         fine = Scene.build(varied(scene.config, h, 1.0, 0.32, (2, 1000)), scene.mesh)

@@ -16,7 +16,7 @@ from study.tables import declared
 from study.tables.claims import claims as verdicts
 from study.tables.claims.claims import claims, claims_sensitivity, claims_tests
 from study.tables.claims.metrics import METRICS
-from study.tables.claims.rules import MARGIN, ClaimRule, TestRule, load_claims
+from study.tables.claims.rules import ClaimRule, TestRule, load_claims
 
 HOLDS, FAILS, DEPENDS, MACHINE, UNDECIDED, UNTESTED = verdicts.VERDICTS
 RERUNS = [
@@ -150,21 +150,16 @@ def test_the_trend_of_all_experiments_together(monkeypatch):
     """Three blocks of three sizes, all ascending: one of 3!^3 orders, SciPy's smallest p-value."""
     columns = [(s, r, 10, None, float(r)) for s in "efg" for r in (6, 10, 20)]
     rising = [(s, "spring", "deim", "full", None, r, f, b, e, 1.0) for s, r, f, b, e in columns]
-    monkeypatch.setitem(globals(), "RERUNS", rising)
-    where = {"method": "deim"}
-    assert measured("trend_p_value", **where) == pytest.approx([1.0 / 216.0])
     # a twin and another method add no block
     more = [(f"{s}_twin", *rest) for s, *rest in rising]
     more += [(*row[:2], "qdeim", *row[3:]) for row in rising]
-    monkeypatch.setitem(globals(), "RERUNS", [*rising, *more])
-    assert measured("trend_p_value") == pytest.approx([1.0 / 216.0])
     # a run that ended early is the worst of its block
     failed = [(*row[:8], np.nan if row[5] == 20 else row[8], 1.0) for row in rising]
-    monkeypatch.setitem(globals(), "RERUNS", failed)
-    assert measured("trend_p_value", **where) == pytest.approx([1.0 / 216.0])
     falling = [(*row[:8], 1.0 / row[8], 1.0) for row in rising]
-    monkeypatch.setitem(globals(), "RERUNS", falling)
-    assert measured("trend_p_value", **where) == pytest.approx([1.0])
+    least = 1.0 / 216.0
+    for rows, p in ((rising, least), (rising + more, least), (failed, least), (falling, 1.0)):
+        monkeypatch.setitem(globals(), "RERUNS", rows)
+        assert measured("trend_p_value") == pytest.approx([p])
 
 
 @pytest.mark.parametrize("metric", ["rerun_error", "error_trend"])
@@ -251,11 +246,6 @@ def test_runs_that_are_not_accurate_are_no_times():
     test = rule("useful_speedup", "<=", 1.0)
     assert verdicts.answer_of(test, np.array([0.0, 0.0, 0.0, 0.9])) == HOLDS
     assert verdicts.answer_of(test, np.array([0.0, 0.0, 1.1, 0.9])) == MACHINE
-
-
-def test_what_compares_no_times_has_no_margin():
-    assert rule("rerun_error").factor == 1.0
-    assert rule("local_share").factor == MARGIN == 1.5
 
 
 def test_sentence_counts_and_shows_the_spread():
@@ -352,18 +342,14 @@ def test_a_group_of_rank_zero_is_no_missing_scene(scene, words):
 @pytest.mark.parametrize(
     ("fault", "message"),
     [
-        ({"metric": "beauty"}, "metric = 'beauty': allowed are local_share, rerun_error"),
         ({"treshold": 1.0}, r"unknown key 'published\.0\.treshold' \(allowed: what, metric"),
-        ({"compare": "=="}, r"published\.0\.compare = '=='"),
         ({"share": 0.4}, r"published\.0\.share"),
         ({"share": 1.1}, r"published\.0\.share"),
-        ({"threshold": float("nan")}, r"published\.0\.threshold"),
         ({"decides": False}, "published: none of them decides"),
         ({"margin": 0.9}, r"published\.0\.margin = 0\.9"),
         ({"metric": "rerun_error", "margin": 2}, "margin = 2: rerun_error compares no times"),
         ({"by": "colour"}, "by: no column 'colour'"),
         ({"where": {"scene": ["@al"]}}, "no set 'al'"),
-        ({"where": {"scen": ["a"]}}, "no column 'scen'.*scene"),
     ],
 )
 def test_faulty_rules_name_file_claim_and_key(tmp_path, fault, message):
@@ -401,7 +387,7 @@ def test_changes_are_told_in_their_order(tmp_path):
         load_claims(path)
 
 
-@pytest.mark.parametrize("content", ["", "[]", "C1: 3", "C1: {published: []}", "sets: {a: [b]}"])
+@pytest.mark.parametrize("content", ["[]", "C1: 3", "C1: {published: []}", "sets: {a: [b]}"])
 def test_files_that_hold_no_claims_are_refused(tmp_path, content):
     path = tmp_path / "claims.yaml"
     path.write_text(content)
@@ -434,10 +420,6 @@ def test_a_fingerprint_changes_with_every_rule_but_not_with_its_words():
         {"margin": 1.2},
     ]  # fmt: skip
     assert len({same, *(fingerprint(**other) for other in others)}) == 1 + len(others)
-
-
-def test_the_claims_are_those_of_the_paper():
-    assert list(RULES) == [f"C{i}" for i in range(1, 13)]
 
 
 def test_without_data_nothing_is_decided():

@@ -1,7 +1,6 @@
 """Every test with the values that it found, and verdicts under other rules, by hand."""
 
 import pandas as pd
-import pytest
 
 from builders import frame
 from pdrom.core.yamlfile import validate
@@ -14,20 +13,15 @@ PATH = ROOT / "config" / "claims.yaml"
 ERRORS = frame(
     "scene r relative_error", ("a", 6, 0.9), ("a", 20, 0.3), ("b", 6, 0.8), ("b", 20, 0.4)
 ).assign(group="spring", method="deim", split="train", gain=1.0)
+SHARES = frame("scene local_share", ("a", 0.75), ("b", 0.5)).assign(implementation="compiled")
 
 
 def made(**rule) -> pd.DataFrame:
-    """Variations of a claim whose published part is this test."""
-    test = {
-        "what": "w", "metric": "reconstruction_error", "compare": ">=", "threshold": 0.5, **rule,
-    }  # fmt: skip
-    return rows_of(test, {"reconstruction_error": ERRORS})
-
-
-def rows_of(test: dict, tables: dict[str, pd.DataFrame]) -> pd.DataFrame:
-    """Variations of a claim with this test, published and beyond, and these tables."""
-    tests = (validate(TestRule, test, "test"),)
+    """Variations of a claim with this test, published and beyond."""
+    test = {"what": "w", "metric": "reconstruction_error", "compare": ">=", "threshold": 0.5}
+    tests = (validate(TestRule, test | rule, "test"),)
     rules = {"C1": ClaimRule.model_construct(published=tests, beyond=tests)}
+    tables = {"reconstruction_error": ERRORS, "local_share": SHARES}
     rows = module.sensitivity_rows(rules, tables)
     assert set(rows.part) == set(PARTS)
     return rows[rows.part == "published"]
@@ -52,11 +46,7 @@ def test_thresholds_and_shares():
 
 def test_margins_vary_where_times_are_compared():
     assert verdicts(made(), "margin") == {}
-    shares = pd.DataFrame(
-        {"scene": ["a", "b"], "implementation": "compiled", "local_share": [0.75, 0.5]}
-    )
-    test = {"what": "w", "metric": "local_share", "compare": ">=", "threshold": 0.35}
-    rows = rows_of(test, {"local_share": shares})
+    rows = made(metric="local_share", threshold=0.35)
     assert verdicts(rows, "margin") == {
         "1": "holds", "1.25": "holds", "1.5": "holds",
         **dict.fromkeys(("2", "3", "5"), module.MACHINE),
@@ -78,50 +68,21 @@ def test_splits_vary_where_a_test_names_one():
     assert verdicts(made(where={"split": ["test", "train"]}), "splits") == {"train": "depends"}
 
 
-def test_a_claim_without_data_has_no_variations():
-    empty = {name: table.checked(pd.DataFrame()) for name, table in declared().items()}
-    assert module.sensitivity_rows(load_claims(PATH), empty).empty
-
-
-# Every test ---------------------------------------------------------------------------------------
-
-SHARES = pd.DataFrame(
-    {"scene": ["a", "b", "c"], "implementation": "compiled", "local_share": [0.2, 0.8, 0.9]}
-)
-
-
-@pytest.fixture(scope="module")
-def tables() -> dict[str, pd.DataFrame]:
-    empty = {name: table.checked(pd.DataFrame()) for name, table in declared().items()}
-    return empty | {"local_share": SHARES}
-
-
-@pytest.fixture(scope="module")
-def outcomes(tables: dict[str, pd.DataFrame]) -> pd.DataFrame:
-    return module.claims_tests(PATH, {}, **tables)
-
-
-def test_what_a_test_found(outcomes):
-    found = outcomes[(outcomes.claim == "C1") & (outcomes.part == "beyond")]
-    one = found.iloc[0]
+def test_every_test_says_what_it_found_and_those_that_decide_give_the_verdicts():
+    tables = {name: table.checked(pd.DataFrame()) for name, table in declared().items()}
+    assert module.sensitivity_rows(load_claims(PATH), tables).empty
+    shares = frame("scene local_share", ("a", 0.2), ("b", 0.8), ("c", 0.9))
+    tables["local_share"] = shares.assign(implementation="compiled")
+    outcomes = module.claims_tests(PATH, {}, **tables)
+    one = outcomes[(outcomes.claim == "C1") & (outcomes.part == "beyond")].iloc[0]
     assert (one.satisfied, one.of, one.close, one.verdict) == (2, 3, 2, module.MACHINE)
-    assert one.margin == 4.0
-    assert (one.least, one["median"], one.most) == (0.2, 0.8, 0.9)
-
-
-def test_a_test_without_rows_is_undecided(outcomes):
+    assert (one.margin, one.least, one["median"], one.most) == (4.0, 0.2, 0.8, 0.9)
     nothing = outcomes[outcomes.of == 0]
     assert (nothing.verdict == module.UNDECIDED).all()
     assert nothing[["least", "median", "most"]].isna().all(axis=None)
-
-
-def test_the_tests_that_decide_give_the_verdicts(tables, outcomes):
+    # words tell the tests of a part apart
+    assert not outcomes.duplicated(["claim", "part", "what"]).any()
     for row in module.claims(PATH, {}, **tables).itertuples():
         for part, verdict in (("published", row.verdict), ("beyond", row.verdict_beyond)):
             mine = outcomes[(outcomes.claim == row.claim) & (outcomes.part == part)]
-            mine = mine[mine.decides]
-            assert module.combined(list(mine.verdict)) == verdict
-
-
-def test_words_tell_the_tests_of_a_part_apart(outcomes):
-    assert not outcomes.duplicated(["claim", "part", "what"]).any()
+            assert module.combined(list(mine.verdict[mine.decides])) == verdict
