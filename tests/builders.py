@@ -60,7 +60,6 @@ def make_scene(
 
 
 def with_effects(scene: Scene, *effects: dict) -> Scene:
-    """The scene with further effects."""
     further = make_scene({"effect": "spring", "weight": 1.0}, *effects).config.effects[1:]
     return scene.changed(effects=(*scene.config.effects, *further))
 
@@ -124,7 +123,6 @@ def simplices(rows: int, count: int) -> Mesh:
 
 
 def bound(kind: type, rows: int, count: int, **settings: float):
-    """A group of ``count`` unit simplices."""
     mesh = simplices(rows, count)
     return kind(kind.Config(weight=1.0, **settings), mesh, np.ones(mesh.vertices))
 

@@ -35,5 +35,4 @@ def group_scene(request: pytest.FixtureRequest) -> Scene:
 
 @pytest.fixture
 def rng() -> np.random.Generator:
-    """Seeded generator."""
     return np.random.default_rng(20260101)

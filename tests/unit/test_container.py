@@ -9,13 +9,12 @@ DOCKERFILE = (ROOT / "Dockerfile").read_text("utf-8")
 IGNORED = (ROOT / ".dockerignore").read_text("utf-8").split()
 
 
-def test_its_python_is_one_that_the_packages_have_wheels_for() -> None:
+def test_its_python_is_one_that_the_packages_have_wheels_for_and_the_script_does_the_rest() -> None:
     found = re.findall(r"^FROM python:(\d+)\.(\d+)-slim", DOCKERFILE, re.MULTILINE)
     assert len(found) == 1
     assert OLDEST <= tuple(map(int, found[0])) <= NEWEST
 
-
-def test_its_environment_is_made_by_the_script_alone() -> None:
+    # its environment is made by the script alone
     assert "RUN ./reproduce run pdrom --help" in DOCKERFILE
     assert 'ENTRYPOINT ["./reproduce"]' in DOCKERFILE
     assert "pip" not in DOCKERFILE

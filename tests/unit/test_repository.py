@@ -1,12 +1,9 @@
 """What git tracks: text and a few pictures, nothing large, nothing binary by accident."""
 
-import subprocess
 from pathlib import Path
 
-import pytest
-
 from pdrom.core.yamlfile import read_yaml
-from places import ROOT
+from places import ROOT, tracked
 from study.artifact.paths import FIGURE, RESULTS, TABLE
 from study.figures.kit.declaration import declarations
 from study.pipeline.folders import Folders
@@ -17,19 +14,7 @@ LARGEST = 300_000
 BINARY = ("docs/*.png", "results/reference/tables/*.xz", "results/reference/studies/*/tables/*.xz")
 
 
-def tracked(*options: str) -> list[Path]:
-    """Files of the index, also new ones; the test is left out where there is no git."""
-    listed = subprocess.run(
-        ["git", "ls-files", "-z", *options], cwd=ROOT, capture_output=True, check=False
-    )
-    if listed.returncode:
-        pytest.skip("no clone of the repository")
-    names = [name for name in listed.stdout.decode().split("\0") if name]
-    return [ROOT / name for name in names if (ROOT / name).is_file()]
-
-
 def offends(path: Path) -> bool:
-    """Whether a file is too large, or binary and not meant to be."""
     inside = path.relative_to(ROOT)
     binary = b"\0" in path.read_bytes()[:8000]
     return path.stat().st_size > LARGEST or (

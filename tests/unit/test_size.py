@@ -5,12 +5,11 @@ Counted in what git tracks. Where a change meets a limit, delete what has no rea
 
 import ast
 import re
-import subprocess
 from functools import cache
 
 import pytest
 
-from places import ROOT
+from places import tracked
 
 LIMITS = {
     "lines of src": 35_864,
@@ -26,24 +25,17 @@ PAGES = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "config/README.md", "do
 
 
 @cache
-def tracked(*patterns: str) -> list[str]:
-    """Texts of the files that git tracks; the test is left out where there is no clone."""
-    listed = subprocess.run(
-        ["git", "ls-files", "-z", "--", *(f":(glob){pattern}" for pattern in patterns)],
-        cwd=ROOT, capture_output=True, check=False,
-    )  # fmt: skip
-    if listed.returncode:
-        pytest.skip("no clone of the repository")
-    paths = [ROOT / name for name in listed.stdout.decode().split("\0") if name]
-    return [path.read_text(encoding="utf-8") for path in paths if path.is_file()]
+def texts(*patterns: str) -> list[str]:
+    paths = tracked("--", *(f":(glob){pattern}" for pattern in patterns))
+    return [path.read_text(encoding="utf-8") for path in paths]
 
 
 def sources() -> list[str]:
-    return tracked("src/**/*.py")
+    return texts("src/**/*.py")
 
 
-def lines(texts: list[str]) -> int:
-    return sum(text.count("\n") for text in texts)
+def lines(found: list[str]) -> int:
+    return sum(text.count("\n") for text in found)
 
 
 def declared(kind: str) -> int:
@@ -68,8 +60,8 @@ def formal_percent() -> float:
 MEASURES = {
     "lines of src": lambda: lines(sources()),
     "modules of src": lambda: len(sources()),
-    "lines of tests": lambda: lines(tracked("tests/**/*.py")),
-    "words of documentation": lambda: sum(len(text.split()) for text in tracked(*PAGES)),
+    "lines of tests": lambda: lines(texts("tests/**/*.py")),
+    "words of documentation": lambda: sum(len(text.split()) for text in texts(*PAGES)),
     "tables": lambda: declared("table"),
     "figures": lambda: declared("figure"),
     "experiments": lambda: declared("experiment"),

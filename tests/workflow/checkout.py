@@ -65,7 +65,6 @@ class Checkout:
         return [Made(r[0], r[2], r[3], tuple(r[4].split(",")), r[-1]) for r in rows[1:]]
 
     def planned(self, *arguments: str) -> set[str]:
-        """Files that a run would make."""
         return {made.file for made in self.summary(*arguments) if made.plan == "update pending"}
 
     def count_as_finished(self, *arguments: str) -> None:

@@ -45,13 +45,12 @@ class Sandbox:
     folder: Path
 
     @classmethod
-    def make(cls, folder: Path, python: Path = Path(sys.executable)) -> "Sandbox":
-        """A sandbox in which nothing was run."""
+    def make(cls, folder: Path) -> "Sandbox":
         copy_repository(folder)
         shutil.copy2(ROOT / "reproduce", folder)
         shutil.copy2(ROOT / "requirements.lock", folder)
         (folder / MICRO_FILE).write_text(yaml.safe_dump(MICRO), encoding="utf-8")
-        return cls(folder)._with_environment(python)
+        return cls(folder)._with_environment()
 
     def copy(self, folder: Path) -> "Sandbox":
         """The same state, times of files included, in another folder."""
@@ -60,12 +59,12 @@ class Sandbox:
         shutil.copytree(self.folder, folder, symlinks=True, ignore=pipes)
         return Sandbox(folder)._with_environment()
 
-    def _with_environment(self, python: Path = Path(sys.executable)) -> "Sandbox":
+    def _with_environment(self) -> "Sandbox":
         programs = self.folder / ".venv" / "bin"
         programs.mkdir(parents=True, exist_ok=True)
         hooks = Path(__file__).parent / "hooks"
         for name, module in (("python", ""), ("snakemake", "-m snakemake")):
-            shim = SHIM.format(hooks=hooks, python=python, module=module)
+            shim = SHIM.format(hooks=hooks, python=sys.executable, module=module)
             (programs / name).write_text(shim, encoding="utf-8")
             (programs / name).chmod(0o755)
         lock = (self.folder / "requirements.lock").read_bytes()
@@ -104,12 +103,10 @@ class Sandbox:
         return process.returncode, output
 
     def finish(self, *targets: str) -> None:
-        """A run that must succeed."""
         status, output = self.run(*targets)
         assert status == 0, output
 
     def path(self, name: str) -> Path:
-        """A file of the sandbox."""
         return self.folder / name
 
     def results(self) -> dict[str, str]:

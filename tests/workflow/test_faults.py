@@ -9,11 +9,8 @@ import os
 import random
 import re
 import resource
-import shutil
 import signal
 import subprocess
-import sys
-from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -47,7 +44,6 @@ def sandbox(undisturbed: Sandbox, tmp_path: Path) -> Sandbox:
 
 @pytest.fixture
 def fresh(tmp_path: Path) -> Sandbox:
-    """A sandbox in which nothing was run."""
     return Sandbox.make(tmp_path / "run")
 
 
@@ -60,7 +56,6 @@ def finished_study(tmp_path_factory: pytest.TempPathFactory) -> Sandbox:
 
 
 def last_lines(output: str, count: int = 2) -> str:
-    """What the user reads last."""
     return "\n".join(output.splitlines()[-count:])
 
 
@@ -179,52 +174,7 @@ def test_the_second_run_at_once_says_so_and_ends(undisturbed, fresh):
     assert fresh.results() == undisturbed.results()
 
 
-@slow
-def test_a_blank_and_a_letter_beyond_ascii_in_the_path(tmp_path):
-    """The interpreter, too, lies in the folder, as it does in ``.venv``."""
-    folder = tmp_path / "Étude du projet"
-    sandbox = Sandbox.make(folder, python=folder / "environment" / "bin" / "python")
-    sandbox.path("environment").symlink_to(sys.prefix)
-    sandbox.finish(RUN)
-    sandbox.path(RUN).unlink()
-    status, output = sandbox.snakemake(RUN)
-    assert status == 0, output
-    assert sandbox.path(RUN).is_file()
-
-
 # Disks ----------------------------------------------------------------------------------------
-
-
-@pytest.fixture
-def mount() -> Iterator[Callable[..., None]]:
-    """Mounts, where this is permitted, and takes them back."""
-    mounted = []
-
-    def do(folder: Path, *options: str) -> None:
-        done = subprocess.run(["mount", *options, folder], capture_output=True, check=False)
-        if done.returncode != 0:
-            pytest.skip(f"mounting is not permitted: {done.stderr.decode().strip()}")
-        mounted.append(folder)
-
-    if os.geteuid() != 0 or shutil.which("mount") is None:
-        pytest.skip("mounting needs root")
-    yield do
-    for folder in reversed(mounted):
-        subprocess.run(["umount", "--lazy", folder], check=True)
-
-
-@slow
-def test_a_full_disk(undisturbed, fresh, mount):
-    """A file system of its own for the results, which fills up while the runs are simulated."""
-    results = fresh.path("results")
-    results.mkdir()
-    mount(results, "-t", "tmpfs", "-o", "size=96k", "tmpfs")
-    status, output = fresh.run(TABLE)
-    assert status != 0
-    assert "cannot be written (No space left on device)" in last_lines(output, 3)
-    assert "Traceback" not in output
-    subprocess.run(["mount", "-o", "remount,size=64m", results], check=True)
-    heals(fresh, undisturbed)
 
 
 def files_of_32_kb() -> None:
@@ -246,28 +196,9 @@ def test_a_write_that_fails(target, how, words, undisturbed, sandbox):
     status, output = sandbox.run(target, **how)
     assert status != 0
     assert re.search(rf"job \w+ failed: {target}: cannot be written \({words}", last_lines(output))
+    assert "Traceback" not in output
     assert not sandbox.temporaries()
     heals(sandbox, undisturbed, target)
-
-
-@slow
-def test_results_that_are_read_only(undisturbed, sandbox, mount):
-    results = sandbox.path("results")
-    sandbox.path(TABLE).unlink()
-    mount(results, "--bind", str(results))
-    subprocess.run(["mount", "-o", "remount,ro,bind", results], check=True)
-    status, output = sandbox.run(TABLE)
-    assert status != 0
-    assert output.splitlines() == [f"reproduce: no write permission in {results}"]
-    subprocess.run(["mount", "-o", "remount,rw,bind", results], check=True)
-    heals(sandbox, undisturbed)
-
-
-def test_a_file_in_place_of_the_results(fresh):
-    fresh.path("results").write_text("")
-    status, output = fresh.run(TABLE)
-    assert status != 0
-    assert output.splitlines() == [f"reproduce: no write permission in {fresh.path('results')}"]
 
 
 # Damaged files --------------------------------------------------------------------------------
@@ -326,25 +257,13 @@ def test_a_damaged_result(name, damage, missing, finished_study, tmp_path):
 # Clocks and edited files ----------------------------------------------------------------------
 
 
-ANY_ORDER = random.Random(1)
-
-
 @slow
-@pytest.mark.parametrize(
-    "seconds",
-    [
-        lambda: -4000 * 86_400,
-        lambda: 4000 * 86_400,
-        # a copy that kept no dates, or a clock that jumped several times during a run
-        lambda: ANY_ORDER.uniform(-1e6, 1e6),
-    ],
-    ids=["back", "ahead", "in no order"],
-)
-def test_a_clock_that_jumped(seconds, undisturbed, sandbox):
-    """The files of a finished run bear the wrong date."""
+def test_a_clock_that_jumped(undisturbed, sandbox):
+    """The files of a finished run bear any dates, as after several jumps or in a copy."""
+    jumps = random.Random(1)
     for path in sandbox.path(MICRO_RESULTS).rglob("*"):
-        stat = path.stat()
-        os.utime(path, ns=(stat.st_atime_ns, stat.st_mtime_ns + int(seconds() * 1e9)))
+        stat, days = path.stat(), jumps.randint(-4000, 4000)
+        os.utime(path, ns=(stat.st_atime_ns, stat.st_mtime_ns + days * 86_400 * 10**9))
     heals(sandbox, undisturbed)
 
 
@@ -352,9 +271,8 @@ MESH = "config/scenes/sheet.obj"
 
 
 @slow
-@pytest.mark.parametrize("date", [None, 0.0], ids=["now", "1970"])
-def test_a_changed_mesh_file_reruns_what_follows(tmp_path, date):
-    """Also when the new file is older than the results, as after unpacking an archive."""
+def test_a_changed_mesh_file_reruns_what_follows(tmp_path):
+    """Though the new file is older than the results, as after unpacking an archive."""
     first, second = (Sandbox.make(tmp_path / name) for name in ("first", "second"))
     for sandbox, wave in ((first, 0.0), (second, 0.1)):
         scene = sandbox.path("config/scenes/spring_oop.yaml")
@@ -364,7 +282,6 @@ def test_a_changed_mesh_file_reruns_what_follows(tmp_path, date):
         sandbox.finish(TABLE)
     flat = first.results()
     write_sheet(first.path(MESH), 0.1)
-    if date is not None:
-        os.utime(first.path(MESH), (date, date))
+    os.utime(first.path(MESH), (0.0, 0.0))
     first.finish(TABLE)
     assert first.results() == second.results() != flat

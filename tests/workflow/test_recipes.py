@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import yaml
 from checkout import Checkout, copy_repository
+from sandbox import MICRO
 
 from pdrom.core.store import check_file, read_table
 from places import ROOT
@@ -32,7 +33,6 @@ class Block:
     code: str
 
     def add_to(self, checkout: Checkout) -> None:
-        """Do what the recipe says."""
         file = checkout.folder / self.path
         if self.below is None:
             assert not file.exists(), f"{self.path} exists"
@@ -46,7 +46,6 @@ class Block:
 
 
 def recipe(title: str) -> list[Block]:
-    """Blocks of a section of the page."""
     (section,) = re.findall(rf"^## {title}\n(.*?)(?=^## |\Z)", PAGE, re.MULTILINE | re.DOTALL)
     return [Block(**found.groupdict()) for found in BLOCK.finditer(section)]
 
@@ -66,14 +65,12 @@ SCENE = {
     ],
     "reduce": {"cable": {"train": 100}},
 }
-STUDY = {
+STUDY = MICRO | {
     "scenes": ["spring_oop", "cable_sheet"],
     "methods": ["leverage", "block-deim"],
     "ranks": [2],
-    "coarsen": {"resolution": 0.25, "frames": 0.05},
-    "sensitivity": {"perturbations": [1e-10], "seeds": [1]},
 }
-ARGUMENTS = ("--configfile", "own.yaml")
+ARGUMENTS, RESULTS = ("--configfile", "own.yaml"), "results/studies/own"
 EXPERIMENT = "src/study/experiments/rest_lengths.py"
 TABLE = "src/study/tables/mesh_sizes.py"
 MODEL = "tests/unit/pdrom/model"
@@ -96,33 +93,20 @@ def checkout(tmp_path_factory: pytest.TempPathFactory) -> Checkout:
     return made
 
 
-@pytest.fixture(scope="module")
-def planned(checkout: Checkout) -> set[str]:
-    """What a run of the whole study would make."""
-    return checkout.planned(*ARGUMENTS)
-
-
-@pytest.fixture(scope="module")
-def results(planned: set[str]) -> str:
-    """Folder of the study's results."""
-    (figure,) = (path for path in planned if path.endswith("/figures/rest_shapes.pdf"))
-    return figure.removesuffix("/figures/rest_shapes.pdf")
-
-
 @pytest.mark.parametrize("title", MOST)
 def test_a_recipe_touches_few_files(title):
     paths = [block.path for block in recipe(title)]
     assert 0 < len(paths) == len(set(paths)) <= MOST[title]
 
 
-def test_what_was_added_belongs_to_the_study(planned, results):
+def test_what_was_added_belongs_to_the_study(checkout):
     assert {
-        f"{results}/figures/rest_shapes.png",
-        f"{results}/tables/mesh_sizes.csv",
-        f"{results}/reruns/spring_oop/spring/leverage.csv",
-        f"{results}/reruns/cable_sheet/cable/leverage.csv",
-        f"{results}/reruns/cable_sheet/cable/block-deim.csv",
-    } <= planned
+        f"{RESULTS}/figures/rest_shapes.png",
+        f"{RESULTS}/tables/mesh_sizes.csv",
+        f"{RESULTS}/reruns/spring_oop/spring/leverage.csv",
+        f"{RESULTS}/reruns/cable_sheet/cable/leverage.csv",
+        f"{RESULTS}/reruns/cable_sheet/cable/block-deim.csv",
+    } <= checkout.planned(*ARGUMENTS)
 
 
 def test_a_figures_option_is_typed_without_another_line(checkout):
@@ -143,16 +127,16 @@ MADE = (
 
 
 @pytest.fixture(scope="module")
-def said(checkout: Checkout, results: str) -> str:
+def said(checkout: Checkout) -> str:
     """What a run said that made what the recipes add."""
-    done = checkout.snakemake(*ARGUMENTS, "--", *(f"{results}/{name}" for name in MADE))
+    done = checkout.snakemake(*ARGUMENTS, "--", *(f"{RESULTS}/{name}" for name in MADE))
     assert done.returncode == 0, done.stderr
     return done.stdout + done.stderr
 
 
 @pytest.mark.slow
-def test_the_added_code_makes_its_files(checkout, results, said):
-    made = checkout.folder / results
+def test_the_added_code_makes_its_files(checkout, said):
+    made = checkout.folder / RESULTS
     assert {check_file(made / name) for name in MADE} == {"intact"}
     assert (made / "figures/rest_shapes.pdf").read_bytes().startswith(b"%PDF")
     assert (made / "figures/rest_shapes.png").is_file()
@@ -182,8 +166,8 @@ def test_the_added_code_makes_its_files(checkout, results, said):
         ("tables/mesh_sizes.csv", TABLE, "> extents", ">= extents"),
     ],
 )
-def test_settings_and_code_make_it_again(checkout, results, said, name, module, old, new):
-    target = f"{results}/{name}"
+def test_settings_and_code_make_it_again(checkout, said, name, module, old, new):
+    target = f"{RESULTS}/{name}"
     arguments = (target, *ARGUMENTS)
     assert checkout.planned(*arguments) == set()
     assert checkout.planned(*arguments, "--config", "blowup_extent=50") == {target}

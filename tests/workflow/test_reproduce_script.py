@@ -76,7 +76,6 @@ class Folder:
         self.path.joinpath("requirements.lock").write_text(LOCK_FILE, encoding="utf-8")
 
     def add_python(self, version: str = "3.12", too_old: int = 0, no_venv: int = 0) -> None:
-        """Put a stand-in for Python on the path."""
         values = {"version": version, "too_old": too_old, "no_venv": no_venv}
         text = PYTHON.format(**values, real=sys.executable, packages=PACKAGES)
         self.python.write_text(text, encoding="utf-8")
@@ -109,11 +108,9 @@ class Folder:
         assert self.calls == [FRONT]
 
     def touch(self, name: str, text: str = "") -> None:
-        """Write a file of the folder."""
         self.path.joinpath(name).write_text(text)
 
     def has(self, name: str) -> bool:
-        """Whether the folder has a file."""
         return self.path.joinpath(name).exists()
 
     @property
@@ -145,6 +142,7 @@ UNFIT = {
     "a new python": (lambda f: f.add_python("3.14", too_old=1), f"{NO_WHEELS} 3.14 .*"),
     "no venv": (lambda f: f.add_python(no_venv=1), "has no venv module.*"),
     "nothing can be made": (lambda f: f.touch(".cache"), "no write permission in .*/a folder"),
+    "a file as results": (lambda f: f.touch("results"), "no write permission in .*/results"),
     "line break": (lambda f: rename(f, "two\nlines"), ".*line break.*"),
     "line break at the end": (lambda f: rename(f, "ends\n"), ".*line break.*"),
 }
@@ -194,9 +192,13 @@ def readable_by_all() -> Iterator[Path]:
     shutil.rmtree(path)
 
 
-def test_a_folder_of_another_user(readable_by_all):
+@pytest.mark.parametrize("place", ["", "results"])
+def test_a_folder_of_another_user(readable_by_all, place):
     folder = Folder(readable_by_all)
-    folder.path.chmod(0o555)
+    closed = folder.path / place
+    closed.mkdir(exist_ok=True)
+    folder.path.chmod(0o777)
+    closed.chmod(0o555)
     command = [str(folder.path / "reproduce")]
     if os.geteuid() == 0:  # root may write anywhere
         setpriv = shutil.which("setpriv")
@@ -205,9 +207,9 @@ def test_a_folder_of_another_user(readable_by_all):
         command = [setpriv, "--reuid=65534", "--regid=65534", "--clear-groups", *command]
     environment = {"PATH": str(folder.programs)}
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
-    folder.path.chmod(0o755)
+    closed.chmod(0o755)
     assert done.returncode != 0
-    assert done.stderr.splitlines() == [f"reproduce: no write permission in {folder.path}"]
+    assert done.stderr.splitlines() == [f"reproduce: no write permission in {closed}"]
 
 
 def test_no_network(folder):
@@ -238,10 +240,14 @@ def test_the_environment_is_made_once_for_each_lock_file(folder):
 
 @pytest.mark.parametrize("change", ["a version", "one more", "one less"])
 def test_packages_that_another_program_changed_are_noticed(change, folder):
+    """Those of the executor for clusters may be added."""
     folder.run()
-    assert folder.run()[1] == ["reproduce: planning"]
     packages = folder.path / ".venv" / PACKAGES
     installed = packages / "numpy-2.1.0.dist-info"
+    lines = (ROOT / "requirements-cluster.lock").read_text("utf-8").splitlines()
+    for name in [line.partition("==")[0] for line in lines if "==" in line]:
+        (packages / f"{name.replace('-', '_')}-1.0.dist-info").mkdir()
+    assert folder.run()[1] == ["reproduce: planning"]
     if change == "one more":
         (packages / "pdrom-0.1.0.dist-info").mkdir()
     elif change == "one less":
@@ -251,14 +257,6 @@ def test_packages_that_another_program_changed_are_noticed(change, folder):
     announcement, why, *_ = folder.run()[1]
     assert "making .venv" in announcement
     assert why == "reproduce: .venv holds other packages than those of requirements.lock"
-
-
-def test_the_executor_for_clusters_may_be_added(folder):
-    folder.run()
-    lines = (ROOT / "requirements-cluster.lock").read_text("utf-8").splitlines()
-    for name in [line.partition("==")[0] for line in lines if "==" in line]:
-        (folder.path / ".venv" / PACKAGES / f"{name.replace('-', '_')}-1.0.dist-info").mkdir()
-    assert folder.run()[1] == ["reproduce: planning"]
 
 
 def test_arguments_are_handed_on(folder):

@@ -13,27 +13,24 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import pytest
+import sandbox
 import yaml
 from checkout import Checkout, Made, copy_repository, only_line
+from sandbox import MICRO_FILE
 
 from places import MICRO_MANUSCRIPT, MICRO_RESULTS
 from study.figures.kit.declaration import declarations
 from study.pipeline.running import hold
 from study.tables import declared
 
-MICRO = {
+MICRO = sandbox.MICRO | {
     "scenes": ["spring_oop", "strain_oop", "bar_release"],
     "methods": ["deim", "block-deim"],
     "ranks": [4, "full"],
-    "coarsen": {"resolution": 0.25, "frames": 0.05},
-    "sensitivity": {"perturbations": [1e-10], "seeds": [1]},
     "subspace": {"scenes": ["strain_oop"], "sizes": [4], "tolerances": [1e-2]},
 }
 # Folders of results that belong to no single scene.
-SHARED = (
-    "tables", "figures", "paper", "article", "hard_cases", "frame_times",
-)  # fmt: skip
-MICRO_FILE = "micro.yaml"
+SHARED = ("tables", "figures", "paper", "article", "hard_cases", "frame_times")
 KINDS = ("pdf", "png")  # of a figure, for pages and for the report
 EDITED = ("workflow", "config", "paper", "src", "Snakefile", MICRO_FILE)
 DAY_NS = 86_400 * 10**9
@@ -47,7 +44,6 @@ TARGETS = (MICRO_MANUSCRIPT, PAGE, ARTICLE, OUTSIDE)
 
 @pytest.fixture(scope="module")
 def clean(tmp_path_factory: pytest.TempPathFactory) -> Checkout:
-    """A copy in which nothing was ever run."""
     return copy_repository(tmp_path_factory.mktemp("clean"))
 
 
@@ -106,18 +102,14 @@ def test_the_contents_count_the_jobs_of_a_run(finished, plan):
     assert {row[5] for row in listed} == {""}  # nothing has run
 
 
-@pytest.fixture
-def at_work(clean, monkeypatch):
-    """This process holds the lock of the clean copy, as a run does."""
+def test_a_fresh_clone_plans_the_whole_study_beside_a_run_and_starts_no_other(clean, monkeypatch):
+    """Tables and figures, and the manuscript in the end. This process holds the lock."""
     monkeypatch.chdir(clean.folder)
     descriptor = hold()
-    yield
-    os.close(descriptor)
-
-
-def test_a_fresh_clone_plans_the_whole_study_beside_a_run(clean, at_work):
-    """Tables and figures, and the manuscript in the end."""
     done = clean.snakemake("-n")
+    refused = only_line(clean.snakemake("results/fom/bar140/train.h5").stderr)
+    os.close(descriptor)
+    assert f"another run (process {os.getpid()} on " in refused
     assert done.returncode == 0, done.stderr
     log = done.stdout + done.stderr
     assert "Manuscript paper/main.pdf, paper/supplement.pdf" in log
@@ -203,12 +195,6 @@ def test_a_broken_file_ends_the_command_with_one_line(finished, path, own, words
     (finished.folder / "own.yaml").unlink(missing_ok=True)
     assert done.returncode != 0
     assert only_line(done.stdout + done.stderr).startswith(f"pdrom: {words}")
-
-
-def test_one_run_at_a_time(clean, at_work):
-    """A plan is made beside it, as the test above shows."""
-    line = only_line(clean.snakemake("results/fom/bar140/train.h5").stderr)
-    assert f"another run (process {os.getpid()} on " in line
 
 
 ENTRY = '    {\n        "fall": "pdrom.model.effects.forces:Gravity",\n'
@@ -329,5 +315,4 @@ def _stage(path: str) -> str:
 
 
 def _scenes(paths: Iterable[str]) -> set[str]:
-    """Names of the scenes that files belong to."""
     return {Path(_below(path)[1]).stem.removesuffix("_scores") for path in paths}

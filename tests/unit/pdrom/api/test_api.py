@@ -31,13 +31,11 @@ KEYS = {"mesh": {"kind": "cloth", "rows": 6, "columns": 5, "plane": "xz"}, "fram
 
 @pytest.fixture(scope="module")
 def full() -> api.FullRun:
-    """A short run of a small sheet."""
     return api.run(api.build_scene(effects=EFFECTS, **KEYS))
 
 
 @pytest.fixture(scope="module")
 def reduced(full: api.FullRun) -> api.ReducedRun:
-    """A reduced run of it."""
     return api.reduce(full, "spring", "block-deim", 2)
 
 
@@ -137,18 +135,13 @@ FAULTY = {
     "positions cut": (
         lambda full, _: spring(replace(full, positions=full.positions[:-1])), "full: positions",
     ),
-    "positions NaN": (
-        lambda full, _: spring(replace(full, positions=np.nan * full.positions)), "full: positions",
-    ),
     "mesh no pair": (lambda *_: given((1, 2, 3)), "mesh of 3 parts"),
     "r a fraction": (lambda full, _: spring(full, r=1.5), "r = 1.5: a whole number"),
-    "r a text": (lambda full, _: spring(full, r="3"), "r = '3': a whole number"),
     "r true": (lambda full, _: spring(full, r=True), "r = True: a whole number"),
     "r zero": (lambda full, _: spring(full, r=0), "r = 0, the snapshots have"),
     "no run": (lambda full, _: api.reduce(full.scene, "spring"), "full = Scene.*a FullRun is"),
     "no scene": (lambda full, _: api.run(full), "scene = FullRun.*a Scene is required"),
     "group nothing": (lambda full, _: api.reduce(full, None), "group = None"),
-    "method nothing": (lambda full, _: api.reduce(full, "spring", None), "unknown method None"),
     "method a list": (lambda full, _: api.basis(full, "spring", ["pod"]), "unknown method"),
     "basis of arrays": (
         lambda full, _: spring(full, r=1, basis_of_group=np.eye(3)),
@@ -193,7 +186,6 @@ FAULTY = {
     "points of a plane": (lambda *_: given((np.eye(3)[:, :2], HALVES)), "points of shape"),
     "points NaN": (lambda *_: given((np.array(SQUARE) * np.nan, HALVES)), "vertex 0 lies at"),
     "points nothing": (lambda *_: given((None, None)), "points of shape"),
-    "points as text": (lambda *_: given(("points", "cells")), "points of shape"),
     "ragged points": (lambda *_: given(([[0.0], [1.0, 2.0]], HALVES)), "points: an array"),
 }  # fmt: skip
 
@@ -249,7 +241,6 @@ def test_a_mesh_is_given_as_arrays(tmp_path):
 
 
 def copies(value):
-    """Two copies, one by pickle."""
     return copy.deepcopy(value), pickle.loads(pickle.dumps(value))
 
 
@@ -291,18 +282,6 @@ def test_docstrings_tell_every_argument(name):
         assert f"\n{argument} : " in told
 
 
-@pytest.mark.parametrize("method", list(api.methods()))
-def test_every_method_runs_to_its_end_or_says_where_it_blew_up(full, method):
-    made = api.reduce(full, "spring", method, 2)
-    outcome = made.outcome
-    assert np.isfinite(outcome.positions).all()
-    assert len(made.error) == outcome.frames
-    assert outcome.finite == (outcome.blowup_frame is None)
-    assert outcome.frames == 12 or not outcome.finite
-    assert made.gain >= 1.0 - 1e-9
-    assert made.ms > 0.0
-
-
 def test_a_picture_has_a_line_for_each_run_and_a_cross_for_a_blow_up(reduced):
     blown = replace(reduced, outcome=replace(reduced.outcome, blowup_frame=7))
     (axes,) = api.plot(reduced, blown).axes
@@ -324,12 +303,11 @@ def test_runs_of_one_scene_are_shown_together_by_size(full, reduced):
     assert [one.name for one in viewed_scenes(full, other)] == ["scene", "other"]
 
 
-@pytest.mark.parametrize("name", ["reduced", "full"])
-def test_records_are_compared_and_hashed_by_identity(reduced, name):
-    record = reduced if name == "reduced" else reduced.full
-    assert record == record
-    assert record != replace(record)
-    assert len({record, reduced.full.scene}) == 2
+def test_records_are_compared_and_hashed_by_identity(reduced):
+    for record in (reduced, reduced.full):
+        assert record == record
+        assert record != replace(record)
+        assert len({record, reduced.full.scene}) == 2
 
 
 def test_a_run_from_elsewhere_reads_no_other_file(reduced, tmp_path):

@@ -11,7 +11,7 @@ from pdrom.core import machine as module
 from pdrom.core.machine import Kernels, Machine, loaded_kernels, machine
 
 
-def test_it_names_threads_and_cores():
+def test_it_names_threads_and_cores_and_survives_the_file_and_refuses_another_layout():
     for threads in (2, 1):
         with threadpool_limits(limits=threads):
             record = machine()
@@ -19,6 +19,11 @@ def test_it_names_threads_and_cores():
     assert record.cores >= 1
     assert record.cpu
     assert record.libraries["numpy"] == version("numpy")
+    # it survives the file, and another layout is refused
+    assert Machine.model_validate_json(record.model_dump_json()) == record
+    for fault in ({"kernels": 3}, {"architecture": "Haswell"}):
+        with pytest.raises(ValidationError):
+            Machine.model_validate({**record.model_dump(), **fault})
 
 
 def test_kernels_are_those_that_are_loaded():
@@ -43,14 +48,6 @@ def test_a_library_that_does_not_say_its_architecture_is_recorded_without(monkey
     )  # fmt: skip
     assert loaded_kernels() == (expected,)
     assert machine().threads == 3
-
-
-def test_it_survives_the_file_and_refuses_another_layout():
-    record = machine()
-    assert Machine.model_validate_json(record.model_dump_json()) == record
-    for fault in ({"kernels": 3}, {"architecture": "Haswell"}):
-        with pytest.raises(ValidationError):
-            Machine.model_validate({**record.model_dump(), **fault})
 
 
 @pytest.mark.parametrize(

@@ -180,19 +180,16 @@ def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
 
 
 def ready(page: Page) -> None:
-    """Wait until the page shows what was chosen."""
     page.wait_for_selector('body[data-ready="yes"]')
 
 
 def choose(page: Page, **chosen: str) -> None:
-    """Choose from lists by the words shown."""
     for name, label in chosen.items():
         page.select_option(f"#{name}", label=label)
         ready(page)
 
 
 def go_to(page: Page, frame: int) -> None:
-    """Move the slider as the keyboard does."""
     page.focus("#frame")
     page.keyboard.press("Home")
     for _ in range(frame):
@@ -212,9 +209,13 @@ def differ(first: np.ndarray, second: np.ndarray) -> bool:
 
 
 @pytest.mark.slow
-def test_two_methods_and_two_frames_differ(opened: Page) -> None:
+def test_two_methods_and_two_frames_differ_and_their_errors_are_explained(opened: Page) -> None:
     shapes = opened.locator("#shapes")
     choose(opened, scene="sheet", method="near")
+    # the floor begins at 1e-9, the largest error is 1
+    assert opened.get_attribute("#errors", "data-decades") == "-9 0"
+    assert "over the full order's motion" in opened.inner_text("#about")
+    assert "largest 1.0 (frame 12), last 1.0 (frame 12)" in opened.inner_text("#about")
     go_to(opened, 0)
     start = picture(shapes)
     assert np.mean(start.min(axis=2) < 200) > 0.01  # something is drawn
@@ -260,16 +261,6 @@ def test_folds_are_seen_and_the_colour_of_distances_can_be_left_out(opened: Page
     assert blueish.sum() > 1000
     yellow = (shapes[..., 0] - shapes[..., 2] > 80).sum()
     assert yellow > 10 * (without[..., 0] - without[..., 2] > 80).sum(), "one colour alone"
-
-
-@pytest.mark.slow
-def test_the_axis_of_errors_fits_them_and_they_are_explained(opened: Page) -> None:
-    choose(opened, scene="sheet", method="near")
-    assert (
-        opened.get_attribute("#errors", "data-decades") == "-9 0"
-    )  # the floor begins at 1e-9, the largest error is 1
-    assert "over the full order's motion" in opened.inner_text("#about")
-    assert "largest 1.0 (frame 12), last 1.0 (frame 12)" in opened.inner_text("#about")
 
 
 @pytest.mark.slow

@@ -29,8 +29,6 @@ class Section(ConfigModel):
 
 
 class Whole(Section):
-    """The section of the configuration."""
-
     others: tuple[str, ...] = ("b",)
 
 
@@ -40,7 +38,6 @@ class Whole(Section):
     writes={"out": Place("c/{scene}.csv")},
 )
 def multiplied(table: File, section: Section, out: File) -> None:
-    """Multiply a column."""
     write_table(read_table(table.path) * section.factor, out.path)
 
 

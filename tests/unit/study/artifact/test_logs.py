@@ -11,20 +11,17 @@ import time
 import numpy as np
 import pytest
 import scipy.linalg  # noqa: F401  -- loads libraries that have threads
-from hypothesis import given
-from hypothesis import strategies as st
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from pdrom.core.errors import INTERRUPTED, MeshError
 from pdrom.core.store.checksum import sets_aside
-from study.artifact.logs import Usage, job_log, planning_log, usage_of, usage_since
+from study.artifact.logs import job_log, planning_log, usage_of, usage_since
 
 LOGGER = logging.getLogger("pdrom")
 
 
 @pytest.fixture(autouse=True)
 def logger_is_as_before():
-    """Whatever happened in a test, the logger of the package is as it was."""
     before = (list(LOGGER.handlers), LOGGER.level)
     yield
     assert (list(LOGGER.handlers), LOGGER.level) == before
@@ -32,7 +29,6 @@ def logger_is_as_before():
 
 @pytest.fixture
 def path(tmp_path):
-    """A log in a folder that does not exist yet."""
     return tmp_path / "logs" / "rule" / "job.log"
 
 
@@ -128,20 +124,6 @@ def test_warnings_of_the_planning_are_shown_once(capsys):
             logging.getLogger("pdrom.anything").warning("look")
             logging.getLogger("pdrom.anything").info("not shown")
     assert capsys.readouterr().err == "pdrom: warning: look\n"
-
-
-AMOUNTS = st.floats(0.0, 1e6)
-
-
-@given(AMOUNTS, AMOUNTS, AMOUNTS)
-def test_what_is_written_is_read_back(tmp_path_factory, wall, processor, memory):
-    log = tmp_path_factory.mktemp("log") / "x.log"
-    log.write_text(f"2026-01-01 INFO pdrom: {Usage(wall, processor, memory)}\n")
-    found = usage_of(log)
-    assert found is not None
-    assert found.wall == pytest.approx(wall, abs=1e-3)
-    assert found.processor == pytest.approx(processor, abs=1e-3)
-    assert found.memory == pytest.approx(memory, abs=0.1)
 
 
 def test_processor_time_and_memory_are_those_of_the_process_and_of_what_it_started():

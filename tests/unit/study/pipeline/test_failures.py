@@ -28,7 +28,6 @@ def snakemake():
 
 
 def fail(logger, rule, log, said):
-    """A failed job as Snakemake logs it."""
     logger.error(f"RuleException:\n{said}", extra={"event": LogEvent.ERROR})
     job = {"rule_name": rule, "log": [str(log)], "output": ["results/x.h5"]}
     logger.error("Error in rule", extra={"event": LogEvent.JOB_ERROR, **job})

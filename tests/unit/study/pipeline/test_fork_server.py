@@ -30,7 +30,6 @@ for command in sys.argv[1:]:
 
 
 def run(*commands: str, owner: str = OWNER, **options) -> subprocess.CompletedProcess[str]:
-    """The owner with these commands, to its end."""
     return subprocess.run(
         [sys.executable, "-c", owner, *commands],
         capture_output=True, text=True, check=True, **options,
@@ -38,7 +37,6 @@ def run(*commands: str, owner: str = OWNER, **options) -> subprocess.CompletedPr
 
 
 def start(command: str, **environment: str) -> subprocess.Popen[str]:
-    """The owner with this command, at work."""
     return subprocess.Popen(
         [sys.executable, "-c", OWNER, command], env={**os.environ, **environment},
         stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
@@ -169,7 +167,6 @@ class ForkServer:
         assert self.host.communicate() == ("ended 1\n", None)
 
     def connect(self) -> socket.socket:
-        """Connection of a client."""
         connection = socket.socket(socket.AF_UNIX)
         connection.connect(self.address)
         return connection
@@ -191,19 +188,15 @@ class ForkServer:
         return os.waitstatus_to_exitcode(int(told[20:])) == 3
 
 
-@pytest.mark.parametrize("streams", [0, 1, 3])
-def test_what_is_no_request_is_dropped(tmp_path, streams):
-    """The client learns it from the end of its connection."""
-    with ForkServer(tmp_path) as server:
-        with server.connect() as connection:
-            socket.send_fds(connection, [b"x"], [0] * streams)
-            assert connection.recv(20) == b""
-        assert server.serves()
-
-
-def test_a_silent_client_and_half_a_request_keep_nobody_waiting(tmp_path):
+def test_no_request_is_dropped_a_silent_client_and_half_a_request_keep_nobody_waiting(tmp_path):
+    """The client of none learns it from the end of its connection."""
     reader, writer = os.pipe()
     with ForkServer(tmp_path) as server, server.connect() as silent, server.connect() as half:
+        for streams in (0, 1, 3):
+            with server.connect() as connection:
+                socket.send_fds(connection, [b"x"], [0] * streams)
+                assert connection.recv(20) == b""
+            assert server.serves()
         socket.send_fds(half, [b"x"], [0, 1, 2, reader])
         os.write(writer, b"/\0")
         assert server.serves()

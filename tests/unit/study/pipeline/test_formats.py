@@ -13,7 +13,7 @@ from pdrom.model.held_out import MOTIONS
 from places import ROOT
 from study.artifact.paths import FULL_ORDER, HELDOUT
 from study.pipeline.folders import Folders
-from study.pipeline.plan import Plan, load_plan
+from study.pipeline.plan import load_plan
 
 SCENE, GROUP, METHOD = "strain_oop", "strain", "block-deim"
 # Rules in the order in which one reads what another writes, with the labels of a job.
@@ -41,13 +41,6 @@ def documented() -> dict[str, dict[str, tuple[str, str, str]]]:
     return found
 
 
-def perform(plan: Plan, name: str, labels: dict[str, str]) -> dict[str, str]:
-    """Run a job here; paths that it wrote by the pattern of the page."""
-    job = plan.job(plan.experiments[name], labels)
-    job.make(job.outputs)
-    return {job.artifact.writes[key].pattern: path for key, path in job.outputs.items()}
-
-
 @pytest.fixture(scope="module")
 def files(tmp_path_factory):
     """A file of each kind, of a small sheet, by its pattern."""
@@ -68,7 +61,9 @@ def files(tmp_path_factory):
         }
         made = {}
         for name, labels in RULES:
-            made |= perform(plan, name, {**labels, **more.get(name, {})})
+            job = plan.job(plan.experiments[name], {**labels, **more.get(name, {})})
+            job.make(job.outputs)
+            made |= {job.artifact.writes[key].pattern: path for key, path in job.outputs.items()}
         made[FULL_ORDER.pattern] = made[HELDOUT.pattern]
     return made, plan.study.bound[SCENE]
 

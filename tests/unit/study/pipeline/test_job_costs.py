@@ -38,7 +38,6 @@ def plan(**coarsen: float) -> SimpleNamespace:
 
 
 def say(results: Path, log: str, processor: float, wall: float = 0.0, memory: float = 0.0) -> None:
-    """Write the log of a job that has ended well."""
     path = results / "logs" / log
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(f"date INFO pdrom: {Usage(wall, processor, memory)}\n", encoding="utf-8")
@@ -84,7 +83,8 @@ def test_pages_say_the_times_of_the_record_and_the_unit(page):
         assert f"{minutes(study.wall_s)} with the set-up {processor}" in text
 
 
-def test_every_experiment_was_measured_and_takes_time():
+def test_every_experiment_was_measured_and_takes_time_and_every_claim_is_recorded():
+    assert pd.read_csv(ROOT / RECORDED).claim.tolist() == list(load_claims(ROOT / RULES))
     assert set(experiments()) <= set(TABLE.index)
     assert (TABLE > 0.0).all().drop("longest_s").all()
 
@@ -140,10 +140,6 @@ def test_another_verdict_is_not_the_same(tmp_path: Path) -> None:
     other.to_csv(tmp_path / "kept.csv", index=False)
     table = replication(today, ROOT / RULES, tmp_path / "kept.csv")
     assert table.rules_unchanged.tolist() == [False, True, False, True]
-
-
-def test_the_kept_record_has_every_claim() -> None:
-    assert pd.read_csv(ROOT / RECORDED).claim.tolist() == list(load_claims(ROOT / RULES))
 
 
 def test_kernels_are_compiled_once(tmp_path, capsys):

@@ -22,7 +22,6 @@ sys.stdin.read()
 
 @pytest.fixture(autouse=True)
 def folder(tmp_path, monkeypatch):
-    """Each test is at work in a folder of its own."""
     monkeypatch.chdir(tmp_path)
     return tmp_path
 

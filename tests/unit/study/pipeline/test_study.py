@@ -28,24 +28,6 @@ def study(**sections) -> Study:
     return Study(STUDY | sections, ROOT)
 
 
-@pytest.mark.parametrize(
-    ("section", "message"),
-    [
-        ({"stability": {"time_steps": [0.0]}}, "stability.time_steps"),
-        ({"stability": {"stiffness_ratios": [-1.0]}}, "stability.stiffness_ratios"),
-        ({"stability": {"min_frames": 50, "max_frames": 40}}, "max_frames = 40: at least"),
-        ({"stability": {"left": 1.0}}, "stability.left = 1.0"),
-        ({"stability": {"departure": 3.0}}, "unknown key 'stability.departure'"),
-        ({"variants": {"scenes": ["spring_oup"]}}, "unknown scene 'spring_oup'"),
-        ({"variants": {"seeds": [1, 1]}}, "seeds = [1, 1]: an entry is given twice"),
-    ],
-)
-def test_faults_are_named(section, message):
-    with pytest.raises(ConfigurationError) as error:
-        study(**section)
-    assert message in str(error.value)
-
-
 def test_short_runs_are_planned_where_the_study_holds_them():
     asked = {"scenes": ["strain_oop", "bar_release"], "ranks": [6, 20]}
     made = study(stability=asked)

@@ -26,7 +26,6 @@ TABLES = ("results/tables/claims.csv",)
 
 @pytest.fixture(autouse=True)
 def project(tmp_path, monkeypatch):
-    """A folder with some results."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(os, "getloadavg", lambda: (0.0, 0.0, 0.0))
     Path("results/figures").mkdir(parents=True)

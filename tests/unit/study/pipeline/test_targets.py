@@ -39,7 +39,6 @@ def test_files_that_have_a_place_of_their_own():
 
 
 def rule(name: str, pattern: str, wildcards: bool = False) -> SimpleNamespace:
-    """A rule of Snakemake that makes what its pattern matches."""
     makes = re.compile(pattern).fullmatch
     return SimpleNamespace(name=name, has_wildcards=lambda: wildcards, is_producer=makes)
 
@@ -55,7 +54,6 @@ RULES = [
 
 @pytest.fixture(scope="module")
 def plan():
-    """A plan of a study with a variant."""
     config = {
         "scenes": ["strain_oop"], "methods": ["deim"], "variants": {"scenes": ["spring_oop"]},
         "coarsen": {"resolution": 0.3, "frames": 0.1},

@@ -23,7 +23,6 @@ def git(folder, *arguments: str) -> None:
 
 @pytest.fixture
 def clone(tmp_path):
-    """A repository with two files, one of them executable."""
     (tmp_path / "sub").mkdir()
     (tmp_path / "sub" / "text.md").write_text("words\n")
     (tmp_path / "run").write_text("#!/bin/sh\n")

@@ -16,7 +16,6 @@ ERRORS = ["relative_error", "relative_error_within_horizon", "error_over_extent"
 
 
 def put(frame, rows, columns, value):
-    """A table with other values in some cells."""
     frame.loc[rows, columns] = value
     return frame
 
@@ -28,7 +27,6 @@ def of_runs(frame, failed):
 
 
 def errors_times(frame, rows, factor, gains):
-    """Errors of rows that are off by a factor, with gains that are off as well."""
     frame.loc[rows, "gain"] *= gains
     frame.loc[rows, [name for name in frame if "error" in name]] *= factor
     return frame
@@ -51,14 +49,12 @@ def blow_ups_on_bases_of_round_off_become_runs(frame):
 
 
 def swapped(frame, column):
-    """A table in which each name of a column stands in place of another."""
     names = frame[column].unique()
     others = dict(zip(names, np.roll(names, 1), strict=True))
     return frame.assign(**{column: frame[column].map(others)})
 
 
 def another(frame, row, column):
-    """A table with another verdict in some rows."""
     now = frame.loc[row, column].iloc[0]
     return put(frame, row, column, "holds" if now != "holds" else "does not hold")
 
@@ -82,7 +78,6 @@ EDITS = {
         "noise", lambda f: put(f, f.relative_error.notna(), "relative_error", 0.5)),
     "an outcome has another name": (
         "stability", lambda f: put(f, f.index[f.outcome == "wrong"][0], "outcome", "accurate")),
-    "hard cases blow up": ("hard_cases", lambda f: put(f, f.index[::5], "outcome", "blow-up")),
     "all errors of held-out motions move a little": (
         RERUNS, lambda f: f.assign(
             shape_error=f.shape_error.where(f.motion == "train", f.shape_error * (1 + 1e-3)))),

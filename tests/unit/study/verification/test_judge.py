@@ -33,7 +33,6 @@ def studies():
 
 @pytest.fixture(scope="module")
 def tiny(studies):
-    """Tables of the tiny study and what they say of each other."""
     return studies[1]
 
 
@@ -53,7 +52,6 @@ def every_column(tables, context, kinds):
 
 
 def three_times(column, values, limit):
-    """Numbers that are off by three times a tolerance."""
     if column.kind == "integer":
         return values + max(1, int(3 * limit * (1 if column.quantity == "share" else values.max())))
     return values + 3 * limit if column.quantity == "share" else values * (1 + 3 * limit)

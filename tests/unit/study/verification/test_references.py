@@ -20,11 +20,12 @@ LIMIT = 1_250_000  # bytes
 
 @pytest.fixture
 def frame(tracked):
-    """Some rows of a table."""
     return tracked[TABLE.name].head(20)
 
 
-def test_a_reference_comes_back_as_it_was_kept_without_what_a_clock_has_a_say_in(frame, tmp_path):
+def test_a_reference_comes_back_as_it_was_kept_without_what_a_clock_has_a_say_in(
+    frame, tmp_path, monkeypatch
+):
     write_reference(TABLE, frame, tmp_path)
     found = read_reference(TABLE, tmp_path)
     lost = dict.fromkeys(set(TABLE.column_names) - set(found.columns))
@@ -34,15 +35,11 @@ def test_a_reference_comes_back_as_it_was_kept_without_what_a_clock_has_a_say_in
     assert "speedup" not in found.columns
     assert [path.name for path in tmp_path.iterdir()] == ["reduced_reruns.csv"]
     assert read_reference(declared()["claims"], tmp_path) is None
-
-
-def test_a_large_table_is_packed_and_leaves_no_other_form(frame, tmp_path, monkeypatch):
-    write_reference(TABLE, frame, tmp_path)
-    plain = read_reference(TABLE, tmp_path).frame
+    # a large table is packed and leaves no other form
     monkeypatch.setattr(references, "PACKED_FROM", 100)
     write_reference(TABLE, frame, tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["reduced_reruns.csv.xz"]
-    pd.testing.assert_frame_equal(read_reference(TABLE, tmp_path).frame, plain)
+    pd.testing.assert_frame_equal(read_reference(TABLE, tmp_path).frame, found.frame)
 
 
 def test_a_damaged_reference_is_named(tmp_path):

@@ -32,7 +32,6 @@ SUBJECT = Subject(OPTIONS, Folders())
 
 
 def _doubled(table: File, out: File) -> None:
-    """A manuscript made from a table."""
     Path(out.path).write_text(Path(table.path).read_text().replace("1.5", "3.0"))
 
 
@@ -81,7 +80,6 @@ def renew_checksum(monkeypatch):
 
 
 def rewrite(change):
-    """Another manifest, with new checksums."""
     path = Path("results/manifest.json")
     content = json.loads(path.read_text())
     change(content["files"])
@@ -109,7 +107,6 @@ def test_intact_files_hold_with_what_a_target_names_beside_the_study(monkeypatch
 
 
 def flipped(name, _):
-    """A file with another digit."""
     content = bytearray(Path(name).read_bytes())
     content[len(content) // 2] ^= 1
     Path(name).write_bytes(bytes(content))
@@ -145,7 +142,6 @@ def lost_and_unlisted(name, monkeypatch):
 
 
 def broken_maker(_, monkeypatch):
-    """What made a file fails now."""
     monkeypatch.setattr(SUBJECT.plan, "fixed", {"paper": [job_of(BROKEN)]})
 
 
