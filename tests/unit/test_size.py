@@ -14,8 +14,8 @@ from places import tracked
 LIMITS = {
     "lines of src": 35_864,
     "modules of src": 215,
-    "lines of tests": 24_052,
-    "words of documentation": 24_562,
+    "lines of tests": 22_786,
+    "words of documentation": 24_560,
     "tables": 25,
     "figures": 23,
     "experiments": 19,
