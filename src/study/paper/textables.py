@@ -219,7 +219,7 @@ def payoff(payoff: pd.DataFrame) -> Rows:
         errors = _known(row.error_train), unseen, _known(row.playback_error)
         gains = map(_known, (row.least_speedup, row.best_speedup, row.most_speedup))
         counts = map(str, (row.scenes, row.accurate, row.pays, row.loses))
-        scored = map(str, (row.accurate_heldout, row.pays_heldout))
+        scored = [str(n) if row.heldout else NONE for n in (row.accurate_heldout, row.pays_heldout)]
         yield [_name(f"{row.method}{basis}"), *counts, *gains, *errors, *scored]
 
 

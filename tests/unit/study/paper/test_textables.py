@@ -161,7 +161,7 @@ C1 beyond & all & $\le$ 0.050 & 0 of 0 & -- & -- & -- \\
   & never \\
 \texttt{b} & \texttt{ecsw, k = 20} & 8 & 66 to 73 & 0.010 & 0.020 & 0.50 & 1 & 3 & 1200 \\
 % payoff
-\texttt{deim\_x} & 3 & 0 & 0 & 0 & -- & -- & -- & \ensuremath{\infty} & -- (0) & -- & 0 & 0 \\
+\texttt{deim\_x} & 3 & 0 & 0 & 0 & -- & -- & -- & \ensuremath{\infty} & -- (0) & -- & -- & -- \\
 \texttt{ecsw, pod} & 3 & 2 & 1 & 1 & 0.50 & 0.50 & 0.50 & 0.50 & 0.50 (2) & 0.90 & 2 & 1 \\
 % the largest numbers of modes and of iterations
 % training
