@@ -1,4 +1,4 @@
-"""Figures of error against time: reduced models by family, other methods, and tolerances."""
+"""Figures of error against time: reduced models by family, other methods, and requested tolerances."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -172,7 +172,7 @@ def _points(ax: Axes, rows: pd.DataFrame, size: float, colour: str, **look: Any)
 
 
 def label_iterations(ax: Axes, found: TradeOffs, scene: str) -> None:
-    """Label each full-order run of ``scene`` with fewer iterations by its number of iterations.
+    """Label each full-order run of ``scene`` that stops early by its number of iterations.
 
     The runs are in ``found`` and are drawn on ``ax``; neighbouring runs share a label.
     """

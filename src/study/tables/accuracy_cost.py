@@ -59,7 +59,7 @@ def accuracy_cost(
     iterations: Mapping[str, int],
     **files: list[paths.File],
 ) -> pd.DataFrame:
-    """One row per full-order run, and per reduced run with a time and an error before the horizon.
+    """One row per full-order run, and per reduced run with a time and an error.
 
     The column ``pareto`` compares rows of the same scene whose errors have the same reference.
 

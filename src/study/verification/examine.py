@@ -164,7 +164,7 @@ class Examination:
         return line(Outcome.REPRODUCED, compared)
 
     def claims(self) -> list[Line]:
-        """Outcomes of the comparison of all claims."""
+        """Verdict of this run on each claim, compared with the expected one."""
         line = self.table(CLAIMS)
         try:
             found = self.found(CLAIMS).set_index("claim")

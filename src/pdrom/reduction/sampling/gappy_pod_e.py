@@ -166,7 +166,7 @@ def eigenvalue_growth(
 
 
 def _smaller_root(squared: np.ndarray, beside: np.ndarray, gap: float) -> np.ndarray:
-    """Root t of `eigenvalue_growth`, (m,), for ``squared`` |b|^2, ``beside`` c and ``gap`` g."""
+    """Smaller root t (m,) of the quadratic in `eigenvalue_growth`; |b|^2, c and g as there."""
     if np.isinf(gap):
         return squared
     mean = squared + beside

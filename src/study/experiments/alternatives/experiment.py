@@ -210,7 +210,7 @@ class Candidate:
     columns: Columns | None = None
 
     def state(self, state: State, scene: Scene) -> State:
-        """Convert the ``state`` of all vertices of ``scene`` to coordinates of the loop."""
+        """Convert the ``state`` of all vertices of ``scene`` to the unknowns of this method."""
         if self.columns is None:
             return state
         own = (self.columns, scene.masses)
@@ -340,7 +340,7 @@ class Timed:
     settings: Comparison
 
     def variants(self) -> Iterator[Variant]:
-        """Loops of all candidates; a frame consists of ``steps`` steps of a loop."""
+        """Methods with their settings, to be timed; ``steps`` of their steps are a frame."""
         scene, wanted = self.scene, min(self.settings.frames, self.scene.config.frames)
         places = np.linspace(0, scene.config.frames - 1, wanted).round().astype(int)
         # in this run, boundaries store their first positions, which runs from later states need

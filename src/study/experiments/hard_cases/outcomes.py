@@ -210,7 +210,7 @@ def _subspace(training: Training, kind: str, sampling: str, limit: float) -> Red
 def row(
     training: Training, name: str, methods: Methods, expected: Mapping[str, Expectation]
 ) -> dict[str, Any]:
-    """Table row of the reduction ``name``: sizes, gain, extent, outcome, reason of a failure."""
+    """Table row of the run with the reduction ``name``: how it ended, and why if it failed."""
     try:
         reduced = reduced_run(training, name, methods, limit=BLOWUP * training.extent)
     except NotReducibleError as error:
