@@ -360,7 +360,7 @@ class Scene:
         return Anderson(window) if window else None
 
     def space(self, system: GlobalSystem) -> VertexSpace:
-        """Return the unknowns of a full-order run, the vertex positions, with this linear ``system``."""
+        """Return the unknowns of a full-order run, all positions, with this linear ``system``."""
         return VertexSpace(system, self.forces, self.boundaries, contacts=self.contacts)
 
 

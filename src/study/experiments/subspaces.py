@@ -400,7 +400,7 @@ def live(mesh: File, train: File, settings: Options, out: File, **files: list[Fi
 def _joint(
     scene: Scene, group: str, reduction: Reduction, beside: list[Labelled]
 ) -> Iterator[Labelled]:
-    """For each position subspace of ``beside``, yield a model with `JOINT` projections of ``group``."""
+    """For each subspace of ``beside``, yield a model with `JOINT` projections of ``group``."""
     for model in {id(model.columns): model for _, model in beside}.values():
         joint = interpolation_of(scene.group(group), model.columns, reduction)
         labels = {"family": "joint", "k": model.columns.modes, "r": reduction.r}

@@ -1,4 +1,4 @@
-"""Figures of error against time: reduced models by family, other methods, and requested tolerances."""
+"""Figures of error against time: reductions by family, other methods, requested tolerances."""
 
 from dataclasses import dataclass
 from typing import Any

@@ -199,7 +199,7 @@ KINDS = {
     "lower gain, separate coefficients": ("deim-joint", "published"),
 }
 _PLACE = ["scene", "group", "r"]
-VOLUMES = ("deformation_gradient", "tetrahedron_strain", "volume")  # constraint groups on tetrahedra
+VOLUMES = ("deformation_gradient", "tetrahedron_strain", "volume")  # groups on tetrahedra
 MESHES = ALL, SHEETS, BARS = "all", "sheets", "bars"
 # Constructor of number columns that summarise many runs, with the tolerance of shares.
 share = partial(number, compared="share")

@@ -145,7 +145,7 @@ class EdgeSpring(simplex.SimplexGroup):
     unit = "m"
     rows_per_element = 1
     per_element = ("rest",)
-    reordered = False  # small meshes stay in one piece: edges are sorted by vertices already, and all cost the same
+    reordered = False  # edges are sorted by vertices already, and all cost the same
     split_from = 8192
     project_kernel = _project
     accumulate_kernel = _accumulate
