@@ -214,7 +214,7 @@ def stability(
 
 
 def outcomes(runs: pd.DataFrame, wrong: float, departure: float) -> list[str]:
-    """Outcome of each run; above the limits ``wrong`` and ``departure`` it is wrong, has departed."""
+    """Outcome of each run, by its error and extent: above ``wrong`` and ``departure`` it failed."""
     full = runs[(runs.method == "full") & (runs.position_basis == "full")]
     extents = full.set_index(SETTING).max_extent.rename("full_extent")
     error = runs.relative_error.astype(float)
