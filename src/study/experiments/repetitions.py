@@ -145,8 +145,8 @@ class ReducedRuns:
     ) -> Iterator[dict[str, Any]]:
         """Rows of held-out motions, by a basis for each number of training motions in ``counts``.
 
-        The first training motion is that of the scene, the others are drawn by seeds. With n
-        training motions, every n-th training snapshot of each is used.
+        The first training motion is that of the scene, the others are drawn by seeds. Of n motions
+        every n-th training snapshot is used. Errors are over the frames before ``end``.
         """
         config, mesh = self.scene.config, self.scene.mesh
         frames = self.data.frames["train"]
