@@ -141,7 +141,7 @@ def _measure(space: ReducedSpace, fixed: np.ndarray, norm: Norm, frames: int) ->
 SKETCH = 60
 # First and largest number of candidate elements. The equations of all elements of a large mesh
 # would not fit into memory, and neighbouring elements are similar.
-CANDIDATES, MOST = 5000, 20_000
+CANDIDATES, MOST = 10_000, 20_000
 SEED = 0
 
 
@@ -196,23 +196,25 @@ def training_equations(
     for _, alike in groupby(training, key=lambda frame: id(frame.measure)):
         frames = list(alike)
         lifted = weighted @ frames[0].measure.T
-        differences, targets = [], []
+        own = np.ascontiguousarray(lifted.reshape(shape)[elements])
         for frame in frames:
             group.begin_frame(columns.B @ frame.start)
-            for before, after in frame.pairs:
-                difference = strain @ after - group.project(columns.B @ before)
-                differences.append(difference.reshape(shape)[elements])
-                sum_of_all = lifted.T @ difference
-                norm += float(np.sum(sum_of_all**2))
-                hashed = (
-                    generator.integers(size, size=sum_of_all.shape),
-                    generator.choice([-1.0, 1.0], size=sum_of_all.shape),
-                )
-                np.add.at(sums, hashed[0], hashed[1] * sum_of_all)
-                targets.append(hashed)
-        buckets, signs = (np.stack(part) for part in zip(*targets, strict=True))
-        own = np.ascontiguousarray(lifted.reshape(shape)[elements])
-        _hash_equations(own, np.stack(differences), buckets, signs, rows)
+            # all iterates of a frame at once, side by side: one pass over each large matrix
+            before, after = (np.hstack(list(frame.pairs[:, i])) for i in range(2))
+            positions, differences = columns.B @ before, strain @ after
+            for pair in range(0, differences.shape[1], 3):
+                at = slice(pair, pair + 3)
+                differences[:, at] -= group.project(np.ascontiguousarray(positions[:, at]))
+            sums_of_all = lifted.T @ differences
+            norm += float(np.sum(sums_of_all**2))
+            entries = len(lifted.T), 3
+            drawn = [
+                (generator.integers(size, size=entries), generator.choice([-1.0, 1.0], entries))
+                for _ in frame.pairs
+            ]
+            buckets, signs = (np.hstack(part) for part in zip(*drawn, strict=True))
+            np.add.at(sums, buckets, signs * sums_of_all)
+            _hash_equations(own, differences.reshape(shape)[elements], buckets, signs, rows)
     if norm > 0.0:
         rows /= np.sqrt(norm)
         sums /= np.sqrt(norm)
@@ -225,16 +227,15 @@ def training_equations(
 def _hash_equations(lifted, differences, buckets, signs, out):
     """Add the equations of each element to the rows ``buckets`` of ``out``, times ``signs``.
 
-    lifted : (m, p, K'), differences : (n, m, p, 3), buckets, signs : (n, K', 3), out : (m, size)
+    lifted : (m, p, K'), differences : (m, p, n), buckets, signs : (K', n), out : (m, size)
     """
     for e in range(out.shape[0]):
-        for n in range(differences.shape[0]):
-            for k in range(lifted.shape[2]):
-                for axis in range(3):
-                    value = 0.0
-                    for row in range(lifted.shape[1]):
-                        value += lifted[e, row, k] * differences[n, e, row, axis]
-                    out[e, buckets[n, k, axis]] += signs[n, k, axis] * value
+        for k in range(lifted.shape[2]):
+            for n in range(differences.shape[2]):
+                value = 0.0
+                for row in range(lifted.shape[1]):
+                    value += lifted[e, row, k] * differences[e, row, n]
+                out[e, buckets[k, n]] += signs[k, n] * value
 
 
 log = logging.getLogger(__name__)
