@@ -1,4 +1,4 @@
-"""Snakemake finds ``--logger pdrom`` by the name of this package."""
+"""Snakemake's logger for the option ``--logger pdrom``, found by the name of this package."""
 
 import logging
 import sys
@@ -10,15 +10,17 @@ from snakemake_interface_logger_plugins.common import LogEvent
 from study.pipeline.progress import Estimate, rounded
 
 NOTHING = "Nothing to be done"
-# Part of Snakemake's message about a failed job; the run's last lines report such jobs instead.
+# Parts of Snakemake's messages about failed jobs, which are not printed: a run's last lines report
+# failed jobs.
 JOB_FAULT = "RuleException"
 CLOSING = "At least one job did not complete successfully"
 
 
 class LogHandler(LogHandlerBase):
-    """One line a started or failed job on standard error, and Snakemake's warnings.
+    """Log handler that prints one line for each started or failed job, and Snakemake's warnings.
 
-    Snakemake's own account stays in its log. In a dry run no jobs are printed.
+    It prints to standard error. Snakemake's other messages are in its log only. In a dry run, no
+    jobs are printed.
     """
 
     writes_to_stream = True
@@ -33,7 +35,7 @@ class LogHandler(LogHandlerBase):
         self._estimate = Estimate()
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Print the part of a log ``record`` that concerns the user, and update the estimate."""
+        """Print a log ``record`` if it concerns the user; update the estimate of remaining time."""
         event, text = getattr(record, "event", None), record.getMessage()
         news = event is None and (record.levelno >= logging.WARNING or NOTHING in text)
         if event == LogEvent.RUN_INFO:

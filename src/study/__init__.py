@@ -1,4 +1,4 @@
 """The study: experiments, tables, figures, verdicts and the paper, made with pdrom.
 
-Data flow, one direction only: runs -> tables -> figures -> paper.
+Data flow in one direction only: from runs to tables, figures and the paper.
 """

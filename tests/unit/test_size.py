@@ -12,10 +12,10 @@ import pytest
 from places import tracked
 
 LIMITS = {
-    "lines of src": 35_864,
+    "lines of src": 35_863,
     "modules of src": 215,
-    "lines of tests": 22_786,
-    "words of documentation": 24_560,
+    "lines of tests": 22_765,
+    "words of documentation": 24_549,
     "tables": 25,
     "figures": 23,
     "experiments": 19,

@@ -206,7 +206,7 @@ def test_no_text_and_no_date_reruns_anything(finished):
     All sources are younger than the results, then all results are younger than now.
     """
     finished.edit(SPRING, '"""Edge springs:', '"""Springs along edges:')
-    finished.edit(SPRING, "    # scaled, so that ", "    # divided, so that ")
+    finished.edit(SPRING, "    # edges are scaled, so that ", "    # edges are divided, so that ")
     finished.edit(SCRIPT, "    make(", "    # the job\n    make(")
     poke = "src/pdrom/model/effects/poke.py"
     finished.edit(poke, "self._order[turn : ", "self._order[0 + turn : ")

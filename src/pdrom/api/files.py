@@ -33,7 +33,7 @@ def load_scene(path: str | os.PathLike[str]) -> Scene:
     Raises
     ------
     ConfigurationError
-        Naming the file, the key and the fault.
+        The file has a fault; the message names the file, the key and the fault.
     """
     path = file_path(path)
     config = validate(SceneConfig, named(read_yaml(path), path.stem), str(path))
@@ -54,7 +54,7 @@ def build_scene(folder: str | os.PathLike[str] = ".", mesh: Any = None, **keys: 
     Raises
     ------
     ConfigurationError
-        Naming the key and the fault.
+        A keyword has a fault; the message names the key and the fault.
     """
     keys, source = named(keys, "scene"), "build_scene"
     if not isinstance(mesh, (tuple, list)):
@@ -138,8 +138,8 @@ def load(path: str | os.PathLike[str], unchecked: bool = False) -> AnyRun:
     Raises
     ------
     StorageError
-        The file is missing, damaged, without a checksum, or has links to other files; it has no
-        run of a scene, or lacks data that its scene requires.
+        The file is missing, damaged, without a checksum, or has links to other files; it contains
+        no run of a scene, or lacks data that its scene requires.
     """
     path = file_path(path)
     try:

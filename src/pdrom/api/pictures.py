@@ -81,11 +81,10 @@ def view(path: str | os.PathLike[str], *runs: AnyRun) -> None:
 
 
 def viewed_scenes(*runs: AnyRun) -> list[ViewedScene]:
-    """Collect runs by scene, for pictures and pages; it raises the errors that `view` raises.
+    """Collect ``runs`` of any kind by scene, for pictures and pages.
 
-    Parameters
-    ----------
-    runs : runs of any kind; runs with equal scenes become one scene
+    ConfigurationError if an argument is no run, SceneError without arguments or if two different
+    scenes have one name.
     """
     if not runs:
         raise SceneError("view: at least one run is required")

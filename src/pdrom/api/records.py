@@ -45,7 +45,7 @@ class FullRun:
 class ReducedRun:
     """A run with the projections of one group reduced, compared with its full-order run.
 
-    gain : norm of the sampled equations' solution operator; 1 if every projection is evaluated
+    gain : factor by which sampling can amplify errors; 1 if every projection is evaluated
     outcome : positions (F' + 1, N, 3) m, differences, and whether it blew up
     ms : median milliseconds per frame
     """
@@ -93,8 +93,8 @@ class RequestedRun:
     outcome : positions (F + 1, N, 3) m, number of frames that meet the tolerance, level that ran
     ms : (F,) milliseconds per frame; checks and failed levels are spread evenly over the frames
     offline_s : seconds of the calibration before the run
-    error : true error over these frames against the converged implicit step; None if the scene is
-        not the one of the calibration, since the error is then unknown
+    error : true error, over the frames that meet the tolerance, against the converged implicit
+        step; None (unknown) if the scene is not the one of the calibration
     """
 
     scene: Scene

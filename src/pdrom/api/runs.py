@@ -162,9 +162,9 @@ def reduce(
     method : name in config/methods.yaml, or a specification
     r : number of modes, from 1 to the rank of the basis
     basis_of_group : basis of the group by `basis` for this method; None makes one from ``full``
-    error : instead of the four above: largest relative error allowed, 0.01 or "velocity=0.05",
-        against the implicit step solved to convergence. The whole scene is reduced as far as that
-        allows, or not at all.
+    error : replaces the four arguments ``group`` to ``basis_of_group``. It is the largest allowed
+        relative error, 0.01 or "velocity=0.05", against the implicit step solved to convergence.
+        The whole scene is reduced as far as this error allows, or not at all.
     scene : with ``error``, another scene with the same mesh to run; ``full`` is the training run
     on_frame : with ``error``, called after each frame with the title of the level of accuracy
 
@@ -172,7 +172,7 @@ def reduce(
     -------
     ReducedRun, or RequestedRun with an ``error``
         ``outcome`` (positions, differences, the frame of a blow-up), ``error`` of each frame,
-        ``gain``, ``ms`` a frame.
+        ``gain`` (amplification of errors by sampling), ``ms`` (milliseconds per frame).
 
     Raises
     ------
@@ -191,7 +191,7 @@ def reduce(
         raise ConfigurationError("scene: only together with an error")
     group = arguments.require(str, group, "group", source=GROUP)
     scene, spec = full.scene, _method_spec(method)
-    size: Any = r  # its range is checked with the basis
+    size: Any = r  # the range of r is checked later, when the rank of the basis is known
     if isinstance(size, bool) or not isinstance(size, Integral):
         raise ConfigurationError(f"r = {shown(r, 60)}: a whole number of modes is required")
     r, chosen = int(size), scene.group(group)

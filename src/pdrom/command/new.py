@@ -59,7 +59,7 @@ VOLUME = """\
   # - {effect: volume, weight: 1.0e+6}
 """
 KILOGRAMS = 10.0  # mass of a vertex in the study's scenes, for which constraint weights are set
-ENOUGH = 3  # fewest held vertices with which a body cannot turn about a line
+ENOUGH = 3  # smallest number of fixed vertices with which a body cannot turn about a line
 
 
 def perform(arguments: argparse.Namespace) -> Status:
@@ -154,13 +154,13 @@ def _sides(mesh: "Mesh") -> dict[str, int]:
     for side in SIDES:
         try:
             found[side] = len(select_vertices(mesh, side))
-        except SceneError:  # a mesh that is flat in this direction has no such side
+        except SceneError:  # raised for a mesh that is flat in this direction: it has no such side
             continue
     return found
 
 
 def _side(mesh: "Mesh", axis: int) -> str:
-    """Selection of `ENOUGH` vertices to fix the mesh: its first such side, or a few at the top."""
+    """Selection that fixes the mesh: its first side with `ENOUGH` vertices, or a few at the top."""
     for side, count in _sides(mesh).items():
         if count >= ENOUGH:
             return side
@@ -169,7 +169,7 @@ def _side(mesh: "Mesh", axis: int) -> str:
 
 
 def _floor(mesh: "Mesh", axis: int) -> str:
-    """YAML of a floor that is half the mesh's extent below the mesh along ``axis``, rounded."""
+    """YAML of a floor half the mesh's longest side below the mesh along ``axis``, rounded."""
     lowest = float(mesh.points[:, axis].min())
     step = 10.0 ** math.floor(math.log10(mesh.extent))
     height = math.floor((lowest - mesh.extent / 2.0) / step) * step

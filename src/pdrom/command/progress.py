@@ -14,7 +14,7 @@ PAUSE = 2.0  # seconds between two lines of `LevelProgress` where stderr is no t
 
 
 class _Line:
-    """Progress line of the run ``name`` on ``stream``; it first announces a compilation, if any."""
+    """Progress line of the run ``name`` on ``stream``; first tells if kernels must be compiled."""
 
     def __init__(self, name: str, stream: TextIO | None = None) -> None:
         self._name, self._stream = name, stream or sys.stderr

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from pdrom.api import ReducedRun, RequestedRun
     from pdrom.model.scene import Scene
 
-WRONG = 0.1  # relative error above which the study calls a run wrong
+WRONG = 0.1  # relative error above which the command calls a run "wrong" instead of "accurate"
 PICTURES = {"pdf": "Creator", "png": "Software", "svg": "Creator"}  # metadata key of the program
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from pdrom.command.base import Command, Status
 
-LONGEST = 100  # characters of an attribute's value
+LONGEST = 100  # largest number of characters shown of an attribute's value
 
 
 def perform(arguments: argparse.Namespace) -> Status:
@@ -79,7 +79,7 @@ def _configuration(configuration: Any, whole: bool) -> Iterator[str]:
         yield from (f"  {line}" for line in text.splitlines())
         return
     for name, value in configuration.items():
-        if isinstance(value, dict) and {"name", "title"} <= value.keys():  # a scene
+        if isinstance(value, dict) and {"name", "title"} <= value.keys():  # the value is a scene
             value = f"{value['name']} ({value['title']})"
         yield f"  {name}: {_short(value)}"
 

@@ -5,9 +5,9 @@ A user who wants to study the influence of a variable names it in ``PDROM_KEEP``
 
 OpenBLAS has kernels for many processors, which round differently, and selects the newest that the
 processor supports. ``OPENBLAS_CORETYPE`` fixes the selection; OpenBLAS does not check that the
-processor has the instructions, without which the process would crash. Kernels of this project are
-compiled on the machine, by a variable for a family of processors instead of the exact one
-(docs/decisions/0015-one-target.md). The variables must be set before NumPy is loaded.
+processor has the instructions, without which the process would crash. Numba compiles the kernels of
+this project on the machine that runs them; a variable makes it compile for a processor family, not
+for the exact one (docs/decisions/0015-one-target.md). Set all variables before NumPy is loaded.
 """
 
 import os

@@ -31,8 +31,8 @@ def reason(error: OSError) -> str:
 class PdromError(Exception):
     """Base of every error that a user's input can cause; shown to the user without a traceback.
 
-    Its text is one line, whatever user input it quotes: line separators are escaped, and
-    a word of a thousand letters is cut.
+    Its text is one line, whatever user input it quotes: line separators are escaped, and a word of
+    a thousand characters or more is shortened to its first 80.
     """
 
     def __str__(self) -> str:

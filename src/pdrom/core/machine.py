@@ -41,7 +41,7 @@ class Units(ConfigModel):
 
     @property
     def unit_s(self) -> float:
-        """Geometric mean of the three times, s; times of two machines are compared by it."""
+        """Geometric mean of the three times, s; unit for run times of different machines."""
         return (self.unit_scalar_s * self.unit_vector_s * self.unit_memory_s) ** (1 / 3)
 
 

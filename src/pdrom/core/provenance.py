@@ -19,7 +19,7 @@ from typing import Any
 from pdrom import __version__
 
 LIBRARIES = ("numpy", "scipy", "numba", "h5py", "pandas", "matplotlib", "snakemake")
-# Keys of a record, in the order in which they are written.
+# Keys of a provenance record, in the order in which they are written.
 RECORD = (
     "made_by", "configuration_sha256", "code_sha256", "pdrom_version", "python_version",
     "library_versions",

@@ -138,7 +138,7 @@ def keys_of(model: type[BaseModel]) -> list[str]:
 
 
 def _model_at(model: type[BaseModel], location: tuple[int | str, ...]) -> type[BaseModel] | None:
-    """Model of the value at ``location`` (keys, indices) in ``model``; None if it has no model."""
+    """Model of the value at ``location`` (keys, indices) in ``model``; None if it has none."""
     current: type[BaseModel] | None = model
     for part in location:
         if isinstance(part, int) or current is None:

@@ -11,16 +11,16 @@ STRIDE = 4
 
 
 def energies(scene: Scene, positions: np.ndarray) -> np.ndarray:
-    """Return total energies (n,), J, of a run: kinetic, of constraint groups, potential of forces.
+    """Return total energies (n,), J, of a run: kinetic, of the constraints, and of the forces.
 
     Parameters
     ----------
     positions : (F + 1, N, 3) m of a run of ``scene``, initial positions first. The velocities are
         (q_f - q_{f-1}) / h as in the step loop; the initial velocities come from the scene.
 
-    They are those of the initial state, of every `STRIDE`-th frame and of the last. All projections
-    are evaluated, also for reduced runs; with K iterations this costs 1 / (STRIDE K) of the local
-    steps of a run. The potential of forces has an arbitrary constant: only differences matter.
+    They belong to the initial state, every `STRIDE`-th frame and the last. All projections are
+    evaluated, also for reduced runs; with K iterations a frame this costs 1 / (STRIDE K) of a run's
+    local steps. The potential of forces has an arbitrary constant: only differences matter.
     """
     frames = sorted({*range(0, len(positions), STRIDE), len(positions) - 1})
     with np.errstate(over="ignore", invalid="ignore"):
@@ -54,7 +54,7 @@ class EnergyScale:
         return cls(scene, zero, peak, own / peak if peak > roundoff else np.empty(0))
 
     def relative(self, positions: np.ndarray) -> np.ndarray:
-        """Return energies of a run, ``positions`` (F' + 1, N, 3) m, minus `zero`, over `peak`.
+        """Return (energies of a run - `zero`) / `peak`, from its ``positions`` (F' + 1, N, 3) m.
 
         The n values are those of every `STRIDE`-th frame and the last; inf if the energy overflows.
         The result is empty (0,) if the energy of the full-order run is only round-off.
@@ -65,11 +65,11 @@ class EnergyScale:
         return np.where(np.isfinite(own), own, np.inf)
 
     def ratio(self, positions: np.ndarray) -> float | None:
-        """Return a run's largest energy over the full-order one's; ``positions`` (F' + 1, N, 3) m.
+        """Return the largest energy of a run divided by that of the full-order run.
 
-        Above one, the run has gained energy that did not come from the initial state or the handles
-        of the full-order run. The result is None if the energy of the full-order run is only
-        round-off.
+        ``positions`` are (F' + 1, N, 3) m. A run with a ratio above one has gained energy that did
+        not come from the initial state or the moving vertices of the full-order run. The result is
+        None if the energy of the full-order run is only round-off.
         """
         return largest(self.relative(positions))
 
@@ -88,7 +88,7 @@ def _energy(scene: Scene, positions: np.ndarray, frame: int) -> float:
     kinetic = 0.5 * float(scene.masses @ np.einsum("ij,ij->i", v, v))
     unused, potential = np.zeros_like(q), 0.0
     for group in scene.groups:
-        group.begin_frame(q)  # data that are computed once per frame
+        group.begin_frame(q)  # computes the data that the group needs once per frame
         potential += group.accumulate(q, unused)
     return kinetic + potential + _force_potential(scene, q)
 

@@ -1,8 +1,8 @@
 """Variations of a scene's motion: held-out motions test a reduction, further ones may train it.
 
-Three held-out motions differ from the training motion by the same rule for all scenes. It was
-chosen with one quantity only: the error of "playback", in which the recorded training motion stands
-for the held-out one. No run of a reduced model was looked at.
+Three held-out motions differ from the training motion by the same rule for all scenes. The rule was
+chosen by one number only: the error of the recorded training motion ("playback") when it is used as
+a prediction of the held-out motion. No run of a reduced model influenced the choice.
 """
 
 from collections.abc import Sequence
@@ -19,23 +19,23 @@ from pdrom.model.mesh.types import Length
 HeldOutMotion = Literal["heldout", "kick", "stiffness"]
 MOTIONS: tuple[HeldOutMotion, ...] = get_args(HeldOutMotion)
 FIRST = MOTIONS[0]
-PLAYBACK = "playback"  # name, in tables, of the recorded training motion used as a result
+PLAYBACK = "playback"  # name, in tables, of the recorded training motion used as a prediction
 FASTER = 0.75  # duration of handle motions in "kick", relative to the training motion
-# Degrees by which gravity is turned, and the axis: 0 is the first of the allowed axes, -1 the last.
+# Motion -> degrees by which gravity turns, and index in the allowed axes: 0 the first, -1 the last.
 TILTS = {"heldout": (-20.0, 0), "kick": (30.0, 0), "stiffness": (20.0, -1)}
-# Direction (sign) in which pins are moved, and the axis: 0 is the first allowed one, -1 the last.
+# Motion -> direction (sign) in which pins move, and index in the allowed axes: 0 first, -1 last.
 CARRIED = {"heldout": (1.0, 0), "stiffness": (-1.0, -1)}
 CARRY_S = 0.5  # duration of the motion of pins, s
 FURTHER = 20261125  # first part of the seeds of further training motions
 
 
 class HeldOut(ConfigModel):
-    """Settings of the held-out motions of a scene; all changes are along the axes ``kick_axes``.
+    """Settings of the held-out (test) motions of a scene; changes are along axes ``kick_axes``.
 
     Motion "heldout" multiplies frame numbers by ``frames_factor``, moves pins by ``carry`` (m) and
     turns gravity. Motion "kick" adds a random initial velocity of ``kick`` (m/s, by ``seed``),
-    makes handles faster (`FASTER`) and turns gravity further to the other side. Motion "stiffness"
-    multiplies the weights of all groups by ``stiffness``, moves handles and pins in other
+    makes handles faster (`FASTER`), turns gravity more and in the opposite sense. "stiffness"
+    multiplies the weights of all constraints by ``stiffness``, moves handles and pins in other
     directions, turns gravity towards another axis and adds an initial velocity by another seed.
     Changes of gravity, handles or pins do not apply to scenes without them.
     """
@@ -61,11 +61,11 @@ class HeldOut(ConfigModel):
     def further(
         self, effects: Sequence[EffectConfig], seed: int, time_step: float
     ) -> tuple[EffectConfig, ...]:
-        """Effects of a further training motion, random by ``seed``; it is no held-out motion.
+        """Effects of a further motion, random by ``seed``, for training and never for tests.
 
         It has an initial velocity of 0.5 to 2 times ``kick``, gravity turned by up to 45 degrees,
-        0.7 to 1.4 times the duration of all schedules, 0.4 to 2.7 times the weights, and pins that
-        move by up to ``carry``.
+        schedules 0.7 to 1.4 times as long, 0.4 to 2.7 times the weights of the constraints, and
+        pins that move by up to ``carry``.
         """
         rng = np.random.default_rng([FURTHER, self.seed, seed])
         axes = ["xyz".index(axis) for axis in self.kick_axes]
@@ -97,7 +97,7 @@ class HeldOut(ConfigModel):
             effect = redirected
             if isinstance(effect, GroupConfig):
                 return effect.model_copy(update={"weight": self.stiffness * effect.weight})
-        elif redirected != effect:  # the effect is a handle
+        elif redirected != effect:  # only handles (vertices that are moved) change
             effect = effect.with_frames_scaled(FASTER)
         degrees, place = TILTS[motion]
         effect = effect.tilted(degrees, axes, place)

@@ -31,18 +31,18 @@ def relative_errors(p: np.ndarray, p_hat: np.ndarray, roundoff: float) -> list[f
 
 
 def shape_residuals(positions: np.ndarray, reference: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return differences R q + t - q_ref in each frame after the best rigid motion, over a scale.
+    """Return differences R q + t - q_ref, where R, t is the best rigid motion of each frame.
 
     R is the optimal rotation, never a reflection (Kabsch 1976), t aligns the centroids.
 
     Parameters
     ----------
-    positions, reference : (F, N, 3) m, finite
+    positions, reference : (F, N, 3) m, finite: the q and the q_ref
 
     Returns
     -------
     residuals, scale
-        (F, N, 3) without unit, and (F,) m, because squares in metres may overflow.
+        (F, N, 3) differences divided by the scale (F,) m, as squares in metres may overflow.
     """
     # scale both runs, since products of positions in an unstable run would overflow
     largest = np.abs(positions).max(initial=0.0, axis=(1, 2), keepdims=True)
@@ -56,7 +56,7 @@ def shape_residuals(positions: np.ndarray, reference: np.ndarray) -> tuple[np.nd
 
 
 def shape_differences(positions: np.ndarray, reference: np.ndarray) -> np.ndarray:
-    """Return norms (F,) m of the differences in each frame after the best rigid motion.
+    """Return norms (F,) m of the differences of two runs in each frame after the best rigid motion.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def shape_differences(positions: np.ndarray, reference: np.ndarray) -> np.ndarra
 def trajectory_error(difference: np.ndarray, displacement: np.ndarray) -> float | None:
     """Return the relative error || Q_red - Q_fom || / || Q_fom - Q_0 || over F frames of a run.
 
-    Q are positions, Q_0 initial ones. None if the full-order run never leaves these, or if F = 0.
+    Q are positions of the reduced or full-order run; None if the latter stays at Q_0 or if F = 0.
 
     Parameters
     ----------

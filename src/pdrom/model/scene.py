@@ -30,9 +30,9 @@ from pdrom.model.mesh.types import Mesh, vertex_measures
 
 log = logging.getLogger(__name__)
 
-# A body held at fewer vertices can rotate about a line.
+# A body that is held (fixed) at fewer vertices than this can rotate about a line.
 FEW = 3
-# A target inside an obstacle by at most this fraction of the mesh extent counts as on its surface.
+# A target inside an obstacle by at most this fraction of the mesh's longest side counts as on it.
 SLACK = 1e-9
 # Largest number of vertices that are listed in a message.
 NAMED = 10
@@ -40,7 +40,7 @@ Mass = Annotated[float, Field(ge=1e-150, le=1e150)]
 
 
 class MassConfig(ConfigModel):
-    """Mass of the vertices of ``select`` (all if it is left out), given in one of two ways.
+    """Mass of the vertices of ``select`` (all if left out): ``vertex_mass`` or ``density``.
 
     vertex_mass : mass of each vertex, kg
     density : kg/m^2 of a surface, kg/m^3 of a volume; times the rest area or volume of a vertex
@@ -58,7 +58,7 @@ class MassConfig(ConfigModel):
 
 
 class ReductionPlan(ConfigModel):
-    """Settings of the reduction of one group: number ``train`` of its training snapshots."""
+    """Reduction of one constraint group: ``train`` is the number of its training snapshots."""
 
     train: Annotated[int, Field(ge=2, le=100_000)]
 
@@ -157,7 +157,7 @@ class SceneConfig(ConfigModel):
         return sorted({EFFECTS[e.effect] for e in self.effects})
 
     def coarsened(self, resolution: float, frames: float) -> Self:
-        """Return the scene with mesh sizes times ``resolution``, frame numbers times ``frames``."""
+        """Return the scene with vertices per side times ``resolution``, frames times ``frames``."""
         count = max(4, round(self.frames * frames))
         even = (count + 1) // 2
         plans = {
@@ -186,7 +186,7 @@ class SceneConfig(ConfigModel):
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A scene bound to its mesh: all effects of the configuration as objects, grouped by role."""
+    """A scene bound to its mesh; it has an object for each effect of the configuration, by role."""
 
     config: SceneConfig
     mesh: Mesh
@@ -264,7 +264,7 @@ class Scene:
         return self._bound(config, self.mesh, self.masses)
 
     def _check_holds(self) -> None:
-        """Raise SceneError if two effects hold a vertex in one frame and one of them moves it."""
+        """Raise SceneError if two effects prescribe different motions of a vertex in one frame."""
         for first, second in combinations(self.boundaries, 2):
             shared = np.intersect1d(first.vertices, second.vertices)
             if len(shared) == 0 or not (first.moves or second.moves):
@@ -298,9 +298,9 @@ class Scene:
         log_obstructed(self)
 
     def log_contacts(self) -> None:
-        """Log a warning for each contact that does not suit the rest shape, see `Contact.doubt`.
+        """Log a warning for each contact that would move vertices at rest or is too thin (`doubt`).
 
-        Vertices that are held in the first frame are ignored.
+        Vertices that are held (fixed) in the first frame are ignored.
         """
         held = base.held_vertices(self.boundaries, 0)
         free = np.setdiff1d(np.arange(self.mesh.vertices), held)
@@ -365,7 +365,7 @@ class Scene:
 
 
 def _place(boundary: base.Boundary) -> base.EffectConfig:
-    """Configuration of ``boundary`` without vertices and end, to find out if motions are equal."""
+    """Configuration of ``boundary`` without vertices and end; equal only for equal motions."""
     return boundary.config.model_copy(update={"select": None, "until": None})
 
 

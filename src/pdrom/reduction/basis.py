@@ -100,8 +100,9 @@ def compute_basis(
     row_mass : (e p,) kg, used by mass weighting
     roundoff : Frobenius norm of the rounding errors in ``snapshots``
     rows_per_element : p
-    signs : generator of random signs by which modes are multiplied before centring "mean-in-modes"
-        adds the first snapshot to them, so that their span depends on the signs; None: no changes
+    signs : generator of random signs for the modes, None to keep them. Signs matter only with
+        centring "mean-in-modes", where their span depends on them: each mode gets the first
+        snapshot added.
     spec : weighting, centring and layout
 
     Raises
@@ -122,7 +123,7 @@ def compute_basis(
         # Subtracting the first snapshot makes no such error.
         rounded = 0.5 * np.finfo(float).eps * matrix.shape[1] * float(np.linalg.norm(matrix))
         mean, error = matrix.mean(axis=1), max(roundoff, rounded)
-        # an axis whose snapshots are constant is inactive here, but active with "mean-in-modes"
+        # here an axis with constant snapshots is inactive; with "mean-in-modes" it is active
         shown = matrix - mean[:, None]
     elif spec.centring == "mean-in-modes":
         mean = matrix[:, 0].copy()
@@ -164,7 +165,7 @@ def basis_of(
 ) -> Basis:
     """Compute the POD basis of the training snapshots of ``data``, by the recipe ``spec``.
 
-    Snapshots ``train`` (n, e p, 3) replace them if given; ``signs`` are those of `compute_basis`.
+    Snapshots ``train`` (n, e p, 3) replace them if given; ``signs`` draws random signs of modes.
     """
     snapshots, p = data.train if train is None else train, data.rows_per_element
     return compute_basis(snapshots, data.row_mass, data.roundoff, p, spec, signs)
@@ -194,7 +195,7 @@ def _check(
 def _per_axis(centred: np.ndarray, noise: float) -> tuple[np.ndarray, np.ndarray, list[int]]:
     """Return one POD basis per axis as (modes, singular values, rank of each axis).
 
-    Modes beyond an axis's rank are zero. Singular value k is the norm of the three k-th values.
+    Modes beyond an axis's rank are zero. Singular value k is the norm of the axes' k-th ones.
     """
     n, m = centred.shape
     modes = np.zeros((n, min(n // 3, m)))
@@ -215,10 +216,10 @@ def _mean_in_modes(
     active: tuple[bool, ...],
     signs: np.random.Generator | None,
 ) -> np.ndarray:
-    """Return modes by the published code: rescaled, plus the snapshot ``first``, then QR per axis.
+    """Return modes, rescaled, plus the snapshot ``first``, then made orthonormal by QR per axis.
 
-    As in that code, an axis with fewer independent columns than modes is completed by arbitrary
-    Householder vectors, which are orthonormal but do not come from the data.
+    As in the program published with the preprint, an axis with fewer independent columns than modes
+    is completed by Householder vectors, which are orthonormal but do not come from the data.
     """
     if v.shape[1] == 0:
         return v
@@ -273,8 +274,8 @@ def thin_qr(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     Householder reflections read A once per column and wait for memory. Here (Terao, Ozaki and
     Ogita 2020) LU with partial pivoting, A = P L U, leaves a well-conditioned L, and two Cholesky
     factorisations of Gram matrices make it orthonormal: L = Q_1 R_1, Q_1 = Q R_2, R = R_2 R_1 U.
-    L need not be well-conditioned: if Q_1 is not orthonormal up to `DEPARTURE`, Householder
-    reflections factor A instead. Otherwise R has the error of the LU factorisation, about
+    If L is ill-conditioned, so that Q_1 is not orthonormal up to `DEPARTURE`, Householder
+    reflections factor A instead. If not, R has the error of the LU factorisation, about
     eps cond(L) relative to each column of A.
     """
     lower, swaps, _ = linalg.lapack.dgetrf(np.array(matrix, order="F"), overwrite_a=True)

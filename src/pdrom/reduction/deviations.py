@@ -17,8 +17,8 @@ from pdrom.reduction.rerun import Rerun, displacement_norms, step_norms
 
 # Number of frames compared at a time, so that the memory used does not grow with the run.
 BLOCK = 32
-# A vertex touches an obstacle if it is closer than this fraction of the mesh extent, since a
-# subspace model does not place vertices exactly on the surface.
+# A vertex touches an obstacle if it is closer than this fraction of the mesh's longest side, since
+# a subspace model does not place vertices exactly on the surface.
 TOUCH = 1e-3
 
 # Names of the per-frame series of the full-order run (REFERENCE) and of other runs (DEVIATIONS).
@@ -56,7 +56,7 @@ class Yardstick:
         """Per-frame series of the full-order run for the argument ``reference`` of `errors_within`.
 
         ``displacement`` (F,) m; ``step`` (F,) m, norm of the time step times the velocities;
-        ``energy`` and ``contact`` as in `deviations`.
+        ``energy`` relative to `scale`; ``contact`` is 1 in frames in which an obstacle is touched.
         """
         blocks = [q for q, _ in _blocks(self.reference, self.reference)]
         return {
@@ -70,7 +70,8 @@ class Yardstick:
     def units(self) -> dict[str, float]:
         """Extent norm, m, and time step, s: keyword arguments of `errors_within`.
 
-        The extent norm, sqrt(N) times the mesh extent, is the norm of a shift by the mesh extent.
+        The extent norm is the Frobenius norm of a shift of all N vertices by the mesh's longest
+        side: sqrt(N) times that side.
         """
         norm = self.scene.mesh.extent * float(np.sqrt(self.reference.shape[1]))
         return {"extent_norm": norm, "time_step": self.scene.config.time_step}
@@ -127,7 +128,7 @@ def errors_within(
     Parameters
     ----------
     run, reference : per-frame series from `Yardstick.deviations` and `Yardstick.series`
-    extent_norm, time_step : norm of a shift by the mesh extent, m, and time step, s
+    extent_norm, time_step : norm of a shift by the mesh's longest side, m, and time step, s
     """
     if len(run["difference"]) < end:
         return dict.fromkeys(ERRORS)
@@ -162,7 +163,8 @@ def error_within(difference: np.ndarray, displacement: np.ndarray, end: int) -> 
 
     Parameters
     ----------
-    difference, displacement : (F',) m, norms of the difference of two runs and of the displacement
+    difference : (F',) m, norms of the difference between the run and the full-order run
+    displacement : (F,) m, norms of the displacement of the full-order run
     """
     if len(difference) < end:
         return None

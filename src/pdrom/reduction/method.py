@@ -32,8 +32,8 @@ class BasisSpec(ConfigModel):
 
     weighting : "mass" makes modes orthonormal in the inner product with the lumped mass of each row
     centring : "affine" subtracts the mean and adds it back online; "mean-in-modes" follows the
-        published code: it subtracts the first snapshot, rescales the modes, adds that snapshot to
-        every mode and orthogonalises the modes again per axis
+        program published with the preprint: it subtracts the first snapshot, rescales the modes,
+        adds that snapshot to every mode and orthogonalises the modes again per axis
     layout : "vectorised" stacks x, y, z of a snapshot in one column, so that they share the
         coefficients; "per-axis" makes one basis for each of x, y, z
     """
@@ -61,13 +61,13 @@ class MethodSpec(BasisSpec):
         variant), "element" samples all 3p entries of an element of p rows
     selection : name in `SELECTIONS`, such as "greedy" (largest residual, as in DEIM)
     solve : solution of the sampled equations: "square", least squares by "qr", or normal equations
-        with Tikhonov term ("tikhonov", the published code)
+        with Tikhonov term ("tikhonov", as in the program published with the preprint)
     oversampling : samples per mode; those in excess of one are selected by S-OPT if that is the
         ``selection``, otherwise by GappyPOD+E
-    gain_bound : samples are added (GappyPOD+E) until the gain is at most this: the largest ratio of
-        the error to that of the best approximation in the basis; None: no bound
+    gain_bound : samples are added (GappyPOD+E) until the gain, the factor by which sampling can
+        amplify the error of the best approximation in the basis, is at most this; None: no bound
     coefficients : "shared" by x, y, z or "per-axis"; None: as ``rows`` and the basis imply
-    repeat_rows : whether the greedy selection may repeat a row, as in the published code
+    repeat_rows : whether the greedy selection may repeat a row, as in the authors' program
     title : name of the method in figures and tables
     """
 
@@ -128,7 +128,7 @@ class MethodSpec(BasisSpec):
 
     @property
     def may_oversample(self) -> bool:
-        """Whether the method allows more samples than modes, to bound the gain."""
+        """Whether more samples than modes are allowed, to bound the amplification of errors."""
         return self.rows in ("scalar", "element") and self.solve != "square"
 
     @property

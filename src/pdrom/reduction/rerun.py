@@ -15,7 +15,7 @@ class Rerun:
     """Result of a reduced run; a run that blows up ends in that frame and is also a result.
 
     positions : (F' + 1, N, 3) m, initial state first; F' finite frames
-    difference : (F',) m, || Q_red - Q_fom ||_F in each frame, of positions reduced and full-order
+    difference : (F',) m, || Q_red - Q_fom ||_F of reduced and full-order positions in each frame
     extent : (F',) longest side of the bounding box in each frame over that of the rest shape
     blowup_frame : first frame whose extent exceeds the limit or is not finite, else None
     coordinates : (F' + 1, K, 3) K unknowns of the step loop: subspace coordinates, or positions
@@ -41,7 +41,7 @@ class Rerun:
 
     @property
     def max_extent(self) -> float:
-        """Largest entry of ``extent``, 0 for a run without frames."""
+        """Longest side of the bounding box in any frame over that at rest; 0 without frames."""
         return float(self.extent.max(initial=0.0))
 
     def row(self, displacement: np.ndarray) -> dict[str, Any]:

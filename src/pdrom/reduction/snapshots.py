@@ -73,7 +73,7 @@ def collect(
     masses: np.ndarray,
     train: np.ndarray,
 ) -> SnapshotSet:
-    """Read snapshots of ``group`` from two runs: training and test frames of one, held-out run.
+    """Read snapshots of ``group``: training and test frames of one run, frames of a held-out run.
 
     Parameters
     ----------

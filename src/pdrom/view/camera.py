@@ -105,7 +105,7 @@ def rotation_to(up: np.ndarray) -> np.ndarray:
     if square == 0.0:
         return np.eye(3)
     turn = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    # not divided by 1 + cosine: near half a turn that difference has no correct digits
+    # this form does not divide by 1 + cosine, which has no correct digits near half a turn
     return np.eye(3) + turn + turn @ turn * ((1.0 - cosine) / square)
 
 

@@ -36,7 +36,7 @@ def write_frames(scene: ViewedScene, png: Path) -> None:
 
 
 def shown_runs(scene: ViewedScene) -> list[ViewedRun]:
-    """One run per group and method: with the largest r <= `SHOWN`, else with the smallest r."""
+    """One run per group and method: that with most modes r <= `SHOWN`, else that with fewest."""
     pairs = dict.fromkeys((run.group, run.method) for run in scene.runs)
     every = [scene.sizes(*pair) for pair in pairs]
     return [([run for run in sizes if run.r <= SHOWN] or sizes[:1])[-1] for sizes in every]
@@ -90,10 +90,7 @@ def _panel(run: ViewedRun, frame: int) -> RunPanel:
 def vtk(scene: ViewedScene, collection: Path) -> None:
     """Write ``scene`` for ParaView: the PVD file ``collection``, frames as VTU files in its folder.
 
-    Raises
-    ------
-    StorageError
-        A frame cannot be written, or would replace a file from outside pdrom.
+    StorageError if a frame cannot be written, or would replace a file from outside pdrom.
     """
     import meshio
 
@@ -141,6 +138,6 @@ def point_data(scene: ViewedScene, frame: int) -> dict[str, np.ndarray]:
 
 
 def _mark(path: Path) -> None:
-    """Append the comment by which `require_own` recognises the XML file ``path``."""
+    """Append the comment that tells pdrom that the XML file ``path`` is its own (`require_own`)."""
     with open(path, "ab") as file:
         file.write(b"\n<!-- " + MARK + b" -->\n")

@@ -12,7 +12,7 @@ from pdrom.view.camera import Camera, Window
 
 AMBIENT = 0.45  # least brightness of a face
 RASTER_ABOVE = 1000  # surfaces with more faces are rasterised, to keep the PDF small
-SHARP = np.cos(np.radians(80.0))  # edges whose faces' normals have a smaller cosine are outlined
+SHARP = np.cos(np.radians(80.0))  # an edge is outlined if its faces' normals have a smaller cosine
 # lights: (direction towards the light in camera coordinates, strength)
 LIGHTS = (((-0.35, 0.45, 0.82), 0.85), ((0.80, -0.10, 0.59), 0.30))
 BACK = 0.78  # factor that darkens the back of an open surface
@@ -23,13 +23,13 @@ Colour = str | tuple[float, float, float]
 
 
 def face_normals(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Unit normals (T, 3) of ``triangles`` (T, 3) of ``points`` (N, 3); zero if without area."""
+    """Unit normals (T, 3) of ``triangles`` (T, 3) of ``points`` (N, 3); zero for zero area."""
     a, b, c = (points[triangles[:, i]] for i in range(3))
     return _unit(np.cross(b - a, c - a))
 
 
 def smooth_normals(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Unit normals (T, 3) of faces, averaged over neighbouring faces; zero if without area.
+    """Unit normals (T, 3) of faces, averaged over neighbouring faces; zero for zero area.
 
     ``points`` are (N, 3), ``triangles`` (T, 3).
     """

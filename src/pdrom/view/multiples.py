@@ -104,9 +104,10 @@ def rim_arrows(
     across: tuple[float, float],
     along: tuple[float, float],
 ) -> None:
-    """Draw arrows on the border of ``ax`` for points outside its x limits ``across``, y ``along``.
+    """Draw arrows on the border of ``ax`` for points outside its limits.
 
-    Arrays ``x``, ``y`` (n,) are the coordinates of the points, ``colour`` that of the arrows.
+    The limits are ``across`` in x and ``along`` in y, arrays ``x``, ``y`` (n,) the coordinates of
+    the points, ``colour`` that of the arrows.
     """
     inside_x, inside_y = clipped(x, *across), clipped(y, *along)
     outside = {

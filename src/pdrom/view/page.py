@@ -49,11 +49,11 @@ class ViewedScene:
     positions : (F + 1, N, 3) m of the full-order run
     ms : milliseconds per frame of the full-order run, None if not measured
     floor : (F,) relative error that perturbations by round-off cause, empty if unknown
-    horizon : frame from which on no run can be judged, due to round-off; None if none is known
+    horizon : first frame in which rounding errors decide, so that no run is compared; else None
     runs : reduced runs, by group, method and ascending size
     effects : effects of the scene; obstacles among them are drawn
     velocities : (F + 1, N, 3) m/s of the full-order run, None if they were not stored
-    first : kind of the run that the others are compared with
+    first : kind of the run with which the reduced runs are compared
     """
 
     name: str
@@ -78,13 +78,7 @@ LARGEST = 25_000_000  # bytes of a page, at most
 
 
 def write_page(scenes: Sequence[ViewedScene], path: str | os.PathLike[str]) -> None:
-    """Write an HTML page that shows ``scenes`` to ``path``.
-
-    Raises
-    ------
-    StorageError
-        The page would have more than `LARGEST` bytes, too many for a browser.
-    """
+    """Write an HTML page of ``scenes`` to ``path``; StorageError if above `LARGEST` bytes."""
     parts = {
         "STYLE": _read("viewer.css"),
         "SCENES": safe_json([pack_scene(scene) for scene in scenes]),

@@ -16,7 +16,7 @@ from pdrom.view.read import RerunInfo, rerun_positions
 from pdrom.view.style import FAILED
 
 SAME_SCALE = 1.25  # a run larger than the reference by more than this factor is drawn smaller
-SLACK = 1.05  # a picture smaller by at most this factor gets no remark about its scale
+SLACK = 1.05  # a run drawn smaller by at most this factor gets no remark about its scale
 SHORTEST, TALLEST = 0.35, 1.5  # least and largest ratio of height to width of a panel
 
 
@@ -28,7 +28,7 @@ class RunPanel:
     positions : (N, 3) m, finite; None if there is nothing to draw
     failure : reason of the failure, drawn in red; None for a run without failure
     remark : one line below the picture
-    reference : whether this is the run that others are compared with
+    reference : whether this is the run with which the other runs are compared
     obstacles : surfaces of the obstacles; None draws the floor y = 0
     """
 
@@ -75,7 +75,7 @@ def fit_aspect(window: Window) -> Window:
 
 
 def draw_run(ax: Axes, row: "Row", i: int) -> None:
-    """Draw run ``i`` of a ``row`` on ``ax``; a run that exceeds its window at a smaller scale.
+    """Draw run ``i`` of a ``row`` on ``ax``, at a smaller scale if it exceeds the row's window.
 
     The outline of the reference shape is drawn for comparison, unless the run is the reference.
     """

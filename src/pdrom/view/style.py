@@ -95,7 +95,7 @@ def look() -> Iterator[None]:
 
 
 def method_styles(names: Iterable[str]) -> dict[str, tuple[str, str]]:
-    """(colour, marker) of each method; others than the presets get spare styles in sorted order."""
+    """(colour, marker) of each method; those that are no presets get spare styles, by name."""
     names = list(names)
     others = sorted(set(names) - set(METHODS))
     spare = {name: _RESERVE[i % len(_RESERVE)] for i, name in enumerate(others)}

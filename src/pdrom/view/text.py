@@ -26,7 +26,7 @@ _SIGNS = {
     "ϑ": r"\vartheta", "ϕ": r"\phi", "ϱ": r"\varrho", "ϵ": r"\epsilon", "ς": r"\varsigma",
     "σ": r"\sigma", "φ": r"\varphi", "ε": r"\varepsilon", "ο": "o",
 }  # fmt: skip
-# Capital Greek letters that look like Latin ones have no command of their own.
+# TeX has no commands for capital Greek letters that look like Latin ones.
 _LATIN_CAPITALS = dict(zip("ΑΒΕΖΗΙΚΜΝΟΡΤΧ", "ABEZHIKMNOPTX", strict=True))
 
 

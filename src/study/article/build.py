@@ -1,4 +1,4 @@
-"""The article: web pages of paper and supplement, and of all tables, figures and claims."""
+"""The article: web pages with the text of paper and supplement, all tables, and all claims."""
 
 import base64
 import gzip
@@ -33,19 +33,17 @@ from study.tables.claims.metrics import METRICS
 from study.tables.claims.rules import Added, ClaimRule, TestRule, load_claims
 from study.tables.kit.declaration import QUANTITIES, TOLERANCES
 
-# Limits in bytes: larger pictures are compressed with losses, larger PDFs are not on the pages.
+# Sizes in bytes: larger pictures are compressed with losses, larger PDFs are left out of the pages.
 LOSSLESS, COPIED = 150_000, 200_000
-MANY = 4  # figures whose options have the same type are related if it has so many keys
+MANY = 4  # figures with options of the same type are related if the type has this many keys
 
 
 def shown_figure(
     name: str, node: Node, size: tuple[int, int], with_pdf: bool, pages: Mapping[str, str]
 ) -> Node:
-    """Return the syntax tree node of a figure: picture, caption, command, links to related data.
+    """Return a figure as a node of pandoc's syntax tree: picture, caption, command, and links.
 
-    Parameters
-    ----------
-    node : node of the figure in pandoc's syntax tree
+    node : node that pandoc made from the figure in the TeX source
     size : width and height of the picture, pixels
     with_pdf : whether the pages include a PDF of the figure
     pages : file name of the page with each figure, by the figure's name
@@ -54,7 +52,7 @@ def shown_figure(
     picture = attributes("", "", width=str(size[0]), height=str(size[1]), loading="lazy")
     alternative = words(plain(caption[1]).strip())
     image = {"t": "Image", "c": [picture, alternative, [f"figures/{name}.webp", ""]]}
-    # the alternative text is without formatting: pandoc hides a caption that equals it
+    # plain text as alternative text: pandoc hides a caption that equals the alternative text
     made = {"t": "RawInline", "c": ["html", _origin(name, with_pdf, pages)]}
     origin = [{"t": "Plain", "c": [*words("Command: "), made]}]
     told = [caption[0], [*caption[1], boxed("Div", origin, "", "origin")]]
@@ -62,7 +60,7 @@ def shown_figure(
 
 
 def _origin(name: str, with_pdf: bool, pages: Mapping[str, str]) -> str:
-    """HTML with a figure's command, tables, PDF, related figures and last verification."""
+    """HTML with the command of a figure, and links to its tables, its PDF and related figures."""
     reads = declarations()[name].reads.values()
     tables = [read.name for read in reads if isinstance(read, TableOf)]
     data = ", ".join(f'<a href="tables/{table}.html">{table}</a>' for table in tables)
@@ -83,7 +81,8 @@ def _origin(name: str, with_pdf: bool, pages: Mapping[str, str]) -> str:
 def _kin(name: str, pages: Mapping[str, str]) -> list[str]:
     """Names of related figures in ``pages``, which show other scenes in the same form.
 
-    Their options have the same type with at least `MANY` keys, or one name begins with the other.
+    Figures are related if their options have the same type with at least `MANY` keys, or if the
+    name of one begins with the name of the other.
     """
     listed = declarations()
     mine = listed[name].options
@@ -109,7 +108,7 @@ FACTS = {
 
 
 def table_page(name: str, csv: bytes, template: str) -> str:
-    """HTML page of table ``name`` from its ``csv``: data, command, tolerance of each column."""
+    """HTML page of table ``name``: its data (``csv``), command, and the meaning of its columns."""
     table = declared().get(name)
     columns = "".join(
         f"<tr data-column='{c.name}'><th scope=row>{c.name}</th>"
@@ -131,14 +130,14 @@ def table_page(name: str, csv: bytes, template: str) -> str:
 
 
 def argument(name: str) -> str:
-    """Argument of ./reproduce that makes table ``name``; ``paper_inputs`` makes tables of facts."""
+    """Argument of ``./reproduce`` that makes table ``name``; all tables of facts share one."""
     if name in FACTS:
         return "paper_inputs"
     return TABLE.at(RESULTS, name=name) if name in declarations() else name
 
 
 def list_page(names: list[str], template: str) -> str:
-    """HTML page by ``template`` with a link and the title of each table in ``names``."""
+    """HTML page with a link to each table in ``names``, and its title."""
     known = declared()
     items = "".join(
         f"<li><a href='tables/{name}.html'><code>{name}</code></a> "
@@ -158,10 +157,8 @@ def claims_page(
     pages: Mapping[str, str],
     template: str,
 ) -> str:
-    """HTML page by ``template`` of all ``claims`` (rules by name), their tests and verdicts.
+    """HTML page of all ``claims`` (rules by name), with their tests and verdicts.
 
-    Parameters
-    ----------
     pages : file name of the page with each figure, by the figure's name
     """
     found, body = verdicts.set_index("claim"), ""
@@ -225,9 +222,10 @@ VERIFIED, INDEX = "verified.js", "index.html"
 
 
 def write_verified(found: Mapping[str, str], folder: Path) -> None:
-    """Write the outcomes of ``verify`` into ``folder``; a key is kind and name ("table payoff").
+    """Write the outcomes ``found`` by ``./reproduce verify`` into ``folder``, for the pages.
 
-    The file is a script, because a page opened from a disk can load scripts but no data.
+    Keys are kind and name, as in "table payoff". The file is a script, because a page opened from a
+    disk can load scripts but no data.
     """
     write_text(f"window.pdromVerified={safe_json(dict(found))};\n", folder / VERIFIED)
 
@@ -240,7 +238,7 @@ ASSETS = {
     "style": "article.css",
     "script": "article.js",
 }
-# File names of the documents' pages, by the name of the TeX source.
+# Name of a TeX source -> file name of its web page.
 PAGES = dict(zip(DOCUMENTS, (INDEX, "supplement.html"), strict=True))
 TITLES = dict(zip(DOCUMENTS, ("Paper", "Supplement"), strict=True))
 LINKS = {"tables.html": "Tables", "claims.html": "Claims", "live.html": "A model, running"}
@@ -263,15 +261,13 @@ def write_article(
 ) -> None:
     """Write all pages of the article to the paths ``outputs``, by name.
 
-    Parameters
-    ----------
     source, references : TeX sources of the manuscript and its bibliography
     tables, machine : CSV of the tables and the record of the machine
     inputs : inputs of the manuscript, including the file `NUMBERS`
     figures, pictures : PDF and PNG of each figure
-    facts, claims : facts about the configuration, and the file of the claims' rules
-    added : values that the study adds to named sets of scenes etc. in ``claims``
-    assets : templates, style and script, see `ASSETS`
+    facts, claims : facts about the configuration, and the file with the rules of the claims
+    added : name of a set of values in the file ``claims`` -> values that the study adds to it
+    assets : templates, style and script (files of `ASSETS`)
     """
     made = {file["name"]: file.path for file in inputs}
     origins = json.loads(read_text(made[NUMBERS]))
@@ -315,7 +311,7 @@ def write_article(
 def _write_figures(
     figures: list[File], pictures: list[File], outputs: Mapping[str, str]
 ) -> dict[str, tuple[tuple[int, int], bool]]:
-    """Write WebP pictures and small PDFs; return picture size, and whether the PDF is copied."""
+    """Write each figure as WebP, and its PDF if small; return (picture size, with PDF) by name."""
     folder = Path(outputs["main"]).parent / "figures"
     png = {picture["name"]: Path(picture.path) for picture in pictures}
     made = {}
@@ -345,21 +341,16 @@ WRITES = {
     **{f"table_{name}": f"tables/{name}.html" for name in FACTS},
     **{f"picture_{name}": f"figures/{name}.webp" for name in declarations()},
 }  # fmt: skip
-LIMIT = 300.0  # time limit of pandoc, s: it would never end if a definition expands to itself
+LIMIT = 300.0  # time limit of pandoc, s; a TeX definition that expands to itself never ends
 
 
 def parsed(text: str, files: Mapping[str, str], references: Path) -> Node:
     r"""Return pandoc's syntax tree of a LaTeX source ``text``, with its bibliography.
 
-    Parameters
-    ----------
+    Raises PaperError if pandoc is not installed, or if it rejects the source.
+
     files : contents of the files that the source reads by ``\input``, by name
     references : path of the BibTeX file
-
-    Raises
-    ------
-    PaperError
-        Pandoc is not installed, or it rejects the source.
     """
     with tempfile.TemporaryDirectory(prefix="pdrom-pandoc-") as folder:
         for name, content in {**files, "article.tex": text}.items():
@@ -371,9 +362,9 @@ def parsed(text: str, files: Mapping[str, str], references: Path) -> Node:
 
 
 def page(tree: Node, template: Path, variables: Mapping[str, str]) -> str:
-    """Return the HTML of ``tree`` by pandoc's ``template`` and ``variables``, or PaperError.
+    """Return the HTML page that pandoc makes of ``tree`` by its ``template`` and ``variables``.
 
-    Formulas become MathML, and a table of contents comes first.
+    Formulas become MathML, and a table of contents comes first. Raises PaperError if pandoc fails.
     """
     words = ["-f", "json", "-t", "html5", "--mathml", "--wrap=none", "--toc", "--toc-depth=2"]
     words += ["--standalone", "--shift-heading-level-by=1", f"--template={template.resolve()}"]

@@ -1,7 +1,7 @@
-r"""Conversion of the manuscript's source to LaTeX that pandoc reads, with numbers as links.
+r"""Conversion of the manuscript's source to LaTeX that pandoc can read, with numbers as links.
 
 Commands that TeX would evaluate are replaced here by their results: ``\val``, ``\known``, ``\row``,
-``\ifpart``, captions of figures. The address of a number's link is ``origin:KEY``.
+``\ifpart``, captions of figures. A number becomes a link to the address ``origin:KEY``.
 """
 
 import re
@@ -28,9 +28,10 @@ _NUMBER = re.compile(
     r"(?:[^A-Za-z]|\\(?:ensuremath|cdot|infty|times|ge|le)(?![A-Za-z])|\b(?:to|of)\b)*\d"
     r"(?:[^A-Za-z]|\bloses\b)*"
 )
-_TAIL = re.compile(r"(\(|, )(\d[\d/, ]*)([)}]?)$")  # number at the end, as in "holds (20/20)"
+_TAIL = re.compile(r"(\(|, )(\d[\d/, ]*)([)}]?)$")  # number at the end of a cell: "holds (20/20)"
 _FIGURE = r"\begin{figure}\includegraphics{%s.pdf}\caption{%s}\label{fig:%s}\end{figure}"
-# One-line definitions of the preamble, which pandoc can read. Definitions of layout are replaced.
+# Definitions of one line in the preamble, which pandoc can read; `REPLACED` has simple definitions
+# for those about the layout.
 _SHORT = re.compile(r"(?m)^\\(?:newcommand\{\\(?!longtableof|tablefile)\w+\}.*\}|newtheorem.*)$")
 REPLACED = r"""
 \newcommand{\longtableof}[4]{\begin{table}\caption{#3}\label{#2}\input{#4}\end{table}}
@@ -42,7 +43,8 @@ REPLACED = r"""
 def prepared(source: str, document: str, origins: Mapping[str, Any], facts: Facts) -> str:
     """Return the ``source`` of a ``document`` for pandoc, with numbers as links to tables.
 
-    ``origins`` is the content of numbers.json: table cells of numbers, and which blocks are shown.
+    ``origins`` is the content of numbers.json: the table cells of each number, and decisions on
+    which sentences are shown.
     """
     preamble, begin, text = source.partition(r"\begin{document}")
     left_out = rf"\emph{{[{note(facts.part, facts.full_study)}]}}"
@@ -62,7 +64,7 @@ def prepared(source: str, document: str, origins: Mapping[str, Any], facts: Fact
 
 
 def _title(preamble: str) -> str:
-    r"""Return the TeX title as one line, with colons in place of line breaks."""
+    r"""Return the command ``\title`` of the ``preamble`` in one line, colons for line breaks."""
     start = preamble.index(r"\title{") + len(r"\title{")
     lines = _PART.sub("", preamble[start : closing(preamble, start)]).split(r"\\")
     words = [re.sub(r"^\[[^\]]*\]|\\large|%", "", line).strip() for line in lines]
@@ -80,7 +82,7 @@ def _decided(source: str, known: Sequence[str], left_out: str) -> str:
 
 
 def _apart(found: re.Match[str]) -> str:
-    """Split a formula at its ``\\val`` numbers, since a link cannot stand inside a formula."""
+    """Split a formula at its numbers (``\\val``), as a link cannot stand inside a formula."""
     if not VAL.search(found[1]):
         return found[0]
     parts = re.split(r"(\\val\{[^{}]*\})", found[1])
@@ -95,9 +97,10 @@ def _link(key: str, text: str) -> str:
 def linked_table(table: Rows, tables: Mapping[str, pd.DataFrame]) -> str:
     """Return the TeX ``table`` with its numbers as links to rows of the study's tables.
 
-    The links lead to the one of ``tables`` with most columns in common. If both have equally many
-    rows, these correspond in order. Otherwise a link selects the rows with equal cells in common
-    columns; columns without an equal cell (rounded numbers, sums, titles) are ignored.
+    The links lead to that one of ``tables`` which has most columns in common with ``table``. If
+    both have the same number of rows, the rows correspond in order. Otherwise a link selects the
+    rows that have equal cells in common columns; columns without an equal cell (rounded numbers,
+    sums, titles) are ignored.
     """
     (columns, header), *body = table
     origin = max(tables, key=lambda name: len({*header} & {*tables[name]}))
@@ -109,7 +112,7 @@ def linked_table(table: Rows, tables: Mapping[str, pd.DataFrame]) -> str:
 
 
 def _agreeing(table: pd.DataFrame, header: Sequence[str], cells: Sequence[str]) -> list[str]:
-    """Filters ``column=value`` that select the rows of ``table`` with equal cells to a TeX row."""
+    """Filters ``column=value`` that select the rows of ``table`` that agree with a TeX row."""
     found = []
     for title, cell in zip(header, cells, strict=True):
         for value in (_plain(cell), _plain(cell).replace(" ", "_")) if title in table else ():
@@ -122,20 +125,20 @@ def _agreeing(table: pd.DataFrame, header: Sequence[str], cells: Sequence[str]) 
 
 
 def _linked_cell(cell: str, key: str) -> str:
-    """Make the number in ``cell`` a link: the whole cell, or a number at its end after words."""
+    """Make the number in ``cell`` a link; it is the whole cell, or stands at the end of words."""
     if _NUMBER.fullmatch(cell):
         return _link(key, cell)
     return _TAIL.sub(lambda found: found[1] + _link(key, found[2]) + found[3], cell)
 
 
 def _plain(cell: str) -> str:
-    """Text of a cell without TeX commands; only the name if the cell begins with one."""
+    """Text of a cell without TeX commands; only the name if it begins with one in typewriter."""
     name = re.match(r"\\texttt\{([^{}]*)\}", cell)
     return (name[1] if name else cell).replace("\\", "")
 
 
 def plain_columns(text: str) -> str:
-    """Return ``text`` with column definitions of tables reduced to letters, as pandoc needs."""
+    """Reduce the column definitions of all tables in ``text`` to letters, which pandoc needs."""
     pieces, start = [], 0
     for found in _SPEC.finditer(text):
         end = closing(text, found.end() + 1)

@@ -1,4 +1,4 @@
-"""Nodes of pandoc's syntax tree, and numbers and links of the article's sections, figures etc."""
+"""Functions on pandoc's syntax tree: nodes, numbers of sections, figures etc., and links."""
 
 import re
 from collections import Counter
@@ -14,26 +14,26 @@ Node = dict[str, Any]  # a node of the syntax tree, or the whole tree
 
 
 def attributes(identifier: str = "", classes: str = "", **keys: str) -> list[Any]:
-    """Attributes of a node: ``identifier``, space-separated ``classes``, and other ``keys``."""
+    """Return pandoc's attributes of a node; ``classes`` are separated by spaces."""
     return [identifier, classes.split(), [[k.replace("_", "-"), v] for k, v in keys.items()]]
 
 
 def boxed(
     kind: str, content: list[Node], identifier: str = "", classes: str = "", **keys: str
 ) -> Node:
-    """Node of the ``kind`` Span or Div around ``content``, with `attributes`."""
+    """Return a node of the ``kind`` "Span" or "Div" around ``content``, with `attributes`."""
     return {"t": kind, "c": [attributes(identifier, classes, **keys), content]}
 
 
 def words(text: str) -> list[Node]:
-    """Return plain text as a list of inline nodes."""
+    """Return a list of nodes for plain ``text``."""
     return [{"t": "Str", "c": text}]
 
 
 def link(inlines: list[Node], address: str, classes: str = "") -> Node:
-    """Node of a link around ``inlines`` to an ``address``, with ``classes``.
+    """Return the node of a link to an ``address`` whose shown nodes are ``inlines``.
 
-    A link around a formula also gets the formula as its title, for screen readers.
+    If these are a formula, the link gets its text as a title, for screen readers.
     """
     formula = all(node["t"] == "Math" for node in inlines)
     title = re.sub(r"\\cdot ?|[{}\\]", lambda m: "·" if "cdot" in m[0] else "", plain(inlines))
@@ -41,7 +41,7 @@ def link(inlines: list[Node], address: str, classes: str = "") -> Node:
 
 
 def plain(node: Any) -> str:
-    """Text of a node or a list of nodes, without formatting."""
+    """Text of a node, or of a list of nodes, without formatting."""
     if isinstance(node, list):
         return "".join(map(plain, node))
     if not isinstance(node, dict):
@@ -55,9 +55,10 @@ def plain(node: Any) -> str:
 
 
 def changed(node: Any, visit: Callable[[Node], Any]) -> Any:
-    """Return a tree with nodes replaced by ``visit``; a node remains if that returns None.
+    """Return a tree in which ``visit`` has replaced nodes.
 
-    Replacements are not visited again. A returned list replaces one node by several.
+    A node remains if ``visit`` returns None, and is replaced by several if it returns a list.
+    Replacements are not visited again.
     """
     if isinstance(node, list):
         made: list[Any] = []
@@ -76,12 +77,16 @@ _LABEL = re.compile(r"\\label\{([^{}]*)\}")
 _EQUATION = re.compile(r"\\begin\{(equation|align)\}")
 _CLAIM = re.compile(r"(\W*)(C\d+)\b(.*)")
 _COLOUR = re.compile(r"color: (ok\w+)")
-PARAGRAPH = 4  # heading level of LaTeX paragraphs
+PARAGRAPH = 4  # level of the headings that pandoc makes of LaTeX paragraphs
 
 
 @dataclass
 class Labels:
-    """TeX labels with numbers and pages; counters of one document's figures, tables and others."""
+    """Counters of the figures, tables etc. of one document, and the numbers of its TeX labels.
+
+    prefix, page : prefix of all numbers, such as "S", and file name of the document's page
+    numbers : TeX label -> (number, page)
+    """
 
     prefix: str
     page: str
@@ -89,7 +94,7 @@ class Labels:
     counts: Counter[str] = field(default_factory=Counter)
 
     def next(self, kind: str, label: str = "") -> str:
-        """Count the next figure, table etc. (``kind``); return and store the ``label``'s number."""
+        """Count the next figure, table etc. (``kind``); store and return its number."""
         self.counts[kind] += 1
         return self.note(label, f"{self.prefix}{self.counts[kind]}")
 
@@ -102,7 +107,7 @@ class Labels:
         return self.note(label, self.prefix + ".".join(parts))
 
     def note(self, label: str, number: str) -> str:
-        """Store ``number`` and page for a non-empty ``label``; return ``number``."""
+        """Store ``number`` and page by ``label``, unless this is empty; return ``number``."""
         if label:
             self.numbers[label] = (number, self.page)
         return number
@@ -111,10 +116,8 @@ class Labels:
 def numbered(tree: Node, labels: Labels, shown: Callable[[str, Node], Node]) -> Node:
     """Number sections, figures, tables, equations and theorems of ``tree``; adapt their layout.
 
-    Parameters
-    ----------
-    labels : receives the number of every TeX label
-    shown : function that returns the node to show, given a figure's name and its numbered node
+    labels : counters, which receive the number of every TeX label
+    shown : function of a figure's name and numbered node; returns the node that replaces it
     """
 
     def visit(node: Node) -> Any:
@@ -133,7 +136,7 @@ def numbered(tree: Node, labels: Labels, shown: Callable[[str, Node], Node]) -> 
             title = {"t": "Header", "c": [1, attributes("references"), words("References")]}
             return [title, node]
         if kind == "Div" and (which := {"theorem", "proposition"} & set(content[0][1])):
-            # pandoc's heading contains the name and a number without the document's prefix
+            # pandoc's heading has a number without the prefix of the document: replace the number
             content[1][0]["c"][0]["c"][-1]["c"] = labels.next(which.pop(), content[0][0])
         if kind == "Math" and content[0]["t"] == "DisplayMath":
             return _equation(node, labels)
@@ -143,10 +146,10 @@ def numbered(tree: Node, labels: Labels, shown: Callable[[str, Node], Node]) -> 
 
 
 def _table(label: str, node: Node, labels: Labels) -> Node:
-    """Table as a scrollable region, with its number and caption in front."""
+    """Return a table in a region that can be scrolled, below its number and caption."""
 
     def headed(node: Node) -> Node | None:
-        """Add a text for screen readers to a formula in a table head; None for other nodes."""
+        """Add the text of a formula, for screen readers; None for nodes that are no formulas."""
         return boxed("Span", [node, _heard(plain(node))]) if node["t"] == "Math" else None
 
     content = _captioned(node, f"Table {labels.next('table', label)}.")["c"]
@@ -164,7 +167,7 @@ def _heard(text: str) -> Node:
 
 
 def _captioned(node: Node, opening: str) -> Node:
-    """Figure or table with ``opening`` (such as "Table 3.") in front of its caption."""
+    """Return a figure or table whose caption begins with ``opening`` (such as "Table 3.")."""
     attribute, (short, blocks), *others = node["c"]
     words_of_caption = blocks[0]["c"] if blocks else []
     strong = {"t": "Strong", "c": words(opening)}
@@ -173,7 +176,7 @@ def _captioned(node: Node, opening: str) -> Node:
 
 
 def _equation(node: Node, labels: Labels) -> Node:
-    """Display formula with its equation numbers, one per line of an ``align`` environment."""
+    """Return a display formula with its number; an ``align`` environment has one for each line."""
     kind, tex = node["c"]
     found = _EQUATION.search(tex)
     lines = [] if found is None else [tex] if found[1] == "equation" else tex.split(r"\\")
@@ -187,17 +190,12 @@ def _equation(node: Node, labels: Labels) -> Node:
 
 
 def resolved(tree: Node, labels: Mapping[str, tuple[str, str]], claims: Mapping[str, Any]) -> Node:
-    """Insert numbers of references, links of numbers and claims, and bold paragraph headings.
+    """Insert the numbers of references, links at numbers and claims, and headings of paragraphs.
 
-    Parameters
-    ----------
-    labels : number and page of each label
+    Raises PaperError if the text refers to a label that no document has.
+
+    labels : TeX label -> (number, page)
     claims : claims by the name that the text uses
-
-    Raises
-    ------
-    PaperError
-        The text refers to a label that no document has.
     """
 
     def visit(node: Node) -> Any:
@@ -216,7 +214,7 @@ def resolved(tree: Node, labels: Mapping[str, tuple[str, str]], claims: Mapping[
 
 
 def _run_in(blocks: list[Node]) -> list[Node]:
-    """Turn headings of paragraphs into bold words at the beginning of the paragraph."""
+    """Turn headings of paragraphs into bold words at the beginning of the paragraphs."""
     made: list[Node] = []
     heading: list[Node] = []
     for block in blocks:
@@ -236,7 +234,7 @@ def _resolved_link(node: Node, labels: Mapping[str, tuple[str, str]]) -> Node | 
     attribute, inlines, (address, _) = node["c"]
     if address.startswith(ORIGIN):
         key = bytes.fromhex(address.removeprefix(ORIGIN)).decode()
-        # the key also selects rows (`study.paper.macros`), which the table's page shows
+        # the key names a table and selects rows, which the page of the table marks
         table, _, rows = key.partition("|")
         place = re.sub(r'[% "<>#]', lambda sign: quote(sign[0]), rows)
         return link(inlines, f"tables/{table}.html" + (f"#{place}" if place else ""), "val")

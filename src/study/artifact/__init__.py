@@ -1,1 +1,1 @@
-"""Artifacts of the study (files made by a declared function): declarations, paths and logs."""
+"""Artifacts (functions declared to make files of the study): declarations, paths and logs."""

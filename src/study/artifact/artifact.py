@@ -1,6 +1,6 @@
 """Artifact: a function that makes files of the study, with its declared input and output files.
 
-A decorator declares it; the parameters have the names of ``reads`` (inputs) and ``writes``::
+A decorator declares it; parameters of the function are the names in ``reads`` and ``writes``::
 
     @experiment(
         "POD of {group} in {scene} ({basis})",
@@ -9,9 +9,9 @@ A decorator declares it; the parameters have the names of ``reads`` (inputs) and
     )
     def pod(snapshots: File, spec: BasisSpec, out: File) -> None: ...
 
-Settings are validated by the function's annotations, and a job depends on declared inputs only. An
-artifact has one job for each combination of the wildcards (scene, group ...) in its output paths;
-their values in one job are called ``labels`` in the code.
+Settings are validated by the annotations of the function. A job depends only on declared inputs.
+Paths of outputs have wildcards (scene, group ...), and an artifact has one job for each combination
+of their values. The values in one job are called ``labels`` in the code.
 """
 
 import inspect
@@ -35,13 +35,13 @@ A = TypeVar("A", bound="Artifact")
 class Artifact:
     """A function that makes files of the study, with its input and output files.
 
-    A function with a parameter ``outputs`` gets a mapping of all output paths by name in it. This
-    serves functions with many output files, or with files in configurable folders.
+    If the function has a parameter ``outputs``, it gets all output paths by name in it. This serves
+    functions with many output files, or with files in configurable folders.
 
     name : name of the function
-    title : progress message when a job starts; ``{scene}`` etc. stand for the job's scene etc.
-    reads : input files and settings, by the names of the function's parameters
-    writes : kinds of output files, by the names of the parameters that receive them
+    title : message when a job starts; ``{scene}`` etc. stand for scene etc. of the job
+    reads : input files and settings, by parameter of the function
+    writes : kinds of output files, by parameter of the function
     alone : True if the function measures times, so that no other job may run meanwhile
     """
 
@@ -60,7 +60,7 @@ class Artifact:
 
     @property
     def address(self) -> str:
-        """Address ``module:name``, from which `load` imports the artifact."""
+        """Address ``module:name`` by which the function `load` imports the artifact."""
         return f"{self.function.__module__}:{self.name}"
 
     @property
@@ -70,7 +70,7 @@ class Artifact:
 
     @property
     def files(self) -> dict[str, FileRead]:
-        """Declared inputs that are files, not settings, by parameter name."""
+        """Declared inputs that are files (the others are settings), by parameter name."""
         reads = self.reads.items()
         return {name: read for name, read in reads if not isinstance(read, SettingRead)}
 
@@ -86,13 +86,13 @@ class Artifact:
         return self.function(*arguments, **named)
 
     def settings(self, sources: Sources, labels: Labels) -> dict[str, Any]:
-        """Return a job's validated settings by parameter; ConfigurationError for an unknown key."""
+        """Return validated settings of a job by parameter; ConfigurationError for unknown keys."""
         reads = [(name, read) for name, read in self.reads.items() if isinstance(read, SettingRead)]
         values = {name: read.value(sources, labels) for name, read in reads}
         return {name: self.types[name].validate_python(value) for name, value in values.items()}
 
     def plain(self, settings: Mapping[str, Any]) -> dict[str, Any]:
-        """Return typed ``settings`` as JSON data, with the fields of the annotated types only."""
+        """Return ``settings`` as JSON data, only with the fields of the annotated types."""
         return {k: self.types[k].dump_python(v, mode="json") for k, v in settings.items()}
 
     def perform(
@@ -100,10 +100,7 @@ class Artifact:
     ) -> None:
         """Run a job with JSON ``settings``, and paths ``inputs`` and ``outputs``, all by parameter.
 
-        Raises
-        ------
-        ValidationError
-            A setting does not have the type of the function's annotation.
+        Raises ValidationError if a setting does not have the type of the function's annotation.
         """
         made: dict[str, Any] = {"outputs": outputs}
         if "outputs" not in inspect.signature(self.function).parameters:
@@ -111,17 +108,15 @@ class Artifact:
         self.function(**self.read(settings, inputs), **made)
 
     def read(self, settings: Mapping[str, Any], inputs: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the function's arguments: contents of ``inputs`` and validated ``settings``."""
+        """Return arguments of the function: contents of ``inputs`` and validated ``settings``."""
         content = {name: read.content(inputs[name]) for name, read in self.files.items()}
         return content | {k: t.validate_python(settings[k]) for k, t in self.types.items()}
 
 
 def make(address: str, code: str, labels: Labels, **job: Mapping[str, Any]) -> None:
-    """Run a job of the artifact at ``address``; each output file records rule, settings and code.
+    """Run a job of the artifact at ``address``; output files record rule, settings and code.
 
-    Parameters
-    ----------
-    code : fingerprint of the code that the job runs
+    code : fingerprint (hash) of the code that the job runs
     labels : scene, group ... of the job, by name
     job : JSON ``settings``, and paths ``inputs`` and ``outputs``, each by parameter name
     """
@@ -131,7 +126,7 @@ def make(address: str, code: str, labels: Labels, **job: Mapping[str, Any]) -> N
 
 
 def declare(made: A, *parameters: str) -> A:
-    """Return ``made``; TypeError if its function takes others than its reads and ``parameters``."""
+    """Return ``made``; TypeError unless its function takes its inputs and ``parameters``."""
     try:
         inspect.signature(made.function).bind(**made.reads, **dict.fromkeys(parameters))
     except TypeError as error:
@@ -140,7 +135,7 @@ def declare(made: A, *parameters: str) -> A:
 
 
 def load(address: str) -> Artifact:
-    """Import and return the artifact at an address ``module:name``."""
+    """Import the artifact at an address ``module:name``, and return it."""
     module, _, name = address.partition(":")
     made: Artifact = getattr(import_module(module), name)
     return made
@@ -150,7 +145,7 @@ def load(address: str) -> Artifact:
 def declared_in(package: str, kind: type[A]) -> dict[str, A]:
     """Return all artifacts of the class ``kind`` in the modules of a package, sorted by name.
 
-    Only modules that import from the module of ``kind`` are searched; others are not imported.
+    To save time, modules that import nothing from the module of ``kind`` are not imported.
     """
     root, found = Path(import_module(package).__path__[0]), {}
     for path in root.rglob("*.py"):
@@ -165,7 +160,7 @@ def declared_in(package: str, kind: type[A]) -> dict[str, A]:
 
 
 def modules_in(value: Any) -> Iterator[str]:
-    """Yield all ``modules`` (names of modules) of Pydantic models in ``value``, such as effects."""
+    """Yield modules named by the attribute ``modules`` of models in ``value``, such as effects."""
     if isinstance(value, BaseModel):
         yield from getattr(value, "modules", ())
         for name in type(value).model_fields:

@@ -1,7 +1,7 @@
 """Log file of a job, its time and memory, and the message that the user sees when the job fails.
 
-Time and memory are measured in the job's own process and are the last line of its log: Snakemake's
-``benchmark:`` samples only every 30 s, which is longer than most jobs take.
+The last line of a job's log has its time and memory, measured in the job's own process. Snakemake's
+``benchmark:`` measures only every 30 s, which is longer than most jobs take.
 """
 
 import errno
@@ -34,27 +34,27 @@ FORMAT = "%(asctime)s %(levelname)-7s %(name)s: %(message)s"
 
 
 class _LogFile(logging.FileHandler):
-    """Log file that ignores a full disk; the job fails anyway when it writes its outputs."""
+    """Log file that ignores a full disk: the job will fail anyway when it writes its outputs."""
 
     stream: TextIOWrapper
 
     def handleError(self, record: logging.LogRecord) -> None:
-        """Ignore an error of writing; the base class would print a traceback for every message."""
+        """Ignore an error of writing, for which the base class would print a traceback."""
 
 
 @contextmanager
 def job_log(path: str) -> Iterator[logging.Logger]:
-    """Write the packages' log to ``path`` while a job runs, with libraries limited to one thread.
+    """Write log messages to ``path`` while a job runs; limit libraries to one thread meanwhile.
 
-    Snakemake allows the libraries as many threads as the job claims, and a job that measures times
-    claims all cores. More threads would also change the order of sums.
+    Snakemake would allow libraries as many threads as the job has cores, and more threads would
+    change the order of sums.
 
     A `PdromError` (a user's mistake) ends the job with one line on stderr. Any other exception
-    leaves its traceback in the log and one line on stderr with the log's path; lack of memory or
-    disk space is named. The last line of a successful job's log reports its resources. If a signal
-    ends the job, Python's stack trace comes last.
+    leaves its traceback in the log and one line on stderr with the log's path; this line also says
+    if memory or disk space was lacking. The last line of the log has time and memory of a job that
+    succeeds, or Python's stack trace if a signal ends the job.
 
-    Damaged results that the job reads are renamed (`pdrom.core.store.checksum`).
+    Damaged results that the job reads are renamed.
     """
     start = time.monotonic()
     loggers = [logging.getLogger(name) for name in PACKAGES]
@@ -95,9 +95,10 @@ def job_log(path: str) -> Iterator[logging.Logger]:
 
 @contextmanager
 def planning_log(quiet: bool) -> Iterator[None]:
-    """Show warnings of pdrom and study on stderr, or drop them if ``quiet``.
+    """Show warnings of pdrom and study on stderr, or suppress them if ``quiet``.
 
-    Every job makes the plan again in its own process, quietly: the main process has shown them.
+    Jobs, which make the plan again in their own processes, suppress them: the main process has
+    shown them already.
     """
     handler = logging.NullHandler() if quiet else logging.StreamHandler()
     handler.setLevel(logging.WARNING)
@@ -126,8 +127,8 @@ class Usage:
 
     wall : seconds from its start to its end
     processor : user and system seconds of the job and of the processes that it started
-    memory : largest resident memory, MB, of the job or of one process that it started; memory of
-        libraries that jobs share is included for each job
+    memory : largest resident memory, MB, of the job or of one process that it started, including
+        the memory of libraries, which jobs share
     """
 
     wall: float
@@ -142,9 +143,9 @@ class Usage:
 
 
 def usage_since(start: float) -> Usage:
-    """Return the wall time since ``start`` (s, monotonic clock), and this process's other usage.
+    """Return wall time since ``start`` (s, monotonic clock), processor time and memory.
 
-    Processor time counts from the start of the process; in a forked job it starts at zero.
+    Processor time counts from the start of this process; a forked job starts at zero.
     """
     used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
     return Usage(
@@ -155,7 +156,7 @@ def usage_since(start: float) -> Usage:
 
 
 def usage_of(log: str | Path) -> Usage | None:
-    """Read the usage from the log of a job; None without a log or if the job failed."""
+    """Read time and memory of a job from its log; None without a log or if the job failed."""
     try:
         lines = Path(log).read_text(encoding="utf-8", errors="replace").splitlines()
     except FileNotFoundError:

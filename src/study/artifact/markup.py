@@ -1,7 +1,7 @@
 r"""Conversion of the mark-up of titles and captions to TeX, plain text and reStructuredText.
 
-The mark-up has two forms: ```name``` is set in typewriter, ``$r \le 20$`` is mathematics.
-``{key}`` stands for a setting of the configuration (`filled`).
+In the mark-up, ```name``` is set in typewriter, ``$r \le 20$`` is mathematics, and ``{key}`` stands
+for the value of a setting of the configuration.
 """
 
 import re
@@ -46,9 +46,9 @@ def to_plain(text: str) -> str:
 
 
 def to_rst(text: str) -> str:
-    """Convert mark-up to one line of reStructuredText in which no character has a special meaning.
+    """Convert mark-up to one line of reStructuredText.
 
-    Every punctuation character gets a backslash, so that no directive, role or link can occur.
+    Every punctuation character gets a backslash, so that none has a special meaning.
     """
     words = " ".join(to_plain(text).split())
     return re.sub(r"([^\w\s]|_)", r"\\\1", words)

@@ -1,7 +1,7 @@
-"""Layout of a results folder: the only module that defines the paths of results.
+"""Layout of a results folder: the only module that defines paths of results.
 
 A `Place` is a kind of file. Its path has wildcards for scene, group, method ..., whose values are
-called labels. The pipeline chooses the results folder itself, one for each configuration.
+called labels. Each configuration has its own results folder, which the pipeline chooses.
 """
 
 import re
@@ -15,7 +15,7 @@ from pdrom.core.errors import StorageError
 
 RESULTS = "results"
 
-# Regular expressions for the values of wildcards in paths, by name; the workflow uses them too.
+# Name of a wildcard in paths -> regular expression for its values; the workflow uses them, too.
 LABELS = {
     "mesh": r"[A-Za-z0-9_.-]+",
     "scene": r"[a-z][a-z0-9_]*",
@@ -36,11 +36,11 @@ class Place:
     pattern: str
 
     def at(self, results: str, **labels: str) -> str:
-        """Path in the folder ``results``; ``labels`` are the values of scene, group ... in it."""
+        """Path of the file in the folder ``results`` for scene, group ... in ``labels``."""
         return f"{results}/{self.pattern.format(**labels)}"
 
     def where(self, **labels: str) -> "Place":
-        """Return the kind of file in whose path some wildcards are replaced by values."""
+        """Return a kind of file whose path has values in place of the wildcards in ``labels``."""
         pattern = self.pattern
         for label, value in labels.items():
             pattern = pattern.replace(f"{{{label}}}", value)
@@ -52,7 +52,7 @@ class Place:
         return _LABEL.findall(self.pattern)
 
     def file(self, path: str) -> "File":
-        """Return ``path`` with scene, group ... in it; StorageError if the pattern does not fit."""
+        """Return ``path`` as a `File`; StorageError if the path does not fit the pattern."""
         found = self._expression.search(path)
         if found is None:
             raise StorageError(f"{path}: no file of the kind '{self.pattern}'")
@@ -63,11 +63,11 @@ class Place:
         return [self.file(path) for path in paths]
 
     def paths(self, sources: Any, labels: Mapping[str, str]) -> str:
-        """Return the path of this kind of file for a job whose scene, group ... are ``labels``."""
+        """Return the path of the file of this kind for a job with scene, group ... ``labels``."""
         return str(sources.file(self, labels))
 
     def content(self, paths: Any) -> "File":
-        """Return the `File` at the path ``paths``, as the argument of an artifact's function."""
+        """Return the `File` at the path ``paths``, which the function of an artifact receives."""
         return self.file(str(paths))
 
     @cached_property
@@ -80,7 +80,7 @@ class Place:
 
 @dataclass(frozen=True)
 class File:
-    """A file: its path, and scene, group ... in the path by name; ``file["scene"]`` returns one."""
+    """A file with its path, and with scene, group ... in the path: ``file["scene"]`` etc."""
 
     path: str
     labels: dict[str, str]
@@ -143,7 +143,7 @@ PLACES = tuple(place for place in vars().copy().values() if isinstance(place, Pl
 
 
 def labels_in(path: str, results: str) -> Iterator[dict[str, str]]:
-    """Yield scene, group ... in ``path``, by name, for each kind of file that the path fits."""
+    """Yield scene, group ... in ``path``, by name, for each kind of file that has such a path."""
     for place in PLACES:
         with suppress(StorageError):
             labels = place.file(path).labels

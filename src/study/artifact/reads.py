@@ -1,8 +1,8 @@
-"""Declarations of the files and settings that an artifact needs, called its reads.
+"""Declarations of the inputs of artifacts: files and settings.
 
-A read contains no path: it names a kind of file, a table or a key of the configuration. `Sources`
-find the paths or the value for a job, given its scene, group ... (``labels``). The artifact's
-function receives the ``content`` of files and the ``value`` of settings.
+A declaration contains no path: it names a kind of file, a table, or a key of the configuration. The
+plan of the study (``sources``) finds paths or value for the scene, group ... (``labels``) of a job.
+The function of the artifact receives the ``content`` of files and the ``value`` of settings.
 """
 
 from collections.abc import Mapping
@@ -15,7 +15,9 @@ from study.artifact.paths import Place
 
 Labels = Mapping[str, str]
 Paths = str | list[str]
-# An object that finds paths and settings for a job's scene, group ...: `study.pipeline.plan.Plan`.
+# Path of a file, kept in git, with rows of a table that the long study (config/extended.yaml) made.
+RECORD = "config/reference/recorded/{}.csv"
+# Object that finds paths and settings for scene, group ... of a job: a `study.pipeline.plan.Plan`.
 Sources = Any
 
 
@@ -45,7 +47,7 @@ class EachOf(Every):
 
 @dataclass(frozen=True)
 class TableOf:
-    """The study's table ``name``, read as a data frame."""
+    """Table ``name`` of the study, read as a data frame."""
 
     name: str
 
@@ -57,7 +59,7 @@ class TableOf:
 
 
 class EditedFiles:
-    """Base class for hand-edited input files: a job reruns if their content changes, not dates."""
+    """Base class for files edited by hand: jobs rerun if the content changes, whatever the date."""
 
     def content(self, paths: Any) -> Any:
         return Path(paths) if isinstance(paths, str) else [Path(path) for path in paths]
@@ -65,7 +67,7 @@ class EditedFiles:
 
 @dataclass(frozen=True)
 class ProjectFile(EditedFiles):
-    """A hand-edited file, given by its path in the project."""
+    """A file edited by hand, given by its path in the project."""
 
     path: str
 
@@ -75,7 +77,7 @@ class ProjectFile(EditedFiles):
 
 @dataclass(frozen=True)
 class ProjectFiles(EditedFiles):
-    """Hand-edited files, given by their paths in the project."""
+    """Files edited by hand, given by their paths in the project."""
 
     named: tuple[str, ...]
 
@@ -84,8 +86,18 @@ class ProjectFiles(EditedFiles):
 
 
 @dataclass(frozen=True)
+class Recorded(EditedFiles):
+    """File of recorded rows of the table ``name``; no file if the setting ``recorded`` is off."""
+
+    name: str
+
+    def paths(self, sources: Sources, labels: Labels) -> Paths:
+        return [RECORD.format(self.name)] if sources.value("recorded", labels) else []
+
+
+@dataclass(frozen=True)
 class SourcesOf(EditedFiles):
-    """Hand-edited files, listed by the attribute ``sources`` of the setting ``key``."""
+    """Files edited by hand that the attribute ``sources`` of the setting ``key`` lists."""
 
     key: str
 
@@ -95,7 +107,7 @@ class SourcesOf(EditedFiles):
 
 @dataclass(frozen=True)
 class Setting:
-    """The configuration value of ``key``; dots in the key separate section and entry."""
+    """Value of a ``key`` of the configuration; a dot in the key separates section and entry."""
 
     key: str
 
@@ -105,7 +117,7 @@ class Setting:
 
 @dataclass(frozen=True)
 class Settings:
-    """Several settings as one Pydantic ``model``; the name of each field is the setting's key."""
+    """Several settings as one Pydantic ``model``, whose fields have the keys of the settings."""
 
     model: type[Any]
 
@@ -114,7 +126,7 @@ class Settings:
         return self.model.model_validate({key: sources.value(key, labels) for key in fields})
 
 
-# A `Place` (kind of file) as an input is its file for the scene, group ... of the job.
-FileRead = Every | TableOf | ProjectFile | ProjectFiles | SourcesOf | Place
+# A `Place` (kind of file) as an input is the file of this kind for scene, group ... of the job.
+FileRead = Every | TableOf | ProjectFile | ProjectFiles | Recorded | SourcesOf | Place
 SettingRead = Setting | Settings
 Read = FileRead | SettingRead

@@ -1,1 +1,1 @@
-"""Experiments of the study, one module for each question that the study answers."""
+"""Experiments: functions that run models and write files of results, by subject."""

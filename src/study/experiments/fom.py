@@ -19,9 +19,10 @@ from study.experiments.kit.base import Solver, experiment, scene_of
     writes={"out": MESH},
 )
 def mesh(sources: list[Path], config: MeshConfig, out: File) -> None:
-    """Build the mesh of ``config`` from its ``sources``, check it and save it to ``out``.
+    """Build the mesh of ``config``, check it and save it to ``out``.
 
-    Paths are relative to the project's folder. Raises MeshError, which names the fault.
+    ``sources`` are files it is built from. Paths are relative to the folder of the project. Raises
+    MeshError, which names the fault.
     """
     made = check_mesh(config.build(Path()), config.label)
     save_mesh(made, out.path, {"label": config.label})
@@ -35,8 +36,8 @@ def mesh(sources: list[Path], config: MeshConfig, out: File) -> None:
 def fom(mesh: File, config: SceneConfig, solver: Solver, **runs: File) -> None:
     """Simulate the training motion and the held-out motions of a scene, each into one of ``runs``.
 
-    The training run and the first held-out run also store projections for the snapshots (the latter
-    at odd frames only); all other runs store positions only.
+    The training run and, in odd frames only, the first held-out run also store projections for the
+    snapshots. All other runs store positions only.
     """
     frames, plans = config.frames, config.reduce
     wanted = {
@@ -53,7 +54,7 @@ def fom(mesh: File, config: SceneConfig, solver: Solver, **runs: File) -> None:
     writes={"out": SNAPSHOTS},
 )
 def snapshots(mesh: File, train: File, heldout: File, config: SceneConfig, out: File) -> None:
-    """Select a group's projections from the runs ``train`` and ``heldout``; save to ``out``."""
+    """Select projections of a group from the runs ``train`` and ``heldout``; save to ``out``."""
     group = out["group"]
     scene = scene_of(config, mesh)
     frames = sets.training_frames(scene.config.frames, scene.config.reduce[group].train)

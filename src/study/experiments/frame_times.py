@@ -1,7 +1,7 @@
-"""Frame times over several processes: full-order runs, and reductions whose speed-up is published.
+"""Frame times in several processes, of full-order runs and of reductions with a cited speed-up.
 
-Every process times everything in another random order. The full-order run of each scene is timed
-twice, as a control: speed-ups as small as the difference of identical runs mean nothing.
+Every process times all runs in another random order. As a control, the full-order run of each scene
+is timed twice: speed-ups as small as the difference between these two times mean nothing.
 """
 
 from collections import defaultdict
@@ -48,7 +48,7 @@ class SubspaceCase(OfScene):
 
 
 class ProjectionCase(OfScene):
-    """Reduced projections of a group, with unreduced positions, whose speed-up the text cites."""
+    """Reduction of a group's projections (not of positions) whose speed-up the text cites."""
 
     group: str
     method: str
@@ -58,7 +58,7 @@ class ProjectionCase(OfScene):
 class FrameTimes(Processes):
     """Section ``frame_times``: numbers of runs, and the reductions whose speed-up the text cites.
 
-    The full-order runs of all scenes and every model of the large scenes are timed as well.
+    Full-order runs of all scenes, and all models of large scenes, are timed in any case.
     """
 
     subspaces: tuple[SubspaceCase, ...] = ()
@@ -66,7 +66,7 @@ class FrameTimes(Processes):
 
 
 class NamedScene(OfScene):
-    """A scene with its name, which occurs in the paths of its files."""
+    """A scene and its name, which the paths of its files contain."""
 
     config: SceneConfig
 
@@ -85,12 +85,13 @@ class Options(ConfigModel):
 
 @dataclass(frozen=True)
 class TimedScene:
-    """A scene to time: its full-order run twice (once as a control), and its reductions.
+    """A scene whose full-order run (twice, once as a control) and reductions are timed.
 
-    mesh : file of the mesh; None builds it from the configuration
-    projections : reduced local steps to time: group, method and size, with basis and samples
-    models : for each file of position subspaces, (method, kind of basis, number of modes) of the
-        models to time; None times all
+    mesh : file of the mesh; None builds the mesh from the configuration
+    projections : reduced local steps to time: (group, method and size; specification of the method;
+        file of the basis; file of the samples)
+    models : file of position subspaces -> (method, kind of basis, number of modes) of the models
+        to time; None times all models in the file
     """
 
     scene: SceneConfig
@@ -101,7 +102,7 @@ class TimedScene:
     models: dict[str, list[tuple[str, str, int]] | None] = field(default_factory=dict)
 
     def variants(self) -> Iterator[Variant]:
-        """Yield every step loop to time: full order, its control, and reductions."""
+        """Yield the step loops to time: full order, full order as a control, and reductions."""
         config = self.scene
         mesh = config.mesh.build(Path()) if self.mesh is None else load_mesh(self.mesh)
         scene = Scene.build(config, mesh)
@@ -141,7 +142,7 @@ class TimedScene:
     alone=True,
 )
 def frame_times(settings: Options, times: File, seconds: File, **files: list[File]) -> None:
-    """Run the timing processes one by one; write frame times, and times to make reductions."""
+    """Run the timing processes one by one; write frame times, and times of making reductions."""
     asked = settings.frame_times
     scenes: dict[str, TimedScene] = {}
     for named, file in zip(settings.timed_scenes, files["meshes"], strict=True):
@@ -159,7 +160,7 @@ def frame_times(settings: Options, times: File, seconds: File, **files: list[Fil
     for case, file in zip(settings.subspace_cases, files["subspaces"], strict=True):
         chosen[file.path].append((case.method, case.position_basis, case.k))
         scenes[case.scene].models[file.path] = chosen[file.path]
-    # a large scene may be among the scenes above
+    # a large scene may be one of the scenes above
     for named, file in zip(settings.large_scenes, files["large"], strict=True):
         scene = TimedScene(named.config, settings.solver, asked.frames)
         scenes.setdefault(named.scene, scene).models[file.path] = None

@@ -1,8 +1,9 @@
-"""Error of K local/global iterations per frame against the limit K -> infinity.
+"""Error of runs with K local/global iterations per frame, against the limit K -> infinity.
 
-In the limit, every frame minimises its objective. The iteration converges linearly, and slowly on
-stiff meshes. It is a quasi-Newton step with the constant system matrix A as Hessian: L-BFGS started
-from A (Liu, Bouaziz and Kavan 2017, section 4) has the same limit, in far fewer evaluations.
+In the limit, every frame minimises its objective. The local/global iteration converges linearly,
+and slowly on stiff meshes. It is a quasi-Newton step with the constant system matrix A as Hessian.
+L-BFGS started from A (Liu, Bouaziz and Kavan 2017, section 4) reaches the same limit in far fewer
+evaluations, and is used here.
 """
 
 import logging
@@ -39,7 +40,7 @@ COLUMNS = [
 class IterationCounts(ConfigModel):
     """Numbers of local/global iterations per frame (``counts``) of full-order runs.
 
-    Each is also run with Anderson acceleration over ``anderson_window`` iterates (0: none).
+    Each number is also run with Anderson acceleration over ``anderson_window`` iterates, if > 0.
     """
 
     counts: tuple[Annotated[int, Field(ge=1, le=10_000)], ...] = (1, 2, 5, 10, 20, 40)
@@ -47,10 +48,10 @@ class IterationCounts(ConfigModel):
 
 
 class IterationSweep(IterationCounts):
-    """Section ``iterations``: the counts, compared with a run in which every frame is converged.
+    """Section ``iterations``: numbers of iterations, and limits of the converged run.
 
-    A frame is converged when one more iteration moves no vertex by more than ``tolerance`` times
-    the extent of the mesh; ``limit`` is the largest number of evaluations of a frame.
+    In the converged run, a frame ends when one more iteration would move no vertex by more than
+    ``tolerance`` times the longest side of the mesh, or after ``limit`` evaluations.
     """
 
     tolerance: kit.Tolerance = 1e-8
@@ -79,14 +80,16 @@ def iterations(
     solver: kit.Solver,
     **files: paths.File,
 ) -> None:
-    """Run a scene up to its horizon with every number K of iterations, and once to convergence.
+    """Run a scene with every number K of iterations, and once to convergence.
 
-    Each K is run without (``window`` 0) and with Anderson acceleration. A row has the errors for
-    one K against the converged run and against the scene's own run. The last row is the converged
-    run itself (``iterations`` empty) with its largest residual: the change by one more iteration,
-    relative to the extent. If a frame stays above the tolerance, there is no converged run, and
-    errors against it are empty. The table ``models`` has the errors of runs in position subspaces
-    against the converged run; their iterations and training frames are those of the scene.
+    Runs end before the frame in which perturbed runs differ too much to be compared. Each K is run
+    without (``window`` 0) and with Anderson acceleration. A row has the errors for one K against
+    the converged run, and against the run with the scene's own K. The last row is the converged run
+    itself (empty ``iterations``) with its largest residual: the change by one more iteration, over
+    the longest side of the mesh. If a frame did not converge, errors against this run are empty.
+
+    The table ``models`` has the errors of runs in position subspaces against the converged run;
+    their iterations and training frames are those of the scene.
     """
     scene = kit.scene_of(config, files["mesh"])
     system = scene.system_with(solver)
@@ -128,20 +131,20 @@ def iterations(
 
 
 def accelerated(counts: list[int], window: int) -> list[tuple[int, int]]:
-    """Pairs (iterations, window) of all runs: plain ones, then accelerated ones of more than 2."""
+    """Pairs (iterations, window): all ``counts`` with window 0, then those above 2 accelerated."""
     plain = [(count, 0) for count in counts]
     return plain + [(count, window) for count in counts if window and count > 2]
 
 
 def stepper_of(scene: Scene, system: GlobalSystem, iterations: int, window: int) -> Stepper:
-    """Full-order step loop of ``scene`` with other ``iterations`` and Anderson ``window``."""
+    """Full-order step loop of ``scene`` with other ``iterations``, Anderson ``window`` (or 0)."""
     changes = {"iterations": iterations, "anderson_window": window}
     other = replace(scene, config=scene.config.model_copy(update=changes))
     return other.stepper(system, track_objective=False)
 
 
-MEMORY = 8
-SUFFICIENT = 1e-4  # constant of Armijo's condition: least decrease relative to slope times step
+MEMORY = 8  # number of steps that L-BFGS stores
+SUFFICIENT = 1e-4  # constant of Armijo's condition: least decrease, over slope times step length
 SHORTEST = 1e-4  # shorter steps are replaced by a plain iteration, which cannot raise the objective
 
 Evaluate = Callable[[np.ndarray], tuple[float, np.ndarray]]
@@ -152,7 +155,7 @@ class Minimum(NamedTuple):
 
     y : (n, 3) last iterate, m
     change : largest change of a coordinate by one more local/global iteration, m
-    evaluations : number of local and global steps done
+    evaluations : number of evaluations, each of one local and one global step
     """
 
     y: np.ndarray
@@ -163,15 +166,13 @@ class Minimum(NamedTuple):
 def minimise(
     evaluate: Evaluate, matrix: sparse.csr_array, y: np.ndarray, tolerance: float, limit: int
 ) -> Minimum:
-    """L-BFGS in the metric of ``matrix``, with backtracking on the objective.
+    """Minimise the objective of a frame by L-BFGS in the metric of ``matrix``, with backtracking.
 
-    Parameters
-    ----------
-    evaluate : function of y that returns the objective and the result G(y) of one local/global
-        iteration; the gradient is A (y - G(y)), and G(y) equals y on fixed rows
+    evaluate : function of y; returns the objective, and the result G(y) of one local/global
+        iteration from y. The gradient is A (y - G(y)); G(y) equals y on fixed rows.
     matrix : A, (n, n) symmetric positive definite
     y : (n, 3) start, m
-    tolerance : largest entry of G(y) - y at which the iteration ends, m
+    tolerance : the minimisation ends when no entry of G(y) - y exceeds this, m
     limit : largest number of evaluations
     """
     pairs: list[_Pair] = []
@@ -199,7 +200,7 @@ def minimise(
         after = target - trial
         moved, change = trial - y, d - after
         both = matrix @ np.hstack([moved, change])
-        a_moved, a_change = both[:, :3].copy(), both[:, 3:].copy()  # contiguous, as read often
+        a_moved, a_change = both[:, :3].copy(), both[:, 3:].copy()  # contiguous: fast to read
         curvature = float(np.vdot(moved, a_change))
         if curvature > 0.0:
             pairs = [*pairs, _Pair(moved, change, a_moved, a_change, curvature)][-MEMORY:]
@@ -208,7 +209,7 @@ def minimise(
 
 
 class _Pair(NamedTuple):
-    """A step of L-BFGS, the change of A^-1 gradient along it, and products of both with A."""
+    """Step of L-BFGS, change of A^-1 times the gradient in it, and products of both with A."""
 
     step: np.ndarray
     change: np.ndarray
@@ -218,7 +219,7 @@ class _Pair(NamedTuple):
 
 
 def _direction(d: np.ndarray, pairs: list[_Pair]) -> np.ndarray:
-    """L-BFGS direction by the two-loop recursion (Nocedal 1980); ``d`` is -A^-1 gradient."""
+    """L-BFGS direction by the two-loop recursion (Nocedal 1980); ``d`` = -A^-1 times gradient."""
     q, alphas = d.copy(), []
     for pair in reversed(pairs):
         alpha = np.vdot(pair.a_step, q) / pair.curvature
@@ -230,9 +231,9 @@ def _direction(d: np.ndarray, pairs: list[_Pair]) -> np.ndarray:
 
 
 class ConvergedStepper(Stepper):
-    """Step loop of a full-order scene that iterates every frame to its minimum.
+    """Full-order step loop that minimises the objective of every frame up to a tolerance.
 
-    ``changes`` and ``evaluations`` have one number of `Minimum` for each frame computed so far.
+    ``changes`` and ``evaluations`` list these fields of `Minimum` for the frames computed so far.
     """
 
     def __init__(self, scene: Scene, system: GlobalSystem, tolerance: float, limit: int) -> None:
@@ -250,7 +251,7 @@ class ConvergedStepper(Stepper):
     def step(
         self, state: State, frame: int, on_last_iterate: Callable[[np.ndarray], None] | None = None
     ) -> tuple[State, FrameReport]:
-        """Compute ``frame`` from ``state``, without objective; ``on_last_iterate`` is ignored."""
+        """Compute ``frame`` from ``state``; ``on_last_iterate`` is ignored, the report is empty."""
         s, elimination, base = self._begin(state, frame)
         rhs = np.empty_like(s)
 
@@ -270,9 +271,10 @@ class ConvergedStepper(Stepper):
 
 
 def converged_run(scene: Scene, tolerance: float, limit: int) -> np.ndarray | None:
-    """Positions (F + 1, N, 3) m of a run of ``scene`` with converged frames, initial ones first.
+    """Positions (F + 1, N, 3) m of a run of ``scene`` in which every frame has converged.
 
-    None if a frame does not reach the ``tolerance`` within ``limit`` evaluations.
+    The initial positions come first. None is returned if a frame does not reach the ``tolerance``
+    within ``limit`` evaluations.
     """
     best = ConvergedStepper(scene, scene.system, tolerance, limit)
     positions = kit.followed(best, scene.initial_state(), scene.config.frames)

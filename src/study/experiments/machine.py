@@ -1,9 +1,9 @@
-"""Record of the machine, its speed by three units of time, and the library versions.
+"""Record of the machine: its speed in three units of time, and the versions of libraries.
 
-``./reproduce run python -m study.experiments.machine`` measures the units in a few seconds: the
-processor time on one thread of 1e9 dependent steps x <- a x + b (scalar), of 1e9 sums and products
-in independent vectors of four doubles (vector), and of reading 1e9 bytes of an array of 256 MiB
-(memory). Each is the minimum over some repeats in turns, scaled from a smaller number of steps.
+The units are the processor times, on one thread, of 1e9 dependent steps x <- a x + b (scalar), of
+1e9 sums and products in independent vectors of four doubles (vector), and of reading 1e9 bytes of
+an array of 256 MiB (memory). Each is measured with fewer steps, as the minimum over some repeats.
+``./reproduce run python -m study.experiments.machine`` measures and prints them in a few seconds.
 """
 
 import sys
@@ -21,7 +21,7 @@ from pdrom.model.compiled.rows import WIDTH, load
 from study.artifact.paths import MACHINE, File
 from study.experiments.kit.base import experiment
 
-AT_ONCE = 8  # number of independent vectors: enough to hide the latency of sums and products
+AT_ONCE = 8  # number of independent vectors, enough to hide the latency of sums and products
 SCALAR_STEPS, VECTOR_TIMES = 10**7, 10**6
 MEMORY_BYTES = 2**28  # read in one call, larger than any cache
 REPEATS = 15
@@ -38,7 +38,7 @@ def machine(out: File) -> None:
 def units() -> Units:
     """Measure the units of time of this machine, each as the minimum over some repeats."""
     numbers = np.ones(MEMORY_BYTES // 8)
-    # (amount of work of one call in units of 1e9, function of a divisor of this amount)
+    # pairs (work of a call, in units of 1e9; function that does this work divided by its argument)
     trials: list[tuple[float, Callable[[int], object]]] = [
         (1e-9 * SCALAR_STEPS, lambda share: _chain(SCALAR_STEPS // share)),
         (
@@ -71,7 +71,7 @@ def _chain(times):
 
 @compiled(nogil=True)
 def _products(numbers, times):
-    """Compute x <- a + x a ``times`` times for `AT_ONCE` vectors x; ``numbers`` has a and all x."""
+    """Compute x <- a + x a ``times`` times for `AT_ONCE` vectors x; ``numbers`` are a, then x."""
     one = load(numbers, 0)
     a, b = load(numbers, WIDTH), load(numbers, 2 * WIDTH)
     c, d = load(numbers, 3 * WIDTH), load(numbers, 4 * WIDTH)

@@ -1,4 +1,4 @@
-"""Basis of a reduced group, from its snapshots."""
+"""POD basis of a constraint group's projections, computed from snapshots."""
 
 import logging
 

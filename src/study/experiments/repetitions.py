@@ -1,9 +1,10 @@
-"""Repeated reduced runs, runs that change one choice of the method at a time, bases of round-off.
+"""Repeated reduced runs, runs with one changed choice, and runs on bases of rounding errors.
 
-A run depends on choices that are arbitrary: the training frames, and the last digits of the start.
-If a conclusion depends on the error of a run, repetitions with other choices show the scatter of
-that error. With several training motions, held-out motions are repetitions, too. A ladder leads
-from published to sound choices, one per rung. Projections that are round-off make bases of noise.
+A run depends on arbitrary choices: the training frames, and the last digits of the start. If a
+conclusion rests on the error of a run, repetitions with other choices show the scatter of the
+error. With several training motions, held-out motions are repetitions, too. A "ladder" is a list of
+methods ("rungs") that leads from the published choices to sound ones and changes one choice at a
+time. Where projections are rounding errors only, bases are computed from these errors.
 """
 
 import logging
@@ -52,7 +53,7 @@ NOISE_COLUMNS = [
 ]  # fmt: skip
 ALL, PLANE, VERTEX = "all", "plane", "vertex"
 Methods = Mapping[str, MethodSpec]
-Runs = list[tuple[dict[str, Any], Rerun | None]]  # (table row, run) of all runs from one start
+Runs = list[tuple[dict[str, Any], Rerun | None]]  # pairs (table row, run) of runs from one start
 Rungs = Annotated[tuple[MethodSpec, ...], Field(min_length=1)]
 
 
@@ -60,7 +61,8 @@ class Repetitions(ConfigModel):
     """Settings of repeated runs.
 
     repetitions : number of random draws, with seeds 1, 2, ...
-    perturbation : length of random displacements of initial positions, relative to the extent
+    perturbation : length of random displacements of the initial positions, relative to the extent
+        (longest side of the bounding box of the mesh)
     """
 
     repetitions: Annotated[int, Field(ge=1, le=1000)] = 5
@@ -69,12 +71,13 @@ class Repetitions(ConfigModel):
 
 @dataclass(frozen=True)
 class ReducedRuns:
-    """Runs of a scene with one group reduced, compared with its full-order run.
+    """Runs of a scene with one constraint group reduced, compared with the full-order run.
 
-    data : snapshots of the group
+    data : snapshots of the group's projections
     reference : (F + 1, N, 3) m, positions of the full-order run
-    end : first frame that is not compared (the horizon)
-    blowup_extent : multiple of the rest shape's extent above which a run ends as a blow-up
+    end : first frame that is not compared, because perturbed full-order runs differ too much in it
+    blowup_extent : a run ends as a blow-up if the longest side of its bounding box exceeds this
+        multiple of that at rest
     """
 
     scene: Scene
@@ -87,11 +90,11 @@ class ReducedRuns:
 
     @cached_property
     def displacement(self) -> np.ndarray:
-        """Norms (F,) m of the full-order run's displacement from its first positions, by frame."""
+        """Norm of the full-order run's displacement from its first positions, by frame: (F,) m."""
         return displacement_norms(self.reference)
 
     def until_the_end(self) -> "ReducedRuns":
-        """Copy with the run shortened to frames before ``end``, but to two frames at least."""
+        """Return a copy whose run is shortened to the frames before ``end``, or to two frames."""
         frames = min(self.scene.config.frames, max(2, self.end))
         scene = self.scene.changed(frames=frames)
         return replace(self, scene=scene, reference=self.reference[: frames + 1])
@@ -99,7 +102,11 @@ class ReducedRuns:
     def basis(
         self, method: MethodSpec, frames: int | None = None, signs: int | None = None
     ) -> Basis:
-        """Basis for ``method``; seeds ``frames`` and ``signs`` draw training frames and signs."""
+        """Return the basis for ``method``.
+
+        With a seed ``frames``, the training frames are drawn at random; with a seed ``signs``, the
+        signs of the singular vectors are.
+        """
         key = (method.basis_id, frames, signs)
         if key not in self._bases:
             train = None if frames is None else drawn(self.data, frames)
@@ -108,22 +115,22 @@ class ReducedRuns:
         return self._bases[key]
 
     def run(self, reduction: Reduction, offset: np.ndarray | None = None) -> Rerun:
-        """Run with ``reduction``, with initial positions displaced by ``offset`` (N, 3) m."""
+        """Run with ``reduction`` from initial positions displaced by ``offset`` (N, 3) m."""
         return rerun_reduced(
             self.scene, self.group, reduction, self.reference, self.blowup_extent, offset=offset
         )
 
     def error(self, outcome: Rerun) -> float | None:
-        """Relative error of a run over frames before ``end``; None if it stopped earlier."""
+        """Relative error of a run over the frames before ``end``; None if it stopped earlier."""
         return error_within(outcome.difference, self.displacement, self.end)
 
     def repeat(
         self, method: MethodSpec, sizes: Sequence[int], varied: Varied, asked: Repetitions
     ) -> list[dict[str, Any]]:
-        """Rows of every repetition of ``method`` at each of ``sizes`` up to the rank, by size.
+        """Return rows of all repetitions of ``method``, at each of ``sizes`` up to the rank.
 
-        ``varied`` is what is drawn at random: initial positions, or training snapshots. Errors are
-        over the frames before ``end``, inf for a run that stopped earlier.
+        ``varied`` tells if initial positions ("start") or training snapshots ("training") are drawn
+        at random. Errors are over the frames before ``end``, inf for a run that stopped earlier.
         """
         rows, made, offset = [], {}, None
         if varied == "start":
@@ -143,10 +150,11 @@ class ReducedRuns:
     def on_motions(
         self, method: MethodSpec, sizes: Sequence[int], counts: Sequence[int]
     ) -> Iterator[dict[str, Any]]:
-        """Rows of held-out motions, by a basis for each number of training motions in ``counts``.
+        """Yield rows of runs of the held-out motions, for each number of training motions.
 
-        The first training motion is that of the scene, the others are drawn by seeds. Of n motions
-        every n-th training snapshot is used. Errors are over the frames before ``end``.
+        The numbers are ``counts``. The first training motion is that of the scene, others are drawn
+        by seeds; of n motions, every n-th training snapshot is used. Errors are over the frames
+        before ``end``, inf for a run that stopped earlier.
         """
         config, mesh = self.scene.config, self.scene.mesh
         frames = self.data.frames["train"]
@@ -171,9 +179,10 @@ class ReducedRuns:
 def recorded(
     scene: Scene, group: str, start: np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Positions (F + 1, N, 3) m of the full-order run, and projections (F, e p, 3) of ``group``.
+    """Return positions (F + 1, N, 3) m of the full-order run, and projections (F, e p, 3).
 
-    ``start`` (N, 3) m is added to the initial positions.
+    The projections are those of the constraint ``group`` with e elements of p rows each. ``start``
+    (N, 3) m is added to the initial positions.
     """
     own, projections = scene.group(group), list[np.ndarray]()
     loop, state = scene.stepper(), scene.initial_state(start)
@@ -185,7 +194,10 @@ def recorded(
 
 
 def drawn(data: sets.SnapshotSet, seed: int) -> np.ndarray:
-    """Draw as many snapshots (n, e p, 3) by ``seed`` from all of ``data`` as are for training."""
+    """Draw snapshots (n, e p, 3) by ``seed`` from training and test snapshots of ``data``.
+
+    Their number n is that of the training snapshots.
+    """
     frames = np.concatenate([data.frames["train"], data.frames["test"]])
     chosen = np.random.default_rng(seed).choice(len(frames), len(data.train), replace=False)
     chosen = chosen[np.argsort(frames[chosen])]
@@ -194,9 +206,11 @@ def drawn(data: sets.SnapshotSet, seed: int) -> np.ndarray:
 
 
 class Cell(ConfigModel):
-    """Runs that are repeated, at each basis size in ``sizes``.
+    """Settings of runs that are repeated.
 
-    training_motions : numbers of training motions, each for runs of held-out motions
+    sizes : basis sizes of the runs
+    varied : what is drawn at random: initial positions, training frames, or held-out motions
+    training_motions : numbers of training motions, with each of which held-out motions are run
     """
 
     sizes: Annotated[tuple[kit.Modes, ...], Field(min_length=1)]
@@ -205,34 +219,36 @@ class Cell(ConfigModel):
 
 
 class Cells(Cell):
-    """Repeated runs: every method at every size in every scene, for all of its groups."""
+    """Repeated runs: every method at every size in every scene, for each group that it reduces."""
 
     scenes: Annotated[tuple[SceneName, ...], Field(min_length=1)]
     methods: Annotated[tuple[str, ...], Field(min_length=1)]
 
 
 class RepetitionSection(Repetitions):
-    """Section ``repetitions``: how runs are repeated, and which runs."""
+    """Section ``repetitions``: numbers for all repetitions, and ``cells``, the repeated runs."""
 
     cells: tuple[Cells, ...] = ()
 
 
 class Repeated(Cell):
-    """A method whose runs of the job's scene and group are repeated, with its specification."""
+    """A method, with its specification, whose runs are repeated for scene and group of the job."""
 
     method: str
     spec: MethodSpec
 
 
 class Ladder(Repetitions):
-    """Methods (rungs) that differ in one choice each; runs are repeated on other training frames.
+    """Methods ("rungs"), each of which differs from the one before in a single choice.
 
     r : basis size of all rungs (the numerical rank if that is smaller)
     signs : number of repetitions of the first rung with other signs of the singular vectors
-    repeated : scenes whose runs are repeated
-    up, down : methods from the published to the sound one; the sound one without a choice each
-    square : separate or shared coefficients with single rows or whole elements as samples, at each
-        of ``sizes``; p single rows replace an element of p rows, for equal numbers of entries
+    repeated : scenes whose runs are repeated with other training frames
+    up : methods from the published to the sound one
+    down : methods that differ from the sound one in one choice each
+    square : methods with separate or with shared coefficients, which sample single rows or whole
+        elements, each at all ``sizes``; p single rows replace an element of p rows, so that numbers
+        of entries are equal
     """
 
     r: Annotated[int, Field(ge=1, le=100_000)] = 20
@@ -244,7 +260,7 @@ class Ladder(Repetitions):
     sizes: tuple[kit.Modes, ...] = ()
 
     def rungs(self, p: int) -> list[tuple[str, MethodSpec, int | None, int]]:
-        """List (direction, method, seed of signs, size r) of all runs; ``p``: rows per element."""
+        """List all runs as (direction, method, seed of signs, size r); elements have ``p`` rows."""
         rows: list[tuple[str, MethodSpec, int | None, int]] = []
         rows += [("up", method, None, self.r) for method in self.up]
         rows += [("down", method, None, self.r) for method in self.down]
@@ -259,17 +275,18 @@ class Ladder(Repetitions):
 
 
 class LadderSection(Ladder):
-    """Section ``ladder``: the methods, and ``scenes`` whose reduced groups are run with them."""
+    """Section ``ladder``: methods of the ladder, and ``scenes`` whose groups are run with them."""
 
     scenes: tuple[str, ...] = ()
 
 
 class NoiseRuns(ConfigModel):
-    """Runs with bases computed from projections that are only round-off.
+    """Settings of runs with bases computed from projections that are only rounding errors.
 
     sizes : numbers of modes
     repetitions : number of randomly displaced initial positions
-    perturbation : displacement of a vertex relative to the extent: a few units of round-off
+    perturbation : displacement of a vertex (a few units of round-off), relative to the longest
+        side of the bounding box
     """
 
     sizes: Annotated[tuple[kit.Modes, ...], Field(min_length=1)] = (6, 10, 20)
@@ -278,14 +295,14 @@ class NoiseRuns(ConfigModel):
 
 
 class Noise(NoiseRuns):
-    """Section ``noise``: ``cases`` maps scenes to a group; scenes not in the study are ignored."""
+    """Section ``noise``: ``cases`` maps a scene to a group; scenes not in the study are ignored."""
 
     cases: dict[str, str] = Field(default_factory=dict)
     methods: tuple[str, ...] = ("deim-joint", "published")
 
 
 class Options(ConfigModel):
-    """Settings of a scene with one group reduced; None omits the runs of ladder or noise."""
+    """Settings of a scene with one group reduced; ladder or noise is not run if it is None."""
 
     scene: SceneConfig
     repetitions: Repetitions
@@ -314,7 +331,7 @@ class Options(ConfigModel):
     },
 )
 def repetitions(settings: Options, **files: paths.File) -> None:
-    """Run repetitions, ladder, and reductions with bases of round-off, for one scene and group.
+    """Run repetitions, ladder, and reductions on bases of rounding errors, for a scene and group.
 
     Tables of runs that the configuration does not request have no rows.
     """
@@ -352,7 +369,7 @@ def repetitions(settings: Options, **files: paths.File) -> None:
 
 
 def _ladder(runs: ReducedRuns, short: ReducedRuns, ladder: Ladder) -> Iterator[dict[str, Any]]:
-    """Yield the row of every method of the ladder; repetitions use ``short``, shortened runs."""
+    """Yield a row for every method of the ladder; ``short`` are shorter runs for repetitions."""
     data = runs.data
     for direction, method, seed, r in ladder.rungs(data.rows_per_element):
         rung = method.title if seed is None else f"signs {seed}"
@@ -362,7 +379,7 @@ def _ladder(runs: ReducedRuns, short: ReducedRuns, ladder: Ladder) -> Iterator[d
         if direction == "square" and r > basis.rank:
             continue
         size = min(r, basis.rank)
-        # without modes (projections that are only round-off) there is no reduction
+        # there is no reduction without modes, that is if all projections are rounding errors
         for reduction in reductions(basis, method, [size] if size else []).values():
             outcome = runs.run(reduction)
             row |= {**outcome.row(runs.displacement), "r": size}
@@ -388,11 +405,12 @@ def _ladder(runs: ReducedRuns, short: ReducedRuns, ladder: Ladder) -> Iterator[d
 def noisy_runs(
     scene: Scene, group: str, asked: NoiseRuns, methods: Methods, limit: float, file: h5py.File
 ) -> list[dict[str, Any]]:
-    """Perturb initial positions, run, compute bases without a cutoff of round-off, and rerun.
+    """Run a scene from perturbed starts, compute bases of rounding errors, and rerun with them.
 
-    Returns the rows of all runs with the ``group`` reduced by each of ``methods``. For each of
-    `kinds` the runs of one start go to ``file``, as in `study.experiments.reruns`, marked if r
-    exceeds the rank; ``limit`` is the extent of a blow-up relative to that of the rest shape.
+    Returns the rows of all runs with the ``group`` reduced by each of ``methods``. For each of the
+    `kinds` of perturbed start, the runs of one start are stored in ``file``; for a size r above the
+    rank there is only a mark. A run ends as a blow-up if its bounding box exceeds ``limit`` times
+    that of the rest shape.
     """
     rows = []
     for axes in kinds(scene):
@@ -413,7 +431,7 @@ def noisy_runs(
 
 
 def irregular(runs: Runs) -> bool:
-    """Whether some method completes runs at some basis sizes and blows up at others."""
+    """Return whether a method completes the run at some basis sizes and blows up at others."""
     ends: dict[str, set[bool]] = {}
     for row, outcome in runs:
         if outcome is not None:
@@ -422,18 +440,19 @@ def irregular(runs: Runs) -> bool:
 
 
 def kinds(scene: Scene) -> tuple[str, ...]:
-    """Names of the sets of coordinates that are perturbed at the start of ``scene``, in turn.
+    """Names of the kinds of perturbed start of ``scene``, by the coordinates that are perturbed.
 
-    They are all coordinates. For a flat mesh also those in its plane, and those in its plane with
-    the normal coordinate of a single vertex.
+    The first kind perturbs all coordinates. For a flat mesh, the second one perturbs coordinates in
+    its plane only, and the third one also the normal coordinate of a single vertex.
     """
     return (ALL, PLANE, VERTEX) if np.ptp(scene.mesh.points, axis=0).min() == 0.0 else (ALL,)
 
 
 def roundoff_field(scene: Scene, axes: str, size: float, seed: int) -> np.ndarray:
-    """Random displacement (N, 3) m, zero in coordinates outside of the set ``axes`` of `kinds`.
+    """Random displacement (N, 3) m; ``axes`` is the kind of perturbed start, one of `kinds`.
 
-    ``size`` is its length relative to the extent; ``seed`` draws the displacement and the vertex.
+    Its length is ``size`` times the longest side of the bounding box. ``seed`` draws the
+    displacement and, for the kind `VERTEX`, the vertex.
     """
     field = kit.perturbation_field(scene, size, seed)
     if axes != ALL:
@@ -450,9 +469,10 @@ def _noisy(
 ) -> Iterator[tuple[dict[str, Any], Rerun | None]]:
     """Yield (row, run) of all reductions, with initial positions displaced by ``start`` (N, 3) m.
 
-    The reductions are trained on all projections of its full-order run, even if they are round-off:
-    there is no cutoff, and no axis is left out. A method with separate systems has, as published,
-    a system for an axis in which nothing moves; elsewhere in this study such an axis has none.
+    The reductions are trained on projections of the full-order run from this start, even if these
+    are rounding errors: no mode is cut off, and no axis is left out. As published, a method with a
+    system of equations for each axis has one for an axis in which nothing moves, too; elsewhere in
+    this study, such an axis has none.
     """
     group, plan, frames = scene.group(name), scene.config.reduce[name], scene.config.frames
     reference, projections = recorded(scene, name, start)

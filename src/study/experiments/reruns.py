@@ -1,6 +1,6 @@
-"""Sampling of a group by one method, and runs with the group reduced, for every basis size r.
+"""Sampling of a constraint group by one method, and runs with the group reduced, at all sizes r.
 
-`stability` runs one scene with several time steps and stiffnesses, by every method.
+`stability` runs one scene with several time steps and stiffnesses, with every method.
 """
 
 import logging
@@ -43,24 +43,24 @@ ERROR_COLUMNS = [
     "relative_error", "relative_error_x", "relative_error_y", "relative_error_z",
     "gain", "rows_sampled", "elements_sampled",
 ]  # fmt: skip
-MOTION = "motion"  # column that only the table of held-out runs has
+MOTION = "motion"  # column that only the table of held-out motions has
 
 
 class Sweep(ConfigModel):
-    """Basis sizes of reconstruction errors: all up to ``dense_to``, then every ``step``-th."""
+    """Basis sizes r of reconstruction errors: all up to ``dense_to``, then every ``step``-th."""
 
     dense_to: kit.Count = 10
     step: kit.Count = 10
 
     def ranks(self, largest: int) -> list[int]:
-        """Sizes from 1 to ``largest``; ``largest`` is always included."""
+        """Return these sizes between 1 and ``largest``, always including ``largest``."""
         dense = range(1, min(self.dense_to, largest) + 1)
         coarse = range(self.dense_to + self.step, largest + 1, self.step)
         return sorted({*dense, *coarse, largest} - {0})
 
 
 class Options(ConfigModel):
-    """Settings of samplings and reduced runs of a scene by one method."""
+    """Settings of the experiment `reruns` for one scene and method."""
 
     scene: SceneConfig
     method: MethodSpec
@@ -91,7 +91,7 @@ class Options(ConfigModel):
 def reruns(motions: list[File], settings: Options, **files: File) -> None:
     """Sample the group, then run training and held-out motions with reductions of every size r.
 
-    One job does all this, because starting another process takes longer than the sampling.
+    One job does both, because the start of another process takes longer than the sampling.
     """
     space, data = load_basis(files["basis"].path), load_snapshots(files["snapshots"].path)
     _sample(space, data, settings, files["sampling"], files["errors"])
@@ -115,10 +115,11 @@ def reruns(motions: list[File], settings: Options, **files: File) -> None:
 def _runs(
     yardstick: Yardstick, sampling: File, basis: Basis, settings: Options, file: h5py.Group
 ) -> Iterator[dict[str, Any]]:
-    """Run a motion for every basis size r and yield the rows; r above the rank gives a marked row.
+    """Run a motion at every basis size r, store the runs in ``file``, and yield their rows.
 
-    The runs are stored in ``file``. Positions are stored only in the file's root group, which
-    contains the training motion: figures show no other motion.
+    For a size above the rank there is no run: the row has no results, the stored group is marked.
+    Positions are stored only for the training motion (in the root group of the file), because
+    figures show no other motion.
     """
     labels, scene = sampling.labels, yardstick.scene
     system = scene.system_with(settings.solver)
@@ -147,12 +148,11 @@ def _runs(
 def _sample(
     basis: Basis, data: SnapshotSet, settings: Options, sampling: File, errors: File
 ) -> None:
-    """Select samples for every size r to reconstruct or rerun; write them and the error table.
+    """Select samples at all sizes r that are reconstructed or run; write samples and errors.
 
-    Parameters
-    ----------
     basis, data : basis of the group, from its training snapshots, and all of its snapshots
-    sampling, errors : files to write; scene, group ... in their paths are the first columns
+    sampling, errors : files of samples and of reconstruction errors; scene, group ... in their
+        paths are the first columns of the table
     """
     labels = sampling.labels
     asked = kit.resolve_ranks(settings.ranks, basis.rank)
@@ -182,17 +182,17 @@ SHORT_COLUMNS = [
     "scene", "method", "r", "h", "stiffness_ratio", "finite", "blowup_frame", "max_extent",
     "energy_ratio", "gain", "group", "position_basis", "k", "frames", "relative_error",
 ]  # fmt: skip
-Local = list[tuple[dict[str, Any], Reduction | None]]  # (first columns of its rows, reduction)
+Local = list[tuple[dict[str, Any], Reduction | None]]  # pairs (first columns of rows, reduction)
 Models = list[tuple[dict[str, Any], SubspaceModel]]
 
 
 class ShortRuns(ConfigModel):
-    """Short runs with other time steps and other stiffnesses of the reduced groups.
+    """Settings of short runs with other time steps and other stiffnesses of the reduced groups.
 
-    The bases and samplings are those of the scene's own setting.
+    Bases and samples remain those of the scene's own time step and stiffness.
 
     ranks : basis sizes r, as far as the study has them; subspaces are run at their largest size
-    time_steps : h in seconds, in addition to the scene's own
+    time_steps : time steps in seconds, in addition to the scene's own one
     stiffness_ratios : factors on the weights of the reduced groups, in addition to 1
     duration : simulated time in seconds, between ``min_frames`` and ``max_frames`` frames
     """
@@ -214,12 +214,12 @@ class ShortRuns(ConfigModel):
 
 
 class Stability(ShortRuns):
-    """Section ``stability``: short runs, and limits by which the outcome of runs is classified.
+    """Section ``stability``: short runs, and limits that determine the outcome of a run.
 
     scenes : names of the scenes; those that are not in the study are ignored
-    wrong : relative error above which a run is finite but wrong
-    departure : a run with more than this multiple of the full-order run's largest extent has left
-        the scene; the key is ``left``
+    wrong : a finite run counts as wrong if its relative error exceeds this value
+    departure : a run has left the scene if its bounding box exceeds this multiple of the largest
+        one of the full-order run; the key in the configuration is ``left``
     """
 
     scenes: tuple[str, ...] = ()
@@ -228,7 +228,7 @@ class Stability(ShortRuns):
 
     @property
     def left(self) -> float:
-        """Value of `departure`, by the name of its key in the configuration."""
+        """Value of `departure` under the name that its key has in the configuration."""
         return self.departure
 
 
@@ -259,7 +259,8 @@ def stability(
 ) -> None:
     """Run full order, reductions and largest subspaces with every time step and stiffness.
 
-    Bases and samplings are those of the scene's own setting, to see how far they are valid.
+    Bases and samples are those of the scene's own time step and stiffness: the runs show how far
+    from these they can be used.
     """
     scene = kit.scene_of(config, mesh)
     local: Local = []
@@ -276,7 +277,7 @@ def stability(
         found: Models = load_models(file.path)
         largest = max(labels["k"] for labels, _ in found)
         models += [(labels, model) for labels, model in found if labels["k"] == largest]
-    # time step and stiffness are varied one at a time
+    # either the time step or the stiffness is varied
     h, limits = scene.config.time_step, (short.min_frames, short.max_frames)
     ratios = sorted({1.0, *short.stiffness_ratios} - {1.0})
     grid = [(step, 1.0) for step in sorted({h, *short.time_steps})] + [(h, own) for own in ratios]
@@ -295,10 +296,10 @@ def stability(
 def _rows(
     scene: Scene, local: Local, models: Models, solver: str, limit: float
 ) -> Iterator[dict[str, Any]]:
-    """Rows of the full-order run of ``scene`` and, if that is finite, of runs by all reductions.
+    """Yield rows of the full-order run of ``scene`` and, if it is finite, of all reduced runs.
 
-    ``limit`` is the extent of a blow-up relative to that of the rest shape. A reduction in
-    ``local`` is None if the basis has fewer modes than requested.
+    A run ends as a blow-up if its bounding box exceeds ``limit`` times that of the rest shape.
+    A reduction in ``local`` is None if the basis has fewer modes than requested.
     """
     system = scene.system_with(solver)
     nothing = np.zeros((scene.config.frames + 1, *scene.mesh.points.shape))

@@ -1,8 +1,8 @@
 """Drift between full-order runs that should be equal (docs/study.md), and forces of effects.
 
-The change of a run after moving its start by 1e-10 of the extent limits the accuracy that can be
-expected of any reduced model. Other runs have another linear solver (another order of summation),
-number of iterations or time step, or leave out an effect.
+A run whose start is moved by 1e-10 of the mesh's size drifts away from the original run. No reduced
+model can be expected to be more accurate than this drift. For comparison, other runs have another
+linear solver (another order of summation), number of iterations or time step, or lack an effect.
 """
 
 from collections.abc import Iterator
@@ -31,14 +31,16 @@ Perturbation = Annotated[float, Field(gt=0.0, lt=1.0)]
 EFFECTS = ["scene", "effect", "role", "frame", "force", "energy"]
 Row = tuple[str, str, int, float, float]
 COLUMNS = ["scene", "perturbation", "seed", "frame", "relative_difference"]
-# Linear solvers; a run is repeated with the first one that is not the default.
+# Linear solvers; a run is repeated with the first of them that is not the default solver.
 OTHER_SOLVERS = ("splu", "splu-columns")
 
 
 class PerturbedRuns(ConfigModel):
-    """Runs from initial positions moved by ``perturbations`` times the extent, for all ``seeds``.
+    """Settings of runs from randomly moved initial positions, for all ``seeds``.
 
-    ``reference`` is the perturbation for the horizon, and the only one for held-out motions.
+    ``perturbations`` are lengths of the displacement relative to the longest side of the mesh.
+    ``reference`` is the one that decides up to which frame runs are compared (the horizon), and the
+    only one for held-out motions.
     """
 
     perturbations: tuple[Perturbation, ...] = (1e-12, 1e-10, 1e-8)
@@ -53,7 +55,7 @@ class PerturbedRuns(ConfigModel):
 
 
 class Sensitivity(PerturbedRuns):
-    """Section ``sensitivity``: the relative difference ``threshold`` ends the compared frames."""
+    """Section ``sensitivity``: runs are compared until perturbed ones differ by ``threshold``."""
 
     threshold: Annotated[float, Field(gt=0.0, allow_inf_nan=False)] = 1e-3
 
@@ -66,10 +68,13 @@ class Sensitivity(PerturbedRuns):
 def sensitivity(
     mesh: File, config: SceneConfig, chosen: PerturbedRuns, out: File, effects: File
 ) -> None:
-    """Write differences of perturbed runs of a scene and its held-out motions to ``out``."""
+    """Run a scene and its held-out motions with perturbations; write the drifts to ``out``.
+
+    Forces and energies of the effects in the scene are written to ``effects``.
+    """
     scene = scene_of(config, mesh)
     parts = [sensitivities(scene, chosen.perturbations, chosen.seeds)]
-    for motion in MOTIONS:  # each held-out motion has its own horizon
+    for motion in MOTIONS:  # each held-out motion is compared up to a frame of its own
         other = scene_of(config, mesh, motion)
         parts += perturbed(other, trajectory(other), chosen.reference, chosen.seeds, motion)
     write_table(pd.concat(parts, ignore_index=True), out.path)
@@ -84,7 +89,7 @@ class _Watched:
         self.moved = np.zeros(())
 
     def apply(self, positions: np.ndarray, before: np.ndarray, held: np.ndarray) -> None:
-        """Apply the contact and record the displacements of the vertices."""
+        """Apply the contact, and store the displacements of the vertices by it."""
         wanted = positions.copy()
         self._contact.apply(positions, before, held)
         self.moved = positions - wanted
@@ -93,10 +98,10 @@ class _Watched:
 def contributions(scene: Scene) -> pd.DataFrame:
     """Norm of the force (N) and energy (J) of each effect, by frame of a run of ``scene``.
 
-    Effects with the same name count as one. Forces are those at the end of a frame, on free
-    vertices: S^T W (p - S q) of a group, M a of a force, M d / h^2 of a contact that moves vertices
-    by d. The force of pins or handles is the remainder of M (q' - q - h v) / h^2 at their vertices,
-    without all other forces; that of initial velocities v is M v / h in the first frame.
+    Effects with the same name count as one. Forces are taken at the end of a frame, on free
+    vertices: S^T W (p - S q) for a constraint group, M a for a force, M d / h^2 for a contact that
+    moves vertices by d. Pins or handles exert M (q' - q - h v) / h^2 minus all other forces, on the
+    vertices that they hold. Initial velocities v exert M v / h in the first frame.
 
     The energy is W_j for a group, the potential with an arbitrary zero for a force, and the added
     kinetic energy for initial velocities. It is nan for effects without an energy.
@@ -136,7 +141,7 @@ def _frame(
         forces[key] = forces.get(key, 0.0) + np.broadcast_to(force, after.positions.shape)
         energies[effect.name] = energies.get(effect.name, 0.0) + energy
 
-    for group in scene.groups:  # data that groups compute once per frame are of this frame
+    for group in scene.groups:  # groups still have the data that they computed for this frame
         missing = group.project(after.positions) - group.S @ after.positions
         weighted = group.row_weights[:, None] * missing
         energy = 0.5 * float(np.sum(missing * weighted))
@@ -154,7 +159,7 @@ def _frame(
         (name, role, frame, float(np.linalg.norm(force[~held])), energies[name])
         for (name, role), force in forces.items()
     ]
-    squares: dict[str, float] = {}  # pins and handles that are not active exert no force
+    squares: dict[str, float] = {}  # squared forces of pins and handles; zero if not active
     for boundary in scene.boundaries:
         pulled = lacking[boundary.held(frame)] if boundary in active else np.zeros(3)
         squares[boundary.name] = squares.get(boundary.name, 0.0) + float(np.sum(pulled**2))
@@ -163,10 +168,11 @@ def _frame(
 
 
 def relative_difference(other: np.ndarray, base: np.ndarray) -> np.ndarray:
-    """Relative difference (F,) of ``other`` from ``base``, trajectories (F + 1, N, 3), by frame.
+    """Relative difference (F,) of two trajectories (F + 1, N, 3) in each frame.
 
-    || Q'_f - Q_f ||_F over the root mean square of || Q_f - Q_0 ||_F over the run: one
-    normalisation for all frames avoids a division by almost zero in slow first frames.
+    It is the norm of the difference in a frame, || Q'_f - Q_f ||_F, over the root mean square of
+    || Q_f - Q_0 ||_F of ``base`` over all frames. A common denominator avoids division by almost
+    zero in slow first frames.
     """
     difference = (other - base)[1:].reshape(len(base) - 1, -1)
     return np.linalg.norm(difference, axis=1) / mean_motion(base)
@@ -175,9 +181,10 @@ def relative_difference(other: np.ndarray, base: np.ndarray) -> np.ndarray:
 def perturbed(
     scene: Scene, base: np.ndarray, size: float, seeds: tuple[int, ...], label: str
 ) -> Iterator[pd.DataFrame]:
-    """Rows of runs from initial positions moved by ``size`` times the extent, for all ``seeds``.
+    """Yield rows of runs from initial positions moved at random, one table for each seed.
 
-    ``base`` (F + 1, N, 3) m is the unperturbed run; column ``perturbation`` contains ``label``.
+    Displacements are ``size`` times the longest side of the mesh. ``base`` (F + 1, N, 3) m is the
+    unperturbed run; column ``perturbation`` has the value ``label``.
     """
     for seed in seeds:
         other = trajectory(scene, perturbation_field(scene, size, seed))
@@ -187,10 +194,10 @@ def perturbed(
 def sensitivities(
     scene: Scene, perturbations: tuple[float, ...], seeds: tuple[int, ...]
 ) -> pd.DataFrame:
-    """Drift by frame of perturbed runs of ``scene`` (``perturbations``, ``seeds``) and variants.
+    """Drift by frame of perturbed runs of ``scene``, and of runs with another change.
 
-    Variants are another solver, four times the iterations, half the time step, and the scene
-    without the effects of one name, unless it would have no constraint group left.
+    The other changes are another solver, four times the iterations, half the time step, and the
+    scene without all effects of one name (unless it would have no constraint group left).
     """
     base, config = trajectory(scene), scene.config
     parts: list[pd.DataFrame] = []
@@ -206,7 +213,7 @@ def sensitivities(
     variants = {
         "solver": trajectory(scene, system=scene.system_with(solver)),
         "iterations x4": trajectory(scene.changed(iterations=4 * config.iterations)),
-        # build it from the configuration, which checks that there are not too many frames
+        # built from its configuration, which checks that there are not too many frames
         "h/2": trajectory(Scene.build(halved.config, halved.mesh))[::2],
     }
     for effect in removable(config):
@@ -218,12 +225,12 @@ def sensitivities(
 
 
 def without(effect: str) -> str:
-    """Value of the column ``perturbation`` for runs without ``effect``."""
+    """Value of the column ``perturbation`` in rows of runs without ``effect``."""
     return f"without {effect}"
 
 
 def removable(config: SceneConfig) -> list[str]:
-    """Names of the effects without which the scene still has a constraint group, each once."""
+    """Names of effects that can be left out, because a constraint group remains without them."""
     names = dict.fromkeys(e.effect for e in config.effects)
     return [name for name in names if config.groups != [name]]
 

@@ -1,8 +1,8 @@
-"""Position subspaces with full projections, sampled elements, or interpolated projections (hrpd).
+"""Models in position subspaces, whose projections are full, sampled (ecsw) or interpolated (hrpd).
 
-The models of a large scene are made and run in one job together with its full-order runs, which no
-other job reads; `study.experiments.frame_times` times them. `live` writes a scene's models to a
-file that a web page loads, to run them in the reader's browser.
+For a large scene, one job makes the models, runs them, and makes the full-order runs, which no
+other job reads; `study.experiments.frame_times` times the models. `live` writes the models of a
+scene to a file that a web page loads, to run them in the reader's browser.
 """
 
 import json
@@ -63,15 +63,17 @@ Sampled = Mapping[str, subspace.Samples | Interpolation]
 
 
 class Hrpd(HrpdSpec):
-    """Settings of models with interpolated projections, and numbers of modes k that have them."""
+    """Settings of models with interpolated projections; ``sizes`` are their numbers of modes k."""
 
     sizes: tuple[kit.Modes, ...] = ()
 
 
 class SubspaceModels(ConfigModel):
-    """Position subspaces: kinds of basis, numbers of modes; tolerances and norm of the sampling.
+    """Settings of models in position subspaces.
 
-    ``hrpd`` adds models with interpolated projections; None adds none.
+    bases, sizes : kinds of basis, and numbers of modes k
+    tolerances, norm : tolerances to which elements are sampled, and norm of the errors
+    hrpd : settings of models with interpolated projections; None for no such models
     """
 
     bases: tuple[kit.PositionBasis, ...] = ("pod", "skinning")
@@ -90,13 +92,13 @@ class SubspaceModels(ConfigModel):
 
 
 class Subspace(SubspaceModels):
-    """Section ``subspace``: the models, and the ``scenes`` that have them (all if empty)."""
+    """Section ``subspace``: the models, and the ``scenes`` for which they are made (empty: all)."""
 
     scenes: tuple[SceneName, ...] = ()
 
 
 class LargeModels(SubspaceModels):
-    """Models of a large scene, without those with full projections, which take too long."""
+    """Settings of models of a large scene; none has full projections, which take too long."""
 
     bases: tuple[kit.PositionBasis, ...] = ("pod",)
     sizes: tuple[kit.Modes, ...] = (20,)
@@ -108,7 +110,7 @@ class LargeModels(SubspaceModels):
 
 
 class Online(LargeModels):
-    """Section ``online``: the models, and the large ``scenes`` that have them."""
+    """Section ``online``: the models, and the large ``scenes`` for which they are made."""
 
     scenes: tuple[str, ...] = ()
 
@@ -205,14 +207,10 @@ def _runs(
     limit: float,
     compared: bool,
 ) -> pd.DataFrame:
-    """Rows of all motions of a scene, one motion after the other, with every model.
+    """Train every model on the training motion, run all motions with it, and return the rows.
 
-    The models are trained on the training motion.
-
-    Parameters
-    ----------
     file : file that receives the models
-    limit : extent relative to that of the rest shape above which a run ends as a blow-up
+    limit : a run ends as a blow-up if its bounding box exceeds this multiple of that at rest
     compared : True to store coordinates and deviations of each run in ``file``, too
     """
     rows: list[dict[str, Any]] = []
@@ -225,7 +223,7 @@ def _runs(
         subspace.store_columns(file.create_group(f"columns/{base}"), columns)
         spent: dict[str, float] = defaultdict(float)
         for of_model, (method, samples) in clocked(models):
-            # all tolerances share one sampling, whose time is part of the first model's
+            # all tolerances share one sampling: its time is part of that of the first model
             family = subspace.ECSW if method.startswith(subspace.ECSW) else method
             spent[family] += of_model
             model = subspace.SubspaceModel(kind, columns, samples)
@@ -256,7 +254,8 @@ def _subspaces(
 ) -> Iterator[tuple[str, Columns, str, int, Iterator[tuple[str, Sampled]]]]:
     """Yield name, columns, kind and size k of every subspace, and an iterator over its models.
 
-    A model is a pair of method and samples. Training frames are even, as for projections' bases.
+    A model is a pair of method and samples. Only even frames are used for training, as for bases of
+    projections.
     """
     scene, points = motion.scene, motion.scene.mesh.points
     count = max(plan.train for plan in scene.config.reduce.values())
@@ -266,7 +265,7 @@ def _subspaces(
         spaces = {g.name: sampled_space(g, points, settings.hrpd) for g in scene.groups}
 
     def samplings(columns: Columns, methods: list[str]) -> Iterator[tuple[str, Sampled]]:
-        """Yield (method, samples) of the models with these ``columns``."""
+        """Yield pairs (method, samples) of the models with these ``columns``."""
         if FULL in methods:
             yield FULL, {}
         if any(method.startswith(subspace.ECSW) for method in methods):
@@ -285,15 +284,17 @@ def _subspaces(
 
 
 LARGEST = 3_000_000  # largest size of a file of models, bytes
-GHOST = 250_000  # approximate number of vertex positions of the full-order run in such a file
+GHOST = 250_000  # approximate number of positions of the full-order run in such a file
 JOINT = "deim-joint"
 FORMAT = 1
 Labelled = tuple[dict[str, Any], subspace.SubspaceModel]
 
 
 class LiveModels(ConfigModel):
-    """Models on the web page, if the study has them: numbers of modes k, tolerances of sampling,
-    and number of modes r of models whose projections are interpolated from joint rows."""
+    """Settings of the models on the web page; models that the study does not have are left out.
+
+    ``sizes`` are numbers of modes k. ``joint_rows`` is the number of modes r of models whose
+    projections are interpolated from rows that are chosen once for x, y and z together."""
 
     sizes: tuple[kit.Modes, ...] = (10, 20, 40)
     tolerances: tuple[kit.Tolerance, ...] = (3e-2, 1e-2, 1e-3)
@@ -303,14 +304,14 @@ class LiveModels(ConfigModel):
 class Live(LiveModels):
     """Section ``live``: models on the web page, and ``scenes`` from which a reader can choose.
 
-    Scenes without models in the study (position subspaces, or ``online.scenes``) are left out.
+    Scenes for which the study has no models in position subspaces are left out.
     """
 
     scenes: tuple[SceneName, ...] = ()
 
 
 class JointRows(kit.OfScene):
-    """A group that the study samples by joint rows (x, y and z of a row together)."""
+    """A constraint group that is sampled by joint rows: by one index for x, y and z of a row."""
 
     group: str
     method: str = JOINT
@@ -318,7 +319,7 @@ class JointRows(kit.OfScene):
 
 
 class Options(ConfigModel):
-    """Settings of the models of a scene for the web page."""
+    """Settings of the experiment `live` for one scene."""
 
     scene: SceneConfig
     title: str
@@ -342,14 +343,8 @@ class Options(ConfigModel):
 def live(mesh: File, train: File, settings: Options, out: File, **files: list[File]) -> None:
     """Write the models of a scene and its full-order run to the file that the web page loads.
 
-    Parameters
-    ----------
-    bases, samplings : files of the groups sampled by joint rows, in the order of the settings
-
-    Raises
-    ------
-    StorageError
-        The file would be larger than `LARGEST`.
+    ``bases`` and ``samplings`` are files of groups sampled by joint rows (of x, y and z), listed in
+    ``settings.joint_rows``. Raises StorageError if the file would be larger than `LARGEST`.
     """
     scene = kit.scene_of(settings.scene, mesh)
     reference = kit.positions_of(train)
@@ -359,14 +354,14 @@ def live(mesh: File, train: File, settings: Options, out: File, **files: list[Fi
     for file in (*files["subspaces"], *files["online"]):
         for own, model in subspace.load_models(file.path):
             method, kind, k = own["method"], own["position_basis"], own["k"]
-            # only models with sampled elements and POD bases
+            # only models with POD bases and sampled elements are chosen
             if method in tolerances and kind == "pod" and k in asked.sizes:
                 labels = {"family": "elements", "k": k, "tau": tolerances[method]}
                 chosen.append((labels, model))
     given = (settings.joint_rows, files["bases"], files["samplings"])
     for case, file, sampling in zip(*given, strict=True):
         basis = load_basis(file.path)
-        # use the requested size, or the largest if that is smaller
+        # use the requested size, or the rank if it is smaller
         size = min(asked.joint_rows, basis.rank)
         reduction = runfiles.load_reduction(basis, sampling.path, case.spec, size)
         chosen += list(_joint(scene, case.group, reduction, chosen))
@@ -378,7 +373,7 @@ def live(mesh: File, train: File, settings: Options, out: File, **files: list[Fi
         "title": settings.title,
         **exported.export_scene(scene),
         **_models(scene, chosen),
-        # surface, and positions of its vertices in every ``stride``-th frame of full order
+        # the surface, and positions of its vertices in every ``stride``-th full-order frame
         "shown": {
             "vertices": pack_array(used, "u4"),
             "triangles": pack_array(triangles.reshape(-1, 3), "u4"),
@@ -400,7 +395,10 @@ def live(mesh: File, train: File, settings: Options, out: File, **files: list[Fi
 def _joint(
     scene: Scene, group: str, reduction: Reduction, beside: list[Labelled]
 ) -> Iterator[Labelled]:
-    """For each subspace of ``beside``, yield a model with `JOINT` projections of ``group``."""
+    """Yield a model with interpolated projections of ``group`` in each subspace of ``beside``.
+
+    ``beside`` are models with sampled elements; ``reduction`` samples rows of x, y and z together.
+    """
     for model in {id(model.columns): model for _, model in beside}.values():
         joint = interpolation_of(scene.group(group), model.columns, reduction)
         labels = {"family": "joint", "k": model.columns.modes, "r": reduction.r}
@@ -409,7 +407,7 @@ def _joint(
 
 
 def _models(scene: Scene, chosen: list[Labelled]) -> dict[str, Any]:
-    """Contents of the file for the web page: bases, and models with the index of their basis."""
+    """Contents of the file for the web page: all bases, and models with an index of a basis."""
     by_basis: dict[int, list[subspace.SubspaceModel]] = {}
     for _, model in chosen:
         by_basis.setdefault(id(model.columns), []).append(model)

@@ -1,6 +1,6 @@
-"""Milliseconds per frame of full-order and reduced runs, of single local steps, and of effects.
+"""Times of full-order and reduced runs, of single local steps, and of effects.
 
-`timing` measures on the mesh of a scene, `scaling` times iterations on meshes of several sizes.
+`timing` measures on the own mesh of a scene, `scaling` times iterations on meshes of other sizes.
 """
 
 import logging
@@ -40,7 +40,7 @@ from study.experiments.kit.measurement import Protocol, Variant, measure
 class NumpyLocalStep:
     """Local step by vectorised NumPy projections of all elements and SciPy sparse products.
 
-    The time of the products with S^T is counted separately, as in `InterpretedLocalStep`.
+    The time of the products with S^T is added up separately, in ``assembly_seconds``.
     """
 
     def __init__(self, group: ConstraintGroup) -> None:
@@ -88,7 +88,7 @@ class InterpretedLocalStep:
         return energy
 
 
-# Implementations of local steps that are timed, by name.
+# Implementations of local steps that are timed in addition to the compiled one, by name.
 IMPLEMENTATIONS: dict[str, Callable[[ConstraintGroup], Any]] = {
     "numpy": NumpyLocalStep,
     "interpreted": InterpretedLocalStep,
@@ -106,16 +106,16 @@ ITERATIONS = [
     "scene", "method", "vertices", "elements", "r", "k", "elements_sampled",
     "ms_per_iteration", "local_ms", "global_ms", "vertices_ms", "local_share",
 ]  # fmt: skip
-STATES, SIZED_STATES = 5, 4  # numbers of states of a run at which single local steps are timed
+STATES, SIZED_STATES = 5, 4  # numbers of states at which `timing` and `scaling` time local steps
 TrainingFrames = Annotated[int, Field(ge=3, le=1000)]
 
 
 class Timing(Protocol):
     """Section ``timing``: numbers of frames, iterations and repeats in timing jobs.
 
-    The slow implementations of the full-order run are timed over fewer frames, the interpreted one
-    also over fewer iterations. ``breakeven`` are the sizes r of reduced local steps that are timed
-    outside of runs, with ``breakeven_repeats`` short repeats.
+    Slow implementations of the full-order run are timed over fewer frames, the interpreted one also
+    over fewer iterations. ``breakeven`` are sizes r of reduced local steps that are timed by
+    themselves, not in runs, with ``breakeven_repeats`` short repeats.
     """
 
     numpy_frames: kit.Count = 4
@@ -155,7 +155,7 @@ class Options(ConfigModel):
     alone=True,
 )
 def timing(mesh: File, fom: File, settings: Options, **files: Any) -> None:
-    """Measure times of frames (``out``), local steps, effects, and frames ``without`` an effect."""
+    """Measure times of frames, local steps and effects, and of frames without some effects."""
     scene, asked = kit.scene_of(settings.scene, mesh), settings.timing
     system, name = scene.system_with(settings.solver), scene.config.name
     frames = min(asked.frames, scene.config.frames)
@@ -207,7 +207,7 @@ def timing(mesh: File, fom: File, settings: Options, **files: Any) -> None:
 def _full_order(
     scene: Scene, system: GlobalSystem, frames: int, asked: Timing, common: dict[str, Any]
 ) -> tuple[Variant, list[Variant]]:
-    """Full-order runs to time: the slowest, with fewer iterations; and all others."""
+    """Full-order runs to time: the slowest implementation (few iterations), and all others."""
     quick = variant(scene, system, scene.groups, frames, {**common, "implementation": "compiled"})
     made = [quick]
     for name, step in IMPLEMENTATIONS.items():
@@ -223,7 +223,7 @@ def _full_order(
 def _other_counts(
     scene: Scene, system: GlobalSystem, frames: int, asked: IterationCounts, common: dict[str, Any]
 ) -> list[Variant]:
-    """Compiled full-order runs with other numbers of iterations, also by Anderson acceleration."""
+    """Compiled full-order runs with other iteration counts, also with Anderson acceleration."""
     variants = []
     counts = sorted({*asked.counts, scene.config.iterations})
     own = (scene.config.iterations, scene.config.anderson_window)
@@ -237,9 +237,9 @@ def _other_counts(
 
 
 class SizedBreakEven(ConfigModel):
-    """Reduced local steps timed on every mesh size: methods, basis sizes r, short repeats.
+    """Settings of the reduced local steps that are timed by themselves on every mesh size.
 
-    Bases are computed from the first ``training_frames`` frames.
+    ``sizes`` are basis sizes r. Bases are computed from the first ``training_frames`` frames.
     """
 
     methods: tuple[str, ...] = ("deim-joint", "block-deim")
@@ -249,10 +249,11 @@ class SizedBreakEven(ConfigModel):
 
 
 class Sized(Protocol):
-    """Settings of the cost on one mesh size.
+    """Settings of the timing on one mesh size.
 
-    Two reductions are trained on ``training_frames`` frames and timed over ``frames``: ``method``
-    (reduced local step, r modes), and energy-conserving sampling to ``tolerance`` with k modes.
+    Two reductions are trained on ``training_frames`` frames and timed over ``frames`` frames:
+    ``method`` with r modes (reduced local step), and energy-conserving sampling to ``tolerance`` in
+    a position subspace of k modes.
     """
 
     method: str = "block-deim"
@@ -265,7 +266,7 @@ class Sized(Protocol):
 
 
 class Scaling(Sized):
-    """Section ``scaling``: ``scenes`` with factors for the number of vertices along a side."""
+    """Section ``scaling``: ``scenes`` maps a scene to factors on the vertices along a side."""
 
     scenes: kit.Sizes = Field(default_factory=dict)
 
@@ -286,7 +287,7 @@ class SizedOptions(ConfigModel):
     alone=True,
 )
 def scaling(sources: list[Path], settings: SizedOptions, iterations: File, breakeven: File) -> None:
-    """Time a scene on one mesh with ``factor`` times the vertices along each side."""
+    """Time a scene on one mesh; a factor in the paths multiplies the vertices along each side."""
     config, sized = settings.scene, settings.scaling
     specs, alone = settings.scaled_methods, settings.scaling.breakeven
     factor = float(iterations["factor"])
@@ -336,10 +337,10 @@ def scaling(sources: list[Path], settings: SizedOptions, iterations: File, break
 
 
 def _training(scene: Scene, system: GlobalSystem, frames: int) -> tuple[np.ndarray, ...]:
-    """Positions (n, N, 3) m, projections and round-off of the first n ``frames`` in full order.
+    """Run the first n ``frames`` in full order; return positions, projections, rounding errors.
 
-    Projections (n, e p, 3) and their round-off (n,) are those of the first group of ``scene``, at
-    the last local iterate of each frame.
+    Positions (n, N, 3) in m are those at the ends of frames. Projections (n, e p, 3) of the first
+    group of ``scene`` and their rounding errors (n,) are those of the last local step of a frame.
     """
     group = scene.groups[0]
     loop, state = scene.stepper(system, track_objective=False), scene.initial_state()
@@ -362,7 +363,7 @@ def _reductions(
     spec: MethodSpec,
     asked: Sequence[int],
 ) -> list[Reduction]:
-    """Reductions of the first group at the sizes ``asked``, which the numerical rank limits."""
+    """Reductions of the first group at the sizes ``asked``, or at the rank where it is smaller."""
     group = scene.groups[0]
     basis = compute_basis(
         projections,

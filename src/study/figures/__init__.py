@@ -1,4 +1,4 @@
-"""Figures of manuscript and report, one module per subject; see `study.figures.kit.declaration`.
+"""Figures of manuscript and report, one module for each subject.
 
-These modules import the plotting library only when drawing, as workflow planning imports them too.
+The modules import the plotting library only when they draw: planning a run imports them, too.
 """

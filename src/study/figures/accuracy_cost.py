@@ -1,4 +1,4 @@
-"""Figures of error against time: reductions by family, other methods, requested tolerances."""
+"""Figures of error against time, for reductions, other methods, and requested tolerances."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -18,13 +18,13 @@ from study.tables.accuracy_cost import FEWER, pareto
 
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "*")
 ERROR, TIME = "relative_error_within_horizon", "ms_per_frame"
-LOW, HIGH = 1e-3, 1e2  # limits of the error axis; errors outside are drawn as arrows at its ends
-ABOVE, BELOW, BLOWN_UP = 6, 7, "x"  # Matplotlib markers of errors off the axis, and of blow-ups
+LOW, HIGH = 1e-3, 1e2  # limits of the error axis; errors outside are arrows at the limits
+ABOVE, BELOW, BLOWN_UP = 6, 7, "x"  # Matplotlib markers: errors off the axis, runs that blew up
 OWN = {"color": style.GREY, "linewidth": 1.2}
 BLIND = {"color": style.FAILED, "linewidth": 0.9, "linestyle": "-."}
 RATES = (60, 30)  # frame rates of real time, 1/s, drawn as lines
 LARGE, SMALL = 2.6, 1.6  # heights of the large and of the small panels, inches
-LINE, GAP = 0.145, 0.06  # height of a legend line, gap between rows of legend blocks, inches
+LINE, GAP = 0.145, 0.06  # height of a line of the legend, gap between rows of blocks, inches
 COLUMNS = 4  # number of legend blocks in a row
 # Families of reduced models and of full-order runs, each with its colour.
 FAMILIES = {
@@ -42,9 +42,9 @@ Block = tuple[str, list[Line2D]]
 
 
 def look_of(method: str, position_basis: str, drawn: Drawn) -> Look:
-    """Family of a model and its legend entry in the family, which all tolerances of a method share.
+    """Family of a model (None if its method is not drawn), and its legend entry in the family.
 
-    Titles of methods are those in ``drawn``. The family is None for a method that is not drawn.
+    All tolerances of a method have the same legend entry. Titles of methods are those in ``drawn``.
     """
     if method == FEWER:
         return ITERATIONS, "K iterations"
@@ -57,7 +57,7 @@ def look_of(method: str, position_basis: str, drawn: Drawn) -> Look:
 
 
 def markers(looks: list[Look]) -> dict[Look, str]:
-    """Marker of each (family, legend entry); markers within a family are different."""
+    """Marker of each pair (family, legend entry), with different markers within a family."""
     found: dict[Look, str] = {}
     for look in dict.fromkeys(looks):
         before = sum(family == look[0] for family, _ in found)
@@ -69,10 +69,12 @@ def markers(looks: list[Look]) -> dict[Look, str]:
 class TradeOffs:
     """Points (error, time) of reduced models in all scenes, with their markers.
 
-    points : rows of the table accuracy_cost whose errors refer to the scene's own full-order run
+    The own full-order run of a scene has the number of iterations that the scene configures.
+
+    points : rows of table accuracy_cost; errors are against the scene's own full-order run
     blown_up : reduced runs that blew up before an error could be computed
     own_ms : scene -> time per frame of its own full-order run, ms
-    own_error : scene -> error of that full-order run against the converged run
+    own_error : scene -> error of its own full-order run against the converged run
     marker : (family, legend entry) -> Matplotlib marker
     """
 
@@ -83,23 +85,18 @@ class TradeOffs:
     marker: dict[Look, str]
 
     def members(self, family: str) -> dict[str, str]:
-        """Mapping of the legend entries in ``family`` to their markers."""
+        """Return a mapping of the legend entries in ``family`` to markers."""
         return {name: marker for (own, name), marker in self.marker.items() if own == family}
 
 
 def trade_offs(
     drawn: Drawn, table: pd.DataFrame, runs: pd.DataFrame
 ) -> tuple[TradeOffs, list[str]]:
-    """Points (error, time) of scenes and methods in ``drawn``, and the list of scenes with points.
+    """Return points (error, time) for scenes and methods in ``drawn``, and scenes with points.
 
-    Parameters
-    ----------
-    table, runs : the tables accuracy_cost and reduced_reruns
+    Raises NothingToDraw if no reduced model has both an error and a time.
 
-    Raises
-    ------
-    NothingToDraw
-        If no reduced model has both an error and a time.
+    table, runs : tables accuracy_cost and reduced_reruns
     """
     table = table.dropna(subset=[ERROR, TIME])
     own = (table.method == "full") & (table.position_basis == "full")
@@ -117,7 +114,7 @@ def trade_offs(
 
 
 def _drawn(table: pd.DataFrame, drawn: Drawn) -> pd.DataFrame:
-    """Rows of ``table`` that are drawn, with their family and legend entry in two new columns."""
+    """Rows of ``table`` that are drawn; new columns have family and legend entry of the model."""
     names = zip(table.method, table.position_basis, strict=True)
     looks = pd.DataFrame(
         [look_of(*name, drawn) for name in names], table.index, ["family", "member"], dtype=object
@@ -126,11 +123,10 @@ def _drawn(table: pd.DataFrame, drawn: Drawn) -> pd.DataFrame:
 
 
 def draw_panel(ax: Axes, found: TradeOffs, scene: str, size: float = 3.0) -> None:
-    """Draw the points of ``scene``, the Pareto front of each family, and the full-order run.
+    """Draw the models of ``scene``, the Pareto front of each family, and the full-order run.
 
-    The points are in ``found`` and are drawn on ``ax`` with markers of ``size`` (points).
-
-    Errors outside the axis are arrows at its ends; blown-up runs are crosses near the upper end.
+    Markers of the models have the given ``size`` (typographic points). Errors outside the axis are
+    arrows at its ends; runs that blew up are crosses near the upper end.
     """
     ax.set_xscale("log")
     log_axis(ax, LOW, HIGH)
@@ -172,7 +168,7 @@ def _points(ax: Axes, rows: pd.DataFrame, size: float, colour: str, **look: Any)
 
 
 def label_iterations(ax: Axes, found: TradeOffs, scene: str) -> None:
-    """Label each full-order run of ``scene`` that stops early by its number of iterations.
+    """Label full-order runs of ``scene`` with fewer iterations than usual by their number K.
 
     The runs are in ``found`` and are drawn on ``ax``; neighbouring runs share a label.
     """
@@ -182,7 +178,7 @@ def label_iterations(ax: Axes, found: TradeOffs, scene: str) -> None:
 
 
 def handles(found: TradeOffs) -> list[Block]:
-    """Legend blocks of the families in ``found``: one colour each, with a marker per entry."""
+    """Return a block of the legend for each family in ``found``: one colour, several markers."""
     common = {"linewidth": 1.0, "markersize": 4.0}
     entries = [
         ("full order", [
@@ -252,7 +248,7 @@ def accuracy_cost(
 
 
 def _draw_rates(ax: Axes) -> None:
-    """Draw vertical lines at the frame rates `RATES`; name rates beyond the axis at its end."""
+    """Draw vertical lines at the frame rates `RATES`; an arrow names rates outside the axis."""
     high = ax.get_xlim()[1]
     beyond = [rate for rate in RATES if 1e3 / rate >= high]
     for rate in set(RATES) - set(beyond):
@@ -270,17 +266,17 @@ def _label(ax: Axes, x: float, text: str) -> None:
     )  # fmt: skip
 
 
-LEAST, MOST = 1e-4, 1.0  # limits of the error axis; errors outside are drawn on them
+LEAST, MOST = 1e-4, 1.0  # limits of the error axis; errors outside are drawn on the limits
 BESIDE = 4  # largest number of panels in a row
 TOLERANCES, TIMES, REACHED = (5e-3, 2e-1), (1e-2, 1e1), (1e-4, 1e0)
-# Kinds of runs with a requested tolerance: colour, and a factor that shifts dots along that axis.
+# Kind of run with a requested tolerance -> (colour, factor that shifts its dots along the axis).
 KINDS = {
     "reduction": (style.BLUE, 0.85),
     "full order": (style.VERMILLION, 1.0),
     "refused": (style.GREY, 1.15),
 }
 BEST, DOT = ("full order, the best of all methods", style.BLACK), (0.55, 0.55, 0.55)
-# Colour of the reduction by the number of motions that it is trained on.
+# Label of a reduction -> (condition on the number of motions it is trained on, colour).
 TRAINED = {
     "reduction, one training motion": ("training_motions == 1", style.GREEN),
     "reduction, several training motions": ("training_motions > 1", style.BLUE),
@@ -295,7 +291,8 @@ def alternatives(options: Scenes, table: pd.DataFrame) -> Figure:
     points of all full-order methods, whose settings are the grey dots. Colours: the best points of
     the reduction (ecsw) trained on frames of one motion or of several; dotted: without the time of
     the vertices. Dashed: playback of the training recording, which takes no time. $\times 100$: the
-    same scene with stiffer weights. Errors outside are drawn on the rim.
+    same scene with stiffer weights; *: recorded by the extended study. Errors outside
+    are drawn on the rim.
     """
     table = options.rows(table[table.motion == FIRST])
     cases = list(table.groupby(["scene", "vertices", "stiffness"]))
@@ -317,7 +314,8 @@ def alternatives(options: Scenes, table: pd.DataFrame) -> Figure:
 def _draw_case(ax: Axes, labels: tuple[str, int, float], case: pd.DataFrame) -> None:
     scene, vertices, stiffness = labels
     stiff = "" if stiffness == 1.0 else rf" $\times {stiffness:g}$"
-    ax.set_title(f"{style.words(scene)}{stiff}, {vertices:,} vertices", fontsize=7.0)
+    mark = "*" if case.recorded.notna().any() else ""
+    ax.set_title(f"{style.words(scene)}{stiff}, {vertices:,} vertices{mark}", fontsize=7.0)
     multiples.log_axis(ax, LEAST, MOST)
     multiples.time_axis(ax, case.ms_per_frame.to_numpy(float))
     rows = case.rename(columns={"error_implicit": "error"}).dropna(subset="error")
@@ -346,7 +344,7 @@ def _draw_best(ax: Axes, rows: pd.DataFrame, colour: str, line: str) -> None:
 
 
 def best_points(rows: pd.DataFrame, error: str) -> pd.DataFrame:
-    """Pareto-optimal ``rows`` in time and the column ``error``, the fastest first."""
+    """Pareto-optimal ``rows`` with respect to time and column ``error``, the fastest first."""
     best = pareto(rows[error].to_list(), rows[TIME].to_list())
     return rows[np.array(best, dtype=bool)].sort_values(TIME)
 
@@ -393,7 +391,7 @@ def requested_tolerances(options: Options, table: pd.DataFrame) -> Figure:
 def dots(
     ax: Axes, tolerances: pd.Series, values: pd.Series, limits: tuple[float, float], colour: str
 ) -> None:
-    """Draw ``values`` against ``tolerances`` as dots on ``ax``; nothing if there are no values.
+    """Draw ``values`` against ``tolerances`` as dots on ``ax``, if there are any values.
 
     Values beyond the ``limits`` are drawn on the limit.
     """

@@ -1,4 +1,4 @@
-"""Figures of the cost of a run: phases, effects, larger meshes, reduced local steps."""
+"""Figures of the cost of a run: by phase, effect and mesh size, and of reduced local steps."""
 
 from itertools import cycle
 
@@ -15,36 +15,36 @@ from study.experiments.kit.base import GLOBAL, REST, RIGHT
 from study.figures.kit.declaration import Columns, Drawn, Methods, NothingToDraw, Scenes, figure
 from study.tables.effects_cost import NOTHING
 
-# Phases of a frame with label and colour. The first two are the local step, whose share is printed.
+# Phases of a frame: (label, colour). The first two form the local step, whose share is printed.
 PHASES = {
     "local_ms": ("local step: projections", style.ORANGE),
     "assembly_ms": ("local step: right-hand side", "#F7D08A"),
     "global_ms": ("global solve", style.BLUE),
 }
 TITLES = {"interpreted": "interpreted loop", "numpy": "vectorised NumPy", "compiled": "compiled"}
-CLAIM = 70.0  # percentage of the local step in claim C1 of the preprint
+CLAIM = 70.0  # share of the local step in a frame, per cent, by claim C1 of the preprint
 CURVES = {
     "ms_per_iteration": ("whole iteration", "-"),
     "local_ms": ("local step", "--"),
     "global_ms": ("global solve", ":"),
     "vertices_ms": ("positions of all vertices", "-."),
 }
-NAMES = {"fom": "full order", "ecsw": "POD subspace, ecsw"}  # methods with a printed exponent
+NAMES = {"fom": "full order", "ecsw": "POD subspace, ecsw"}  # methods whose exponent is printed
 SCALED = {"fom": (style.BLACK, "o"), "ecsw": ("#1B6E6E", ">")}
-ROOM = 2.6  # end of the axis over the largest mesh size; leaves space for printed exponents
+ROOM = 2.6  # the axis ends at this multiple of the largest mesh size: space for exponents
 FRAMES = ["effect", "frame", "force"]
 SHOWN = 3  # number of scenes whose forces are drawn
 LOW, HIGH = 1e-12, 1e2
 ROUNDOFF = 1e-14  # smallest drawn force relative to the largest force of the scene
 OTHERS = ("#8C6D31", "#5A5A5A", "#B03A6B", "#2B2B80", "#3E8E7E", "#A0522D", "#7F7F00")
-MARKERS = "*dph8H|"  # markers of effects that are no constraint groups, which have others
+MARKERS = "*dph8H|"  # markers of effects that are no constraint groups; groups have own markers
 UNLISTED = "forces, holds, contacts"
 COLOURS = {UNLISTED: style.VERMILLION, RIGHT: style.SKY, GLOBAL: "#3A5A78", REST: "#C9C4BA"}
 Looks = dict[str, tuple[str, str]]
 
 
 class BreakEven(Methods):
-    """Options: scenes, methods, and the number of panels in a row."""
+    """Options of the figure: scenes, methods, and the number of panels in a row."""
 
     columns: Columns = 3
 
@@ -117,7 +117,7 @@ def scaling(options: Scenes, drawn: Drawn, table: pd.DataFrame) -> Figure:
         ax.set_xlabel("vertices")
     sizes = table[table.scene.isin(scenes)].vertices
     times[0].set_xlim(0.75 * sizes.min(), ROOM * sizes.max())
-    for axis in (times[0].xaxis, times[0].yaxis):  # all panels share the axes of the first
+    for axis in (times[0].xaxis, times[0].yaxis):  # all panels share the axes of the first panel
         low, high = np.log10(axis.get_view_interval())
         plain_ticks(axis, high - low)
     times[0].set_ylabel("time of an iteration (ms)")
@@ -220,7 +220,7 @@ def effects_contribution(
 
 
 def _looks(drawn: Drawn, rows: pd.DataFrame) -> Looks:
-    """Colour and marker of each effect in ``rows``; constraint groups have those of all figures."""
+    """Colour and marker of each effect in ``rows``; constraint groups have fixed ones."""
     known, effects = drawn.looks, list(dict.fromkeys(rows.effect))
     others = [effect for effect in effects if effect not in known]
     groups = {effect: known[effect] for effect in effects if effect in known}
@@ -291,7 +291,7 @@ def effects_cost(options: Scenes, drawn: Drawn, table: pd.DataFrame) -> Figure:
 def _draw_scenes(
     ax: Axes, costs: pd.DataFrame, scenes: list[str], colours: dict[str, str]
 ) -> list[str]:
-    """Draw a bar per scene with the share of each effect; return the effects for the legend."""
+    """Draw for each scene a bar with the share of each effect; return effects for the legend."""
     costs = costs.assign(part=costs.effect.where(costs.effect.isin(list(colours)), UNLISTED))
     parts = [part for part in colours if (costs.part == part).any()]
     for y, scene in enumerate(scenes):

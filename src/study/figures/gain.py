@@ -1,4 +1,7 @@
-"""Figures of errors against gain, choice of method, and basis size; figure of singular values."""
+"""Figures of errors against gain, method and basis size; figure of singular values.
+
+The gain is the factor by which sampling amplifies errors.
+"""
 
 from pathlib import Path
 
@@ -15,10 +18,10 @@ from study.figures.kit import declaration as kit
 from study.figures.kit.declaration import Beside, Drawn, Experiment, figure
 from study.tables.kit.results import FAILED, judged_runs
 
-GAINS = (1.0, 1e5)  # limits of the gain axis; points outside are drawn on them
+GAINS = (1.0, 1e5)  # limits of the gain axis; points outside are drawn on the limits
 ERRORS, LADDER_ERRORS = (1e-5, 1e2), (1e-4, 1e2)
 ENDS = ("low", "median", "high")
-DECADES = 4  # number of decades of the gain with a bar; the last also counts larger gains
+DECADES = 4  # number of decades of the gain with a bar of their own; another has larger gains
 _KEYS = ["scene", "group", "method", "r"]
 
 
@@ -63,7 +66,7 @@ def error_against_gain(options: kit.Methods, drawn: Drawn, **tables: pd.DataFram
 def _draw_method(
     ax: Axes, runs: pd.DataFrame, ranges: pd.DataFrame, colour: str, marker: str
 ) -> None:
-    """Draw runs as dots by gain (error amplification) and error; crosses: ranges of repetitions."""
+    """Draw a dot at gain and error of each run, and a cross for the ``ranges`` of repeated runs."""
     x, y = runs.gain.to_numpy(float), runs.error.to_numpy(float)
     multiples.rim_arrows(ax, x, y, colour=colour, across=GAINS, along=ERRORS)
     ax.plot(
@@ -78,8 +81,8 @@ def _draw_method(
 
 
 def _draw_decades(ax: Axes, runs: pd.DataFrame) -> None:
-    """Draw the share of failed runs per decade of the gain (error amplification), with counts."""
-    # the last decade also counts all larger gains, including infinite ones
+    """Draw the percentage of failed runs for each decade of the gain, and the numbers of runs."""
+    # the last bar has all larger gains, including infinite ones
     upper = np.ceil(np.log10(runs.gain.clip(upper=10.0**DECADES + 1.0))).clip(lower=1)
     decades = runs.groupby(upper.astype(int)).failed.agg(["size", "mean"])
     places = np.arange(len(decades))
@@ -164,7 +167,7 @@ def _draw_quantity(
 
 
 VALUES = (1e-17, 3.0)
-SHOWN = (1e-7, 1e3)  # limits of the error axis; errors outside are drawn on them
+SHOWN = (1e-7, 1e3)  # limits of the error axis; errors outside are drawn on the limits
 PUBLISHED = "#B5B5B5"
 PUBLISHED_CODE = "config/reference/published_code"
 REGION = "#F1EFEB"
@@ -173,7 +176,7 @@ Panel = tuple[Axes, Experiment, pd.DataFrame]
 
 
 class Reconstruction(Beside, kit.Methods):
-    """Options: scenes, methods, panels per row, and experiments of the published code."""
+    """Options of a figure: scenes, methods, panels in a row, experiments of the published code."""
 
 
 def _panels(
@@ -183,7 +186,10 @@ def _panels(
     limits: tuple[float, float],
     legend: int,
 ) -> tuple[Figure, list[Panel]]:
-    """Figure with a panel per scene and group in ``table``, and space for ``legend`` lines."""
+    """Figure with a panel for each scene and group in ``table``, and space for a legend.
+
+    ``limits`` are those of the vertical axes; ``legend`` is the number of lines of the legend.
+    """
     pairs = [
         (each, rows)
         for each in drawn.experiments
@@ -199,7 +205,10 @@ def _panels(
 
 
 def _published(path: Path, columns: list[str], options: Beside, each: Experiment) -> pd.DataFrame:
-    """Rows of the file ``path``, output of the published code, for scene and group of ``each``."""
+    """Rows of the file ``path`` for the scene and group of ``each``.
+
+    The file has output of the published code, the program that the preprint's authors published.
+    """
     output = read_table(path, ["experiment", "group", *columns], result=False)
     name = options.published.get(each.scene)
     return output[(output.experiment == name) & (output.group == each.group)]
@@ -239,9 +248,9 @@ def singular_values(options: Beside, drawn: Drawn, table: pd.DataFrame, publishe
 
 
 def _draw_values(ax: Axes, rows: pd.DataFrame, colour: str, marker: str) -> None:
-    """Draw singular values; values that are round-off are hollow, in a shaded region.
+    """Draw singular values; those of rounding errors have hollow markers in a shaded region.
 
-    The region ends between the smallest value above round-off and the largest that is round-off.
+    The region ends between the largest value of rounding errors and the smallest one above them.
     """
     component = rows.component.to_numpy(float)
     above = rows.above_roundoff.astype(bool).to_numpy()
@@ -309,7 +318,7 @@ def reconstruction_error(
 
 
 def _draw_errors(ax: Axes, rows: pd.DataFrame, method: str) -> bool:
-    """Draw the errors of ``method``, with arrows above the axis; return whether it has any."""
+    """Draw the errors of ``method``, arrows for those above the axis; return if there are any."""
     colour, marker = style.method_styles([method])[method]
     drawn = False
     for split, dashes in style.SPLITS.items():

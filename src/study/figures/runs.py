@@ -1,4 +1,4 @@
-"""Figures of reduced runs of the preprint's scenes and their full-order runs."""
+"""Figures that show reduced runs beside full-order runs, for the scenes of the preprint."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -23,11 +23,11 @@ from study.figures.sensitivity_floor import FLOORS, Floors
 from study.tables.kit.results import trained
 
 NOISY = {"all": "all axes", "plane": "in the plane", "vertex": "one vertex across"}
-WRONG = 0.1  # relative error above which a run has failed; a run that cannot start has failed, too
-DISTANCES = (1e-4, 1.0)  # limits of the colour scale, in extents of the mesh
+WRONG = 0.1  # a run has failed if its relative error exceeds this, or if it cannot start
+DISTANCES = (1e-4, 1.0)  # limits of the colour scale, over the longest side of the bounding box
 FOOTER = 0.55  # height of the colour scale, inches
-TOLERANCE = "ecsw-1e-02"  # method of the position-subspace run in the first figure
-MODES = 20  # largest number of modes k of that subspace
+TOLERANCE = "ecsw-1e-02"  # method of the run in a position subspace in the figure `teaser`
+MODES = 20  # largest number of modes k of this subspace
 Files = list[File]
 RUNS: dict[str, Read] = {
     "meshes": EachOf(MESH, "experiments"),
@@ -42,11 +42,12 @@ full-order run at the same instant; a framed picture is drawn to the smaller sca
 
 @dataclass(frozen=True)
 class Shown:
-    """A scene at the drawn frame, with its full-order positions and a text for the frame.
+    """A scene at one frame, with what is needed to draw runs at this frame.
 
-    full : (1, N, 3) full-order positions, m
+    when : text on the frame
+    full : (1, N, 3) positions of the full-order run, m
     colour : RGB colour of the reduced runs
-    bodies : meshes of obstacles, see `obstacles_of`
+    bodies : meshes of obstacles that are drawn; None without obstacles
     """
 
     experiment: Experiment
@@ -59,17 +60,20 @@ class Shown:
     bodies: list[Mesh] | None
 
     def panel(self, path: str, info: RerunInfo) -> RunPanel:
-        """Panel of the reduced run ``info`` in the file ``path``."""
+        """Return the panel (picture) of the reduced run ``info`` in the file ``path``."""
         return view.run_panel(path, info, self.frame, colour=self.colour, title=info.title)
 
     def window(self, panels: list[RunPanel]) -> Window:
-        """Window of the camera that contains the full-order run and ``panels``."""
+        """Return the part of the image plane that contains the full-order run and ``panels``."""
         return view.shared_window(self.camera, self.full[0], panels)
 
     def row(
         self, label: str, panels: list[RunPanel], window: Window, note: str | None = None
     ) -> Row:
-        """Row of pictures: the full-order run, then ``panels``; ``label`` is below the title."""
+        """Return a row of pictures: the full-order run, then ``panels``.
+
+        The title of the row is that of the experiment, with ``label`` below.
+        """
         first = RunPanel("full order", style.FULL_ORDER, self.full[0], reference=True)
         panels = [replace(panel, obstacles=self.bodies) for panel in (first, *panels)]
         return Row(
@@ -85,7 +89,7 @@ class Shown:
 
 @dataclass(frozen=True)
 class Runs:
-    """Inputs of figures of runs: a file of each kind per scene, for ``reruns`` also per method."""
+    """Inputs of figures of runs: one file of each kind per scene, of ``reruns`` also per method."""
 
     options: ReducedRuns
     drawn: Drawn
@@ -101,11 +105,11 @@ class Runs:
 
     @cached_property
     def floors(self) -> Floors:
-        """Drift of perturbed runs (sensitivity floor) and horizon of each scene."""
+        """Drift of perturbed runs of each scene, and frame from which on runs are not compared."""
         return Floors(self.sensitivity, self.horizon)
 
     def shown(self, experiment: Experiment) -> Shown:
-        """Data of the scene of ``experiment`` at the last of the options' instants."""
+        """Return the scene of ``experiment`` at the last instant in the options."""
         path, instant = experiment.path(self.full_order), self.options.frames[-1:]
         (frame,), full = positions_at(path, instant)
         return Shown(
@@ -120,7 +124,7 @@ class Runs:
         )
 
     def reduced(self, shown: Shown) -> dict[str, list[RunPanel]]:
-        """Panels of the reduced runs with the basis sizes in the options, by method."""
+        """Return panels of the reduced runs, by method, for the basis sizes in the options."""
         found = {}
         for method in self.drawn.methods:
             path = shown.experiment.path(self.reruns, method=method)
@@ -129,7 +133,7 @@ class Runs:
         return found
 
     def rows(self, experiment: Experiment) -> list[Row]:
-        """One row per method, or a single row with a note if no method could run."""
+        """Return a row for each method, or a single row with a note if no method could run."""
         shown = self.shown(experiment)
         reduced = self.reduced(shown)
         everything = [panel for panels in reduced.values() for panel in panels]
@@ -142,22 +146,25 @@ class Runs:
         ]
 
     def draw(self) -> Figure:
-        """Draw a row per scene and method: the full-order run, then reduced runs by size.
+        """Draw a row for each scene and method: the full-order run, then reduced runs by size.
 
-        All pictures of a scene show the last instant of the options with the same camera. A picture
-        that does not fit has a frame and its own scale, printed below. The grey outline is the
+        All pictures of a scene show the last instant in the options with the same camera. A picture
+        that does not fit has a frame and a scale of its own, printed below. The grey outline is the
         full-order run.
         """
         return view.draw_rows([row for each in self.drawn.experiments for row in self.rows(each)])
 
 
 def nothing_ran(panels: list[RunPanel]) -> bool:
-    """Whether all ``panels`` belong to basis sizes above the numerical rank, which cannot run."""
+    """Return whether no run of ``panels`` could start, as all sizes exceed the numerical rank."""
     return all(panel.positions is None and not panel.failure for panel in panels)
 
 
 def obstacles_of(experiment: Experiment, positions: np.ndarray) -> list[Mesh] | None:
-    """Obstacles near ``positions`` (F, N, 3) m; None if a floor, drawn as a shadow, is the only."""
+    """Meshes of obstacles near ``positions`` (F, N, 3) m; None if a floor is the only obstacle.
+
+    Such a floor is drawn as a shadow.
+    """
     bodies = obstacles(positions, experiment.effects)
     floor = any(effect.effect == "floor" for effect in experiment.effects)
     return None if floor and len(bodies) == 1 else bodies
@@ -208,14 +215,13 @@ def bending_runs(
 
 
 def noise_rows(drawn: Drawn, shown: Shown, table: pd.DataFrame, path: str) -> list[Row]:
-    """One row per method and kind of perturbed start; pictures state the number of failed starts.
+    """Return a row for each method and kind of perturbed start.
 
-    Kinds with equal numbers of failures at every size share a row, which shows a run of the first.
+    Pictures have the number of starts from which the run failed. If kinds have equal numbers at
+    every size, they share a row, which shows a run of the first kind.
 
-    Parameters
-    ----------
-    table : rows of the table ``noise`` for the experiment in ``shown``
-    path : file of the runs of this scene and group whose bases are round-off
+    table : rows of table ``noise`` for the experiment in ``shown``
+    path : file with the runs of the experiment on bases made of rounding errors
     """
     shown, rows = replace(shown, bodies=None), []
     for method in drawn.methods:
@@ -233,7 +239,7 @@ def noise_rows(drawn: Drawn, shown: Shown, table: pd.DataFrame, path: str) -> li
 
 
 def _alike(table: pd.DataFrame) -> dict[tuple[tuple[int, str], ...], list[str]]:
-    """Group kinds of perturbed start by the numbers of failed starts (as texts) at each size r."""
+    """Group kinds of perturbed starts by the numbers of failed runs, as text for each size r."""
     table = table[table.r <= table["rank"]]
     failed = ~(table.relative_error <= WRONG)
     kinds: dict[tuple[tuple[int, str], ...], list[str]] = {}
@@ -293,7 +299,10 @@ def cloth_all_grid(options: ReducedRuns, drawn: Drawn, horizon: Horizon, **files
 def _over_time(
     path: str, options: ReducedRuns, title: str, frames: list[int], full: np.ndarray, mesh: Mesh
 ) -> list[RunPanel] | None:
-    """Panels of a reduced run at ``frames``, coloured by distance to ``full``; None if none ran."""
+    """Panels of a reduced run at ``frames``, coloured by the distance to the full-order run.
+
+    ``full`` has its positions. None is returned if no size in the options could run.
+    """
     infos = choose_ranks(rerun_infos(path), options.ranks)
     info = next((i for i in infos if not i.marked), None)
     if info is None:
@@ -346,10 +355,8 @@ def teaser(
 def _teaser_row(
     runs: Runs, experiment: Experiment, errors: pd.DataFrame, subspace: str | None
 ) -> Row:
-    """Row of the full-order and reduced runs of ``experiment``, with methods as titles.
+    """Return a row with the full-order run and the reduced runs of ``experiment``.
 
-    Parameters
-    ----------
     errors : rows of the table reduced_reruns for the training motion
     subspace : file of the runs in position subspaces, or None
     """
@@ -361,7 +368,7 @@ def _teaser_row(
     for method, found in reduced.items() if ran else ():
         own = errors[(errors.group == experiment.group) & (errors.method == method)]
         drawn = [panel for panel in found if panel.positions is not None]
-        # without a chosen size, `found` has the largest sizes
+        # if the options have no sizes, `found` has the largest sizes
         sizes = (drawn or found)[-(len(runs.options.ranks) or 1) :]
         own = own[own.position_basis == "full"]
         panels += [_with_error(panel, method, own, "r") for panel in sizes]
@@ -373,7 +380,7 @@ def _teaser_row(
 
 
 def _with_error(panel: RunPanel, method: str, rows: pd.DataFrame, size: str) -> RunPanel:
-    """Return ``panel`` with its method in the title, and its error before the horizon below."""
+    """Return ``panel`` with its method in the title and its error, over compared frames, below."""
     number = int(panel.title.split()[2])
     error = rows[rows[size] == number].relative_error_within_horizon.dropna()
     remark = f"error {error.iloc[0]:.2g}" if len(error) else panel.remark
@@ -381,7 +388,10 @@ def _with_error(panel: RunPanel, method: str, rows: pd.DataFrame, size: str) -> 
 
 
 def _subspace(frame: int, path: str) -> RunPanel | None:
-    """Panel of the run in the largest subspace of at most `MODES` modes; None without one."""
+    """Return the panel of the run in the largest position subspace of at most `MODES` modes.
+
+    None is returned if there is no such subspace.
+    """
     colour = style.surface_colour(style.GREEN)
     with open_hdf5(path) as file:
         models = file["models"]

@@ -1,4 +1,4 @@
-"""Figures on the mesh: snapshots and modes, iterations of DEIM, elements with sampled entries."""
+"""Figures on the mesh: snapshots and modes, iterations of DEIM, elements that are sampled."""
 
 from dataclasses import dataclass
 
@@ -30,20 +30,20 @@ NEWEST = {
     "markerfacecolor": "none", "markeredgecolor": style.SKY, "markeredgewidth": 1.6,
     "markersize": 8.5,
 }  # fmt: skip
-SEVERAL = "several"  # legend of elements with sampled entries of several axes
+SEVERAL = "several"  # key of elements in which entries of several axes are sampled
 AXES = {**style.AXES, SEVERAL: "#333333"}
 ROW_HEIGHT = 1.85  # height of a row of panels, inches
 
 
 class Steps(kit.View):
-    """Options: camera and number of iterations; only the first scene and method are drawn."""
+    """Options of the figure: camera, number of iterations; the first scene and method are drawn."""
 
     count: kit.Count = 6
     columns: kit.Columns = 3
 
 
 class Entries(kit.View):
-    """Options: camera, and basis sizes, of which the first that exists is drawn on the mesh."""
+    """Options of the figure: camera, and basis sizes; the first size that exists is drawn."""
 
     ranks: kit.Ranks = ()
 
@@ -52,11 +52,11 @@ class Entries(kit.View):
 class Iteration:
     """Step k of a greedy selection of samples.
 
-    magnitude : (e,) size of mode k's residual on each element, which the selection maximises: the
-        largest entry (``rows`` "scalar"), the largest norm of a row over x, y, z ("joint"), or the
-        norm of all entries of the element ("element")
-    earlier, newest : indices of the elements picked before, and of the element of this step
-    entry : index in the mode of the (first) entry picked in this step
+    magnitude : (e,) size of mode k's residual on each element; the selection takes the largest. It
+        is the largest entry of the element (``rows`` "scalar"), the largest norm of a row of x, y
+        and z ("joint"), or the norm of all entries of the element ("element")
+    earlier, newest : indices of the elements chosen in earlier steps, and in this step
+    entry : index, in the vector of the mode, of the first entry chosen in this step
     """
 
     k: int
@@ -131,26 +131,21 @@ def iterations(
 ) -> list[Iteration]:
     """First ``count`` steps of a greedy selection, recomputed from the selected entries.
 
-    The residual of step k is v_k - V_{k-1} c, with c from the equations at the samples so far
-    (Chaturantabut and Sorensen 2010, algorithm 1). The next sample is where it is largest.
+    The residual of step k is v_k - V_{k-1} c: mode v_k minus its interpolation by the earlier modes
+    V_{k-1}, with coefficients c from the equations at the samples so far (Chaturantabut and
+    Sorensen 2010, algorithm 1). The next sample is taken at the largest residual. Raises
+    StorageError if an entry lies outside the basis, or if there are too few entries for one step.
 
-    Parameters
-    ----------
     V : (3 e p, rank) modes of e elements with p = ``rows_per_element``
     entries : row indices of V in the order of selection: one per step for ``rows`` "scalar" and
-        "joint" (the x entry of a row represents the row), 3 p per step for "element"
-
-    Raises
-    ------
-    StorageError
-        If an entry lies outside the basis, or there are too few entries for one step.
+        "joint" (the x entry stands for x, y and z of a row), 3 p per step for "element"
     """
     per_step = 3 * rows_per_element if rows == "element" else 1
     if len(entries) < per_step or entries.min() < 0 or entries.max() >= len(V):
         raise StorageError(f"{len(entries)} sampled entries do not fit a basis of {len(V)} rows")
     residual_of = _joint_residual if rows == "joint" else _shared_residual
     per_element = 3 * rows_per_element
-    length = {"scalar": 1, "joint": 3, "element": per_element}[rows]  # number of entries per norm
+    length = {"scalar": 1, "joint": 3, "element": per_element}[rows]  # entries in one norm
     steps = []
     for k in range(min(count, len(entries) // per_step, V.shape[1])):
         residual = residual_of(V, entries[: k * per_step], k)
@@ -169,7 +164,7 @@ def iterations(
 
 
 def _shared_residual(V: np.ndarray, entries: np.ndarray, k: int) -> np.ndarray:
-    """Residual of mode k, with coefficients shared by all axes (least squares if oversampled)."""
+    """Residual of mode k; coefficients are common to x, y, z (least squares if oversampled)."""
     if k == 0:
         return V[:, 0]
     coefficients = np.linalg.lstsq(V[entries, :k], V[entries, k], rcond=None)[0]
@@ -177,7 +172,7 @@ def _shared_residual(V: np.ndarray, entries: np.ndarray, k: int) -> np.ndarray:
 
 
 def _joint_residual(V: np.ndarray, entries: np.ndarray, k: int) -> np.ndarray:
-    """Residual of mode k with separate coefficients for each axis, from the same rows."""
+    """Residual of mode k; x, y and z have separate coefficients, from samples in the same rows."""
     split = V.reshape(-1, 3, V.shape[1])
     residual = np.empty(split.shape[:2])
     for axis in range(3):
@@ -239,7 +234,7 @@ def deim_entries(options: Entries, drawn: kit.Drawn, **files: list[File]) -> Fig
 def _draw_hits(
     ax: Axes, elements: shapes.ElementMap, entries: np.ndarray, per_element: int, camera: Camera
 ) -> None:
-    """Draw a dot on each element with sampled ``entries``, in the colour of their axis."""
+    """Draw a dot on each element in which ``entries`` are sampled, in the colour of their axis."""
     hit: dict[int, str] = {}
     for entry in entries:
         element, axis = int(entry) // per_element, "xyz"[int(entry) % 3]
@@ -288,15 +283,15 @@ def _draw_evaluations(ax: Axes, samplings: dict[str, list[SamplingView]], per_el
     style.grid(ax)
 
 
-# (left edge, width, height) of the four matrices in inches; their upper edges are aligned
+# (left edge, width, height) of the four drawn matrices, inches; their upper edges are aligned.
 BLOCKS = ((0.75, 1.6, 1.9), (2.8, 1.6, 1.9), (4.8, 0.85, 0.85), (6.0, 0.85, 0.85))
 SIGNS = ((2.575, "="), (4.6, "×"), (5.825, "×"))
-ABOVE, TITLE, FOOTER = 0.36, 0.34, 0.44  # heights of two lines, a title, the colour scale, inches
-LEFT, TALLEST = 0.75, 1.45  # left edge and largest height of pictures, inches
+ABOVE, TITLE, FOOTER = 0.36, 0.34, 0.44  # heights, inches: two lines, a title, the colour scale
+LEFT, TALLEST = 0.75, 1.45  # left edge and largest height of pictures of the mesh, inches
 
 
 class Snapshots(kit.View):
-    """Options: camera, instants of the snapshots, and number of modes."""
+    """Options of the figure: camera, instants of the snapshots, and number of modes."""
 
     frames: kit.Instants = (0.1, 0.5, 0.9)
     count: kit.Count = 6
@@ -359,7 +354,7 @@ def _height(window: Window, count: int) -> float:
 
 
 def _draw_product(figure: Figure, basis: Basis, centred: np.ndarray, title: str) -> None:
-    """Draw the four matrices; rows of snapshots and modes are sorted by axis: x, y, z."""
+    """Draw snapshots, modes, singular values and coefficients as matrices; x, y, z in turn."""
     from matplotlib.colors import LogNorm
 
     rank, tiny = basis.rank, np.finfo(float).tiny
@@ -405,7 +400,7 @@ def _draw_matrix(ax: Axes, matrix: np.ndarray, title: str) -> None:
 
 
 def _row(figure: Figure, count: int, bottom: float, height: float, label: str) -> list[Axes]:
-    """Axes for a row of pictures, ``bottom`` inches above the lower edge, with a ``label``."""
+    """Return ``count`` axes for a row of pictures, ``bottom`` inches above the lower edge."""
     whole, step = figure.get_figheight(), (style.WIDTH - LEFT) / max(count, 1) / style.WIDTH
     middle = (bottom + 0.5 * height) / whole
     figure.text(0.008, middle, label, va="center", fontsize=7.5)
@@ -422,7 +417,7 @@ def _row(figure: Figure, count: int, bottom: float, height: float, label: str) -
 def _draw_column(
     ax: Axes, elements: shapes.ElementMap, points: np.ndarray, column: np.ndarray, camera: Camera
 ) -> str:
-    """Draw one entry of each element, relative to the largest; return the entry's name."""
+    """Draw one entry of each element, divided by the largest; return the name of the entry."""
     values, words = shapes.signed_entry(column, len(column) // (3 * len(elements.cells)))
     largest = max(float(np.abs(values).max()), np.finfo(float).tiny)
     elements.draw(ax, points, values / largest, camera, shapes.signed())

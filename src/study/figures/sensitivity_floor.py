@@ -1,4 +1,4 @@
-"""Figure of the drift between full-order runs with perturbed starts, and of scenes' horizons."""
+"""Figure of the drift of perturbed full-order runs, which limits the frames that are compared."""
 
 from collections.abc import Sequence
 
@@ -15,7 +15,7 @@ from study.experiments.kit.base import Horizon, floor_of, horizon
 from study.figures.kit.declaration import Columns, Drawn, NothingToDraw, Scenes, figure
 from study.tables.kit.results import TWIN
 
-# Inputs of figures that use sensitivity floors (drift of perturbed runs).
+# Inputs of figures that use sensitivity floors, the drift of runs with perturbed starts.
 FLOORS: dict[str, Read] = {
     "sensitivity": EachOf(SENSITIVITY, "experiments"),
     "horizon": Setting("horizon"),
@@ -24,19 +24,14 @@ COLUMNS = ["scene", "perturbation", "frame", "relative_difference"]
 
 
 class Floors:
-    """Sensitivity floor (drift of perturbed runs by frame) and horizon (its frame above a limit).
+    """Sensitivity floor and horizon of each scene.
 
-    The attribute ``of`` maps a scene to its floor: the largest relative difference over all seeds
-    by frame (F,), empty if the scene has no perturbed runs.
+    The floor is the drift of runs with perturbed starts, by frame. The horizon is the first frame
+    at which the floor exceeds a limit; from there on runs cannot be compared. The attribute ``of``
+    maps a scene to its floor: the largest relative difference over all seeds by frame (F,), empty
+    if the scene has no perturbed runs. Raises StorageError if a file is damaged or lacks a column.
 
-    Parameters
-    ----------
     sensitivity : files with tables of the perturbed runs, one per scene
-
-    Raises
-    ------
-    StorageError
-        If a file is damaged or lacks a column.
     """
 
     def __init__(self, sensitivity: Sequence[File], horizon: Horizon) -> None:
@@ -45,12 +40,12 @@ class Floors:
         self.of = {s: floor_of(table, s, self.perturbation) for s, table in tables.items()}
 
     def horizon(self, scene: str) -> int | None:
-        """First frame at which the floor of ``scene`` exceeds the threshold; None if none does."""
+        """First frame at which the drift in ``scene`` exceeds the threshold; None if none does."""
         end = horizon(self.of[scene], self.threshold)
         return end if end < len(self.of[scene]) else None
 
     def instant(self, scene: str, frame: int) -> str:
-        """Text with ``frame``, and a remark if it is past the scene's horizon: not comparable."""
+        """Text with ``frame``, and a remark if runs cannot be compared there (past the horizon)."""
         end = self.horizon(scene)
         return f"frame {frame}" if end is None or frame <= end else f"frame {frame}, past horizon"
 
@@ -59,7 +54,7 @@ LOW, HIGH = 1e-12, 1e2
 
 
 class Floored(Scenes):
-    """Options: scenes, and the number of panels in a row."""
+    """Options of the figure: scenes, and the number of panels in a row."""
 
     columns: Columns = 3
 

@@ -13,16 +13,16 @@ from study.figures.kit.declaration import Drawn, Methods, NothingToDraw, Ranks, 
 CELLS = 48  # largest width of a row of blocks, in cells; further blocks go to another row
 ROW = 0.145  # height of a row of cells, inches
 GAP = 0.45  # distance between blocks, in cells
-LEAST = 2.0  # smallest width of a title, in cells
-DENSE = 30  # above this number of columns, labels are vertical and titles have two lines
+LEAST = 2.0  # smallest width of the title of a block, in cells
+DENSE = 30  # with more columns than this, labels are vertical and titles have two lines
 
 
 @dataclass(frozen=True)
 class Look:
-    """Look of an outcome: cell colour, symbol in the cell and its colour, legend text.
+    """Drawing of an outcome: cell colour, symbol in the cell, colour of the symbol, legend text.
 
-    Outcomes can be told apart without colour: they differ in lightness, and cells of failed runs
-    have a symbol. The symbol of a blow-up is the number of its frame.
+    Outcomes can be distinguished without colour: cells differ in lightness, and cells of failed
+    runs have a symbol. The symbol of a blow-up is the number of the frame in which it happened.
     """
 
     face: str
@@ -46,7 +46,7 @@ Cells = dict[tuple[str, str], pd.Series]  # (scene, group) -> row of the table s
 
 @dataclass(frozen=True)
 class Block:
-    """Neighbouring columns of cells under one title; each column has a label."""
+    """Neighbouring columns of cells with a common title; each column has a label."""
 
     title: str
     labels: Sequence[str]
@@ -55,7 +55,7 @@ class Block:
 
 @dataclass(frozen=True)
 class Strip:
-    """Blocks side by side, with the same rows of cells: ``rows`` maps (scene, group) to a label."""
+    """Blocks side by side with common rows of cells: ``rows`` maps (scene, group) to a label."""
 
     rows: dict[tuple[str, str], str]
     blocks: Sequence[Block]
@@ -67,7 +67,7 @@ class Strip:
         return {str(cell.outcome) for cell in cells if cell is not None}
 
     def draw(self, ax: Axes) -> None:
-        """Draw a cell on ``ax`` for each row and column that has a run; others stay empty."""
+        """Draw on ``ax`` a cell for each row and column in which there is a run."""
         x, ticks = 0.0, []
         labels = [label for block in self.blocks for label in block.labels]
         dense = len(labels) > DENSE
@@ -107,7 +107,7 @@ def _draw_cell(ax: Axes, x: float, y: float, found: pd.Series) -> None:
 
 
 class Sizes(Methods):
-    """Options: scenes, methods and basis sizes."""
+    """Options of the figure: scenes, methods and basis sizes."""
 
     ranks: Ranks = ()
 
@@ -182,7 +182,7 @@ def _cells(rows: pd.DataFrame) -> Cells:
 
 
 def _wrapped(rows: dict[tuple[str, str], str], blocks: list[Block], xlabel: str) -> list[Strip]:
-    """Strips with common ``rows``, each with as many ``blocks`` as fit into `CELLS` cells."""
+    """Distribute ``blocks`` over strips with common ``rows``, at most `CELLS` cells wide."""
     parts: list[list[Block]] = []
     used = 0
     for block in blocks if rows else ():

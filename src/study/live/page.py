@@ -18,12 +18,9 @@ HEAD = re.compile(r'pdromLive\(\{"format":1,"scene":("\w+"),"title":("(?:[^"\\]|
 
 
 def _write(models: list[File], html: Path, outputs: Mapping[str, str], **parts: Path) -> None:
-    """Write the page from its template and ``parts``; the page loads the models of a chosen scene.
+    """Write the page from the template ``html`` and ``parts`` (styles, scripts), with a scene list.
 
-    Raises
-    ------
-    StorageError
-        A file of models is damaged or has another format.
+    Raises StorageError if a file of models is damaged or has another format.
     """
     texts = {name.upper(): path.read_text("utf-8") for name, path in parts.items()}
     texts["SCENES"] = safe_json([scene for file in models if (scene := _listed(file))])
@@ -31,7 +28,10 @@ def _write(models: list[File], html: Path, outputs: Mapping[str, str], **parts: 
 
 
 def _listed(file: File) -> dict[str, str] | None:
-    """Entry of a scene in the page's list, by its file of models; None if that has no models."""
+    """Entry of the page's list of scenes for a file of models; None if the file has no models.
+
+    Raises StorageError if the file has another format.
+    """
     text = read_text(file.path)
     if '"models":[]' in text:
         return None

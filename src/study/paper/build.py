@@ -1,4 +1,4 @@
-"""Artifacts of the manuscript: its inputs (macros, TeX tables, bibliography) and its PDFs."""
+"""Artifacts of the manuscript: files that its source includes (numbers, tables ...), and PDFs."""
 
 import json
 import re
@@ -27,16 +27,16 @@ from study.paper.source import DOCUMENTS, documents
 from study.paper.tex import build_pdfs
 from study.paper.textables import TEX_TABLES, reads, tex_table
 
-PAGES = {"main": 16, "supplement": 30}  # largest number of pages of each document
+PAGES = {"main": 16, "supplement": 30}  # largest allowed number of pages of each document
 
 
 class Facts(BaseModel):
     """Facts that the manuscript states and that are not results of experiments.
 
     captions : titles and captions of the figures, as TeX, by name
-    part : name of the results' configuration, None for the full study
-    full_study : name of the full study's configuration
-    pages : largest number of pages, by document
+    part : name of the configuration, None for the full study (by default config/default.yaml)
+    full_study : name of the configuration of the full study
+    pages : largest allowed number of pages, by document
     tables : rows of tables about the configuration (scenes, methods, study), by table
     """
 
@@ -60,10 +60,10 @@ def write_inputs(
     r"""Write macros.tex, figures.tex, TeX tables, bibliographies and the file `NUMBERS`.
 
     Inputs are the TeX files ``source``, BibTeX ``references``, CSV ``tables``, the record of the
-    ``machine`` and ``facts``. ``outputs`` are the paths of the files by name.
+    ``machine``, and ``facts``. ``outputs`` maps names of the files to paths.
 
-    The file `NUMBERS` has, for every ``\val`` key and TeX table, the table cells of its numbers,
-    and for each document, which sentences are shown (`decisions`).
+    The file `NUMBERS` has the table cells from which each number is computed (by ``\val`` key), the
+    tables from which each TeX table is made, and the decisions on the sentences of each document.
     """
     texts = documents(source[0].parent)
     whole = "".join(texts.values())
@@ -86,9 +86,9 @@ def write_inputs(
 
 
 def fact_tables(machine: Path, facts: Facts) -> dict[str, pd.DataFrame]:
-    """Return tables of ``facts``, and the record in the file ``machine`` as a table of one row.
+    """Return the tables of ``facts``, and the record in the file ``machine`` as a table.
 
-    Versions of libraries are columns ``version_NAME``.
+    This table has one row; versions of libraries are in columns ``version_NAME``.
     """
     tables = {name: pd.DataFrame(rows) for name, rows in facts.tables.items()}
     try:
@@ -100,7 +100,7 @@ def fact_tables(machine: Path, facts: Facts) -> dict[str, pd.DataFrame]:
     row["kernels"] = ", ".join(sorted({k.architecture for k in record.kernels if k.architecture}))
     if record.units is not None:
         row |= {**record.units.model_dump(), "unit_s": record.units.unit_s}
-    # names of processor and system may contain any character
+    # names of processor and system may contain characters that TeX cannot typeset
     words = {key: replaced(value) for key, value in row.items() if isinstance(value, str)}
     return {**tables, "machine": pd.DataFrame([{**row, **words}])}
 
@@ -112,10 +112,9 @@ def build(
     facts: Facts,
     outputs: Mapping[str, str],
 ) -> None:
-    """Build the PDFs of the paper and of its supplement.
+    """Build the PDFs of the paper and of its supplement, which must lie in one folder.
 
-    The two PDFs link to each other and must lie in one folder. ``source`` are the TeX files; they
-    include ``figures`` and ``inputs``, the files of `write_inputs`.
+    ``source`` are the TeX files; they include ``figures``, and ``inputs`` made by `write_inputs`.
     """
     results = [Path(file.path) for file in (*figures, *inputs)]
     for path in results:
@@ -129,12 +128,10 @@ _CITE = re.compile(r"\\cite\{([^}]*)\}")
 
 
 def bibliography(source: str, references: Path) -> str:
-    """Return the TeX bibliography of the entries that ``source`` cites, in order of citation.
+    """Return the TeX bibliography of what ``source`` cites, in the order of the citations.
 
-    Raises
-    ------
-    PaperError
-        A cited key is not in ``references`` or lacks a field, or the file is not BibTeX.
+    Raises PaperError if a cited key is not in ``references`` or lacks a field, or the file is not
+    BibTeX.
     """
     cited = [key.strip() for group in _CITE.findall(source) for key in group.split(",")]
     keys = list(dict.fromkeys(cited))
@@ -174,7 +171,7 @@ paper_inputs = Artifact(
     {Path(name).stem: PAPER_INPUT.where(name=name) for name in FILES},
     write_inputs,
 )
-# `Plan.fixed` replaces the output paths of this artifact, which depend on the configuration
+# The paths of the PDFs depend on the configuration; `Plan.fixed` sets them.
 paper = Artifact(
     "paper",
     "Manuscript",

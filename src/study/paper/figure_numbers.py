@@ -1,4 +1,4 @@
-"""Numbers of the figures in paper, supplement and preprint, and a page that lists all figures."""
+"""Numbers of the figures in paper, supplement and preprint; a page that lists all figures."""
 
 import re
 from pathlib import Path
@@ -13,9 +13,9 @@ SUPPLEMENT = "S"  # prefix of the figure numbers in the supplement
 
 
 class Numbers(NamedTuple):
-    """Numbers of a figure: manuscript ("3" in the paper, "S7" in the supplement) and preprint.
+    """Numbers of a figure in the manuscript and in the preprint; None where it does not occur.
 
-    A number is None if the document does not contain the figure.
+    The number in the manuscript is "3" in the paper, "S7" in the supplement.
     """
 
     manuscript: str | None
@@ -37,10 +37,7 @@ class Numbers(NamedTuple):
 def figure_numbers(root: Path) -> dict[str, Numbers]:
     """Return the numbers of every figure, by name, from the manuscript's source below ``root``.
 
-    Raises
-    ------
-    PaperError
-        A section file of the manuscript is missing.
+    Raises PaperError if a file of the source is missing.
     """
     counted: dict[str, str] = {}
     for prefix, source in zip(("", SUPPLEMENT), documents(root / "paper").values(), strict=True):
@@ -61,7 +58,7 @@ The keys given here choose in `config/figures.yaml` what it shows.
 
 
 def figures_page(root: Path = Path()) -> str:
-    """Markdown page of all figures, with the numbers in the manuscript below ``root``."""
+    """Markdown page about all figures, with their numbers in the manuscript below ``root``."""
     parts = [HEAD]
     numbers = figure_numbers(root)
     for name, figure in declarations().items():
@@ -76,7 +73,7 @@ def figures_page(root: Path = Path()) -> str:
 
 
 def _text(marked: str) -> str:
-    """Convert mark-up to Markdown: names in typewriter, each setting as its key."""
+    """Convert mark-up to Markdown; a setting ``{key}`` becomes its key, not its value."""
     plain = re.sub(r"\{([a-z_.]+)\}", r"@\1@", marked)
     pieces = re.split(r"(`[^`]*`)", plain)
     words = "".join(p if p.startswith("`") else to_plain(p) for p in pieces)
@@ -84,7 +81,7 @@ def _text(marked: str) -> str:
 
 
 def _words(read: Read) -> str | None:
-    """Return words for a table or files that a figure reads; None for settings."""
+    """Return a text for a table or files that a figure reads, None for a setting."""
     match read:
         case TableOf():
             return f"table `{read.name}`"

@@ -1,4 +1,4 @@
-r"""Numbers of the manuscript, and sentences that are left out if the study lacks their numbers.
+r"""Numbers in the manuscript's text, and sentences that are left out if their numbers are missing.
 
 The TeX source refers to a number by a key, which is the number's place in a table::
 
@@ -9,9 +9,9 @@ the matching rows: ``max``, ``min``, ``median``, ``count`` or ``distinct`` (the 
 values). A filter is column=value or column!=value. Each key that the source uses becomes one TeX
 macro, so that no number is typed by hand.
 
-A block ``\known{... \val{key} ...}`` is a sentence, ``\row{... & \val{key} \\}`` a table row. If
-the tables have no row for one of its keys, the block is left out. A note about the full study
-replaces the first sentence that is left out of each paragraph.
+A block ``\known{... \val{key} ...}`` is a sentence, a block ``\row{... & \val{key} \\}`` a row of a
+table. A block is left out if the study's tables have no row for one of its keys. In each paragraph,
+a note about the full study replaces the first sentence that is left out.
 """
 
 import re
@@ -26,10 +26,10 @@ from pdrom.view.text import escape
 
 VAL = re.compile(r"\\val\{([^{}]*)\}")
 _FILTER = re.compile(r"(.*?)(!?=)(.*)")
-Filter = tuple[str, str, str]  # column, sign, value
+Filter = tuple[str, str, str]  # (column, "=" or "!=", value)
 MISSING = "n/a"
 _COUNTS = ("count", "distinct")
-# Columns that identify a run; the other columns are its outcomes.
+# Columns that identify a run; all other columns are results of the run.
 _LABELS = ("scene", "group", "method", "position_basis", "variant", "direction", "experiment")
 AGGREGATES: dict[str, Callable[[pd.Series], Any]] = {
     "max": pd.Series.max,
@@ -48,10 +48,8 @@ def keys_of(source: str) -> list[str]:
 def macros(source: str, tables: Mapping[str, pd.DataFrame]) -> str:
     r"""Return TeX macros for every ``\val`` key of ``source``, with numbers from ``tables``.
 
-    Raises
-    ------
-    PaperError
-        A table or column is unknown, or several rows match a key without an aggregate.
+    Raises PaperError if a table or column is unknown, or several rows match a key without an
+    aggregate.
     """
     lines = [
         "% generated from results/tables",
@@ -63,18 +61,18 @@ def macros(source: str, tables: Mapping[str, pd.DataFrame]) -> str:
 
 
 def _defined(lines: Sequence[str], kind: str, texts: Mapping[str, str]) -> str:
-    """TeX ``lines``, a macro ``kind@NAME`` for each of ``texts`` by name, and ``makeatother``."""
+    """Return TeX: ``lines``, then a macro ``kind@NAME`` for each of ``texts``, by name."""
     made = [rf"\expandafter\def\csname {kind}@{k}\endcsname{{{text}}}" for k, text in texts.items()]
     return "\n".join([*lines, *made, r"\makeatother"]) + "\n"
 
 
 class Number(NamedTuple):
-    """A number in the manuscript's text, and its origin.
+    """A number in the manuscript's text, and the table cells from which it is computed.
 
     text : the number as TeX
     value : unrounded value, None if there is none
-    rows : numbers of the table rows from which the value is computed, from 0
-    take : name of the aggregate, None for a single cell
+    rows : row numbers of these cells in ``table``, from 0
+    take : name of the aggregate over these cells, None for a single cell
     """
 
     text: str
@@ -86,12 +84,9 @@ class Number(NamedTuple):
 
 
 def number_of(key: str, tables: Mapping[str, pd.DataFrame]) -> Number:
-    """Return the number of ``key`` in ``tables``; its text is `MISSING` if there is no value.
+    """Return the number that ``key`` selects; its text is `MISSING` if there is no value.
 
-    Raises
-    ------
-    PaperError
-        A table or column is unknown, or several rows match without an aggregate.
+    Raises PaperError for an unknown table or column, or several rows without an aggregate.
     """
     table, filters, column, aggregate = _parse(key, tables)
     rows = matching(tables[table], filters)
@@ -111,9 +106,9 @@ def number_of(key: str, tables: Mapping[str, pd.DataFrame]) -> Number:
 
 
 def is_held(key: str, tables: Mapping[str, pd.DataFrame]) -> bool:
-    """Return whether ``tables`` have a row for ``key``; its cell may be empty.
+    """Return whether ``tables`` have a row that ``key`` selects; its cell may be empty.
 
-    For a count, only filters in the columns `_LABELS` must match a row, so that it may be 0.
+    A count may be 0: for a count, only filters on the columns `_LABELS` must select a row.
     """
     table, filters, _, aggregate = _parse(key, tables)
     if aggregate in _COUNTS:
@@ -124,7 +119,7 @@ def is_held(key: str, tables: Mapping[str, pd.DataFrame]) -> bool:
 def _parse(
     key: str, tables: Mapping[str, pd.DataFrame]
 ) -> tuple[str, list[Filter], str, str | None]:
-    """Return table, filters, column and aggregate of a key."""
+    """Split a key into table, filters, column and aggregate; PaperError if one is unknown."""
     name, *parts = key.split("|")
     if name not in tables:
         raise PaperError(f"\\val{{{key}}}: no table '{name}' (allowed: {', '.join(tables)})")
@@ -162,7 +157,7 @@ def _same(cell: Any, value: str) -> bool:
 
 
 def format_number(value: Any) -> str:
-    """Format a cell as TeX: text escaped, integers plain, others with two significant digits."""
+    """Format a cell as TeX: text is escaped, numbers except integers get two significant digits."""
     if isinstance(value, str):
         return escape(value)
     if isinstance(value, bool | np.bool_):
@@ -189,7 +184,7 @@ SHOWN, NOTED, DROPPED = "shown", "noted", "dropped"
 
 
 class Sentence(NamedTuple):
-    """A ``known`` or ``row`` block: text, number of its paragraph, positions in the source."""
+    """Block ``known`` or ``row``: its text, number of its paragraph, positions in the source."""
 
     text: str
     paragraph: int
@@ -201,10 +196,7 @@ class Sentence(NamedTuple):
 def sentences(source: str) -> list[Sentence]:
     r"""Return all ``\known`` and ``\row`` blocks of a TeX source, in order.
 
-    Raises
-    ------
-    PaperError
-        A block is not closed, or contains another block.
+    Raises PaperError if a block is not closed or contains another block.
     """
     found: list[Sentence] = []
     opening = _OPENING.search(source)
@@ -220,7 +212,7 @@ def sentences(source: str) -> list[Sentence]:
 
 
 def decisions(source: str, tables: Mapping[str, pd.DataFrame]) -> list[str]:
-    r"""Decide for each ``\known`` or ``\row`` block: shown, noted (replaced by a note), dropped."""
+    r"""Decide for each ``\known`` or ``\row`` block: show it, replace it by a note, or drop it."""
     made, noted = [], set()
     for sentence in sentences(source):
         if all(is_held(key, tables) for key in keys_of(sentence.text)):
@@ -236,9 +228,9 @@ def decisions(source: str, tables: Mapping[str, pd.DataFrame]) -> list[str]:
 def provenance(decided: Mapping[str, Sequence[str]], part: str | None, full_study: str) -> str:
     r"""Return the TeX definitions of ``\known``, ``\row``, ``\ifpart`` and configuration names.
 
-    ``decided`` has the decisions on the blocks of each document by the document's name, which is
-    ``\jobname`` in TeX. ``part`` is the results' configuration (``\configuration``), None for the
-    full study, where ``\ifpart`` is false. ``full_study`` is the full study's configuration.
+    decided : name of a document (``\jobname`` in TeX) -> decisions on its blocks
+    part : name of the configuration of the results; None for the full study (``\ifpart`` is false)
+    full_study : name of the configuration of the full study
     """
     lines = [
         r"\newif\ifpart",
@@ -252,7 +244,7 @@ def provenance(decided: Mapping[str, Sequence[str]], part: str | None, full_stud
         r"\let\known@dropped\@gobble",
         r"\newcommand{\known@next}{\csname known@\jobname @\arabic{known}\endcsname}",
         r"\newcommand{\known}[1]{\stepcounter{known}\known@next{#1}}",
-        # \noalign: a row that is left out must not start a table cell
+        # \noalign because a row that is left out must not start a table cell
         r"\newcommand{\row}[1]{\noalign{\stepcounter{known}}\known@next{#1}}",
     ]
     for document, made in decided.items():
@@ -263,7 +255,7 @@ def provenance(decided: Mapping[str, Sequence[str]], part: str | None, full_stud
 
 
 def note(part: str | None, full_study: str) -> str:
-    """TeX note in place of omitted sentences; ``part``: configuration, None for the full study."""
+    """Note (TeX) that replaces omitted sentences; ``part`` is None if the study is the full one."""
     if part is None:
         return "Sentences are left out here whose numbers this study does not hold."
     full = rf"\texttt{{{escape(full_study)}}}"
@@ -271,7 +263,7 @@ def note(part: str | None, full_study: str) -> str:
 
 
 def closing(source: str, start: int) -> int:
-    """Position in ``source`` of the brace that closes a block whose content begins at ``start``."""
+    """Position of the brace in ``source`` that closes a block whose content begins at ``start``."""
     depth = 1
     for brace in _BRACE.finditer(source, start):
         depth += {"{": 1, "}": -1}.get(brace[0], 0)

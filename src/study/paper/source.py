@@ -1,4 +1,4 @@
-r"""TeX source of the manuscript; `OWN` is the variant for studies of a user's own scenes."""
+r"""TeX source of the manuscript; folder `OWN` has a short variant for studies of own scenes."""
 
 import re
 from pathlib import Path
@@ -13,16 +13,13 @@ _PART = re.compile(r"\\input\{((?:sections/|supplement/|preamble)[^{}]*\.tex)\}"
 
 
 def whole_source(document: Path) -> str:
-    r"""Text of a document in which preamble and sections replace their ``\input`` commands.
+    r"""Text of a document; its ``\input`` commands are replaced by preamble and sections.
 
-    Raises
-    ------
-    PaperError
-        An included file is missing.
+    Raises PaperError if an included file is missing.
     """
 
     def part(match: re.Match[str]) -> str:
-        for folder in document.parents[:2]:  # documents in `OWN` use the preamble of its parent
+        for folder in document.parents[:2]:  # documents in `OWN` use the preamble one folder above
             if (path := folder / match[1]).is_file():
                 return path.read_text(encoding="utf-8")
         raise PaperError(f"{document}: no file {document.parent / match[1]}")
@@ -31,12 +28,15 @@ def whole_source(document: Path) -> str:
 
 
 def documents(folder: Path) -> dict[str, str]:
-    """Source of each document of the manuscript in ``folder``, by name, with its sections."""
+    """Source text of each document of the manuscript in ``folder``, by name, with its sections."""
     return {name: whole_source(folder / f"{name}.tex") for name in DOCUMENTS}
 
 
 def source_files(root: Path, own: bool = False) -> list[str]:
-    """Paths of TeX files below ``root``, documents and preamble first; ``own``: variant `OWN`."""
+    """Paths of the manuscript's TeX files: documents, preamble, sections (none if ``own``).
+
+    If ``own``, the documents are those of the variant `OWN`. Paths are relative to ``root``.
+    """
     folder = root / "paper"
     files = [(root / OWN if own else folder) / f"{name}.tex" for name in DOCUMENTS]
     files.append(folder / "preamble.tex")

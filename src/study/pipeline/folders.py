@@ -1,4 +1,4 @@
-"""Folders of the results: each configuration has its own folder."""
+"""Folders of results: each configuration of the study has its own results folder."""
 
 import re
 from collections.abc import Iterable
@@ -25,7 +25,7 @@ class Folders:
 
     @property
     def documents(self) -> dict[str, str]:
-        """Paths of both PDFs (manuscript, supplement), by the name of the TeX source."""
+        """Paths of both PDFs (manuscript and supplement), by the path of their TeX source."""
         supplement = Path(self.manuscript).with_name("supplement.pdf").as_posix()
         return dict(zip(DOCUMENTS, (self.manuscript, supplement), strict=True))
 
@@ -33,19 +33,14 @@ class Folders:
 def folders(configfiles: Iterable[str | Path], settings: Iterable[str]) -> Folders:
     """Return the folders of a configuration.
 
-    The default configuration has the folders ``results`` and ``paper``. Every other one has
-    ``results/studies/NAME``. NAME is the key ``study`` of the configuration, else the stem of its
-    last file. If there are only settings from the command line, NAME is `OWN`.
+    The default configuration has the folders ``results`` and ``paper``. Every other configuration
+    has ``results/studies/NAME``. NAME is its key ``study``, or without this key the stem of its
+    last file. If it consists only of settings from the command line, NAME is `OWN`. Raises
+    ConfigurationError if NAME contains other characters than letters, digits, _ and -, or is too
+    long.
 
-    Parameters
-    ----------
-    configfiles : files of ``--configfile``, in order
-    settings : ``key=value`` pairs of ``--config``
-
-    Raises
-    ------
-    ConfigurationError
-        If the name contains other characters than letters, digits, _ and -, or is too long.
+    configfiles : files given by the option ``--configfile``, in order
+    settings : ``key=value`` pairs given by the option ``--config``
     """
     default, pairs = Path(DEFAULT).resolve(), list(settings)
     files = [str(file) for file in configfiles if Path(file).resolve() != default]

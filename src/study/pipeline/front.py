@@ -18,13 +18,13 @@ from study.pipeline.commandline import CommandLine, check_files, recall
 from study.pipeline.folders import folders
 from study.pipeline.running import end_at_sigterm
 
-# The greedy scheduler: Snakemake's default one solves an integer program whenever it chooses jobs,
-# which costs more time than it saves, since jobs are short.
+# Options of every run. The greedy scheduler chooses jobs fast. Snakemake's default scheduler solves
+# an integer program at each choice, which takes more time than it saves, since jobs are short.
 OPTIONS = ("--scheduler", "greedy", "--rerun-incomplete")
 
 LINES = ("--logger", "pdrom")
 
-# Modules that receive the remaining arguments, by the first argument.
+# First argument -> module that is run with the remaining arguments.
 HANDED_ON = {
     "test": "pytest",
     "verify": "study.verification.command",
@@ -35,14 +35,11 @@ HANDED_ON = {
 def completed(arguments: Sequence[str]) -> list[str]:
     """Return the ``arguments`` of the command line with the options that Snakemake needs.
 
-    Raises
-    ------
-    ConfigurationError
-        A configuration file is missing or is not a mapping, a target was read as the value of an
-        option, or a figure does not exist.
+    Raises ConfigurationError if a configuration file is missing or is not a mapping, a target was
+    read as the value of an option, or a figure does not exist.
     """
     if arguments[:1] == ["figure"]:
-        from study.pipeline.targets import figure_arguments  # here: it imports the whole package
+        from study.pipeline.targets import figure_arguments  # not at the top: it imports a lot
 
         arguments = figure_arguments(arguments[1:])
     command = CommandLine(arguments)
@@ -55,7 +52,7 @@ def completed(arguments: Sequence[str]) -> list[str]:
     lines = LINES if replaced and not command.own_output else ()
     own, made = folders(command.configfiles, command.settings), {}
     if command.targets:
-        from study.pipeline.targets import described, files  # here: it imports the whole package
+        from study.pipeline.targets import described, files  # not at the top: it imports a lot
 
         made = {target: files(target, own) for target in command.targets}
         # print the files if a target is a name and not a path
@@ -66,7 +63,7 @@ def completed(arguments: Sequence[str]) -> list[str]:
 
 
 def _start(command: Sequence[str]) -> NoReturn:
-    """Replace this process by the program ``command[0]``, found on PATH, with its arguments."""
+    """Replace this process by the program ``command[0]``, found on PATH; the rest are arguments."""
     if not command:
         sys.exit(
             "pdrom: run: the name of a program is missing, as in: ./reproduce run pdrom --help"

@@ -1,8 +1,9 @@
-"""The manifest of a study: its result files with checksums, code, settings and environments.
+"""The manifest of a study: a list of its result files, with checksums and their origin.
 
-It is written at the end of every successful run, from the checksum files of the results, so that no
-large file is read again. HDF5 files have a BLAKE2b digest only, other files also a SHA-256. Equal
-results have equal manifests.
+The origin of a file is the rule that made it, hashes of its code and settings, and versions of
+libraries. The manifest is written at the end of every successful run. Large files (HDF5) are not
+read again: they have only the BLAKE2b digest from their checksum file, other files also a SHA-256.
+Equal results have equal manifests.
 """
 
 import hashlib
@@ -26,9 +27,10 @@ _ENVIRONMENT = ("pdrom_version", "python_version", "library_versions")
 
 
 class Entry(ConfigModel):
-    """Entry of a result file: size, digests, its rule, and its key in `Manifest.environments`.
+    """Entry of a result file in the manifest: size, digests, and origin of the file.
 
     sha256 : None for an HDF5 file, or a file that was damaged before the manifest was written
+    environment : key in `Manifest.environments`
     """
 
     bytes: int
@@ -50,10 +52,11 @@ class Entry(ConfigModel):
 
 
 class Manifest(ConfigModel):
-    """Entries of result files by path, relative to the folder of the manifest.
+    """Entries of all result files.
 
     options : command-line options that name the configuration
     environments : versions of the package, of Python and of libraries, by a short key
+    files : entries by path of the file, relative to the folder of the manifest
     """
 
     format: Literal[1] = 1
@@ -77,7 +80,7 @@ def write_manifest(plan: Plan, options: Iterable[str]) -> None:
 
 
 def read_manifest(results: str) -> Manifest:
-    """Read a folder's manifest; StorageError if it is missing, damaged or of another format."""
+    """Read the manifest of a folder; StorageError if it is missing, damaged or of old format."""
     path = Path(paths.MANIFEST.at(results))
     if check_file(path) is Condition.DAMAGED:
         raise StorageError(f"{path}: damaged, its content and its checksum differ")
@@ -89,9 +92,9 @@ def read_manifest(results: str) -> Manifest:
 
 
 def study_files(plan: Plan) -> Iterator[str]:
-    """Existing files of a study: files of its plan, and files requested by command-line targets.
+    """Existing result files of a study, without logs, hidden files and files of other studies.
 
-    Logs, hidden files and other studies in the results folder are left out.
+    Files outside its plan are included if a target on the command line may have requested them.
     """
     yield from (path for path in plan.own_files if Path(path).is_file())
     for folder, below, names in os.walk(plan.results):
@@ -102,9 +105,9 @@ def study_files(plan: Plan) -> Iterator[str]:
 
 
 def asked_for(found: Iterable[str], plan: Plan) -> Iterator[str]:
-    """Yield the paths of ``found`` outside the plan that a command-line target may have requested.
+    """Yield those of the paths ``found`` that a target on the command line may have requested.
 
-    A path is such a target if the scene and the method in it exist.
+    These are paths outside the plan whose scene and method exist.
     """
     scenes, methods = set(scene_names(plan.study.root)), {*plan.study.methods, ""}
     for path in found:

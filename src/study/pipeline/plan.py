@@ -1,6 +1,7 @@
-"""Plan of a study: for every artifact its jobs, which become rules and jobs of the workflow.
+"""Plan of a study: the jobs of every artifact (function declared to make files).
 
-Jobs have paths of input and output files, settings and fingerprints of their code.
+A job has paths of input and output files, settings, and a fingerprint (hash) of its code. The
+workflow turns jobs into those of Snakemake.
 """
 
 import logging
@@ -37,7 +38,10 @@ log = logging.getLogger(__name__)
 
 
 def check_subspaces(study: Study) -> None:
-    """Warn of scenes whose effects allow no position subspace; ConfigurationError if required."""
+    """Warn of scenes with effects that position subspaces cannot represent.
+
+    Raises ConfigurationError if the configuration lists such a scene for models in subspaces.
+    """
     outside = {
         name: effects
         for name, config in {**study.scenes, **study.online}.items()
@@ -56,14 +60,14 @@ def check_subspaces(study: Study) -> None:
 
 
 def check_live(study: Study) -> None:
-    """Raise ConfigurationError for a scene whose models the live web page cannot run or load."""
+    """Raise ConfigurationError if the live web page could not load or run the models of a scene."""
     settings = study.settings
     for name in (labels["scene"] for labels in labels_of(study, LIVE_MODEL)):
         try:
             require_known(study.scene(name))
         except SceneError as error:
             raise ConfigurationError(f"live.scenes: {error}") from error
-        # lower bound of a file's size: vertices, masses and bases (k + 4 columns) in base 64
+        # lower bound of a file's size: vertices, masses and bases (of k + 4 columns) in base 64
         vertices = study.vertices[name]
         section = settings.subspace if name in study.scenes else settings.online
         sizes = [k for k in settings.live.sizes if k in section.sizes and "pod" in section.bases]
@@ -79,7 +83,7 @@ def check_live(study: Study) -> None:
 
 
 def check_texts(study: Study) -> None:
-    """Raise ConfigurationError for a text of ``study`` that figures or TeX cannot typeset."""
+    """Raise ConfigurationError if figures or TeX cannot typeset a text of ``study``."""
     folder, ladder = study.root / "config", study.settings.ladder
     for name, method in study.methods.items():
         require_typeset(method.title, f"{folder / 'methods.yaml'}: {name}.title")
@@ -99,12 +103,13 @@ def check_texts(study: Study) -> None:
 
 @dataclass(frozen=True)
 class Job:
-    """A job: an artifact with values (``labels``) of scene, group ... in its output paths.
+    """A job: an artifact (function that makes files), with all that its function gets.
 
-    inputs, outputs : paths by name of the function's parameter
-    settings : settings by name of the parameter, as JSON data
-    content : checksum of the hand-edited files among the inputs, whose dates are not reliable
-    code : fingerprint of the code that the job runs
+    labels : values of scene, group ... in the output paths, by name
+    inputs, outputs : paths of files, by name of the function's parameter
+    settings : JSON data, by name of the function's parameter
+    content : checksum of inputs that are edited by hand: a date does not tell if they changed
+    code : fingerprint (hash) of the code that the job runs
     """
 
     artifact: Artifact
@@ -116,7 +121,7 @@ class Job:
     code: str
 
     def make(self, outputs: Mapping[str, str]) -> None:
-        """Run the job in this process; ``outputs`` are the paths of the files to write, by name."""
+        """Run the job in this process and write its files to the paths ``outputs``, by name."""
         make(
             self.artifact.address,
             settings=self.settings,
@@ -141,17 +146,13 @@ def load_plan(
     folders: Folders = OF_STUDY,
     quiet: bool = False,
 ) -> "Plan":
-    """Return the plan of ``config``, checked before any job starts.
+    """Return the plan of the configuration ``config``, and check it.
 
-    Parameters
-    ----------
-    files : configuration files, named in error messages
-    quiet : True to drop warnings
+    Raises PdromError if the configuration is faulty.
 
-    Raises
-    ------
-    PdromError
-        The configuration is faulty.
+    files : configuration files, for error messages
+    folders : folders of the results
+    quiet : True to suppress warnings
     """
     names = [os.path.relpath(path) for path in files] or [DEFAULT]
     source = f"configuration ({', '.join(sorted(set(names)))})"
@@ -163,9 +164,9 @@ def load_plan(
 
 
 class Plan:
-    """Jobs, files and settings of a study that the workflow rules need.
+    """Jobs and files of a study.
 
-    It finds the paths and settings that artifacts declare as their inputs.
+    For the inputs that artifacts declare, the plan finds the paths and the settings.
     """
 
     def __init__(self, study: Study, folders: Folders = OF_STUDY) -> None:
@@ -175,7 +176,7 @@ class Plan:
         self.tables = declared()
 
     def check(self) -> None:
-        """Read every file that the configuration names, to find faults before any job starts."""
+        """Check the configuration and files it names, so that faults show before any job starts."""
         settings = self.study.settings
         load_claims(self.study.root / "config" / "claims.yaml", settings.claim_sets)
         for key in ("ladder", "live", "subspace", "scaling", "stability"):
@@ -193,7 +194,7 @@ class Plan:
 
     @cached_property
     def fixed(self) -> dict[str, list[Job]]:
-        """Jobs that exist once per study (tables, figures, pages, manuscript), by log folder."""
+        """Jobs without wildcards (tables, figures, pages, manuscript), by folder of their logs."""
         return {
             "tables": [self.job(table) for table in self.tables.values()],
             "figures": [self.job(figure) for figure in declarations().values()],
@@ -223,11 +224,14 @@ class Plan:
         return {*self.made, *measured}
 
     def job(self, artifact: Artifact, labels: Labels = MappingProxyType({})) -> Job:
-        """Job for scene, group ... in ``labels``; ConfigurationError if an input is unknown."""
+        """Return the job of ``artifact`` for the scene, group ... in ``labels``.
+
+        Raises ConfigurationError if the configuration lacks an input that the artifact declares.
+        """
         own = {name: labels[name] for name in artifact.labels}
         key = (artifact.rule, *own.values())
         if key not in self._jobs:
-            known = {**own, "figure": artifact.name}  # the name selects the options of a figure
+            known = {**own, "figure": artifact.name}  # a figure's options are found by its name
             settings = artifact.settings(self, known)
             inputs = {k: read.paths(self, known) for k, read in artifact.files.items()}
             edited = [k for k, read in artifact.files.items() if isinstance(read, EditedFiles)]
@@ -243,12 +247,12 @@ class Plan:
             )
         return self._jobs[key]
 
-    # Methods of the protocol `Sources`: paths and values for the inputs that artifacts declare ---
+    # The following methods belong to the protocol `Sources`, by which declared inputs are found.
 
     def file(self, place: Place, labels: Labels) -> str:
-        """Path of the file of the kind ``place`` for scene, group ... of a job in ``labels``.
+        """Path of the file of the kind ``place`` for the scene, group ... in ``labels``.
 
-        If ``labels`` have no mesh, it follows from the scene; a missing basis from the method.
+        If ``labels`` lack the mesh, it is that of the scene; a missing basis is that of the method.
         """
         found = dict(labels)
         if "mesh" in place.labels and "mesh" not in found:
@@ -258,7 +262,7 @@ class Plan:
         return place.at(self.results, **{name: found[name] for name in place.labels})
 
     def files(self, place: Place, labels: Labels) -> list[str]:
-        """Paths of all files of the kind ``place`` whose scene, group ... agree with ``labels``."""
+        """Paths of all files of the kind ``place`` for the scene, group ... in ``labels``."""
         study = self.study.only(labels["scene"]) if "scene" in labels else self.study
         return [
             place.at(self.results, **held)
@@ -273,7 +277,7 @@ class Plan:
         return TABLE.at(self.results, name=name)
 
     def value(self, key: str, labels: Labels) -> Any:
-        """Configuration value of ``key``, or the value that a function in `DERIVED` computes."""
+        """Value of a dotted ``key``: from the configuration, or by a function of `DERIVED`."""
         head, *parts = key.split(".")
         if head not in DERIVED:
             return self.study.value(key)
@@ -281,5 +285,5 @@ class Plan:
 
 
 def listed(paths: Paths) -> list[str]:
-    """Return ``paths``, one path or a list of paths, as a list."""
+    """Return ``paths``, which is one path or several, as a list."""
     return [paths] if isinstance(paths, str) else list(paths)

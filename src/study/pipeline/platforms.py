@@ -1,7 +1,7 @@
-"""Check of whether the locked packages have wheels for this machine, before any download.
+"""Check that the locked packages have wheels for this machine, before anything is downloaded.
 
-``./reproduce`` runs this file by its path with the system's Python, before any package is
-installed: only the standard library may be imported.
+``./reproduce`` runs this file with the system's Python before any package is installed: it may
+import only the standard library.
 """
 
 import platform
@@ -40,5 +40,5 @@ def obstacle(system: str, processor: str, python: tuple[int, int], libc: str) ->
 
 if __name__ == "__main__":
     libc = platform.libc_ver()[0] if platform.system() == "Linux" else ""
-    # exit with the reason as error message, or successfully without one
+    # exit with an error message if there is an obstacle, else with status 0
     sys.exit(obstacle(platform.system(), platform.machine(), sys.version_info[:2], libc))

@@ -1,4 +1,4 @@
-"""Remaining time of a run, as an estimate, and the jobs of a dry run with their expected time."""
+"""Estimate of a run's remaining time, and a list of the jobs that a dry run would start."""
 
 import logging
 from collections import Counter, defaultdict
@@ -8,12 +8,12 @@ from itertools import accumulate
 
 from snakemake_interface_logger_plugins.common import LogEvent
 
-# An estimate is shown after at least so many finished jobs and this share of the expected work.
+# An estimate is shown when this number of jobs and this fraction of the expected work are done.
 ENOUGH_JOBS, ENOUGH = 2, 0.05
-# Least expected remaining time of an unfinished job, as a fraction of its expected duration.
+# Smallest remaining time of an unfinished job, as a fraction of its expected duration.
 REST = 0.1
-# Beginnings of Snakemake's reasons for running a job, with shorter texts. The reason `FOLLOWS` is
-# a consequence of other jobs, and is left out if there is another reason.
+# Beginnings of Snakemake's texts on why it runs a job -> shorter texts. The reason `FOLLOWS` is a
+# consequence of other jobs, and is not shown if a job has another reason as well.
 FOLLOWS = "Input files updated by another job"
 REASONS = {
     "Forced execution": "forced",
@@ -34,8 +34,8 @@ class Expected:
     """Expected time of a job.
 
     seconds : expected duration of the job
-    share : claimed fraction of this machine's cores; 1 on a cluster
-    after : expected seconds of the longest chain of jobs that wait for this job
+    share : fraction of this machine's cores that the job uses; 1 on a cluster
+    after : expected seconds of the longest chain of jobs that can start only after this job
     """
 
     seconds: float
@@ -48,10 +48,11 @@ class Estimate:
     """Estimate of the remaining seconds of a run.
 
     The slowdown of this machine is the median ratio of measured to expected time of finished jobs,
-    weighted by expected time, so that the few jobs that compile kernels have little effect. The
-    average number of parallel jobs follows from the core time that jobs have claimed until now.
+    weighted by expected time: a few jobs that compile kernels first have little effect on it. The
+    mean number of parallel jobs follows from the core time that jobs have used until now.
 
-    jobs, begun, ended : expected times, and times in s of start and end, by job number
+    jobs : expected time of each job, by number of the job
+    begun, ended : times in s at which jobs have started and ended, by number of the job
     """
 
     jobs: Mapping[int, Expected] = field(default_factory=dict)
@@ -59,7 +60,7 @@ class Estimate:
     ended: dict[int, float] = field(default_factory=dict)
 
     def left(self, now: float) -> float | None:
-        """Return the remaining seconds at the time ``now``, s; None while too few jobs are done."""
+        """Return the remaining seconds at time ``now`` (in s); None until enough jobs are done."""
         begun = {number: start for number, start in self.begun.items() if number in self.jobs}
         ran = {number: self.ended.get(number, now) - start for number, start in begun.items()}
         done = [(ran[n], self.jobs[n].seconds) for n in ran if n in self.ended]
@@ -92,12 +93,10 @@ def rounded(seconds: float) -> str:
 
 
 class Preview(logging.Handler):
-    """Log handler that counts the jobs of a dry run, by reading Snakemake's log.
+    """Log handler that reads Snakemake's messages in a dry run and counts the jobs.
 
-    Parameters
-    ----------
-    seconds : function that returns the expected processor seconds of a job from its log's path
-    cores : number of cores of the run; a job that measures times claims all of them
+    seconds : function of the path of a job's log; returns the job's expected processor seconds
+    cores : number of cores of the run; a job that measures times needs all of them
     """
 
     def __init__(self, seconds: Callable[[str], float], cores: int) -> None:
@@ -109,19 +108,19 @@ class Preview(logging.Handler):
         self._ended = False
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Add the job of a log ``record`` to the counts, reasons and times."""
+        """Add the job that a log ``record`` announces to the counts, reasons and times."""
         self._ended = self._ended or END in record.getMessage()
         if getattr(record, "event", None) != LogEvent.JOB_INFO:
             return
         self._jobs[record.rule_name] += 1
         self._reasons[record.rule_name] |= shortened(record.reason)
-        if record.log:  # rules that only collect targets have no log and take no time
+        if record.log:  # rules without a log only collect targets and take no time
             seconds = self._of_job(str(record.log[0]))
             self._processor += seconds
             self._wall += seconds * min(record.threads, self._cores) / self._cores
 
     def text(self) -> str:
-        """One line per rule, then totals of jobs and time; empty if the dry run did not finish."""
+        """Text with one line per rule, then the totals; empty if the dry run did not finish."""
         if not self._ended:
             return ""
         width = max(map(len, self._jobs))
@@ -138,7 +137,7 @@ class Preview(logging.Handler):
 
 
 def shortened(reason: str) -> set[str]:
-    """Short texts of the reasons in Snakemake's message ``reason``, as a set."""
+    """Set of the short texts (see `REASONS`) for the reasons that Snakemake's ``reason`` names."""
     found = [text for text in REASONS if reason.startswith(text) or f"; {text}" in reason]
     own = [text for text in found if text != FOLLOWS] or found
     return {REASONS[text] for text in own}

@@ -1,4 +1,4 @@
-"""Rules of the Snakemake workflow, one for each artifact (declared function that makes files)."""
+"""Rules of the Snakemake workflow, one for each artifact (function declared to make files)."""
 
 from collections.abc import Callable, Iterator, Mapping
 from operator import attrgetter
@@ -13,16 +13,16 @@ from study.pipeline.plan import Job, Plan
 from study.tables.kit.declaration import Table
 
 UNNUMBERED = "–"
-# Attributes of a job that the workflow tracks as parameters, in addition to its files.
+# Attributes of a job that become parameters of its rule: Snakemake reruns the job if one changes.
 PARAMETERS = ("settings", "content", "code")
 
 
 def rules(plan: Plan, cores: int) -> Iterator[SimpleNamespace]:
-    """Yield the rule of each artifact of ``plan``; rules that measure times claim ``cores``.
+    """Yield the rule of each artifact of ``plan``; jobs that measure times use all ``cores``.
 
-    Attributes of a rule are those of a Snakemake rule; functions of the wildcards give values that
-    differ between its jobs. The attribute ``shown`` has the arguments of Snakemake's function
-    ``report`` for each output of the HTML report, by output name.
+    The attributes are those of a Snakemake rule. Values that differ between its jobs are functions
+    of the wildcards. The attribute ``shown`` is for the HTML report: it maps names of outputs to
+    arguments of Snakemake's function ``report``.
     """
     for experiment in plan.experiments.values():
         yield _experiment(plan, experiment, cores)
@@ -48,7 +48,7 @@ def _experiment(plan: Plan, experiment: Experiment, cores: int) -> SimpleNamespa
             name: f"{plan.results}/{place.pattern}" for name, place in experiment.writes.items()
         },
         log=f"{plan.results}/logs/{experiment.rule}{'/' if labels else ''}{labels}.log",
-        # on a cluster the jobs of one scene form a batch: different scenes share only mesh jobs
+        # on a cluster, the jobs of a scene form a batch, as scenes have only mesh jobs in common
         group=None if experiment.alone or "scene" not in experiment.labels else "scene",
         threads=cores if experiment.alone else 1,
         # a job that measures times gets a whole node of a cluster
@@ -60,7 +60,7 @@ def _experiment(plan: Plan, experiment: Experiment, cores: int) -> SimpleNamespa
 
 
 def _fixed(plan: Plan, job: Job, folder: str, numbers: Mapping[str, Numbers]) -> SimpleNamespace:
-    """Rule of the one ``job`` of an artifact without wildcards; ``numbers``: numbers of figures."""
+    """Rule of an artifact with only one ``job``; ``numbers`` are the figures' numbers by name."""
     artifact, paths = job.artifact, job.outputs
     params = {"artifact": artifact.address, **{name: getattr(job, name) for name in PARAMETERS}}
     shown: dict[str, dict[str, Any]] = {}
@@ -97,7 +97,7 @@ def _fixed(plan: Plan, job: Job, folder: str, numbers: Mapping[str, Numbers]) ->
 
 
 def _figure(figure: Declaration, numbers: Numbers) -> dict[str, Any]:
-    """Arguments of Snakemake's ``report`` for a figure; its first entry of labels sorts figures."""
+    """Arguments of Snakemake's ``report`` for a figure; the first label sorts the figures."""
     own = {"paper": numbers.manuscript or UNNUMBERED}
     if numbers.preprint is None:
         category, labels = "Figures of this study", {"name": figure.name, **own}

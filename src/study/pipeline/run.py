@@ -1,4 +1,4 @@
-"""First and last steps of a run that ``./reproduce`` or ``snakemake`` has started."""
+"""First and last steps of a run of the workflow, by ``./reproduce`` or by ``snakemake``."""
 
 import atexit
 import logging
@@ -36,10 +36,10 @@ def units_of(study: str, root: Path) -> Units:
 
 
 def expected_seconds(plan: Plan) -> Callable[[str], float]:
-    """Return a function that gives a job's expected processor seconds from the path of its log.
+    """Return a function that maps the path of a job's log to its expected processor seconds.
 
     Kinds of jobs that were never measured get the median of all kinds. Times are scaled by the
-    speed of this machine, if an earlier run of the plan has measured it.
+    speed of this machine if an earlier run has measured the speed.
     """
     root, full = plan.study.root, plan.study.settings.coarsen == Coarsen()
     study, column = ("full", "seconds") if full else ("tiny", "coarse_seconds")
@@ -59,12 +59,12 @@ def expected_seconds(plan: Plan) -> Callable[[str], float]:
 def tell_expectation(workflow: Any, plan: Plan) -> None:
     """Log the expected seconds of every job of ``workflow``, for the progress lines of a run.
 
-    A job that measures times claims the whole machine, as does every job on a cluster.
+    A job that measures times has the whole machine for itself, as has every job on a cluster.
     """
     dag, seconds_of = workflow.dag, expected_seconds(plan)
     expected: dict[int, Expected] = {}
     after: dict[Any, float] = {}
-    # visit jobs before their prerequisites, so that the time after each job is already known
+    # in reverse order, so that the times of the jobs that wait for a job are already known
     for job in reversed([job for level in dag.toposorted() for job in level]):
         if not dag.needrun(job) or not job.log:
             continue
@@ -80,19 +80,19 @@ def tell_expectation(workflow: Any, plan: Plan) -> None:
     )
 
 
-# Folders of files whose dates Snakemake compares; future dates in them are replaced.
+# Folders of the files whose dates Snakemake compares; dates in the future are replaced there.
 DATED = ("results", "paper", "config", "workflow")
-# Name of the Snakemake executor that runs the jobs of a batch on a node of a cluster.
+# Name of the Snakemake executor that runs a batch of jobs on a node of a cluster.
 JOBSTEP = "slurm-jobstep"
 
 
 class Run:
-    """The run of this process: locks its folder, starts the fork server, reports the outcome."""
+    """Run of the workflow in this process: lock on the folder, fork server, reported outcome."""
 
     def __init__(self) -> None:
-        """Lock the working directory; end the process with an error message if it is locked.
+        """Lock the working directory, or end the process with a message if it is locked already.
 
-        A command that runs no job, such as a dry run, takes no lock and works during another run.
+        A command that runs no job, such as a dry run, needs no lock and works during another run.
         """
         running.end_at_sigterm()
         with one_line():
@@ -107,14 +107,10 @@ class Run:
         logging.getLogger("snakemake.logging").addHandler(self.failures)
 
     def check(self, plan: Plan, rules: Iterable[Any], cores: int) -> None:
-        """Check that targets and report can be made; print the jobs of a dry run at its end.
+        """Check that requested targets and the report can be made; let a dry run list its jobs.
 
         ``rules`` are Snakemake's rules of ``plan``; ``cores`` is the number of cores of the run.
-
-        Raises
-        ------
-        ConfigurationError
-            A target or the report cannot be made.
+        Raises ConfigurationError if a target or the report cannot be made.
         """
         check_targets(plan, self.command.targets, list(rules))
         reports = self.command.report and not self.command.targets
@@ -129,15 +125,15 @@ class Run:
             atexit.register(lambda: sys.stdout.write(planned.text()))
 
     def title(self, plan: Plan) -> str:
-        """Name of this run's configuration, and how it differs from the full study, if it does."""
+        """Name of the run's configuration, followed by its differences from the full study."""
         named, words = configuration(self.command), plan.study.apart
         return f"{named} ({words})" if words else named
 
     def start(self, workflow: Any, plan: Plan) -> None:
-        """Start the fork server, unless jobs run on a cluster; log the expected times of jobs."""
-        # Remove the limit on the rate of job starts. With a limit, Snakemake starts a timer each
-        # time it selects jobs, which triggers another selection and another timer. At the end of a
-        # run these timers take a third of a core, and the process waits for the last one.
+        """Log the expected times of jobs, and start the fork server if jobs run on this machine."""
+        # Remove the limit on the rate of job starts. With a limit, Snakemake starts a timer at each
+        # selection of jobs, which triggers another selection and another timer. At the end of a run
+        # these timers use a third of a core, and the process waits for the last one.
         workflow.scheduler.job_rate_limiter = None
         running.stop_at_sigterm(self.failures.note_sigterm)
         say_compilation(os.environ.get("NUMBA_CACHE_DIR", ""))
@@ -150,7 +146,7 @@ class Run:
             start_server()
 
     def succeed(self, workflow: Any, plan: Plan) -> None:
-        """End a successful run: write overview and manifest; print the summary at the very end."""
+        """End a successful run: write overview and manifest; print the summary as last output."""
         try:
             if not self.command.targets:
                 text = contents(self.command, workflow.dag, plan.folders)
@@ -161,23 +157,23 @@ class Run:
         atexit.register(sys.stderr.write, summary(self.command, plan))
 
     def fail(self) -> None:
-        """End a failed or interrupted run: exit, and print the causes after Snakemake's lines."""
+        """End a failed or interrupted run: exit and print the causes as last output."""
         text, status = self.failures.end()
         atexit.register(sys.stderr.write, text)
         sys.exit(status)
 
 
 def start_batch(workflow: Any) -> None:
-    """Start the fork server for the jobs of a batch, if ``workflow`` runs on a cluster's node.
+    """Start the fork server for a batch of jobs, if ``workflow`` runs on a node of a cluster.
 
-    Snakemake runs twice on a node: the first process hands the batch to a second one (by the
-    executor `JOBSTEP`), which runs the jobs.
+    Snakemake runs twice on a node: a first process starts a second one by the executor `JOBSTEP`;
+    the second one runs the jobs and needs no fork server of its own.
     """
     if workflow.remote_exec and JOBSTEP not in sys.argv:
         start_server()
 
 
 def say_compilation(cache: str) -> None:
-    """Print that kernels are compiled first, if the folder ``cache`` has no compiled time step."""
+    """Print that kernels are compiled first if the folder ``cache`` has no compiled kernels."""
     if not any(Path(cache).glob("dynamics*/*.nbi")):
         sys.stderr.write("pdrom: the first jobs compile kernels (once, some minutes)\n")

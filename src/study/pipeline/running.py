@@ -1,12 +1,12 @@
-"""The process of a run: its lock on the folder, the dates of its files, and its end by SIGTERM.
+"""The process of a run: it locks its folder, corrects dates of files, and ends at SIGTERM.
 
 The operating system releases the lock when the process ends, for whatever reason. Snakemake's own
 lock consists of files, which a killed run leaves behind: a process that has the operating system's
 lock deletes them.
 
-Snakemake compares dates and refuses a result that is older than its inputs. If the clock was set
-back, no run could succeed before the clock passes the dates of existing files, so that future dates
-are replaced. At SIGTERM, jobs are ended, since Snakemake would wait minutes for running jobs.
+Snakemake refuses a result that is older than its inputs. After the clock was set back, existing
+files have dates in the future, and no new result would be accepted: such dates are replaced. At
+SIGTERM, running jobs are ended, too, since Snakemake would wait for them for minutes.
 """
 
 import errno
@@ -29,23 +29,21 @@ from pdrom.core.errors import INTERRUPTED, PdromError
 FOLDER = Path(".snakemake")
 LOCK = FOLDER / "run.lock"
 SNAKEMAKE_LOCKS = FOLDER / "locks"
-# Nanoseconds between successive new dates, where dates in the future are replaced.
+# Nanoseconds between successive dates that replace dates in the future.
 STEP_NS = 10_000
-# Seconds after SIGTERM at which a job that still runs is killed.
+# Seconds after SIGTERM at which jobs that still run are killed.
 PATIENCE = 5.0
 
 
 class AtWorkError(PdromError):
-    """Error: another process runs the workflow in this folder, or the lock file is unusable."""
+    """Another process runs the workflow in this folder, or the lock file cannot be used."""
 
 
 def hold() -> int:
     """Lock the working directory until the process ends; return the descriptor of the lock file.
 
-    Raises
-    ------
-    AtWorkError
-        Another process has the lock, which the message names, or the lock file is unusable.
+    Raises AtWorkError if another process (named in the message) has the lock, or the lock file
+    cannot be used.
     """
     try:
         FOLDER.mkdir(exist_ok=True)
@@ -68,7 +66,7 @@ def hold() -> int:
 
 
 def remove_stale_locks() -> None:
-    """Delete Snakemake's lock files of a killed run, unless another process has the lock."""
+    """Delete the lock files that a killed run of Snakemake left, unless a run is at work."""
     if not SNAKEMAKE_LOCKS.is_dir():
         return
     try:
@@ -78,10 +76,10 @@ def remove_stale_locks() -> None:
 
 
 def settle_dates(folders: Iterable[str | Path]) -> int:
-    """Replace future file dates in ``folders`` by dates just before now; return how many.
+    """Replace file dates in the future by dates just before now; return the number of files.
 
-    The order of the dates remains, so that newer files still cause reruns. The date of a symbolic
-    link itself is changed, not the date of its target, which may lie elsewhere.
+    The order of the dates remains, so that newer inputs still cause reruns. For a symbolic link the
+    date of the link changes, not the date of its target, which may lie outside ``folders``.
     """
     now = time.time_ns()
     files = [path for folder in folders for path in Path(folder).rglob("*") if path.is_file()]
@@ -96,7 +94,7 @@ def settle_dates(folders: Iterable[str | Path]) -> int:
 
 
 def end_at_sigterm() -> None:
-    """Install a handler for SIGTERM before any job runs: print one line, and end this process."""
+    """Let SIGTERM print one line and end this process (handler for the time before jobs run)."""
 
     def end(number: int, frame: object) -> None:
         _say(b"pdrom: ended by SIGTERM\n")
@@ -106,7 +104,7 @@ def end_at_sigterm() -> None:
 
 
 def stop_at_sigterm(note: Callable[[], None]) -> None:
-    """Install a handler for SIGTERM: call ``note``, end all jobs, then the run as Ctrl-C does."""
+    """Let SIGTERM call ``note``, end all jobs, and then end the run as Ctrl-C does."""
 
     def stop(number: int, frame: object) -> None:
         _say(b"pdrom: SIGTERM: ending the jobs that run\n")
@@ -125,13 +123,13 @@ def _say(line: bytes) -> None:
 
 
 def _end_jobs() -> None:
-    """End the processes of all jobs, including new ones, in a loop until this process ends."""
+    """End the processes of all jobs, also of jobs that start meanwhile, until this one ends."""
     begin, own = time.monotonic(), psutil.Process()
     while True:
         late = time.monotonic() - begin > PATIENCE
         for process in own.children(recursive=True):
             with suppress(psutil.Error, ProcessLookupError):
-                # skip the fork server (it has its own session): it ends the forks of dead clients
+                # not the fork server, which has its own session: it ends jobs with dead clients
                 if os.getsid(process.pid) == os.getsid(0):
                     process.send_signal(signal.SIGKILL if late else signal.SIGTERM)
         time.sleep(0.5)

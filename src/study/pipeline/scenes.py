@@ -1,41 +1,24 @@
-"""Scenes of config/scenes, changed as a study configures, and built to detect faults before a run.
+"""Scenes of config/scenes, with the changes that a study configures, checked by building them."""
 
-A configuration can also derive variants of scenes: other meshes, weights and initial velocities.
-"""
-
-from collections.abc import Callable, Iterable, Iterator
-from itertools import product
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Annotated, Self
+from typing import Annotated
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from pdrom.core.errors import ConfigurationError, PdromError, choices
-from pdrom.core.yamlfile import ConfigModel, SceneName, named, read_yaml, validate
+from pdrom.core.yamlfile import ConfigModel, named, read_yaml, validate
 from pdrom.model.constraints.base import GroupConfig
 from pdrom.model.effects import EFFECTS
 from pdrom.model.effects.base import Seed, effect_config
 from pdrom.model.mesh.config import MeshFile
 from pdrom.model.scene import Scene, SceneConfig
-from study.experiments.kit.base import varied
 
 Fraction = Annotated[float, Field(gt=0.0, le=1.0)]
-Positive = Annotated[float, Field(gt=0.0, le=1e12, allow_inf_nan=False)]
-
-
-class GivenOnce(ConfigModel):
-    """Base class of settings that rejects lists with repeated entries."""
-
-    @model_validator(mode="after")
-    def _given_once(self) -> Self:
-        for key, values in self:
-            if isinstance(values, tuple) and len(set(values)) < len(values):
-                raise ValueError(f"{key} = {list(values)}: an entry is given twice")
-        return self
 
 
 class Coarsen(ConfigModel):
-    """Factors for the mesh resolution (vertices along a side) and for all frame numbers."""
+    """Factors on the resolution of meshes (vertices along a side) and on all numbers of frames."""
 
     resolution: Fraction = 1.0
     frames: Fraction = 1.0
@@ -46,10 +29,11 @@ class Coarsen(ConfigModel):
 
 
 class Replicate(ConfigModel):
-    """Changes that turn every scene into a new sample, on which rules fixed before are tested.
+    """Changes that turn every scene into a new one, to test rules that were fixed before.
 
-    frames_factor : stretches handles, pins and schedules in time; below 1 the motion is faster
-    kick : speed of random initial velocities, m/s, along the axes of the held-out motions
+    frames_factor : factor on the frame numbers of handles, pins and schedules; below 1 the motion
+        is faster
+    kick : speed of random initial velocities, m/s, along the axes that the held-out motions use
     seed : seed of these velocities; it is also added to the seeds of the held-out motions
     """
 
@@ -58,7 +42,7 @@ class Replicate(ConfigModel):
     seed: Seed = 0
 
     def of(self, scene: SceneConfig) -> SceneConfig:
-        """Return ``scene`` at another speed, with other initial velocities and held-out seeds."""
+        """Return ``scene`` with another speed of motion, initial velocities and held-out seeds."""
         if self == Replicate():
             return scene
         effects = [effect.with_frames_scaled(self.frames_factor) for effect in scene.effects]
@@ -79,7 +63,7 @@ def scene_names(root: Path) -> list[str]:
 
 
 def require_scenes(root: Path, names: Iterable[str], key: str) -> None:
-    """Raise ConfigurationError, which names ``key``, if a scene of ``names`` has no file."""
+    """Raise ConfigurationError, with ``key`` in its text, if a scene in ``names`` has no file."""
     known = scene_names(root)
     for name in names:
         if name not in known:
@@ -87,28 +71,16 @@ def require_scenes(root: Path, names: Iterable[str], key: str) -> None:
 
 
 def load_bound_scene(root: Path, name: str, *changes: Change) -> Scene:
-    """Return scene ``name`` of ``root`` with ``changes``, built on its mesh to detect every fault.
+    """Read scene ``name`` below ``root``, apply ``changes``, and build it on its mesh.
 
-    Raises
-    ------
-    ConfigurationError
-        The scene or its held-out variant is faulty; the message names file and fault.
+    Raises ConfigurationError if the scene or its variant for held-out motions is faulty; the
+    message names file and fault.
     """
-    return bind(root, read_scene(root, name, *changes), str(scene_file(root, name)))
-
-
-def bind(root: Path, scene: SceneConfig, source: str) -> Scene:
-    """Return ``scene``, built on its mesh; error messages begin with ``source``.
-
-    Raises
-    ------
-    ConfigurationError
-        The scene or its held-out variant is faulty; the message names the fault.
-    """
+    scene, source = read_scene(root, name, *changes), scene_file(root, name)
     try:
         mesh = scene.mesh.build(root)
         bound = Scene.build(scene, mesh)
-        # the held-out variant has equal constraint groups, so that only its other effects are built
+        # the held-out variant has the same constraint groups: build only its other effects
         heldout = scene.heldout_variant()
         other = tuple(e for e in heldout.effects if not isinstance(e, GroupConfig))
         Scene.build(heldout.model_copy(update={"effects": other}), mesh)
@@ -120,9 +92,10 @@ def bind(root: Path, scene: SceneConfig, source: str) -> Scene:
 
 
 def read_scene(root: Path, name: str, *changes: Change) -> SceneConfig:
-    """Return the configuration of scene ``name`` below ``root``, with ``changes``; builds no mesh.
+    """Read the configuration of scene ``name`` below ``root`` and apply ``changes``.
 
-    The path of a mesh file becomes relative to ``root``. Raises ConfigurationError for a fault.
+    No mesh is built. The path of a mesh file becomes relative to ``root``. Raises
+    ConfigurationError if the file is missing or faulty.
     """
     require_scenes(root, [name], "scenes")
     path = scene_file(root, name)
@@ -145,43 +118,3 @@ def scene_file(root: Path, name: str) -> Path:
 def not_taken(scene: SceneConfig) -> list[str]:
     """Names of the effects of a scene that a position subspace cannot represent."""
     return [e.effect for e in scene.effects if not EFFECTS.load(e.effect).in_subspace]
-
-
-class Variants(GivenOnce):
-    """Section ``variants``: variants of every scene, by every combination of the lists.
-
-    resolutions : factors for the number of vertices along each side of the mesh
-    stiffness_ratios : factors for the weights of the reduced groups
-    seeds : seeds of random initial velocities of at most `kick`, m/s
-    """
-
-    scenes: tuple[SceneName, ...] = ()
-    resolutions: Annotated[tuple[Positive, ...], Field(min_length=1)] = (1.0,)
-    stiffness_ratios: Annotated[tuple[Positive, ...], Field(min_length=1)] = (1.0,)
-    seeds: Annotated[tuple[Seed, ...], Field(min_length=1)] = (1,)
-    kick: Annotated[float, Field(gt=0.0, le=1e3)] = 0.5
-
-    def of(self, read: Callable[[str], SceneConfig]) -> Iterator[SceneConfig]:
-        """Yield every variant of the scenes; ``read`` returns the configuration of a scene by name.
-
-        The variant's name contains its factors: ``strain_oop_m1p5_w0p01_s3`` has 1.5 times the
-        vertices along a side, 0.01 times the weight, and random initial velocities with seed 3.
-        """
-        lists = (self.resolutions, self.stiffness_ratios, self.seeds)
-        for scene, factor, ratio, seed in product(map(read, self.scenes), *lists):
-            h, frames = scene.time_step, scene.frames
-            stiff = varied(scene, h, ratio, h * frames, (frames, frames))
-            kick = {"effect": "kick", "speed": self.kick, "seed": seed}
-            yield stiff.model_copy(
-                update={
-                    "name": f"{scene.name}_m{_word(factor)}_w{_word(ratio)}_s{seed}",
-                    "title": f"{scene.title}; mesh x {factor:g}, weight x {ratio:g}, start {seed}",
-                    "mesh": scene.mesh.coarsened(factor),
-                    "effects": (*stiff.effects, effect_config(kick, len(stiff.effects))),
-                }
-            )
-
-
-def _word(number: float) -> str:
-    """Number as part of a scene's name: ``p`` replaces the point, ``m`` the minus sign."""
-    return f"{number:g}".replace(".", "p").replace("-", "m").replace("+", "")

@@ -13,15 +13,15 @@ from typing import Any
 
 from pdrom.core.environment import settle
 
-# Shapes of matrices as in scenes: rows of one element up to a constraint group, sizes of bases.
+# Numbers of rows (from one element up to a constraint group) and columns (sizes of a basis).
 ROWS = (1, 2, 3, 4, 6, 9, 12, 27, 48, 96, 100, 256, 300, 900, 1000, 2700)
 COLUMNS = (1, 2, 3, 4, 6, 8, 12, 16, 20, 25, 32, 50)
-# Tolerance relative to the largest entry; rounding errors at these sizes are far smaller.
+# Tolerance relative to the largest entry; rounding errors of such small matrices are far below.
 TOLERANCE = 1e-9
 
 
 def main() -> None:
-    """Make all calculations; the last line on standard output names a calculation that fails."""
+    """Make all calculations; if one fails or crashes, the last line of output has its name."""
     faulthandler.enable()
     settle()
     for what in calculations():
@@ -30,7 +30,7 @@ def main() -> None:
 
 
 def calculations() -> Iterator[str]:
-    """Yield the name of each calculation, and make it when the next name is requested."""
+    """Yield the name of each calculation; the calculation is made when the next name is taken."""
     import numpy as np
     import scipy.linalg
 

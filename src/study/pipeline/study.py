@@ -1,19 +1,19 @@
-"""The study: the scenes, methods and settings that one configuration covers, and its files.
+"""The study: scenes, methods and settings of one configuration, and the files it makes.
 
-Most kinds of files exist for every scene, constraint group and method of the study. Kinds that
-exist only for some of these are listed at the end.
+Most kinds of files exist for every scene, constraint group and method of the study. Kinds of files
+that exist only for some of these are listed at the end of the module.
 """
 
 from collections.abc import Callable, Iterable, Mapping
 from copy import copy
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from pdrom.core.errors import ConfigurationError, choices
-from pdrom.core.yamlfile import SceneName, read_yaml, validate
+from pdrom.core.yamlfile import ConfigModel, SceneName, read_yaml, validate
 from pdrom.model.dynamics.system import DEFAULT_SOLVER
 from pdrom.model.held_out import MOTIONS
 from pdrom.model.mesh.config import MeshConfig
@@ -38,12 +38,12 @@ from study.pipeline.folders import DEFAULT
 from study.tables import declared
 
 
-class StudySettings(scene_kit.GivenOnce):
-    """Content of config/default.yaml, possibly overridden by --configfile.
+class StudySettings(ConfigModel):
+    """Content of config/default.yaml, with changes by ``--configfile`` and ``--config``.
 
-    The type of a section is declared by the experiment that it configures. It defines the default
-    values; this class defines those of keys without a section.
-    ``study`` names the folder of the results, see `study.pipeline.folders`.
+    The type of a section, with its default values, is declared in the module of the experiment
+    that it configures. Defaults of keys without a section are declared here. The key ``study``
+    names the folder of the results.
     """
 
     scenes: Annotated[tuple[SceneName, ...], Field(min_length=1)]
@@ -70,8 +70,15 @@ class StudySettings(scene_kit.GivenOnce):
     live: Live = Live()
     alternatives: Alternatives = Alternatives()
     requested_tolerances: RequestedTolerances = RequestedTolerances()
-    variants: scene_kit.Variants = scene_kit.Variants()
+    recorded: bool = True  # whether tables also have recorded rows of long runs
     study: str | None = None
+
+    @model_validator(mode="after")
+    def _given_once(self) -> Self:
+        for key, values in self:
+            if isinstance(values, tuple) and len(set(values)) < len(values):
+                raise ValueError(f"{key} = {list(values)}: an entry is given twice")
+        return self
 
 
 class Study:
@@ -84,27 +91,22 @@ class Study:
         source: str = f"configuration ({DEFAULT})",
         configuration: str = DEFAULT,
     ) -> None:
-        """Build all scenes of a merged ``config`` below ``root``.
+        """Build all scenes of ``config``, the merged configuration, in the project folder ``root``.
 
         Error messages begin with ``source``; the manuscript shows the name ``configuration``.
-
-        Raises
-        ------
-        ConfigurationError
-            A setting is wrong; the message names file, key, value and the allowed values.
+        Raises ConfigurationError if a setting is wrong; the message names file, key, value and the
+        allowed values.
         """
         self.root, self.configuration = root, configuration
         self.settings = settings = validate(StudySettings, config, source)
         self.titles: dict[str, str] = {}  # titles of scenes, for tables and figures
         self.vertices: dict[str, int] = {}
         self._known: dict[str, SceneConfig] = {}
-        # changes to every scene of config/scenes, in the order in which they apply
+        # changes made to every scene read from config/scenes, in this order
         self._changes = changes = (settings.replicate, settings.coarsen)
         self.bound: dict[str, Scene] = {
             name: scene_kit.load_bound_scene(root, name, *changes) for name in settings.scenes
         }
-        for scene in settings.variants.of(lambda name: scene_kit.read_scene(root, name, *changes)):
-            self.bound[scene.name] = scene_kit.bind(root, scene, "variants")
         self.scenes = {name: self._physics(s) for name, s in self.bound.items()}
         self.online = {
             name: self._physics(scene_kit.load_bound_scene(root, name, *changes))
@@ -119,7 +121,7 @@ class Study:
         return load_choices(self.root / "config" / "figures.yaml", known)
 
     def value(self, key: str) -> Any:
-        """Value of the configuration at ``key``; ConfigurationError if the key does not exist."""
+        """Value of a dotted ``key`` of the configuration; ConfigurationError if there is none."""
         return part_of(self.settings, key.split("."), key)
 
     @cached_property
@@ -129,19 +131,22 @@ class Study:
 
     def scene(self, name: str) -> SceneConfig:
         """Return any scene by ``name``; ConfigurationError if its file is missing or faulty."""
-        if name not in self._known:  # built to check it, but not stored in `bound`
+        if name not in self._known:  # build the scene only to check it: it is not in the study
             self._physics(scene_kit.load_bound_scene(self.root, name, *self._changes))
         return self._known[name]
 
     def _physics(self, scene: Scene) -> SceneConfig:
-        """Return the scene's configuration with the name as title: jobs do not depend on titles."""
+        """Return a scene's configuration, its title replaced by its name.
+
+        Jobs then do not depend on titles, which tables and figures read from `titles`.
+        """
         config = scene.config
         self.titles[config.name], self.vertices[config.name] = config.title, scene.mesh.vertices
         self._known[config.name] = config.model_copy(update={"title": config.name})
         return self._known[config.name]
 
     def only(self, scene: str) -> "Study":
-        """Return a copy of the study with only this ``scene``, which may be outside the study."""
+        """Return a copy of the study whose only scene is ``scene``, in the study or not."""
         single = copy(self)
         single.scenes = {scene: self.scene(scene)}
         return single
@@ -163,7 +168,7 @@ class Study:
 
     @property
     def apart(self) -> str:
-        """Text about the differences from the full study; empty for the full study."""
+        """Text on how this study differs from the full study; empty for the full study."""
         if self.is_full:
             return ""
         coarsen = self.settings.coarsen
@@ -186,7 +191,7 @@ class Study:
         return {scene.mesh.identifier: scene.mesh for scene in self.scenes.values()}
 
     def mesh(self, identifier: str) -> MeshConfig:
-        """Configuration of the mesh ``identifier`` of any scene in config/scenes or the study."""
+        """Configuration of the mesh ``identifier``, of a scene in config/scenes or in the study."""
         return self.meshes.get(identifier) or self.every_mesh[identifier]
 
     @cached_property
@@ -202,7 +207,10 @@ class Study:
         return BasisSpec(**{key: getattr(method, key) for key in BasisSpec.model_fields})
 
     def named_methods(self, names: Iterable[str], key: str) -> dict[str, MethodSpec]:
-        """Methods by name; ConfigurationError, with ``key`` in the message, for an unknown name."""
+        """Methods ``names`` of config/methods.yaml, by name.
+
+        An unknown name raises a ConfigurationError, which says that it stands under ``key``.
+        """
         known = self.every_method
         for name in names:
             if name not in known:
@@ -211,7 +219,7 @@ class Study:
 
 
 def part_of(value: Any, parts: Iterable[str], key: str) -> Any:
-    """Nested attribute of ``value`` along the names ``parts``; ConfigurationError without one."""
+    """Attribute of ``value`` along the nested names ``parts``; ConfigurationError without one."""
     for part in parts:
         if not hasattr(value, part):
             known = choices(part, getattr(type(value), "model_fields", ()))
@@ -224,7 +232,7 @@ Labels = dict[str, str]
 
 
 def labels_of(study: Study, place: paths.Place) -> list[Labels]:
-    """Scene, group ... of every file of the kind ``place`` that the study makes, in its order."""
+    """Scene, group ... of every file of the kind ``place`` that the study makes, in order."""
     names = place.labels
     scenes = SCENES[place](study) if place in SCENES else study.scenes
     known: Iterable[Labels] = [{}]
@@ -249,12 +257,12 @@ def labels_of(study: Study, place: paths.Place) -> list[Labels]:
 
 
 def _held(study: Study, listed: Iterable[str]) -> list[str]:
-    """Scenes of the study that are in ``listed``, in the order of the study."""
+    """Scenes of the study that are also in ``listed``, in the order of the study."""
     return [scene for scene in study.scenes if scene in {*listed}]
 
 
 def _with_subspaces(study: Study) -> list[str]:
-    """Scenes with models in position subspaces: those configured, else all possible ones."""
+    """Scenes with models in position subspaces: the configured ones, else all that allow them."""
     section = study.settings.subspace
     if not (section.bases and section.sizes):
         return []
@@ -262,18 +270,18 @@ def _with_subspaces(study: Study) -> list[str]:
     return _held(study, section.scenes or takes)
 
 
-# Names of the tables, figures and TeX inputs that every study makes, by the kind of their files.
+# Kind of file -> names of the tables, figures or TeX inputs of which every study makes such a file.
 NAMES: dict[paths.Place, Callable[[], Iterable[str]]] = {
     paths.TABLE: declared,
     paths.FIGURE: declarations,
     paths.FIGURE_PICTURE: declarations,
     paths.PAPER_INPUT: lambda: FILES,
 }
-# Kinds of files for reduced models whose vertex positions lie in a subspace.
+# Kinds of files with results of reduced models whose vertex positions lie in a subspace.
 MODELS = (
     paths.SUBSPACES, paths.SUBSPACES_TRAIN, paths.SUBSPACES_HELDOUT, paths.SUBSPACES_SECONDS,
 )  # fmt: skip
-# Scenes that have files of a kind, possibly as a mapping to factors of each scene's mesh size.
+# Kind of file -> scenes that have it, possibly as a mapping to factors of each scene's mesh size.
 SCENES: dict[paths.Place, Callable[[Study], Iterable[str]]] = {
     **dict.fromkeys(MODELS, _with_subspaces),
     paths.SCALING: lambda study: study.settings.scaling.scenes,
@@ -282,21 +290,21 @@ SCENES: dict[paths.Place, Callable[[Study], Iterable[str]]] = {
     paths.ALTERNATIVE_TIMES: lambda study: study.settings.alternatives.scenes,
     paths.ONLINE: lambda study: study.online,
     paths.ONLINE_MODELS: lambda study: study.online,
-    # configured scenes for which the study makes reduced models
+    # of the configured scenes, those for which the study makes models in position subspaces
     paths.LIVE_MODEL: lambda study: [
         scene
         for scene in study.settings.live.scenes
         if scene in {*_with_subspaces(study), *study.online}
     ],
     paths.STABILITY: lambda study: _held(study, study.settings.stability.scenes),
-    # the configured scenes, else all scenes, including large ones
+    # the configured scenes, or if none is configured all scenes, including the large ones
     paths.REQUESTED_TOLERANCES: lambda study: [
         scene
         for scene in (*study.scenes, *study.online)
         if scene in (study.settings.requested_tolerances.scenes or (*study.scenes, *study.online))
     ],
 }
-# Functions of study, scene and group that return whether the reduced group has files of a kind.
+# Kind of file -> function of study, scene and group: whether the reduced group has such files.
 GROUPS: dict[paths.Place, Callable[[Study, str, str], bool]] = {
     paths.REPETITIONS: lambda study, scene, group: any(
         scene in cell.scenes for cell in study.settings.repetitions.cells

@@ -1,7 +1,7 @@
-"""Texts about a finished run: its last lines, and results/contents.md, an overview of the study.
+"""Texts about a finished run: the last lines it prints, and the overview results/contents.md.
 
-The overview lists every claim, figure, table and section of the text with the command that makes it
-and the processor minutes of this command, then captions of figures and columns of tables.
+The overview lists every claim, figure, table and section of the text, with the command that makes
+it and the processor minutes this needs. Captions of figures and columns of tables follow.
 """
 
 import os
@@ -16,7 +16,7 @@ import psutil
 from pdrom.core.store import Condition, check_file, read_table
 from study.artifact import paths
 from study.artifact.logs import usage_of
-from study.artifact.reads import Every, ProjectFile, Read, Setting, TableOf
+from study.artifact.reads import Every, ProjectFile, Read, Recorded, Setting, TableOf
 from study.figures.kit.declaration import declarations
 from study.paper.figure_numbers import figures_page
 from study.paper.macros import keys_of
@@ -29,9 +29,9 @@ from study.tables import declared
 from study.tables.claims.rules import load_claims
 from study.tables.kit.declaration import Table
 
-# Limit of the load average per core over five minutes; above it, other programs must have run.
+# A load average (over five minutes, for each core) above this value shows that other programs ran.
 BUSY = 1.7
-LISTED = 8  # largest number of targets that the summary names
+LISTED = 8  # largest number of targets that the last lines of a run name
 TABLES_HEAD = """# Tables
 
 Tables are CSV with one row per observation, SI units unless a unit says otherwise, and an empty
@@ -69,12 +69,7 @@ def processor_seconds() -> float:
 
 
 def summary(command: CommandLine, plan: Plan) -> str:
-    """Return the last lines of a successful run.
-
-    Parameters
-    ----------
-    command, plan : command line of the run, and its plan
-    """
+    """Return the last lines of a successful run, from its command line and its plan."""
     folders, apart = plan.folders, plan.study.apart
     wall = time.time() - psutil.Process().create_time()
     lines = [f"configuration: {configuration(command)}"]
@@ -116,9 +111,9 @@ def configuration(command: CommandLine) -> str:
 
 
 def verdicts_in(results: str) -> dict[str, tuple[str, str]]:
-    """Verdicts on each claim (for published settings, beyond them); empty without a valid table."""
+    """Both verdicts on each claim (as published, beyond), by claim; empty without a valid table."""
     path = paths.TABLE.at(results, name="claims")
-    # a damaged file is not renamed here, but by the next job that reads it
+    # a damaged file is only ignored here: the next job that reads it renames it
     if not Path(path).is_file() or check_file(path) is not Condition.INTACT:
         return {}
     table = read_table(path, ["claim", "verdict", "verdict_beyond"])
@@ -126,7 +121,7 @@ def verdicts_in(results: str) -> dict[str, tuple[str, str]]:
 
 
 def _section(table: Table) -> str:
-    """Markdown that describes a table and its columns."""
+    """Markdown text that describes a table and its columns."""
     sources = dict.fromkeys(_source(read) for read in table.reads.values())
     lines = [
         f"## {table.name}",
@@ -155,15 +150,17 @@ def _source(read: Read) -> str:
             return f"setting `{key}`"
         case ProjectFile(path):
             return f"`{path}`"
+        case Recorded():
+            return "recorded rows"
     raise TypeError(f"{read} has no words")
 
 
 class Entry(NamedTuple):
-    """A line of the overview.
+    """Line of the overview.
 
     kind : claim, figure, table, section (TeX file whose text contains numbers) or manuscript
-    files : paths of its files in the default configuration
-    words : arguments of ./reproduce that make these files
+    files : paths of the files it stands for, in the default configuration
+    words : arguments of ``./reproduce`` that make these files
     """
 
     kind: str
@@ -173,7 +170,7 @@ class Entry(NamedTuple):
 
 
 def entries() -> Iterator[Entry]:
-    """Yield the entries of claims, figures, tables, sections and manuscript, in this order."""
+    """Yield lines of the overview: claims, figures, tables, sections and the manuscript."""
     for name in load_claims(Path("config/claims.yaml")):
         yield Entry("claim", name, (paths.TABLE.at(paths.RESULTS, name="claims"),), ("claims",))
     for name, figure in declarations().items():
@@ -182,7 +179,7 @@ def entries() -> Iterator[Entry]:
             "figure", name, (paths.FIGURE.at(paths.RESULTS, name=name),), ("figure", number)
         )
     tables = {name: paths.TABLE.at(paths.RESULTS, name=name) for name in declared()}
-    # use a table's path if a figure has the same name, since the name would request both
+    # if table and figure have equal names, use the table's path: the name would request both
     words = {name: path if name in declarations() else name for name, path in tables.items()}
     for name, path in tables.items():
         yield Entry("table", name, (path,), (words[name],))
@@ -196,10 +193,8 @@ def entries() -> Iterator[Entry]:
 
 
 def contents(command: CommandLine, dag: Any, folders: Folders) -> str:
-    """Text of the overview, after a run that has made all files.
+    """Return the text of the overview after a run that has made all files.
 
-    Parameters
-    ----------
     command : command line that started the run
     dag : Snakemake's graph of all jobs of the study
     folders : folders of the study's results
@@ -222,9 +217,10 @@ def contents(command: CommandLine, dag: Any, folders: Folders) -> str:
 def costs(
     listed: Sequence[Entry], dag: Any, folders: Folders
 ) -> Iterator[tuple[int, float | None]]:
-    """Yield the number of jobs, with all prerequisites, and processor minutes of each entry.
+    """Yield for each line of the overview the number of jobs it needs, and processor minutes.
 
-    The minutes are None if a job was not measured. ``dag`` is Snakemake's graph of jobs.
+    Jobs include all prerequisites. The minutes are None if one of the jobs was not measured.
+    ``dag`` is Snakemake's graph of jobs.
     """
     makers = {str(file): job for job in dag.jobs for file in job.output}
     used = {job: usage_of(job.log[0]) for job in makers.values()}

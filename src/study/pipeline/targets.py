@@ -1,4 +1,7 @@
-"""Targets of the command line: figures by number or name, tables, files; checks and suggestions."""
+"""Targets (results requested on the command line): translation to paths of files, and checks.
+
+A target is the number or name of a figure, the name of a table or of a rule, or a path.
+"""
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from itertools import takewhile
@@ -23,19 +26,15 @@ def figure_arguments(arguments: Sequence[str]) -> list[str]:
     """Return options and targets for Snakemake, from the ``arguments`` after the word ``figure``.
 
     A figure is given by its name, its number in the paper (``3``), in the supplement (``S3``) or in
-    the preprint (``preprint:3``). The returned target is the single string ``figure NAME``, which
-    `files` turns into a path.
-
-    Raises
-    ------
-    ConfigurationError
-        No figure is given, or a given figure does not exist.
+    the preprint (``preprint:3``). A returned target is a single string ``figure NAME``, which the
+    function `files` turns into a path. Raises ConfigurationError if no figure is given, or a given
+    figure does not exist.
     """
     named = list(takewhile(lambda word: not word.startswith("-"), arguments))
     options = [word for word in arguments[len(named) :] if word != "--"]
     numbers = figure_numbers(Path())
     by_place = {n.manuscript: name for name, n in numbers.items() if n.manuscript}
-    # numbers of the paper first, then numbers of the supplement
+    # order of suggestions: first the numbers of the paper, then those of the supplement
     ordered = sorted(by_place, key=lambda n: (SUPPLEMENT in n, int(n.removeprefix(SUPPLEMENT))))
     known = {number: by_place[number] for number in ordered}
     known |= {f"{PREPRINT}{n.preprint}": name for name, n in numbers.items() if n.preprint}
@@ -49,16 +48,16 @@ def figure_arguments(arguments: Sequence[str]) -> list[str]:
 
 
 def described(target: str) -> str:
-    """Text of a ``target`` for the user; numbers in the documents follow the name of a figure."""
+    """Text for the user about a ``target``; the name of a figure is followed by its numbers."""
     word, _, name = target.partition(" ")
     return f"{WORD} {figure_numbers(Path())[name].label(name)}" if word == WORD else target
 
 
 def files(target: str, folders: Folders) -> list[str]:
-    """Return the paths in ``folders`` for ``target``, the name of a figure or table or a path.
+    """Return the paths in ``folders`` for a ``target``: the name of a figure or table, or a path.
 
-    A path below ``results`` becomes one in the results folder of this study. ``figure NAME`` is
-    the figure only, even if a table has the same name.
+    A path below ``results`` becomes a path in the results folder of this study. A name stands for
+    figure and table if both have it; the target ``figure NAME`` is the figure only.
     """
     word, _, name = target.partition(" ")
     alone = word == WORD and name in declarations()
@@ -70,7 +69,7 @@ def files(target: str, folders: Folders) -> list[str]:
 
 
 def own_file(path: str, folders: Folders) -> str:
-    """Translate a path in the full study's folders to that in ``folders``; keep other paths."""
+    """Translate a path in the default folders (results, paper) to ``folders``; keep others."""
     for document, file in Folders().documents.items():
         if path == file:
             return folders.documents[document]
@@ -80,9 +79,10 @@ def own_file(path: str, folders: Folders) -> str:
 
 
 def check_targets(plan: Plan, targets: Iterable[str], rules: Sequence[Any]) -> None:
-    """Raise ConfigurationError, with a suggestion, for a target that no rule of Snakemake makes.
+    """Raise ConfigurationError, with a suggestion, if no rule of Snakemake makes a target.
 
-    ``targets`` are the arguments of the command line.
+    targets : names of rules, and paths, from the command line
+    rules : Snakemake's rules
     """
     own = {rule.name for rule in rules if not rule.has_wildcards()}
     for target in targets:
@@ -100,7 +100,11 @@ def check_targets(plan: Plan, targets: Iterable[str], rules: Sequence[Any]) -> N
 
 
 def _allowed(study: Study, label: str, before: Mapping[str, str]) -> Collection[str] | None:
-    """Allowed values of ``label`` (scene, group ...) after values ``before``; None if all are."""
+    """Allowed values of ``label`` in a path, or None if every value is allowed.
+
+    The label is scene, group, method, basis or mesh. ``before`` has the labels to the left of it
+    with their values: the allowed groups depend on the scene.
+    """
     match label:
         case "scene":
             return {*scene_names(study.root), *study.scenes}
@@ -116,7 +120,7 @@ def _allowed(study: Study, label: str, before: Mapping[str, str]) -> Collection[
 
 
 def _unknown(plan: Plan, target: str, rules: Collection[str]) -> str:
-    """Last part of the message about an unknown target; ``rules`` have no wildcards."""
+    """Second half of the message about an unknown target; ``rules`` are names to suggest."""
     scenes = {*scene_names(plan.study.root), *plan.study.scenes}
     if target in scenes:
         example = paths.FULL_ORDER.at(plan.results, scene=target, run="train")

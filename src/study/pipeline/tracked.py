@@ -8,6 +8,9 @@ its log's path below ``logs``: an experiment, or ``tables``, ``figures`` or ``pa
 
 ``./reproduce run python -m study.pipeline.tracked replication`` updates the file of the table
 `replication` from the table of claims of the study ``config/replication.yaml``.
+
+``./reproduce run python -m study.pipeline.tracked rows`` updates the tables of long runs from the
+study ``config/extended.yaml``; tables of other studies show their rows, too.
 """
 
 import sys
@@ -21,6 +24,7 @@ from pdrom.core.errors import ConfigurationError, PdromError, choices
 from pdrom.core.store import atomic_path, read_table
 from study.artifact.logs import usage_of
 from study.artifact.paths import TABLE
+from study.artifact.reads import RECORD
 from study.pipeline.commandline import one_line
 from study.pipeline.folders import folders
 from study.tables.claims.claims import MEASURED, RULES
@@ -31,6 +35,8 @@ COSTS = Path("config/reference/job_costs.csv")
 COLUMNS = ["kind", "seconds", "coarse_seconds", "longest_s", "memory_mb"]
 COARSE = "config/tiny.yaml"
 SAMPLE = "config/replication.yaml"
+LONG = "config/extended.yaml"
+KEPT = ("alternatives", "winners", "requested_tolerances")
 
 
 def write_tracked(path: Path, content: bytes) -> None:
@@ -79,10 +85,15 @@ def recorded_verdicts(claims: Path, rules: Path) -> pd.DataFrame:
     StorageError
         The table is missing or damaged.
     """
-    table = read_table(claims)[["claim", *MEASURED]]
     loaded = load_claims(rules)
-    day = datetime.fromtimestamp(claims.stat().st_mtime, UTC).date().isoformat()
-    return table.assign(rules=[loaded[claim].fingerprint for claim in table.claim], date=day)
+    table = dated(claims, "date")[["claim", *MEASURED, "date"]]
+    return table.assign(rules=[loaded[claim].fingerprint for claim in table.claim])
+
+
+def dated(path: Path, column: str) -> pd.DataFrame:
+    """Return the table in the file ``path`` with the day of its last change in a ``column``."""
+    day = datetime.fromtimestamp(path.stat().st_mtime, UTC).date().isoformat()
+    return read_table(path).assign(**{column: day})
 
 
 def _used(results: str) -> pd.DataFrame:
@@ -97,19 +108,22 @@ def _used(results: str) -> pd.DataFrame:
 
 
 def main(words: Sequence[str]) -> None:
-    """Update the files for ``words``, "costs" or "replication"; ConfigurationError for others."""
+    """Update files for ``words``: "costs", "replication", "rows"; ConfigurationError for others."""
     for word in words or [""]:
         if word == "costs":
-            path = COSTS
-            table = measured_costs(folders([], []).results, folders([COARSE], []).results)
+            made = {COSTS: measured_costs(folders([], []).results, folders([COARSE], []).results)}
         elif word == "replication":
-            path = Path(REPLICATED)
             claims = TABLE.at(folders([SAMPLE], []).results, name="claims")
-            table = recorded_verdicts(Path(claims), Path(RULES))
+            made = {Path(REPLICATED): recorded_verdicts(Path(claims), Path(RULES))}
+        elif word == "rows":
+            results = folders([LONG], []).results
+            tables = {name: Path(TABLE.at(results, name=name)) for name in KEPT}
+            made = {Path(RECORD.format(name)): dated(t, "recorded") for name, t in tables.items()}
         else:
-            known = choices(word, ["costs", "replication"])
+            known = choices(word, ["costs", "replication", "rows"])
             raise ConfigurationError(f"tracked: '{word}': unknown{known}")
-        write_tracked(path, table.to_csv(index=False).encode())
+        for path, table in made.items():
+            write_tracked(path, table.to_csv(index=False).encode())
 
 
 if __name__ == "__main__":

@@ -1,9 +1,10 @@
-"""Settings of a job that are derived from the configuration, by the names in `DERIVED`.
+"""Settings that functions compute from the configuration for a job; `DERIVED` lists their names.
 
-All other settings are keys of the configuration. If a setting is annotated with the base class of
-its section, it has the fields of the base class only, so that a job depends on nothing else.
+All other settings are keys of the configuration. If a job's parameter is annotated with a base
+class of the section's type, the job gets the fields of the base class and depends on no others.
 
-``labels`` contain scene, group ... of the job, for a figure its name, which selects its options.
+The parameter ``labels`` of all functions has scene, group ... of the job, by name; for a figure it
+has the name of the figure, which selects the options of the figure.
 """
 
 from collections.abc import Callable, Mapping
@@ -31,19 +32,19 @@ from study.pipeline.folders import DEFAULT
 from study.pipeline.study import Study, labels_of
 from study.tables.kit.results import FAR
 
-# Basis used in tables that show one basis for each constraint group, if a method has it.
+# Basis that is shown if a table shows one basis for each group and a method of the study has it.
 USUAL_BASIS = "none-none-vectorised"
 
 
 def _stability(study: Study, labels: Labels) -> Stability:
-    """Settings of the stability experiment, with those sizes r for which the study has samples."""
+    """Settings of the stability experiment, only with sizes r for which the study has samples."""
     section = study.settings.stability
     held = tuple(r for r in section.ranks if r in study.settings.ranks)
     return section.model_copy(update={"ranks": held})
 
 
 def _usual_bases(study: Study, labels: Labels) -> list[paths.File]:
-    """Basis file of each reduced group: `USUAL_BASIS` if a method uses it, else the first."""
+    """One basis file per scene and reduced group: that of `USUAL_BASIS`, else the first one."""
     chosen: dict[tuple[str, str], Labels] = {}
     for held in labels_of(study, paths.BASIS):
         group = (held["scene"], held["group"])
@@ -53,17 +54,17 @@ def _usual_bases(study: Study, labels: Labels) -> list[paths.File]:
 
 
 def _holds(study: Study, place: paths.Place, labels: Labels) -> bool:
-    """Return whether the study makes the file of kind ``place`` for the job's scene, group ...."""
+    """Return whether the study makes a file of kind ``place`` for scene, group ... of the job."""
     return {name: labels[name] for name in place.labels} in labels_of(study, place)
 
 
 def _of_scene(study: Study, place: paths.Place, labels: Labels) -> tuple[OfScene, ...]:
-    """The job's scene as a tuple; empty if the study makes no file of kind ``place`` for it."""
+    """Tuple with the job's scene; empty if the study makes no file of kind ``place`` for it."""
     return (OfScene(scene=labels["scene"]),) if _holds(study, place, labels) else ()
 
 
 def _joint_rows(study: Study, labels: Labels) -> tuple[JointRows, ...]:
-    """Reduced groups of a scene, by method `JOINT`; empty if the study lacks scene or method."""
+    """Reduced groups of a scene with the method `JOINT`; empty if the study lacks one of these."""
     scene = labels["scene"]
     if JOINT not in study.methods or scene not in study.scenes:
         return ()
@@ -78,7 +79,7 @@ def _named(scenes: Mapping[str, SceneConfig]) -> list[NamedScene]:
 
 
 def _subspace_cases(study: Study, labels: Labels) -> tuple[SubspaceCase, ...]:
-    """Position-subspace models to time per frame, as configured, if the study makes them."""
+    """Models in position subspaces whose frames are timed: the configured ones that exist."""
     held = {labels["scene"] for labels in labels_of(study, paths.SUBSPACES)}
     models = study.settings.subspace
     return tuple(
@@ -89,7 +90,7 @@ def _subspace_cases(study: Study, labels: Labels) -> tuple[SubspaceCase, ...]:
 
 
 def _projection_cases(study: Study, labels: Labels) -> tuple[ProjectionCase, ...]:
-    """Reductions to time per frame, as configured, if the study computes their samples."""
+    """Reductions whose frames are timed: the configured ones for which the study has samples."""
     held = labels_of(study, paths.SAMPLING)
     return tuple(
         case
@@ -99,9 +100,9 @@ def _projection_cases(study: Study, labels: Labels) -> tuple[ProjectionCase, ...
 
 
 def scaled_methods(study: Study, labels: Labels) -> dict[str, MethodSpec]:
-    """Methods that are timed on meshes of increasing size, by name; ``labels`` are not used.
+    """Methods, by name, that are timed on meshes of increasing size.
 
-    They need not be among the methods of the study.
+    They need not be among the methods of the study. ``labels`` are not used.
     """
     section = study.settings.scaling
     found = study.named_methods([section.method], "scaling.method")
@@ -109,7 +110,7 @@ def scaled_methods(study: Study, labels: Labels) -> dict[str, MethodSpec]:
 
 
 def _repeated(study: Study, labels: Labels) -> tuple[Repeated, ...]:
-    """Repeated runs of a scene, one for each method of each configured entry (``cell``)."""
+    """Repeated runs of a scene: one for each method of each entry of ``repetitions.cells``."""
     cells = [c for c in study.settings.repetitions.cells if labels["scene"] in c.scenes]
     return tuple(
         Repeated(method=name, spec=spec, **cell.model_dump(include={*Cell.model_fields}))
@@ -125,14 +126,15 @@ class Run(Experiment):
 
     @property
     def labels(self) -> dict[str, str]:
-        """Scene, group and method, by name, as they occur in the paths of this run's files."""
+        """Scene, group and method, by name, which the paths of this run's files contain."""
         return {**super().labels, "method": self.method}
 
 
 def _options(study: Study, labels: Labels) -> Options:
-    """Options of a figure, with scenes outside the study removed.
+    """Options of a figure without the scenes that are not in the study.
 
-    If no listed scene or method is in the study, the list becomes empty, which means all.
+    If none of the listed scenes (or methods) is in the study, the list becomes empty: all of the
+    study are shown.
     """
     chosen = study.figures[labels["figure"]]
     update: dict[str, tuple[str, ...]] = {}
@@ -144,7 +146,7 @@ def _options(study: Study, labels: Labels) -> Options:
 
 
 def _experiments(study: Study, labels: Labels) -> tuple[Experiment, ...]:
-    """Reduced groups that a figure's options choose, in the configured order."""
+    """Reduced groups that the options of a figure select, in the configured order."""
     chosen = _options(study, labels)
     found = []
     for scene in chosen.names("scenes") or tuple(study.scenes):
@@ -164,14 +166,14 @@ def _experiments(study: Study, labels: Labels) -> tuple[Experiment, ...]:
 
 
 def _reductions(study: Study, labels: Labels) -> dict[str, Reduction]:
-    """Methods that a figure's options choose, by name, in the configured order."""
+    """Methods that the options of a figure select, by name, in the configured order."""
     named = _options(study, labels).names("methods") or tuple(study.methods)
     held = {name: study.methods[name] for name in named if name in study.methods}
     return {name: Reduction(title=spec.title, rows=spec.rows) for name, spec in held.items()}
 
 
 def _runs(study: Study, labels: Labels) -> tuple[Run, ...]:
-    """All combinations of a figure's reduced groups and methods."""
+    """All combinations of the reduced groups and the methods that a figure shows."""
     methods = _reductions(study, labels)
     return tuple(
         Run(**experiment.model_dump(), method=method)
@@ -181,7 +183,7 @@ def _runs(study: Study, labels: Labels) -> tuple[Run, ...]:
 
 
 def _facts(study: Study, labels: Labels) -> Facts:
-    """Contents of the manuscript that are no results: captions, settings, limits of pages."""
+    """Contents of the manuscript that are no results: captions, settings, limits on pages."""
     own = study.is_own
     said = [(name, each.words(study.value)) for name, each in declarations().items()]
     return Facts(

@@ -1,4 +1,4 @@
-"""Tables of the study, one module for each subject; see `study.tables.kit.declaration`."""
+"""Tables of the study, one module for each subject; `study.tables.kit` declares them."""
 
 from study.tables.kit.declaration import declared
 

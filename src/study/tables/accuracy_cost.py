@@ -10,12 +10,13 @@ which a reduction must beat. ``fom-anderson`` is a full-order run with Anderson 
 """
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
 from study.artifact import paths
-from study.artifact.reads import Every, Setting, TableOf
+from study.artifact.reads import Every, Recorded, Setting, TableOf
 from study.experiments.kit.base import ANDERSON, FOM
 from study.tables.kit import results
 from study.tables.kit.declaration import count, flag, integer, number, shared, table, text, timed
@@ -130,6 +131,7 @@ def pareto(error: Sequence[float], cost: Sequence[float]) -> list[bool]:
         number("error", "error over these frames against the converged implicit step"),
         number("velocity_error", "error of the velocities, likewise"),
         number("playback_error", "error of playback of the training motion, likewise"),
+        number("reference_error", "of the reference of the request, likewise; 0: used instead"),
         number("expected", "error in the calibration, times the factor", compared="error"),
         number("estimate", "estimate by checks and a second run, likewise", compared="error"),
         flag("broken", "met, and the error is above the tolerance", compared="error"),
@@ -138,26 +140,29 @@ def pareto(error: Sequence[float], cost: Sequence[float]) -> list[bool]:
         integer("checks", "frames that a more accurate level did as well", compared="error"),
         *shared("ms_per_frame"),
         text("full_level", "cheapest full order within tolerance by calibration", compared="error"),
-        number("full_error", "its error over the same frames"),
         timed(number("full_ms", "time of its frame, without checks", "ms")),
         timed(number("over_full", "time of a frame over that")),
         timed(number("own_ms", "time of a frame with the scene's own iterations", "ms")),
         timed(number("over_own", "time of a frame over that")),
+        results.DAY,
     ),
-    reads={"runs": Every(paths.REQUESTED_TOLERANCES)},
+    reads={
+        "runs": Every(paths.REQUESTED_TOLERANCES),
+        "record": Recorded("requested_tolerances"),
+    },
 )
-def requested_tolerances(runs: list[paths.File]) -> pd.DataFrame:
-    """Rows of all scenes, one per run with a requested tolerance, from the files ``runs``."""
+def requested_tolerances(runs: list[paths.File], record: list[Path]) -> pd.DataFrame:
+    """Rows of all scenes, one per run with a requested tolerance, from ``runs`` and ``record``."""
     rows = results.joined(runs)
-    if rows.empty:
-        return rows
-    met = rows.frames > 0
-    return rows.assign(
-        met=met,
-        broken=met & ~(rows.error <= rows.tolerance),
-        over_full=rows.ms_per_frame / rows.full_ms,
-        over_own=rows.ms_per_frame / rows.own_ms,
-    )
+    if len(rows):
+        met = rows.frames > 0
+        rows = rows.assign(
+            met=met,
+            broken=met & ~(rows.error <= rows.tolerance),
+            over_full=rows.ms_per_frame / rows.full_ms,
+            over_own=rows.ms_per_frame / rows.own_ms,
+        )
+    return results.with_recorded(rows, record)
 
 
 # Columns that identify a curve; the rows of a curve differ only in size r.

@@ -4,25 +4,17 @@ Table winners has the fastest method for each allowed error, and meshes where it
 """
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
 from pdrom.model.held_out import MOTIONS, PLAYBACK
 from study.artifact import paths
-from study.artifact.reads import Every, Setting, TableOf
+from study.artifact.reads import Every, Recorded, Setting, TableOf
 from study.experiments.alternatives import experiment as settings
-from study.tables.kit.declaration import (
-    flag,
-    integer,
-    number,
-    quantiles,
-    shared,
-    table,
-    text,
-    timed,
-)
-from study.tables.kit.results import joined, median_interval
+from study.tables.kit.declaration import flag, integer, interval, number, shared, table, text, timed
+from study.tables.kit.results import DAY, joined, median_interval, with_recorded
 
 STIFFNESS = number("stiffness", "factor on all weights of the scene", compared="exact")
 SUBSTEPS = integer("substeps", "steps that a frame is divided into")
@@ -64,32 +56,36 @@ KNOWN = 3.0  # allowed errors below this multiple of the reference's own error a
         integer("frames", "frames that errors are taken over"),
         flag("finite", "no frame blew up", compared="error"),
         *shared("ms_per_frame vertices_ms"),
-        timed(number("ms_low", "the whole in the fastest process", "ms")),
-        timed(number("ms_high", "the same in the slowest process", "ms")),
         integer("processes", "processes that timed it, all in the first motion"),
         number("error_implicit", "against the converged step", tolerance=LOOSE),
         number("error_continuous", "against continuous time: the total", tolerance=LOOSE),
         number("reference_error", "estimated error of that motion"),
         number("span_error", "error of the nearest motion in the subspace of a reduction"),
+        DAY,
     ),
-    reads={"parts": Every(paths.ALTERNATIVES), "times": Every(paths.ALTERNATIVE_TIMES)},
+    reads={
+        "parts": Every(paths.ALTERNATIVES),
+        "times": Every(paths.ALTERNATIVE_TIMES),
+        "record": Recorded("alternatives"),
+    },
 )
-def alternatives(parts: list[paths.File], times: list[paths.File]) -> pd.DataFrame:
+def alternatives(
+    parts: list[paths.File], times: list[paths.File], record: list[Path]
+) -> pd.DataFrame:
     """One row per solver with its settings and held-out motion, in the order of files ``parts``.
 
-    ``times`` has the frame times measured in each process; the table gives their medians.
+    ``times`` has the frame times measured in each process; the table gives their medians. Rows of
+    ``record`` follow.
     """
     rows = joined(parts)
-    if rows.empty:
-        return rows
-    rows, processes = beside(rows, joined(times))
-    ms = rows[processes]
-    return rows.assign(
-        ms_per_frame=ms.median(axis=1),
-        ms_low=ms.min(axis=1),
-        ms_high=ms.max(axis=1),
-        processes=ms.count(axis=1),
-    )
+    if len(rows):
+        rows, processes = beside(rows, joined(times))
+        ms = rows[processes]
+        rows = rows.assign(
+            ms_per_frame=ms.median(axis=1),
+            processes=ms.count(axis=1),
+        )
+    return with_recorded(rows, record)
 
 
 def beside(rows: pd.DataFrame, times: pd.DataFrame) -> tuple[pd.DataFrame, list[int]]:
@@ -121,7 +117,7 @@ def beside(rows: pd.DataFrame, times: pd.DataFrame) -> tuple[pd.DataFrame, list[
         timed(number("reduced_ms", "time of a frame of the reduction, if it reaches it", "ms")),
         timed(number("reduced_vertices_ms", "of it, the positions of all vertices", "ms")),
         timed(number("reduced_speedup", "time of the best full order over that of the reduction")),
-        *map(timed, quantiles("reduced_speedup_low reduced_speedup_high")),
+        *map(timed, interval("reduced_speedup_low reduced_speedup_high")),
         timed(text("reduced_method", "the reduction that is the fastest to reach it")),
         timed(integer("reduced_training_motions", "the motions that it is trained on")),
         timed(integer("reduced_iterations", "its iterations of a substep")),
@@ -133,20 +129,25 @@ def beside(rows: pd.DataFrame, times: pd.DataFrame) -> tuple[pd.DataFrame, list[
         timed(number("speedup", "median of reduced_speedup over the motions that reach it")),
         timed(number("speedup_low", "least 2.5 % quantile of a motion")),
         timed(number("speedup_high", "largest 97.5 % quantile of a motion")),
+        DAY,
     ),
     reads={
         "rows": TableOf("alternatives"),
         "times": Every(paths.ALTERNATIVE_TIMES),
         "limits": Setting("alternatives.errors"),
+        "record": Recorded("winners"),
     },
 )
-def winners(rows: pd.DataFrame, times: list[paths.File], limits: Sequence[float]) -> pd.DataFrame:
+def winners(
+    rows: pd.DataFrame, times: list[paths.File], limits: Sequence[float], record: list[Path]
+) -> pd.DataFrame:
     """One row per scene, mesh, stiffness, motion, reference and error limit.
 
     The method is empty if no method reaches the limit. Limits below `KNOWN` times the error of the
     continuous-time reference have no row. Some methods were run in the first motion only.
     """
     found = []
+    rows = rows[rows.recorded.isna()]
     if len(rows):
         rows, processes = beside(rows, joined(times))
     for labels, case in rows.groupby(CASE, sort=False):
@@ -160,11 +161,12 @@ def winners(rows: pd.DataFrame, times: list[paths.File], limits: Sequence[float]
                 row = {**named, "reference": reference, "limit": limit}
                 found.append({**row, **_best(known, limit, processes)})
     made = pd.DataFrame(found, columns=winners.column_names)
-    if made.empty:
-        return made
-    curves = made.groupby(CURVE, sort=False)
-    pays = pd.DataFrame([{**dict(zip(CURVE, k, strict=True)), **_pays(own)} for k, own in curves])
-    return made.drop(columns=pays.columns.difference(CURVE)).merge(pays, on=CURVE, how="left")
+    if len(made):
+        curves = made.groupby(CURVE, sort=False)
+        pays = [{**dict(zip(CURVE, k, strict=True)), **_pays(own)} for k, own in curves]
+        rest = made.columns.difference([name for name in pays[0] if name not in CURVE])
+        made = made[rest].merge(pd.DataFrame(pays), on=CURVE, how="left")
+    return with_recorded(made, record)
 
 
 def _best(rows: pd.DataFrame, limit: float, processes: list[int]) -> dict[str, object]:

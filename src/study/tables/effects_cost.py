@@ -1,4 +1,4 @@
-"""Tables of times: effects and local steps of full-order runs, mesh sizes, and speed-ups."""
+"""Tables of times: of effects and local steps of full-order runs, by mesh size, and speed-ups."""
 
 from collections.abc import Iterator
 
@@ -12,22 +12,13 @@ from study.experiments.frame_times import CONTROL, FULL, REDUCED
 from study.experiments.kit.base import FOM, GLOBAL, REST, RIGHT, Horizon, floor_of, horizons
 from study.experiments.sensitivity import without
 from study.tables.kit import results
-from study.tables.kit.declaration import (
-    flag,
-    integer,
-    number,
-    quantiles,
-    shared,
-    table,
-    text,
-    timed,
-)
+from study.tables.kit.declaration import flag, integer, interval, number, shared, table, text, timed
 
 KEYS = ["scene", "effect"]
-NOTHING = "nothing"  # value of the column effect for the whole scene, with no effect left out
+NOTHING = "nothing"  # value of column effect in the row of a scene with all its effects
 PHASE, SEVERAL = "phase", "several"
 IMPLEMENTATIONS = ("interpreted", "numpy", "compiled")
-FEWEST = 3  # least number of meshes for the fit of an exponent
+FEWEST = 3  # smallest number of meshes to which an exponent is fitted
 
 
 @table(
@@ -70,13 +61,13 @@ def effects_cost(
 ) -> pd.DataFrame:
     """One row per effect or phase of a scene, then one per set of effects left out together.
 
-    Parameters
-    ----------
-    parts, left_out : times of effects, and of scenes without some of them; they are scaled to the
-        full-order times in ``frame_times``
+    Column ``moved`` is empty for the only constraint group of a scene, which cannot be left out.
+
+    parts, left_out : times of effects, and of scenes without some effects; both are scaled so that
+        scenes have the full-order times of table ``frame_times``
     contributions : forces and energies by frame
-    sensitivity, horizon : drift of perturbed runs and its limit, which ends the compared frames;
-        ``moved`` is empty for the only group of a scene, which cannot be left out
+    sensitivity, horizon : drift of runs with perturbed starts, and limit of the drift up to which
+        frames are compared
     """
     costs, removed = results.joined(files["parts"]), results.joined(files["left_out"])
     if costs.empty:
@@ -105,26 +96,26 @@ def effects_cost(
 
 
 def _absent(rows: pd.DataFrame, others: pd.DataFrame) -> np.ndarray:
-    """Boolean array: for each of ``rows``, whether ``others`` has no row of scene and effect."""
+    """Boolean array: True for ``rows`` whose scene and effect occur in no row of ``others``."""
     keys, known = (pd.MultiIndex.from_frame(each[KEYS]) for each in (rows, others))
     return ~keys.isin(known)
 
 
 def _acting(frames: pd.DataFrame, sensitivity: pd.DataFrame, horizon: Horizon) -> pd.DataFrame:
-    """Force and energy of each effect in ``frames``, and drift of the run without this effect."""
+    """Force and energy of each effect in ``frames``, and drift of the run without the effect."""
     made = frames.groupby([*KEYS, "role"], sort=False, as_index=False).agg(
         force=("force", lambda force: float(np.sqrt(np.mean(np.square(force))))),
         energy=("energy", lambda of: float(of.max() - of.min() if len(of) > 1 else of.iloc[0])),
     )
     length = frames.groupby("scene").frame.max() + 1
-    # effects of the start have a row in the first frame only, but the RMS is over all frames
+    # effects of the start have a row for the first frame only; divide by the number of all frames
     starts = made.role == "start"
     made.loc[starts, "force"] /= np.sqrt(made.scene[starts].map(length).to_numpy(float))
     made["force_share"] = made.force / made.groupby("scene").force.transform("sum")
     ends = horizons(sensitivity, horizon.perturbation, horizon.threshold)
 
     def largest(scene: str, label: float | str) -> float | None:
-        """Largest drift of the run ``label`` before the horizon; None without run or frame."""
+        """Largest drift of the run ``label`` over the compared frames; None if there are none."""
         drift = floor_of(sensitivity, scene, label)[: ends[scene]]
         return float(drift.max()) if len(drift) else None
 
@@ -149,7 +140,8 @@ def _acting(frames: pd.DataFrame, sensitivity: pd.DataFrame, horizon: Horizon) -
 def local_share(timings: list[File], frame_times: pd.DataFrame) -> pd.DataFrame:
     """One row per scene and implementation, with ``timings`` scaled to the table ``frame_times``.
 
-    Shares include assembly of the right-hand side: compiled kernels project and assemble in a pass.
+    Shares of the local step include the assembly of the right-hand side, because compiled kernels
+    compute projections and right-hand side in one pass.
     """
     times = results.timings_in_one_time(timings, frame_times)
     full = times[times.method.isna()].copy()
@@ -182,9 +174,9 @@ def local_share(timings: list[File], frame_times: pd.DataFrame) -> pd.DataFrame:
 def scaling(parts: list[File]) -> pd.DataFrame:
     """One row per scene, mesh size and method, from the files ``parts`` of all scenes.
 
-    Speed-ups of an iteration are relative to the full-order run. Exponents belong to power laws,
-    fitted in logarithms over all meshes of a scene and method and repeated in each of these rows.
-    An exponent is empty if there are fewer than three meshes, as any two points lie on a power law.
+    Speed-ups compare the time of an iteration with the full-order run. The exponent belongs to a
+    power law, fitted in logarithms over all meshes of a scene and method; each of these rows has
+    it. It is empty if there are fewer than three meshes, as any two points lie on a power law.
     """
     rows = results.joined(parts)
     if rows.empty:
@@ -206,8 +198,8 @@ _MODEL = ["scene", "position_basis", "k", "method"]
 _REDUCTION = ["scene", "group", "method", "r"]
 _LABELS = ["scene", "group", "method", "position_basis", "k", "r"]
 _ERROR = "relative_error_within_horizon"
-# The full-order run is timed twice as a control. If both times differ by more than this factor,
-# speed-ups are not shown. Fixed on 2026-11-22, before any control had been measured.
+# As a control, the full-order run is timed twice. Speed-ups are not shown if the two times differ
+# by more than this factor, which was fixed on 2026-11-22, before any control was measured.
 CONFIRMED = 1.5
 UNCONFIRMED = "not confirmed by its control"
 _ERRORS = {
@@ -223,17 +215,17 @@ _TIMES = ["ms_per_frame", "vertices_ms", "speedup", "speedup_low", "speedup_high
         *shared("scene vertices"),
         integer("processes", "processes that timed it"),
         *shared("ms_per_frame"),
-        *map(timed, quantiles("low_ms high_ms", unit="ms")),
+        *map(timed, interval("low_ms high_ms", unit="ms")),
         timed(number("control_ratio", "time of the same run, timed once more, over this one")),
-        *map(timed, quantiles("control_low control_high")),
+        *map(timed, interval("control_low control_high")),
         timed(flag("control_agrees", "the quantiles enclose one")),
         timed(number("twin_ratio", "time of the scene's twin, the same frames, over this one")),
-        *map(timed, quantiles("twin_low twin_high")),
+        *map(timed, interval("twin_low twin_high")),
     ),
     reads={"parts": Every(paths.FRAME_TIMES)},
 )
 def frame_times(parts: list[File]) -> pd.DataFrame:
-    """One row per scene: median frame times over processes, and medians of ratios in a process."""
+    """One row per scene: medians over processes of frame times and of ratios of two such times."""
     rows = results.joined(parts)
     if rows.empty:
         return rows
@@ -285,7 +277,12 @@ def frame_times(parts: list[File]) -> pd.DataFrame:
     },
 )
 def speedups(times: pd.DataFrame, reruns: pd.DataFrame, **files: list[File]) -> pd.DataFrame:
-    """One row per reduction timed in ``parts``; each speed-up is a ratio within one process."""
+    """One row per reduction timed in ``parts``; speed-ups compare runs of one and the same process.
+
+    times, reruns : tables frame_times and reduced_reruns
+    projections, subspaces : processor times of the reductions
+    large : errors and processor times of the reductions of large scenes
+    """
     rows = results.joined(files["parts"])
     if rows.empty or not (rows.role == REDUCED).any():
         return pd.DataFrame()
@@ -309,10 +306,8 @@ def speedups(times: pd.DataFrame, reruns: pd.DataFrame, **files: list[File]) -> 
 
 
 def timed_reductions(rows: pd.DataFrame, times: pd.DataFrame) -> Iterator[dict]:
-    """Yield scene, group, method ..., median times and speed-up of each reduction, as dictionaries.
+    """Yield a row for each reduction: scene, group, method ..., median times, and speed-up.
 
-    Parameters
-    ----------
     rows : times measured in each process, with the role of the run (full order or reduced)
     times : table frame_times
     """
@@ -350,13 +345,13 @@ def _errors(reruns: pd.DataFrame, keys: list[str]) -> pd.DataFrame:
 
 
 def large_errors(large: pd.DataFrame) -> pd.DataFrame:
-    """Errors of each model of large scenes over all frames; ``large`` has rows of all motions."""
+    """Errors over all frames of each model in table ``large``, which has rows for all motions."""
     whole = large.rename(columns={"relative_error": _ERROR}).assign(horizon_frame=1)
     return _errors(whole, _MODEL)
 
 
 def _first_known(made: pd.DataFrame, sources: list[pd.DataFrame], column: str) -> pd.DataFrame:
-    """Return ``made`` with ``column`` from the first of ``sources`` that has a value for a row."""
+    """Return ``made`` with a ``column``; a cell's value is from the first source that has one."""
     found = pd.Series(float("nan"), made.index)
     for source in sources:
         keys = [key for key in _LABELS if key in source.columns]
@@ -390,13 +385,13 @@ def _first_known(made: pd.DataFrame, sources: list[pd.DataFrame], column: str) -
     },
 )
 def online(parts: list[File], measured: list[File], times: pd.DataFrame) -> pd.DataFrame:
-    """One row per model of large scenes (files ``parts``), with errors and ``measured`` times."""
+    """One row per model of large scenes, with errors (``parts``) and times (``measured``)."""
     rows = results.joined(parts)
     if rows.empty:
         return rows
     found = pd.DataFrame(list(timed_reductions(results.joined(measured), times)))
     made = rows[rows.motion == results.TRAIN].rename(columns={"r": "elements_sampled"})
-    made = made.drop(columns="playback_error")  # zero for the training motion
+    made = made.drop(columns="playback_error")  # this is zero for the training motion
     made = made.merge(large_errors(rows).rename(columns=_ERRORS), on=_MODEL, how="left")
     made = made.merge(found[[*_MODEL, *_TIMES]], on=_MODEL, how="left")
     return made.assign(ms_per_iteration=made.ms_per_frame / made.iterations)

@@ -1,11 +1,12 @@
-"""Tables of errors: of reconstructions, perturbed runs, and single choices of the method.
+"""Tables of errors: of reconstructions, of perturbed runs, and of runs with one changed choice.
 
-Table gain_interventions shows whether the error of a run falls if only the gain is lowered (the
-gain is the amplification of errors by the samples). A correlation of gain and error over methods
-may have any difference of the methods as its cause. The methods compared there have the same basis
-and size. They differ in the sampling, or in whether the axes share coefficients (four combinations,
-from table ladder). If separate coefficients did harm only by their gain, a lower gain would also
-lower the error among methods with the same kind of coefficients: the last two steps compare them.
+Table gain_interventions shows whether the error of a run falls if only the gain is lowered. (The
+gain is the factor by which sampling amplifies errors.) A mere correlation of gain and error over
+methods could be caused by any difference between the methods. The table therefore compares pairs of
+methods with equal basis and size. They differ in their samples, or in whether the axes x, y and z
+share coefficients (table ladder has the four combinations). The last two of its steps compare
+methods with the same kind of coefficients. There, too, the error would fall with the gain if
+separate coefficients did harm only by their larger gain.
 """
 
 from collections.abc import Iterator, Mapping
@@ -36,11 +37,11 @@ _CELL = ["scene", "group", "method", "r", "varied"]
         number("relative", "over the first one"),
         flag("above_roundoff", "larger than the rounding errors of the projections"),
     ),
-    # one basis per group, without weights and centring if a method of the study has such a basis
+    # one basis for each constraint group, that without weights and centring if a method has it
     reads={"bases": EachOf(paths.BASIS, "usual_bases")},
 )
 def singular_values(bases: list[paths.File]) -> pd.DataFrame:
-    """One row per mode of each of the ``bases``, in the order of the files."""
+    """One row for each mode of each POD basis in the files ``bases``, in their order."""
     parts = []
     for file in bases:
         basis = load_basis(file.path)
@@ -101,7 +102,7 @@ def sensitivity(parts: list[paths.File]) -> pd.DataFrame:
         integer("seed", "of the start's round-off"),
         *shared("method r"),
         integer("rank", "modes that the snapshots have without a cutoff", compared="value"),
-        # modes of round-off differ between machines, and so does the gain of their interpolation
+        # modes of rounding errors, and thus the gain (error amplification), depend on the machine
         replace(*shared("gain"), compared="skipped"),
         *shared("frames finite blowup_frame"),
         number("relative_error", "error of the positions over all frames up to the horizon"),
@@ -109,7 +110,7 @@ def sensitivity(parts: list[paths.File]) -> pd.DataFrame:
     reads={"parts": Every(paths.NOISE)},
 )
 def noise(parts: list[paths.File]) -> pd.DataFrame:
-    """Rows of the files ``parts`` of all scenes, in order."""
+    """Rows of the files ``parts``, one file for each scene, in order."""
     return joined(parts)
 
 
@@ -129,10 +130,10 @@ def noise(parts: list[paths.File]) -> pd.DataFrame:
     reads={"parts": Every(paths.REPETITIONS)},
 )
 def repetitions(parts: list[paths.File]) -> pd.DataFrame:
-    """One row per scene, group, method, r and what is varied, with statistics over repetitions.
+    """Statistics over repeated runs: one row per scene, group, method, r and kind of variation.
 
-    The median of a distribution lies outside the range of n independent draws with probability
-    2^(1 - n): five draws enclose it with probability 15/16, whatever the distribution is.
+    The median of any distribution lies outside the range of n independent draws with probability
+    2^(1 - n): five draws enclose it with probability 15/16.
     """
     rows = joined(parts)
     if rows.empty:
@@ -177,23 +178,24 @@ def repetitions(parts: list[paths.File]) -> pd.DataFrame:
     reads={"parts": Every(paths.LADDER)},
 )
 def ladder(parts: list[paths.File]) -> pd.DataFrame:
-    """Rows of the files ``parts`` of all scenes, in order."""
+    """Rows of the files ``parts``, one file for each scene, in order."""
     return joined(parts)
 
 
+# Steps of the table below: name -> (method before, method after). The samples differ in each.
 STEPS = {
     "whole elements for single entries": ("deim", "block-deim"),
     "three elements a mode for one": ("block-deim", "gappy"),
 }
-# Pairs of methods in table ladder that differ in the coefficients or in the samples only. Pairs of
-# single rows and whole elements are compared only if an element has more than one row.
+# Pairs of methods in table ladder that differ only in the coefficients, or only in the samples. A
+# step whose name begins with "whole elements" needs elements that have more than one row.
 SQUARE = {
     "shared coefficients, single rows": ("single rows, separate", "single rows, shared"),
     "shared coefficients, whole elements": ("whole elements, separate", "whole elements, shared"),
     "whole elements, separate coefficients": ("single rows, separate", "whole elements, separate"),
     "whole elements, shared coefficients": ("single rows, shared", "whole elements, shared"),
 }
-# Methods with the same kind of coefficients; any two of their runs are compared, by falling gain.
+# Methods with the same kind of coefficients. Of any two, the run with the larger gain is "before".
 KINDS = {
     "lower gain, shared coefficients": ("deim", "block-deim", "gappy"),
     "lower gain, separate coefficients": ("deim-joint", "published"),
@@ -201,7 +203,7 @@ KINDS = {
 _PLACE = ["scene", "group", "r"]
 VOLUMES = ("deformation_gradient", "tetrahedron_strain", "volume")  # groups on tetrahedra
 MESHES = ALL, SHEETS, BARS = "all", "sheets", "bars"
-# Constructor of number columns that summarise many runs, with the tolerance of shares.
+# Constructor of number columns that summarise many runs; machines may differ in them as in shares.
 share = partial(number, compared="share")
 
 
@@ -218,7 +220,7 @@ share = partial(number, compared="share")
         count("rescued", "pairs among these whose error after does not"),
         share("gain_ratio", "median of the gain after over that before"),
         share("error_ratio", "median of the error of the run after over that before"),
-        *declaration.quantiles("error_ratio_low error_ratio_high", share),
+        *declaration.interval("error_ratio_low error_ratio_high", share),
         share("p_value", "two-sided sign test over all families, for which a tie is no fall"),
         count("families", "families among the scenes: a scene and its twin"),
         count("families_fallen", "those whose median error ratio is below one"),
@@ -233,11 +235,12 @@ share = partial(number, compared="share")
 def gain_interventions(
     reruns: pd.DataFrame, reconstruction: pd.DataFrame, ladder: pd.DataFrame
 ) -> pd.DataFrame:
-    """One row per step (change of method that lowers the gain) and kind of mesh.
+    """One row for each step (change of method that lowers the gain) and kind of mesh.
 
-    Results of one family (a scene and its variant, "twin") are dependent: the bootstrap
-    resamples families and the sign test counts families. Errors below the drift of perturbed runs
-    are raised to it. A run that ended early has an infinite error; two such runs make no pair.
+    A scene and its variant ("twin") form a family, whose results are dependent: the bootstrap
+    resamples families, and the sign test counts families. Errors smaller than the drift of
+    perturbed runs are raised to this drift. A run that ended early has an infinite error; two such
+    runs are not compared.
     """
     runs = judged_runs(reruns, reconstruction)
     rows = []
@@ -253,7 +256,7 @@ def gain_interventions(
 def _steps(
     runs: pd.DataFrame, square: pd.DataFrame
 ) -> Iterator[tuple[str, str, str, pd.DataFrame]]:
-    """Yield name of each step, method before, method after, and table of the compared runs."""
+    """Yield for each step: name, method before, method after, and table of the compared runs."""
     for name, methods in STEPS.items():
         yield name, *methods, _pairs(runs, *methods)
     for name, (before, after) in SQUARE.items():
@@ -271,7 +274,7 @@ def _steps(
 
 
 def _square(ladder: pd.DataFrame, runs: pd.DataFrame) -> pd.DataFrame:
-    """Runs of table ladder with direction "square", for scenes, groups and sizes in ``runs``."""
+    """Runs of table ladder with direction "square", at scenes, groups and sizes of ``runs``."""
     chosen = ladder[(ladder.direction == "square") & ladder.gain.notna()]
     chosen = chosen.rename(columns={"rung": "method"})
     error = chosen.relative_error_within_horizon.astype(float).fillna(np.inf)
@@ -280,7 +283,7 @@ def _square(ladder: pd.DataFrame, runs: pd.DataFrame) -> pd.DataFrame:
 
 
 def _pairs(runs: pd.DataFrame, before: str, after: str) -> pd.DataFrame:
-    """Pairs of runs by two methods: scene, group, errors, ratios (after/before) of gain, error."""
+    """Pairs of runs by two methods: scene, group, errors, ratios after/before of gain and error."""
     error = np.maximum(runs.error, runs.sensitivity_floor)
     runs = runs[[*_PLACE, "method", "gain"]].assign(error=error)
     one, other = (runs[runs.method == m].drop(columns="method") for m in (before, after))
@@ -292,13 +295,13 @@ def _pairs(runs: pd.DataFrame, before: str, after: str) -> pd.DataFrame:
 
 
 def _summary(pairs: pd.DataFrame) -> Mapping[str, float]:
-    # imported here because it takes a second, which planning the workflow does not need
+    # SciPy's import takes a second, so it is not at the top: planning the workflow does without
     from scipy.stats import binomtest
 
     by_family = pairs.groupby(families(pairs.scene)).error
     fallen = int((by_family.median() < 1.0).sum())
     values = [own.to_numpy(float) for _, own in by_family]
-    # bootstrap of the median over all values, drawing whole families with replacement
+    # bootstrap of the median over all values; whole families are drawn with replacement
     drawn = np.random.default_rng(SEED).integers(len(values), size=(RESAMPLES, len(values)))
     medians = [np.median(np.concatenate([values[i] for i in row])) for row in drawn]
     low, high = np.percentile(medians, [2.5, 97.5], method="inverted_cdf")

@@ -1,4 +1,4 @@
-"""Tables of reduced runs: errors and times, outcomes by method, and outcomes in hard cases."""
+"""Tables of reduced runs: their errors and times, and how they end, also in hard cases."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -52,18 +52,17 @@ def reduced_reruns(
 ) -> pd.DataFrame:
     """Reduced runs of the training motion with their times, then runs of each held-out motion.
 
-    There is one row per motion, scene, group, method and r, followed by runs in position subspaces,
-    in which all groups are reduced and r is the number of evaluated elements. The horizon is the
-    first frame at which perturbed runs differ too much for a comparison, per scene and motion.
-    Errors within it use earlier frames only; they are empty for a run that blew up before. Rows of
-    the method `PLAYBACK` show the recorded training motion in place of each held-out one.
+    There is one row per motion, scene, group, method and r. Rows of runs in position subspaces
+    follow; all groups are reduced there, and r is the number of evaluated elements. The horizon of
+    a scene and motion is the first frame at which perturbed runs differ too much for a comparison.
+    Errors "within the horizon" use earlier frames only; they are empty for a run that blew up
+    before. Rows of the method `PLAYBACK` show how far the recorded training motion is from each
+    held-out one.
 
-    Parameters
-    ----------
-    full_order : runs of all motions
-    runs, rows, rows_heldout : HDF5 files of the runs, and their tables in the same order
+    full_order : files of the full-order runs of all motions
+    runs, rows, rows_heldout : HDF5 files of the reduced runs, and their tables in the same order
     subspaces, subspace_rows, subspace_rows_heldout : such files for runs in position subspaces
-    sensitivity, horizon : drift of perturbed runs of each motion, and its limit (`horizons`)
+    sensitivity, horizon : drift of perturbed runs of each motion, and the limit of this drift
     """
     judged: list[pd.DataFrame] = []
     for motion in (TRAIN, *MOTIONS):
@@ -89,7 +88,10 @@ def reduced_reruns(
 
 
 def _played(full_order: list[File], ends: Mapping[str, int], motion: str) -> pd.DataFrame:
-    """Errors of showing the recorded training motion in place of ``motion``; ``ends``: horizons."""
+    """Errors of the recorded training motion, taken as a run of ``motion``, one row per scene.
+
+    ``ends`` has for each scene the frame from which on motions are not compared (its horizon).
+    """
     runs = {(run["scene"], run["run"]): run for run in full_order}
     rows = []
     for scene in dict.fromkeys(run["scene"] for run in full_order):
@@ -106,7 +108,7 @@ def _played(full_order: list[File], ends: Mapping[str, int], motion: str) -> pd.
 
 
 def _judged(run: File, row: File, end: int, motion: str) -> pd.DataFrame:
-    """Rows of one motion in table ``row``, with errors before frame ``end`` from file ``run``."""
+    """Rows of table ``row`` for one motion, with errors before frame ``end`` from file ``run``."""
     table = read_table(row.path)
     if motion != TRAIN:  # tables of training runs have no column "motion"
         table = table[table.motion == motion]
@@ -126,7 +128,7 @@ def _judged(run: File, row: File, end: int, motion: str) -> pd.DataFrame:
 def _errors(
     runs: Sequence[h5py.Group], reference: Series, end: int, units: Mapping[str, Any]
 ) -> dict[str, list[float | None]]:
-    """Errors of each run before frame ``end``, by name; None for a run without frames."""
+    """Errors of the runs before frame ``end``: name of an error -> values (None without frames)."""
     known = {unit: float(units[unit]) for unit in ("extent_norm", "time_step")}
     found = [
         errors_within({series: run[series][...] for series in DEVIATIONS}, reference, end, **known)
@@ -138,7 +140,7 @@ def _errors(
 
 
 def _with_times(runs: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
-    """Return ``runs`` with times and with speed-ups over the compiled full-order run."""
+    """Return ``runs`` with columns of times and speed-ups over the compiled full-order run."""
     full = times[times.method.isna() & (times.implementation == "compiled")]
     reference = full.set_index("scene").ms_per_frame
     reduced = times[times.method.notna()].copy()
@@ -151,7 +153,7 @@ def _with_times(runs: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
     local = runs[runs.position_basis == "full"].merge(
         reduced.loc[~inside, keys + measured], on=keys, how="left"
     )
-    # match times of subspace models by size k: their r is the number of evaluated elements
+    # rows of subspace models match by the size k, not by r: this is a number of elements there
     keys = [k for k in KEYS if k != "r"]
     subspace = runs[runs.position_basis != "full"]
     if len(subspace) == 0:
@@ -161,10 +163,10 @@ def _with_times(runs: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
     return pd.concat([local, subspace], ignore_index=True)
 
 
-# possible outcomes; only runs with the first one are used further
+# Possible outcomes of a run.
 OUTCOMES = ("accurate", "wrong", "left the scene", "blow-up", "not run", "not judged")
 SETTING = ["experiment", "scene", "h", "stiffness_ratio"]  # columns that identify a full-order run
-# Fraction of runs on degenerate meshes whose outcome may differ between machines, by rounding.
+# Fraction of runs on degenerate meshes whose outcome may depend on rounding errors of the machine.
 FRAGILE = 0.005
 
 
@@ -197,14 +199,14 @@ def stability(
     departure: float,
     **files: list[File],
 ) -> pd.DataFrame:
-    """Rows of the study's reduced runs (experiment "rerun"), then of short runs ("sweep").
+    """Outcomes of the study's reduced runs (experiment "rerun"), then of short runs ("sweep").
 
     Method "full" with position basis "full" is the full-order run. The error of a "rerun" row is
-    computed before the horizon, the error of a "sweep" row over the whole run.
+    taken over the frames in which perturbed runs still agree, that of a "sweep" row over all.
 
-    Parameters
-    ----------
     time_steps : scene -> time step h in seconds
+    wrong, departure : a run fails if its error exceeds ``wrong``, or if its bounding box exceeds
+        ``departure`` times that of the full-order run
     """
     reruns = _rerun_rows(files["reruns"], files["subspaces"], reduced_reruns)
     runs = pd.concat([_full_order_rows(files["full_order"]), reruns], ignore_index=True)
@@ -214,7 +216,11 @@ def stability(
 
 
 def outcomes(runs: pd.DataFrame, wrong: float, departure: float) -> list[str]:
-    """Outcome of each run, by its error and extent: above ``wrong`` and ``departure`` it failed."""
+    """Outcome of each run, one of `OUTCOMES`.
+
+    A run is "wrong" if its error exceeds ``wrong``; it "left the scene" if its extent (longest side
+    of the bounding box) exceeds ``departure`` times that of the full-order run.
+    """
     full = runs[(runs.method == "full") & (runs.position_basis == "full")]
     extents = full.set_index(SETTING).max_extent.rename("full_extent")
     error = runs.relative_error.astype(float)
@@ -243,7 +249,7 @@ def _full_order_rows(files: list[File]) -> pd.DataFrame:
 def _rerun_rows(
     reruns: list[File], subspaces: list[File], reduced_reruns: pd.DataFrame
 ) -> pd.DataFrame:
-    """Reduced runs of the training motion; ``relative_error`` is the error before the horizon."""
+    """Reduced runs of the training motion; errors use frames in which perturbed runs agree."""
     local = joined(reruns).assign(position_basis="full", k=np.nan)
     runs = pd.concat([local, joined(subspaces)], ignore_index=True)
     runs = runs.drop(columns="relative_error")

@@ -24,7 +24,7 @@ NAME = f"pdrom-{__version__}"
 
 
 def bundle(arguments: Sequence[str]) -> Status:
-    """Write the archive of a finished study; otherwise print its missing or damaged files."""
+    """Write the archive if all files of the study are intact, else print which ones are not."""
     chosen = options_parser("bundle", __doc__).parse_args(arguments)
     subject = Subject.of(chosen.configfile, chosen.config)
     status = verify_files(subject)
@@ -32,7 +32,7 @@ def bundle(arguments: Sequence[str]) -> Status:
         return status
     folder = Path(subject.results)
     names = [*read_manifest(subject.results).files, paths.MANIFEST.pattern]
-    small = {n: folder / n for n in names if not n.endswith(".h5")}  # a run can remake HDF5 files
+    small = {n: folder / n for n in names if not n.endswith(".h5")}  # HDF5 files can be made again
     results = {os.path.normpath(f"published/results/{name}"): p for name, p in small.items()}
     target = folder / f"{NAME}.tar.gz"
     write_archive(Path(), results, target)
@@ -41,12 +41,10 @@ def bundle(arguments: Sequence[str]) -> Status:
 
 
 def write_archive(root: Path, results: Mapping[str, Path], target: Path) -> None:
-    """Write a gzipped tar archive of the last commit of ``root`` and of ``results``, by name.
+    """Write a gzipped tar archive of the last commit of ``root`` and of ``results`` to ``target``.
 
-    Raises
-    ------
-    ConfigurationError
-        Git is missing, ``root`` is no git clone, or tracked files differ from the last commit.
+    ``results`` maps names in the archive to paths of files. Raises ConfigurationError if git is
+    missing, ``root`` is no git clone, or tracked files differ from the last commit.
     """
     date = int(os.environ.get("SOURCE_DATE_EPOCH", "0"))
     if changed := _git(root, "status", "--porcelain", "--untracked-files=no").decode():

@@ -1,4 +1,4 @@
-"""Command ``./reproduce verify``: arguments, comparison, update of the expected tables."""
+"""Command ``./reproduce verify`` compares results with expected tables, or updates these tables."""
 
 import argparse
 import subprocess
@@ -21,19 +21,15 @@ from study.verification.subject import Status, Subject, ended, options_parser, s
 NOTHING = "Nothing to be done"
 CODES = "exit codes: 0 all holds; 1 faulty input; 2 not understood; 3 differs; 4 not there"
 PAGE = "verification.md"
-# Largest number of differences that the file `PAGE` lists for each table, figure or claim.
+# Largest number of differences that the file `PAGE` lists for one table, figure or claim.
 ON_PAGE = 20
 
 
 def update(subject: Subject, reason: str) -> Path:
-    """Replace the expected tables by those of ``subject``, log the reason, return their folder.
+    """Replace the expected tables by those of ``subject`` and log the reason; return their folder.
 
-    Raises
-    ------
-    ConfigurationError
-        The reason is empty.
-    StorageError
-        A table is missing, damaged, or older than its inputs; then nothing is written.
+    Raises ConfigurationError if the reason is empty. Raises StorageError if a table is missing,
+    damaged, or older than its inputs; then nothing is written.
     """
     words = " ".join(reason.split())
     if not words:
@@ -84,12 +80,8 @@ def parser() -> argparse.ArgumentParser:
 def verify(arguments: Sequence[str]) -> Status:
     """Run the command with the ``arguments`` of the command line; return its exit code.
 
-    Raises
-    ------
-    ConfigurationError
-        The configuration is faulty, or it has no expected tables.
-    StorageError
-        A file cannot be read or written, or --update is refused.
+    Raises ConfigurationError if the configuration is faulty, or it has no expected tables. Raises
+    StorageError if a file cannot be read or written, or --update is refused.
     """
     asked = parser().parse_args(arguments)
     subject = Subject.of(asked.configfile, asked.config)
@@ -102,12 +94,9 @@ def verify(arguments: Sequence[str]) -> Status:
 
 
 def verify_tables(subject: Subject) -> Status:
-    """Compare the tables of ``subject`` with the expected tables; print and write the outcomes.
+    """Compare the tables of ``subject`` with the expected ones; print outcomes and write `PAGE`.
 
-    Raises
-    ------
-    ConfigurationError
-        The configuration has no expected tables.
+    Raises ConfigurationError if the configuration has no expected tables.
     """
     folder = folder_of(subject.results)
     if not folder.is_dir():
@@ -129,7 +118,7 @@ def verify_tables(subject: Subject) -> Status:
 
 
 def status_of(lines: Iterable[Line]) -> Status:
-    """Exit code for ``lines``: `MISSING` if a result is missing, else `DIFFERS` or `HOLDS`."""
+    """Exit code: `MISSING` if a result is missing, `DIFFERS` if one differs, else `HOLDS`."""
     outcomes = {line.outcome for line in lines}
     if Outcome.MISSING in outcomes:
         return Status.MISSING
@@ -138,7 +127,7 @@ def status_of(lines: Iterable[Line]) -> Status:
 
 
 def counted(lines: Sequence[Line]) -> str:
-    """Numbers of ``lines`` by kind and outcome, as text."""
+    """Text with the number of claims, figures and tables of each outcome."""
     parts = []
     for kind in dict.fromkeys(line.kind for line in lines):
         own = [line.outcome for line in lines if line.kind == kind]
@@ -148,7 +137,7 @@ def counted(lines: Sequence[Line]) -> str:
 
 
 def page(lines: Sequence[Line], about: str) -> str:
-    """Return the Markdown page of all ``lines``; ``about`` is its first sentence."""
+    """Return a Markdown page with all outcomes ``lines``; ``about`` is its first sentence."""
     meaning = "What is compared, and what the outcomes mean, is in `docs/verification.md`."
     parts = ["# Verification", "", about, meaning, "", counted(lines) + ".", ""]
     for kind in dict.fromkeys(line.kind for line in lines):

@@ -1,6 +1,6 @@
-"""Comparison of a table with the expected table: pairs of rows, distances of cells, differences.
+"""Comparison of a table with its expected version: rows are paired, then cells are compared.
 
-Rows that depend on rounding errors, as of chaotic or ill-conditioned runs, are compared by counts.
+Of the cells that depend on rounding errors (chaotic or ill-conditioned runs), some may differ.
 """
 
 from collections import Counter
@@ -16,35 +16,36 @@ from study.tables import declared
 from study.tables.kit.declaration import TOLERANCES, Column, Table
 from study.tables.kit.results import trained
 
-# Differences up to this size count as rounding errors of sums.
+# Absolute differences of two numbers up to this size are ignored as rounding errors of sums.
 FLOOR = 1e-12
-# Relative tolerances of numbers of samples that a fit determines, and of errors of wrong runs.
+# Relative tolerances: of numbers of samples chosen by a fit, and of errors of runs above `WRONG`.
 FITTED, OF_WRONG_RUNS = 0.25, 0.3
 # Part of the names of methods whose elements are chosen by a non-negative least-squares fit.
 FITTING = "ecsw"
-# Limits of the gain (amplification of errors by the samples). Above the first, errors of reruns on
-# two processors have few or no equal digits; above the second, approximation errors and gains, too.
+# Limits of the gain, by which sampling amplifies errors. Above the first, errors of a run on two
+# processors share few or no digits; above the second, nor do reconstruction errors and gains.
 OF_RUNS, DIRECT = 1e2, 1e5
 RUNS, SPECTRA, RECONSTRUCTION = "reduced_reruns", "singular_values", "reconstruction_error"
-# Relative error above which a run is wrong, as in all tables of the study.
+# A run whose relative error exceeds this value counts as wrong, as in all tables of the study.
 WRONG = 0.1
-# Columns with the error of a run; the first one that a table has decides if the run is wrong.
+# Columns with the error of a run; the first one that a table has is compared with `WRONG`.
 OF_RUN = ("relative_error_within_horizon", "relative_error")
-# Columns that identify the samples of a reduction (`SAMPLES`) or a run (`RUN`).
+# Columns that identify a sampled reduction of projections (`SAMPLES`), or a reduced run (`RUN`).
 SAMPLES = ("scene", "group", "method", "r")
 RUN = (*SAMPLES, "position_basis", "k")
 # Largest number of cells that describe a row in a message.
 NAMED = 6
-# A small shift of a whole column is a difference, too: a share of its cells must differ by less
-# than `CLOSE`, or than 1/`OWN` of the column's own tolerance. The share is `MOST` for a column of
-# at least `TEN` errors without own tolerance, else `HALF`. In a column of fewer than `LEAST` cells
-# without own tolerance, all cells must differ by less than `LONE`.
+# A small shift of a whole column is reported, too: a share of its cells must differ by less than
+# `CLOSE`, or than 1/`OWN` of the tolerance that the column declares. The share is `MOST` for a
+# column of at least `TEN` errors without a declared tolerance, else `HALF`. In a column of fewer
+# than `LEAST` cells without a declared tolerance, all cells must differ by less than `LONE`.
 MOST, HALF, TEN, LEAST = 0.9, 0.5, 10, 3
 CLOSE, OWN, LONE = 1e-5, 50, 0.01
-# Limits for cells that depend on rounding: (share of runs that may differ, distance above which
-# they do, columns by which runs are grouped). A tenth may differ by a factor 10, half by 2.
+# Limits for cells that depend on rounding errors: (share of the runs that may differ, relative
+# difference above which a run differs, columns by which the runs are grouped for counting). In each
+# group, a tenth of the runs may differ by more than a factor of 10, and half by more than 2.
 LOOSE = ((0.1, 1 - 1 / 10, ("scene", "noisy_axes", "method")), (0.5, 1 - 1 / 2, ("scene",)))
-# A text or flag column with a tolerance may have this number of differing cells in any case.
+# Number of cells that may always differ in a column of texts or flags with a tolerance.
 FEW = 3
 Difference = tuple[float, str]  # (distance of two cells, inf if not a number; text of a message)
 
@@ -55,20 +56,21 @@ def kept(table: Table) -> dict[str, Column]:
 
 
 def names_row(column: Column) -> bool:
-    """Return whether a column identifies rows: a name, a parameter or a size."""
+    """Return whether ``column`` identifies rows, as names, parameters and sizes do."""
     return column.quantity == "exact" and not column.timed
 
 
 def names(frame: pd.DataFrame, columns: Sequence[str] = SAMPLES) -> list[tuple]:
-    """Cells in ``columns`` of each row of ``frame``, as tuples of text that identify the row."""
+    """Return for each row of ``frame`` the cells in ``columns``, as a tuple of texts."""
     return list(frame[list(columns)].astype(str).itertuples(index=False, name=None))
 
 
 def pairs(table: Table, expected: pd.DataFrame, found: pd.DataFrame) -> list[tuple[int, int]]:
-    """Pairs (row of ``expected``, row of ``found``) of matching rows of ``table``, sorted.
+    """Pairs of matching rows (index in ``expected``, index in ``found``), sorted.
 
-    Rows match first by all identifying columns and integer values such as numbers of samples. The
-    other rows match, in order, by identifying columns only: a fit may change a number of samples.
+    Rows are first matched by identifying columns and by integer values such as numbers of samples.
+    Rows left over are matched, in order, by identifying columns only: a fit that chooses samples
+    may choose another number of them.
     """
     named = [c.name for c in table.columns if names_row(c)]
     counts = [c.name for c in table.columns if c.quantity == "value" and c.kind == "integer"]
@@ -87,7 +89,7 @@ def pairs(table: Table, expected: pd.DataFrame, found: pd.DataFrame) -> list[tup
 
 
 def _key(cell: object) -> str:
-    """Cell as text, with fewer digits than expected tables store; empty for a missing value."""
+    """Text of a cell with fewer digits than are stored in expected tables; empty if missing."""
     if cell is None or cell is pd.NA or cell != cell:
         return ""
     return f"{cell:.6g}" if isinstance(cell, float) else str(cell)
@@ -96,16 +98,17 @@ def _key(cell: object) -> str:
 class Context:
     """Facts from other expected tables that show which rows depend on rounding errors.
 
-    chaotic : scenes with frames after the horizon, where perturbed runs differ too much to compare
-    modes : number of modes above round-off by scene and group
-    gains : gain (amplification of errors by the samples), by the columns `SAMPLES`
-    ended : runs without an error, by the columns `RUN`, in the expected and in the found table
+    chaotic : scenes whose perturbed runs differ too much for a comparison in their last frames
+    modes : number of modes above round-off, by scene and constraint group
+    gains : factor by which sampling amplifies errors, by the cells in the columns `SAMPLES`
+    ended : runs that have no error since they ended early, as cells in the columns `RUN`; one set
+        for the expected table of runs, one for the found table
     """
 
     def __init__(
         self, tables: Mapping[str, pd.DataFrame], found: pd.DataFrame | None = None
     ) -> None:
-        """Read the facts from expected ``tables`` by name, and from the ``found`` table of runs."""
+        """Read the facts from the expected ``tables`` (by name) and the ``found`` table `RUNS`."""
         runs, spectra, errors = (
             tables[name] if name in tables else declared()[name].checked(pd.DataFrame())
             for name in (RUNS, SPECTRA, RECONSTRUCTION)
@@ -123,7 +126,7 @@ class Context:
 class Comparison:
     """Comparison of an expected and a found table, cell by cell.
 
-    e, f : matching rows of the expected and of the found table, in equal order
+    e, f : matching rows of the expected table (e) and of the found table (f), in equal order
     """
 
     def __init__(
@@ -133,23 +136,23 @@ class Comparison:
         self.pairs = pairs(table, expected, found)
         self.e = expected.iloc[[i for i, _ in self.pairs]].reset_index(drop=True)
         self.f = found.iloc[[j for _, j in self.pairs]].reset_index(drop=True)
-        self.loose = cache(self._loose)  # cells of a column that depend on rounding errors
-        self._timed: Sequence = [()] * len(self.e)  # names of timed columns, for each row
+        self.loose = cache(self._loose)  # function; returns cells that depend on rounding errors
+        self._timed: Sequence = [()] * len(self.e)  # per row, names of columns that depend on time
         if table.timed_cells is not None:
             reads = table.reads.items()
             files = {name: Path(r.path) for name, r in reads if isinstance(r, ProjectFile)}
             self._timed = table.timed_cells(self.e, **files)
 
     def compared(self, column: Column) -> np.ndarray:
-        """Boolean array (rows): True where the column's cell does not depend on timing."""
+        """Boolean array (rows): True where the cell of ``column`` depends on no measured time."""
         return np.array([column.name not in names for names in self._timed], dtype=bool)
 
     def firm(self, column: Column) -> np.ndarray:
-        """Boolean array (rows): True where the column's cell does not depend on rounding errors."""
+        """Boolean array (rows): True where the cell of ``column`` depends on no rounding errors."""
         return ~np.any([np.zeros(len(self.e)), *self.loose(column).values()], axis=0)
 
     def _loose(self, column: Column) -> dict[str, np.ndarray]:
-        """Boolean arrays (rows) by reason: True where the cell depends on rounding errors."""
+        """Boolean arrays (rows), one for each reason why cells depend on rounding errors."""
         if names_row(column):
             return {}
         chaotic = self.e.filter(items=["scene"]).isin(list(self.context.chaotic)).any(axis=1)
@@ -164,7 +167,7 @@ class Comparison:
         }
 
     def _of_round_off(self) -> np.ndarray:
-        """Boolean array of rows whose r is at least the number of modes above round-off minus 1."""
+        """Boolean array: True for rows with r >= number of modes above round-off minus one."""
         rows, modes = self.e, self.context.modes
         if "noisy_axes" in rows or not {"scene", "group", "r"} <= set(rows.columns):
             return np.full(len(rows), "noisy_axes" in rows)
@@ -172,7 +175,7 @@ class Comparison:
         return (rows.r >= np.array(most, dtype=float) - 1).fillna(False).to_numpy(dtype=bool)
 
     def _gains(self) -> np.ndarray:
-        """Largest amplification (gain) of each row; 0 if unknown."""
+        """Largest known gain (factor by which sampling amplifies errors) of each row, else 0."""
         found = [np.zeros(len(self.e))]
         for column in self.table.columns:
             if column.name.startswith("gain") and column.quantity == "value":
@@ -182,9 +185,9 @@ class Comparison:
         return np.fmax.reduce(found)
 
     def wrong(self, column: Column) -> np.ndarray:
-        """Boolean array of cells of an error ``column`` in wrong runs, which get a wider tolerance.
+        """Boolean array: True for cells that get the wider tolerance of errors in wrong runs.
 
-        A run is wrong if its error is above `WRONG`; the cell's own error must be above it, too.
+        Both the error of the run and the error in the cell of ``column`` must exceed `WRONG`.
         """
         judged = [name for name in OF_RUN if name in self.e][:1]
         judged += [column.name] if "error" in column.name else []
@@ -194,16 +197,17 @@ class Comparison:
         return (self.e[judged] > WRONG).all(axis=1).to_numpy(dtype=bool)
 
     def fitted(self) -> np.ndarray:
-        """Boolean array of rows of reductions whose number of samples is determined by a fit.
+        """Boolean array: True for rows of reductions whose samples are chosen by a fit.
 
-        Without a column ``method``, all rows are such if there is a column ``tau`` (its tolerance).
+        In tables without a column ``method``, a column ``tau`` (tolerance of the fit) shows that
+        all rows belong to such reductions.
         """
         if "method" not in self.e:
             return np.full(len(self.e), "tau" in self.e)
         return self.e.method.astype(str).str.contains(FITTING).to_numpy(dtype=bool)
 
     def limits(self, column: Column) -> np.ndarray:
-        """Tolerance of each cell of a column, array (rows)."""
+        """Array (rows) with the tolerance of each cell of ``column``."""
         limit = np.full(len(self.e), column.within)
         if column.quantity == "value" and column.kind == "integer":
             limit[self.fitted()] = FITTED
@@ -211,15 +215,15 @@ class Comparison:
         return limit
 
     def beyond(self, column: Column, wider: float = 0.0) -> np.ndarray:
-        """Boolean array of compared cells that differ by more than the tolerance and ``wider``."""
+        """Boolean array: True for compared cells that differ by more than limit and ``wider``."""
         limit = np.maximum(self.limits(column), wider)
         return (self.apart(column) > limit) & self.compared(column)
 
     def apart(self, column: Column) -> np.ndarray:
-        """Distance of each pair of cells of ``column``, array (rows).
+        """Array (rows) with the distance of the expected and the found cell of ``column``.
 
-        It is the difference for shares, and the difference over the larger number for other
-        numbers. It is 0 for equal cells, inf for unequal texts or if one value is missing.
+        It is the absolute difference for shares, and the difference over the larger number for
+        other numbers. It is 0 for equal cells, inf for unequal texts or if one value is missing.
         """
         e, f = self.e[column.name], self.f[column.name]
         numbers = all(pd.api.types.is_numeric_dtype(cells) for cells in (e, f))
@@ -236,9 +240,10 @@ class Comparison:
 
 
 def judge(comparison: Comparison) -> tuple[list[str], str]:
-    """Return texts of all differences, largest first, and a text with the number of compared cells.
+    """Return texts of all differences, largest first, and a text on the compared cells.
 
-    Cells that depend on rounding are compared by counts; the text has their number by reason.
+    The second text has the number of compared cells, and by reason the number of those that depend
+    on rounding errors: of these cells only the number that differs is limited.
     """
     found = [*_rows(comparison)]
     compared, loose = 0, Counter[str]()
@@ -255,16 +260,16 @@ def judge(comparison: Comparison) -> tuple[list[str], str]:
 def _difference(
     where: str, expected: str, found: str, size: float = np.inf, allowed: float = 0.0
 ) -> Difference:
-    """Return a difference: its ``size``, and a text; ``where`` names row and column."""
+    """Return ``size`` and text of a difference; ``where`` names the row and column it is in."""
     off = f" (off by {size:.2g}, allowed {allowed:.2g})" if np.isfinite(size) else ""
     return size, f"{where}: expected {expected}, found {found}{off}"
 
 
 def _rows(comparison: Comparison) -> Iterator[Difference]:
-    """Yield differences for rows without a matching row in the other table, and for their order.
+    """Yield a difference for each row without a matching row, and one if the order has changed.
 
-    Some tables list only runs that have an error (`Table.only_with_error`). In such a table, a row
-    may be missing if its run has no error in that study.
+    In a table that lists only runs with an error (`Table.only_with_error`), a row may be missing
+    if its run ended early and thus has no error.
     """
     table, context, words = comparison.table, comparison.context, ("a row", "none")
     for side, frame in enumerate((comparison.expected, comparison.found)):
@@ -319,9 +324,10 @@ def _shifted(comparison: Comparison, column: Column, firm: np.ndarray) -> Iterat
 
 
 def _loose(comparison: Comparison, column: Column, cells: np.ndarray) -> Iterator[Difference]:
-    """Yield a difference where too many runs differ, among the ``cells`` that depend on rounding.
+    """Yield a difference where more runs differ than `LOOSE` allows.
 
-    A value that is missing in one table counts as a difference. Cells of one run count once.
+    Only the given ``cells``, which depend on rounding errors, are counted. A value that is missing
+    in one of the two tables counts as a difference. Several cells of one run count once.
     """
     rows = comparison.e[cells]
     run = [*SAMPLES, *({"seed"} & set(rows.columns))]
@@ -350,7 +356,7 @@ def in_words(value: object) -> str:
 
 
 def _row_in_words(table: Table, frame: pd.DataFrame, row: int) -> str:
-    """Text that identifies a ``row`` of ``frame``: its names, sizes and values, at most `NAMED`."""
+    """Text that identifies a ``row``: up to `NAMED` of its names, sizes and values."""
     columns = [c.name for c in table.columns if names_row(c) or c.quantity == "value"]
     cells = [(name, frame[name].iloc[row]) for name in columns]
     named = [f"{name} {in_words(value)}" for name, value in cells if not pd.isna(value)]

@@ -1,4 +1,4 @@
-"""Outcomes of the comparison for the claims, figures and tables of a results folder."""
+"""Comparison of the claims, figures and tables of a results folder with the expected ones."""
 
 from collections.abc import Mapping, Sequence
 from enum import StrEnum
@@ -22,7 +22,7 @@ from study.verification.subject import Subject
 
 RULES = Path("config/claims.yaml")
 CLAIMS = "claims"
-# Verdict columns of the table of claims; for each the key of its tests in the rules, and its name.
+# Verdict columns of table claims -> (key of the deciding tests in `RULES`, words in messages).
 PARTS = {"verdict": ("published", "as published"), "verdict_beyond": ("beyond", "beyond")}
 
 
@@ -40,7 +40,7 @@ class Line(NamedTuple):
     """Outcome of one claim, figure or table.
 
     kind : claim, figure or table
-    text : size, row and column of the largest difference, or a reason
+    text : largest difference with its row and column, or the reason for the outcome
     details : all differences as text, largest first
     """
 
@@ -58,11 +58,13 @@ GOOD = (Outcome.REPRODUCED, Outcome.NOT_COMPARABLE)
 
 
 class Examination:
-    """Comparison of a subject's results with the expected ones, by functions with cached results.
+    """Comparison of the results of a configuration with the expected ones.
 
-    condition : returns the `Condition` of the file at a path, None if it is missing
+    Three attributes are functions with cached return values:
+
+    condition : returns the `Condition` of the file at a path, None if the file is missing
     read : returns the table of a name, as read from its file
-    again : returns the table of a name, made again from other tables (`_again`)
+    again : returns the table of a name, computed again from other tables (see `_again`)
     """
 
     def __init__(self, subject: Subject) -> None:
@@ -71,7 +73,7 @@ class Examination:
         self.read, self.again = cache(self._read), cache(self._again)
 
     def lines(self) -> list[Line]:
-        """Outcomes of all claims, figures and tables, and of CSV files that are no known table."""
+        """Outcomes of all claims, figures and tables; a CSV file of no known table "differs"."""
         tables = {name: self.table(name) for name in declared()}
         figures = [self._figure(job, tables) for job in self.subject.plan.fixed["figures"]]
         folder = Path(TABLE.at(self.subject.results, name="any")).parent
@@ -85,10 +87,7 @@ class Examination:
     def found(self, name: str) -> pd.DataFrame:
         """Return table ``name`` with all declared columns.
 
-        Raises
-        ------
-        StorageError
-            It is missing or damaged, or has columns that are not declared.
+        Raises StorageError if its file is missing or damaged, or has columns not declared.
         """
         return declared()[name].checked(self.read(name))
 
@@ -108,7 +107,7 @@ class Examination:
 
     @cached_property
     def context(self) -> compare.Context:
-        """Rows that depend on rounding errors, by expected tables and the found table of runs."""
+        """Facts that show which rows depend on rounding errors (see `compare.Context`)."""
         tables = {name: reference.frame for name, reference in self.expected.items()}
         try:
             return compare.Context(tables, self.found(compare.RUNS))
@@ -116,9 +115,9 @@ class Examination:
             return compare.Context(tables)
 
     def _again(self, name: str) -> pd.DataFrame | None:
-        """Return the table ``name``, computed again from existing tables, if it reads tables only.
+        """Return the table ``name``, computed again from the existing tables that it reads.
 
-        None for tables that read other files, or if an input is missing or damaged.
+        Return None if the table reads other files, too, or if an input is missing or damaged.
         """
         if not is_derived(name):
             return None
@@ -129,7 +128,7 @@ class Examination:
             return read_table(files[job.outputs["table"]])
 
     def table(self, name: str) -> Line:
-        """Outcome of the comparison of the table ``name``."""
+        """Compare the table ``name`` with the expected one and return the outcome."""
 
         def line(outcome: Outcome, text: str, *details: str) -> Line:
             return Line("table", name, outcome, text, details)
@@ -164,7 +163,7 @@ class Examination:
         return line(Outcome.REPRODUCED, compared)
 
     def claims(self) -> list[Line]:
-        """Verdict of this run on each claim, compared with the expected one."""
+        """Outcome for each claim: whether the verdicts of this run are the expected ones."""
         line = self.table(CLAIMS)
         try:
             found = self.found(CLAIMS).set_index("claim")
@@ -209,7 +208,7 @@ class Examination:
 
 
 def _claim(name: str, expected: pd.DataFrame, found: pd.DataFrame, decided: pd.DataFrame) -> Line:
-    """Outcome of claim ``name``; ``decided`` is the table ``found``, made again from its inputs."""
+    """Compare verdicts on claim ``name``: expected, found, and computed again (``decided``)."""
     if name not in expected.index or name not in found.index:
         text = "the claim is new" if name in found.index else "the claim is gone"
         return Line("claim", name, Outcome.DIFFERS, text)
@@ -236,7 +235,7 @@ def _results(paths: Sequence[str]) -> list[str]:
 
 
 def _first_difference(found: pd.DataFrame, again: pd.DataFrame) -> str | None:
-    """Text about the first difference between ``found`` and ``again``; None if they are equal."""
+    """Text on the first cell in which two tables differ, or on their sizes; None if all agree."""
     if list(found.columns) != list(again.columns) or len(found) != len(again):
         return f"which have {len(again)} rows of {len(again.columns)} columns"
     other = (found != again) & ~(found.isna() & again.isna())

@@ -1,9 +1,9 @@
 """``./reproduce verify --files``: check that every file is unchanged since the last run.
 
-The plan lists the files that must exist, the manifest has their checksums. Tables, figures and the
-manuscript with its inputs are made again from the existing files and compared: a file that was
-replaced together with its checksum and its manifest entry differs from the file made again. Results
-of experiments take too long to repeat; only their checksums are compared.
+The plan of the study lists the files that must exist, the manifest has their checksums. Tables,
+figures and the manuscript are also made again from the existing files and compared. This reveals a
+file that was replaced together with its checksum and its manifest entry. Experiments take too long
+to be repeated; of their results only the checksums are compared.
 """
 
 import filecmp
@@ -31,12 +31,12 @@ FOREIGN = "no file of this study"
 UNLISTED = "not in the manifest"
 # Largest number of faults that are printed one by one.
 SHOWN = 20
-# Errors that a job may raise if its input tables were edited.
+# Types of errors that a job may raise if somebody edited its input tables.
 FAULTS = (PdromError, ArithmeticError, LookupError, TypeError, ValueError)
 
 
 def verify_files(subject: Subject) -> Status:
-    """Compare the files of ``subject`` with its manifest; print faults and remedies."""
+    """Compare the files of a study with its manifest; print faults, and commands that mend them."""
     place = Path(MANIFEST.at(subject.results))
     hint = f"a run that succeeds writes it: {subject.command()}"
     if not place.is_file():
@@ -71,7 +71,10 @@ def verify_files(subject: Subject) -> Status:
 
 
 def _fault(path: str, entry: Entry | None, ours: bool) -> str:
-    """Text on the fault of the file at ``path``; empty if the file agrees with its entry."""
+    """Text on the fault of the file at ``path``; empty if the file agrees with the manifest.
+
+    ``ours`` tells whether the file belongs to the study, ``entry`` is its line in the manifest.
+    """
     if not ours:
         return FOREIGN
     if not Path(path).is_file():
@@ -86,13 +89,10 @@ def _fault(path: str, entry: Entry | None, ours: bool) -> str:
 def made(job: Job) -> Iterator[dict[str, Path]]:
     """Run a job in a temporary folder; yield a mapping of its output paths to the new files.
 
-    Raises
-    ------
-    StorageError
-        The job fails on the existing input files.
+    Raises StorageError if the job fails on the existing input files.
     """
     parents = [os.path.dirname(path) or os.curdir for path in job.outputs.values()]
-    root = os.path.commonpath(parents)  # keep subfolders: two pages may have the same name
+    root = os.path.commonpath(parents)  # keep subfolders: two outputs may have equal file names
     with TemporaryDirectory(prefix="pdrom-again-") as folder:
         inside = {name: os.path.relpath(path, root) for name, path in job.outputs.items()}
         outputs = {name: os.path.join(folder, path) for name, path in inside.items()}
@@ -106,7 +106,7 @@ def made(job: Job) -> Iterator[dict[str, Path]]:
 
 
 def differing(job: Job) -> list[str]:
-    """Paths of a job's outputs that differ when the job is repeated; all if it fails then."""
+    """Repeat a job and return paths of outputs that differ now; all paths if the job fails."""
     try:
         with made(job) as files:
             return [old for old, new in files.items() if not filecmp.cmp(old, new, shallow=False)]
@@ -115,6 +115,6 @@ def differing(job: Job) -> list[str]:
 
 
 def is_derived(name: str) -> bool:
-    """Return whether the table ``name`` reads other tables only, no files of experiments."""
+    """Return whether the table ``name`` reads only other tables, no results of experiments."""
     reads = declared()[name].reads.values()
     return not any(isinstance(read, Every) for read in reads)

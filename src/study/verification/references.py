@@ -1,8 +1,7 @@
-"""Expected tables in a compact form, stored in git below ``results/reference``.
+"""Files of the expected tables, kept in git below ``results/reference``.
 
-Columns that are never compared are left out, and numbers are rounded to the compared digits. A
-table is a CSV file, so that its changes are readable; a large table is compressed (``.csv.xz``), so
-that the total size remains small.
+Columns that are never compared are left out, and numbers are rounded to `DIGITS` digits. A table is
+a CSV file, whose changes git shows; a large table is compressed (``.csv.xz``) to save space.
 """
 
 import io
@@ -20,7 +19,7 @@ from study.tables import declared
 from study.tables.kit.declaration import Table
 from study.verification.compare import kept
 
-# Stored digits of numbers: their rounding error is at most a hundredth of the tolerances.
+# Stored digits of numbers; the error of rounding is at most a hundredth of any tolerance.
 DIGITS = 9
 PACKED_FROM = 50_000
 LOG = "changes.md"
@@ -32,14 +31,14 @@ Written by `./reproduce verify --update --reason "..."`, newest last.
 
 
 class Reference(NamedTuple):
-    """An expected table: ``frame`` has all declared columns, ``columns`` names the stored ones."""
+    """Expected table: ``frame`` has all declared columns, ``columns`` names those in the file."""
 
     frame: pd.DataFrame
     columns: tuple[str, ...]
 
 
 def folder_of(results: str) -> Path:
-    """Folder of the expected tables that belong to a folder of ``results``."""
+    """Folder of the expected tables to which the folder ``results`` is compared."""
     root = Path(RESULTS)
     return root / "reference" / Path(results).relative_to(root) / "tables"
 
@@ -58,10 +57,7 @@ def write_reference(table: Table, frame: pd.DataFrame, folder: Path) -> None:
 def read_reference(table: Table, folder: Path) -> Reference | None:
     """Return the expected ``table`` in ``folder``; None if there is none.
 
-    Raises
-    ------
-    StorageError
-        The file cannot be read.
+    Raises StorageError if the file cannot be read.
     """
     plain, packed = _paths(table.name, folder)
     path = plain if plain.is_file() else packed
@@ -78,13 +74,13 @@ def read_reference(table: Table, folder: Path) -> Reference | None:
 
 
 def read_references(folder: Path) -> dict[str, Reference]:
-    """Return the expected tables in ``folder``, by name; errors are those of `read_reference`."""
+    """Return all expected tables in ``folder`` by name; StorageError if one cannot be read."""
     read = {name: read_reference(table, folder) for name, table in declared().items()}
     return {name: reference for name, reference in read.items() if reference is not None}
 
 
 def note(folder: Path, reason: str, day: date, code: str) -> None:
-    """Add the date ``day``, the ``code`` version and the ``reason`` to the log in ``folder``."""
+    """Add ``day``, version of the code and reason of an update to the log in ``folder``."""
     path = folder / LOG
     text = path.read_text(encoding="utf-8") if path.is_file() else HEAD
     write_tracked(path, f"{text}- {day:%Y-%m-%d}, code {code}: {reason}\n".encode())

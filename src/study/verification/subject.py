@@ -31,12 +31,11 @@ class Subject:
 
     @classmethod
     def of(cls, configfiles: Sequence[str], settings: Sequence[str]) -> "Subject":
-        """Results of the configuration given by files and settings, by default of the last run.
+        """Return the results of the configuration that ``configfiles`` and ``settings`` define.
 
-        Raises
-        ------
-        ConfigurationError
-            A configuration file is missing or is not a mapping.
+        Without both, it is the configuration of the last run.
+
+        Raises ConfigurationError if a configuration file is missing or is not a mapping.
         """
         files = ["--configfile", *configfiles] if configfiles else []
         options = [*files, *(["--config", *settings] if settings else [])] or recall()
@@ -50,14 +49,14 @@ class Subject:
         return self.folders.results
 
     def command(self, *targets: str) -> str:
-        """Command that makes the ``targets`` of this configuration; all files without targets."""
+        """Shell command that makes the files ``targets``, or without targets the whole study."""
         ends = ["--", *targets] if targets and self.options else targets
         return shlex.join(["./reproduce", *self.options, *ends])
 
     @cached_property
     def plan(self) -> Plan:
         """Plan of the configuration, merged from its files and settings as by Snakemake."""
-        # imported here because ``--help`` and errors in the arguments need no Snakemake
+        # Snakemake is imported only here, so that ``--help`` and argument errors come at once.
         from snakemake.cli import parse_config
         from snakemake.settings.types import ConfigSettings
         from snakemake.utils import update_config

@@ -51,7 +51,7 @@ __all__ = [
 ]  # fmt: skip
 # Every page, picture and ParaView file of pdrom has this text in its first or last MARKED bytes.
 MARK, MARKED = b"made by pdrom, which may replace this file", 65_536
-# Hash of the machine in names of temporary files: leftovers of other machines are not removed.
+# Hash of the machine's name, part of temporary file names: a machine removes only its own files.
 _MACHINE = hashlib.blake2b(platform.node().encode(), digest_size=2).hexdigest()
 
 
@@ -90,7 +90,7 @@ def atomic_path(path: str | os.PathLike[str], with_checksum: bool = True) -> Ite
             os.replace(temporary, target)
             place = checksum_path(target)
             content = place.read_bytes() if place.is_file() else b""
-            if content and Checksum.parse(content).content == content:  # of an older file
+            if content and Checksum.parse(content).content == content:  # an older file's checksum
                 place.unlink()
     except OSError as error:
         raise StorageError(f"{target}: cannot be written ({reason(error)})") from error
@@ -179,9 +179,9 @@ def _bring_to_disk(path: Path) -> None:
 def _rename(temporary: Path, checksum: Path, target: Path) -> None:
     """Rename the ``temporary`` result and its ``checksum`` file to their names, the checksum first.
 
-    A process killed in between leaves no file, or an older one that the checksum does not match:
-    both are made again. In the other order it would leave a good file without a checksum. If the
-    second renaming fails, the older file keeps its own checksum.
+    A process killed in between leaves no result, or an older one that the checksum does not match:
+    the next run makes either again. If the result were renamed first, such a process would leave a
+    good file without a checksum. If the second renaming fails, the older file keeps its checksum.
     """
     place = checksum_path(target)
     previous = place.read_bytes() if place.is_file() else None

@@ -10,7 +10,7 @@ The line before it is a comment to that program; it contains the provenance
 (`pdrom.core.provenance`) with a digest of its own.
 
 The stored checksum is compared with that of the file's bytes. Any difference, in the file or in its
-checksum, counts as damage. A change of both could match only by a collision of 512 bits.
+checksum, counts as damage. If both change, they match only if two 512-bit digests agree by chance.
 """
 
 import errno

@@ -11,7 +11,7 @@ from numba import cfunc, njit, types
 from numba.extending import intrinsic
 
 _INTEGER = ir.IntType(types.intp.bitwidth)
-KERNELS = ("compiled", "constraints", "dynamics")  # folders of functions that may be inlined
+KERNELS = ("compiled", "constraints", "dynamics")  # folders whose functions may be inlined
 
 
 @cache

@@ -43,7 +43,7 @@ def empty(numbers: int, dtype: type = np.float64) -> np.ndarray:
     """Return an uninitialised array (numbers,) of ``dtype``, aligned to the size of a row."""
     kind = np.dtype(dtype)
     memory = np.empty(numbers * kind.itemsize + ROW_BYTES, np.uint8)
-    # with the memoryview, views of the returned array have it, not ``memory``, as their base
+    # made from the memoryview: the base of its views is then the returned array, not ``memory``
     start = -memory.ctypes.data % ROW_BYTES
     return np.frombuffer(memory.data, kind, numbers, start)
 

@@ -37,7 +37,7 @@ class WeightFactor(ConfigModel):
 
 
 class GroupConfig(EffectConfig):
-    """``weight`` w of the group; some kinds multiply it by rest area or volume of the element.
+    """``weight`` w of a constraint; some kinds multiply it by the element's rest area or volume.
 
     ``factors`` multiply the weights of some elements, one factor after the other.
     """
@@ -120,9 +120,9 @@ class ConstraintGroup(Effect):
         """Compute once-per-frame data at ``q`` (N, 3) m, for ``elements`` (m,) or all if None."""
 
     def kernel_parameters(self) -> np.ndarray:
-        """Return the numbers that ``gradient_kernel`` needs in addition to S q, in its order.
+        """Return the numbers that ``gradient_kernel`` needs besides S q, in the order it expects.
 
-        Once-per-frame numbers are those of the last call of ``begin_frame``.
+        Numbers that change once per frame come from the last call of ``begin_frame``.
         """
         raise NotImplementedError(f"{self.name} has no gradient kernel")
 

@@ -17,13 +17,13 @@ from pdrom.model.constraints.base import ConstraintGroup, GroupConfig, direction
 from pdrom.model.constraints.local_kernel import FIRST, OWN, VERTICES, LocalKernel
 from pdrom.model.mesh.types import Mesh, barycentric_areas, boundary_edges
 
-# If a unit vector has a shorter projection on the plane of the rim (equator), that is round-off.
+# A unit vector's projection on the plane of the rim (equator) is round-off if shorter than this.
 RIM = 1e-15
-# A longer projection is orthogonal to the normal up to 2e-12. A shorter one has lost digits by
-# cancellation and is orthogonalised again.
+# If the projection on the plane of the rim is longer than this, it is orthogonal to the normal up
+# to 2e-12. A shorter one has lost digits by cancellation and is orthogonalised again.
 NEAR_POLE = 1e-4
 
-# Offsets of the packed numbers: weight, rest magnitude, rest curvature, side times normal; count
+# Offsets of an element's weight, rest magnitude, rest curvature, side times normal; their count
 WEIGHT, MAGNITUDE, REST, POLE, MANIFOLD = 0, 1, 2, 5, 8
 # Offsets in the working array: curvature, projection p, height of its direction over the equator
 H, P, HEIGHT, SIZE = 0, 3, 6, 7
@@ -190,7 +190,7 @@ def accumulate_vertices(y_place, rhs_place, record, part):
 def project_gradients(d_pointer, manifold_pointer, p_pointer, m):
     """Write the projections p (m, 3) of the curvature vectors S q (m, 3) onto the half spheres.
 
-    ``manifold_pointer`` points to the packed numbers; see `gradient_kernel` for all arguments.
+    The arguments are pointers to S q, to the packed numbers of the elements and to p.
     """
     d, p = carray(d_pointer, (m, 3)), carray(p_pointer, (m, 3))
     blocks = (m + lanes.LANES - 1) // lanes.LANES
@@ -285,7 +285,7 @@ def fan_normals(q, vertices, elements, start, fan, triangles, normals):
         normals[i, 0], normals[i, 1], normals[i, 2] = nx, ny, nz
 
 
-# A vertex is flat if its rest curvature is below this fraction of the summands, i.e. round-off.
+# A vertex counts as flat if its rest curvature is below this fraction of the terms of its sum.
 FLAT = 1e-9
 
 
@@ -296,13 +296,13 @@ class VertexBending(ConstraintGroup):
     value has the magnitude m and lies on side s = +1 or -1 of the surface. p is the point nearest
     to H on the half sphere { |p| = m, s p.n >= 0 }. The vertex normal n is that at the beginning of
     the frame: the half sphere is fixed during iterations, so that the objective cannot rise. If H
-    is on the other side, p is on the rim of the half sphere and pulls the vertex back, so that it
-    does not flip. A flat rest shape has m = 0 up to round-off and s = 0. If H = 0, p is the pole
-    m s n; if moreover the triangles around the vertex have no area, p is the rest vector.
+    is outside that half space, p is on the rim of the half sphere and pulls the vertex back, which
+    thus does not flip. A flat rest shape has m = 0 up to round-off and s = 0. If H = 0, p is the
+    pole m s n; if moreover the triangles around the vertex have no area, p is the rest vector.
     """
 
     class Config(GroupConfig):
-        """Weight w, divided by area, and the fields of `GroupConfig`."""
+        """Weight w per area, and the fields of `GroupConfig`."""
 
         effect: Literal["bending"] = "bending"
 

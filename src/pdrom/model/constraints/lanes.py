@@ -21,7 +21,7 @@ SMALLEST = 1e-300
 
 
 def lane_function(function):
-    """Compile a ``function`` of one lane: inlined, without checks for division by zero."""
+    """Compile a ``function`` of one element: inlined, without checks for division by zero."""
     return inner(function, forceinline=True)
 
 
@@ -69,7 +69,7 @@ def take(packed, numbers, elements, start, out):
 
 @lane_function
 def load(work, first, lane):
-    """Return the numbers ``first`` to ``first + 2`` of a ``lane`` of ``work`` as a vector."""
+    """Return the numbers ``first`` to ``first + 2`` of the element in a ``lane`` of ``work``."""
     return (
         at(work, first * LANES + lane),
         at(work, (first + 1) * LANES + lane),
@@ -79,7 +79,7 @@ def load(work, first, lane):
 
 @lane_function
 def save(work, first, lane, vector):
-    """Write a ``vector`` to the numbers ``first`` to ``first + 2`` of a ``lane`` of ``work``."""
+    """Write ``vector`` to numbers ``first`` to ``first + 2`` of the element in a ``lane``."""
     work[first * LANES + lane] = vector[0]
     work[(first + 1) * LANES + lane] = vector[1]
     work[(first + 2) * LANES + lane] = vector[2]
@@ -87,7 +87,7 @@ def save(work, first, lane, vector):
 
 @lane_function
 def load_matrix(work, first, lane):
-    """Return the nine numbers from ``first`` on of a ``lane`` of ``work`` as three vectors."""
+    """Return nine numbers from ``first`` on, of the element in a ``lane``, as three vectors."""
     return load(work, first, lane), load(work, first + 3, lane), load(work, first + 6, lane)
 
 
@@ -101,7 +101,7 @@ def save_matrix(work, first, lane, matrix):
 
 @lane_function
 def unmarked(work, mark):
-    """Return the number of lanes of ``work`` with the value zero at offset ``mark``, as float."""
+    """Return how many elements in ``work`` have the value zero at offset ``mark``, as float."""
     left = 0.0
     for lane in range(LANES):
         left += 1.0 if work[mark * LANES + lane] == 0.0 else 0.0

@@ -17,7 +17,7 @@ from pdrom.model.compiled.functions import Callback, caller, compiled, inner
 # Indices into every record: the number of vertices; FIRST + k is the first unit of part k, and
 # FIRST + k + 1 the end of its units. Entries that differ between kernels begin at OWN.
 VERTICES, FIRST, OWN = 0, 1, 4
-# Values of the argument `part` of a kernel: one of two parts, or preparation of data for both.
+# Values of a kernel's argument `part`: do the first or second part, or prepare data for both.
 PARTS, PREPARE = (0, 1), 2
 
 Table = tuple[np.ndarray, np.ndarray, int]
@@ -41,7 +41,7 @@ _call_local, _call_gradients = caller(types.float64), caller(types.void)
 
 @inner(forceinline=True)
 def call(address, y, rhs, record, part):
-    """Call a local kernel by its address, with y, rhs, record and part as in `local_kernel`."""
+    """Call a local kernel by its ``address``: positions y, right-hand side, its data, and part."""
     return _call_local(address, (y, rhs, record, part))
 
 
@@ -66,8 +66,8 @@ class LocalKernel:
     function : result of `local_kernel`; it is compiled when its address is first needed
     vertices, units : number of vertices and number of units (blocks of elements or rows)
     arrays, numbers : the record contains, from `OWN` on, the numbers and the arrays' addresses
-    touched : function that maps a unit to the vertices of all units from it on; a kernel with this
-        function is divided into two parts, others have one part
+    touched : function that maps a unit's number to the vertices of this and all later units; a
+        kernel with this function is divided into two parts, a kernel without it has one part
     prepares : whether the kernel must be called with `PREPARE` before its parts
 
     Attributes
@@ -184,6 +184,6 @@ def gradient_kernel(function):
 def call_gradients(address, d, parameters, p, m):
     """Call a gradient kernel by its ``address``.
 
-    ``d``, ``parameters``, ``p`` are addresses as in `gradient_kernel`, ``m`` counts elements.
+    ``d`` (S q of ``m`` elements), ``parameters`` of the group, ``p`` (projections) are addresses.
     """
     _call_gradients(address, (d, parameters, p, m))

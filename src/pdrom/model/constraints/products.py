@@ -22,7 +22,7 @@ from pdrom.model.constraints.lanes import LANES, SMALLEST, lane_function, load, 
 # offsets in the working array: the values (input, then result), and intermediate numbers
 VALUES, SCALE, TARGET, LARGEST, LEAST, MARK, SIZE = 0, 3, 4, 5, 6, 7, 8
 STEPS = 60
-# state of a lane: still iterating; converged or diverged; initial product already in the range
+# state of one element: still iterating; converged or diverged; its product was already in the range
 _OPEN, _CLOSED, _INSIDE = 1.0, 0.0, 2.0
 # Newton steps below LAST_STEP * t and residuals of f below ROUNDOFF * c are round-off
 LAST_STEP, ROUNDOFF = 1e-15, 1e-10
@@ -49,7 +49,7 @@ def _product(t, values, solid):
 
 @lane_function
 def _start(work, low, high, solid):
-    """Scale the values and set starting points; return the number of lanes with two solutions."""
+    """Scale the values and set starting points; return how many elements have two solutions."""
     low_root = low ** (1.0 / 3.0) if solid else np.sqrt(low)
     high_root = high ** (1.0 / 3.0) if solid else np.sqrt(high)
     several = 0.0
@@ -61,7 +61,7 @@ def _start(work, low, high, solid):
         scale = s[0] if s[0] > root else root
         inverse = 1.0 / scale
         target = bound * inverse * inverse * (inverse if solid else 1.0)
-        # not smaller: such a target is negligible compared with the scaled values
+        # raise a tiny target to SMALLEST: it is negligible compared with the scaled values
         target = target if target > SMALLEST else SMALLEST
         first, second = s[0] * inverse, s[1] * inverse if solid else 1.0
         # bounds on t if the values must grow: t_1 >= s_1, t_2 >= s_2, t_1 >= t_2 >= t
@@ -83,7 +83,7 @@ def _start(work, low, high, solid):
 
 @lane_function
 def _advance(work, place, side, solid):
-    """Do a Newton step from above (side 1) or below (-1); return the number of iterating lanes."""
+    """Do a Newton step from above (side 1) or below (-1); return how many elements go on."""
     left = 0.0
     for lane in range(LANES):
         t, target = work[place * LANES + lane], work[TARGET * LANES + lane]
@@ -150,7 +150,7 @@ def nearest_block(work, low, high, solid):
         if _advance(work, LARGEST, 1.0, solid) == 0.0:
             break
     if several > 0.0:
-        # in the lanes that may have a second solution, iterate again, from below
+        # for elements that may have a second solution, iterate again, from below
         for lane in range(LANES):
             mark = work[MARK * LANES + lane]
             again = mark == _CLOSED and work[LEAST * LANES + lane] > 0.0
@@ -162,7 +162,7 @@ def nearest_block(work, low, high, solid):
 
 
 def reference_nearest(values: np.ndarray, low: float, high: float) -> np.ndarray:
-    """Return nearest values (e, 2 or 3) like `nearest_block`, but by bisection with NumPy.
+    """Return the nearest values (e, 2 or 3) with a product in a range, by bisection with NumPy.
 
     If several solutions are possible, each is bracketed on a grid, and the nearest is returned.
 

@@ -4,8 +4,8 @@ An element with p rows has p + 1 vertices, S q = D^-T [q_1 - q_0, ..., q_p - q_0
 matrix D of the rest shape (1 for springs). This module reads positions and adds forces of blocks of
 elements (see `pdrom.model.constraints.lanes`); the groups differ in the projection of a block.
 
-A whole block computes an expensive case if one of its elements requires it. Neighbouring elements
-are in similar states and share vertices in the cache, so that blocks of neighbours are cheap. As
+If one element of a block needs a more expensive formula, the whole block computes it. Neighbouring
+elements are in similar states and share vertices in the cache: blocks of neighbours are cheap. As
 mesh files often list neighbours far apart, kernels visit the elements in another order. The public
 arrays of a group (S, weights, projections) keep the order of the mesh.
 """
@@ -36,7 +36,7 @@ TAKEN, TAKEN_GEOMETRY, ARRAYS = range(OWN + 7, OWN + 10)
 class SimplexGroup(StencilGroup):
     """A group of simplices whose kernels work on packed blocks of elements.
 
-    A subclass sets two kernels and overrides `_extra` if its elements have other packed numbers:
+    A subclass sets two kernels. It overrides `_extra` if it stores other numbers than operators.
 
     accumulate_kernel : a `pdrom.model.constraints.local_kernel.local_kernel` whose units are blocks
     project_kernel : local kernel that writes the projections of some elements, see `samples`
@@ -226,7 +226,7 @@ def store_projections(work, count, start, p):
 
 
 # Elements are visited in the order of the mesh if its blocks have at most KEPT times as many
-# vertices as blocks in the sorted order, as is the case for grids.
+# vertices as blocks in the sorted order, which is true of grids.
 KEPT = 1.5
 
 

@@ -8,7 +8,7 @@ nearest(work, low, high) : compute the projections p
 forces(work, geometry, block) : compute the forces S^T W p on the corners, and w |S q - p|^2
 
 The loops over blocks are in this module. Each group has its own kernels, which call the loops with
-its functions: Numba caches such kernels on disk, but neither closures nor functions of functions.
+its functions: Numba caches such kernels on disk, but no closures or functions that take functions.
 """
 
 from typing import Annotated, Self
@@ -33,7 +33,7 @@ def project(y_place, p_place, record, part, rows, gradients, nearest):
     ----------
     y_place, p_place, record : addresses of positions, projections and record of a local kernel
     part : 0 or 1, selects the working array
-    gradients, nearest : functions of a block, see the module's docstring
+    gradients, nearest : functions of a block, which compute S q and the projections
     """
     corners, numbers = rows + 1, 1 + rows * rows
     y, _, packed, geometry, allowed, work, _, _ = simplex.arguments(
@@ -59,7 +59,7 @@ def accumulate(y_place, rhs_place, record, part, rows, gradients, nearest, force
     Parameters
     ----------
     y_place, rhs_place, record : addresses of positions, right-hand side and record
-    rows, gradients, nearest, forces : number of rows of S_e; functions of a block, see the module
+    rows, gradients, nearest, forces : rows of S_e; functions of a block for S q, p, and the forces
     """
     y, rhs, corners, geometry, allowed, work, first, last = simplex.arguments(
         y_place, rhs_place, record, part, rows + 1, 1 + rows * rows
@@ -87,7 +87,7 @@ def project_gradients(d_pointer, range_pointer, p_pointer, m, rows, work_size, n
     ----------
     d_pointer, p_pointer : pointers to S q and to the projections, both (rows m, 3)
     range_pointer : pointer to the least and the largest allowed value
-    nearest : function of a block, see the module
+    nearest : function of a block, which computes the projections
     """
     d, p = carray(d_pointer, (rows * m, 3)), carray(p_pointer, (3 * rows * m,))
     allowed = carray(range_pointer, (2,))

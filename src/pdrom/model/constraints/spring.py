@@ -14,7 +14,7 @@ from pdrom.model.constraints.lanes import LANES, SMALLEST, lane_function, pack, 
 from pdrom.model.constraints.local_kernel import gradient_kernel, local_kernel
 from pdrom.model.mesh.types import Mesh
 
-# packed numbers of an edge: weight and rest length; in another array the 3 of the rest edge
+# offset of the rest length after the weight, and count of both; REST numbers are a rest edge's own
 LENGTH, GEOMETRY = 1, 2
 REST = 3
 # further indices into the record: addresses of all rest edges, and of memory for a block of them
@@ -36,7 +36,7 @@ def _rest_lengths(x, y, z, length, rest, place):
     px, py, pz = multiply(factor, x), multiply(factor, y), multiply(factor, z)
     if arithmetic.all_within(square, LOW, HIGH):
         return px, py, pz
-    # scaled, so that squares neither overflow nor underflow; edges that are not finite stay so
+    # edges are scaled, so that squares neither overflow nor underflow; if not finite, they stay so
     scale = add(add(arithmetic.magnitude(x), arithmetic.magnitude(y)), arithmetic.magnitude(z))
     inverse = divide(arithmetic.constant(1.0), add(scale, arithmetic.constant(SMALLEST)))
     ux, uy, uz = multiply(inverse, x), multiply(inverse, y), multiply(inverse, z)
@@ -161,7 +161,7 @@ class EdgeSpring(simplex.SimplexGroup):
         self._assemble(mesh.vertices)
 
     def _assemble(self, vertices: int) -> None:
-        # not part of the geometry, since only edges of length zero need their rest edge
+        # rest edges are stored apart from the geometry, since only edges of length zero need them
         self._own_arrays = pack(self.rest), np.empty(REST * LANES)
         super()._assemble(vertices)
 

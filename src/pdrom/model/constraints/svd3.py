@@ -14,7 +14,7 @@ from pdrom.model.constraints.lanes import LANES, absolute_sum, choose, dot, load
 SWEEPS = 12
 # two columns count as orthogonal if the cosine of their angle is smaller
 ORTHOGONAL = 1e-15
-# if all tangents of rotations in a sweep are smaller, the remaining cosines are about their squares
+# if all tangents of a sweep's rotations are below this, the cosines left are about their squares
 LAST_TANGENT = 1e-8
 # if the second singular value is below this fraction of the first, its vector is inaccurate
 RANK = 1e-15
@@ -43,7 +43,7 @@ def jacobi_rotation(a, b, done):
 
 @lanes.lane_function
 def _sweep(work):
-    """Rotate each pair of columns once; return the number of lanes not yet orthogonal."""
+    """Rotate each pair of columns once; return the number of matrices not yet orthogonal."""
     for lane in range(LANES):
         b0, b1, b2 = lanes.load_matrix(work, B, lane)
         v0, v1, v2 = lanes.load_matrix(work, V, lane)
@@ -83,7 +83,7 @@ def _larger_first(a, v, b, w):
 def orthonormal_pair(b0, b1):
     """Return directions and norms (u0, u1, s0, s1) of orthogonal columns ``b0``, ``b1``.
 
-    ``b0`` is the longer column. A zero column gets a fixed direction orthogonal to the other.
+    ``b0`` is the longer column. A zero column gets a fixed direction orthogonal to the other one.
     """
     s0 = np.sqrt(dot(b0, b0))
     u0 = choose(s0 > 0.0, scaled(1.0 / s0, b0), (1.0, 0.0, 0.0))
@@ -115,7 +115,7 @@ def rotated_pair(f0, f1, sign):
 def factor_block(work):
     """Write U to `B`, V to `V` and the signed singular values of F, largest first, to `SIGMA`.
 
-    Lanes with `FOUND` = 1, whose projection is already known, get meaningless results.
+    Elements with `FOUND` = 1, whose projection is already known, get meaningless results.
     """
     for lane in range(LANES):
         f0, f1, f2 = lanes.load_matrix(work, simplex.F, lane)
@@ -144,7 +144,7 @@ def factor_block(work):
 
 @lanes.lane_function
 def compose_block(work):
-    """Write U diag(sigma) V^T of `factor_block` to P, except in lanes with a known P (`FOUND`)."""
+    """Write U diag(sigma) V^T of `factor_block` to P, unless an element's P is known (`FOUND`)."""
     for lane in range(LANES):
         u, v = lanes.load_matrix(work, B, lane), lanes.load_matrix(work, V, lane)
         sigma, found = load(work, SIGMA, lane), work[FOUND * LANES + lane] != 0.0

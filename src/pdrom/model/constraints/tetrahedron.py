@@ -22,7 +22,7 @@ STEPS = 16
 # the SVD is used if det F over the cube of the root mean square of the singular values is below
 # this
 WELL_CONDITIONED = 1e-2
-# the iteration ends if a step has a smaller squared norm, which leaves an error of about 1e-18
+# the iteration ends if the squared norm of a step is below this: the error left is about 1e-18
 LAST_STEP = 1e-18
 
 _OPEN, _FOUND, _UNSUITED = 0.0, 1.0, 2.0
@@ -34,8 +34,8 @@ def _start(work):
         f0, f1, f2 = lanes.load_matrix(work, F, lane)
         square = (dot(f0, f0) + dot(f1, f1) + dot(f2, f2)) / 3.0
         inverse = 1.0 / np.sqrt(square)
-        # scaled first, since products in the determinant could overflow; if the mean square itself
-        # overflows or vanishes, the SVD is used
+        # F is scaled first, since products in the determinant could overflow; if the mean square
+        # itself overflows or vanishes, the SVD is used
         x0, x1, x2 = scaled(inverse, f0), scaled(inverse, f1), scaled(inverse, f2)
         suited = square > lanes.SMALLEST and dot(x0, cross(x1, x2)) > WELL_CONDITIONED
         lanes.save_matrix(work, P, lane, (x0, x1, x2))
@@ -44,7 +44,7 @@ def _start(work):
 
 @lanes.lane_function
 def _advance(work):
-    """Do one step of the iteration in lanes that still iterate; the others do not change."""
+    """Do one step of the iteration for elements that still iterate; converged ones stay."""
     for lane in range(LANES):
         x0, x1, x2 = lanes.load_matrix(work, P, lane)
         c0, c1, c2 = cross(x1, x2), cross(x2, x0), cross(x0, x1)
@@ -60,7 +60,7 @@ def _advance(work):
 
 @lanes.lane_function
 def _rotations(work):
-    """Write nearest rotations to P and 1 to FOUND in lanes of well-conditioned F; 0 in others."""
+    """Write nearest rotations to P; set FOUND to 1 for well-conditioned F, to 0 for other F."""
     _start(work)
     for _ in range(STEPS):
         _advance(work)
@@ -73,7 +73,7 @@ def _rotations(work):
 
 @lanes.lane_function
 def _within_range(work, low, high):
-    """Copy F to P; set FOUND to 1 in lanes whose singular values are certainly in [low, high].
+    """Copy F to P; set FOUND to 1 if the singular values of F are certainly in [low, high].
 
     A sufficient condition is det F > 0 and a small |F^T F - I|_F, an upper bound of the distance of
     every squared singular value from 1.

@@ -28,7 +28,7 @@ from pdrom.model.mesh.types import Mesh
 FLAT = 1e-2
 # if the mean square is in this range, the closed form neither overflows nor loses digits
 LOW, HIGH = 1e-60, 1e60
-# EQUAL m is added to h: no division by zero if sigma_1 = sigma_2 up to round-off
+# EQUAL times the mean eigenvalue m is added to h, which is zero if sigma_1 = sigma_2
 EQUAL = 1e-17
 
 
@@ -41,7 +41,7 @@ def _closed_form(f0, f1, low, high):
     normal = lanes.cross(f0, f1)
     product = np.sqrt(dot(normal, normal))
     large = np.sqrt(mean + h)
-    # three reciprocals from one division
+    # one division serves for three reciprocals
     inverse = 1.0 / (large * product * h)
     of_large, of_product, of_h = (
         inverse * product * h,

@@ -1,8 +1,8 @@
 """Volume constraints of tetrahedra: det F lies in a range (Bouaziz et al. 2014, 5.1).
 
 In area constraints of triangles, the product of the two singular values of F lies in a range. As an
-element may become arbitrarily long and thin, both sets of matrices are unbounded, and there is no
-bound of the projections.
+element may become arbitrarily long and thin, both sets of allowed matrices are unbounded: the
+projections have no bound.
 """
 
 from typing import Literal

@@ -146,10 +146,10 @@ def all_iterations(
     which : (first, end, K): compute iterations first, ..., end - 1 of the K iterations of a frame
     y, s, base, rhs : iterate, prediction, (M/h^2) s, working array; flat rows of four numbers
     inertia : (N,) M/h^2, kg/s^2
-    tables, second : tables of the local kernels; array for their second parts, and its range
+    tables, second : tables of the local kernels; (array, first row, end) for their second parts
     factor : triangular factor of the global system (`pdrom.model.dynamics.solvers.Factor`)
     history : history of the acceleration; with `NO_HISTORY` its code is not compiled
-    objective, seconds : objective and times, written as in `CompiledIterations.run`
+    objective, seconds : written: (K,) objective, J, or empty; (4,) s, entries 1, 2 for the steps
     watch : buffer for the clock, from `pdrom.model.compiled.functions.clock`
     """
     first, end, iterations = which
@@ -162,7 +162,7 @@ def all_iterations(
         add_part(preparing, y.ctypes.data, rhs.ctypes.data)
         energy = add_part(local, y.ctypes.data, rhs.ctypes.data)
         if stop > start:
-            # the second parts of all local steps add to a separate array
+            # the second part of each local step adds to a separate array, which is added to rhs
             other[WIDTH * start : WIDTH * stop] = 0.0
             energy += add_part(kernels, y.ctypes.data, other.ctypes.data)
             for i in range(WIDTH * start, WIDTH * stop):
@@ -183,7 +183,7 @@ def all_iterations(
                 objective[k] = objective[k - 1]
         else:
             sweep(panels, vertices, loads, work, rhs, y)
-            # the last iterate of a frame is the image G(y) itself, whose objective cannot be larger
+            # the last image G(y) ends the frame unchanged: its objective cannot exceed that of y
             if history is not None and k < iterations - 1:
                 combine(history, y)
         seconds[2] += now(watch) - between
@@ -253,7 +253,7 @@ class WholeFrames:
     def run(
         self, q: np.ndarray, v: np.ndarray, frames: range, h: float, iterations: int, track: bool
     ) -> Blocks | None:
-        """Run as many first ``frames`` as one call can; return None if the solver is not compiled.
+        """Run the first of ``frames``, as many as a call can; return None for an uncompiled solver.
 
         Parameters
         ----------
@@ -290,7 +290,7 @@ def _accelerate(constants, rates, velocities, result):
         for axis in range(3):
             total = 0.0
             for k in range(len(constants)):
-                # a zero rate is not multiplied: the product is nan if the velocity is not finite
+                # if the rate is zero, do not multiply: 0 times an infinite velocity would be nan
                 own = -rates[k, i] * velocities[i, axis] if rates[k, i] else constants[k, i, axis]
                 total += own
             result[i, axis] = total

@@ -1,10 +1,10 @@
 """Factorisations of the global system: factor once, solve often.
 
 Panels (supernodes) are consecutive columns of a factor that substitution ("sweep") treats together.
-A panel stores all rows below its columns in which one of them has an entry, with explicit zeros in
-the others. With wider panels, fewer numbers are read twice and substitution waits less often for
-the preceding column, but more zeros are stored. Dynamic programming finds the partition of the
-columns with the smallest estimated number of processor cycles.
+A panel stores, of the rows below its columns, those in which any of its columns has an entry; the
+other columns get explicit zeros. In wider panels, fewer numbers are read twice and substitution
+waits less often for the preceding column, but more zeros are stored. Dynamic programming finds the
+partition of the columns with the smallest estimated number of processor cycles.
 """
 
 from typing import Any
@@ -110,7 +110,7 @@ def _fill(indptr, indices, data, inverse, first, row_start, value_start, rows, v
             row = indices[k]
             if row >= b and place[row] < 0:
                 place[row] = 0
-                # insertion sort: most rows belong at the end, and a sort takes a second to compile
+                # insertion sort: rows are nearly sorted, and NumPy's sort takes a second to compile
                 new = start + count
                 while new > start and rows[new - 1] > row:
                     rows[new] = rows[new - 1]
@@ -151,7 +151,7 @@ NOTHING_FREE: Factor = (
     np.zeros(0),
     np.zeros(0),
 )
-# Coupling in the form of `sweeps.load`, if no unknown is coupled to a held (prescribed) vertex.
+# Empty coupling, as `sweeps.load` reads it: no unknown is coupled to a held (prescribed) vertex.
 NO_COUPLING = (np.zeros(0, np.int64), np.zeros(1, np.int32), np.zeros(0, np.int32), np.zeros(0))
 
 

@@ -132,7 +132,7 @@ class VertexSpace(Space):
             return None, None
         loop = CompiledIterations(local_steps, self.system.inertia, acceleration)
         effects = self._forces, self._boundaries, self._contacts
-        # not for subclasses, which may override any part of a frame
+        # whole frames are not compiled for subclasses, which may override any part of a frame
         if type(self) is not VertexSpace or not WholeFrames.suits(local_steps, *effects):
             return loop, None
         return loop, WholeFrames(self, loop, self._forces, self._contacts, acceleration)

@@ -1,8 +1,10 @@
 """The step loop of projective dynamics, shared by the full-order model and every reduced run.
 
-A frame (Bouaziz et al. 2014, alg. 1) begins with y = s = q + h v + h^2 a. Each of K iterations has
-a local step p_j = p_j(y) per constraint group j (`LocalStep`) and a global step
-(M/h^2 + sum S^T W S) y = (M/h^2) s + sum S^T W p. The frame ends with v = (y - q) / h and q = y.
+A frame (Bouaziz et al. 2014, alg. 1) begins with the iterate y = s = q + h v + h^2 a (positions q,
+velocities v, accelerations a, time step h). Each of K iterations has a local step, the projections
+p = p(y) of each constraint group (`LocalStep`), and a global step, which solves
+(M/h^2 + sum S^T W S) y = (M/h^2) s + sum S^T W p with masses M and, summed over the groups,
+operators S and weights W. The frame ends with v = (y - q) / h and q = y.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -36,7 +38,7 @@ class LocalStep(Protocol):
         """Prepare a frame whose first positions are ``q`` (N, 3) m; called once per frame."""
 
     def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
-        """Add S^T W p(y) to ``rhs`` (N, 3); return the energy W(y) in J, nan if it is unknown."""
+        """Add S^T W p(y), projections p, to ``rhs`` (N, 3); return the energy, J (nan: unknown)."""
 
 
 @dataclass(frozen=True)
@@ -49,11 +51,11 @@ class State:
 
 @dataclass(frozen=True)
 class FrameReport:
-    """Objective and computation times of a frame.
+    """Objective and computation times of a frame with K iterations.
 
-    objective : (K,) J, 1/(2 h^2) |M^1/2 (y - s)|^2 + sum_j W_j(y) with energies W_j of groups, at
-        the iterates y of K local steps (last accepted iterate if one is rejected); nan if an energy
-        is unknown, empty if it was not tracked
+    objective : (K,) J, 1/(2 h^2) |M^1/2 (y - s)|^2 + sum_j W_j(y), energies W_j of the constraint
+        groups, at the iterate y of each local step (a rejected one is replaced by the last accepted
+        one); nan if an energy is unknown, empty if it was not tracked
     seconds : (4,) time of each of `PHASES`
     """
 
@@ -106,7 +108,7 @@ class Stepper:
         Changes that the caller makes between two frames do not affect the following frames.
         """
         while frames:
-            # a subclass may override `step`, which is then called
+            # if a subclass overrides `step`, it is called for every frame
             own = type(self).step is not Stepper.step
             done = () if own else self._at_once(state, frames)
             for after in done or (self.step(state, frames.start),):
@@ -122,7 +124,7 @@ class Stepper:
         done = self._whole.run(q, v, frames, h, self.iterations, self._track)
         if done is None:
             return ()
-        # time outside compiled code counts as phase 0, divided equally among the frames
+        # time outside compiled code is added to phase 0, divided equally among the frames
         beside = perf_counter() - started - float(done[3].sum())
         done[3][:, 0] += max(beside, 0.0) / len(done[3])
         return [
@@ -131,7 +133,7 @@ class Stepper:
         ]
 
     def _begin(self, state: State, frame: int) -> tuple[np.ndarray, Solve, np.ndarray]:
-        """Return the prediction s, its fixed coordinates at targets; the system; (M/h^2) s."""
+        """Return s with fixed coordinates at their targets, the factored system and (M/h^2) s."""
         space, h = self.space, self.time_step
         s = space.predict(state.positions, state.velocities, h)
         fixed, targets = space.fixed(frame, state.positions)
@@ -193,7 +195,7 @@ class Stepper:
             objective[k : k + 1] = objective[k - 1 : k]
         else:
             system.solve(rhs, y)
-            # the last iterate of a frame is the image G(y) itself, whose objective cannot be larger
+            # the last image G(y) ends the frame unchanged: its objective cannot exceed that of y
             if k < self.iterations - 1:
                 acceleration.combine(y)
         seconds[2] += perf_counter() - before

@@ -44,11 +44,11 @@ class _Panel:
         return spread(self.builder, self.builder.load(self.builder.gep(pointer, [offset])))
 
     def inverse(self, column):
-        """Return 1 / D of a ``column`` of the panel, in all lanes."""
+        """Return 1 / D of a ``column`` of the panel, repeated in all numbers of a register."""
         return self._spread(self._own, self._index(column))
 
     def triangle(self, row, column):
-        """Return an entry of L in the strict lower triangle of the panel, in all lanes."""
+        """Return an entry of L in the panel's strict lower triangle, repeated in a register."""
         return self._spread(self._own, self._index(self.width + row * (row - 1) // 2 + column))
 
     def pointer(self, offset):
@@ -66,7 +66,7 @@ class _Panel:
         self.builder.store(row, pointer, align=8)
 
     def less(self, a, entry, b):
-        """Return a - entry * b, lane by lane."""
+        """Return a - entry * b for registers of four numbers, each number for itself."""
         return multiply_add(self.builder, self.builder.fneg(entry), b, a)
 
     def rows_below(self):
@@ -150,10 +150,10 @@ _backward = _panel_intrinsic(_write_backward)
 
 @compiled(nogil=True)
 def load(beside, indptr, indices, data, targets, loads):
-    """Write the product of coupling and ``targets`` to ``loads``, only in the rows ``beside``.
+    """Write the product of a coupling matrix and ``targets`` to the rows ``beside`` of ``loads``.
 
-    The coupling is a CSR matrix (``indptr``, ``indices``, ``data``), ``targets`` are (m, 3) m,
-    ``loads`` is a flat array of rows of four numbers, whose other rows are zero.
+    The matrix, CSR (``indptr``, ``indices``, ``data``), couples unknowns to held vertices, which
+    have ``targets`` (m, 3) m. ``loads`` is a flat array of rows of four numbers, zero elsewhere.
     """
     for i in beside:
         for axis in range(3):
@@ -166,7 +166,7 @@ def load(beside, indptr, indices, data, targets, loads):
 def _sweep(
     count, first, row_start, value_start, rows, values, size, vertices, loads, x, rhs, y
 ):  # fmt: skip
-    """`sweep` of ``count`` panels and ``size`` unknowns; the other arguments are addresses."""
+    """Substitute in ``count`` panels of ``size`` unknowns like `sweep`; the rest are addresses."""
     first, vertices = integers(first, count + 1), integers(vertices, size)
     row_start, value_start = indices(row_start, count + 1), indices(value_start, count + 1)
     rows, values = integers(rows, row_start[count]), doubles(values, value_start[count])
@@ -187,7 +187,7 @@ def _sweep(
         store(y, WIDTH * at(vertices, i), load_row(x, WIDTH * i))
 
 
-# Compiled loops call it by address; otherwise it would be compiled again with each of them.
+# Compiled loops call `_sweep` by its address: otherwise each of them would compile it again.
 SWEEP = Callback(_sweep, types.void(*(types.intp,) * 12))
 _call = caller(types.void)
 

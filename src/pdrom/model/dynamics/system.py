@@ -12,12 +12,12 @@ from pdrom.model.dynamics import solvers
 
 DEFAULT_SOLVER = "supernodal"
 
-# Largest relative error of a solve; with a larger one, a body would move without any force.
+# Largest accepted relative error of a solve; with a larger one, a body would move without a force.
 ACCURACY = 1e-6
 
 
 class Elimination:
-    """The system with the vertices ``fixed`` eliminated; x, y, z have the same factorisation.
+    """Factored system without the vertices ``fixed``; x, y and z share one factorisation.
 
     Attributes
     ----------
@@ -60,8 +60,8 @@ def require_accurate(matrix, solve: Callable[[np.ndarray, np.ndarray], object]) 
     """Raise SolverError if ``solve`` does not reproduce a known solution for a ``matrix`` (n, n).
 
     ``solve`` gets a right-hand side (n, 3) and the array for the solution. The known solution is a
-    translation: the terms of all elements cancel, and those of inertia (and pins) remain. They are
-    the first to be lost if the matrix has large rounding errors.
+    translation, for which the terms of all elements cancel and those of inertia (and pins) remain.
+    If the matrix has large rounding errors, these remaining terms are the first to be lost.
     """
     if matrix.shape[0] == 0:
         return

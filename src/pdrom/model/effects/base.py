@@ -28,7 +28,7 @@ from pdrom.core.yamlfile import ConfigModel, describe, shown
 from pdrom.model.effects import EFFECTS
 from pdrom.model.mesh.types import Length, Mesh
 
-# A vertex inside an obstacle by at most this depth, relative to the mesh extent, only touches it.
+# A vertex inside an obstacle by at most this fraction of the mesh's longest side only touches it.
 TOUCHING = 1e-6
 
 
@@ -68,7 +68,7 @@ class EffectConfig(ConfigModel):
     def tilted(self, degrees: float, axes: Sequence[int], place: int) -> Self:
         """Return the effect; gravity is turned by ``degrees``, other effects do not change.
 
-        It turns towards the entry ``place`` of ``axes`` (0, 1, 2) without an axis along gravity.
+        It turns towards ``axes[place]`` (0, 1 or 2) after removal of an axis along gravity.
         """
         return self
 
@@ -106,7 +106,7 @@ class Start(Effect):
 class Force(Effect):
     """Effect that accelerates the vertices.
 
-    A position subspace supports accelerations a + c v with velocity v and rate c of each vertex.
+    In a position subspace, accelerations can only be a - c v, with constants a and c per vertex.
     """
 
     time_step: float
@@ -294,5 +294,5 @@ def held_path(
         known += 1
     paths = [b.path(frames[:known], q) for b, q in zip(active, current, strict=True)]
     if single:
-        return vertices, np.array(paths[0], order="C")  # a copy: code is compiled anew for views
+        return vertices, np.array(paths[0], order="C")  # for a view, Numba would compile code again
     return vertices, np.concatenate([np.empty((known, 0, 3)), *paths], axis=1)[:, first]

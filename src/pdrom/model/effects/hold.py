@@ -77,7 +77,7 @@ class Pins(Hold):
 
 
 class HandleConfig(HoldConfig):
-    """Motion of ``over`` frames from frame ``start``; then the vertices are held at rest."""
+    """Handle: vertices move for ``over`` frames from frame ``start``, then are held at rest."""
 
     over: Annotated[FrameNumber, Field(ge=1)]
 

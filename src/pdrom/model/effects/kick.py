@@ -10,7 +10,7 @@ from pdrom.model.mesh.types import Mesh
 
 
 class Kick(Start):
-    """Random initial velocity: combination of 1, x, y, z, xy, yz, zx in scaled coordinates, seeded.
+    """Random initial velocity: seeded combination of 1, x, y, z, xy, yz, zx (scaled coordinates).
 
     Low-degree polynomials excite slow motions of the whole body, without noise at the scale of
     elements.

@@ -10,7 +10,7 @@ from pdrom.model.effects.base import Contact, EffectConfig, Vector
 from pdrom.model.mesh.selection import require_direction, require_ordered
 from pdrom.model.mesh.types import Length, Mesh, PositiveLength
 
-# A vertex inside by at most this depth, relative to the mesh extent, counts as outside.
+# A vertex that is inside by at most this fraction of the mesh's longest side counts as outside.
 SLACK = 1e-9
 
 Entries = tuple[np.ndarray, np.ndarray, np.ndarray]
@@ -216,7 +216,7 @@ def _axis_vectors(axes: np.ndarray, signs: np.ndarray) -> np.ndarray:
     return np.eye(3)[axes] * signs[:, None]
 
 
-RINGS = 24  # number of intervals of a drawn sphere from pole to pole, half of those around it
+RINGS = 24  # intervals of a drawn sphere from pole to pole; there are twice as many around it
 # Corners of the faces of a drawn box; the bits of a corner's number are 1 on upper sides x, y, z.
 FACES = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
 

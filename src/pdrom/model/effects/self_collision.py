@@ -11,7 +11,7 @@ from pdrom.model.mesh.types import MAX_LENGTH, MIN_LENGTH, Mesh
 
 # Largest number of searches for close pairs per frame, and of passes over the pairs per search.
 SEARCHES, SWEEPS = 20, 100
-# Radius of the search for pairs, relative to the thickness; passes may bring such pairs closer.
+# Radius of the search for pairs, relative to the thickness: passes may bring farther pairs closer.
 REACH = 1.25
 # Passes end when no pair is closer than this fraction of the thickness.
 ENOUGH = 0.95

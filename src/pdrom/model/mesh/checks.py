@@ -76,7 +76,7 @@ def check_indices(cells: np.ndarray, vertices: int, kind: str, name: str) -> Non
 
 
 def check_range(points: np.ndarray, scale: float, name: str) -> None:
-    """Raise MeshError if coordinates or the extent, times ``scale``, are too large or too small.
+    """Raise MeshError if coordinates or the longest side, times ``scale``, are too large or small.
 
     Squares of such lengths would overflow or lose all digits.
 

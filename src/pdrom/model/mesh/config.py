@@ -117,9 +117,9 @@ class BarMesh(GeneratedMesh):
 
 
 class MeshFile(MeshModel):
-    """A mesh file, in the folder of its scene or below; formats with several files are excluded.
+    """A mesh file in the scene file's folder or below; formats with several files are excluded.
 
-    path : path relative to that folder, see also `below`
+    path : path of the mesh file, relative to the folder of the scene file
     """
 
     kind: Literal["file"]
@@ -137,7 +137,7 @@ class MeshFile(MeshModel):
         return value
 
     def below(self, folder: str) -> Self:
-        """Return the mesh with ``folder``, that of its scene, in front of the path."""
+        """Return the mesh with the scene's ``folder`` put in front of its path."""
         return self.model_copy(update={"path": f"{folder}/{self.path}"})
 
     def build(self, root: Path) -> Mesh:
@@ -173,7 +173,7 @@ class MeshFile(MeshModel):
         path = root / self.path
         try:
             inside = path.resolve().is_relative_to(root.resolve())
-        except (OSError, RuntimeError) as error:  # a cycle of symbolic links
+        except (OSError, RuntimeError) as error:  # raised for a cycle of symbolic links
             raise MeshError(f"mesh.path = '{self.path}': leads nowhere") from error
         if not inside:
             raise MeshError(f"mesh.path = '{self.path}': a link that leads out of {root.resolve()}")
@@ -185,7 +185,7 @@ class MeshFile(MeshModel):
 
 
 class GivenMesh(MeshModel):
-    """Mesh given as arrays from Python, which files of runs contain next to the configuration.
+    """Mesh given as arrays from Python; files of runs store these arrays with the configuration.
 
     blake2b : digest of the arrays, by which configurations of different meshes differ
     """

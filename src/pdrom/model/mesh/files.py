@@ -97,7 +97,7 @@ FORMATS = {
     ".vtu": ("vtu",),
     ".wkt": ("wkt",),
 }
-# A copy of the path of Python, since the workflow changes `sys.executable` to a shell command.
+# Path of Python, stored at import, since the workflow changes `sys.executable` to a shell command.
 PYTHON = sys.executable
 ADVICE = f"{VARIABLE}=2 in the environment doubles the limits"
 
@@ -142,7 +142,7 @@ def _arrays(path: Path, digest: str, limits: MeshLimits) -> tuple[np.ndarray, np
     # -P: modules in the folder of the script must not shadow the standard library
     command = [PYTHON, "-P", "-X", "utf8", "-W", "ignore", reader.__file__, str(path)]
     command += [",".join(FORMATS[path.suffix.lower()]), *map(str, numbers)]
-    # one thread each: threads of the linear algebra libraries, unused here, would reserve memory
+    # allow one thread per linear algebra library: more threads, unused here, would reserve memory
     single = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
     try:
         ended = subprocess.run(

@@ -174,7 +174,7 @@ class CutError(UnreadableError):
 
 
 def only_kind(kinds: Iterable[str]) -> str:
-    """Return the kind of all cells; `RefusedError` if ``kinds`` has none, several or others."""
+    """Return the one kind in ``kinds``; `RefusedError` if none, several, or not in `CORNERS`."""
     found = list(dict.fromkeys(kinds))
     if len(found) != 1 or found[0] not in CORNERS:
         raise RefusedError(
@@ -249,8 +249,8 @@ def check_before(name: str, content: bytes) -> None:
     CutError
         The end mark of this format is missing.
     UnreadableError
-        The reader would ignore a line that changes the mesh, or the numbers of vertices that are
-        listed in another order.
+        The reader would ignore a line that changes the mesh, or the numbers given to vertices,
+        which are not in ascending order.
     """
     binary = name == "stl" and 84 + 50 * int.from_bytes(content[80:84], "little") == len(content)
     if name in ENDS and not binary and not re.search(ENDS[name], content, re.M):
@@ -284,7 +284,7 @@ def check_after(name: str, content: bytes, mesh: Any) -> None:
         counts = re.findall(rb"^[ \t]*(?:NELEM|MARKER_ELEMS)[ \t]*=[ \t]*(\d+)", content, re.M)
         announced = {sum(map(int, counts))}
     elif name == "vtk":
-        offsets = content.startswith(b"# vtk DataFile Version 5")  # counts one offset too many
+        offsets = content.startswith(b"# vtk DataFile Version 5")  # its CELLS number is one larger
         counts = re.findall(rb"^(CELLS|CELL_TYPES)[ \t]+(\d+)", content, re.M)
         announced = {int(count) - (offsets and word == b"CELLS") for word, count in counts}
     if announced - {there}:
@@ -318,7 +318,7 @@ def without_faces(cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
 
     def number(triangles: np.ndarray) -> np.ndarray:
         a, b, c = np.sort(triangles.astype(np.int64), axis=1).T
-        return (a * size + b) * size + c  # 64 bits are enough for a million vertices
+        return (a * size + b) * size + c  # an integer per face; 64 bits suffice for 10^6 vertices
 
     known = np.isin(number(cells["triangle"]), number(faces)).all()
     return {"tetra": cells["tetra"]} if known else cells
@@ -392,7 +392,7 @@ class _Bytes(_Noticing, io.BufferedReader):
 
     def read(self, size: int | None = -1, /) -> bytes:
         content = super().read(size)
-        # not for reads of the whole file or of large pieces, which may reach past the end
+        # only small reads are recorded: those of the whole file or large pieces may exceed its end
         if size and len(content) < size < PIECE:
             self.note()
         return content
@@ -412,7 +412,7 @@ def read_obj(path: Path) -> tuple[np.ndarray, np.ndarray]:
     Raises
     ------
     UnreadableError
-        A statement is unknown, a corner of a face no integer, or a number invalid.
+        A statement is unknown, a corner of a face is no integer, or a number is invalid.
     """
     # comments are removed first, as a backslash at their end does not continue the line
     content = re.sub(rb"#[^\n]*", b"", path.read_bytes())

@@ -200,7 +200,7 @@ SIDES = {
     "back": (2, -1),
     "front": (2, 1),
 }
-TOLERANCE = 1e-6  # tolerance of coordinates of a side, relative to the mesh extent
+TOLERANCE = 1e-6  # tolerance of coordinates of a side, relative to the mesh's longest side
 
 
 def select_vertices(mesh: Mesh, selection: Selection) -> np.ndarray:
@@ -253,7 +253,7 @@ def _part(
     graph = sparse.coo_array((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(n, n))
     labels = csgraph.connected_components(graph, directed=False)[1][among]
     parts = [among[labels == label] for label in np.unique(labels)]
-    # rounded, so that sizes that are equal by symmetry are equal on every machine
+    # sizes are rounded, so that those equal by symmetry are equal on every machine
     parts.sort(key=lambda part: (-round(float(sizes[part].sum()) / mesh.extent, 9), part[0]))
     if index >= len(parts):
         raise SceneError(f"selection {what}: index = {index}, the mesh has {len(parts)}")
@@ -279,5 +279,5 @@ def farthest_points(points: np.ndarray, candidates: np.ndarray, count: int) -> n
 
 
 def _distance(points: np.ndarray, point: np.ndarray) -> np.ndarray:
-    # rounded, so that distances that are equal by symmetry are equal on every machine
+    # distances are rounded, so that those equal by symmetry are equal on every machine
     return np.round(np.linalg.norm(points - point, axis=1), 12)

@@ -23,16 +23,18 @@ from pdrom.reduction.subspace.model import SubspaceModel
 from pdrom.reduction.subspace.space import projector
 
 WINDOW = 5  # number of differences of iterates that Anderson acceleration combines
-# Full-order cost in ns: of a projection over its squared number of rows, of an entry of the factor,
-# of acceleration per vertex and iteration; of a compiled frame, and extra if computed in Python.
+# Full-order cost in ns: a projection takes PROJECTION times its squared number of rows, an entry of
+# the factor ENTRY, acceleration ACCELERATED per vertex and iteration, a frame in Python IN_PYTHON
+# more than a compiled FRAME.
 PROJECTION, ENTRY, ACCELERATED = 5.0, 0.9, 6.5
 FRAME, IN_PYTHON = 2.3e4, 1.2e5
-# Reduced cost in ns: of a projection, of an entry of a dense product, of the rest of an iteration.
+# Reduced cost in ns: a projection takes SAMPLED times its squared number of rows, an entry of a
+# dense product DENSE, the rest of an iteration ITERATION.
 SAMPLED, DENSE, ITERATION = 12.5, 0.23, 1.2e3
 REDUCED_FRAME, REDUCED_IN_PYTHON = 4e4, 2.3e5
-# A Cholesky factor is estimated to have FILL n log2 N entries; the matrix has n, in N rows.
+# Estimated number of entries of the Cholesky factor: FILL n log2 N for n entries in N rows.
 FILL = 0.35
-# Size of the random shift of a perturbed start, relative to the mesh extent, and its seed.
+# Size of the random shift of a perturbed start, relative to the mesh's longest side, and its seed.
 MOVED, SEED = 1e-10, 0
 CONVERGED, MOST = 80, 320  # iterations of a reference: CONVERGED at first, doubled up to MOST
 Quantity = Literal["position", "velocity"]
@@ -70,7 +72,7 @@ class Level:
 
     @property
     def exact(self) -> "Level":
-        """More accurate full-order level with which frames of this level are compared."""
+        """Full-order level, more accurate than this one, whose frames check those of this level."""
         return Level(CONVERGED if self.model is not None else 2 * self.iterations, WINDOW)
 
     def scene(self, scene: Scene) -> Scene:
@@ -103,7 +105,7 @@ class Trajectory:
 
     Parameters
     ----------
-    moved : whether the initial positions are perturbed by `MOVED` times the mesh extent
+    moved : whether to perturb the initial positions by `MOVED` times the mesh's longest side
     on_frame : callback after each frame
 
     Attributes
@@ -152,7 +154,7 @@ class Trajectory:
 
         Returns
         -------
-        The defect of the frame: the distance, m, between the two results.
+        The defect (error made in one frame): the distance, m, between the two results.
         """
         frame = self.frames
         before = State(self.ends[-1], self._of_vertices(self._state.velocities))
@@ -179,7 +181,7 @@ def relative_errors(
 ) -> np.ndarray:
     """Return relative errors (F',) over the first 1, 2, ..., F' frames of a run.
 
-    They are relative to the norm of the reference's displacement. Velocities are differences of
+    Errors are divided by the norm of the reference's displacement. Velocities are differences of
     frames. An error is infinite if the run is not finite, or differs from a reference at rest.
 
     Parameters

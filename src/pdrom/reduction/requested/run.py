@@ -35,14 +35,14 @@ Count = Annotated[int, Field(ge=1, le=10_000)]
 # Seed of the second motion on which levels are calibrated, a random variation of the training one
 # (`HeldOut.further`). The motions that train reductions have smaller seeds.
 CALIBRATED = 100
-# An error counts as unknown if the frames in which it is known are fewer than this fraction.
+# An error counts as unknown unless it can be estimated in at least this fraction of the frames.
 JUDGED = 0.1
 PROBED = 6  # number of frames of a calibration run in which the defect is computed
 CHECKS = 2  # smallest number of checked frames of a run
 # A reduction is run only if its estimated cost, with checks, is less than this fraction of the full
 # order's cost. A larger fraction would be within the error of the estimates.
 WORTH = 2.0 / 3.0
-# A run whose extent exceeds this multiple of the mesh extent counts as blown up.
+# A run counts as blown up if its bounding box is larger than that at rest by more than this factor.
 BLOWUP_EXTENT = 100.0
 SLOW = "the iterations converge too slowly after it"
 ROUNDOFF = "round-off decides after it"
@@ -67,10 +67,7 @@ class Request(ConfigModel):
 def read_request(wish: object, source: str = "error") -> Request:
     """Read a requested tolerance: a `Request`, a number, or text such as "velocity=0.05".
 
-    Raises
-    ------
-    ConfigurationError
-        ``wish`` has an unknown quantity or no number between 0 and 1; the message names ``source``.
+    ConfigurationError, naming ``source``, for an unknown quantity or no number between 0 and 1.
     """
     if isinstance(wish, Request):
         return wish
@@ -119,7 +116,7 @@ class Calibrated:
 
     work : estimated cost of a frame, ns
     errors : for each motion, relative errors (F,) over the first 1, ..., F frames
-    defect : largest defect of a frame, relative to the root mean square displacement of the motion
+    defect : largest error made in one frame, relative to the motion's root mean square displacement
     ms : processor time of a frame of the first motion, ms
     """
 
@@ -143,15 +140,15 @@ class Outcome:
     frames : number of first frames over which the estimated error is within the tolerance; 0 if no
         level can meet it: the most accurate full-order level has run instead
     limit : reason why later frames are not within the tolerance; empty if all frames are
-    expected : error of the chosen level on the motions of the calibration, times the factor
-    estimate : estimated error over these frames, times the factor; None if ``frames`` is 0
+    expected : error of the chosen level on the motions of the calibration, times the safety factor
+    estimate : estimated error over these frames, times the safety factor; None if ``frames`` is 0
     level : title of the level that computed the positions
     reduced : whether that level is a reduced model
     failed : titles of the levels that were run before and did not meet the tolerance
     checks : numbers of the frames that were checked
     seconds : processor time of all computed frames, without preparations before the first one
-    full_ms : processor time of a frame of the cheapest full order that meets the tolerance in the
-        calibration, without checks
+    full_ms : processor time, ms, of a frame, without checks, by the cheapest full-order level that
+        meets the tolerance in the calibration
     """
 
     positions: np.ndarray
@@ -176,7 +173,8 @@ class Outcome:
 class Calibration:
     """Calibrated ``levels``, ordered by work, and the reference ``motions`` they were run on.
 
-    All errors are those of one quantity. Tolerances may not be below that of the calibration.
+    All errors are those of positions, or of velocities. A tolerance may not be below that of the
+    calibration.
     """
 
     levels: list[Calibrated]
@@ -190,16 +188,20 @@ class Calibration:
         return max(full, key=lambda each: (each.level.iterations, each.level.window))
 
     def horizon(self, error: float) -> tuple[int, str]:
-        """Number of first frames in which ``error`` can be judged, and the reason of the limit."""
+        """Number of first frames in which an error of ``error`` can be measured; reason of the end.
+
+        It ends where the reference runs are less accurate, or rounding errors decide.
+        """
         least = error / self.settings.factor
         converged = min(levels.last_within(motion.unconverged, least) for motion in self.motions)
         sharp = min(levels.last_within(motion.sensitivity, least) for motion in self.motions)
         return min(converged, sharp), ROUNDOFF if sharp < converged else SLOW
 
     def expected(self, level: Calibrated, error: float) -> float:
-        """Largest error of ``level`` on all motions before `horizon`, times the safety factor.
+        """Largest error of ``level`` on all motions, times the safety factor, up to the `horizon`.
 
-        It is at least the error of the reference runs, and infinite if the horizon is too short.
+        It is at least the error of the reference runs. It is infinite if errors can be measured in
+        too few frames (`JUDGED`).
         """
         end, _ = self.horizon(error)
         if end < max(JUDGED * self.motions[0].scene.config.frames, 1):
@@ -208,7 +210,7 @@ class Calibration:
         return self.settings.factor * float(max(errors[end - 1] for errors in known))
 
     def admissible(self, error: float) -> list[Calibrated]:
-        """Levels with an expected error of at most ``error``; none if no full-order level is."""
+        """Levels with an expected error of at most ``error``; none if all of them are reduced."""
         good = [each for each in self.levels if self.expected(each, error) <= error]
         return good if any(not each.reduced for each in good) else []
 
@@ -218,9 +220,9 @@ class Calibration:
         return next(full, self.most_accurate)
 
     def second(self, level: Calibrated, error: float) -> Calibrated:
-        """Cheapest other level of this kind, expected error at most ``error`` times the factor.
+        """Level with which a run of ``level`` is compared: the cheapest other one of its kind.
 
-        Return ``level`` itself if there is none.
+        Its expected error is at most ``error`` times the safety factor; ``level`` if there is none.
         """
         most = error * self.settings.factor
         alike = [each for each in self.levels if each.reduced == level.reduced]
@@ -230,8 +232,8 @@ class Calibration:
     def attempts(self, error: float) -> list[Calibrated]:
         """Levels to run in turn until one meets the tolerance ``error``.
 
-        These are the cheapest reduction, if it is cheaper in spite of its second run and checks,
-        the cheapest full-order level, and the most accurate one; only this if none is admissible.
+        First the cheapest reduction, if it saves time even with its second run and checks, then the
+        cheapest admissible full-order level, if there is one, last the most accurate one.
         """
         full = self.full_order(error)
         most = WORTH * (full.work + self.second(full, error).work)
@@ -288,8 +290,9 @@ class CheckedRun:
     def _estimated(self, level: Calibrated) -> tuple[Trajectory, np.ndarray]:
         """Run ``level`` until it ends or a check fails; return the run and estimated errors (F,).
 
-        The expected error is multiplied by the ratio of the run's root mean square defect to that
-        of the calibration, if above 1. All errors are inf if none is known or a check failed.
+        The expected error is multiplied by the root mean square of the run's defects (errors made
+        in one frame) over that of the calibration, if above 1. Errors are inf if none is known or a
+        check failed.
         """
         own, frames, full = self._own, self._frames, self._own.full_order(self._error).level
         largest = BLOWUP_EXTENT * self._scene.mesh.extent
@@ -302,7 +305,7 @@ class CheckedRun:
         for frame in check_frames(frames, frames // own.settings.every if level.reduced else 0):
             run.to(frame).check(exact)
             size = np.sqrt(np.mean(np.square(list(run.defects.values())))) / own.motions[0].unit
-            with np.errstate(divide="ignore", invalid="ignore"):  # defects may be zero
+            with np.errstate(divide="ignore", invalid="ignore"):  # errors of frames may be zero
                 estimate = expected * float(np.fmax(1.0, np.divide(size, level.defect)))
             if not (estimate <= self._error and np.ptp(run.ends[-1], axis=0).max() <= largest):
                 return run, hopeless
@@ -409,11 +412,7 @@ def transferred(trained: Scene, scene: Scene) -> Scene:
 
     Errors of levels depend on these, so that the calibration uses those of the scene to be run.
     Held vertices, their paths and the initial velocity remain those of ``trained``.
-
-    Raises
-    ------
-    ConfigurationError
-        ``scene``, which the message names, has another mesh or other constraint groups.
+    ConfigurationError, naming ``scene``, if it has another mesh or other constraint groups.
     """
     mesh, own = trained.mesh, scene.mesh
     alike = [

@@ -42,7 +42,7 @@ class Selection(ABC):
         return oversample(v, size, chosen, count=count)
 
 
-# Residuals with a relative difference below this may count as equal, see `tie_weights`.
+# Residuals that differ by less than this fraction may count as equal; the first one is then chosen.
 TIE = 1e-6
 
 
@@ -126,8 +126,8 @@ def joint_rows(v: np.ndarray, active: tuple[bool, ...], repeat: bool) -> np.ndar
     For mode k each axis a has its own system (P^T V_a) c_a = P^T v_{k,a}, where P^T selects rows.
     The row with the largest sum of squared residuals of the axes (times `tie_weights`) is selected
     for all axes. As it may be useless for one axis, that system may be singular: it is solved in
-    the least-squares sense. With ``repeat`` a row may be selected again, as in the published code;
-    without it, the result has at most as many entries as the basis has rows.
+    the least-squares sense. With ``repeat`` a row may be selected again, as in the program of the
+    preprint's authors; without it, the result has at most as many entries as the basis has rows.
 
     Parameters
     ----------
@@ -141,7 +141,8 @@ def joint_rows(v: np.ndarray, active: tuple[bool, ...], repeat: bool) -> np.ndar
 def _greedy(parts: Sequence[np.ndarray], total: int, count: int, repeat: bool) -> np.ndarray:
     """Select ``count`` of ``total`` blocks of rows by residuals of the modes, the largest first.
 
-    Each of ``parts`` of the modes, such as one axis, has its own coefficients and equal blocks.
+    ``parts`` are the modes, or their rows of each axis. Each part is fitted by coefficients of its
+    own, and is divided into ``total`` blocks of rows; squared residuals of all parts are added.
     """
     fits = [(np.asfortranarray(part), GrowingFit(part.shape[1])) for part in parts]
     weights = tie_weights(total) ** 2

@@ -38,8 +38,8 @@ def bound_gain(v: np.ndarray, size: int, elements: np.ndarray, bound: float) -> 
     """Extend ``elements`` until the gain || (P^T V)^+ ||_2 of their rows is at most ``bound``.
 
     Return all elements if even these do not meet the bound. With orthonormal columns all elements
-    have the gain 1, so that every bound of at least 1 can be met. Arguments ``v``, ``size`` and
-    errors raised are those of `oversample`.
+    have the gain 1, so that every bound of at least 1 can be met. The basis ``v`` (size e, r) has
+    ``size`` rows for each element. SamplingError if an element is repeated or out of range.
     """
     growing = _Growing(v, size, elements)
     while len(growing.picked) < growing.total and growing.gain > bound:
@@ -74,7 +74,7 @@ class _Growing:
 
     @property
     def gain(self) -> float:
-        """Gain 1 / sigma_min(P^T V); inf if the smallest eigenvalue of G is round-off."""
+        """Amplification of errors 1 / sigma_min(P^T V); inf if G is singular up to round-off."""
         roundoff = len(self._gram) * np.finfo(float).eps * np.trace(self._gram)
         return 1.0 / np.sqrt(self._smallest) if self._smallest > roundoff else np.inf
 
@@ -118,7 +118,7 @@ class _Growing:
         return int(others[np.argmax(growth)]) if growth.max(initial=0.0) > bound else first
 
     def _growth_at_most(self, elements: np.ndarray, products: np.ndarray) -> np.ndarray:
-        """Upper bounds on `eigenvalue_growth` of ``elements``, from small products only."""
+        """Upper bounds on `eigenvalue_growth` of ``elements``, from products B B^T without B."""
         products = products[elements]
         squared = np.einsum("es,es->e", products, products)
         stretched = np.einsum("est,et->es", self._squares[elements], products)
@@ -153,8 +153,8 @@ def eigenvalue_growth(
 
     Parameters
     ----------
-    blocks : (m, s, r) matrices B of m candidates
-    products : (m, s) vectors b = B u of the candidates
+    blocks : (m, s, r) matrices B of m elements that may be added
+    products : (m, s) vectors b = B u of these elements
     weakest : (r,) the unit vector u
     gap : g >= 0
     """
@@ -166,7 +166,7 @@ def eigenvalue_growth(
 
 
 def _smaller_root(squared: np.ndarray, beside: np.ndarray, gap: float) -> np.ndarray:
-    """Smaller root t (m,) of the quadratic in `eigenvalue_growth`; |b|^2, c and g as there."""
+    """Smaller root t (m,) of t^2 - (g + n) t + g |b|^2, n = |b|^2 + c, from |b|^2, c and g."""
     if np.isinf(gap):
         return squared
     mean = squared + beside

@@ -8,7 +8,7 @@ from pdrom.reduction.sampling.deim import Selection, block_elements, deim_entrie
 
 
 class Greedy(Selection):
-    """DEIM by entries or elements; samples for more modes extend those for r modes."""
+    """DEIM by entries or elements; the samples for r modes begin with those for fewer modes."""
 
     def one_a_mode(self, v: np.ndarray, size: int, ranks: Sequence[int]) -> dict[int, np.ndarray]:
         path = deim_entries(v) if size == 1 else block_elements(v, size)

@@ -23,7 +23,7 @@ from pdrom.model.scene import Scene
 from pdrom.reduction.rerun import Rerun, compare
 from pdrom.reduction.sampling.reduction import Reduction
 
-SPLIT_FROM = 1 << 17  # a lift with N r at least this large is computed in two parts of its rows
+SPLIT_FROM = 1 << 17  # with at least this many vertices times modes, S^T W V c has two parts
 
 # Indices into the kernel's record, an array of integers: numbers of modes, sets, columns, sampled
 # values; addresses of the sampler and of its record, then of the arrays of `Lift` and the clocks.
@@ -34,9 +34,9 @@ AXES, OWN_SETS, LIFTED, OFFSET, SECONDS, PROJECTIONS, CLOCK, SIZE = range(OWN + 
 
 @dataclass(frozen=True)
 class Lift:
-    """Arrays of a reduced local step, for r modes, N vertices, c columns; "set": of coefficients.
+    """Arrays of a reduced local step with r modes, N vertices and c columns of the reconstruction.
 
-    starts : (sets + 1,) index at which the sampled entries of each set begin
+    starts : (sets + 1,) index at which the sampled entries of each set of coefficients begin
     positions : index of each sampled entry in the projections of the sampled elements
     packed : working memory for the sampled entries of one set
     operators : solution operators (r, m) of all sets, flattened, one after the other
@@ -180,7 +180,7 @@ def _accumulate(y, rhs_place, record, part):
 
 
 class ReducedLocalStep:
-    """Local step that evaluates sampled elements and adds the reconstruction of all to the rhs.
+    """Local step that evaluates sampled elements and adds a reconstruction of S^T W p to rhs.
 
     Before the run, the offset S^T W mean (N, 3), the reconstruction S^T W V for each set of
     coefficients and the solution operators are computed. Online steps are the projections of the
@@ -295,7 +295,7 @@ def rerun(
     blowup_extent: float,
     offset: np.ndarray | None = None,
 ) -> Rerun:
-    """Run a scene with other local steps and compare it with its full-order trajectory.
+    """Run a scene with given local steps and compare it with its full-order trajectory.
 
     Parameters
     ----------
@@ -319,9 +319,9 @@ def rerun_reduced(
     system: GlobalSystem | None = None,
     offset: np.ndarray | None = None,
 ) -> Rerun:
-    """Run a scene with the projections of ``group`` reduced; arguments as in `rerun`.
+    """Run a scene with the projections of ``group`` reduced; compare it with the full-order run.
 
-    ``reduction`` evaluates the projections; ``system`` defaults to the scene's own.
+    ``reduction`` replaces the projections, ``system`` is by default the scene's; see also `rerun`.
     """
     steps = replace_group(scene, group, ReducedLocalStep(scene.group(group), reduction))
     return rerun(scene, system or scene.system, steps, reference, blowup_extent, offset)

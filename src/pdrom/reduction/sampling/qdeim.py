@@ -7,7 +7,7 @@ import numpy as np
 from pdrom.reduction.sampling.deim import Selection, tie_weights
 
 EPS = np.finfo(float).eps
-# Number of candidate rows per mode; it is doubled if fewer than FEW pivots are found among them.
+# Pivots are searched among this many rows per mode; twice as many if fewer than FEW are found.
 ROWS_A_MODE, FEW = 2, 8
 
 
@@ -16,7 +16,7 @@ def qdeim_elements(v: np.ndarray, size: int) -> np.ndarray:
 
     Pivots are chosen among the columns of V^T, in groups of the ``size`` columns of an element.
     The group with the largest Frobenius norm (times `tie_weights`) is selected, and the direction
-    in R^r that dominates it is projected out of all groups. For ``size`` 1 this is the paper's
+    in R^r that dominates it is projected out of all groups. For ``size`` 1 this is the published
     method. For larger sizes, projecting out the whole group would exhaust R^r after about r / size
     elements; one direction per element gives as many elements as modes, like the greedy selection.
     The removed directions are orthonormal and lie in the span of the selected groups, so
@@ -51,7 +51,10 @@ class _Left:
         self._error = self._rounding(self._squares)
 
     def pick_among(self, count: int, most: int) -> int:
-        """Add pivots among ``count`` candidates, up to ``most`` in all; return the number added."""
+        """Add pivots among the ``count`` elements with the largest bounds; return their number.
+
+        At most ``most`` pivots are selected in all.
+        """
         candidates, rest = self._highest(count)
         left = self._rows.reshape(self.total, self._size, -1)[candidates]
         left = left.reshape(len(candidates) * self._size, -1)

@@ -20,7 +20,7 @@ def solution_operator(a: np.ndarray, solve: Solve, tikhonov: float) -> np.ndarra
     ``solve`` is one of these methods:
     square : A^-1; nan if A is not square or singular to working precision, so that a run blows up
     qr : least squares A^+ by a QR factorisation; nan if A has not full column rank
-    tikhonov : (A^T A + t I)^-1 A^T, the normal equations of the published code; t is ``tikhonov``
+    tikhonov : (A^T A + t I)^-1 A^T with t = ``tikhonov``, as in the preprint authors' program
     """
     if solve == "tikhonov":
         gram = a.T @ a + tikhonov * np.eye(a.shape[1])
@@ -121,11 +121,11 @@ class Block:
 
 
 class Reduction:
-    """Interpolation (or projection) of projections by a method with r modes.
+    """Approximation of a group's projections by r modes, from sampled entries or from all of them.
 
-    An axis whose training data are round-off has zero coefficients and does not enter the gain:
-    methods with a system per axis, as published, would divide round-off by round-off there. A
-    singular system of any other axis is a failure of the method: the gain is inf and the
+    An axis whose training data are round-off has zero coefficients and does not enter the gain (the
+    amplification of errors): the preprint's method would divide round-off by round-off there. If
+    the system of any other axis is singular, the method fails: the gain is inf and the
     reconstruction nan.
 
     Attributes
@@ -169,7 +169,9 @@ class Reduction:
 
     @property
     def gain(self) -> float:
-        """|| (P^T V)^+ ||_2 with sampled rows P^T V, the largest of all blocks; inf if singular.
+        """Amplification of errors || (P^T V)^+ ||_2, P^T V the sampled rows; inf if singular.
+
+        With several sets of coefficients it is the largest.
 
         For orthonormal V the reconstruction p^ of p satisfies || p - p^ || <= gain
         || (I - V V^T)(p - mean) || (Chaturantabut and Sorensen 2010, lemma 3.2), also for separate
@@ -183,7 +185,7 @@ class Reduction:
 
     @property
     def condition(self) -> float:
-        """Condition number of the sampled rows P^T V, the largest of all blocks."""
+        """Condition number of the sampled rows P^T V, the largest of all sets of coefficients."""
         return self._norms[1]
 
     @property
@@ -209,12 +211,8 @@ def select(basis: Basis, spec: MethodSpec, r: int) -> Sampling:
 def select_path(basis: Basis, spec: MethodSpec, ranks: Sequence[int]) -> dict[int, Sampling]:
     """Select samples of ``basis`` by the method ``spec`` for each number r of modes in ``ranks``.
 
-    Greedy samples are nested in r, except those in excess of r, which depend on all r modes.
-
-    Raises
-    ------
-    RankError
-        If an r is below 1 or exceeds the numerical rank of the basis.
+    Greedy samples for r modes begin with those for fewer modes; samples beyond one per mode depend
+    on all r modes. RankError if an r is below 1 or exceeds the numerical rank of the basis.
     """
     if not ranks:
         return {}

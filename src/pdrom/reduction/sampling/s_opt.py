@@ -34,7 +34,7 @@ def s_opt_path(v: np.ndarray, size: int) -> np.ndarray:
     Raises
     ------
     SamplingError
-        A mode depends on the earlier modes at the sampled rows, whichever element is added.
+        A mode depends on the earlier modes at the sampled rows, whichever element is added to them.
     """
     state = _Sampled(v, size)
     for mode in range(min(v.shape[1], state.total)):
@@ -43,7 +43,7 @@ def s_opt_path(v: np.ndarray, size: int) -> np.ndarray:
 
 
 class SOpt(Selection):
-    """S-OPT: one element per mode, nested in r; further elements by the S-measure, too."""
+    """S-OPT: one element per mode (nested selections), then further ones, all by the S-measure."""
 
     def one_a_mode(self, v: np.ndarray, size: int, ranks: Sequence[int]) -> dict[int, np.ndarray]:
         path = s_opt_path(v, size)
@@ -101,14 +101,14 @@ class _Sampled:
         """
         if not self.picked and mode is not None:
             return int(np.argmax(self._squares[:, mode]))
-        shifted = self._products + np.eye(self._products.shape[1])  # I + M of the class docstring
+        shifted = self._products + np.eye(self._products.shape[1])  # I + M, M = B G^-1 B^T
         modes, residual = self._modes, np.ones(self.total)
         if mode is not None:
             z, q = self._residual()
             solved = np.linalg.solve(shifted, z[:, :, None])[:, :, 0]
             modes, residual = mode + 1, q + np.maximum(np.einsum("es,es->e", z, solved), 0.0)
         possible = residual > DEPENDENT**2
-        # a determinant is at least 1, smaller ones are round-off
+        # det(I + M) is at least 1; a smaller value is round-off
         determinants = np.maximum(np.linalg.slogdet(shifted)[1], 0.0)
         columns = self._squares[self.picked, :modes].sum(axis=0) + self._squares[:, :modes]
         measure = np.full(self.total, -np.inf)

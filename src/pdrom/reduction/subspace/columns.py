@@ -20,7 +20,7 @@ from pdrom.reduction.basis import fix_signs, pod
 # A column is dropped if its part orthogonal to the earlier ones is below this fraction of it.
 DEPENDENT = 1e-9
 
-# Relative tolerance at which the POD modes of an atom's non-affine motion are truncated.
+# Relative error up to which POD modes represent the non-affine motion of vertices fixed together.
 OWN_MOTION = 1e-3
 
 # Motion smaller than this fraction of the positions counts as round-off.
@@ -84,8 +84,8 @@ def build_columns(
 ) -> Columns:
     """Build a subspace from ``modes`` (N, k) of the free vertices and own columns of each atom.
 
-    An atom has affine columns and, if its motion in ``trajectory`` (n, N, 3) m is not affine, POD
-    modes of the remainder, truncated at the relative error `OWN_MOTION`.
+    Each of ``atoms``, vertices fixed and released together, gets affine columns. If its motion in
+    ``trajectory`` (n, N, 3) m is not affine, POD modes of the rest are added (`OWN_MOTION`).
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ def orthonormal(columns: np.ndarray) -> np.ndarray:
     for column in columns.T:
         norm = np.linalg.norm(column)
         rest = column.copy()
-        for _ in range(2):  # two passes suffice (Kahan and Parlett)
+        for _ in range(2):  # the second pass removes the first one's round-off (Kahan and Parlett)
             for other in kept:
                 rest -= other * (other @ rest)
         if norm > 0.0 and np.linalg.norm(rest) > DEPENDENT * norm:

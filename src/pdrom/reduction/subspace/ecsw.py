@@ -6,8 +6,9 @@ weight the element in the system matrix and in the right-hand side. The reduced 
 again a projective-dynamics problem, with weights xi_e w_e >= 0. Whatever the factors, its objective
 cannot rise in an iteration: they affect the accuracy, not the stability.
 
-Training iterates come from a run in the position subspace with all projections. One iteration from
-z to z', A z' = (M/h^2) s + sum_e B^T S_e^T w_e p_e(B z), can be written as
+Training iterates come from a run in the position subspace q = B z with all projections. One
+iteration from z to z', A z' = (M/h^2) s + sum_e B^T S_e^T w_e p_e(B z), with the system matrix A,
+masses M and prediction s in coordinates of the subspace and the time step h, can be written as
 sum_e g_e = (M/h^2)(s - z') with g_e = B^T S_e^T w_e (S_e B z' - p_e(B z)). Sampled elements whose
 factors satisfy sum_e xi_e g_e = sum_e g_e map z to the same z'. The factors are therefore fitted to
 the pairs (z, z') of a run. A residual r of the equations changes the next iterate by A^-1 r and
@@ -49,7 +50,7 @@ Norm = Literal["energy", "response"]
 class TrainingFrame:
     """Iterates of one frame of the training run.
 
-    start : (K, 3) coordinates at the frame's beginning, for data computed once per frame
+    start : (K, 3) subspace coordinates at the frame's start, for data computed once per frame
     pairs : (n, 2, K, 3) coordinates before and after each iteration
     measure : (K', K) matrix; |measure r| is the size of a residual r in the chosen norm, "energy":
         |measure r|^2 = r^T A^-1 r, J; "response": |M^1/2 x|^2 for the response x, kg m^2. The K'
@@ -119,7 +120,7 @@ class _Watched(SubspaceLocalStep):
 
 
 def _measure(space: ReducedSpace, fixed: np.ndarray, norm: Norm, frames: int) -> np.ndarray:
-    """`TrainingFrame.measure` (K', K) for ``fixed`` coordinates and a run of ``frames`` frames."""
+    """Matrix (K', K), K' of K coordinates not ``fixed``: |matrix r| is residual r in ``norm``."""
     size = len(space.matrix)
     free = np.setdiff1d(np.arange(size), fixed)
     block, inertia = (m[np.ix_(free, free)] for m in (space.matrix, space.inertia_matrix))
@@ -139,8 +140,8 @@ def _measure(space: ReducedSpace, fixed: np.ndarray, norm: Norm, frames: int) ->
 # Training equations are hashed to SKETCH rows per coordinate of the subspace. There must be several
 # times more rows than selected elements, or the factors would fit the random hashing.
 SKETCH = 60
-# First and largest number of candidate elements. The equations of all elements of a large mesh
-# would not fit into memory, and neighbouring elements are similar.
+# First and largest number of elements among which samples are chosen: the equations of all elements
+# of a large mesh would not fit into memory, and neighbouring elements are similar.
 CANDIDATES, MOST = 10_000, 20_000
 SEED = 0
 
@@ -150,8 +151,8 @@ def ecsw_elements(
 ) -> list[tuple[np.ndarray, np.ndarray]]:
     """Select elements (m,) and their factors xi > 0 (m,) for each tolerance.
 
-    In a large group the candidates are a random (seeded) subset, which is doubled, up to `MOST`,
-    until all tolerances are met. They always approximate the sum over all elements.
+    In a large group they are chosen from a random (seeded) subset, which is doubled, up to `MOST`,
+    until all tolerances are met. They always approximate the sum over all elements of the group.
 
     Parameters
     ----------
@@ -176,7 +177,7 @@ def ecsw_elements(
 def training_equations(
     group: ConstraintGroup, columns: Columns, training: Training, elements: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return m equations, one column per element: (m, len(elements)); and sums over all (m,).
+    """Return m equations (m, len(elements)), one column per element; and sums (m,) over all.
 
     For each pair (z, z') of iterates and each coordinate there is one equation with the entries
     g_e = B^T S_e^T w_e (S_e B z' - p_e(B z)), multiplied by `TrainingFrame.measure`. All are scaled
@@ -199,7 +200,7 @@ def training_equations(
         own = np.ascontiguousarray(lifted.reshape(shape)[elements])
         for frame in frames:
             group.begin_frame(columns.B @ frame.start)
-            # all iterates of a frame at once, side by side: one pass over each large matrix
+            # one pass over each large matrix serves all iterates of a frame, put side by side
             before, after = (np.hstack(list(frame.pairs[:, i])) for i in range(2))
             positions, differences = columns.B @ before, strain @ after
             for pair in range(0, differences.shape[1], 3):
@@ -227,7 +228,8 @@ def training_equations(
 def _hash_equations(lifted, differences, buckets, signs, out):
     """Add the equations of each element to the rows ``buckets`` of ``out``, times ``signs``.
 
-    lifted : (m, p, K'), differences : (m, p, n), buckets, signs : (K', n), out : (m, size)
+    Equation (k, n) of element e is the product of lifted[e, :, k] and differences[e, :, n]. Shapes:
+    lifted (m, p, K'), differences (m, p, n), buckets and signs (K', n), out (m, size).
     """
     for e in range(out.shape[0]):
         for k in range(lifted.shape[2]):
@@ -243,7 +245,8 @@ log = logging.getLogger(__name__)
 # A unit column depends on the active columns if its part orthogonal to them is below this.
 DEPENDENT = 1e-7
 
-# Columns added at a time: correlation above CLOSE x the largest; at most BLOCK x the active ones.
+# Columns are added together if their correlation with the residual is above CLOSE x the largest, at
+# most BLOCK x as many as are active.
 CLOSE = 0.7
 BLOCK = 0.2
 
@@ -365,7 +368,7 @@ class _ActiveSet:
         return True
 
     def _solve(self) -> None:
-        """Least squares on the active columns; columns that turn negative are removed."""
+        """Solve least squares on the active columns; remove columns with negative values."""
         while self._active:
             n = len(self._active)
             half = self._forward(self._target[:n])
@@ -391,7 +394,7 @@ class _ActiveSet:
         return linalg.solve_triangular(self._factor[:n, :n], rhs, lower=True, check_finite=False)
 
     def _keep(self, keep: np.ndarray, x: np.ndarray) -> None:
-        """Remove all active columns except those marked in ``keep``; ``x`` are the values."""
+        """Remove the active columns not marked in ``keep``; ``x`` has the values of all of them."""
         kept = np.flatnonzero(keep)
         size, n = len(self._active), len(kept)
         first = int(np.flatnonzero(~keep)[0])

@@ -22,7 +22,7 @@ from pdrom.reduction.subspace.interpolation import Interpolation
 from pdrom.reduction.subspace.model import Samples, SubspaceModel
 from pdrom.reduction.subspace.space import PROBES, ReducedSpace, probe_vertices, reduced_state
 
-# Of a basis with more entries, only the rows that iterations use are stored as doubles.
+# In a basis with more entries than this, only the rows that iterations use are stored as doubles.
 DOUBLES = 60_000
 MANIFOLDS = ("clamped", "length")
 
@@ -30,10 +30,7 @@ MANIFOLDS = ("clamped", "length")
 def export_scene(scene: Scene) -> dict[str, Any]:
     """Export the data of ``scene`` that all its subspace models have in common.
 
-    Raises
-    ------
-    SceneError
-        The browser's simulation code lacks a constraint group or another effect of the scene.
+    SceneError if the browser's simulation code lacks a constraint group or effect of the scene.
     """
     require_known(scene.config)
     floors = [contact.config.height for contact in scene.contacts]

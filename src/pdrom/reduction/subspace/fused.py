@@ -114,9 +114,9 @@ class _Fused:
     def run(
         self, q: np.ndarray, v: np.ndarray, frames: range, h: float, iterations: int, track: bool
     ) -> Blocks | None:
-        """Run as many of ``frames`` as one call can, see `WholeFrames.run`, without the objective.
+        """Run the first of ``frames``, as many as one compiled call can, without the objective.
 
-        Return None for a frame that meets a floor and some frames after it, as contacts often last.
+        Return None for a frame that meets a floor and, as contacts last, for some frames after it.
         """
         if self._waiting and frames.start:
             self._waiting -= 1
@@ -174,8 +174,8 @@ class _Sampled:
 class _Operators:
     """Matrices and vectors of an iteration for one set of fixed coordinates.
 
-    iterated : D, L^T, d_0, c and z; for the objective: weights of the rows, M/h^2 of the free
-        coordinates, and working memory
+    iterated : D, L^T, d_0, c and z of the module's docstring; for the objective: weights of the
+        rows, M/h^2 of the free coordinates, and working memory
     begun : matrix that maps s to c, coupling to the fixed coordinates, working vectors
     """
 
@@ -219,7 +219,7 @@ def vectors(count: int) -> np.ndarray:
 
 @compiled(nogil=True)
 def product(matrix, m, n, start, x, out):
-    """Set ``out`` = ``start`` + M ``x`` (arrays as `vectors`), M (m, n) arranged by `blocks`."""
+    """Set ``out`` = ``start`` + M ``x``, vectors from `vectors`; `blocks` has arranged M (m, n)."""
     entry = 0
     for row in range(0, 3 * m, 3 * TALL):
         a, b = load(start, row), load(start, row + 3)
@@ -299,7 +299,7 @@ def _objective(weights, d, p, inertia, y, s):
 
 @inner
 def _predict(z, v, acceleration, rate, rates, h, s):
-    """Write the prediction s = z + h v + h^2 (a + c v + C v); c is ``rate``, C is ``rates``."""
+    """Write s = z + h v + h^2 (a + c v + C v), a ``acceleration``, c ``rate``, C ``rates``."""
     for i in range(len(z)):
         for axis in range(3):
             total = acceleration[i, axis] + rate * v[i, axis]

@@ -57,7 +57,7 @@ class SampledSpace:
     V : (e p, d) basis, orthonormal in the inner product of the weights W; used for x, y and z
     elements : (m,) sampled elements, ascending
     operator : (d, m p) maps sampled projections to coefficients by weighted least squares
-    gain : || (P^T W^(1/2) V)^+ ||_2 with P^T the selection of sampled rows
+    gain : amplification of errors || (P^T W^(1/2) V)^+ ||_2, P^T selects the sampled rows
     """
 
     def __init__(self, group: ConstraintGroup, V: np.ndarray, elements: np.ndarray) -> None:

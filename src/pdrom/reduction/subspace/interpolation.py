@@ -21,10 +21,10 @@ class Interpolation:
     elements : (m,) sampled elements of p rows, ascending; none if the projections are constant
     operator : (r, n), maps sampled values to coefficients; n = m p if it is applied to each axis
         (coefficients (r, 3)), n = 3 m p if the axes share the coefficients (r, 1)
-    modes : B^T S^T W V, (K, r) or (3 K, r) in these two cases
+    modes : B^T S^T W V, (K, r) for coefficients of each axis, (3 K, r) for shared ones
     offset : (K, 3) constant part of the right-hand side
     stiffness : (K, K) B^T S^T W S B of all elements
-    gain : || operator ||_2
+    gain : || operator ||_2, the largest factor by which errors of samples grow
     """
 
     elements: np.ndarray

@@ -42,9 +42,9 @@ class Samples:
 
 @dataclass(frozen=True)
 class SubspaceModel:
-    """Reduced model: kind of its columns (see `make_columns`), columns, samples by group.
+    """Reduced model: kind of its columns ("pod", "skinning"), columns, samples of each group.
 
-    A group without samples evaluates all elements with factor one.
+    A constraint group without samples evaluates all elements with factor one.
     """
 
     position_basis: str
@@ -162,7 +162,7 @@ def sample_elements(
     They are trained on iterates of a run in the subspace with all projections, in up to `FRAMES` of
     the training ``frames``. The run begins at ``start``, a state in subspace coordinates, or at the
     scene's initial state if None. Each scene of ``others``, further training motions, adds as many
-    frames. Residuals are measured in ``norm`` (see module `ecsw`).
+    frames. Residuals of the training equations are measured in ``norm`` (module `ecsw`).
     """
     count = -(-FRAMES // (1 + len(others)))
     chosen = frames[np.unique(np.linspace(0, len(frames) - 1, count).round().astype(int))]

@@ -62,7 +62,7 @@ class DenseElimination:
         return self._inverse @ (rhs[self.free] - self._load)
 
     def response(self, inertia: np.ndarray) -> np.ndarray:
-        """Matrix (K', K) that maps s, whose fixed coordinates are targets, to free coordinates.
+        """Matrix (K', K) that maps a prediction s (K, 3), with targets set, to K' free coordinates.
 
         They solve the system for the right-hand side ``inertia`` s; ``inertia`` is M/h^2 (K, K).
         """
@@ -71,7 +71,7 @@ class DenseElimination:
         return result
 
     def lift(self, rows: np.ndarray) -> np.ndarray:
-        """Rows (m, K') times the inverse: response to a unit force on each of ``rows`` (m, K)."""
+        """Responses (m, K') to unit forces on ``rows`` (m, K): their free part times A^-1."""
         return rows[:, self.free] @ self._inverse
 
 
@@ -117,7 +117,7 @@ class ReducedSpace(Space):
 
     @cached_property
     def affine(self) -> tuple[np.ndarray, float, np.ndarray]:
-        """Acceleration by all forces: constant (K, 3), rate, and rates (K, K), (0, 0) if zero."""
+        """Acceleration by all forces: constant (K, 3) + rate v + rates v; rates (K, K) or empty."""
         constant, rate, rates = np.zeros((len(self.matrix), 3)), 0.0, np.zeros((0, 0))
         for own, factor in self.forces:
             constant += own
@@ -133,7 +133,7 @@ class ReducedSpace(Space):
         return all(contact.height is not None for contact in self._contacts)
 
     def free_frames(self, path: np.ndarray) -> int:
-        """Number of frames in ``path`` (n, K, 3) before the first with a probe below a floor."""
+        """Number of frames in ``path`` (n, K, 3) before a tested vertex is below a floor."""
         first = len(path)
         for contact in self._contacts:
             first = contact.free_frames(path[:first])
@@ -224,7 +224,7 @@ def _reduce_force(force: base.Force, columns: Columns, scene: Scene) -> tuple[np
 
 
 class _ReducedBoundary:
-    """Boundary condition in the subspace; exact, as each atom of fixed vertices has coordinates."""
+    """Boundary condition in the subspace, exact since vertices fixed together have coordinates."""
 
     def __init__(self, boundary: base.Boundary, columns: Columns) -> None:
         self.boundary = boundary
@@ -233,7 +233,7 @@ class _ReducedBoundary:
         self._columns = columns
 
     def held(self, frame: int) -> np.ndarray:
-        """Indices of the coordinates of all atoms that are fixed in ``frame``, ascending."""
+        """Indices, ascending, of the coordinates of all vertices that are fixed in ``frame``."""
         return self._of(frame)[0]
 
     def path(self, frames: range, current: np.ndarray) -> np.ndarray:
@@ -271,7 +271,7 @@ class _ReducedContact:
         self._project = projector(columns, scene.masses)
 
     def free_frames(self, path: np.ndarray) -> int:
-        """Number of frames in ``path`` (n, K, 3) before the first with a probe below this floor."""
+        """Number of frames in ``path`` (n, K, 3) before a tested vertex is below this floor."""
         lowest = (path[:, :, 1] @ self._probes.T).min(axis=1)
         # a frame with non-finite coordinates counts as one with contact
         above = lowest >= self.height
@@ -284,7 +284,7 @@ class _ReducedContact:
         self._contact.apply(corrected, self._probes @ before, held_probes)
         if np.array_equal(probed, corrected):
             return
-        # columns of an atom are zero at other vertices, so that fixed coordinates do not change
+        # columns of fixed vertices are zero at other vertices: fixed coordinates do not change
         full = self._columns.B @ y
         self._contact.apply(full, self._columns.B @ before, held)
         y[...] = self._project @ full

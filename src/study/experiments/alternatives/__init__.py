@@ -1,1 +1,1 @@
-"""Comparison of projective dynamics with alternatives: error against time per frame."""
+"""Comparison of methods that solve the same scenes: error against time per frame."""

@@ -1,8 +1,8 @@
-"""Error and time of every method on one scene, against two references.
+"""Time of every method on one scene, and its errors against two references.
 
-The first reference is the implicit step of the scene, solved to convergence, which methods approach
-with more iterations. The second is the motion in continuous time, which a user wants and which the
-implicit step misses. All methods run the held-out motions; only subspaces are trained.
+The first reference is the scene's implicit time step, solved to convergence, which methods approach
+with more iterations. The second is the motion in continuous time: a user wants this motion, and the
+implicit step deviates from it. All methods run the held-out motions; only subspaces are trained.
 """
 
 import logging
@@ -42,9 +42,9 @@ REDUCED, ACCELERATED = REDUCTIONS = "ecsw", "ecsw-anderson"  # names of the redu
 TWO_LEVEL: Final = "two-level"  # full order, with a trained subspace for its coarse level
 TRAINED: Final = (TWO_LEVEL, *REDUCTIONS)
 CONVERGED: Final = "converged"  # the implicit step solved to convergence
-TRAINING: Final = "training"  # key for the runs on which reductions are trained
+TRAINING: Final = "training"  # key in `Comparison.work` for runs on which reductions are trained
 
-# These columns together identify a candidate (method with its settings) of a scene.
+# Columns that together identify a candidate (method with its settings) in a scene.
 SETTING: Final = ["method", "substeps", "iterations", "training_motions", "k"]
 
 Factors = Annotated[tuple[Annotated[float, Field(gt=0.0, le=1e8)], ...], Field(min_length=1)]
@@ -74,7 +74,8 @@ def _methods(steps: dict[str, Any]) -> dict[str, Any]:
     return steps
 
 
-# (substeps, iterations) by method: one with many, and many with one. Other settings are slower.
+# Method -> pairs (substeps of a frame, iterations of each substep): one substep with several
+# iterations, or several substeps with one. Other pairs are slower at the same error.
 STEPS: dict[str, tuple[Steps, ...]] = {
     "projective": (
         (1, 1), (1, 2), (1, 3), (1, 4), (1, 5), (1, 10), (1, 20), (1, 40), (1, 80),
@@ -89,10 +90,10 @@ STEPS: dict[str, tuple[Steps, ...]] = {
 
 
 class ContinuousReference(ConfigModel):
-    """Motion in continuous time, by explicit steps; the first run has ``substeps`` per frame.
+    """Settings of the motion in continuous time, computed by explicit steps.
 
-    The step is halved until the estimated error is below ``tolerance``, but the product of vertices
-    and steps of a frame stays below ``limit``.
+    The first run has ``substeps`` per frame. The step is halved until the estimated error is below
+    ``tolerance``, as long as the product of vertices and steps of a frame is at most ``limit``.
     """
 
     substeps: kit.Count = 40
@@ -101,9 +102,11 @@ class ContinuousReference(ConfigModel):
 
 
 class ImplicitReference(ConfigModel):
-    """Implicit step, solved until one more local/global iteration of a frame moves no vertex by
-    more than ``tolerance`` times the mesh size; ``limit`` is the largest number of evaluations of a
-    frame. Runs that train a reduction stop at the larger ``training_tolerance``.
+    """Settings of the converged implicit step.
+
+    It is solved until one more local/global iteration of a frame moves no vertex by more than
+    ``tolerance`` times the mesh size, in at most ``limit`` evaluations. Runs that train a reduction
+    stop at the larger ``training_tolerance``.
     """
 
     tolerance: kit.Tolerance = 1e-7
@@ -112,16 +115,19 @@ class ImplicitReference(ConfigModel):
 
 
 class Comparison(Processes):
-    """Comparison of methods on one scene and one mesh.
+    """Settings of the comparison of methods on one scene and one mesh.
 
-    ``steps`` has pairs (substeps of a frame, iterations of each substep) by method. Errors cover
-    all frames of each of the held-out ``motions``. On its own mesh a scene runs with all weights
-    times each of its factors in ``stiffness`` (1 if it has none). Each of ``processes`` new
-    processes times ``frames`` frames spread over the first motion. Reductions have each number of
-    ``modes``, sample elements to tolerance ``tau``, and are trained on each number of
-    ``training_motions``, the first of which is the scene's. The coarse level of the two-level
-    method has the tolerance ``coarse_tau`` and the fewest training motions. Runs with more ``work``
-    (vertices x substeps x iterations; for ``training`` vertices x motions) are left out.
+    Each of ``processes`` new processes times ``frames`` frames, spread over the first motion.
+
+    stiffness : scene -> factors on all its weights, on its own mesh (1 for other scenes)
+    steps : method -> pairs (substeps of a frame, iterations of each substep)
+    work : method -> largest product vertices x substeps x iterations (for ``training``: vertices x
+        motions); runs with more work are left out
+    modes, tau : numbers of modes of reductions, and tolerance to which elements are sampled
+    training_motions : numbers of motions on which reductions are trained, the scene's motion first
+    coarse_tau : tolerance of the coarse level of the two-level method, which is trained on the
+        smallest number of motions
+    motions : held-out motions; errors cover all of their frames
     """
 
     stiffness: dict[str, Factors] = Field(default_factory=dict)
@@ -142,24 +148,24 @@ class Comparison(Processes):
     repeats: kit.Repeats = 1
 
     def factors(self, scene: str, size: float) -> tuple[float, ...]:
-        """Factors for all weights of ``scene``; only 1 if ``size`` refines or coarsens its mesh."""
+        """Factors on all weights of ``scene``; only 1 if ``size`` refines or coarsens its mesh."""
         return self.stiffness.get(scene, (1.0,)) if size == 1.0 else (1.0,)
 
     def pairs(self, method: str, vertices: int) -> list[tuple[int, int]]:
-        """Pairs (substeps, iterations) of ``method`` within its ``work`` for so many vertices."""
+        """Pairs (substeps, iterations) of ``method`` whose work does not exceed its limit."""
         steps = self.steps.get(method, ())
         return [(n, k) for n, k in steps if self.affords(method, vertices * n * k)]
 
     def affords(self, method: str, work: int) -> bool:
-        """Whether ``work``, vertices x substeps x iterations, is within the method's limit."""
+        """Return whether ``work`` (vertices x substeps x iterations) is in the method's limit."""
         return work <= self.work.get(method, work)
 
 
 class Alternatives(Comparison):
-    """Section ``alternatives``; ``scenes`` has mesh sizes (factors for vertices per side) by scene.
+    """Section ``alternatives``.
 
-    The total mass does not depend on the factor. The table winners has a row for each allowed error
-    in ``errors``.
+    scenes : scene -> factors on the vertices along a side of its mesh; the mass does not change
+    errors : allowed errors, for each of which the table winners has a row
     """
 
     scenes: kit.Sizes = Field(default_factory=dict)
@@ -179,9 +185,11 @@ COLUMNS = [
 
 @dataclass(frozen=True)
 class Trained:
-    """A reduced ``model`` for frames of ``substeps`` steps, trained on a number of ``motions``.
+    """A reduced model and its training.
 
-    seconds : processor time of the training with its full-order runs, s
+    motions : number of motions on which the model was trained
+    substeps : number of steps of a frame for which the model was trained
+    seconds : processor time of the training and of its full-order runs, s
     coarse : True for the coarse level of the two-level method, False for a reduction
     """
 
@@ -197,8 +205,9 @@ class Candidate:
     """A method with its settings, ready to run on one scene.
 
     steps : number of steps of the loop in a frame
-    positions, output : functions of the loop's coordinates: vertex positions, and these in float32
-    columns : columns of the loop's position subspace, None if its coordinates are positions
+    positions : function that computes positions of all vertices from the loop's coordinates
+    output : the same in single precision, which is timed; None if coordinates are positions
+    columns : columns of the loop's position subspace; None if coordinates are positions
     """
 
     labels: dict[str, object]
@@ -210,16 +219,17 @@ class Candidate:
     columns: Columns | None = None
 
     def state(self, state: State, scene: Scene) -> State:
-        """Convert the ``state`` of all vertices of ``scene`` to the unknowns of this method."""
+        """Convert a ``state`` of all vertices of ``scene`` to coordinates of this method's loop."""
         if self.columns is None:
             return state
         own = (self.columns, scene.masses)
         return State(coordinates(*own, state.positions), coordinates(*own, state.velocities))
 
     def run(self, frames: int, limit: float, extent: float) -> np.ndarray | None:
-        """Return positions (F + 1, N, 3) at the ends of frames, preceded by the initial ones.
+        """Run the method; return positions (F + 1, N, 3) m at the start and at the ends of frames.
 
-        None if the run is not finite, or grows beyond ``limit`` times the ``extent`` (m).
+        None is returned if the run is not finite, or if a side of its bounding box exceeds
+        ``limit`` times the ``extent`` (m).
         """
         run = BoundedRun(
             self.loop.run, self.start, frames * self.steps, limit, extent, self.positions
@@ -234,7 +244,7 @@ def candidates(
 ) -> Iterator[Candidate]:
     """Yield every method with each pair (substeps, iterations) in ``settings``, for ``scene``.
 
-    ``models`` are results of `trained` for another motion.
+    ``models`` were trained by `trained` on other motions than that of ``scene``.
     """
     systems: dict[int, GlobalSystem] = {}
     start, reduced = scene.initial_state(), []
@@ -268,12 +278,12 @@ def candidates(
 
 
 def trained(training: Scene, settings: Comparison) -> Iterator[Trained]:
-    """Yield position subspaces with sampled elements, trained on one or more training motions.
+    """Yield models in position subspaces with sampled elements, trained on one or more motions.
 
     Training motions are that of ``training`` and further ones drawn by seeds. The columns are modes
-    of nearly converged frames: with n motions, every n-th frame of each. The elements are sampled
-    on iterates of these motions in the subspace, for every number of substeps that a reduction
-    needs. With the fewest motions, a coarse level for the two-level method is made, too.
+    of nearly converged frames: with n motions, of every n-th frame of each. Elements are sampled on
+    iterates of these motions in the subspace, for every number of substeps that a reduction needs.
+    With the smallest number of motions, a coarse level for the two-level method is trained, too.
     """
     vertices, own = training.mesh.vertices, settings.implicit
     taken, coarse = (
@@ -315,7 +325,8 @@ def trained(training: Scene, settings: Comparison) -> Iterator[Trained]:
 def substepped(scene: Scene, substeps: int, iterations: int, window: int = 0) -> Scene:
     """Return the scene with each frame split into ``substeps`` frames of ``iterations`` each.
 
-    Effects keep their times in seconds. ``window``: iterates of Anderson acceleration, 0 for none.
+    Effects keep their times in seconds. ``window`` is the number of iterates in Anderson
+    acceleration, 0 for none.
     """
     config = scene.config
     changes = {
@@ -332,7 +343,7 @@ def substepped(scene: Scene, substeps: int, iterations: int, window: int = 0) ->
 
 @dataclass(frozen=True)
 class Timed:
-    """A scene in the motion that is timed, its reductions, and ``labels``: its first columns."""
+    """A scene in the motion that is timed, its reduced models, and first columns (``labels``)."""
 
     labels: dict[str, object]
     scene: Scene
@@ -340,10 +351,15 @@ class Timed:
     settings: Comparison
 
     def variants(self) -> Iterator[Variant]:
-        """Methods with their settings, to be timed; ``steps`` of their steps are a frame."""
+        """Yield the step loops of all methods with all settings, to be timed."""
         scene, wanted = self.scene, min(self.settings.frames, self.scene.config.frames)
         places = np.linspace(0, scene.config.frames - 1, wanted).round().astype(int)
-        # in this run, boundaries store their first positions, which runs from later states need
+        # The first frames are one for each set of held vertices. An unmeasured run of these frames
+        # factorises all matrices, so that no measured frame has to.
+        held = [tuple(b.active(frame) for b in scene.boundaries) for frame in places]
+        first = [held.index(kind) for kind in dict.fromkeys(held)]
+        places = np.concatenate([places[first], np.delete(places, first)])
+        # this run starts at the first frame, where boundaries store positions that they need later
         states = [
             scene.initial_state(),
             *(end for end, _ in simulate(scene, track_objective=False)),
@@ -353,7 +369,7 @@ class Timed:
             starts = tuple((each.state(states[f], scene), f * each.steps) for f in places)
             yield Variant(
                 labels, each.loop, each.start, wanted * each.steps, output=each.output,
-                steps=each.steps, starts=starts,
+                steps=each.steps, starts=starts, warm=len(first) * each.steps,
             )  # fmt: skip
 
 
@@ -372,13 +388,11 @@ class Options(ConfigModel):
     alone=True,
 )
 def alternatives(sources: list[Path], settings: Options, out: File, times: File) -> None:
-    """Compare all methods on one mesh, with ``factor`` times the vertices along each side.
+    """Compare all methods on one mesh, with a factor on the vertices along each side.
 
-    Parameters
-    ----------
-    sources : files of the mesh; the job depends on them
+    sources : files of the mesh, on which the job depends
     settings : scene, methods and limits
-    out, times : tables of errors and of times, with the factor in their paths
+    out, times : tables of errors and of times; their paths contain the factor
     """
     factor, section = float(out["factor"]), settings.alternatives
     rows, cases = [], []
@@ -402,7 +416,7 @@ def alternatives(sources: list[Path], settings: Options, out: File, times: File)
 
 
 def sized(config: SceneConfig, factor: float, stiffness: float) -> SceneConfig:
-    """Return ``config`` on a ``factor`` times finer mesh of equal mass, ``stiffness`` as stiff."""
+    """Return ``config`` with a ``factor`` times finer mesh, equal mass, weights x ``stiffness``."""
     finer = config.coarsened(factor, 1.0)
     counts = [c.mesh.build(Path()).vertices for c in (config, finer)]
     effects = tuple(
@@ -416,11 +430,11 @@ def sized(config: SceneConfig, factor: float, stiffness: float) -> SceneConfig:
 def _rows(
     scene: Scene, recorded: np.ndarray, models: tuple[Trained, ...], settings: Options
 ) -> Iterator[dict[str, Any]]:
-    """Errors of the references, then of every candidate, in the motion of ``scene``.
+    """Yield rows with errors in the motion of ``scene``: two references, then every candidate.
 
-    The first row is the converged implicit step, the second shows the ``recorded`` training motion
-    in place of a solution. Errors against the implicit step are None if a frame of it did not
-    converge or if it would be too expensive; all errors of a run that blew up are None.
+    The first row is the converged implicit step, the second the ``recorded`` training motion, taken
+    as a solution. Errors against the implicit step are None if one of its frames did not converge
+    or if it would be too expensive. All errors of a run that blew up are None.
     """
     section, name, vertices = settings.alternatives, scene.config.name, scene.mesh.vertices
     frames, wanted, implicit = scene.config.frames, section.continuous, None

@@ -1,1 +1,1 @@
-"""Hard cases: scenes with extreme input, and the properties that their runs must have."""
+"""Hard cases: scenes with extreme input, and properties that every run of them must have."""

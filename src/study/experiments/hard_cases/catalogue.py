@@ -26,14 +26,14 @@ ROTATION = {"effect": "deformation_gradient", "weight": 1e8}
 VOLUME = {"effect": "volume", "weight": 1e6}
 AREA = {"effect": "area", "weight": 1e6}
 
-# Checks for free bodies without forces, for such bodies that start at rest, for all other scenes.
+# Names of checks: for free bodies, for free bodies without forces that start at rest, for the rest.
 FREE = ("finite", "bounded", "objective", "momentum", "determinism")
 CALM = (*FREE, "energy")
 FORCED = ("finite", "bounded", "objective", "determinism")
 
 
 def sheet(wave: float = 0.0) -> Mesh:
-    """A horizontal sheet of 36 vertices; ``wave`` is the height of its waves (`cloth`)."""
+    """A horizontal sheet of 36 vertices, with waves of the height ``wave`` (m)."""
     return cloth(6, 6, "xz", wave=wave)
 
 
@@ -67,19 +67,19 @@ def shifted(mesh: Mesh, *offset: float) -> Mesh:
 def _case(
     name: str, why: str, holds: tuple[str, ...], mesh: record.Shape, *effects: dict, **rest: Any
 ) -> record.HardCase:
-    """Return a hard case; ``rest``: its ``start``, ``bound``, ``slow``, and scene settings."""
+    """Return a hard case; ``rest`` has its ``start``, ``bound``, ``slow``, and scene settings."""
     own = {key: rest.pop(key) for key in ("start", "bound", "slow") if key in rest}
     return record.HardCase(name, why, holds, mesh, effects, rest, **own)
 
 
 def _heavy_and_light(mesh: Mesh) -> np.ndarray:
-    """Masses (N,) kg over eight decades, in random order."""
+    """Masses (N,) in kg that span eight decades, in random order."""
     order = np.random.default_rng(3).permutation(mesh.vertices)
     return np.logspace(-4, 4, mesh.vertices)[order]
 
 
 def _all_but(*free: int) -> dict:
-    """Pins on every vertex of `sheet` except the vertices ``free``."""
+    """Pins that hold every vertex of `sheet` except the vertices ``free``."""
     held = tuple(int(v) for v in np.setdiff1d(np.arange(sheet().vertices), free))
     return {"effect": "pins", "select": held}
 
@@ -102,7 +102,7 @@ def _one_bad_element() -> Mesh:
 
 
 def _squashed() -> list[record.HardCase]:
-    """Sheets and bars that start flattened to a plane, line or point, as needles, or merged."""
+    """Sheets and bars that start flattened to a plane, a line or a point."""
     bar = "every tetrahedron is flattened to a {}: F is singular"
     flat = "every triangle is collinear: the sheet is a {}"
     kinds = (
@@ -175,7 +175,7 @@ def _states() -> list[record.HardCase]:
 def _sizes() -> list[record.HardCase]:
     """Scenes with volume or area constraints, for which the nearest shape is not unique."""
     lying = record.mapped((1, 0, 5), (0, 1, 0), (0, 0, 1))
-    # large bound: a moving body of constant volume or area may stretch without limit
+    # a large bound on the bounding box: a body of constant volume or area may stretch without limit
     loose, cases = 40.0, []
     for label, mesh, group, flat in (
         ("volume", small_bar, VOLUME, record.scales(1, 1, 0)),
@@ -368,7 +368,7 @@ def _obstacles() -> list[record.HardCase]:
 
 
 def _unstructured() -> list[record.HardCase]:
-    """Unstructured meshes: no two elements are alike, and none lies along an axis."""
+    """Scenes with unstructured meshes: no two elements are alike, and none lies along an axis."""
     ring, skin, starfish, torus = (
         partial(read_mesh_file, config_file(f"scenes/meshes/{name}").resolve()) for name in MESHES
     )
@@ -395,7 +395,7 @@ def _unstructured() -> list[record.HardCase]:
 
 
 def _collisions() -> list[record.HardCase]:
-    """Bodies that collide with themselves."""
+    """Scenes of bodies that collide with themselves."""
     apart = {"effect": "self_collision", "thickness": 0.18}
     return [
         _case("collision_folded", "vertices of different layers coincide, and fall as a heap",
@@ -421,5 +421,5 @@ CASES: dict[str, record.HardCase] = {case.name: case for part in PARTS for case 
 
 
 def reducible_cases(slow: bool = False) -> list[str]:
-    """Names of the hard cases that can be run, not refused: the slow ones, or all others."""
+    """Names of the hard cases that are not refused: the slow ones if ``slow``, else all others."""
     return [name for name, c in CASES.items() if c.slow == slow and c.holds != ("refused",)]

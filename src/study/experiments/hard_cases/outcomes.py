@@ -1,4 +1,4 @@
-"""Outcome of every reduction in every hard case, compared with the expected outcome."""
+"""Outcomes of reductions in hard cases (scenes with extreme input), and the expected outcomes."""
 
 import logging
 from collections import Counter
@@ -37,9 +37,9 @@ FAILURES = ("refused", "singular", "blow-up", "distorted", "objective rises", "m
 R, K, TOLERANCE = 10, 6, 1e-2
 HRPD = HrpdSpec(dimension=20, samples=60)
 BASES = {"pod": ("full", "ecsw", "hrpd"), "skinning": ("full", "hrpd")}
-# A run with an extent above these multiples of `Training.extent` is a blow-up, or distorted.
+# A run whose bounding box exceeds these multiples of `Training.extent` blew up, or is distorted.
 BLOWUP, DISTORTED = 100.0, 3.0
-# Kinds of constraint manifolds on which the norm of any projection has a bound known in advance.
+# Kinds of constraint manifolds on which the norm of projections is bounded, whatever the state.
 BOUNDED = ("clamped", "length", "half sphere")
 Methods = Mapping[str, MethodSpec]
 log = logging.getLogger(__name__)
@@ -60,10 +60,10 @@ ReducibleCase = Annotated[str, AfterValidator(lambda case: _known(case, reducibl
 
 
 class Expectation(ConfigModel):
-    """Hard cases in which a reduction fails, and the reason.
+    """Hard cases in which a reduction fails, and the reason (``why``).
 
-    fails : names of cases in which it must fail
-    may_fail : names of cases in which it may fail, depending on round-off
+    fails : names of hard cases in which the reduction must fail
+    may_fail : names of hard cases in which it fails or not, depending on rounding errors
     """
 
     why: Annotated[str, Field(min_length=20)]
@@ -79,7 +79,7 @@ class Expectation(ConfigModel):
 
 
 def surprise(outcome: str, case: str, expected: Expectation | None) -> str:
-    """Text on how the ``outcome`` of ``case`` contradicts the ``expected`` one; empty if not."""
+    """Text on how the ``outcome`` in a hard case contradicts the expected one; empty if not."""
     must, may = (expected.fails, expected.may_fail) if expected else ((), ())
     if outcome in FAILURES:
         listed = case in (*must, *may)
@@ -88,7 +88,7 @@ def surprise(outcome: str, case: str, expected: Expectation | None) -> str:
 
 
 class Training:
-    """Full-order run of a hard case, with snapshots of its first group, the one to be reduced."""
+    """Full-order run of a hard case, with snapshots of its first group, which is reduced."""
 
     def __init__(self, case: record.HardCase) -> None:
         self.case = case
@@ -98,7 +98,7 @@ class Training:
         self._roundoff: list[float] = []
         self.run = record.full_order(case, self.scene, self._observe)
         self._bases: dict[str, Basis] = {}
-        # largest extent (m) of the run, the rest shape, the start and the fixed vertices
+        # largest side of the bounding box (m) of run, rest shape, start, and fixed vertices
         self.extent = max(self.run.extent, record.reach(self.scene, self.run))
 
     def _observe(self, frame: int, y: np.ndarray) -> None:
@@ -107,7 +107,7 @@ class Training:
             self._roundoff.append(self.group.roundoff(y))
 
     def basis(self, spec: MethodSpec) -> Basis:
-        """Basis of the snapshots in even frames, with the centring, weights etc. of ``spec``."""
+        """Return the basis of the snapshots, with the centring, weights etc. of ``spec``."""
         if spec.basis_id not in self._bases:
             self._bases[spec.basis_id] = compute_basis(
                 np.stack(self._snapshots),
@@ -121,11 +121,12 @@ class Training:
 
 @dataclass(frozen=True)
 class ReducedRun:
-    """A reduced run, None in ``run`` if the basis is empty, and sizes of the reduction.
+    """A reduced run, and sizes of the reduction.
 
-    r : basis size; in a subspace the number of evaluated elements
-    k : number of columns of the position subspace, None in vertex positions
-    gain : amplification of errors by the interpolation, None without interpolation
+    run : None if the basis is empty, so that nothing can be reduced
+    r : basis size; in a position subspace the number of evaluated elements
+    k : number of columns of the position subspace, None if positions are not reduced
+    gain : factor by which the interpolation amplifies errors, None without interpolation
     """
 
     run: record.Record | None
@@ -134,7 +135,7 @@ class ReducedRun:
     gain: float | None = None
 
     def outcome(self, training: Training) -> str:
-        """Return the first of `NOTHING`, `FAILURES` that applies to the run, else `HOLDS`."""
+        """Return `NOTHING`, or the first of the `FAILURES` of the run, or else `HOLDS`."""
         run = self.run
         if run is None:
             return NOTHING
@@ -144,11 +145,11 @@ class ReducedRun:
             return "blow-up"
         if run.extent > DISTORTED * training.extent:
             return "distorted"
-        # in a position subspace the objective must fall in every iteration, as in full order; with
-        # interpolated projections and unreduced positions it may rise
+        # In a position subspace, the objective must fall in every iteration, as in full order. With
+        # unreduced positions and interpolated projections it may rise.
         if self.k is not None and run.excess.max() > 0.0:
             return "objective rises"
-        # internal forces S^T W p sum to zero for any p, so that reduction keeps the momentum
+        # internal forces S^T W p sum to zero for any projections p: reduction keeps the momentum
         case = training.case
         if "momentum" in case.holds and record.momentum(case, training.scene, run):
             return "momentum changes"
@@ -156,19 +157,15 @@ class ReducedRun:
 
 
 def names(methods: Methods) -> list[str]:
-    """Names of all reductions: ``methods``, then ``BASIS-SAMPLING`` for position subspaces."""
+    """Names of all reductions: those of ``methods``, then BASIS-SAMPLING for position subspaces."""
     return [*methods, *(f"{basis}-{sampling}" for basis in BASES for sampling in BASES[basis])]
 
 
 def reduced_run(training: Training, name: str, methods: Methods, limit: float) -> ReducedRun:
-    """Run the hard case of ``training`` again with the reduction ``name``, one of `names`.
+    """Run the hard case of ``training`` again, with the reduction ``name``.
 
-    The run ends as a blow-up when its extent exceeds ``limit`` (m).
-
-    Raises
-    ------
-    PdromError
-        The reduction refuses the scene.
+    The run ends as a blow-up if a side of its bounding box exceeds ``limit`` (m). Raises PdromError
+    if the reduction refuses the scene.
     """
     if name not in methods:
         kind, _, sampling = name.partition("-")
@@ -186,7 +183,10 @@ def reduced_run(training: Training, name: str, methods: Methods, limit: float) -
 
 
 def _subspace(training: Training, kind: str, sampling: str, limit: float) -> ReducedRun:
-    """Run in a position subspace of a ``kind``; ECSW is trained on a run from the case's start."""
+    """Run in a position subspace with a basis of this ``kind`` and projections by ``sampling``.
+
+    ECSW is trained on a run in the subspace from the start of the hard case.
+    """
     scene = training.scene
     columns = make_columns(scene, training.run.positions[1::2], kind, k=K)
     start = training.case.start(scene)
@@ -210,7 +210,7 @@ def _subspace(training: Training, kind: str, sampling: str, limit: float) -> Red
 def row(
     training: Training, name: str, methods: Methods, expected: Mapping[str, Expectation]
 ) -> dict[str, Any]:
-    """Table row of the run with the reduction ``name``: how it ended, and why if it failed."""
+    """Row of the run with the reduction ``name``: how it ended, and why if it failed."""
     try:
         reduced = reduced_run(training, name, methods, limit=BLOWUP * training.extent)
     except NotReducibleError as error:
@@ -232,9 +232,10 @@ def row(
 
 
 class HardCases(ConfigModel):
-    """Section ``hard_cases``: names of the cases; without names, all that are not slow.
+    """Section ``hard_cases``.
 
-    expected : failures by reduction, with their reason; a reduction without entry must never fail
+    cases : names of the hard cases that are run; without names, all that are not slow
+    expected : reduction -> its expected failures; a reduction without an entry must never fail
     """
 
     cases: tuple[ReducibleCase, ...] = ()
@@ -242,7 +243,7 @@ class HardCases(ConfigModel):
 
     @property
     def modules(self) -> list[str]:
-        """Classes of the cases' effects as "module:attribute", of which jobs hash the code."""
+        """Classes of effects in the hard cases ("module:attribute"), for fingerprints of jobs."""
         chosen = self.cases or reducible_cases()
         effects = {effect["effect"] for name in chosen for effect in CASES[name].effects}
         return sorted(EFFECTS[effect] for effect in effects)
@@ -260,9 +261,9 @@ class HardCases(ConfigModel):
 def hard_cases(
     meshes: list[Path], every_method: dict[str, MethodSpec], asked: HardCases, cases: File
 ) -> None:
-    """Run the cases with every reduction; log outcomes that contradict the expected ones.
+    """Run hard cases with every reduction; log outcomes that contradict the expected ones.
 
-    ``meshes`` only declares the mesh files as inputs: the cases read these files themselves.
+    ``meshes`` only declares inputs of the job: the hard cases read these files themselves.
     """
     found = []
     for name in asked.cases or reducible_cases():

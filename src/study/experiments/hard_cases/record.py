@@ -1,18 +1,21 @@
-"""Hard cases: initial states, records of runs, bounds for rounding errors, and checks.
+"""Hard cases (scenes with extreme input): initial states, runs, and checks of the runs.
 
-In exact arithmetic the objective 1/(2h^2) |M^1/2 (y - s)|^2 + sum_j W_j(y) (positions y, prediction
-s) falls in every iteration. Computed values differ for two reasons (u: `EPS`, c: `OPERATIONS`):
+In exact arithmetic, the objective 1/(2h^2) |M^1/2 (y - s)|^2 + sum_j W_j(y) falls in every
+iteration (y: positions, s: prediction, h: time step, M: masses, W_j: energy of group j). Computed
+values may rise for two reasons, with the unit round-off u (`EPS`) and a constant c (`OPERATIONS`):
 
-- evaluation: y - s and S y - p are wrong by c u (|y| + |s|) and c u (|S| |y| + |p|). With R the
-  objective of these errors alone, a value E is wrong by at most 2 sqrt(E R) + R (Cauchy-Schwarz);
-- solution: the global step misses the minimum of its quadratic by d^T A d / 2 for an error d of y.
-  A Cholesky solve leaves a residual |r| <= c u |A| |y| (Higham 2002, theorem 10.4), so that this
-  is at most |r|^2 / (2 lambda_min(A)). In a subspace the right-hand side has the same error in the
-  vertices, so that r <= c u |B|^T |A| |y|, and the explicit inverse adds d <= c u cond(A) |z|,
-  where A has columns scaled to length one.
+- evaluation: y - s and S y - p have errors up to c u (|y| + |s|) and c u (|S| |y| + |p|), where p
+  are the projections of S y. If R is the objective of these errors alone, the error of a value E is
+  at most 2 sqrt(E R) + R (Cauchy-Schwarz);
+- solution: the global step minimises a quadratic with matrix A. An error d of y misses the minimum
+  by d^T A d / 2. A Cholesky solve leaves a residual |r| <= c u |A| |y| (Higham 2002, theorem 10.4),
+  so that the minimum is missed by at most |r|^2 / (2 lambda_min(A)). In a subspace with columns B
+  and coordinates z, the right-hand side has the same error in the vertices, so that
+  r <= c u |B|^T |A| |y|, and the explicit inverse adds d <= c u cond(A) |z|, where A has columns
+  scaled to length one.
 
-The smallest mass over h^2 bounds lambda_min from below, without pins. The bound is very loose if
-masses are round-off compared with the weights and only pins make A regular.
+Without pins, the smallest mass over h^2 is a lower bound of lambda_min. It is very loose if masses
+are round-off compared with the weights of the groups, so that only pins make A regular.
 """
 
 from collections.abc import Callable, Sequence
@@ -40,12 +43,13 @@ class HardCase:
     """A scene that is hard for a named reason, and the properties that its run must have.
 
     why : property that makes the scene hard
-    holds : names of the checks that the full-order run must pass (`record.CHECKS`); a case with
-        only "refused" must raise an error when its scene is built or run
+    holds : names in `CHECKS` of the checks that the full-order run must pass; if it is "refused"
+        only, an error must be raised when the scene is built or run
     mesh, effects, settings : arguments of `build`; ``mesh`` is a function that returns the mesh
     start : function of the scene that returns the state before the first frame
-    bound : largest allowed extent, relative to the largest extent of start, rest shape and handles
-    slow : True if only the slow tests run the case
+    bound : largest allowed extent (longest side of the bounding box) of the run, relative to the
+        largest one of start, rest shape and fixed vertices
+    slow : True if only the slow tests run this scene
     """
 
     name: str
@@ -59,7 +63,7 @@ class HardCase:
     slow: bool = False
 
     def scene(self) -> Scene:
-        """Build the scene of this hard case; raise PdromError if it is refused."""
+        """Build the scene; raise PdromError if it is refused."""
         return build(self.mesh(), *self.effects, **self.settings)
 
 
@@ -70,10 +74,10 @@ def build(
     masses: Callable[[Mesh], np.ndarray] | None = None,
     **settings: Any,
 ) -> Scene:
-    """Return a scene of ``effects`` on ``mesh``.
+    """Build a scene of ``effects`` on ``mesh``.
 
-    ``masses`` maps a mesh to masses (N,) kg, equal by default; ``settings`` are keys of
-    `SceneConfig`.
+    ``masses`` is a function of the mesh that returns masses (N,) in kg; without it, masses are
+    equal. ``settings`` are keys of `SceneConfig`.
     """
     named = {"name": "hard_case", "title": "hard case"}
     own = {"mesh": {"kind": "file", "path": "generated"}, "frames": frames, **settings}
@@ -82,12 +86,12 @@ def build(
 
 
 def at_rest(positions: np.ndarray) -> State:
-    """A state at ``positions`` (N, 3) without velocity."""
+    """Return a state with ``positions`` (N, 3) m and without velocities."""
     return State(positions, np.zeros_like(positions))
 
 
 def mapped(*rows: tuple[float, float, float]) -> Start:
-    """Start at rest: the rest shape under the linear map with these ``rows`` about its centre."""
+    """Start at rest, in the rest shape mapped about its centre by a matrix with these ``rows``."""
 
     def start(scene: Scene) -> State:
         points = scene.mesh.points
@@ -98,12 +102,12 @@ def mapped(*rows: tuple[float, float, float]) -> Start:
 
 
 def scales(x: float, y: float, z: float) -> Start:
-    """Start at rest: rest shape scaled by ``x``, ``y``, ``z`` about its centre (< 0: mirrored)."""
+    """Start at rest, in the rest shape scaled about its centre; a negative factor mirrors it."""
     return mapped((x, 0, 0), (0, y, 0), (0, 0, z))
 
 
 def scrambled(size: float = 1.0) -> Start:
-    """Start at rest: vertices at random in a cube of ``size`` times the rest shape's extent."""
+    """Start at rest, vertices at random in a cube of ``size`` times the longest side at rest."""
 
     def start(scene: Scene) -> State:
         points = scene.mesh.points
@@ -114,7 +118,10 @@ def scrambled(size: float = 1.0) -> Start:
 
 
 def noisy(start: Start, size: float) -> Start:
-    """Start at rest: positions of ``start`` with normal noise of ``size`` times the rest extent."""
+    """Start at rest, in the positions of ``start`` with added normally distributed noise.
+
+    Its standard deviation is ``size`` times the longest side of the mesh's bounding box.
+    """
 
     def moved(scene: Scene) -> State:
         noise = np.random.default_rng(SEED).standard_normal(scene.mesh.points.shape)
@@ -124,14 +131,14 @@ def noisy(start: Start, size: float) -> Start:
 
 
 def pairs_merged(scene: Scene) -> State:
-    """Start with every odd vertex on the vertex before it, so that edges have length zero."""
+    """Start with every odd vertex on the vertex before it, so that edges have no length."""
     points = scene.mesh.points.copy()
     points[1::2] = points[: len(points) - len(points) % 2 : 2]
     return at_rest(points)
 
 
 def folded(scene: Scene) -> State:
-    """Start folded: the half with larger x is mirrored onto the other, where vertices coincide."""
+    """Start folded: the half with larger x is mirrored onto the half with smaller x."""
     points = scene.mesh.points.copy()
     centre = 0.5 * (points[:, 0].min() + points[:, 0].max())
     points[:, 0] = centre - np.abs(points[:, 0] - centre)
@@ -139,12 +146,12 @@ def folded(scene: Scene) -> State:
 
 
 def falling(speed: float) -> Start:
-    """Start in the rest shape, with all vertices moving down at ``speed``, m/s."""
+    """Start in the rest shape, with all vertices moving down at ``speed`` (m/s)."""
     return lambda scene: _vertical(scene, np.full(len(scene.mesh.points), -speed))
 
 
 def meeting(speed: float) -> Start:
-    """Start with the upper vertices moving down and the lower ones up, at ``speed``, m/s."""
+    """Start with upper vertices moving down and lower ones moving up, at ``speed`` (m/s)."""
 
     def start(scene: Scene) -> State:
         y = scene.mesh.points[:, 1]
@@ -161,22 +168,23 @@ def _vertical(scene: Scene, speeds: np.ndarray) -> State:
 
 
 def lowered(offset: float) -> Start:
-    """Start at rest: the rest shape moved by ``offset`` (m) along y."""
+    """Start at rest, in the rest shape moved by ``offset`` (m) along y."""
     return lambda scene: at_rest(scene.mesh.points + np.array([0.0, offset, 0.0]))
 
 
 EPS = np.finfo(float).eps
-# Constant c: a row of S or A has about 10 entries, and each value undergoes a few more operations.
+# Constant c of the bounds: a row of S or A has about 10 entries, with a few operations for each.
 OPERATIONS = 32.0
-# A shape counts as recovered up to this distance from the rest shape, relative to the extent.
+# A run has recovered its rest shape if it ends within this distance, over the mesh's longest side.
 RECOVERED = 1e-2
 
 
 @dataclass(frozen=True)
 class Roundoff:
-    """Bound for rises of the objective that rounding errors alone cause, for one step loop.
+    """Bound for rises of the objective of a step loop by rounding errors alone.
 
-    basis : B (N, K) if positions are B z with coordinates z; None if coordinates are positions
+    basis : (N, K) columns B, if positions are B z with coordinates z; None if the step loop has
+        the positions themselves as coordinates
     """
 
     scene: Scene
@@ -184,9 +192,10 @@ class Roundoff:
     basis: np.ndarray | None = None
 
     def allowance(self, before: State, after: State, first: float) -> float:
-        """Bound for the objective's rise by rounding in a frame that starts at ``first``, both J.
+        """Bound (J) for the rise of the objective by rounding errors in one frame.
 
-        The size of the iterates is estimated from the states ``before`` and ``after`` the frame.
+        ``first`` is the objective (J) at its beginning. The size of the iterates is estimated from
+        the states ``before`` and ``after`` the frame.
         """
         h = self.loop.time_step
         acceleration = self.loop.space.acceleration(before.positions, before.velocities)
@@ -203,7 +212,7 @@ class Roundoff:
         return evaluation + self._dense(self.basis, size, largest)
 
     def _noise(self, size: float) -> float:
-        """R: the objective of rounding errors alone if all coordinates have this ``size``, J."""
+        """Objective R of rounding errors alone, J, if all coordinates are of this ``size`` (m)."""
         h = self.loop.time_step
         unit = OPERATIONS * EPS * size
         total = 1.5 * float(self.scene.masses.sum()) / h**2 * (2.0 * unit) ** 2
@@ -213,15 +222,15 @@ class Roundoff:
         return total
 
     def _residual(self, size: float) -> np.ndarray:
-        """Bound c u |A| |y| (N,) for the linear solver's residual, if no |y| exceeds ``size``."""
+        """Bound c u |A| |y| (N,) of the linear solver's residual, if all |y| are up to ``size``."""
         rows = np.asarray(abs(self.scene.system.matrix).sum(axis=1)).ravel()
         return OPERATIONS * EPS * size * rows
 
     def _dense(self, b: np.ndarray, size: float, largest: np.ndarray) -> float:
         matrix = b.T @ (self.scene.masses[:, None] * b) / self.loop.time_step**2
-        steps: Sequence[Any] = self.loop.local_steps  # in a subspace each has a matrix
+        steps: Sequence[Any] = self.loop.local_steps  # local steps in a subspace have matrices
         matrix = matrix + sum(step.matrix for step in steps)
-        # scale columns to length one, so that the result does not depend on units of coordinates
+        # columns are scaled to length one: the result does not depend on units of coordinates
         scale = np.sqrt(np.diag(matrix))
         eigenvalues = np.linalg.eigvalsh(matrix / np.outer(scale, scale))
         smallest, greatest = max(eigenvalues[0], EPS * eigenvalues[-1]), eigenvalues[-1]
@@ -235,11 +244,11 @@ class Roundoff:
 class Record:
     """A run, frame by frame; it ends before the first frame that is not finite.
 
-    positions, velocities : (F + 1, N, 3) m and m/s, with the start as the first entry
-    rise : (F,) largest rise of the objective between successive iterations, relative to the frame's
-        first objective; zero if it never rose
-    excess : (F,) absolute rise minus the bound for rounding errors, J
-    energy : (F + 1,) sum of the kinetic energy and the potential energy of the groups, J
+    positions, velocities : (F + 1, N, 3) m and m/s, beginning with the start
+    rise : (F,) largest rise of the objective from one iteration to the next, over the objective at
+        the beginning of the frame; zero if the objective never rises
+    excess : (F,) this rise in J, minus the bound for rounding errors
+    energy : (F + 1,) kinetic energy plus potential energy of the groups, J
     blowup_frame : first frame that is not finite or too large, None if there is none
     """
 
@@ -257,14 +266,14 @@ class Record:
 
 
 class Watched:
-    """Reduced local step that reports the energy of the full projections instead of its own."""
+    """Reduced local step that returns the energy of the full projections, not the reduced one."""
 
     def __init__(self, step: LocalStep, group: LocalStep) -> None:
         self.name = step.name
         self._step, self._group = step, group
 
     def begin_frame(self, q: np.ndarray) -> None:
-        """Compute data that are constant during a frame, for both steps, at ``q`` (N, 3) m."""
+        """Let both steps compute their data for a frame, from positions ``q`` (N, 3) m."""
         self._step.begin_frame(q)
         self._group.begin_frame(q)
 
@@ -284,11 +293,10 @@ def record(
 ) -> Record:
     """Run all frames of ``scene`` with ``loop`` from ``state``.
 
-    Parameters
-    ----------
-    model : the position subspace of ``loop``; None if its coordinates are the positions
-    limit : extent in metres above which the run ends as a blow-up
-    observe : called with the number and the last local iterate of every frame
+    model : model in whose position subspace ``loop`` runs; None if its coordinates are positions
+    limit : longest side of the bounding box, in m, above which the run ends as a blow-up
+    observe : function that is called with the number of every frame, and the iterate at which the
+        last local step of the frame computes projections
     """
     roundoff = Roundoff(scene, loop, None if model is None else model.columns.B)
     positions: Callable[[np.ndarray], np.ndarray] = model.positions if model else lambda y: y
@@ -344,13 +352,13 @@ def finite(case: HardCase, scene: Scene, run: Record) -> str:
 
 
 def bounded(case: HardCase, scene: Scene, run: Record) -> str:
-    """Check that the bounding box of every frame stays below the size that ``case`` allows."""
+    """Check that no frame's bounding box exceeds the size that the hard case allows."""
     limit = case.bound * reach(scene, run)
     return "" if run.extent <= limit else f"extent {run.extent:.3g} m, allowed {limit:.3g} m"
 
 
 def reach(scene: Scene, run: Record) -> float:
-    """Largest extent of the rest shape, the start, and the fixed vertices in all frames, m."""
+    """Largest extent (side of the bounding box) of rest shape, start, and fixed vertices, m."""
     sizes = [scene.mesh.extent, float(np.ptp(run.positions[0], axis=0).max())]
     held = np.unique(np.concatenate([[], *(b.vertices for b in scene.boundaries)]).astype(int))
     if len(held):
@@ -359,7 +367,7 @@ def reach(scene: Scene, run: Record) -> float:
 
 
 def objective(case: HardCase, scene: Scene, run: Record) -> str:
-    """Check that no iteration raises the objective by more than rounding explains."""
+    """Check that no iteration raises the objective by more than rounding errors can explain."""
     worst = int(np.argmax(run.excess))
     if run.excess[worst] <= 0.0:
         return ""
@@ -369,8 +377,8 @@ def objective(case: HardCase, scene: Scene, run: Record) -> str:
 def energy(case: HardCase, scene: Scene, run: Record) -> str:
     """Check that kinetic plus potential energy never exceeds its value at the start.
 
-    For a start at rest the first frame obeys this after any number of iterations, since its
-    objective is this energy; later frames obey it by the damping of the implicit step.
+    If the start is at rest, this is so in the first frame after any number of iterations, because
+    its objective is this energy; in later frames it is so because the implicit step damps.
     """
     start, largest = run.energy[0], run.energy.max()
     elastic = float(np.abs(run.positions).max()) ** 2 * float(abs(scene.system.matrix).sum())
@@ -380,14 +388,14 @@ def energy(case: HardCase, scene: Scene, run: Record) -> str:
 
 
 def momentum(case: HardCase, scene: Scene, run: Record) -> str:
-    """Check that linear momentum is changed by gravity only."""
+    """Check that gravity alone changes the linear momentum."""
     h, masses = scene.config.time_step, scene.masses
     pull = sum((f.acceleration(run.positions[0], run.velocities[0]) for f in scene.forces), 0.0)
     frames = np.arange(len(run.velocities))[:, None]
     found = np.einsum("n,fna->fa", masses, run.velocities)
     expected = found[0] + frames * h * masses.sum() * np.broadcast_to(pull, 3)
     error = np.abs(found - expected).max()
-    # columns of S^T W p and of the linear solver's residual sum to zero up to rounding
+    # the columns of S^T W p, and of the linear solver's residual, sum to zero up to rounding
     size = float(np.abs(run.positions).max()) + float(np.abs(run.velocities).max()) * h
     noise = EPS * OPERATIONS * size * (masses.sum() / h + h * abs(scene.system.matrix).sum())
     allowed = noise * max(1.0, np.sqrt(len(found)))
@@ -424,9 +432,9 @@ CHECKS: dict[str, Check] = {
 
 
 def faults(case: HardCase) -> list[str]:
-    """Return the checks that the full-order run of ``case`` fails, each with its reason.
+    """Return the checks that the full-order run of a hard case fails, each with its reason.
 
-    If the case must be refused, building or running the scene must raise a `PdromError`.
+    If the scene must be refused, building or running it must raise a `PdromError`.
     """
     if case.holds == ("refused",):
         try:

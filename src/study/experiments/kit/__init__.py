@@ -1,1 +1,1 @@
-"""Helpers of experiments: settings, measurement, and runs that several experiments need."""
+"""Helpers of experiments: settings, measurement of times, and files of runs and reductions."""

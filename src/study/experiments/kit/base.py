@@ -1,10 +1,11 @@
 """Declaration of experiments, settings that several of them share, and scenes from files.
 
-An experiment answers a question of the study by files.
+An experiment is a function that runs models and writes its results to files.
 
 The sensitivity floor of a scene is the drift of its full-order run, by frame, after a small random
 displacement of the start: the largest over all seeds (`study.experiments.sensitivity`). The horizon
-is the first frame with a floor above a threshold: from it on, errors say nothing about a method.
+is the first frame in which the floor exceeds a threshold: from this frame on, errors of reduced
+runs say nothing about a method.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -28,7 +29,7 @@ from study.artifact.reads import Read
 
 
 class Experiment(Artifact):
-    """An artifact (declared function that makes files) whose function writes its files itself."""
+    """An artifact (function declared to make files) whose function itself writes the files."""
 
 
 def experiment(
@@ -36,12 +37,8 @@ def experiment(
 ) -> Callable[[Callable[..., None]], Experiment]:
     """Return a decorator that declares a function as an experiment (`Artifact`).
 
-    ``title`` is the message of its jobs. With ``alone``, no other job runs at the same time.
-
-    Raises
-    ------
-    TypeError
-        If the parameters of the function are not the names in ``reads`` and ``writes``.
+    ``title`` is the message of its jobs. With ``alone``, no other job runs at the same time. Raises
+    TypeError if the parameters of the function are not the names in ``reads`` and ``writes``.
     """
 
     def decorate(function: Callable[..., Any]) -> Experiment:
@@ -56,58 +53,59 @@ def experiments() -> dict[str, Experiment]:
     return declared_in("study.experiments", Experiment)
 
 
-FOM = "fom"  # full-order run with the scene's or another number of iterations
-ANDERSON = "fom-anderson"  # full-order run with Anderson acceleration
+FOM = "fom"  # method in tables: full-order run, with the scene's or another number of iterations
+ANDERSON = "fom-anderson"  # method in tables: full-order run with Anderson acceleration
 
-# names of the phases of a frame that belong to no effect
+# names of those phases of a frame that belong to no effect
 RIGHT, GLOBAL, REST = "right-hand side", "global solve", "rest of the frame"
-# A run ends as a blow-up when its bounding box exceeds this multiple of the rest shape's extent.
+# A run ends as a blow-up if its bounding box exceeds this multiple of that of the rest shape.
 BlowupExtent = Annotated[float, Field(gt=1.0, le=1e12)]
 Count = Annotated[int, Field(ge=1, le=100_000)]
 Repeats = Annotated[int, Field(ge=1, le=1000)]
 Modes = Annotated[int, Field(ge=1, le=1000)]
 Tolerance = Annotated[float, Field(gt=0.0, lt=1.0)]
-# Factors for the number of vertices along each side of the mesh, by name of the scene.
+# Name of a scene -> factors on the number of vertices along each side of its mesh.
 Sizes = dict[str, tuple[Annotated[float, Field(gt=0.0, le=100.0)], ...]]
 PositionBasis = Literal["pod", "skinning"]
 Rank = Annotated[int, Field(ge=1, le=100_000)] | Literal["full"]
 
 
 class OfScene(ConfigModel):
-    """Base class of settings that identify files of a scene."""
+    """Base class of settings that identify a file of a scene."""
 
     scene: SceneName
 
     @property
     def labels(self) -> dict[str, str]:
-        """Scene, group ... in the paths of the files, by name: all text settings."""
+        """Scene, group ... in the path of the file, by name: all settings that are texts."""
         return {name: text for name, text in self if isinstance(text, str)}
 
 
 def floor_of(table: pd.DataFrame, scene: str, perturbation: float | str) -> np.ndarray:
-    """Sensitivity floor (F,) of a scene: drift by frame for one size or name of perturbation.
+    """Drift (F,) of perturbed runs of a scene, by frame, for a size or name of the perturbation.
 
-    The floor is empty if the scene was not perturbed in this way.
+    The array is empty if the scene has no such runs. The largest drift over all seeds is returned.
 
-    Parameters
-    ----------
-    table : perturbed runs with scene, perturbation, frame and relative_difference; seeds may be
-        separate rows or already combined
+    table : perturbed runs, with columns scene, perturbation, frame and relative_difference; rows
+        may be those of single seeds, or the largest over all seeds
     """
     label = perturbation if isinstance(perturbation, str) else f"{perturbation:g}"
-    # a column that contains only numbers is read from a file as floats
+    # if all perturbations are numbers, the column was read from its file as floats
     rows = table[(table.scene == scene) & (table.perturbation.astype(str) == label)]
     return rows.groupby("frame").relative_difference.max().to_numpy(float)
 
 
 def horizon(floor: np.ndarray, threshold: float) -> int:
-    """First frame in which the sensitivity floor (F,) exceeds ``threshold``; F if it never does."""
+    """First frame in which the drift ``floor`` (F,) exceeds ``threshold``; F if none does."""
     above = np.flatnonzero(~(floor <= threshold))
     return int(above[0]) if len(above) else len(floor)
 
 
 def horizons(table: pd.DataFrame, perturbation: float | str, threshold: float) -> dict[str, int]:
-    """Horizon of every scene in ``table``: first frame with a floor above ``threshold``."""
+    """Return scene -> first frame in which the drift of its perturbed runs exceeds ``threshold``.
+
+    table, perturbation : drift of perturbed runs, and size or name of the perturbation that counts
+    """
     scenes = table.scene.unique()
     return {s: horizon(floor_of(table, s, perturbation), threshold) for s in scenes}
 
@@ -122,7 +120,7 @@ Solver = Annotated[str, AfterValidator(_known)]
 
 
 class Horizon(ConfigModel):
-    """Settings of the horizon: runs of a scene are compared in earlier frames only.
+    """Settings of the horizon of a scene, the frame before which runs are compared.
 
     It is the first frame in which runs with this ``perturbation`` differ by over ``threshold``.
     """
@@ -131,13 +129,13 @@ class Horizon(ConfigModel):
     threshold: Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 
     def frames(self, perturbed: File) -> int:
-        """Number of frames before the horizon, from the table ``perturbed`` of a scene."""
+        """Number of frames that are compared, from the file ``perturbed`` of perturbed runs."""
         spread = floor_of(read_table(perturbed.path), perturbed["scene"], self.perturbation)
         return horizon(spread, self.threshold)
 
 
 def resolve_ranks(ranks: Sequence[Rank], rank: int) -> list[int]:
-    """Sort basis sizes ``ranks``, with "full" replaced by the numerical ``rank`` (omitted if 0)."""
+    """Sort basis sizes ``ranks``; "full" is replaced by the numerical ``rank``, or omitted if 0."""
     full = [rank] if "full" in ranks and rank > 0 else []
     return sorted({*(int(r) for r in ranks if r != "full"), *full})
 
@@ -146,7 +144,7 @@ TRAIN = "train"
 
 
 def scene_of(config: SceneConfig, mesh: File, run: str = TRAIN) -> Scene:
-    """Scene of ``config`` in the motion ``run`` ("train" or a held-out motion) on its mesh file."""
+    """Build the scene of ``config`` on its mesh; ``run`` is "train" or a held-out motion."""
     chosen = config if run == TRAIN else config.heldout_variant(cast(HeldOutMotion, run))
     scene = Scene.build(chosen, load_mesh(mesh.path))
     scene.log_holds()
@@ -154,19 +152,19 @@ def scene_of(config: SceneConfig, mesh: File, run: str = TRAIN) -> Scene:
 
 
 def positions_of(run: File, frames: int | None = None) -> np.ndarray:
-    """Positions (F + 1, N, 3) m of a full-order run, or of its first ``frames`` frames."""
+    """Read positions (F + 1, N, 3) m of a full-order run, or only of its first ``frames``."""
     with open_hdf5(run.path) as file:
         return file["positions"][: None if frames is None else frames + 1]
 
 
 def followed(loop: Stepper, state: State, frames: int) -> np.ndarray:
-    """Positions (F + 1, N, 3) m of ``loop`` over ``frames``, beginning with ``state``."""
+    """Run ``loop`` from ``state`` over ``frames`` frames; return positions (F + 1, N, 3) m."""
     ends = [after.positions for after, _ in loop.run(state, range(frames))]
     return np.stack([state.positions, *ends])
 
 
 def perturbation_field(scene: Scene, size: float, seed: int) -> np.ndarray:
-    """Random vectors (N, 3) m by ``seed``, each ``size`` times the extent of ``scene`` long."""
+    """Random vectors (N, 3) m by ``seed``, ``size`` times the longest side of the mesh long."""
     field = np.random.default_rng(seed).standard_normal((scene.mesh.vertices, 3))
     return size * scene.mesh.extent * field / np.linalg.norm(field, axis=1, keepdims=True)
 
@@ -181,8 +179,8 @@ def varied(
     """Return ``config`` with another ``time_step`` (s) and other weights of reduced groups.
 
     The weights of reduced groups are multiplied by ``stiffness_ratio``. Schedules keep their times
-    in seconds, so that their frame numbers change. The run lasts ``duration`` seconds, but at least
-    ``frames[0]`` and at most ``frames[1]`` frames.
+    in seconds, so that their frame numbers change. The run lasts ``duration`` seconds, but has at
+    least ``frames[0]`` and at most ``frames[1]`` frames.
     """
     count = min(max(round(duration / time_step), frames[0]), frames[1])
     effects = []
@@ -191,6 +189,6 @@ def varied(
         if isinstance(effect, GroupConfig) and effect.effect in config.reduce:
             effect = effect.model_copy(update={"weight": stiffness_ratio * effect.weight})
         effects.append(effect)
-    # settings of the reduction, such as the number of training snapshots, remain
+    # settings of the reduction, such as the number of training snapshots, do not change
     changes = {"time_step": time_step, "frames": count, "effects": tuple(effects)}
     return config.model_copy(update=changes)

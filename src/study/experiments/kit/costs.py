@@ -1,6 +1,6 @@
-"""Times per frame of each effect and of scenes without one, and times of single local steps.
+"""Times of single local steps, of each effect in a frame, and of frames without some effects.
 
-Effects are timed by wrappers, so that a normal run contains no timers.
+Wrappers measure the times of effects, so that a normal run contains no timers.
 """
 
 from collections.abc import Callable, Hashable, Mapping, Sequence
@@ -32,20 +32,20 @@ COLUMNS = [
 ]  # fmt: skip
 COSTS = ["scene", "effect", "elements", "ms_per_frame", "share"]
 LEFT_OUT = ["scene", "left_out", "groups", "elements", "ms_per_frame", "own_ms"]
-# Methods of effects that the step loop calls: of groups, forces, boundaries, contacts (`_roles`).
+# Methods that the step loop calls of constraint groups, forces, boundaries and contacts, in turn.
 _QUESTIONS = (
     ("begin_frame", "accumulate"), ("acceleration",), ("active", "held", "takes_hold", "path"),
     ("apply",),
 )  # fmt: skip
-# Entries of a timed kernel's record: address and record of the untimed kernel, then addresses of
-# the seconds and clocks of its two parts and of its preparation.
+# Places in the record (array of integers) of a timed kernel: address and record of the kernel
+# without timers, addresses of its seconds and clocks (of two parts and the preparation), and size.
 KERNEL, RECORD, SECONDS, CLOCKS, SIZE = range(OWN, OWN + 5)
 
 
 def variant(
     scene: Scene, system: GlobalSystem, steps: Sequence[LocalStep], frames: int, labels: dict
 ) -> Variant:
-    """Step loop to time: ``scene`` with local ``steps`` from its initial state; no objective."""
+    """Step loop of ``scene`` to time, with local ``steps``; it does not evaluate the objective."""
     loop = scene.stepper(system, steps, track_objective=False)
     return Variant(labels, loop, scene.initial_state(), frames)
 
@@ -53,18 +53,15 @@ def variant(
 def local_costs(
     scene: Scene, reduced: Mapping[tuple, ReducedLocalStep], states: np.ndarray, **often: int
 ) -> pd.DataFrame:
-    """Milliseconds of one evaluation of each local step, as the mean over some states.
+    """Milliseconds of one evaluation of each reduced local step, and of the full one of its group.
 
-    Rows of reduced local steps also have the times of the dense product that solves for the
-    coefficients, and of the reconstruction, each measured separately.
+    Times are means over some states. A row also has times of two parts of the reduced local step,
+    each measured separately: the dense product that solves for the coefficients, and the
+    reconstruction. All steps are measured in turn.
 
-    All steps are measured in turn.
-
-    Parameters
-    ----------
     often : ``warmup``, ``repeats``: numbers of unmeasured and of measured evaluations
-    reduced : local steps by group, method and r, bound to the groups of ``scene``
-    states : (n, N, 3) positions in m; data that are constant during a frame are those of the first
+    reduced : (group, method, r) -> reduced local step of a group of ``scene``
+    states : (n, N, 3) m, positions; data that steps compute once a frame are those of the first
     """
     groups = {name: scene.group(name) for name, _, _ in reduced}
     rhs, iterates = vertices(len(states[0])), [as_vertices(y) for y in states]
@@ -89,7 +86,7 @@ def local_costs(
 
 
 def _each(call: Callable[..., object], arguments: Sequence[tuple]) -> Callable[[], None]:
-    """Return a function that calls ``call`` with each of the ``arguments``."""
+    """Return a function that calls ``call`` once with each tuple in ``arguments``."""
 
     def every() -> None:
         for own in arguments:
@@ -99,11 +96,9 @@ def _each(call: Callable[..., object], arguments: Sequence[tuple]) -> Callable[[
 
 
 class Timed:
-    """Wrapper of an effect that adds up the time of its methods called by the step loop.
+    """Wrapper of an effect; adds up the time of the methods that the step loop calls.
 
-    Attributes
-    ----------
-    local_kernel : kernel of a constraint group, with timers in compiled code; else None
+    local_kernel : for a constraint group, its kernel with timers in compiled code; else None
     """
 
     def __init__(self, effect: Effect, questions: Sequence[str]) -> None:
@@ -117,12 +112,12 @@ class Timed:
 
     @property
     def seconds(self) -> float:
-        """Seconds spent in the effect since `reset`."""
+        """Seconds spent in the effect since the last call of `reset`."""
         return self._asked + self.kernel_seconds
 
     @property
     def kernel_seconds(self) -> float:
-        """Part of `seconds` that is spent inside the compiled loop."""
+        """Seconds spent in compiled code of the effect since the last call of `reset`."""
         return float(self._kernel.sum())
 
     def reset(self) -> None:
@@ -145,12 +140,10 @@ def effect_costs(
 ) -> pd.DataFrame:
     """Times per frame of the full-order run: effects, right-hand side, global solve, the rest.
 
-    The table has the columns `COSTS`. An effect listed several times has one row. ``elements`` is
-    the number of elements of a group, of vertices that pins or handles may fix, else of all
-    vertices. The right-hand side is the time of the compiled local pass outside of the groups.
+    The table has the columns `COSTS`; several effects of one name have one row. ``elements`` is the
+    number of elements of a group, of vertices that pins or handles may fix, or else of all
+    vertices. The time of the right-hand side is that of the compiled local pass without the groups.
 
-    Parameters
-    ----------
     warmup, repeats : numbers of unmeasured and of measured runs
     """
     questions = zip(_roles(scene), _QUESTIONS, strict=True)
@@ -176,7 +169,7 @@ def _roles(scene: Scene) -> tuple[Sequence[Effect], ...]:
 def _profile(
     loop: Stepper, scene: Scene, frames: int, stands: list[Timed], names: list[str]
 ) -> list[list[float]]:
-    """Milliseconds of each frame: the total, effects, right-hand side, global solve, the rest."""
+    """Milliseconds of each frame: total, each effect, right-hand side, global solve, the rest."""
     state, rows = scene.initial_state(), []
     for frame in range(frames):
         for stand in stands:
@@ -185,7 +178,7 @@ def _profile(
         own = [sum(stand.seconds for stand in stands if stand.name == name) for name in names]
         inside = sum(stand.kernel_seconds for stand in stands)
         total, (_, local, solve, _) = float(report.seconds.sum()), report.seconds.tolist()
-        # without a compiled local pass, groups assemble the right-hand side themselves
+        # without a compiled local pass, the times of groups include their right-hand side
         right = local - inside if inside > 0.0 else 0.0
         parts = [*own, right, solve, total - sum(own) - right - solve]
         rows.append([1e3 * part for part in (total, *parts)])
@@ -193,7 +186,7 @@ def _profile(
 
 
 def _elements(scene: Scene, name: str) -> int:
-    """Number of elements of the group ``name``, or of vertices that another effect concerns."""
+    """Number of elements of the group ``name``; for another effect, of vertices it acts on."""
     for group in scene.groups:
         if group.name == name:
             return group.elements
@@ -202,10 +195,10 @@ def _elements(scene: Scene, name: str) -> int:
 
 
 def left_out_sets(scene: Scene) -> list[tuple[str, ...]]:
-    """Sets of effects to leave out: none, each single effect, all groups but one.
+    """Sets of effects to leave out: the empty set, each single effect, all groups except one.
 
-    The list is empty for a scene with a single group, which cannot be left out. Effects of the
-    start, such as a kick, cost no time in a frame and are never left out.
+    The list is empty for a scene with a single constraint group, which cannot be left out. Effects
+    that only change the start, such as a kick, cost no time in a frame and are never left out.
     """
     groups = scene.config.groups
     if len(groups) < 2:
@@ -222,8 +215,9 @@ def left_out(
 ) -> pd.DataFrame:
     """Times per frame of the scene built without some of its effects; columns are `LEFT_OUT`.
 
-    ``own_ms`` is the time of these effects in the complete scene, from ``costs`` by `effect_costs`.
-    ``frames``, ``warmup`` and ``repeats`` are as there; ``solver`` names the linear solver.
+    Column ``own_ms`` is the time of these effects in the complete scene, from the table ``costs``
+    (made by `effect_costs`). ``solver`` names the linear solver; ``warmup`` and ``repeats`` are
+    numbers of unmeasured and of measured runs.
     """
     sets = left_out_sets(scene)
     if not sets:
@@ -254,7 +248,7 @@ def _timed(y, rhs, record, part):
 
 
 def timed(kernel: LocalKernel) -> tuple[LocalKernel, np.ndarray]:
-    """Return ``kernel`` with timers, and the array (3,) of seconds of two parts and preparation."""
+    """Return ``kernel`` with timers, and the seconds (3,) of its two parts and its preparation."""
     seconds, clocks = np.zeros(PREPARE + 1), np.stack([clock() for _ in range(PREPARE + 1)])
     arrays = (seconds, clocks)
     places = [kernel.address, kernel.record.ctypes.data, *(array.ctypes.data for array in arrays)]

@@ -1,11 +1,12 @@
-"""Timings in one process, after a warm-up, with the compared variants in turn.
+"""Timing of step loops ("variants"), alternately, after a warm-up.
 
-A variant has a step loop and its initial state. Every repeat runs each variant once from there, so
-that changes of the processor's clock rate affect all variants alike. For each frame, the time of
-the median repeat is used: an interruption by other programs affects one frame of one repeat.
+A variant is a step loop with its initial state. Each repeat runs every variant once from its
+initial state, so that changes of the processor's clock rate affect all variants alike. For each
+frame, the time of the median repeat is used: an interruption by another program affects one frame
+of one repeat only.
 
-The addresses of arrays and code in a process change its times by more than its repeats scatter.
-Only new processes show that (`in_processes`); a fork would inherit the addresses.
+Times also depend on the addresses of arrays and code in a process, by more than repeats scatter.
+Only new processes (`in_processes`) show this scatter, since a fork inherits the addresses.
 """
 
 import logging
@@ -31,10 +32,10 @@ from study.experiments.kit.base import Count, Repeats
 T = TypeVar("T")
 log = logging.getLogger(__name__)
 
-# Times of a frame, in this order: total; prediction, contacts and velocities; projections of all
-# groups, and coefficients of reduced groups; product with S^T W, if it is separate from the
-# projections; right-hand side from coefficients; global step; positions of all vertices, if the
-# loop has other coordinates.
+# Columns of the times of a frame: the total; prediction, contacts and velocities; projections of
+# all groups and coefficients of reduced groups; product of projections with S^T W, if it is
+# separate from them; right-hand side from coefficients; global step; positions of all vertices, if
+# the loop has coordinates in a subspace.
 PHASES = (
     "ms_per_frame", "inertia_ms", "local_ms", "assembly_ms", "lift_ms", "global_ms", "vertices_ms",
 )  # fmt: skip
@@ -42,7 +43,7 @@ _INNER = ("assembly_seconds", "lift_seconds")
 
 
 class Protocol(ConfigModel):
-    """Settings: ``repeats`` timed runs of ``frames`` frames each, after ``warmup`` untimed runs."""
+    """Settings of a timing: ``repeats`` timed runs of ``frames`` frames, after ``warmup`` runs."""
 
     frames: Count = 10
     warmup: Annotated[int, Field(ge=0, le=1000)] = 1
@@ -50,7 +51,7 @@ class Protocol(ConfigModel):
 
 
 class Processes(Protocol):
-    """Settings: ``processes`` time every run, each with ``frames``, ``warmup`` and ``repeats``."""
+    """Settings of a timing that several new ``processes`` repeat, one after the other."""
 
     frames: Count = 4
     repeats: Repeats = 3
@@ -59,13 +60,17 @@ class Processes(Protocol):
 
 @dataclass(frozen=True)
 class Variant:
-    """A loop to time: first columns of its row, the loop with its first state, number of frames.
+    """A step loop to time.
 
-    ``share`` is the fraction of a frame's iterations that the loop does; the times of phases inside
-    the iterations are divided by it. ``output`` computes the positions of all vertices from the
-    coordinates of a loop in a subspace, after every ``steps`` of its steps. ``starts`` are pairs
-    (state, number of the next step); if given, ``steps`` steps are timed from each of them in turn,
-    in place of the first ``frames``.
+    labels : first columns of its row
+    loop, start, frames : step loop, state before the first frame, number of frames
+    share : fraction of a frame's iterations that the loop does; the times of phases inside the
+        iterations are divided by it
+    output : function that computes the positions of all vertices from coordinates in a subspace; it
+        is called after every ``steps`` steps of the loop
+    starts : pairs (state, number of the next step); if there are any, ``steps`` steps are timed
+        from each of them in turn, in place of the first ``frames``
+    warm : number of frames of an unmeasured run; None for ``frames``
     """
 
     labels: dict[str, Any]
@@ -76,22 +81,21 @@ class Variant:
     output: Callable[[np.ndarray], np.ndarray] | None = None
     steps: int = 1
     starts: tuple[tuple[State, int], ...] = ()
+    warm: int | None = None
 
 
 def measure(variants: Sequence[Variant], warmup: int, repeats: int) -> list[dict[str, Any]]:
-    """Time all variants; the first of ``warmup`` runs also factorises and caches matrices.
+    """Time all variants; return a row for each: labels, and times of the `PHASES` in ms.
 
-    Returns a row per variant: its labels, and times by phase (`PHASES`) in ms, as means over the
-    frames, each frame from its median repeat.
-
-    Parameters
-    ----------
-    warmup, repeats : numbers of unmeasured and of measured runs of each variant
+    Times are means over the frames, where each frame's time is from its median repeat. Of each
+    variant there are ``warmup`` unmeasured runs, the first of which also factorises and caches
+    matrices, and ``repeats`` measured runs.
     """
     samples: list[list[np.ndarray]] = [[] for _ in variants]
     for repeat in range(-warmup, repeats):
         for own, variant in zip(samples, variants, strict=True):
-            own.append(_time_once(variant))
+            frames = variant.frames if repeat >= 0 else variant.warm or variant.frames
+            own.append(_time_once(variant, frames))
         log.info("repeat %d of %d", max(0, repeat + 1), repeats)
     times = [median_frames(np.array(own[warmup:])).tolist() for own in samples]
     return [
@@ -103,7 +107,7 @@ def measure(variants: Sequence[Variant], warmup: int, repeats: int) -> list[dict
 def measure_calls(
     calls: Mapping[Hashable, Callable[[], object]], warmup: int, repeats: int
 ) -> dict[Hashable, float]:
-    """Median time of each of ``calls``, ms; calls alternate, the first ``warmup`` are untimed."""
+    """Median time (ms) of each of ``calls``, in turn, after ``warmup`` untimed calls of each."""
     samples: dict[Hashable, list[float]] = {key: [] for key in calls}
     for _ in range(warmup + repeats):
         for key, call in calls.items():
@@ -114,7 +118,7 @@ def measure_calls(
 
 
 def clocked(made: Iterable[T]) -> Iterator[tuple[float, T]]:
-    """Yield (processor time in s to make it, item) for every item of ``made``."""
+    """Yield pairs (processor time in s to make an item, item) for all items of ``made``."""
     items = iter(made)
     while True:
         before = process_time()
@@ -125,12 +129,12 @@ def clocked(made: Iterable[T]) -> Iterator[tuple[float, T]]:
         yield process_time() - before, item
 
 
-def _time_once(variant: Variant) -> np.ndarray:
-    """Milliseconds by phase (`PHASES`) of each frame, up to the first that is not finite."""
+def _time_once(variant: Variant, frames: int) -> np.ndarray:
+    """Run a variant; return milliseconds (frames, `PHASES`) up to a frame that is not finite."""
     loop, state, rows = variant.loop, variant.start, []
     frame = -1
     with np.errstate(over="ignore", invalid="ignore"):
-        for number in range(variant.frames):
+        for number in range(frames):
             frame += 1
             if variant.starts and number % variant.steps == 0:
                 state, frame = variant.starts[number // variant.steps]
@@ -155,10 +159,10 @@ def _time_once(variant: Variant) -> np.ndarray:
 
 
 def median_frames(samples: np.ndarray) -> np.ndarray:
-    """Mean over frames of ``samples`` (repeats, frames, phases), each from its median repeat.
+    """Mean over frames of ``samples`` (repeats, frames, phases), of each frame one repeat.
 
-    The median repeat of a frame is the one with the median total, the first phase. All phases are
-    from this repeat, since medians of single phases would not add up to the total.
+    This is the repeat with the median total (first phase). All phases of a frame are from this
+    repeat, since medians of single phases would not add up to the total.
     """
     order = np.argsort(samples[:, :, 0], axis=0, kind="stable")[len(samples) // 2]
     return samples[order, np.arange(samples.shape[1])].mean(axis=0)
@@ -167,15 +171,11 @@ def median_frames(samples: np.ndarray) -> np.ndarray:
 def in_processes(
     cases: Sequence[Callable[[], Iterable[Variant]]], asked: Processes
 ) -> list[dict[str, Any]]:
-    """Rows of all variants (labels and times) for each of several new processes, in order.
+    """Time all variants in several new processes; return their rows (labels, times), in order.
 
-    One process after the other times all variants, in a random order of its own. Each of ``cases``
-    is pickled and called in the process, where it makes its variants.
-
-    Raises
-    ------
-    PdromError
-        A process failed; the message ends with the last line of its output.
+    The processes run one after the other, each with another random order of the variants. A process
+    gets the pickled functions ``cases``, which make the variants. Raises PdromError if a process
+    fails; the message ends with the last line of its output.
     """
     rows: list[dict[str, Any]] = []
     with TemporaryDirectory() as folder:
@@ -197,7 +197,7 @@ def in_processes(
 
 
 def _in_this_process(given: str, answer: str, process: str) -> None:
-    """Time the pickled cases in the file ``given`` and write the rows to the file ``answer``."""
+    """Time the variants of the pickled functions in file ``given``; write rows to ``answer``."""
     with damaged_set_aside():  # rename damaged files, as the job does that started this process
         cases, asked = pickle.loads(Path(given).read_bytes())
         variants = [variant for case in cases for variant in case()]

@@ -1,4 +1,4 @@
-"""Load reductions and bases from their files, compute errors of runs, and store runs."""
+"""Functions that load reductions, find bases, compute errors of runs, and store runs."""
 
 import os
 from collections.abc import Sequence
@@ -19,7 +19,7 @@ from study.artifact.paths import File
 def load_reduction(
     basis: Basis, sampling: str | os.PathLike[str], method: MethodSpec, r: int
 ) -> Reduction:
-    """Reduction of size r by ``method`` and ``basis``; StorageError if ``sampling`` has no r."""
+    """Load the reduction of size ``r`` from ``sampling``; StorageError if the file has none."""
     with open_hdf5(sampling) as file:
         store = file[f"r{r:04d}"]
         stored = Sampling(store["entries"][...], store["elements"][...])
@@ -27,7 +27,10 @@ def load_reduction(
 
 
 def basis_of(sampling: File, method: MethodSpec, bases: Sequence[File]) -> File:
-    """Basis file of a ``sampling`` by ``method``; StorageError if it is not among ``bases``."""
+    """Return the one of the files ``bases`` to which samples by ``method`` in a file belong.
+
+    Raises StorageError if the basis is not among them.
+    """
     wanted = {"scene": sampling["scene"], "group": sampling["group"], "basis": method.basis_id}
     for basis in bases:
         if basis.labels == wanted:
@@ -42,7 +45,7 @@ def run_error(run: np.ndarray, reference: np.ndarray) -> float | None:
 
 
 def store_end(store: h5py.Group, outcome: Rerun, with_positions: bool = True) -> None:
-    """Store the blow-up frame, the largest extent and, in single precision, positions of a run."""
+    """Store blow-up frame, largest size and, in single precision, positions of a run."""
     blowup = -1 if outcome.blowup_frame is None else outcome.blowup_frame
     store.attrs.update(blowup_frame=blowup, max_extent=outcome.max_extent)
     if with_positions:

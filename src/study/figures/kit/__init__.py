@@ -1,1 +1,1 @@
-"""Helpers for figures: their declaration, their options, and the drawing of elements."""
+"""Helpers for figures: declaration of figures and of their options, and drawing of elements."""

@@ -43,18 +43,18 @@ AZIMUTH = 30.0  # azimuth of every camera, degrees
 
 
 class NothingToDraw(Exception):
-    """The configuration has no data for a figure; the message names the missing data."""
+    """Raised if the configuration has no data for a figure; the message names what is missing."""
 
 
 class Options(ConfigModel):
-    """Base class of the options of figures in config/figures.yaml; subclasses add keys.
+    """Base class of the options of a figure in config/figures.yaml; subclasses add keys.
 
-    Chosen names that the configuration lacks are not drawn. An empty list of names, or a list whose
-    names are all absent, selects everything in the configuration.
+    Listed names that the configuration lacks are not drawn. An empty list, or a list of which the
+    configuration has no name, selects everything in the configuration.
     """
 
     def names(self, key: str) -> Names:
-        """Chosen names under ``key`` (scenes, methods); empty if the figure has no such option."""
+        """Names listed under ``key`` (scenes, methods); empty if the figure has no such option."""
         return getattr(self, key, ())
 
     def words(self) -> str:
@@ -84,24 +84,27 @@ class Methods(Scenes):
 
 
 class View(Methods):
-    """Options of a figure: elevation of the camera, degrees; gravity points down in the picture."""
+    """Options of a figure: scenes, methods, elevation of the camera (degrees, gravity is down)."""
 
     elevation: Annotated[float, Field(ge=-90.0, le=90.0)] = 20.0
 
     def camera(self, experiment: "Experiment") -> Camera:
-        """Camera for the scene of ``experiment``."""
+        """Return the camera for pictures of the scene of ``experiment``."""
         return Camera(AZIMUTH, self.elevation, tuple(up_of(experiment.effects).tolist()))
 
 
 class Beside(Scenes):
-    """Options: number of panels per row, and the published code's experiment for each scene."""
+    """Options of a figure: panels in a row, and scene -> experiment of the published code.
+
+    The published code is the program that the authors of the preprint published.
+    """
 
     columns: Columns = 3
     published: dict[str, str] = Field(default_factory=dict)
 
 
 class ReducedRuns(View):
-    """Options: basis sizes of the reduced runs, and instants (fractions of the run) to draw."""
+    """Options of a figure: basis sizes of reduced runs; instants to draw (fractions of the run)."""
 
     ranks: Ranks = ()
     frames: Instants = (0.1, 0.5, 0.9)
@@ -112,9 +115,9 @@ class _Plain(BaseModel):
 
 
 class Experiment(_Plain):
-    """A constraint group that is reduced in a scene.
+    """A constraint group (all constraints of one kind) that is reduced in a scene.
 
-    mesh, effects : identifier of the scene's mesh, and all of its effects
+    mesh, effects : identifier of the mesh of the scene, and all effects of the scene
     only : True if the scene reduces no other group
     """
 
@@ -126,12 +129,12 @@ class Experiment(_Plain):
 
     @property
     def modules(self) -> tuple[str, ...]:
-        """Modules of the scene's effects, which define element positions and obstacle shapes."""
+        """Modules of the scene's effects, whose code determines drawn elements and obstacles."""
         return tuple(sorted({EFFECTS[effect.effect] for effect in self.effects}))
 
     @property
     def labels(self) -> dict[str, str]:
-        """Scene, group and mesh, by name, as they occur in the paths of the files."""
+        """Scene, group and mesh, by name, which the paths of files contain."""
         return {"scene": self.scene, "group": self.group, "mesh": self.mesh}
 
     @property
@@ -141,13 +144,13 @@ class Experiment(_Plain):
         return name if self.only else f"{name}: {self.group.replace('_', ' ')}"
 
     def find(self, files: Sequence[File], **labels: str) -> str | None:
-        """Path of the first of ``files`` of this scene, group, mesh and ``labels``; else None."""
+        """Path of the first file of this scene, group, mesh and ``labels``; None without one."""
         own = self.labels | labels
         found = (f.path for f in files if all(own.get(k, v) == v for k, v in f.labels.items()))
         return next(found, None)
 
     def path(self, files: Sequence[File], **labels: str) -> str:
-        """Path of the first file that `find` finds; LookupError if there is none."""
+        """Path of the first file that the method `find` finds; LookupError without one."""
         path = self.find(files, **labels)
         if path is None:
             raise LookupError(f"no file of {self.labels | labels}")
@@ -155,17 +158,18 @@ class Experiment(_Plain):
 
 
 class Reduction(_Plain):
-    """Title of a reduction method, and the kind of rows that it samples (`MethodSpec.rows`)."""
+    """Reduction method: title, and kind of rows that it samples (as in `MethodSpec.rows`)."""
 
     title: str
     rows: str
 
 
 class Drawn(_Plain):
-    """The experiments and methods of a study that a figure draws, selected by its options.
+    """Experiments and methods that the options of a figure select, in the order of drawing.
 
-    experiments, reductions : selected scenes with a reduced group, and methods by name, in order
-    groups : all constraint groups of the model, whose order decides their colours
+    experiments : a scene with a reduced group each
+    reductions : methods by name
+    groups : names of all constraint groups that exist; their order determines their colours
     """
 
     experiments: tuple[Experiment, ...]
@@ -184,7 +188,7 @@ class Drawn(_Plain):
 
     @property
     def looks(self) -> dict[str, tuple[str, str]]:
-        """(colour, marker) of every constraint group."""
+        """Name of each constraint group -> (colour, marker)."""
         looks = style.GROUP_LOOKS
         return {group: looks[place % len(looks)] for place, group in enumerate(self.groups)}
 
@@ -193,22 +197,19 @@ class Drawn(_Plain):
         return [experiment for experiment in self.experiments if experiment.scene == scene]
 
     def title(self, method: str) -> str:
-        """Title of ``method``, ready to be drawn; its name if the method is not selected."""
+        """Title of ``method`` as plain words; its name if the method is not selected."""
         held = self.reductions.get(method)
         return plain_words(held.title if held else method)
 
     def handles(self, looks: Mapping[str, tuple[str, str]], **common: Any) -> list[Line2D]:
-        """Legend entry of each method in ``looks`` (colour, marker), with style ``common``."""
+        """Return a legend entry for each method in ``looks`` (method -> colour, marker)."""
         return [
             style.handle(self.title(method), color=colour, marker=marker, **common)
             for method, (colour, marker) in looks.items()
         ]
 
     def scenes_of(self, table: pd.DataFrame, nothing: str) -> list[str]:
-        """Scenes that have a row in ``table``; raise `NothingToDraw` if there are none.
-
-        nothing : message of the exception
-        """
+        """Scenes with a row in ``table``; raise NothingToDraw (text ``nothing``) without one."""
         scenes = [scene for scene in self.scenes if (table.scene == scene).any()]
         if not scenes:
             raise NothingToDraw(nothing)
@@ -231,15 +232,15 @@ ELSEWHERE = "the full study (config/default.yaml) draws it"
 
 @dataclass(frozen=True)
 class Declaration(Artifact):
-    """Figure of the study, with the name of the function that draws it.
+    """Figure of the study, named after the function that draws it.
 
-    The function gets its inputs and ``options``, whose type defines keys and defaults of the
-    figure's options in config/figures.yaml. It raises `NothingToDraw` if the configuration has no
-    data for the figure, and StorageError for a damaged file.
+    The function gets its inputs and ``options``; the type of these declares the keys of the figure
+    in config/figures.yaml, and their defaults. The function raises `NothingToDraw` if the
+    configuration has no data for the figure, and StorageError for a damaged file.
 
     title, caption : text in the mark-up of `study.artifact.markup`; ``{key}`` in a caption stands
         for the value of a setting
-    number : number of the reproduced figure in the preprint; None for a figure of this study
+    number : number of the figure in the preprint that it reproduces; None for an own figure
     """
 
     caption: str = ""
@@ -248,17 +249,14 @@ class Declaration(Artifact):
 
     @property
     def options(self) -> type[Options]:
-        """Type of the figure's options, from the annotation of its function."""
+        """Type of the options, as annotated in the function that draws the figure."""
         chosen: type[Options] = self.function.__annotations__["options"]
         return chosen
 
     def words(self, value: Callable[[str], Any]) -> tuple[str, str]:
-        """Title and caption in mark-up; ``value`` returns the settings named in the caption.
+        """Title and caption in mark-up; ``value`` returns the value of a setting in the caption.
 
-        Raises
-        ------
-        ConfigurationError
-            If a setting does not exist.
+        Raises ConfigurationError if a setting does not exist.
         """
         return self.title, filled(self.caption, value)
 
@@ -272,10 +270,7 @@ class Declaration(Artifact):
     def draw(self, **read: Any) -> Figure:
         """Draw the figure from its inputs, or a note if they have no data for it.
 
-        Raises
-        ------
-        StorageError
-            If a file is missing or damaged.
+        Raises StorageError if a file is missing or damaged.
         """
         with style.look():
             try:
@@ -288,15 +283,13 @@ class Declaration(Artifact):
 def figure(
     *, title: str, reads: Mapping[str, Read], number: int | None = None, more: str = ""
 ) -> Callable[[Callable[..., Figure]], Declaration]:
-    """Return a decorator that declares a function, called with ``options`` and inputs, as a figure.
+    """Return a decorator that declares a function as the drawing of a figure.
 
-    A function with a parameter ``drawn`` also gets the scenes, groups and methods selected by the
-    options. The caption is the docstring followed by ``more``; line breaks count as blanks.
+    The function gets ``options`` and the inputs ``reads``. If it has a parameter ``drawn``, it gets
+    the scenes, groups and methods that the options select. The caption is the docstring of the
+    function followed by ``more``; line breaks count as blanks.
 
-    Raises
-    ------
-    TypeError
-        If the function has no caption, or its parameters do not match ``reads``.
+    Raises TypeError if the docstring is missing, or if the parameters do not match ``reads``.
     """
 
     def decorate(function: Callable[..., Figure]) -> Declaration:
@@ -316,11 +309,10 @@ def figure(
 def write_figure(
     figure: Figure, title: str, pdf: str | os.PathLike[str], png: str | os.PathLike[str]
 ) -> None:
-    """Write ``figure`` to the files ``pdf`` (embedded TrueType fonts, no dates) and ``png``.
+    """Write ``figure`` to the files ``pdf`` and ``png``, with ``title`` in their metadata.
 
-    Both files have ``title`` in their metadata; repeated calls write the same bytes.
-
-    A file appears only when it is complete.
+    Fonts are embedded as TrueType. The files have no dates, so that repeated calls write the same
+    bytes. A file appears only when it is complete.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
@@ -335,12 +327,9 @@ def write_figure(
 
 @cache
 def declarations() -> dict[str, Declaration]:
-    """Return figures by name, first those of the preprint in its order, then the others by name.
+    """Return all figures by name: first those of the preprint by number, then the others by name.
 
-    Raises
-    ------
-    ConfigurationError
-        If two figures have the same number.
+    Raises ConfigurationError if two figures have the same number.
     """
     found = declared_in(PACKAGE, Declaration)
     numbers = [made.number for made in found.values() if made.number is not None]
@@ -352,17 +341,12 @@ def declarations() -> dict[str, Declaration]:
 
 
 def load_choices(path: Path, known: Mapping[str, Collection[str]]) -> dict[str, Options]:
-    """Options of every figure: its defaults, overridden by the file ``path``.
+    """Read the options of every figure from the file ``path``; other options have their defaults.
 
-    Parameters
-    ----------
-    known : option key (scenes, methods) -> names that are allowed in it
+    Raises ConfigurationError if a figure or key is unknown, a value is outside its range, or a name
+    is not in ``known``.
 
-    Raises
-    ------
-    ConfigurationError
-        If there is an unknown figure or key, a value outside its range, or a name that is not in
-        ``known``.
+    known : key of options (scenes, methods) -> names that are allowed in it
     """
     content = read_yaml(path)
     content = {} if content is None else content

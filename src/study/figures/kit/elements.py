@@ -17,7 +17,7 @@ SIGNED = "RdBu_r"
 
 
 def magnitudes(norm: Normalize | None = None) -> ScalarMappable:
-    """Colour map from near white to dark for values from 0 to 1, or in the range of ``norm``."""
+    """Return a colour map from near white to dark, for values from 0 to 1 or as ``norm`` says."""
     import matplotlib as mpl
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import LinearSegmentedColormap, Normalize
@@ -28,7 +28,7 @@ def magnitudes(norm: Normalize | None = None) -> ScalarMappable:
 
 
 def signed() -> ScalarMappable:
-    """Colour map for values from -1 to 1."""
+    """Return a colour map from blue to red for values from -1 to 1."""
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
 
@@ -37,9 +37,9 @@ def signed() -> ScalarMappable:
 
 @dataclass(frozen=True)
 class ElementMap:
-    """Elements of one constraint group on one mesh, which `draw` colours by values.
+    """Elements of one constraint group on one mesh, to be coloured by values.
 
-    kind : mesh entity of an element: vertex, edge, triangle or tetrahedron
+    kind : part of the mesh that is an element: vertex, edge, triangle or tetrahedron
     cells : (e, m) vertex indices of each element
     """
 
@@ -52,10 +52,11 @@ class ElementMap:
         return points[self.cells].mean(axis=1)
 
     def face_values(self, values: np.ndarray) -> np.ndarray:
-        """Values of the elements (e,) transferred to the surface triangles (T,).
+        """Transfer ``values`` of elements (e,) to the triangles of the surface, (T,).
 
-        A triangle gets its own value, the value of its tetrahedron, or the mean of its vertices
-        (NaN if none has a value). The value of a vertex is its own, or the mean over its edges.
+        If elements are triangles or tetrahedra, a triangle has their value. If they are vertices or
+        edges, it has the mean value of its vertices (NaN if none has a value); the value of a
+        vertex is then its own, or the mean over its edges.
         """
         triangles = self.mesh.triangles
         if self.kind == "triangle":
@@ -85,9 +86,9 @@ class ElementMap:
         camera: Camera,
         colours: ScalarMappable,
     ) -> None:
-        """Draw the mesh with vertices at ``points`` (N, 3) m on ``ax``, as seen by ``camera``.
+        """Draw the mesh, its vertices at ``points`` (N, 3) in m, as seen by ``camera``.
 
-        Each element has a value in ``values`` (e,), which ``colours`` maps to a colour.
+        ``values`` (e,) has a value for each element, which ``colours`` maps to a colour.
         """
         if self.kind == "edge" and not len(self.mesh.tetrahedra):
             draw_surface(
@@ -102,15 +103,11 @@ class ElementMap:
 
 
 def element_map(group: str, mesh: Mesh, elements: int, source: str) -> ElementMap:
-    """Elements of the constraint ``group`` on ``mesh``, in the order of their projections' rows.
+    """Return the elements of the constraint ``group`` on ``mesh``, in the order of their rows.
 
-    Raises
-    ------
-    StorageError
-        If ``group`` is no constraint group, or its number of elements on ``mesh`` is not
-        ``elements``, the number in the file ``source``.
-    ConfigurationError
-        If no effect has the name ``group``.
+    Raises StorageError if the effect ``group`` is no constraint group, or its number of elements on
+    ``mesh`` is not ``elements``, the number in the file ``source``. Raises ConfigurationError if no
+    effect has the name ``group``.
     """
     effect = EFFECTS.load(group)
     if not issubclass(effect, ConstraintGroup):
@@ -122,9 +119,10 @@ def element_map(group: str, mesh: Mesh, elements: int, source: str) -> ElementMa
 
 
 def signed_entry(vector: np.ndarray, rows_per_element: int) -> tuple[np.ndarray, str]:
-    """Values (e,) of the element entry with the largest absolute value, and its name (axis, row).
+    """Find the entry with the largest absolute value; return it of all elements, and its name.
 
-    vector : vector with 3 p entries for each of e elements, with p = ``rows_per_element``
+    ``vector`` has 3 p entries for each of e elements, p = ``rows_per_element``. The returned values
+    (e,) have the place of that entry in each element; the name consists of axis and row.
     """
     entries = vector.reshape(-1, 3 * rows_per_element)
     slot = int(np.argmax(np.abs(vector))) % (3 * rows_per_element)

@@ -1,14 +1,14 @@
 """Start of jobs as forks of a process in which the libraries are already loaded.
 
-A job's interpreter needs about a second to load NumPy, SciPy, pandas and numba, and a study has
-hundreds of jobs. One server process loads them once; each job is a fork of it. The workflow starts
-scripts by `client.py`, which asks the server for a fork, hands over its streams, environment and
-folder, and exits with the status of the fork. If no server answers (on a platform without safe
+A study has hundreds of jobs, and a new interpreter needs about a second to load NumPy, SciPy,
+pandas and numba. One server process loads them once; each job is a fork of it. The workflow starts
+scripts by `client.py`, which requests a fork from the server, passes on its streams, environment
+and folder, and exits with the status of the fork. If no server answers (on a platform without safe
 forks, or after the server was killed), the client runs the script in its own interpreter.
 
-No job outlives its run, whichever process is killed. The server ends the forks of a killed client
-or run, the operating system ends the forks of a killed server, the client ends the processes that
-those forks had started, and a plain interpreter ends itself when its run ends.
+No job outlives its run, whichever process is killed. If the client or the run is killed, the server
+ends the forks. If the server is killed, the operating system ends the forks, and the client ends
+processes that they had started. A job in its own interpreter ends itself when its run ends.
 """
 
 import os
@@ -22,14 +22,14 @@ from pathlib import Path
 
 from study.pipeline.fork_server.client import ADDRESS, PIPE, place_of
 
-# Path of the Python interpreter. The workflow starts scripts by the command of `interpreter`.
+# Path of the Python interpreter; the workflow itself uses the command that `interpreter` returns.
 PYTHON = sys.executable
 
-# Forks of a process that has loaded system frameworks are unsafe on macOS.
+# On macOS, forks of a process that has loaded system frameworks are unsafe.
 SUPPORTED = sys.platform == "linux"
 
-# Modules that the server loads in advance: third-party libraries that most jobs or all figures
-# use, modules that every job imports first, and the modules of the most frequent experiment.
+# Modules that the server loads: libraries that most jobs or all figures use, modules that every
+# job imports first, and the modules of the experiment with the most jobs.
 LIBRARIES = (
     "h5py", "matplotlib.backends.backend_agg", "matplotlib.backends.backend_pdf", "numba", "numpy",
     "pandas", "study.artifact.logs", "pdrom.core.provenance", "study.experiments.kit.base",
@@ -39,22 +39,17 @@ LIBRARIES = (
 
 
 def interpreter() -> str:
-    """Shell command that runs a script in a fork of the server, by way of `client.py`."""
+    """Shell command that runs a script in a fork of the server (by means of `client.py`)."""
     client = Path(__file__).with_name("client.py")
     return f"{shlex.quote(PYTHON)} -I -S {shlex.quote(str(client))}"
 
 
 def hold_pipe(place: Path) -> None:
-    """Open a named pipe until this process ends; jobs outside the fork server then end, too.
+    """Open a named pipe; it closes when this process ends, and jobs without fork server end then.
 
-    Parameters
-    ----------
-    place : path of the pipe, passed to jobs by an environment variable; an old pipe is replaced
+    Raises OSError if the file system does not support named pipes.
 
-    Raises
-    ------
-    OSError
-        The file system does not support named pipes.
+    place : path of the pipe, which jobs get by an environment variable; an old pipe is replaced
     """
     place.unlink(missing_ok=True)
     os.mkfifo(place)
@@ -65,18 +60,18 @@ def hold_pipe(place: Path) -> None:
 
 
 def start_server(libraries: Sequence[str] = LIBRARIES) -> None:
-    """Start the fork server of this process; the server ends when this process does.
+    """Start the fork server of this process; the server ends when this process ends.
 
     Jobs inherit the server's address in an environment variable. The address is an abstract socket
     name of Linux: it is no file and disappears with the last listening process, so that a killed
     run leaves nothing behind. Clients that connect before the ``libraries`` are loaded wait in the
-    socket's queue.
+    queue of the socket.
     """
     if not SUPPORTED:
         return
     name = f"pdrom-{secrets.token_hex(16)}"
-    # The server reads one end of a pipe whose other end only this process has open: the pipe closes
-    # when this process ends, and the server notices that.
+    # The server has one end of a pipe; only this process has the other end open. When this process
+    # ends, the pipe closes, which tells the server to end.
     owner, _kept_open = os.pipe()
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as listener:
         listener.bind(place_of(name))

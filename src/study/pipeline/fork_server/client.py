@@ -1,8 +1,8 @@
 """Run a script in a fork of the server, or in this interpreter if no server answers.
 
 This file is started for every job, and imports only a few standard modules to start fast. A script
-outside the server ends when the run has ended: the run keeps one end of a pipe open
-(`study.pipeline.fork_server.hold_pipe`), which closes when the run is killed, on every platform.
+that runs without the server ends when the run ends: the run keeps one end of a pipe open (see
+`study.pipeline.fork_server.hold_pipe`), which every platform closes when the run is killed.
 """
 
 import os
@@ -19,10 +19,10 @@ FORWARDED = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 def main() -> int:
-    """Run the job and return its exit code; end by the same signal if a signal ended the job."""
+    """Run the job and return its exit code; if a signal ended the job, end by the same signal."""
     name = os.environ.get(ADDRESS)
     script = len(sys.argv) == 2 and not sys.argv[1].startswith("-")
-    # signals are blocked until the job's process number is known, so that they can be forwarded
+    # block signals until the process number of the job is known, to which they are forwarded
     signal.pthread_sigmask(signal.SIG_BLOCK, FORWARDED)
     connection = connect(name) if name and script else None
     answer = ask(connection) if connection else b""
@@ -36,7 +36,7 @@ def main() -> int:
     signal.pthread_sigmask(signal.SIG_UNBLOCK, FORWARDED)
     status = receive(connection)
     if not status:
-        # the job has ended with the server, but processes that the job had started still run
+        # the server is gone, and the job with it: end the processes that the job had started
         forward(job, signal.SIGKILL)
         sys.stderr.write("pdrom: the process that jobs start from is gone\n")
         return 1
@@ -49,7 +49,7 @@ def main() -> int:
 
 
 def connect(name: str) -> socket.socket | None:
-    """Connection to the server ``name``; None if no process of the same user listens there."""
+    """Connect to the server ``name``; return None if no process of this user listens there."""
     connection = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     try:
         connection.connect(place_of(name))
@@ -59,7 +59,7 @@ def connect(name: str) -> socket.socket | None:
 
 
 def place_of(name: str) -> bytes:
-    """Address of the abstract socket ``name`` of Linux, which has no file."""
+    """Address of the abstract socket ``name``; such sockets of Linux have no file."""
     return b"\0" + os.fsencode(name)
 
 
@@ -74,7 +74,7 @@ def of_this_user(connection: socket.socket) -> bool:
 
 
 def ask(connection: socket.socket) -> bytes:
-    """Request a fork over ``connection``; return its process number, b"" if the server is gone.
+    """Request a fork over ``connection``; return its process number, or b"" without a server.
 
     The server gets the standard streams, and a pipe with folder, script and environment of the job.
     """
@@ -99,7 +99,7 @@ def receive(connection: socket.socket) -> bytes:
 
 
 def forward(job: int, number: int) -> None:
-    """Send signal ``number`` to the process group of a ``job``: itself and what it has started."""
+    """Send signal ``number`` to the process ``job`` and all processes that it has started."""
     with suppress(ProcessLookupError):
         os.killpg(job, number)
 
@@ -117,9 +117,9 @@ def run_alone() -> None:
 
 
 def end_with(pipe: str) -> None:
-    """Kill this job when ``pipe`` closes: only the run opens it to write, so the run has ended."""
+    """Kill this job when ``pipe`` closes: only the run has it open for writing, so it has ended."""
     try:
-        # without O_NONBLOCK, open would wait for a writer if the run has already ended
+        # if the run has already ended, open would wait forever for a writer without O_NONBLOCK
         number = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
         os.set_blocking(number, True)
         os.read(number, 1)

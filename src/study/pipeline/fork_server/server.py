@@ -1,8 +1,8 @@
 """Server process from which jobs are forked.
 
-It has one thread. It loads third-party libraries and the modules that every job imports first, not
-modules of effects, which only some scenes list. It ends, together with its jobs, when the process
-that started it has ended. A client that is killed or sends an invalid request is disconnected.
+The server has one thread. It loads libraries and modules that most jobs import, not modules of
+effects, which only some scenes use. It ends, together with its jobs, when the process that started
+it has ended. A client that is killed or sends an invalid request is disconnected.
 """
 
 import atexit
@@ -28,11 +28,10 @@ _DIES_WITH_PARENT = 1  # constant PR_SET_PDEATHSIG of <sys/prctl.h>
 class Server:
     """Server that forks a job for each request until its owner, the process of the run, ends.
 
-    A request is a message with the descriptors of three standard streams and of a pipe. The fork
-    reads folder, script and environment from the pipe, each ended by a zero byte, and a last zero.
+    A request is a message with file descriptors of the three standard streams and of a pipe. From
+    the pipe, the fork reads the folder, the script and the variables of the environment. Each of
+    these texts ends with a zero byte, and another zero byte follows.
 
-    Parameters
-    ----------
     listener : socket to which clients connect
     owner : read end of a pipe whose write end only the owner has open
     """
@@ -44,7 +43,7 @@ class Server:
         self.silent: list[socket.socket] = []
         # clients that wait for the end of their job, by the process number of the job
         self.jobs: dict[int, socket.socket] = {}
-        # the end of a job (SIGCHLD) writes a byte into this pipe, on which the loop waits
+        # when a job ends, its signal SIGCHLD writes a byte into this pipe, for which the loop waits
         self.wake, self._waker = os.pipe()
         os.set_blocking(self._waker, False)
         self._process = os.getpid()
@@ -63,15 +62,15 @@ class Server:
                 return None
             if self.wake in ready:
                 os.read(self.wake, 4096)
-            # send exit statuses of ended jobs to their clients, which may have ended
+            # send exit statuses of jobs that have ended to their clients, which may be gone
             for process in list(self.jobs):
                 done, status = os.waitpid(process, os.WNOHANG)
                 if done:
                     with self.jobs.pop(process) as client, suppress(OSError):
                         client.sendall(NUMBER % status)
             for process, client in self.jobs.items():
-                # a client sends nothing after its request: readable data mean that its connection
-                # is closed, so that its job is killed
+                # A client sends nothing after its request. If its connection becomes readable, the
+                # client is gone, and its job is killed.
                 if client in ready:
                     forward(process, signal.SIGKILL)
             for client in [client for client in self.silent if client in ready]:
@@ -85,10 +84,10 @@ class Server:
                     client.close()
 
     def _answer(self, client: socket.socket) -> str | None:
-        """Fork a job if the client's message is a request.
+        """Fork a job if the client's message is a request, else close the connection.
 
-        Return the script in the fork, None in the server. Without a request the connection is
-        closed, and the client runs its script outside the server.
+        Return the path of the script in the fork, None in the server. A client whose connection
+        was closed runs its script without the server.
         """
         self.silent.remove(client)
         streams: list[int] = []
@@ -103,7 +102,7 @@ class Server:
         if process is None:
             client.close()
             return None
-        # server and fork both set the process group, so that it exists before either continues
+        # the fork sets its process group, too: it must exist before either process continues
         os.setpgid(process, process)
         self.jobs[process] = client
         try:
@@ -113,9 +112,9 @@ class Server:
         return None
 
     def _become_job(self, client: socket.socket, streams: list[int]) -> str:
-        """Set up a fork as the job and return its script; close the server's file descriptors."""
+        """Prepare this fork for its job, without descriptors of the server; return the script."""
         os.setpgid(0, 0)
-        # let the system kill this job when the server ends, which may have happened before this
+        # the system shall kill this job when the server ends; if it has ended already, exit
         self._libc.prctl(_DIES_WITH_PARENT, signal.SIGKILL)
         if os.getppid() != self._process:
             os._exit(1)
@@ -143,13 +142,13 @@ class Server:
 
 
 def main() -> None:
-    """Load the libraries and serve requests; in a fork, run the job's script as main module."""
+    """Load the libraries and serve requests; in a fork, run the script of the job."""
     listener = socket.socket(fileno=int(sys.argv[1]))
     owner, libraries = int(sys.argv[2]), sys.argv[3:]
     for library in libraries:
         importlib.import_module(library)
     if "numba" in libraries:
-        # register numba's own functions here, else each fork would do it
+        # register numba's own functions once, which otherwise every fork would do
         target = importlib.import_module("numba.core.registry").cpu_target
         target.typing_context.refresh()
         target.target_context.refresh()
@@ -166,7 +165,7 @@ def main() -> None:
     atexit._run_exitfuncs()
     sys.stdout.flush()
     sys.stderr.flush()
-    # exit at once, as in `multiprocessing`: freeing the libraries' memory would take far longer
+    # exit without freeing the memory of the libraries, which takes long (as `multiprocessing` does)
     os._exit(0)
 
 

@@ -1,8 +1,8 @@
 """Tables about the preprint's claims, by the rules of config/claims.yaml.
 
-The tests of a claim are evaluated and their results combined to verdicts. Table claims has the
-verdicts, claims_tests the result of every test, claims_sensitivity the verdicts under changed
-rules.
+The tests of a claim are evaluated, and their results are combined to verdicts. Table claims has
+the verdicts, claims_tests has the result of every test, claims_sensitivity the verdicts under
+changed rules, and replication compares with verdicts on other scenes.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -33,11 +33,12 @@ MEASURED = [f"{name}{suffix}" for suffix in PARTS.values() for name in ("verdict
 class Outcome:
     """Result of one test.
 
-    verdict : one of `VERDICTS`; "cannot be decided" if nothing can be compared, "depends on the
-        machine" if ratios of times close to the threshold decide
+    verdict : one of `VERDICTS`; "cannot be decided" if there are no values to compare, "depends on
+        the machine" if the verdict rests on ratios of times that are close to the threshold
     measured : text with the range of the values
     sentence : text with the number of rows that satisfy the comparison
-    condition : this number for each value of the test's column ``by``, if the verdict is "depends"
+    condition : text with this number for each value of the test's column ``by``, if the verdict
+        depends on rows or on the machine
     """
 
     verdict: str
@@ -47,24 +48,27 @@ class Outcome:
 
 
 def values_of(test: TestRule, tables: Tables) -> pd.DataFrame:
-    """Scene, group, method ... and the compared value of each row that ``test`` selects."""
+    """Table of the rows that ``test`` selects: their scene, group, method ..., and a `VALUE`."""
     return METRICS[test.metric].values(tables, dict(test.where), test.accuracy)
 
 
 def satisfied(test: TestRule, values: np.ndarray) -> np.ndarray:
-    """Boolean array: whether each of ``values`` satisfies the comparison of ``test``."""
+    """Boolean array: True for each of ``values`` that satisfies the comparison of ``test``."""
     return values >= test.threshold if test.compare == ">=" else values <= test.threshold
 
 
 def close(test: TestRule, values: np.ndarray) -> np.ndarray:
-    """Boolean array: whether a value is a ratio of times too close to the threshold to decide."""
+    """Boolean array: True for ratios of times that are too close to the threshold to decide."""
     ratio = METRICS[test.metric].ratio
     apart = ratio(values) / ratio(np.array(test.threshold))
     return (apart > 1.0 / test.factor) & (apart < test.factor)
 
 
 def answer(share: float, good: int, total: int) -> str:
-    """Verdict of a test that ``good`` of ``total`` rows satisfy, if a fraction ``share`` must."""
+    """Verdict of a test for which a fraction ``share`` of rows must agree.
+
+    Of ``total`` rows, ``good`` rows satisfy the comparison of the test.
+    """
     if total == 0:
         return UNDECIDED
     if good >= share * total:
@@ -73,7 +77,7 @@ def answer(share: float, good: int, total: int) -> str:
 
 
 def answer_of(test: TestRule, values: np.ndarray) -> str:
-    """Verdict of ``test``; `MACHINE` if values close to the threshold could change it."""
+    """Verdict of ``test``; `MACHINE` if values close to the threshold could change the verdict."""
     near = close(test, values)
     sure, total = int((satisfied(test, values) & ~near).sum()), len(values)
     answers = {answer(test.share, sure + more, total) for more in range(int(near.sum()) + 1)}
@@ -81,7 +85,7 @@ def answer_of(test: TestRule, values: np.ndarray) -> str:
 
 
 def evaluate(test: TestRule, tables: Tables) -> Outcome:
-    """Compare the rows of ``tables`` that ``test`` selects with its threshold."""
+    """Compare the values of the rows that ``test`` selects from ``tables`` with its threshold."""
     rows = values_of(test, tables)
     values = rows[VALUE].to_numpy(float)
     if len(values) == 0:
@@ -108,7 +112,7 @@ def evaluate(test: TestRule, tables: Tables) -> Outcome:
 
 
 def _broken_down(test: TestRule, rows: pd.DataFrame, passed: np.ndarray) -> str:
-    """Text with the number of rows that satisfy the test for each value of its column ``by``."""
+    """Text with the number of rows that satisfy ``test``, for each value of its column ``by``."""
     if test.by is None or test.by not in rows:
         return f"{int(passed.sum())} of {len(passed)}"
     counts = pd.Series(passed).groupby(rows[test.by].to_numpy(), sort=False)
@@ -117,7 +121,7 @@ def _broken_down(test: TestRule, rows: pd.DataFrame, passed: np.ndarray) -> str:
 
 
 def _range(values: np.ndarray) -> str:
-    """Text with the smallest and largest value, and the median of three or more values."""
+    """Text with smallest and largest of ``values``, and with the median if there are three."""
     low, high = _text(values.min()), _text(values.max())
     if low == high:
         return low
@@ -134,7 +138,7 @@ def _text(value: float) -> str:
 
 
 def combined(verdicts: Sequence[str]) -> str:
-    """Verdict of a claim whose tests have ``verdicts``: it holds if all tests hold.
+    """Verdict of a claim from the ``verdicts`` of its tests: the claim holds if all tests hold.
 
     Without any tests, the claim is "not tested".
     """
@@ -147,7 +151,7 @@ def combined(verdicts: Sequence[str]) -> str:
 
 
 def timed_columns(rule: ClaimRule) -> set[str]:
-    """Columns whose cell depends on measured times, in the row of the claim with this ``rule``."""
+    """Columns of table claims whose cell depends on measured times for the claim of ``rule``."""
     found: set[str] = set()
     for part, suffix in PARTS.items():
         timed = [test for test in getattr(rule, part) if test.timed]
@@ -160,7 +164,10 @@ def timed_columns(rule: ClaimRule) -> set[str]:
 
 
 def by_rules(timed: Callable[[ClaimRule, Any], set[str]]) -> TimedCells:
-    """Function for `Table.timed_cells`: calls ``timed`` with the claim's rule and each row."""
+    """Return a function for `Table.timed_cells`, which calls ``timed`` for each row of a table.
+
+    The arguments of ``timed`` are the rule of the row's claim, and the row.
+    """
 
     def timed_cells(table: pd.DataFrame, **files: Path) -> list[set[str]]:
         rules = load_claims(files["rules"])
@@ -170,7 +177,7 @@ def by_rules(timed: Callable[[ClaimRule, Any], set[str]]) -> TimedCells:
 
 
 def timed_parts(*cells: str) -> TimedCells:
-    """Function for `Table.timed_cells`: columns ``cells`` in rows whose verdict uses times."""
+    """Return a function for `Table.timed_cells`: ``cells``, in rows whose verdict uses times."""
     return by_rules(
         lambda rule, row: {*cells} if f"verdict{PARTS[row.part]}" in timed_columns(rule) else set()
     )
@@ -181,19 +188,19 @@ WORDS = {"source", "paper", "figure_or_table", "section", "shown", "text", "qual
 SAID = {"what", "metric", "decides", "compare", "threshold", "share"}
 FOUND = ("satisfied", "of", "close", "least", "median", "most", "verdict")
 ONE_OF = f"one of: {', '.join(VERDICTS)}"
-# Constructor of columns that depend on timing and that verification does not compare.
+# Constructor of columns that may depend on times and are not compared with expected tables.
 skipped = partial(Column, timed=True, compared="skipped")
 FACTORS = (0.5, 0.8, 1.25, 2.0)  # multiples of each threshold that are tried
 SHARES = (0.5, 0.6, 0.75, 0.9, 1.0)
-MARGINS = (1.0, 1.25, 1.5, 2.0, 3.0, 5.0)  # margins of tests that compare times; 1 is no margin
-SMALL = 10  # largest size r that counts as small
+MARGINS = (1.0, 1.25, 1.5, 2.0, 3.0, 5.0)  # margins tried for tests that compare times; 1: none
+SMALL = 10  # verdicts are tried with sizes r up to this one only, and with larger ones only
 SPLITS = ("train", "test", "heldout")
 VARIED = ("threshold", "share", "margin", "sizes", "splits", "scenes")
-# Fraction of rows whose verdict may differ between machines, because few runs determine it.
+# Fraction of rows whose verdict may differ between machines, as few runs determine the verdict.
 FRAGILE = 0.01
 _Rows = list[pd.DataFrame]
 _Keep = Callable[[pd.Series], pd.Series]
-_Variation = tuple[str, str, Sequence[TestRule], _Rows]  # kind, name, changed tests, their rows
+_Variation = tuple[str, str, Sequence[TestRule], _Rows]  # (kind, name, changed tests, their rows)
 
 
 @declare(
@@ -222,7 +229,7 @@ _Variation = tuple[str, str, Sequence[TestRule], _Rows]  # kind, name, changed t
     timed_cells=by_rules(lambda rule, row: timed_columns(rule)),
 )
 def claims(rules: Path, added: Added, **tables: pd.DataFrame) -> pd.DataFrame:
-    """One row per claim, in the order of ``rules``; ``added`` extends sets of scenes in them."""
+    """One row for each claim, in the order of the file ``rules``; ``added`` extends its sets."""
     found = load_claims(rules, added)
     return pd.DataFrame([_row(name, rule, tables) for name, rule in found.items()])
 
@@ -283,7 +290,7 @@ def _timed_of_test(rule: ClaimRule, row: Any) -> set[str]:
     timed_cells=by_rules(_timed_of_test),
 )
 def claims_tests(rules: Path, added: Added, **tables: pd.DataFrame) -> pd.DataFrame:
-    """One row per claim, verdict and test, in the order of the file ``rules``; see `claims`."""
+    """One row for each claim, kind of verdict and test; ``added`` extends sets in ``rules``."""
     rows = [
         {"claim": name, "part": part, **test.model_dump(include=SAID), **_found(test, tables)}
         for name, rule in load_claims(rules, added).items()
@@ -294,7 +301,7 @@ def claims_tests(rules: Path, added: Added, **tables: pd.DataFrame) -> pd.DataFr
 
 
 def _found(test: TestRule, tables: Tables) -> dict[str, Any]:
-    """Margin, counts, verdict and range of the values of a test (range None without values)."""
+    """Result of a test for its columns: margin, counts of rows, range of values, and verdict."""
     values = values_of(test, tables)[VALUE].to_numpy(float)
     good, total = int(satisfied(test, values).sum()), len(values)
     spread = (values.min(), np.median(values), values.max()) if total else (None, None, None)
@@ -318,14 +325,14 @@ def _found(test: TestRule, tables: Tables) -> dict[str, Any]:
     timed_cells=timed_parts("verdict", "verdict_of_rules", "same"),
 )
 def claims_sensitivity(rules: Path, added: Added, **tables: pd.DataFrame) -> pd.DataFrame:
-    """One row per claim of ``rules``, verdict, and change of its tests; see `sensitivity_rows`."""
+    """One row for each claim, kind of verdict, and change of the tests that decide it."""
     return sensitivity_rows(load_claims(rules, added), tables)
 
 
 def sensitivity_rows(rules: Mapping[str, ClaimRule], tables: Tables) -> pd.DataFrame:
-    """One row per claim, verdict, and variation of the tests that decide the verdict.
+    """One row for each claim, kind of verdict, and variation of the tests that decide it.
 
-    A variation is left out if a test selects no rows then, or if a split or filter has no effect.
+    A variation is left out if it changes nothing, or if a changed test selects no rows.
     """
     made = []
     for claim, rule in rules.items():
@@ -353,7 +360,7 @@ def _with(test: TestRule, **changes: Any) -> TestRule:
 
 
 def _variations(tests: Sequence[TestRule], rows: _Rows, tables: Tables) -> Iterator[_Variation]:
-    """Yield tests with other limits, on a part of their rows, or on another set of snapshots."""
+    """Yield variations: tests with other limits, with fewer rows, or on other snapshots."""
     for factor in FACTORS:
         changed = [_with(test, threshold=factor * test.threshold) for test in tests]
         yield "threshold", f"x {factor:g}", changed, rows
@@ -379,7 +386,10 @@ def _variations(tests: Sequence[TestRule], rows: _Rows, tables: Tables) -> Itera
 def _kept(
     tests: Sequence[TestRule], rows: _Rows, varied: str, column: str, keeps: Mapping[str, _Keep]
 ) -> Iterator[_Variation]:
-    """Yield variations that keep only rows selected by one of the filters ``keeps`` of a column."""
+    """Yield one variation for each filter in ``keeps`` (name -> function of ``column``).
+
+    The function returns True for the rows that are kept.
+    """
     for name, keep in keeps.items():
         kept = [values[keep(values[column])] if column in values else values for values in rows]
         if sum(map(len, kept)) < sum(map(len, rows)):
@@ -407,7 +417,7 @@ def _kept(
     timed_cells=timed_parts("verdict", "same", "measured"),
 )
 def replication(claims: pd.DataFrame, rules: Path, recorded: Path) -> pd.DataFrame:
-    """One row per claim and verdict, for claims both in ``claims`` and in the file ``recorded``."""
+    """One row for each kind of verdict of each claim that the file ``recorded`` has, too."""
     loaded = load_claims(rules)
     both = claims.merge(pd.read_csv(recorded), on="claim", suffixes=("", "_replication"))
     unchanged = [

@@ -1,4 +1,4 @@
-"""Metrics of claims: functions that return a number for each selected row of a table or group."""
+"""Metrics of claims: functions that return a number for each selected row (or group of rows)."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -26,19 +26,20 @@ _RERUN = ("motion", "frames", "blowup_frame", _ERROR, *_RUN, "position_basis", "
 
 
 def filtered(table: pd.DataFrame, where: Where) -> pd.DataFrame:
-    """Rows of ``table`` whose columns have the values that ``where`` (column -> values) allows."""
+    """Rows of ``table`` with allowed values; ``where`` maps column names to allowed values."""
     for column, allowed in where.items():
         table = table[table[column].isin(allowed)]
     return table
 
 
 def reruns(table: pd.DataFrame, where: Where) -> pd.DataFrame:
-    """Reduced runs of the training motion that started (sizes above the numerical rank do not).
+    """Reduced runs of the training motion that could be started.
 
-    Runs with reduced positions are included only if ``where`` selects a position basis, because a
-    method may have the same name with full and reduced positions. ``r: [full]`` selects the largest
-    size tried for each scene, group and method. This includes runs that blew up before the first
-    frame: otherwise a smaller size that survived would be mistaken for full rank.
+    A run cannot be started if its size r exceeds the numerical rank of the snapshots. Runs with
+    reduced positions are included only if ``where`` selects a position basis, because methods have
+    the same names with full and with reduced positions. ``r: [full]`` selects the largest size
+    tried for each scene, group and method, even if the run blew up in its first frame: a smaller
+    size that survived must not be mistaken for full rank.
     """
     table = trained(table)
     table = table if "position_basis" in where else table[table.position_basis == "full"]
@@ -50,7 +51,7 @@ def reruns(table: pd.DataFrame, where: Where) -> pd.DataFrame:
 
 
 def by_axis(table: pd.DataFrame, where: Where) -> pd.DataFrame:
-    """Selected rows of ``table``, once per axis x, y, z, with its error as ``relative_error``."""
+    """Selected rows of ``table`` three times: ``relative_error`` is the error in x, in y, in z."""
     parts = [table.assign(axis=a, relative_error=table[f"relative_error_{a}"]) for a in AXES]
     return filtered(pd.concat(parts, ignore_index=True), where)
 
@@ -58,7 +59,7 @@ def by_axis(table: pd.DataFrame, where: Where) -> pd.DataFrame:
 def held_out(
     choose: Callable[[pd.DataFrame, Where], pd.DataFrame], table: pd.DataFrame, where: Where
 ) -> pd.DataFrame:
-    """Rows selected by ``choose``, with the median over held-out motions as their error.
+    """Rows of ``table`` selected by ``choose``; their error is the median over held-out motions.
 
     Runs without an error on held-out motions are left out. Times are those of the training motion.
     """
@@ -67,20 +68,21 @@ def held_out(
 
 
 def decay(rows: pd.DataFrame, accuracy: float) -> pd.Series:
-    """Singular values relative to the largest; groups with round-off values only are left out."""
+    """Singular values over the largest one, without groups that have only rounding errors."""
     rows = rows[rows.groupby(["scene", "group"]).above_roundoff.transform("any")]
     return rows.relative
 
 
 def reconstruction(rows: pd.DataFrame, accuracy: float) -> pd.Series:
-    """Reconstruction error of each row; a singular interpolation has an infinite error."""
+    """Reconstruction error of each row; infinite if the matrix of the interpolation is singular."""
     return rows[rows.gain.notna()].relative_error.fillna(np.inf)
 
 
 def axis_reconstruction(rows: pd.DataFrame, accuracy: float) -> pd.Series:
-    """Errors of reconstructed projections as in `reconstruction`, for each of the axes x, y and z.
+    """Reconstruction errors of the projections' x-, y- and z-coordinates, one in each row.
 
-    An axis whose projections are round-off at every basis size has no error and is left out.
+    Rows of an axis whose projections are rounding errors only have no error and are left out. An
+    error is infinite if the matrix of the interpolation is singular.
     """
     rows = rows[rows.gain.notna()]
     curve = [rows[label] for label in (*_RUN, "split", "axis")]
@@ -97,8 +99,8 @@ def elements_per_entry(rows: pd.DataFrame, accuracy: float) -> pd.Series:
 def local_ratio(name: str, rows: pd.DataFrame, accuracy: float) -> pd.Series:
     """Time of a reduced local step, or of a part of it, over that of the full compiled local step.
 
-    The value is column ``name`` at the largest size of each scene, group, method and mesh: if the
-    dense solve becomes too expensive at some size, the largest size shows it.
+    Returned is column ``name`` at the largest size r of each scene, group, method and mesh, where
+    the dense solve for the coefficients is the most expensive.
     """
     rows = rows.dropna(subset=[name]).sort_values("r")
     return rows.groupby(CURVE, sort=False).tail(1).sort_index()[name]
@@ -116,10 +118,10 @@ def best_useful_speedup(rows: pd.DataFrame, accuracy: float) -> pd.DataFrame:
 
 
 def error_trend(rows: pd.DataFrame, accuracy: float) -> pd.DataFrame:
-    """Spearman's rank correlation of error and size, per scene, group and method.
+    """Spearman's rank correlation of error and size r, for each scene, group and method.
 
-    It is 1 if the error rises with every size, -1 if it falls. Blow-ups share the highest rank.
-    Fewer than three sizes give no value; equal errors give 0.
+    It is 1 if the error rises with every size, -1 if it falls with every size. Runs that blew up
+    share the highest rank. Fewer than three sizes give no value; equal errors give 0.
     """
     trends = []
     for labels, run in rows.groupby(_RUN, sort=False):
@@ -131,15 +133,16 @@ def error_trend(rows: pd.DataFrame, accuracy: float) -> pd.DataFrame:
 
 
 def trend_p_value(name: str, rows: pd.DataFrame, accuracy: float) -> pd.DataFrame:
-    """P-value of Page's test (1963) that errors rise with the size, over families of scenes.
+    """P-value of Page's test (1963) that errors rise with the size r, over families of scenes.
 
-    Errors are read from column ``name``, for repeated runs a median over repetitions. Treatments
-    are the sizes of an experiment (scene, group, method) in ascending order; blow-ups share the
-    highest rank. A block is a family, a scene with its variant ("twin"), with the mean ranks of its
-    experiments, as these are dependent. Only experiments with the most common number of sizes are
-    used. The result has one row, or none with fewer than two blocks or fewer than three sizes.
+    Errors are read from column ``name`` (for repeated runs, a median over repetitions). Treatments
+    of the test are the sizes of an experiment (scene, group, method) in ascending order; runs that
+    blew up share the highest rank. Experiments on a scene and on its variant ("twin") are
+    dependent: this family is one block, with mean ranks. Only experiments with the most common
+    number of sizes are used. The result has one row, or none if there are fewer than two blocks or
+    fewer than three sizes.
     """
-    # imported here because it takes a second, which planning the workflow does not need
+    # SciPy's import takes a second, so it is not at the top: planning the workflow does without
     from scipy.stats import page_trend_test, rankdata
 
     runs = [run for _, run in rows.sort_values("r").groupby(_RUN, sort=False)]
@@ -156,12 +159,12 @@ def trend_p_value(name: str, rows: pd.DataFrame, accuracy: float) -> pd.DataFram
 
 
 def noise_error(rows: pd.DataFrame, accuracy: float) -> pd.Series:
-    """Error of runs whose basis is round-off; infinite if a run ends early or cannot start."""
+    """Error of runs with a basis of rounding errors; infinite if a run ended early or not began."""
     return rows[rows.r <= rows["rank"]].relative_error.fillna(np.inf)
 
 
 def position_basis_ratio(rows: pd.DataFrame, accuracy: float) -> pd.DataFrame:
-    """Error with POD position basis over error with skinning basis of equal size k, per scene.
+    """Ratio of the errors with POD and with skinning position bases, for each scene and size k.
 
     Pairs in which both errors exceed ``accuracy`` are left out, as their ratio is meaningless.
     """
@@ -173,7 +176,7 @@ def position_basis_ratio(rows: pd.DataFrame, accuracy: float) -> pd.DataFrame:
 
 
 def over_the_rest(share: np.ndarray) -> np.ndarray:
-    """Ratio share / (1 - share) of a part's time to the remaining time."""
+    """Time of a part over the remaining time, from the ``share`` of the part in the whole time."""
     with np.errstate(divide="ignore"):
         return np.divide(share, np.subtract(1.0, share))
 
@@ -183,7 +186,7 @@ class Metric:
     """Metric of a test, computed from columns of one table.
 
     of : function of the selected rows and ``accuracy``; returns values of some of these rows, or a
-        table of columns such as scene and group with a `VALUE` in each row
+        table with a column `VALUE` and columns such as scene and group
     choose : function of the table and ``where`` (column -> allowed values) that selects the rows
     labels : columns allowed in ``where`` in addition to the columns of the table
     ratio : function that converts a value to a ratio of two times, for metrics based on times
@@ -197,11 +200,9 @@ class Metric:
     ratio: Callable[[np.ndarray], np.ndarray] = np.asarray
 
     def values(self, tables: Tables, where: Where, accuracy: float) -> pd.DataFrame:
-        """Columns such as scene, and a `VALUE`, for each row of the table that ``where`` allows.
+        """Table with a `VALUE` and columns such as scene for each row that ``where`` allows.
 
-        Parameters
-        ----------
-        accuracy : largest error of a run that counts as accurate
+        A run counts as accurate if its error is at most ``accuracy``.
         """
         rows = self.choose(tables[self.table], where)
         found = self.of(rows, accuracy)
@@ -221,7 +222,7 @@ METRICS = {
     "local_share": Metric(
         lambda rows, _: rows.local_share, "local_share", ("local_share",), ratio=over_the_rest
     ),
-    # error before the horizon; infinite for a run that blew up before it
+    # error over the frames in which perturbed runs agree; infinite for a run that blew up in them
     "rerun_error": _of_reruns(lambda rows, _: rows[_ERROR].fillna(np.inf)),
     "useful_speedup": _of_reruns(useful_speedup, "speedup"),
     "best_useful_speedup": _of_reruns(best_useful_speedup, "speedup"),

@@ -17,12 +17,12 @@ from study.tables import declared
 from study.tables.claims.metrics import METRICS, Value
 
 SETS = "sets"
-_NAMED = "@"  # in ``where``, the prefix of the name of a set of values
+_NAMED = "@"  # prefix of a name of a set, which stands in ``where`` for the values of the set
 Added = Mapping[str, Sequence[Value]]
 NONE_ADDED: Added = MappingProxyType({})
-MARGIN = 1.5  # default margin of tests that compare times
-PARTS = {"published": "", "beyond": "_beyond"}  # names of verdicts -> suffix of their columns
-# Inputs of the tables of the claims: rules file, setting and tables.
+MARGIN = 1.5  # default of `TestRule.margin` for tests that compare times
+PARTS = {"published": "", "beyond": "_beyond"}  # name of a verdict -> suffix of its columns
+# Inputs of the tables about claims: the file of rules, a setting, and all tables with metrics.
 READS: dict[str, Read] = {
     "rules": ProjectFile("config/claims.yaml"),
     "added": Setting("claim_sets"),
@@ -33,15 +33,16 @@ READS: dict[str, Read] = {
 class TestRule(ConfigModel):
     """Test of a claim: comparison of a metric with a threshold.
 
-    what : description of the compared rows, which the verdict's reason quotes
+    what : description of the compared rows, quoted in the reason of the verdict
     metric : name in `METRICS`
     where : column -> allowed values
     accuracy : largest error of a run that counts as accurate, for metrics that depend on it
-    margin : a ratio of times that differs from the threshold by less than this factor does not
-        count for either side, see `factor`
+    margin : a ratio of times that differs from the threshold by less than this factor counts
+        neither for nor against the claim; None for the default, see `factor`
     share : the test holds if at least this fraction of rows satisfies the comparison, does not hold
         if at least this fraction violates it; else the verdict is "depends"
-    by : column; for a verdict "depends", rows are counted for each of its values
+    by : column by whose values rows are counted, to explain a verdict "depends"
+    decides : whether the verdict on the claim uses this test
     """
 
     __test__ = False
@@ -59,14 +60,14 @@ class TestRule(ConfigModel):
 
     @property
     def timed(self) -> bool:
-        """Whether the compared values or the row selection depend on measured times."""
+        """Whether the compared values or the selection of rows depend on measured times."""
         metric = METRICS[self.metric]
         timing = declared()[metric.table].timing_columns
         return not set(timing).isdisjoint({*metric.columns, *self.where})
 
     @property
     def factor(self) -> float:
-        """Margin of the test, `MARGIN` by default; 1 if the test does not depend on timing."""
+        """Margin of the test, by default `MARGIN`; 1 (no margin) if no times are compared."""
         if not self.timed:
             return 1.0
         return MARGIN if self.margin is None else self.margin
@@ -90,7 +91,7 @@ class TestRule(ConfigModel):
 class Change(ConfigModel):
     """Date and reason of a change in the rules of a claim.
 
-    after_data : whether results that the rules evaluate were known at this date
+    after_data : whether the results to which the rules apply were already known at this date
     rules : fingerprint of the changed rules, see `ClaimRule.fingerprint`
     """
 
@@ -101,7 +102,7 @@ class Change(ConfigModel):
 
 
 class ClaimRule(ConfigModel):
-    """A claim of the preprint, its section and figures there, and the tests that decide it.
+    """Claim of the preprint, its section and figures there, and the tests that decide about it.
 
     text : the claim in our words
     paper : the statement of the preprint, in a few words
@@ -151,17 +152,12 @@ class ClaimRule(ConfigModel):
 
 
 def load_claims(path: Path, added: Added = NONE_ADDED) -> dict[str, ClaimRule]:
-    """Claims of the file ``path`` by identifier; names of sets are replaced by their values.
+    """Read claims from the file ``path``, by identifier; replace names of sets by their values.
 
-    Parameters
-    ----------
-    added : name of a set in the file -> values that a study appends to it, for scenes that the file
-        does not list
+    Raises ConfigurationError if the file is invalid, or has no set of a name in ``added``.
 
-    Raises
-    ------
-    ConfigurationError
-        If the file is invalid, or has no set of a name in ``added``.
+    added : name of a set in the file -> values to append to it, such as scenes that only this
+        study has
     """
     content = read_yaml(path)
     if not isinstance(content, dict) or not {*content} - {SETS}:

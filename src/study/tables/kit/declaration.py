@@ -10,7 +10,7 @@ A table is declared by a decorator on the function that computes it::
     def local_share(timings: list[File], wrong: float) -> pd.DataFrame: ...
 
 The function gets its inputs by name: files as a list of `File`, tables as data frames, values of
-the configuration as plain data. The returned frame is reduced to the declared columns and types.
+the configuration as plain data. The data frame it returns is then brought to the declared columns.
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence
@@ -27,8 +27,8 @@ from study.artifact.artifact import Artifact, declare, declared_in
 from study.artifact.paths import TABLE
 from study.artifact.reads import Read
 
-# Kinds of column content. Each determines how far results of two machines may differ; limits are
-# based on measurements, see docs/decisions/0010-six-kinds.md.
+# Kinds of content of a column. The kind determines how far the results of two machines may differ.
+# The limits are based on measurements (docs/decisions/0010-six-kinds.md).
 Quantity = Literal["exact", "value", "error", "share", "timed", "skipped"]
 QUANTITIES: dict[Quantity, str] = {
     "exact": "names, parameters, sizes, truth values: equal",
@@ -38,9 +38,9 @@ QUANTITIES: dict[Quantity, str] = {
     "timed": "what depends on timing, a compiler or a cache: not judged",
     "skipped": "rounding errors, and words about other columns: not compared",
 }
-# Allowed difference of one number between two machines, unless the column has its own tolerance.
+# Allowed difference of a number between two machines, unless its column declares a tolerance.
 TOLERANCES: dict[Quantity, float] = {"exact": 1e-8, "value": 1e-4, "error": 0.05, "share": 0.1}
-# Allowed difference of integers of quantity "share" (numbers of runs) between two machines.
+# Allowed difference between two machines for integers of quantity "share" (numbers of runs).
 TALLY = 2.0
 Kind = Literal["text", "integer", "number", "flag"]
 _DTYPES: dict[Kind, str] = {"integer": "Int64", "number": "float64", "flag": "boolean"}
@@ -50,12 +50,12 @@ _DTYPES: dict[Kind, str] = {"integer": "Int64", "number": "float64", "flag": "bo
 class Column:
     """Column of a table; any of its cells may be empty.
 
-    meaning : description of the content for readers, in a few words
+    meaning : short description of the content, which the documentation of the tables shows
     unit : empty for text, counts and dimensionless numbers
     timed : whether values depend on timing (or on memory in use), so that two runs may differ
-    compared : kind of content (`Quantity`), if it does not follow from type and name
-    tolerance : allowed difference, if not the default of its kind of content; for text and flags
-        the fraction of rows that may differ
+    compared : kind of content (`Quantity`); None if it follows from the type and the name
+    tolerance : allowed difference between two machines, for text and flags the fraction of rows
+        that may differ; None for the default of the kind of content
     """
 
     kind: Kind
@@ -77,7 +77,10 @@ class Column:
 
     @property
     def within(self) -> float:
-        """Allowed difference of a cell; 0 for text and flags, and for integers except shares."""
+        """Allowed difference of a cell: `tolerance`, or a default that depends on the content.
+
+        The default is 0 for text and flags, and for integers unless they are of quantity "share".
+        """
         if self.tolerance is not None:
             return self.tolerance
         if self.kind == "integer":
@@ -85,11 +88,11 @@ class Column:
         return TOLERANCES.get(self.quantity, 0.0) if self.kind == "number" else 0.0
 
     def cast(self, values: pd.Series) -> pd.Series:
-        """Cast ``values`` to the column type; raise ValueError or TypeError if they do not fit."""
+        """Convert ``values`` to the type of the column; ValueError or TypeError if that fails."""
         if self.kind == "text":
             return values
         if self.kind == "flag":
-            # pandas turns flags into numbers when a table is joined with an empty column
+            # pandas may have turned flags into numbers while joining tables
             others = values[values.notna() & ~values.isin([True, False])]
             if len(others):
                 raise ValueError(f"'{others.iloc[0]}'")
@@ -103,29 +106,33 @@ text = partial(Column, "text")
 integer = partial(Column, "integer")
 flag = partial(Column, "flag")
 number = partial(Column, "number")
-# Constructor of columns that count runs or scenes: several may differ between machines.
+# Constructor of columns with numbers of runs or scenes, which may differ a little between machines.
 count = partial(integer, compared="share")
 
 
 def timed(column: Column) -> Column:
-    """Copy of ``column`` marked as dependent on timing."""
+    """Return a copy of ``column`` that is marked as dependent on timing."""
     return replace(column, timed=True)
 
 
-def quantiles(names: str, make: Callable[..., Column] = number, unit: str = "") -> list[Column]:
-    """Two columns ``names``: bootstrap interval of the median in the column before them."""
+def interval(names: str, make: Callable[..., Column] = number, unit: str = "") -> list[Column]:
+    """Return two columns: bounds of the median that stands in the column before (95 % bootstrap).
+
+    names : names of both columns, separated by a space
+    make : constructor of the columns
+    """
     low, high = names.split()
     meaning = "2.5 % quantile of this median (bootstrap)"
     return [make(low, meaning, unit), make(high, "97.5 % quantile", unit)]
 
 
 def extremes(name: str) -> list[Column]:
-    """Columns ``name_low`` and ``name_high``: least and largest value over repetitions."""
+    """Return columns ``name_low`` and ``name_high``: least and largest value over repeated runs."""
     words = {"low": "least", "high": "largest"}
     return [number(f"{name}_{end}", f"{word} {name}") for end, word in words.items()]
 
 
-# Columns that several tables share, so that a column name has the same meaning in each.
+# Columns that occur in several tables, declared once so that a name has one meaning everywhere.
 _SHARED = (
     text("scene", "name of the scene"),
     text("group", "constraint group whose projections are reduced; all in a position subspace"),
@@ -182,27 +189,29 @@ _SHARED = (
     timed(number("local_ms", "time of the local step in a frame", "ms")),
     timed(number("global_ms", "time of the global solve in a frame", "ms")),
     timed(number("speedup", "time of the full-order run over that of this one")),
-    *map(timed, quantiles("speedup_low speedup_high")),
+    *map(timed, interval("speedup_low speedup_high")),
     timed(number("local_share", "local step over it and the global solve")),
 )
 
 
 def shared(names: str) -> list[Column]:
-    """Shared columns for the space-separated ``names``; KeyError for a name that is not shared."""
+    """Columns of `_SHARED` with the space-separated ``names``; KeyError if a name is not there."""
     by_name = {column.name: column for column in _SHARED}
     return [by_name[name] for name in names.split()]
 
 
-# Function of a table and its project files; returns names of columns that depend on timing, by row.
+# Function of a table and the paths of project files; for each row, it returns the names of the
+# columns whose cell depends on timing.
 TimedCells = Callable[..., Sequence[Collection[str]]]
 
 
 @dataclass(frozen=True)
 class Table(Artifact):
-    """Table of the study; calling it with the function's inputs computes the data frame.
+    """Table of the study; calling it with the inputs of its function computes the data frame.
 
-    timed_cells : function that returns the columns that depend on timing, if rows differ in them
-    only_with_error : whether the table lists only runs that have an error before their horizon
+    timed_cells : function that returns for each row the columns that depend on timing; None if
+        these are the same for all rows (columns marked as ``timed``)
+    only_with_error : whether runs that ended too early to have an error are missing in the table
     """
 
     columns: tuple[Column, ...] = ()
@@ -211,7 +220,7 @@ class Table(Artifact):
     rule_pattern = "{}_table"
 
     def __call__(self, *arguments: Any, **named: Any) -> pd.DataFrame:
-        """Compute the table from its inputs and bring it to the declared columns, see `checked`."""
+        """Compute the table from its inputs and return it with the declared columns and types."""
         return self.checked(self.function(*arguments, **named))
 
     def perform(
@@ -227,16 +236,14 @@ class Table(Artifact):
 
     @property
     def timing_columns(self) -> tuple[str, ...]:
-        """Names of columns whose values may differ between two runs on one machine."""
+        """Names of columns that depend on timing and thus differ even between runs on a machine."""
         return tuple(column.name for column in self.columns if column.timed)
 
     def checked(self, table: pd.DataFrame) -> pd.DataFrame:
         """Return ``table`` with exactly the declared columns, in their order and with their types.
 
-        Raises
-        ------
-        StorageError
-            If there are rows and a column is missing or contains a value that does not fit.
+        Raises StorageError if a column of a non-empty table is missing, or a value does not have
+        the column's type.
         """
         missing = [name for name in self.column_names if name not in table.columns]
         if missing and len(table):
@@ -255,16 +262,13 @@ class Table(Artifact):
 def table(
     *, title: str, columns: Sequence[Column], reads: Mapping[str, Read], **more: Any
 ) -> Callable[[Callable[..., pd.DataFrame]], Table]:
-    """Return a decorator that declares a function as the computation of the table of its name.
+    """Return a decorator for the function that computes a table; the table gets its name.
 
-    Parameters
-    ----------
+    Raises TypeError if a column is declared twice, or the function's parameters do not match
+    ``reads``.
+
+    reads : parameter of the function -> input
     more : values of the fields ``timed_cells`` and ``only_with_error`` of `Table`
-
-    Raises
-    ------
-    TypeError
-        If a column is declared twice, or the function's parameters do not match ``reads``.
     """
 
     def decorate(function: Callable[..., pd.DataFrame]) -> Table:

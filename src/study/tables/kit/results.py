@@ -8,6 +8,7 @@ Errors over held-out motions are summarised by their median, as fixed in config/
 """
 
 from collections.abc import Collection, Iterable, Sequence
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -15,7 +16,7 @@ import pandas as pd
 from pdrom.core.store import read_table
 from study.artifact.paths import File
 from study.experiments.kit.measurement import PHASES
-from study.tables.kit.declaration import integer, number
+from study.tables.kit.declaration import integer, number, text
 
 RESAMPLES, SEED, LEVEL = 2000, 1, 0.95
 KEYS = ["scene", "group", "method", "position_basis", "k", "r"]  # columns that identify a run
@@ -41,6 +42,23 @@ def joined(files: Iterable[File]) -> pd.DataFrame:
     """Rows of the tables in ``files``, in order; an empty frame without columns if none exist."""
     parts = [part for part in (read_table(file.path) for file in files) if len(part)]
     return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame()
+
+
+DAY = text("recorded", "day on which config/extended.yaml recorded the row; empty: of this run")
+
+
+def with_recorded(rows: pd.DataFrame, record: list[Path]) -> pd.DataFrame:
+    """Add rows of ``record`` to ``rows``, but for scenes, weights and meshes that have rows."""
+    if not record:
+        return rows.assign(recorded=None)
+    others = read_table(record[0], result=False)
+    if rows.empty:
+        return others
+    # requested tolerances have no stiffness: their scenes run with their own weights only
+    keys = [key for key in ("scene", "stiffness", "vertices") if key in rows]
+    own = pd.MultiIndex.from_frame(rows[keys].astype(object))
+    others = others[~pd.MultiIndex.from_frame(others[keys].astype(object)).isin(own)]
+    return pd.concat([rows.assign(recorded=None), others], ignore_index=True)
 
 
 def in_one_time(

@@ -52,7 +52,7 @@ def written(tmp_path_factory):
 @pytest.fixture(scope="module")
 def table(written):
     parts, times = written
-    return alternatives([parts], [times])
+    return alternatives([parts], [times], [])
 
 
 def test_rows_of_a_scene(written, table):
@@ -108,13 +108,27 @@ def test_a_finer_mesh_has_the_mass_of_the_scene():
 
 def test_tables_of_the_rows(written, table):
     times = [written[1]]
-    found = winners(table, times, [1.0, 1e-3, 1e-12])
+    found = winners(table, times, [1.0, 1e-3, 1e-12], [])
     assert len(found) == 2 * 2 * (3 + 2)
-    assert len(winners(alternatives([], []), [], [0.1])) == 0
+    assert len(winners(alternatives([], [], []), [], [0.1], [])) == 0
     strict = found[(found.limit == 1e-3) & (found.reference == "continuous")]
     assert (strict[strict.motion == "heldout"].method == "explicit").all()
     assert (found.motions == 2).all()
     assert found[found.limit == 1e-12].method.isna().all()
+
+
+def test_recorded_rows_of_other_meshes_are_beside_those_of_the_run(written, table, tmp_path):
+    parts, times = written
+    record = tmp_path / "record.csv"
+    finer = table.assign(recorded="2026-01-02", vertices=120)
+    pd.concat([table.assign(recorded="2026-01-02"), finer]).to_csv(record, index=False)
+    both = alternatives([parts], [times], [record])
+    assert both.groupby("vertices").recorded.count().to_dict() == {30: 0, 120: len(table)}
+    # what is recorded of the times is a table as well, which is not made again
+    found = winners(both, [times], [0.1], [])
+    assert set(found.vertices) == {30}
+    found.assign(recorded="2026-01-02", vertices=120).to_csv(record, index=False)
+    assert len(winners(both, [times], [0.1], [record])) == 2 * len(found)
 
 
 def test_winners_are_the_cheapest_that_reach_the_error(tmp_path):
@@ -126,14 +140,14 @@ def test_winners_are_the_cheapest_that_reach_the_error(tmp_path):
     ).assign(
         **labels, training_motions=lambda t: t.method.map({"ecsw": 4}), offline_s=3.0, vertices=9,
         vertices_ms=0.1, motion="heldout", error_continuous=lambda t: t.error_implicit,
-        reference_error=1e-2,
+        reference_error=1e-2, recorded=None,
     )  # fmt: skip
     # speed-ups are ratios within a process; in the second one both methods are slower
     ms = rows.dropna(subset="ms_per_frame").drop(columns="error_implicit")
     slow = ms.assign(process=2, ms_per_frame=4.0 * ms.ms_per_frame)
     measured = pd.concat([ms.assign(process=1), slow])[experiment.TIME_COLUMNS]
     write_table(measured, tmp_path / "times.csv")
-    found = winners(rows, [File(str(tmp_path / "times.csv"), {})], [0.1, 0.01])
+    found = winners(rows, [File(str(tmp_path / "times.csv"), {})], [0.1, 0.01], [])
     found = found.set_index(["reference", "limit"])
     loose, strict = found.loc[("implicit", 0.1)], found.loc[("implicit", 0.01)]
     assert (loose.method, loose.second, loose.margin, loose.reduced_speedup) == ("a", "b", 2.0, 2.0)

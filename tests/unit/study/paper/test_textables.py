@@ -97,10 +97,10 @@ TABLES = {
     ),
     "winners": frame(
         "scene stiffness reference limit vertices from_plain from_best speedup "
-        "speedup_low speedup_high motions reached",
-        ("s_one", 1.0, "implicit", 0.1, 400, 400, 1600, 17.0, 15.0, 20.0, 3, 2),
-        ("s_one", 1.0, "implicit", 0.1, 10_000, 400, 1600, 17.0, 15.0, 20.0, 3, 2),
-        ("s_two", 100.0, "continuous", 0.01, 400, *5 * [None], 3, 0),
+        "speedup_low speedup_high motions reached recorded",
+        ("s_one", 1.0, "implicit", 0.1, 400, 400, 1600, 17.0, 15.0, 20.0, 3, 2, None),
+        ("s_one", 1.0, "implicit", 0.1, 10_000, 400, 1600, 17.0, 15.0, 20.0, 3, 2, "2026-01-02"),
+        ("s_two", 100.0, "continuous", 0.01, 400, *5 * [None], 3, 0, None),
     ),
     "payoff": frame(
         "position_basis method scenes accurate pays loses least_speedup best_speedup "
@@ -168,7 +168,7 @@ C1 beyond & all & $\le$ 0.050 & 0 of 0 & -- & -- & -- \\
 \texttt{bar\_a} & 9 & kick & 0.75 & 0.25 & 0.12 & 0.12 & 0.062 & 4 & 16 \\
 % won or lost
 % pays
-\texttt{s\_one} & implicit & 0.10 & 400 to 10000 & 400 & 1600 & 17 (15 to 20) & 2 of 3 \\
+\texttt{s\_one}* & implicit & 0.10 & 400 to 10000 & 400 & 1600 & 17 (15 to 20) & 2 of 3 \\
 \texttt{s\_two} $\times 100$ & continuous & 0.010 & 400 & -- & -- & -- & 0 of 3 \\
 """
 

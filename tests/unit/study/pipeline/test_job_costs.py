@@ -1,5 +1,6 @@
 """Beginning of a run; what git keeps of runs: times of jobs, and recorded verdicts."""
 
+import re
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -131,6 +132,7 @@ def verdicts(**columns: str) -> pd.DataFrame:
 def test_another_verdict_is_not_the_same(tmp_path: Path) -> None:
     write_table(claims.checked(verdicts()), tmp_path / "claims.csv")
     recorded = recorded_verdicts(tmp_path / "claims.csv", ROOT / RULES)
+    assert re.fullmatch(r"20\d\d-\d\d-\d\d", recorded.date[0])
     recorded.to_csv(tmp_path / "kept.csv", index=False)
     today = verdicts(verdict_beyond="does not hold")
     table = replication.checked(replication(today, ROOT / RULES, tmp_path / "kept.csv"))

@@ -1,6 +1,5 @@
 """Studies: settings and defaults, scenes made out of others, and those that no subspace takes."""
 
-import re
 import shutil
 from collections.abc import Iterator
 from typing import Any
@@ -10,15 +9,12 @@ import yaml
 
 from pdrom.core.errors import ConfigurationError
 from pdrom.core.yamlfile import read_yaml, validate
-from pdrom.model.constraints.base import GroupConfig
-from pdrom.model.scene import Scene, SceneConfig
 from places import CONFIG, ROOT
 from study.artifact import paths
-from study.artifact.paths import LABELS
 from study.experiments.kit.base import experiments
 from study.experiments.reruns import stability
 from study.pipeline.plan import Plan, check_live, check_subspaces
-from study.pipeline.scenes import Replicate, Variants, read_scene
+from study.pipeline.scenes import Replicate, read_scene
 from study.pipeline.study import Study, StudySettings, labels_of
 
 STUDY = {"scenes": ["spring_oop", "strain_oop"], "methods": ["deim", "gappy"], "ranks": [6, "full"]}
@@ -78,46 +74,9 @@ def test_the_study_repeats_no_default() -> None:
     assert repeated == []
 
 
-SECTION = Variants(
-    scenes=("spring_oop",), resolutions=(0.5, 1.5), stiffness_ratios=(0.01, 1), seeds=(1, 2)
-)
-
-
-def read(name: str) -> SceneConfig:
-    return read_scene(ROOT, name)
-
-
-def test_a_variant_of_each_combination_differs_in_mesh_weight_and_start_alone() -> None:
-    """Its name is one that a path takes; another seed is another start of the same motion."""
-    made = {scene.name: scene for scene in SECTION.of(read)}
-    assert len(made) == 2 * 2 * 2
-    assert all(re.fullmatch(LABELS["scene"], name) for name in made)
-    scene, base = made["spring_oop_m1p5_w0p01_s2"], read("spring_oop")
-    assert scene.mesh == base.mesh.coarsened(1.5)
-    weights = [e.weight for e in scene.effects if isinstance(e, GroupConfig)]
-    before = [e.weight for e in base.effects if isinstance(e, GroupConfig)]
-    assert weights == [0.01 * weight for weight in before]
-    assert scene.effects[-1].model_dump()["seed"] == 2
-    assert len(scene.effects) == len(base.effects) + 1
-    same = set(SceneConfig.model_fields) - {"name", "title", "mesh", "effects"}
-    assert all(getattr(scene, key) == getattr(base, key) for key in same)
-    pair = [made[f"spring_oop_m0p5_w1_s{seed}"] for seed in (1, 2)]
-    mesh = pair[0].mesh.build(ROOT)
-    first, second = (Scene.build(scene, mesh).initial_state().velocities for scene in pair)
-    assert (first != second).any()
-
-
-def test_a_study_holds_its_variants_beside_its_scenes() -> None:
-    config = {"scenes": ["strain_oop"], "methods": ["deim"], "variants": SECTION.model_dump()}
-    study = Study({**config, "coarsen": {"resolution": 0.3, "frames": 0.1}}, ROOT)
-    assert len(study.scenes) == 1 + 8
-    fine, coarse = (study.bound[f"spring_oop_m{m}_w1_s1"].mesh for m in ("1p5", "0p5"))
-    assert fine.vertices > coarse.vertices
-
-
 def test_a_replicated_scene_is_faster_and_starts_elsewhere() -> None:
     change = Replicate(frames_factor=0.8, kick=0.1, seed=100)
-    base, scene = read("bar_twist"), read_scene(ROOT, "bar_twist", change)
+    base, scene = read_scene(ROOT, "bar_twist"), read_scene(ROOT, "bar_twist", change)
     turns = [[e.over for e in s.effects if e.effect == "rotate"] for s in (base, scene)]
     assert turns == [[100, 100], [80, 80]]
     assert scene.effects[-1].model_dump() == {

@@ -55,14 +55,14 @@ RULES = [
 @pytest.fixture(scope="module")
 def plan():
     config = {
-        "scenes": ["strain_oop"], "methods": ["deim"], "variants": {"scenes": ["spring_oop"]},
+        "scenes": ["strain_oop"], "methods": ["deim"],
         "coarsen": {"resolution": 0.3, "frames": 0.1},
     }  # fmt: skip
     return Plan(Study(config, ROOT))
 
 
 def test_what_a_rule_makes_is_a_target(plan):
-    """Files of the study, of its variant, and of scenes outside it."""
+    """Files of the study, and of scenes outside it."""
     scenes = [*plan.study.scenes, "bar_twist"]
     wanted = [f"results/fom/{scene}/heldout.h5" for scene in scenes]
     wanted += [f"results/meshes/{mesh}.h5" for mesh in plan.study.meshes]

@@ -372,7 +372,7 @@ def test_a_request_is_broken_where_it_counts_as_met_and_the_error_is_larger(tmp_
     rows = [ROW, ROW | {"error": 0.06}, ROW | {"frames": 0, "error": 0.06, "reduced": False}]
     path = REQUESTED_TOLERANCES.at(str(tmp_path), scene="s")
     write_table(pd.DataFrame(rows, columns=COLUMNS), path)
-    made = requested_tolerances([REQUESTED_TOLERANCES.file(path)])
+    made = requested_tolerances([REQUESTED_TOLERANCES.file(path)], [])
     assert made.met.tolist() == [True, True, False]
     assert made.broken.tolist() == [False, True, False]
     assert made.over_full.tolist() == [0.5] * 3

@@ -1,1 +1,1 @@
-"""Alternatives to projective dynamics for the same energy and the same scenes."""
+"""Methods that solve the same scenes, with the same energies, as projective dynamics."""

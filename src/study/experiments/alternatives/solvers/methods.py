@@ -1,7 +1,8 @@
-"""Projective dynamics with n substeps of K iterations per frame (Macklin et al. 2019: K = 1).
+"""Methods with n substeps per frame, the implicit ones with K iterations in each substep.
 
-Methods: plain, Anderson acceleration (`pdrom.model.dynamics.acceleration`), the same with a coarse
-level, Chebyshev's semi-iteration (Wang 2015, alg. 1), and explicit integration.
+They are the plain local/global iteration (with K = 1 as in Macklin et al. 2019), the same with
+Anderson acceleration, with Anderson acceleration and a coarse level, and with Chebyshev's
+semi-iteration (Wang 2015, alg. 1), and explicit integration.
 """
 
 from dataclasses import dataclass
@@ -29,9 +30,10 @@ from study.experiments.alternatives.solvers.substeps import (
 from study.experiments.kit.base import followed
 
 WINDOW = 5  # number of earlier iterates in Anderson acceleration, as in Peng et al. 2018
-# Estimated convergence rate of the plain iteration, and number of plain iterations before the
-# extrapolation. Both are set by hand, as in Wang 2015: of five rates this is best on both sheets
-# of the comparison, which favours the method. A rate measured from the first iterates is worse.
+# Parameters of Chebyshev's semi-iteration: estimated convergence rate of the plain iteration, and
+# number of plain iterations before the first extrapolation. Both are set by hand, as in Wang 2015.
+# Of five rates, this one is best on both sheets of the comparison, a choice that favours the
+# method; a rate measured from the first iterates is worse.
 RATE = 0.98
 PLAIN = 5
 
@@ -60,7 +62,7 @@ def _plain(y, v, acceleration, step, substeps, iterations, fixed, targets, inert
 
 
 class Accelerated(Alternative):
-    """Anderson acceleration over `WINDOW` iterates, for all groups."""
+    """Local/global iteration with Anderson acceleration over `WINDOW` iterates."""
 
     name = "anderson"
 
@@ -88,14 +90,14 @@ def _anderson(
             objective = add_projections(tables, y, rhs) + inertia_energy(y, s, inertia)
             if not refuse(history, y, objective):
                 sweep(panels, vertices, loads, work, rhs, y)
-                # not after the last iteration: an extrapolation could raise the objective
+                # no extrapolation after the last iteration, as it could raise the objective
                 if k < iterations - 1:
                     combine(history, y)
         end(y, before, step, v)
 
 
 class Chebyshev(Alternative):
-    """Chebyshev's semi-iteration: extrapolation from the second-last iterate, varying weights."""
+    """Chebyshev's semi-iteration, which extrapolates each iterate from the one before the last."""
 
     name = "chebyshev"
 
@@ -131,25 +133,22 @@ def _chebyshev(
         end(y, before, step, v)
 
 
-INNER = 10  # iterations on the coarse level, with Anderson acceleration
+INNER = 10  # number of iterations on the coarse level, which have Anderson acceleration
 
 
 class TwoLevel(Alternative):
-    """Anderson acceleration with a coarse level: the subspace of a ``model`` of the scene.
+    """Anderson acceleration with a coarse level: the position subspace of a ``model`` of the scene.
 
     The plain iteration converges slowly for deformations that are stiff in the system matrix A and
-    soft in the objective. Its result G(y) is therefore corrected in the span of columns V with
-    V^T A V = 1: the component g = V^T A (G(y) - y) of the step is replaced by the step z that
-    minimises the objective of y + V z, in which sampled elements represent all elements. This is
-    the full approximation scheme (Brandt 1977) with one additive smoothing step: -g is the exact
-    gradient in the span, so that z = g = 0 where y solves the frame, whatever the samples are. The
-    corrected iteration is accelerated; an iterate that raises the objective is replaced by the last
-    G(y) without correction.
+    soft in the objective. Its result G(y) is therefore corrected in the span of the columns V of
+    the subspace, scaled to V^T A V = 1. The component g = V^T A (G(y) - y) of the step is replaced
+    by the step z that minimises the objective of y + V z, in which sampled elements stand for all
+    elements. This is the full approximation scheme (Brandt 1977) with one additive smoothing step:
+    -g is the exact gradient in the span, so that z = g = 0 where y solves the frame, whatever the
+    samples are. The corrected iteration is accelerated. An iterate that raises the objective is
+    replaced by the last G(y) without correction.
 
-    Raises
-    ------
-    SceneError
-        The scene has several groups, or is refused by `Alternative`.
+    Raises SceneError if the scene has several groups, or if `Alternative` refuses it.
     """
 
     name = "two-level"
@@ -207,7 +206,7 @@ def _two_level(
         for k in range(iterations):
             rhs[:] = base
             objective = add_projections(tables, y, rhs) + inertia_energy(y, s, inertia)
-            # also check the first corrected iterate, which may raise the objective
+            # the first corrected iterate is checked, too, as it may raise the objective
             if refuse(history, y, objective, 0):
                 y[:] = plain
                 continue
@@ -221,7 +220,7 @@ def _two_level(
 
 @compiled(nogil=True)
 def _correct(coarse, start, image):
-    """Replace the part of ``image - start`` in the span by the step to the sampled minimum."""
+    """Correct ``image`` = G(y), ``start`` = y: minimise the sampled objective in the span."""
     span, duals, rows, steps, inverse, vertices, tables, history = coarse
     size, sampled = WIDTH * span.shape[1], WIDTH * len(vertices)
     step, x, at_start = np.zeros(size), np.empty(sampled), np.zeros(sampled)
@@ -234,7 +233,7 @@ def _correct(coarse, start, image):
     z[:] = first
     forget(history)
     for _ in range(INNER):
-        refuse(history, z, np.nan)  # nan: accept the iterate, whose objective is unknown
+        refuse(history, z, np.nan)  # with nan as objective, which is unknown, no iterate is refused
         moved[:] = x
         _add_product(rows, z, moved)
         forces[:] = 0.0
@@ -253,7 +252,7 @@ def _add_product(matrix, x, out):
     m, n = matrix.shape
     numbers = matrix.reshape(-1)
     for i in range(m):
-        # two independent sums, which the processor computes in parallel
+        # two independent sums, which the processor can compute in parallel
         even, odd = load(out, WIDTH * i), constant(0.0)
         for k in range(0, n - 1, 2):
             even = add_scaled(even, at(numbers, n * i + k), load(x, WIDTH * k))
@@ -263,14 +262,16 @@ def _add_product(matrix, x, out):
         store(out, WIDTH * i, add(even, odd))
 
 
-UNSTABLE = 1e100  # a run with larger coordinates (m), or with values not finite, is unstable
+UNSTABLE = 1e100  # a run with larger coordinates (m), or with values not finite, was unstable
 
 
 class Explicit(Alternative):
-    """Position Verlet for all groups: half a drift, a kick, half a drift; ignores ``iterations``.
+    """Explicit integration by position Verlet; ``iterations`` are ignored.
 
-    Second order and symplectic (Tuckerman et al. 1992), with one force evaluation per substep.
-    Stable while the substep is shorter than 2 / omega of the stiffest mode.
+    A substep advances positions over half its time, then velocities over its whole time, and then
+    positions over the other half. The method is symplectic and of second order (Tuckerman et al.
+    1992), with one evaluation of forces per substep. It is stable if the substep is shorter than
+    2 / omega, where omega is the angular frequency of the stiffest mode.
     """
 
     name = "explicit"
@@ -280,7 +281,7 @@ class Explicit(Alternative):
         for group in scene.groups:
             total = total + group.system_matrix()
         total.sort_indices()
-        # stiffness matrix: sum of S^T W S over all groups, as CSR arrays for `_multiply`
+        # stiffness matrix, the sum of S^T W S over all groups, as CSR arrays for `_multiply`
         self._stiffness = *(i.astype(np.int32) for i in (total.indptr, total.indices)), total.data
 
     def _advance(self, part: Substeps) -> None:
@@ -325,8 +326,9 @@ def _multiply(matrix, y, out):
 
 @dataclass(frozen=True)
 class Continuous:
-    """Result of `continuous`: positions (F + 1, N, 3) m at the ends of frames, initial ones first.
+    """Motion in continuous time, as computed by `continuous`.
 
+    positions : (F + 1, N, 3) m, initial positions Q_0, then positions at the ends of frames
     error : estimate of || Q - Q_exact || / || Q - Q_0 ||, from the change by the last halving
     substeps : number of explicit steps of a frame
     """
@@ -341,8 +343,6 @@ def continuous(
 ) -> Continuous:
     """Run ``frames`` of ``scene`` by explicit steps, halving the step until the error is small.
 
-    Parameters
-    ----------
     tolerance : estimated relative error that ends the halving
     substeps : number of substeps of a frame in the first run
     limit : largest number of substeps of a frame; the last run is returned, whatever its error
@@ -352,9 +352,10 @@ def continuous(
         after = followed(Explicit(scene, substeps), start, frames)
         if before is not None:
             change = _change(before, after)
-            # Richardson's estimate of the remaining error: a third of the last change if changes
-            # fall to a quarter, as in a method of second order. If they do not even fall to a half,
-            # the motion is not smooth or not yet resolved, and the estimate is the whole change.
+            # Richardson's estimate of the remaining error. With each halving of the step, changes
+            # of a method of second order fall to a quarter; a third of the last change then
+            # remains. If changes do not even fall to a half, the motion is not smooth or not yet
+            # resolved, and the estimate is the whole change.
             ratio = last / change if change > 0.0 and np.isfinite(last) else 1.0
             error = change / min(max(ratio - 1.0, 1.0), 3.0)
             if error <= tolerance or 2 * substeps > limit:

@@ -1,8 +1,9 @@
-"""A frame in equal substeps, with the same fixed vertices and contacts as in the step loop.
+"""Base class of methods that divide a frame into equal substeps.
 
-The potential energy of all groups, W(y) = sum_j 1/2 sum_e w_e |S_e y - p_e(y)|^2, has the gradient
-S^T W S y - S^T W p(y): p is the nearest point of the manifold, so that the derivative of p is
-tangential and drops out (Bouaziz et al. 2014, sect. 3).
+Fixed vertices and contacts are those of the ordinary step loop. The potential energy of all groups
+j with elements e, W(y) = sum_j 1/2 sum_e w_e |S_e y - p_e(y)|^2, has the gradient
+S^T W S y - S^T W p(y): the projection p is the nearest point of a manifold, so that the derivative
+of p is tangential and drops out (Bouaziz et al. 2014, sect. 3).
 """
 
 from abc import abstractmethod
@@ -36,7 +37,7 @@ METHODS = Registry(
 
 
 class Substeps(NamedTuple):
-    """Arguments of the compiled loops over substeps of a frame, in the order of their signatures.
+    """Arguments of compiled loops over substeps of a frame, in the order of the parameters.
 
     y, v : (4 N,) positions m and velocities m/s, changed in place: x, y, z and 0 of each vertex
     acceleration : (3,) m/s^2
@@ -58,15 +59,12 @@ class Substeps(NamedTuple):
 class Alternative(Stepper):
     """Base class of methods that divide a frame into ``substeps`` steps of ``iterations`` each.
 
-    A handle moves at constant speed during a frame, whatever the number of substeps. As in the step
-    loop, contacts act at the end of a frame, and groups compute data for the frame at its begin.
-    Loops with equal substeps may share a factored ``system``. `METHODS` lists all classes.
-
-    Raises
-    ------
-    SceneError
-        The scene has a force other than gravity (every substep would have to evaluate it if it
-        depends on the motion), or a group without a compiled local step.
+    A handle moves at constant speed during a frame, whatever the number of substeps. As in the
+    ordinary step loop, contacts act at the end of a frame, and groups compute data for a frame at
+    its beginning. Loops with equal substeps may share a factorised ``system``. `METHODS` lists the
+    derived classes. Raises SceneError if the scene has a force other than gravity (which every
+    substep would have to evaluate if it depends on the motion), or a group without a compiled local
+    step.
     """
 
     name: ClassVar[str]
@@ -88,18 +86,21 @@ class Alternative(Stepper):
         self.substeps = substeps
         self.masses = scene.masses
         kernels = [group.local_kernel for group in scene.groups if group.local_kernel is not None]
-        # the tables point to memory of the kernels, so that the kernels must not be freed
+        # keep the kernels: the tables contain addresses of their memory
         self._kernels = local = LocalPass(kernels)
         self.tables = local.first, local.preparing, local.second
         self._prepare(scene)
 
     def _prepare(self, scene: Scene) -> None:
-        """Prepare data that the method uses in all frames; nothing by default."""
+        """Prepare data that the method uses in all frames; the base class prepares nothing."""
 
     def step(
         self, state: State, frame: int, on_last_iterate: Callable[[np.ndarray], None] | None = None
     ) -> tuple[State, FrameReport]:
-        """Compute ``frame`` from ``state``, without objective; ``on_last_iterate`` is ignored."""
+        """Compute ``frame`` from ``state``; ``on_last_iterate`` is ignored.
+
+        The report has the time of the whole frame as that of the local step, and no objective.
+        """
         started = perf_counter()
         q = state.positions
         fixed, targets = self.space.fixed(frame, q)
@@ -108,7 +109,7 @@ class Alternative(Stepper):
             local.begin_frame(q)
         positions, velocities = as_vertices(q), as_vertices(state.velocities)
         y, v = flat(positions), flat(velocities)
-        # if fixed vertices do not move, all substeps have the same targets and form one part
+        # if fixed vertices do not move, all substeps have the same targets: advance them together
         parts = 1 if np.array_equal(q[fixed], targets) else self.substeps
         for part in range(1, parts + 1):
             now = targets + (1.0 - part / parts) * (q[fixed] - targets)
@@ -118,7 +119,7 @@ class Alternative(Stepper):
                     *(self.iterations, fixed, now),
                 )
             )
-        # vertices that a contact moves get their mean velocity over the frame
+        # a vertex that a contact moves gets its mean velocity over the frame
         free = positions.copy()
         self.space.correct(positions, q, frame)
         moved = (positions != free).any(axis=1)
@@ -132,10 +133,10 @@ class Alternative(Stepper):
 
     @abstractmethod
     def _advance(self, part: Substeps) -> None:
-        """Advance positions and velocities in ``part`` over its substeps, in place."""
+        """Advance the positions and velocities in ``part`` over its substeps, in place."""
 
     def _factor(self, part: Substeps) -> Factor:
-        """Cholesky factor of the system matrix without fixed vertices, as the solver needs it."""
+        """Cholesky factor of the system matrix without the rows and columns of fixed vertices."""
         elimination = self.space.eliminate(part.fixed, part.targets)
         assert isinstance(elimination, Elimination)
         assert elimination.factor is not None
@@ -144,12 +145,10 @@ class Alternative(Stepper):
 
 @compiled(nogil=True)
 def begin(y, v, acceleration, step, fixed, targets, before, s):
-    """Begin a substep of an implicit method at its prediction s = y + step v + step^2 a.
+    """Begin a substep of an implicit method at the prediction s = y + step v + step^2 a.
 
-    ``before`` receives the old positions; fixed vertices of ``s`` and ``y`` move to their targets.
+    ``before`` receives the old positions. In ``s`` and ``y``, fixed vertices are at their targets.
 
-    Parameters
-    ----------
     y, v : (4 N,) positions m and velocities m/s: x, y, z and 0 of each vertex
     acceleration : (3,) m/s^2
     step : length of the substep, s
@@ -169,7 +168,7 @@ def begin(y, v, acceleration, step, fixed, targets, before, s):
 
 @compiled(nogil=True)
 def end(y, before, step, v):
-    """Set velocities ``v`` by positions ``before`` and ``y`` at begin and end of a ``step`` (s)."""
+    """Set velocities ``v``, from positions ``before`` and after (``y``) a substep of ``step`` s."""
     for k in range(len(y)):
         v[k] = (y[k] - before[k]) / step
 

@@ -1,5 +1,6 @@
 """Timings: interleaved, after a warm-up, started afresh, and the phases of one repeat."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -102,6 +103,9 @@ def test_the_positions_of_all_vertices_are_part_of_a_frame():
     assert calls == [("b", 5, 0.0), ("b", 6, 1.0), ("b", 9, 0.0), ("b", 10, 1.0)]
     assert own["ms_per_frame"] == pytest.approx(1000.0 + own["vertices_ms"], rel=1e-12)
     assert other["vertices_ms"] == 0.0
+    calls.clear()
+    measure([replace(spread, loop=Clock("b", calls, seconds(*6 * [1.0])), warm=2)], 1, 1)
+    assert [frame for _, frame, _ in calls] == [5, 6, 5, 6, 9, 10]
 
 
 def test_calls_take_turns():
