@@ -14,8 +14,8 @@ from places import tracked
 LIMITS = {
     "lines of src": 35_863,
     "modules of src": 215,
-    "lines of tests": 22_765,
-    "words of documentation": 24_549,
+    "lines of tests": 22_762,
+    "words of documentation": 24_547,
     "tables": 25,
     "figures": 23,
     "experiments": 19,
