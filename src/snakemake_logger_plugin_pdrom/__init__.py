@@ -10,8 +10,8 @@ from snakemake_interface_logger_plugins.common import LogEvent
 from study.pipeline.progress import Estimate, rounded
 
 NOTHING = "Nothing to be done"
-# Parts of Snakemake's messages about failed jobs, which are not printed: a run's last lines report
-# failed jobs.
+# Parts of Snakemake's messages about failed jobs. Such messages are not printed, because the last
+# lines of a run report all failed jobs.
 JOB_FAULT = "RuleException"
 CLOSING = "At least one job did not complete successfully"
 

@@ -11,7 +11,10 @@ T = TypeVar("T")
 
 
 def require(kind: type[T] | tuple[type[T], ...], value: Any, name: str, source: str) -> T:
-    """Return ``value``; ConfigurationError with ``name`` and ``source`` if it is no ``kind``."""
+    """Return ``value`` if it is of the type ``kind``, else raise ConfigurationError.
+
+    The error names the argument (``name``) and tells what makes such a value (``source``).
+    """
     if isinstance(value, kind):
         return value
     kinds = " or ".join(k.__name__ for k in (kind if isinstance(kind, tuple) else (kind,)))

@@ -22,7 +22,7 @@ from pdrom.reduction.rerun import Rerun, displacement_norms
 
 
 def load_scene(path: str | os.PathLike[str]) -> Scene:
-    """Scene of a YAML file, bound to its mesh.
+    """Scene described by a YAML file, with its mesh.
 
     A relative path of a mesh file starts at the folder of the YAML file.
 
@@ -41,7 +41,7 @@ def load_scene(path: str | os.PathLike[str]) -> Scene:
 
 
 def build_scene(folder: str | os.PathLike[str] = ".", mesh: Any = None, **keys: Any) -> Scene:
-    """Scene from keywords, which are the keys of a scene's YAML file, bound to its mesh.
+    """Scene, with its mesh, from keywords, which are the keys of a scene's YAML file.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def build_scene(folder: str | os.PathLike[str] = ".", mesh: Any = None, **keys: 
 
 
 def bound(config: SceneConfig, folder: Path, source: str) -> Scene:
-    """Scene of ``config`` with its mesh, read from ``folder``; errors begin with ``source``."""
+    """Scene of ``config``; a mesh file's path is relative to ``folder``; errors name ``source``."""
     try:
         return Scene.build(config, config.mesh.build(folder))
     except PdromError as error:
@@ -221,7 +221,7 @@ def _reduced(scene: Scene, file: h5py.File) -> ReducedRun:
 
 
 def _scene(file: h5py.File, path: Path) -> Scene:
-    """Scene of a run, with the mesh that is stored in ``file``, else read from its mesh file."""
+    """Scene of the run in ``file``; the mesh is stored in it, or is read from the mesh file."""
     settings = json.loads(file.attrs["configuration"])
     # the pipeline stores the scene under the key "config", `save` and `run` under "scene"
     scene = validate(SceneConfig, settings.get("config") or settings["scene"], str(path))

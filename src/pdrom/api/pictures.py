@@ -61,8 +61,8 @@ def plot(*runs: ReducedRun) -> Figure:
 def view(path: str | os.PathLike[str], *runs: AnyRun) -> None:
     """Write a page (HTML, one file) that shows runs; a browser opens it without a network.
 
-    A reduced run is shown with its full-order run; a run within a requested tolerance, too, if that
-    is among ``runs``. Runs with equal scenes are shown together.
+    A reduced run is shown with its full-order run. A run within a requested tolerance is shown with
+    the full-order run of its scene if ``runs`` have one. Runs with equal scenes are shown together.
 
     Parameters
     ----------
@@ -103,12 +103,12 @@ def _scene(run: AnyRun) -> Scene:
 
 
 def _alike(scene: Scene) -> SceneConfig:
-    """Configuration of ``scene`` without a requested tolerance, on which runs do not depend."""
+    """Configuration to compare scenes by: without ``requested_error``, which changes no run."""
     return scene.config.model_copy(update={"requested_error": None})
 
 
 def _viewed(runs: list[AnyRun]) -> ViewedScene:
-    """Runs of one scene, the full-order run first if there is one."""
+    """Prepare ``runs`` of one scene for a page, the full-order run first if there is one."""
     full = [run.full if isinstance(run, ReducedRun) else run for run in runs]
     known: list[FullRun | RequestedRun] = [run for run in full if isinstance(run, FullRun)]
     first = [*known, *(run for run in runs if isinstance(run, RequestedRun))][0]
@@ -130,7 +130,7 @@ def _viewed(runs: list[AnyRun]) -> ViewedScene:
 
 
 def _shown(run: AnyRun, positions: np.ndarray) -> ViewedRun:
-    """``run`` for a page, with its errors against the reference's ``positions`` (F + 1, N, 3) m."""
+    """Prepare ``run`` for a page, with errors against a run with ``positions`` (F + 1, N, 3) m."""
     if isinstance(run, ReducedRun):
         names, blowup = (run.group, run.method, run.method), run.outcome.blowup_frame
         moved, ms = np.asarray(run.outcome.positions), run.ms if np.isfinite(run.ms) else None

@@ -28,7 +28,7 @@ class FullRun:
 
     positions : (F + 1, N, 3) m; entry 0 is the initial state
     ms : (F,) milliseconds of each frame
-    snapshots : training snapshots of every constraint group, by its name
+    snapshots : name of each constraint group -> its training snapshots
     """
 
     scene: Scene
@@ -46,7 +46,7 @@ class ReducedRun:
     """A run with the projections of one group reduced, compared with its full-order run.
 
     gain : factor by which sampling can amplify errors; 1 if every projection is evaluated
-    outcome : positions (F' + 1, N, 3) m, differences, and whether it blew up
+    outcome : positions (F' + 1, N, 3) m of F' frames, differences from the full order, any blow-up
     ms : median milliseconds per frame
     """
 
@@ -80,7 +80,7 @@ class ReducedRun:
 
     @property
     def title(self) -> str:
-        """Group, method and size of the reduction."""
+        """Text with the group, the method and the size r of the reduction."""
         return f"{self.group.replace('_', ' ')}, {self.method}, r = {self.r}"
 
 
@@ -90,8 +90,8 @@ class RequestedRun:
 
     scene : scene that was run
     request : requested tolerance and the quantity that it bounds
-    outcome : positions (F + 1, N, 3) m, number of frames that meet the tolerance, level that ran
-    ms : (F,) milliseconds per frame; checks and failed levels are spread evenly over the frames
+    outcome : positions (F + 1, N, 3) m, number of frames that meet the tolerance, solver used
+    ms : (F,) milliseconds per frame, all equal: the mean over frames, checks and failed attempts
     offline_s : seconds of the calibration before the run
     error : true error, over the frames that meet the tolerance, against the converged implicit
         step; None (unknown) if the scene is not the one of the calibration

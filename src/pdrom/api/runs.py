@@ -97,8 +97,8 @@ def basis(full: FullRun, group: str, method: str | MethodSpec = "pod") -> Basis:
     Returns
     -------
     Basis
-        Modes ``V`` (3 e p, rank), ``mean`` (3 e p,), all ``singular_values``, and the ``rank``:
-        modes above round-off. Entries: e elements, p rows of each, 3 axes, the axis fastest.
+        Modes ``V`` (3 e p, rank), ``mean`` (3 e p,), all ``singular_values``, ``rank`` (number of
+        modes above round-off). A vector has e elements one after another, p rows (x, y, z) each.
 
     Raises
     ------
@@ -118,7 +118,7 @@ def basis(full: FullRun, group: str, method: str | MethodSpec = "pod") -> Basis:
 
 
 def methods() -> dict[str, MethodSpec]:
-    """Reduction methods of config/methods.yaml by name; an installed package has its own copy."""
+    """Map names to the methods in config/methods.yaml, of which an installed package has a copy."""
     return load_methods(config_file("methods.yaml"))
 
 
@@ -166,13 +166,13 @@ def reduce(
         relative error, 0.01 or "velocity=0.05", against the implicit step solved to convergence.
         The whole scene is reduced as far as this error allows, or not at all.
     scene : with ``error``, another scene with the same mesh to run; ``full`` is the training run
-    on_frame : with ``error``, called after each frame with the title of the level of accuracy
+    on_frame : with ``error``, called after each frame with the title of the solver in use
 
     Returns
     -------
-    ReducedRun, or RequestedRun with an ``error``
-        ``outcome`` (positions, differences, the frame of a blow-up), ``error`` of each frame,
-        ``gain`` (amplification of errors by sampling), ``ms`` (milliseconds per frame).
+    ReducedRun, or RequestedRun if ``error`` is given
+        A ReducedRun has ``outcome`` (positions, differences from ``full``, frame of a blow-up),
+        ``error`` of each frame, ``gain`` (amplification of errors by sampling), ``ms`` (per frame).
 
     Raises
     ------
@@ -223,7 +223,7 @@ def reduce(
 
 
 def _method_spec(method: str | MethodSpec) -> MethodSpec:
-    """Return the method of this name in config/methods.yaml; a specification is not changed."""
+    """Return the method of this name in config/methods.yaml; return a specification as it is."""
     if isinstance(method, MethodSpec):
         return method
     known = methods()
@@ -254,7 +254,7 @@ def _fitting_basis(made: Any, group: ConstraintGroup, spec: MethodSpec) -> Basis
 
 
 def _within(full: FullRun, error: Wish, scene: Scene, on_frame: OnFrame) -> RequestedRun:
-    """Calibrate levels of accuracy on the run ``full``, then run ``scene``, which has its mesh.
+    """Calibrate solvers (levels of accuracy) on the motion of ``full``, then run ``scene`` by one.
 
     The calibration uses the material, masses, time step and number of frames of ``scene``.
     """

@@ -26,9 +26,9 @@ class Command:
 
     title : description in one line
     example : example of a call
-    arguments : keywords of `argparse.ArgumentParser.add_argument` for each argument
+    arguments : name of each argument -> keywords of `argparse.ArgumentParser.add_argument`
     perform : function that executes the command and returns the exit code
-    one_of : mutually exclusive arguments
+    one_of : names of the arguments of which a call may have only one
     """
 
     title: str
@@ -38,7 +38,7 @@ class Command:
     one_of: Sequence[str] = ()
 
 
-# Arguments of more than one command.
+# Keywords of `add_argument` for arguments that several commands have.
 SCENE = {"metavar": "SCENE.yaml", "help": "file of the scene"}
 UNCHECKED = {
     "action": "store_true",
@@ -60,8 +60,8 @@ def require_output(path: str | Path, reads: Sequence[str]) -> None:
     Raises
     ------
     StorageError
-        The file cannot be written, would replace a file from outside pdrom, or is one of the
-        files that the command ``reads``.
+        The file cannot be written, would replace a file that pdrom did not write, or is one of
+        the files that the command ``reads``.
     """
     from pdrom.core.errors import StorageError
     from pdrom.core.store import require_own, require_place

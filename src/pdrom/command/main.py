@@ -1,6 +1,6 @@
 """``pdrom COMMAND ...``: the parser, messages and exit codes; each command is a module of its own.
 
-A command's module declares its arguments as a `Command` and imports the rest when it runs.
+A command's module declares its arguments as a `Command`, and imports all else only when it runs.
 """
 
 import argparse
@@ -102,13 +102,13 @@ def _fail(message: str) -> int:
 
 
 def main() -> None:
-    """Run the command line in the environment of `settle`; exit with the command's exit code."""
+    """Set environment variables (`settle`), run the command line, and exit with its exit code."""
     root = checkout()
     if root and os.access(root / ".cache", os.W_OK):  # compiled kernels are shared with ./reproduce
         os.environ.setdefault("NUMBA_CACHE_DIR", str(root / ".cache" / "numba"))
         os.environ.setdefault("MPLCONFIGDIR", str(root / ".cache" / "matplotlib"))
     settle()
-    # a closed stream is None here, and the next file opened would get its descriptor
+    # a stream that the caller closed is None here; the next file opened would get its descriptor
     sys.stdout = sys.stdout or open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
     sys.stderr = sys.stderr or open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
     sys.exit(run(sys.argv[1:]))

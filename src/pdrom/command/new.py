@@ -58,7 +58,7 @@ VOLUME = """\
   - {effect: tetrahedron_strain, weight: 1.0e+6}
   # - {effect: volume, weight: 1.0e+6}
 """
-KILOGRAMS = 10.0  # mass of a vertex in the study's scenes, for which constraint weights are set
+KILOGRAMS = 10.0  # mass of a vertex for which the weights in these templates are set
 ENOUGH = 3  # smallest number of fixed vertices with which a body cannot turn about a line
 
 
@@ -146,7 +146,7 @@ def _about(mesh: "Mesh") -> str:
 
 
 def _sides(mesh: "Mesh") -> dict[str, int]:
-    """Number of vertices on each side of the mesh (left, top, ...), by the name of the side."""
+    """Map the name of each side that the mesh has (left, top, ...) to its number of vertices."""
     from pdrom.core.errors import SceneError
     from pdrom.model.mesh.selection import SIDES, select_vertices
 
@@ -160,7 +160,7 @@ def _sides(mesh: "Mesh") -> dict[str, int]:
 
 
 def _side(mesh: "Mesh", axis: int) -> str:
-    """Selection that fixes the mesh: its first side with `ENOUGH` vertices, or a few at the top."""
+    """YAML of vertices to pin: the first side with `ENOUGH` vertices, or `ENOUGH` at the top."""
     for side, count in _sides(mesh).items():
         if count >= ENOUGH:
             return side
@@ -169,7 +169,7 @@ def _side(mesh: "Mesh", axis: int) -> str:
 
 
 def _floor(mesh: "Mesh", axis: int) -> str:
-    """YAML of a floor half the mesh's longest side below the mesh along ``axis``, rounded."""
+    """YAML of a floor below the mesh by about half its longest side, where ``axis`` points up."""
     lowest = float(mesh.points[:, axis].min())
     step = 10.0 ** math.floor(math.log10(mesh.extent))
     height = math.floor((lowest - mesh.extent / 2.0) / step) * step

@@ -1,4 +1,4 @@
-"""Progress of a run and its calibration: one line on stderr, rewritten on a terminal."""
+"""Progress lines of runs and calibrations, on stderr; on a terminal one line is rewritten."""
 
 import os
 import sys
@@ -8,13 +8,13 @@ from typing import Self, TextIO
 
 from pdrom.model.dynamics.stepper import FrameReport
 
-WIDTH = 24  # characters of the bar
+WIDTH = 24  # number of characters of the progress bar
 EVERY = 0.2  # seconds between two updates of the line on a terminal
 PAUSE = 2.0  # seconds between two lines of `LevelProgress` where stderr is no terminal
 
 
 class _Line:
-    """Progress line of the run ``name`` on ``stream``; first tells if kernels must be compiled."""
+    """Progress line of the run ``name`` on ``stream``; says first if kernels must be compiled."""
 
     def __init__(self, name: str, stream: TextIO | None = None) -> None:
         self._name, self._stream = name, stream or sys.stderr
@@ -65,7 +65,7 @@ class Progress(_Line):
 
 
 class LevelProgress(_Line):
-    """Line with the level of accuracy that is running and the time so far, every few seconds."""
+    """Line with the title of the solver (level of accuracy) in use and the time since the start."""
 
     def __enter__(self) -> Self:
         return self
@@ -74,7 +74,7 @@ class LevelProgress(_Line):
         self._end()
 
     def __call__(self, title: str) -> None:
-        """Note a frame done by the level called ``title``."""
+        """Show ``title``, the solver that has computed a frame, every `EVERY` or `PAUSE` s."""
         now = monotonic()
         if now - self._shown >= (EVERY if self._terminal else PAUSE):
             self._show(f"{self._name}: {title}, {now - self._began:.0f} s", now)

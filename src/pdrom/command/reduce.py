@@ -12,7 +12,8 @@ if TYPE_CHECKING:
     from pdrom.model.scene import Scene
 
 WRONG = 0.1  # relative error above which the command calls a run "wrong" instead of "accurate"
-PICTURES = {"pdf": "Creator", "png": "Software", "svg": "Creator"}  # metadata key of the program
+# Kind of picture -> key of its metadata that names the program which made it.
+PICTURES = {"pdf": "Creator", "png": "Software", "svg": "Creator"}
 
 
 def _size(text: str) -> int:
@@ -91,7 +92,7 @@ def _told(reduced: "ReducedRun") -> str:
 
 
 def _perform_request(arguments: argparse.Namespace) -> Status:
-    """Calibrate on the training run, run within the tolerance; print level, error and time."""
+    """Calibrate on a training run, run the scene within the tolerance; print errors and times."""
     from pdrom.api import FullRun, load, load_scene, reduce, save
     from pdrom.command.progress import LevelProgress
     from pdrom.core.errors import ConfigurationError, StorageError
@@ -142,7 +143,7 @@ def _answer(made: "RequestedRun") -> str:
 
 
 def _done(made: "RequestedRun") -> list[str]:
-    """Lines of text about the run ``made``: level of accuracy, estimated error and time."""
+    """Lines of text about the run ``made``: solver in use, estimated error and time."""
     outcome, ms = made.outcome, made.ms[0]
     tried = f", after {', '.join(outcome.failed)}" if outcome.failed else ""
     known = [f"expected at most {outcome.expected:.2g}"]

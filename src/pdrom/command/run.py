@@ -8,7 +8,7 @@ from pdrom.command.base import SCENE, Command, Status, files_of, require_output
 
 
 def perform(arguments: argparse.Namespace) -> Status:
-    """Run the scene of ``arguments`` with a progress line, and print the name of the result."""
+    """Run the scene of ``arguments`` with a progress line, and print the path of the result."""
     import numpy as np
 
     from pdrom.api import load_scene, run

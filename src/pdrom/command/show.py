@@ -79,7 +79,7 @@ def _configuration(configuration: Any, whole: bool) -> Iterator[str]:
         yield from (f"  {line}" for line in text.splitlines())
         return
     for name, value in configuration.items():
-        if isinstance(value, dict) and {"name", "title"} <= value.keys():  # the value is a scene
+        if isinstance(value, dict) and {"name", "title"} <= value.keys():  # settings of a scene
             value = f"{value['name']} ({value['title']})"
         yield f"  {name}: {_short(value)}"
 

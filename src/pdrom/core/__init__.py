@@ -1,7 +1,7 @@
 """Code that all packages share; this module finds the project's folder and configuration files.
 
-A wheel contains these files in ``pdrom/config`` (listed in pyproject.toml), so that an installed
-package needs no checkout.
+A wheel contains the configuration files in ``pdrom/config`` (listed in pyproject.toml), so that an
+installed package needs no checkout.
 """
 
 from importlib.resources import files

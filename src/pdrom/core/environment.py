@@ -4,10 +4,10 @@ A user who wants to study the influence of a variable names it in ``PDROM_KEEP``
 ``PDROM_KEEP="OPENBLAS_CORETYPE" OPENBLAS_CORETYPE=Nehalem ./reproduce``.
 
 OpenBLAS has kernels for many processors, which round differently, and selects the newest that the
-processor supports. ``OPENBLAS_CORETYPE`` fixes the selection; OpenBLAS does not check that the
-processor has the instructions, without which the process would crash. Numba compiles the kernels of
-this project on the machine that runs them; a variable makes it compile for a processor family, not
-for the exact one (docs/decisions/0015-one-target.md). Set all variables before NumPy is loaded.
+processor supports. ``OPENBLAS_CORETYPE`` fixes the selection; OpenBLAS does not check whether the
+processor has the required instructions, without which the process crashes. Numba compiles this
+project's kernels on the machine that runs them; ``NUMBA_CPU_NAME`` makes it compile for a family of
+processors (docs/decisions/0015-one-target.md). All variables must be set before NumPy is loaded.
 """
 
 import os
@@ -15,7 +15,7 @@ import platform
 from collections.abc import Mapping
 from pathlib import Path
 
-# Variables, or their prefixes, that configure numerical libraries, Python, Matplotlib and TeX.
+# Prefixes of inherited variables to remove, of numerical libraries, Python, Matplotlib and TeX.
 CLEARED = (
     "OPENBLAS_", "GOTO_", "BLIS_", "MKL_", "VECLIB_", "OMP_", "GOMP_", "KMP_",
     "NPY_", "NUMPY_", "SCIPY_", "NUMBA_", "NUMEXPR_", "PYTHON", "MPL", "MATPLOTLIB",
@@ -66,7 +66,7 @@ def settled(
     }
     if kernels:
         fixed["OPENBLAS_CORETYPE"] = kernels
-    if TARGET not in asked:  # the features belong to the target
+    if TARGET not in asked:  # a user who keeps the target name keeps its features, too
         fixed |= target
     return kept | {name: value for name, value in fixed.items() if name not in asked}
 

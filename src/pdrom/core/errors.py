@@ -22,7 +22,7 @@ def suggestion(value: object, allowed: Iterable[str]) -> str:
 
 
 def reason(error: OSError) -> str:
-    """Operating system's message for ``error``; HDF5 hides its number in a longer text."""
+    """Operating system's message for ``error``, whose number HDF5 puts only into a longer text."""
     hidden = re.search(r"errno = (\d+)", str(error))
     number = error.errno or (int(hidden[1]) if hidden else 0)
     return os.strerror(number) if number in errno.errorcode else " ".join(str(error).split())[:200]
@@ -55,7 +55,7 @@ class DegenerateElementError(MeshError):
 
 
 class SceneError(PdromError):
-    """A scene contradicts itself or its mesh: an empty selection, a wrong element."""
+    """A scene is contradictory, or its mesh lacks the vertices or cells that an effect needs."""
 
 
 class NotReducibleError(SceneError):

@@ -33,7 +33,7 @@ class Kernels(ConfigModel):
 
 
 class Units(ConfigModel):
-    """Seconds of three benchmark loops: scalar, vector and memory (`study.experiments.machine`)."""
+    """Times, s, of three benchmark loops: scalar, vector, memory (`study.experiments.machine`)."""
 
     unit_scalar_s: float
     unit_vector_s: float

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-LEVELS = 65535  # steps of a quantised coordinate across the bounding box of the run
+LEVELS = 65535  # number of steps into which a side of the bounding box is divided
 
 
 def pack_text(values: np.ndarray) -> str:
@@ -24,8 +24,8 @@ def pack_array(values: np.ndarray, kind: str) -> dict[str, Any]:
 def pack_positions(positions: np.ndarray) -> dict[str, Any]:
     """Quantise ``positions`` (F, N, 3) m in their bounding box; pack changes between frames.
 
-    Quantisation changes a coordinate by at most half a step. Differences between frames, modulo
-    2^16, are stored because they compress better than the positions.
+    Quantisation to `LEVELS` steps per side changes a coordinate by at most half a step. Differences
+    between frames, modulo 2^16, are stored because they compress better than the positions.
     """
     low, high = positions.min(axis=(0, 1)), positions.max(axis=(0, 1))
     step = np.where(high > low, (high - low) / LEVELS, 1.0)

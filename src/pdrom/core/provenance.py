@@ -1,8 +1,8 @@
 """Provenance of a result: the job that made it, its settings, code and libraries.
 
-Inside the context `made_by`, every file that `pdrom.core.store` writes records the job in its
-checksum; HDF5 files also record it in attributes. Two equal runs have equal records: these contain
-no date, no folder and no commit, since a commit may change only documentation.
+Inside the context `made_by`, `pdrom.core.store` records the job with the checksum of every file it
+writes, in HDF5 files also as attributes. Two equal runs have equal records: these contain no date,
+no folder and no commit, since a commit may change only documentation.
 """
 
 import hashlib
@@ -37,7 +37,7 @@ def made_by(name: str, configuration: Any, code: str = "") -> Iterator[None]:
     ----------
     name : name of a rule of the workflow, or of a function of the package
     configuration : all settings of the job, hashed as JSON
-    code : fingerprint of the code that it runs; empty outside of the workflow
+    code : fingerprint of the code that the job runs; empty outside of the workflow
     """
     canonical = json.dumps(configuration, sort_keys=True, default=str)
     hashed = hashlib.sha256(canonical.encode()).hexdigest()

@@ -1,7 +1,7 @@
-"""Registries: names of the configuration whose implementations are imported on demand.
+"""Registries, which map names in configuration files to the code that implements them.
 
-A registry maps a name of the configuration to ``"package.module:attribute"``. A module is imported
-only when its name is used.
+A registry maps each name to a text ``"package.module:attribute"``. The module is imported only when
+the name is used.
 """
 
 from collections.abc import Iterator, Mapping
@@ -15,7 +15,7 @@ class Registry(Mapping[str, str]):
     """Read-only map from a name to its implementation, given as "module:attribute"."""
 
     def __init__(self, kind: str, entries: Mapping[str, str]) -> None:
-        """Store ``entries`` (name -> "module:Class"); ``kind`` is the noun in error messages."""
+        """Store ``entries`` (name -> "module:Class"); ``kind`` names an entry in error messages."""
         self.kind = kind
         self._entries = dict(entries)
 

@@ -35,7 +35,7 @@ class ConfigModel(BaseModel):
 
 
 class _PlainLoader(yaml.CSafeLoader):
-    """YAML loader that runs no code of tags and refuses a key that is given twice."""
+    """YAML loader that runs no code named by tags and refuses a key that is given twice."""
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
         seen = set()
@@ -99,8 +99,8 @@ def validate(model: type[M], data: Any, source: str) -> M:
 
 
 def describe(error: ValidationError, model: type[BaseModel]) -> str:
-    """Text of the first fault of a validation by ``model``: ``key = value: allowed``."""
-    # faults "missing" come last: a misspelt key causes one, too, which is less informative
+    """Message about the first fault that ``model`` found, as ``key = value: what is required``."""
+    # a misspelt key is reported as unknown and as missing: the less helpful "missing" comes last
     faults = sorted(error.errors(), key=lambda fault: fault["type"] == "missing")
     fault = faults[0]
     location = fault["loc"]
@@ -119,7 +119,7 @@ def describe(error: ValidationError, model: type[BaseModel]) -> str:
     if fault["type"] == "union_tag_not_found":
         return f"{key}: key {fault['ctx']['discriminator']} is missing"
     if fault["type"] == "value_error" and isinstance(fault["input"], (dict, list, BaseModel)):
-        # the validator's message itself names the fault within the value
+        # leave out the value, which may be long: the validator's message names the fault within it
         return f"{key}: {message}" if location and not message.startswith(key) else message
     return f"{key} = {shown(fault['input'], 80)}: {message}"
 
@@ -138,7 +138,7 @@ def keys_of(model: type[BaseModel]) -> list[str]:
 
 
 def _model_at(model: type[BaseModel], location: tuple[int | str, ...]) -> type[BaseModel] | None:
-    """Model of the value at ``location`` (keys, indices) in ``model``; None if it has none."""
+    """Model of the value at ``location`` (keys, indices) in ``model``; None if not exactly one."""
     current: type[BaseModel] | None = model
     for part in location:
         if isinstance(part, int) or current is None:

@@ -18,9 +18,9 @@ def energies(scene: Scene, positions: np.ndarray) -> np.ndarray:
     positions : (F + 1, N, 3) m of a run of ``scene``, initial positions first. The velocities are
         (q_f - q_{f-1}) / h as in the step loop; the initial velocities come from the scene.
 
-    They belong to the initial state, every `STRIDE`-th frame and the last. All projections are
-    evaluated, also for reduced runs; with K iterations a frame this costs 1 / (STRIDE K) of a run's
-    local steps. The potential of forces has an arbitrary constant: only differences matter.
+    The n energies are those of the initial state, every `STRIDE`-th frame and the last one. All
+    projections are evaluated, also for reduced runs; with K iterations a frame this costs
+    1 / (STRIDE K) of a run's local steps. The forces' potential is defined up to a constant.
     """
     frames = sorted({*range(0, len(positions), STRIDE), len(positions) - 1})
     with np.errstate(over="ignore", invalid="ignore"):

@@ -64,7 +64,7 @@ class HeldOut(ConfigModel):
         """Effects of a further motion, random by ``seed``, for training and never for tests.
 
         It has an initial velocity of 0.5 to 2 times ``kick``, gravity turned by up to 45 degrees,
-        schedules 0.7 to 1.4 times as long, 0.4 to 2.7 times the weights of the constraints, and
+        frame numbers of effects times 0.7 to 1.4, weights of the constraints times 0.4 to 2.7, and
         pins that move by up to ``carry``.
         """
         rng = np.random.default_rng([FURTHER, self.seed, seed])
@@ -97,7 +97,7 @@ class HeldOut(ConfigModel):
             effect = redirected
             if isinstance(effect, GroupConfig):
                 return effect.model_copy(update={"weight": self.stiffness * effect.weight})
-        elif redirected != effect:  # only handles (vertices that are moved) change
+        elif redirected != effect:  # true of handles (effects that move vertices) only
             effect = effect.with_frames_scaled(FASTER)
         degrees, place = TILTS[motion]
         effect = effect.tilted(degrees, axes, place)

@@ -69,7 +69,7 @@ def shape_differences(positions: np.ndarray, reference: np.ndarray) -> np.ndarra
 def trajectory_error(difference: np.ndarray, displacement: np.ndarray) -> float | None:
     """Return the relative error || Q_red - Q_fom || / || Q_fom - Q_0 || over F frames of a run.
 
-    Q are positions of the reduced or full-order run; None if the latter stays at Q_0 or if F = 0.
+    Q are positions of the reduced or full-order run; None if the full order stays at Q_0 or F = 0.
 
     Parameters
     ----------

@@ -118,7 +118,7 @@ class _SnapshotRecorder:
             self._targets.append((group, position, data, roundoff))
 
     def observer(self, frame: int) -> Callable[[np.ndarray], None] | None:
-        """Return a function that stores the last iterate's snapshots; None if none in ``frame``."""
+        """Return a function that stores snapshots of an iterate; None if ``frame`` needs none."""
         wanted = [t for t in self._targets if frame in t[1]]
         if not wanted:
             return None

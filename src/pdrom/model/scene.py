@@ -298,7 +298,7 @@ class Scene:
         log_obstructed(self)
 
     def log_contacts(self) -> None:
-        """Log a warning for each contact that would move vertices at rest or is too thin (`doubt`).
+        """Log the warnings of all contacts (`doubt`), for example that one moves vertices at rest.
 
         Vertices that are held (fixed) in the first frame are ignored.
         """
@@ -365,7 +365,7 @@ class Scene:
 
 
 def _place(boundary: base.Boundary) -> base.EffectConfig:
-    """Configuration of ``boundary`` without vertices and end; equal only for equal motions."""
+    """Configuration of ``boundary`` without ``select``, ``until``; equal only for equal motions."""
     return boundary.config.model_copy(update={"select": None, "until": None})
 
 

@@ -1,4 +1,4 @@
-"""Bases of projection snapshots: weighting, centring, POD with fixed signs, numerical rank."""
+"""POD bases computed from snapshots of projections: weighting, centring, signs, numerical rank."""
 
 import os
 from dataclasses import dataclass
@@ -100,9 +100,9 @@ def compute_basis(
     row_mass : (e p,) kg, used by mass weighting
     roundoff : Frobenius norm of the rounding errors in ``snapshots``
     rows_per_element : p
-    signs : generator of random signs for the modes, None to keep them. Signs matter only with
-        centring "mean-in-modes", where their span depends on them: each mode gets the first
-        snapshot added.
+    signs : generator that draws the sign of each mode; None keeps all signs. Signs matter only with
+        centring "mean-in-modes": it adds the first snapshot to every mode, so that the span of the
+        modes depends on their signs.
     spec : weighting, centring and layout
 
     Raises
@@ -118,18 +118,19 @@ def compute_basis(
     mean, error, shown = np.zeros(len(matrix)), roundoff, matrix
     if spec.centring == "affine":
         # The mean of n snapshots has a rounding error of at most n eps/2 times the sum of the
-        # terms' magnitudes (Higham 2002, section 4.2). The error is equal in all columns, and this
+        # terms' magnitudes (Higham 2002, section 4.2). The error is equal in all columns; `rounded`
         # bounds its Frobenius norm. Otherwise constant snapshots would get modes of round-off.
         # Subtracting the first snapshot makes no such error.
         rounded = 0.5 * np.finfo(float).eps * matrix.shape[1] * float(np.linalg.norm(matrix))
         mean, error = matrix.mean(axis=1), max(roundoff, rounded)
-        # here an axis with constant snapshots is inactive; with "mean-in-modes" it is active
+        # an axis with constant snapshots is inactive with this centring, active with the others
         shown = matrix - mean[:, None]
     elif spec.centring == "mean-in-modes":
         mean = matrix[:, 0].copy()
     centred = (matrix - mean[:, None]) * scale[:, None]
     noise = error * float(scale.max())
-    # an axis is active if its norm exceeds the round-off of the data and of the largest axis
+    # an axis is active if the norm of its snapshots exceeds both the round-off of the data and the
+    # round-off that belongs to the largest norm of an axis
     norms = np.array([np.linalg.norm(shown[axis::3]) for axis in range(3)])
     least = max(error, max(shown.shape) * np.finfo(float).eps * norms.max())
     active = tuple(bool(norm > least) for norm in norms)
@@ -142,7 +143,7 @@ def compute_basis(
         rank = numerical_rank(sigma, centred.shape, noise)
     v = modes[:, : rank if any(active) else 0]
     if spec.centring == "mean-in-modes":
-        # no more modes than rows per axis can be orthonormal on each axis
+        # on one axis, no more modes can be orthonormal than the axis has rows
         v = _mean_in_modes(v[:, : len(row_mass)], centred, mean * scale, active, signs)
         mean = np.zeros_like(mean)
     return Basis(
@@ -195,7 +196,8 @@ def _check(
 def _per_axis(centred: np.ndarray, noise: float) -> tuple[np.ndarray, np.ndarray, list[int]]:
     """Return one POD basis per axis as (modes, singular values, rank of each axis).
 
-    Modes beyond an axis's rank are zero. Singular value k is the norm of the axes' k-th ones.
+    Modes beyond an axis's rank are zero. The returned singular value k is the 2-norm of the k-th
+    singular values of the three axes.
     """
     n, m = centred.shape
     modes = np.zeros((n, min(n // 3, m)))
@@ -216,7 +218,7 @@ def _mean_in_modes(
     active: tuple[bool, ...],
     signs: np.random.Generator | None,
 ) -> np.ndarray:
-    """Return modes, rescaled, plus the snapshot ``first``, then made orthonormal by QR per axis.
+    """Rescale modes ``v``, add the snapshot ``first`` to each, and orthonormalise per axis by QR.
 
     As in the program published with the preprint, an axis with fewer independent columns than modes
     is completed by Householder vectors, which are orthonormal but do not come from the data.
@@ -275,8 +277,8 @@ def thin_qr(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     Ogita 2020) LU with partial pivoting, A = P L U, leaves a well-conditioned L, and two Cholesky
     factorisations of Gram matrices make it orthonormal: L = Q_1 R_1, Q_1 = Q R_2, R = R_2 R_1 U.
     If L is ill-conditioned, so that Q_1 is not orthonormal up to `DEPARTURE`, Householder
-    reflections factor A instead. If not, R has the error of the LU factorisation, about
-    eps cond(L) relative to each column of A.
+    reflections factor A instead. If L is well-conditioned, R has the error of the LU factorisation,
+    about eps cond(L) relative to each column of A.
     """
     lower, swaps, _ = linalg.lapack.dgetrf(np.array(matrix, order="F"), overwrite_a=True)
     m = matrix.shape[1]

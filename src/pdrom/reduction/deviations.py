@@ -48,7 +48,7 @@ class Yardstick:
 
     @cached_property
     def scale(self) -> EnergyScale:
-        """Zero and largest energy of the full-order run, by which energies of runs are scaled."""
+        """Zero point and unit of energies: lowest potential, largest energy of the full order."""
         return EnergyScale.of(self.scene, self.reference)
 
     @cached_property
@@ -100,7 +100,7 @@ class Yardstick:
         }
 
     def errors(self, outcome: Rerun) -> dict[str, float | None]:
-        """Errors over all frames of the run ``outcome``, by column name of the tables."""
+        """Map column names of tables to the errors over all frames of the run ``outcome``."""
         end = len(self.displacement)
         return errors_within(self.deviations(outcome), self.series, end, **self.units)
 
@@ -121,7 +121,7 @@ class Yardstick:
 def errors_within(
     run: Series, reference: Series, end: int, extent_norm: float, time_step: float
 ) -> dict[str, float | None]:
-    """Return the errors over the frames before ``end``, by column name.
+    """Return a mapping of column names to the errors over the frames before number ``end``.
 
     An error is None if the run ended earlier or the full-order run lacks the quantity.
 
@@ -133,17 +133,17 @@ def errors_within(
     if len(run["difference"]) < end:
         return dict.fromkeys(ERRORS)
     displacement, shape = reference["displacement"], run["shape_difference"]
-    drift, count = None, end // STRIDE + 1  # entry 0 is the initial energy
+    drift, count = None, end // STRIDE + 1  # number of energies, of which the first is initial
     if count > 1 and len(reference["energy"]):
         drift = float(np.abs(run["energy"][:count] - reference["energy"][:count]).max())
-    # delay of the first contact; inf if only the full-order run has one, -inf if only this run has
+    # first frame with contact of this run and of the full-order run; inf if there is no contact
     first, wanted = (
         float(np.argmax(touched)) if np.any(touched) else np.inf
         for touched in (run["contact"][:end], reference["contact"][:end])
     )
 
     def over_extent(difference: np.ndarray) -> float | None:
-        """Root mean square of ``difference`` before ``end``, divided by ``extent_norm``."""
+        """Root mean square of ``difference`` before frame ``end``, divided by ``extent_norm``."""
         return float(np.sqrt(np.mean(np.square(difference[:end] / extent_norm)))) if end else None
 
     found = (
@@ -172,7 +172,7 @@ def error_within(difference: np.ndarray, displacement: np.ndarray, end: int) -> 
 
 
 def _blocks(positions: np.ndarray, reference: np.ndarray) -> list[tuple[Any, Any]]:
-    """Split both runs into blocks of frames; each begins with the last frame of the one before."""
+    """Split both runs into blocks; a block begins with the last frame of the previous block."""
     starts = range(0, max(len(positions) - 1, 1), BLOCK)
     ends = (min(start + BLOCK + 1, len(positions)) for start in starts)
     return [(positions[s:e], reference[s:e]) for s, e in zip(starts, ends, strict=True)]

@@ -1,6 +1,6 @@
-"""Reduction methods, each a combination of basis, sampled rows, selection and solution.
+"""Reduction methods: each combines a basis, a kind of samples, a selection rule and a solver.
 
-The presets are combinations with a name. The module of a selection is imported on first use.
+methods.yaml gives names to combinations. A selection rule's module is imported on first use.
 """
 
 import re
@@ -44,7 +44,7 @@ class BasisSpec(ConfigModel):
 
     @property
     def basis_id(self) -> str:
-        """Name of the file of the basis."""
+        """Name of the recipe, which is part of the path of the basis's file."""
         return f"{self.weighting}-{self.centring}-{self.layout}"
 
     @property
@@ -122,7 +122,7 @@ class MethodSpec(BasisSpec):
 
     @property
     def modules(self) -> list[str]:
-        """Import paths "module:attribute" of the selections in use, for the code's fingerprint."""
+        """Import paths "module:attribute" of the selection rules used, to detect changed code."""
         selects = self.rows in ("scalar", "element") or self.oversampling > 1
         return [SELECTIONS[self.selection]] if selects else []
 
@@ -140,7 +140,7 @@ class MethodSpec(BasisSpec):
 
 
 def load_methods(path: Path) -> dict[str, MethodSpec]:
-    """Read the methods in ``path`` (methods.yaml) by name; ConfigurationError for any fault."""
+    """Map names to the methods in ``path`` (methods.yaml); ConfigurationError for any fault."""
     content = read_yaml(path)
     if not isinstance(content, dict) or not content:
         raise ConfigurationError(f"{path}: a mapping of method names is required")

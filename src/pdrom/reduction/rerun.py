@@ -14,7 +14,7 @@ from pdrom.model.runs import BoundedRun
 class Rerun:
     """Result of a reduced run; a run that blows up ends in that frame and is also a result.
 
-    positions : (F' + 1, N, 3) m, initial state first; F' finite frames
+    positions : (F' + 1, N, 3) m of the initial state and of F' finite frames
     difference : (F',) m, || Q_red - Q_fom ||_F of reduced and full-order positions in each frame
     extent : (F',) longest side of the bounding box in each frame over that of the rest shape
     blowup_frame : first frame whose extent exceeds the limit or is not finite, else None
@@ -45,7 +45,7 @@ class Rerun:
         return float(self.extent.max(initial=0.0))
 
     def row(self, displacement: np.ndarray) -> dict[str, Any]:
-        """Table row of the run; ``displacement`` (F,) m is the norm of the full-order motion."""
+        """Map column names of tables to results of the run; ``displacement`` as in `error`."""
         return {
             "frames": self.frames,
             "finite": self.finite,
@@ -57,9 +57,7 @@ class Rerun:
     def error(self, displacement: np.ndarray) -> float | None:
         """Relative error over the whole run; None if the run ended early.
 
-        Parameters
-        ----------
-        displacement : (F,) m, displacement norm of the full-order run in each frame
+        ``displacement`` (F,) m is the norm of the full-order run's displacement in each frame.
         """
         if not self.finite or self.frames < len(displacement):
             return None

@@ -1,4 +1,4 @@
-"""Snapshots of projections of a constraint group: training and test frames, reading, storing."""
+"""Snapshots of the projections of a constraint group: choice of frames, reading and storing."""
 
 import os
 from dataclasses import dataclass

@@ -1,7 +1,7 @@
 """Matplotlib types for annotations of figures; at run time they are placeholders.
 
 Every run of the workflow imports all modules of figures, but only a job that draws one needs
-Matplotlib. Such modules import its types from here, and its functions inside their own functions.
+Matplotlib. Modules of figures thus import its types from here and its functions when they draw.
 """
 
 from typing import TYPE_CHECKING, Any

@@ -1,7 +1,7 @@
 """Files that show a scene's runs: a picture of four frames, and files for ParaView.
 
-The picture has a row for the full-order run and below it one per other run. For ParaView there is a
-VTU file per frame, and a PVD file with the times.
+The picture has a row for the full-order run and below it one for each reduced run that `shown_runs`
+selects. For ParaView there is a VTU file per frame, and a PVD file with the times.
 """
 
 from dataclasses import replace
@@ -44,7 +44,7 @@ def shown_runs(scene: ViewedScene) -> list[ViewedRun]:
 
 def _draw(scene: ViewedScene) -> Figure:
     """Draw one row per run; the grey outline in reduced rows is the full-order run."""
-    # rotation of the scene and its obstacles after which y points up
+    # the scene and its obstacles are turned so that y points up
     turn, found = rotation_to(up_of(scene.effects)), obstacles(scene.positions, scene.effects)
     bodies = [replace(body, points=body.points @ turn) for body in found]
     runs = tuple(replace(run, positions=run.positions @ turn) for run in scene.runs)

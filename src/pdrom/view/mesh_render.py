@@ -104,7 +104,7 @@ def draw_floor(ax: Axes, points: np.ndarray, mesh: Mesh, camera: Camera, window:
 
     Parameters
     ----------
-    ax, camera, window : picture and its view
+    ax, camera, window : axes of the picture, its camera and its visible rectangle
     points : (N, 3) m, positions of the vertices
     """
     from matplotlib.collections import PolyCollection

@@ -8,7 +8,7 @@ from pdrom.view import style
 from pdrom.view.artists import Axes, Axis, Figure, SubFigure
 
 PANEL_HEIGHT = 1.45  # inches
-NEAR = 0.05  # markers closer than this fraction of the axis share a label
+NEAR = 0.05  # markers closer in x than this fraction of the x axis share a label
 
 
 def small_multiples(
@@ -74,7 +74,7 @@ def log_axes(ax: Axes, across: tuple[float, float], along: tuple[float, float]) 
 
 
 def time_axis(ax: Axes, times: np.ndarray) -> None:
-    """Make x of ``ax`` logarithmic with ``times`` inside; plain numbers at ticks that fit."""
+    """Make x of ``ax`` logarithmic, from before to after all ``times``, with plain numbers."""
     ax.set_xscale("log")
     low, high = np.log10(np.nanmin(times)), np.log10(np.nanmax(times))
     pad = max(0.1, 0.08 * (high - low))
@@ -83,7 +83,7 @@ def time_axis(ax: Axes, times: np.ndarray) -> None:
 
 
 def plain_ticks(axis: Axis, decades: float) -> None:
-    """Label at least two ticks of a logarithmic ``axis`` over ``decades`` with plain numbers."""
+    """Label at least two ticks of a logarithmic ``axis``, ``decades`` long, with plain numbers."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
     steps = [(0.4, (1, 1.5, 2, 3, 5, 7)), (0.7, (1, 2, 3, 5)), (1.3, (1, 2, 5)), (2.0, (1, 3))]
@@ -132,11 +132,11 @@ def clipped(values: np.ndarray, low: float, high: float) -> np.ndarray:
 def label_counts(
     ax: Axes, x: Iterable[float], y: Iterable[float], counts: Iterable[float], prefix: str = ""
 ) -> None:
-    """Write a number below and to the left of each marker; markers close together share a label.
+    """Write the count of each marker below and to the left of it, one label for close markers.
 
-    ``ax`` has markers at ``x``, ``y``; a label is ``prefix`` with its number of ``counts``.
+    ``ax`` has markers at ``x``, ``y`` with ``counts``; a label is ``prefix`` and the counts.
 
-    x : ascending; the limits of the axis must be final
+    x : ascending; the limits of the x axis must have been set before
     """
     low, high = np.log10(ax.get_xlim())
     groups: list[list[tuple[float, float, float]]] = []

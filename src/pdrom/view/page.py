@@ -49,11 +49,11 @@ class ViewedScene:
     positions : (F + 1, N, 3) m of the full-order run
     ms : milliseconds per frame of the full-order run, None if not measured
     floor : (F,) relative error that perturbations by round-off cause, empty if unknown
-    horizon : first frame in which rounding errors decide, so that no run is compared; else None
-    runs : reduced runs, by group, method and ascending size
+    horizon : first frame from which on rounding errors decide and no run is compared, or None
+    runs : reduced runs, sorted by group, method and basis size r
     effects : effects of the scene; obstacles among them are drawn
     velocities : (F + 1, N, 3) m/s of the full-order run, None if they were not stored
-    first : kind of the run with which the reduced runs are compared
+    first : label of the run with which the reduced runs are compared
     """
 
     name: str
@@ -70,7 +70,7 @@ class ViewedScene:
     first: str = "full order"
 
     def sizes(self, group: str, method: str) -> list[ViewedRun]:
-        """Runs of a group and a method by ascending size."""
+        """Runs of a group and a method by ascending basis size r."""
         return [run for run in self.runs if (run.group, run.method) == (group, method)]
 
 

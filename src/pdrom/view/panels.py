@@ -54,7 +54,7 @@ class RunPanel:
 def shared_window(
     camera: Camera, reference: np.ndarray, panels: list[RunPanel], margin: float = 0.1
 ) -> Window:
-    """Window of ``reference`` (N, 3) m and of ``panels`` of about its size, seen by ``camera``."""
+    """Window around ``reference`` (N, 3) m and the ``panels`` not much larger, by ``camera``."""
     base = window_of(camera, [reference], margin)
     size = SAME_SCALE * max(base.width, base.height)
     clouds = [reference]
@@ -180,7 +180,7 @@ def run_panel(
 ) -> RunPanel:
     """Panel of a reduced run at ``frame``, with a message if the run failed or never began.
 
-    The run is read from the file ``path``, where ``info`` describes it.
+    The run that ``info`` describes is read from the file ``path``.
     """
     if info.marked:
         return RunPanel(title, colour, None, remark="not run: r exceeds\nthe numerical rank")

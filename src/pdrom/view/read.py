@@ -97,9 +97,7 @@ def choose_ranks(infos: list[RerunInfo], asked: tuple[int | str, ...]) -> list[R
 def rerun_positions(path: str, info: RerunInfo, frame: int) -> tuple[int, np.ndarray] | None:
     """Index and positions (N, 3) m of the last finite frame up to ``frame``; None without any.
 
-    The run is read from the file ``path``, where ``info`` describes it.
-
-    A run that blew up has fewer frames than the full-order run.
+    The run that ``info`` describes is in the file ``path``; it has fewer frames if it blew up.
     """
     with open_hdf5(path) as file:
         data = file[info.label]["positions"] if info.entries else ()

@@ -95,7 +95,7 @@ def look() -> Iterator[None]:
 
 
 def method_styles(names: Iterable[str]) -> dict[str, tuple[str, str]]:
-    """(colour, marker) of each method; those that are no presets get spare styles, by name."""
+    """Map each method to (colour, marker); methods not in `METHODS` share a few spare styles."""
     names = list(names)
     others = sorted(set(names) - set(METHODS))
     spare = {name: _RESERVE[i % len(_RESERVE)] for i, name in enumerate(others)}
@@ -174,7 +174,7 @@ def handles(looks: Mapping[str, tuple[str, str]], **common: Any) -> list[Line2D]
 
 
 def split_handles(splits: Iterable[str]) -> list[Line2D]:
-    """Legend entries for sets of snapshots, ``splits`` (training, test, ...), by line style."""
+    """Legend entries for sets of snapshots, ``splits`` (train, test, ...), with line styles."""
     return [handle(SPLIT_NAMES[s], color="#555555", linestyle=SPLITS[s]) for s in splits]
 
 

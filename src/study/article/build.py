@@ -35,7 +35,7 @@ from study.tables.kit.declaration import QUANTITIES, TOLERANCES
 
 # Sizes in bytes: larger pictures are compressed with losses, larger PDFs are left out of the pages.
 LOSSLESS, COPIED = 150_000, 200_000
-MANY = 4  # figures with options of the same type are related if the type has this many keys
+MANY = 4  # two figures with the same type of options are related if it has this many keys or more
 
 
 def shown_figure(
@@ -52,7 +52,7 @@ def shown_figure(
     picture = attributes("", "", width=str(size[0]), height=str(size[1]), loading="lazy")
     alternative = words(plain(caption[1]).strip())
     image = {"t": "Image", "c": [picture, alternative, [f"figures/{name}.webp", ""]]}
-    # plain text as alternative text: pandoc hides a caption that equals the alternative text
+    # the alternative text is plain: pandoc would hide a caption that equals it exactly
     made = {"t": "RawInline", "c": ["html", _origin(name, with_pdf, pages)]}
     origin = [{"t": "Plain", "c": [*words("Command: "), made]}]
     told = [caption[0], [*caption[1], boxed("Div", origin, "", "origin")]]
@@ -81,8 +81,8 @@ def _origin(name: str, with_pdf: bool, pages: Mapping[str, str]) -> str:
 def _kin(name: str, pages: Mapping[str, str]) -> list[str]:
     """Names of related figures in ``pages``, which show other scenes in the same form.
 
-    Figures are related if their options have the same type with at least `MANY` keys, or if the
-    name of one begins with the name of the other.
+    Two figures are related if their options have the same type and this has at least `MANY` keys,
+    or if the name of one figure begins with the name of the other.
     """
     listed = declarations()
     mine = listed[name].options
@@ -130,14 +130,14 @@ def table_page(name: str, csv: bytes, template: str) -> str:
 
 
 def argument(name: str) -> str:
-    """Argument of ``./reproduce`` that makes table ``name``; all tables of facts share one."""
+    """Argument of ``./reproduce`` that makes table ``name``; all tables in `FACTS` share one."""
     if name in FACTS:
         return "paper_inputs"
     return TABLE.at(RESULTS, name=name) if name in declarations() else name
 
 
 def list_page(names: list[str], template: str) -> str:
-    """HTML page with a link to each table in ``names``, and its title."""
+    """HTML page that lists the tables ``names``: for each a link and the title of the table."""
     known = declared()
     items = "".join(
         f"<li><a href='tables/{name}.html'><code>{name}</code></a> "
@@ -222,10 +222,10 @@ VERIFIED, INDEX = "verified.js", "index.html"
 
 
 def write_verified(found: Mapping[str, str], folder: Path) -> None:
-    """Write the outcomes ``found`` by ``./reproduce verify`` into ``folder``, for the pages.
+    """Write the outcomes of ``./reproduce verify`` to a file in ``folder`` that all pages load.
 
-    Keys are kind and name, as in "table payoff". The file is a script, because a page opened from a
-    disk can load scripts but no data.
+    ``found`` maps kind and name, such as "table payoff", to the outcome. The file is a script,
+    because a page opened from a disk can load scripts but no data.
     """
     write_text(f"window.pdromVerified={safe_json(dict(found))};\n", folder / VERIFIED)
 
@@ -259,11 +259,11 @@ def write_article(
     outputs: Mapping[str, str],
     **assets: Path,
 ) -> None:
-    """Write all pages of the article to the paths ``outputs``, by name.
+    """Write all pages of the article to ``outputs`` (name of a page or file -> path).
 
     source, references : TeX sources of the manuscript and its bibliography
-    tables, machine : CSV of the tables and the record of the machine
-    inputs : inputs of the manuscript, including the file `NUMBERS`
+    tables, machine : CSV files of the tables, and the file that describes the machine
+    inputs : generated files that the manuscript includes, and the file `NUMBERS`
     figures, pictures : PDF and PNG of each figure
     facts, claims : facts about the configuration, and the file with the rules of the claims
     added : name of a set of values in the file ``claims`` -> values that the study adds to it
@@ -311,7 +311,7 @@ def write_article(
 def _write_figures(
     figures: list[File], pictures: list[File], outputs: Mapping[str, str]
 ) -> dict[str, tuple[tuple[int, int], bool]]:
-    """Write each figure as WebP, and its PDF if small; return (picture size, with PDF) by name."""
+    """Write figures as WebP and small PDFs; return name -> (size in pixels, whether it has PDF)."""
     folder = Path(outputs["main"]).parent / "figures"
     png = {picture["name"]: Path(picture.path) for picture in pictures}
     made = {}
@@ -345,11 +345,11 @@ LIMIT = 300.0  # time limit of pandoc, s; a TeX definition that expands to itsel
 
 
 def parsed(text: str, files: Mapping[str, str], references: Path) -> Node:
-    r"""Return pandoc's syntax tree of a LaTeX source ``text``, with its bibliography.
+    r"""Return pandoc's syntax tree of the LaTeX source ``text`` and of its bibliography.
 
     Raises PaperError if pandoc is not installed, or if it rejects the source.
 
-    files : contents of the files that the source reads by ``\input``, by name
+    files : name -> content of each file that the source reads by ``\input``
     references : path of the BibTeX file
     """
     with tempfile.TemporaryDirectory(prefix="pdrom-pandoc-") as folder:

@@ -30,8 +30,8 @@ _NUMBER = re.compile(
 )
 _TAIL = re.compile(r"(\(|, )(\d[\d/, ]*)([)}]?)$")  # number at the end of a cell: "holds (20/20)"
 _FIGURE = r"\begin{figure}\includegraphics{%s.pdf}\caption{%s}\label{fig:%s}\end{figure}"
-# Definitions of one line in the preamble, which pandoc can read; `REPLACED` has simple definitions
-# for those about the layout.
+# Finds definitions of commands in the preamble that take one line, which pandoc can read. Those
+# about the layout are left out: `REPLACED` has simple definitions of the same commands.
 _SHORT = re.compile(r"(?m)^\\(?:newcommand\{\\(?!longtableof|tablefile)\w+\}.*\}|newtheorem.*)$")
 REPLACED = r"""
 \newcommand{\longtableof}[4]{\begin{table}\caption{#3}\label{#2}\input{#4}\end{table}}
@@ -64,7 +64,7 @@ def prepared(source: str, document: str, origins: Mapping[str, Any], facts: Fact
 
 
 def _title(preamble: str) -> str:
-    r"""Return the command ``\title`` of the ``preamble`` in one line, colons for line breaks."""
+    r"""Return the command ``\title`` of the ``preamble``, with colons in place of line breaks."""
     start = preamble.index(r"\title{") + len(r"\title{")
     lines = _PART.sub("", preamble[start : closing(preamble, start)]).split(r"\\")
     words = [re.sub(r"^\[[^\]]*\]|\\large|%", "", line).strip() for line in lines]
@@ -72,7 +72,7 @@ def _title(preamble: str) -> str:
 
 
 def _decided(source: str, known: Sequence[str], left_out: str) -> str:
-    r"""Return ``source`` with each ``\known`` or ``\row`` block kept, removed, or ``left_out``."""
+    r"""Keep, drop or replace (by ``left_out``) ``\known`` and ``\row`` blocks as ``known`` says."""
     pieces, start = [], 0
     for sentence, decision in zip(sentences(source), known, strict=True):
         shown = {SHOWN: sentence.text, NOTED: left_out}.get(decision, "")
@@ -97,10 +97,10 @@ def _link(key: str, text: str) -> str:
 def linked_table(table: Rows, tables: Mapping[str, pd.DataFrame]) -> str:
     """Return the TeX ``table`` with its numbers as links to rows of the study's tables.
 
-    The links lead to that one of ``tables`` which has most columns in common with ``table``. If
-    both have the same number of rows, the rows correspond in order. Otherwise a link selects the
-    rows that have equal cells in common columns; columns without an equal cell (rounded numbers,
-    sums, titles) are ignored.
+    All links lead to one table: the one of ``tables`` with most columns in common with ``table``.
+    If both have the same number of rows, row i is linked to row i there. Otherwise a row is linked
+    to the rows with equal cells in common columns; columns in which no row has an equal cell
+    (rounded numbers, sums, titles) are ignored.
     """
     (columns, header), *body = table
     origin = max(tables, key=lambda name: len({*header} & {*tables[name]}))
@@ -112,7 +112,7 @@ def linked_table(table: Rows, tables: Mapping[str, pd.DataFrame]) -> str:
 
 
 def _agreeing(table: pd.DataFrame, header: Sequence[str], cells: Sequence[str]) -> list[str]:
-    """Filters ``column=value`` that select the rows of ``table`` that agree with a TeX row."""
+    """Filters ``column=value`` that select rows of ``table`` with the ``cells`` of a TeX row."""
     found = []
     for title, cell in zip(header, cells, strict=True):
         for value in (_plain(cell), _plain(cell).replace(" ", "_")) if title in table else ():
@@ -125,20 +125,20 @@ def _agreeing(table: pd.DataFrame, header: Sequence[str], cells: Sequence[str]) 
 
 
 def _linked_cell(cell: str, key: str) -> str:
-    """Make the number in ``cell`` a link; it is the whole cell, or stands at the end of words."""
+    """Return ``cell`` with a link on its number: the whole cell, or a number at its end."""
     if _NUMBER.fullmatch(cell):
         return _link(key, cell)
     return _TAIL.sub(lambda found: found[1] + _link(key, found[2]) + found[3], cell)
 
 
 def _plain(cell: str) -> str:
-    """Text of a cell without TeX commands; only the name if it begins with one in typewriter."""
+    """Text of a cell without backslashes; only the name if the cell begins with ``\\texttt``."""
     name = re.match(r"\\texttt\{([^{}]*)\}", cell)
     return (name[1] if name else cell).replace("\\", "")
 
 
 def plain_columns(text: str) -> str:
-    """Reduce the column definitions of all tables in ``text`` to letters, which pandoc needs."""
+    """Reduce the column definitions of all tables in ``text`` to letters that pandoc can read."""
     pieces, start = [], 0
     for found in _SPEC.finditer(text):
         end = closing(text, found.end() + 1)

@@ -33,7 +33,7 @@ def words(text: str) -> list[Node]:
 def link(inlines: list[Node], address: str, classes: str = "") -> Node:
     """Return the node of a link to an ``address`` whose shown nodes are ``inlines``.
 
-    If these are a formula, the link gets its text as a title, for screen readers.
+    If they are a formula, its text becomes the title of the link, for screen readers.
     """
     formula = all(node["t"] == "Math" for node in inlines)
     title = re.sub(r"\\cdot ?|[{}\\]", lambda m: "·" if "cdot" in m[0] else "", plain(inlines))
@@ -94,7 +94,7 @@ class Labels:
     counts: Counter[str] = field(default_factory=Counter)
 
     def next(self, kind: str, label: str = "") -> str:
-        """Count the next figure, table etc. (``kind``); store and return its number."""
+        """Count the next figure, table etc. (``kind``); return its number, stored by ``label``."""
         self.counts[kind] += 1
         return self.note(label, f"{self.prefix}{self.counts[kind]}")
 
@@ -146,10 +146,10 @@ def numbered(tree: Node, labels: Labels, shown: Callable[[str, Node], Node]) -> 
 
 
 def _table(label: str, node: Node, labels: Labels) -> Node:
-    """Return a table in a region that can be scrolled, below its number and caption."""
+    """Return the table ``node`` in a region that can be scrolled; its caption is above."""
 
     def headed(node: Node) -> Node | None:
-        """Add the text of a formula, for screen readers; None for nodes that are no formulas."""
+        """Return a formula with its text for screen readers; None if ``node`` is no formula."""
         return boxed("Span", [node, _heard(plain(node))]) if node["t"] == "Math" else None
 
     content = _captioned(node, f"Table {labels.next('table', label)}.")["c"]
@@ -190,12 +190,12 @@ def _equation(node: Node, labels: Labels) -> Node:
 
 
 def resolved(tree: Node, labels: Mapping[str, tuple[str, str]], claims: Mapping[str, Any]) -> Node:
-    """Insert the numbers of references, links at numbers and claims, and headings of paragraphs.
+    """Resolve references to numbers; make numbers and claims links; set headings of paragraphs.
 
     Raises PaperError if the text refers to a label that no document has.
 
     labels : TeX label -> (number, page)
-    claims : claims by the name that the text uses
+    claims : mapping whose keys are the names of the claims in the text, such as "C4"
     """
 
     def visit(node: Node) -> Any:
@@ -214,7 +214,7 @@ def resolved(tree: Node, labels: Mapping[str, tuple[str, str]], claims: Mapping[
 
 
 def _run_in(blocks: list[Node]) -> list[Node]:
-    """Turn headings of paragraphs into bold words at the beginning of the paragraphs."""
+    """Replace the headings of paragraphs by bold words at the beginning of each paragraph."""
     made: list[Node] = []
     heading: list[Node] = []
     for block in blocks:
@@ -234,7 +234,7 @@ def _resolved_link(node: Node, labels: Mapping[str, tuple[str, str]]) -> Node | 
     attribute, inlines, (address, _) = node["c"]
     if address.startswith(ORIGIN):
         key = bytes.fromhex(address.removeprefix(ORIGIN)).decode()
-        # the key names a table and selects rows, which the page of the table marks
+        # the key has the name of a table and filters for rows; the table's page marks these rows
         table, _, rows = key.partition("|")
         place = re.sub(r'[% "<>#]', lambda sign: quote(sign[0]), rows)
         return link(inlines, f"tables/{table}.html" + (f"#{place}" if place else ""), "val")

@@ -35,13 +35,13 @@ A = TypeVar("A", bound="Artifact")
 class Artifact:
     """A function that makes files of the study, with its input and output files.
 
-    If the function has a parameter ``outputs``, it gets all output paths by name in it. This serves
-    functions with many output files, or with files in configurable folders.
+    A function with a parameter ``outputs`` gets a mapping of names to all output paths in it. This
+    serves functions with many output files, or with files in configurable folders.
 
     name : name of the function
     title : message when a job starts; ``{scene}`` etc. stand for scene etc. of the job
-    reads : input files and settings, by parameter of the function
-    writes : kinds of output files, by parameter of the function
+    reads : parameter of the function -> declared input (files or a setting)
+    writes : parameter of the function -> kind of output file
     alone : True if the function measures times, so that no other job may run meanwhile
     """
 
@@ -70,13 +70,13 @@ class Artifact:
 
     @property
     def files(self) -> dict[str, FileRead]:
-        """Declared inputs that are files (the others are settings), by parameter name."""
+        """Mapping of parameters to declared inputs that are files (the others are settings)."""
         reads = self.reads.items()
         return {name: read for name, read in reads if not isinstance(read, SettingRead)}
 
     @cached_property
     def types(self) -> dict[str, TypeAdapter[Any]]:
-        """Pydantic type adapters that validate the settings, by parameter name."""
+        """Mapping of each parameter for a setting to the Pydantic adapter that validates it."""
         hints = get_type_hints(self.function, include_extras=True)
         settings = [name for name, read in self.reads.items() if isinstance(read, SettingRead)]
         return {name: TypeAdapter(hints[name]) for name in settings}
@@ -86,19 +86,19 @@ class Artifact:
         return self.function(*arguments, **named)
 
     def settings(self, sources: Sources, labels: Labels) -> dict[str, Any]:
-        """Return validated settings of a job by parameter; ConfigurationError for unknown keys."""
+        """Map parameters to the job's validated settings; ConfigurationError for unknown keys."""
         reads = [(name, read) for name, read in self.reads.items() if isinstance(read, SettingRead)]
         values = {name: read.value(sources, labels) for name, read in reads}
         return {name: self.types[name].validate_python(value) for name, value in values.items()}
 
     def plain(self, settings: Mapping[str, Any]) -> dict[str, Any]:
-        """Return ``settings`` as JSON data, only with the fields of the annotated types."""
+        """Convert ``settings`` to JSON data with only the fields of the parameters' types."""
         return {k: self.types[k].dump_python(v, mode="json") for k, v in settings.items()}
 
     def perform(
         self, settings: Mapping[str, Any], inputs: Mapping[str, Any], outputs: Mapping[str, str]
     ) -> None:
-        """Run a job with JSON ``settings``, and paths ``inputs`` and ``outputs``, all by parameter.
+        """Run a job. The arguments map parameters to JSON data, input paths and output paths.
 
         Raises ValidationError if a setting does not have the type of the function's annotation.
         """
@@ -108,7 +108,7 @@ class Artifact:
         self.function(**self.read(settings, inputs), **made)
 
     def read(self, settings: Mapping[str, Any], inputs: Mapping[str, Any]) -> dict[str, Any]:
-        """Return arguments of the function: contents of ``inputs`` and validated ``settings``."""
+        """Map parameters of the function to the contents of ``inputs`` and valid ``settings``."""
         content = {name: read.content(inputs[name]) for name, read in self.files.items()}
         return content | {k: t.validate_python(settings[k]) for k, t in self.types.items()}
 
@@ -117,8 +117,8 @@ def make(address: str, code: str, labels: Labels, **job: Mapping[str, Any]) -> N
     """Run a job of the artifact at ``address``; output files record rule, settings and code.
 
     code : fingerprint (hash) of the code that the job runs
-    labels : scene, group ... of the job, by name
-    job : JSON ``settings``, and paths ``inputs`` and ``outputs``, each by parameter name
+    labels : scene, group ... of the job, such as {"scene": "bar_release"}
+    job : ``settings`` (JSON), ``inputs``, ``outputs`` (paths); each maps parameters to values
     """
     made = load(address)
     with made_by(made.rule, {**job["settings"], "labels": dict(labels)}, code):
@@ -126,7 +126,7 @@ def make(address: str, code: str, labels: Labels, **job: Mapping[str, Any]) -> N
 
 
 def declare(made: A, *parameters: str) -> A:
-    """Return ``made``; TypeError unless its function takes its inputs and ``parameters``."""
+    """Return ``made``; TypeError unless its function takes ``made.reads`` and ``parameters``."""
     try:
         inspect.signature(made.function).bind(**made.reads, **dict.fromkeys(parameters))
     except TypeError as error:
@@ -160,7 +160,7 @@ def declared_in(package: str, kind: type[A]) -> dict[str, A]:
 
 
 def modules_in(value: Any) -> Iterator[str]:
-    """Yield modules named by the attribute ``modules`` of models in ``value``, such as effects."""
+    """Yield the names in the attribute ``modules`` of all models (such as effects) in ``value``."""
     if isinstance(value, BaseModel):
         yield from getattr(value, "modules", ())
         for name in type(value).model_fields:

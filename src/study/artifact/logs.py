@@ -97,8 +97,8 @@ def job_log(path: str) -> Iterator[logging.Logger]:
 def planning_log(quiet: bool) -> Iterator[None]:
     """Show warnings of pdrom and study on stderr, or suppress them if ``quiet``.
 
-    Jobs, which make the plan again in their own processes, suppress them: the main process has
-    shown them already.
+    Each job makes the plan again in its own process, and is quiet: the main process has shown the
+    warnings already.
     """
     handler = logging.NullHandler() if quiet else logging.StreamHandler()
     handler.setLevel(logging.WARNING)
@@ -145,7 +145,7 @@ class Usage:
 def usage_since(start: float) -> Usage:
     """Return wall time since ``start`` (s, monotonic clock), processor time and memory.
 
-    Processor time counts from the start of this process; a forked job starts at zero.
+    Processor time counts from the start of this process, for a forked job from the fork.
     """
     used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
     return Usage(

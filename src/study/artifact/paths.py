@@ -40,7 +40,7 @@ class Place:
         return f"{results}/{self.pattern.format(**labels)}"
 
     def where(self, **labels: str) -> "Place":
-        """Return a kind of file whose path has values in place of the wildcards in ``labels``."""
+        """Return a kind of file: each wildcard in ``labels`` is replaced by its value there."""
         pattern = self.pattern
         for label, value in labels.items():
             pattern = pattern.replace(f"{{{label}}}", value)
@@ -63,7 +63,7 @@ class Place:
         return [self.file(path) for path in paths]
 
     def paths(self, sources: Any, labels: Mapping[str, str]) -> str:
-        """Return the path of the file of this kind for a job with scene, group ... ``labels``."""
+        """Return the path of the file of this kind for a job with these ``labels`` (scene ...)."""
         return str(sources.file(self, labels))
 
     def content(self, paths: Any) -> "File":
@@ -80,7 +80,7 @@ class Place:
 
 @dataclass(frozen=True)
 class File:
-    """A file with its path, and with scene, group ... in the path: ``file["scene"]`` etc."""
+    """A file: its path and the labels in the path; ``file["scene"]`` is the scene, for example."""
 
     path: str
     labels: dict[str, str]
@@ -143,7 +143,7 @@ PLACES = tuple(place for place in vars().copy().values() if isinstance(place, Pl
 
 
 def labels_in(path: str, results: str) -> Iterator[dict[str, str]]:
-    """Yield scene, group ... in ``path``, by name, for each kind of file that has such a path."""
+    """Yield the labels in ``path``, as {"scene": "bar140"}, for each kind of file that fits it."""
     for place in PLACES:
         with suppress(StorageError):
             labels = place.file(path).labels

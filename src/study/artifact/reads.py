@@ -15,9 +15,9 @@ from study.artifact.paths import Place
 
 Labels = Mapping[str, str]
 Paths = str | list[str]
-# Path of a file, kept in git, with rows of a table that the long study (config/extended.yaml) made.
+# Path of a file in git with the rows of table {} that the long study config/extended.yaml computed.
 RECORD = "config/reference/recorded/{}.csv"
-# Object that finds paths and settings for scene, group ... of a job: a `study.pipeline.plan.Plan`.
+# A `study.pipeline.plan.Plan`: finds paths and settings for the scene, group ... of a job.
 Sources = Any
 
 
@@ -59,7 +59,7 @@ class TableOf:
 
 
 class EditedFiles:
-    """Base class for files edited by hand: jobs rerun if the content changes, whatever the date."""
+    """Base class for files edited by hand: jobs rerun if their content, not only date, changes."""
 
     def content(self, paths: Any) -> Any:
         return Path(paths) if isinstance(paths, str) else [Path(path) for path in paths]
@@ -117,7 +117,7 @@ class Setting:
 
 @dataclass(frozen=True)
 class Settings:
-    """Several settings as one Pydantic ``model``, whose fields have the keys of the settings."""
+    """Several settings as one Pydantic ``model``; the name of a field is the key of its setting."""
 
     model: type[Any]
 
@@ -126,7 +126,7 @@ class Settings:
         return self.model.model_validate({key: sources.value(key, labels) for key in fields})
 
 
-# A `Place` (kind of file) as an input is the file of this kind for scene, group ... of the job.
+# An input declared as a `Place` (kind of file) is the file of this kind for the job's scene etc.
 FileRead = Every | TableOf | ProjectFile | ProjectFiles | Recorded | SourcesOf | Place
 SettingRead = Setting | Settings
 Read = FileRead | SettingRead

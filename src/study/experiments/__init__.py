@@ -1,1 +1,1 @@
-"""Experiments: functions that run models and write files of results, by subject."""
+"""Experiments: functions that run models and write files of results, a module per subject."""

@@ -1,4 +1,4 @@
-"""Frame times in several processes, of full-order runs and of reductions with a cited speed-up.
+"""Frame times, in several processes, of full-order runs and of reductions.
 
 Every process times all runs in another random order. As a control, the full-order run of each scene
 is timed twice: speed-ups as small as the difference between these two times mean nothing.
@@ -40,7 +40,7 @@ SECONDS_COLUMNS = ["scene", "group", "method", "r", "reduction_s"]
 
 
 class SubspaceCase(OfScene):
-    """A model in a position subspace whose speed-up the text cites."""
+    """A model in a position subspace whose speed-up the manuscript cites."""
 
     method: str
     position_basis: PositionBasis = "pod"
@@ -48,7 +48,7 @@ class SubspaceCase(OfScene):
 
 
 class ProjectionCase(OfScene):
-    """Reduction of a group's projections (not of positions) whose speed-up the text cites."""
+    """Reduction of a group's projections (not of positions) whose speed-up the manuscript cites."""
 
     group: str
     method: str
@@ -56,7 +56,7 @@ class ProjectionCase(OfScene):
 
 
 class FrameTimes(Processes):
-    """Section ``frame_times``: numbers of runs, and the reductions whose speed-up the text cites.
+    """Section ``frame_times``: numbers of runs, and reductions whose speed-up the manuscript cites.
 
     Full-order runs of all scenes, and all models of large scenes, are timed in any case.
     """

@@ -131,13 +131,13 @@ def iterations(
 
 
 def accelerated(counts: list[int], window: int) -> list[tuple[int, int]]:
-    """Pairs (iterations, window): all ``counts`` with window 0, then those above 2 accelerated."""
+    """Pairs (iterations, window): ``counts`` with 0, then those above 2 with a ``window`` > 0."""
     plain = [(count, 0) for count in counts]
     return plain + [(count, window) for count in counts if window and count > 2]
 
 
 def stepper_of(scene: Scene, system: GlobalSystem, iterations: int, window: int) -> Stepper:
-    """Full-order step loop of ``scene`` with other ``iterations``, Anderson ``window`` (or 0)."""
+    """Full-order step loop of ``scene`` with ``iterations`` and Anderson ``window`` (0: none)."""
     changes = {"iterations": iterations, "anderson_window": window}
     other = replace(scene, config=scene.config.model_copy(update=changes))
     return other.stepper(system, track_objective=False)
@@ -145,7 +145,7 @@ def stepper_of(scene: Scene, system: GlobalSystem, iterations: int, window: int)
 
 MEMORY = 8  # number of steps that L-BFGS stores
 SUFFICIENT = 1e-4  # constant of Armijo's condition: least decrease, over slope times step length
-SHORTEST = 1e-4  # shorter steps are replaced by a plain iteration, which cannot raise the objective
+SHORTEST = 1e-4  # shorter L-BFGS steps are replaced by a local/global iteration
 
 Evaluate = Callable[[np.ndarray], tuple[float, np.ndarray]]
 
@@ -200,7 +200,7 @@ def minimise(
         after = target - trial
         moved, change = trial - y, d - after
         both = matrix @ np.hstack([moved, change])
-        a_moved, a_change = both[:, :3].copy(), both[:, 3:].copy()  # contiguous: fast to read
+        a_moved, a_change = both[:, :3].copy(), both[:, 3:].copy()  # contiguous copies: faster
         curvature = float(np.vdot(moved, a_change))
         if curvature > 0.0:
             pairs = [*pairs, _Pair(moved, change, a_moved, a_change, curvature)][-MEMORY:]
@@ -209,7 +209,7 @@ def minimise(
 
 
 class _Pair(NamedTuple):
-    """Step of L-BFGS, change of A^-1 times the gradient in it, and products of both with A."""
+    """L-BFGS step, change of A^-1 times the gradient by it, both times A, and their curvature."""
 
     step: np.ndarray
     change: np.ndarray

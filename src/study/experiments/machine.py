@@ -23,7 +23,7 @@ from study.experiments.kit.base import experiment
 
 AT_ONCE = 8  # number of independent vectors, enough to hide the latency of sums and products
 SCALAR_STEPS, VECTOR_TIMES = 10**7, 10**6
-MEMORY_BYTES = 2**28  # read in one call, larger than any cache
+MEMORY_BYTES = 2**28  # size of the array that is read, larger than any cache
 REPEATS = 15
 
 
@@ -38,7 +38,7 @@ def machine(out: File) -> None:
 def units() -> Units:
     """Measure the units of time of this machine, each as the minimum over some repeats."""
     numbers = np.ones(MEMORY_BYTES // 8)
-    # pairs (work of a call, in units of 1e9; function that does this work divided by its argument)
+    # pairs (work of a whole call, in units of 1e9; function of n that does 1/n of this work)
     trials: list[tuple[float, Callable[[int], object]]] = [
         (1e-9 * SCALAR_STEPS, lambda share: _chain(SCALAR_STEPS // share)),
         (

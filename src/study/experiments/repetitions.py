@@ -1,4 +1,4 @@
-"""Repeated reduced runs, runs with one changed choice, and runs on bases of rounding errors.
+"""Reduced runs: repeated, with one choice changed, or with bases computed from rounding errors.
 
 A run depends on arbitrary choices: the training frames, and the last digits of the start. If a
 conclusion rests on the error of a run, repetitions with other choices show the scatter of the
@@ -94,7 +94,7 @@ class ReducedRuns:
         return displacement_norms(self.reference)
 
     def until_the_end(self) -> "ReducedRuns":
-        """Return a copy whose run is shortened to the frames before ``end``, or to two frames."""
+        """Return a copy with only the frames before ``end``, but with at least two frames."""
         frames = min(self.scene.config.frames, max(2, self.end))
         scene = self.scene.changed(frames=frames)
         return replace(self, scene=scene, reference=self.reference[: frames + 1])
@@ -105,7 +105,7 @@ class ReducedRuns:
         """Return the basis for ``method``.
 
         With a seed ``frames``, the training frames are drawn at random; with a seed ``signs``, the
-        signs of the singular vectors are.
+        signs of the singular vectors are drawn.
         """
         key = (method.basis_id, frames, signs)
         if key not in self._bases:
@@ -150,11 +150,11 @@ class ReducedRuns:
     def on_motions(
         self, method: MethodSpec, sizes: Sequence[int], counts: Sequence[int]
     ) -> Iterator[dict[str, Any]]:
-        """Yield rows of runs of the held-out motions, for each number of training motions.
+        """Yield rows of runs of the held-out motions, for each of ``counts`` training motions.
 
-        The numbers are ``counts``. The first training motion is that of the scene, others are drawn
-        by seeds; of n motions, every n-th training snapshot is used. Errors are over the frames
-        before ``end``, inf for a run that stopped earlier.
+        The first training motion is that of the scene, others are drawn by seeds; of n motions,
+        every n-th training snapshot is used. Errors are over the frames before ``end``, inf for a
+        run that stopped earlier.
         """
         config, mesh = self.scene.config, self.scene.mesh
         frames = self.data.frames["train"]
@@ -219,27 +219,27 @@ class Cell(ConfigModel):
 
 
 class Cells(Cell):
-    """Repeated runs: every method at every size in every scene, for each group that it reduces."""
+    """Repeated runs: every method at every size, for each reduced group of each of ``scenes``."""
 
     scenes: Annotated[tuple[SceneName, ...], Field(min_length=1)]
     methods: Annotated[tuple[str, ...], Field(min_length=1)]
 
 
 class RepetitionSection(Repetitions):
-    """Section ``repetitions``: numbers for all repetitions, and ``cells``, the repeated runs."""
+    """Section ``repetitions``: settings of all repetitions, and the repeated runs (``cells``)."""
 
     cells: tuple[Cells, ...] = ()
 
 
 class Repeated(Cell):
-    """A method, with its specification, whose runs are repeated for scene and group of the job."""
+    """A method, with its specification, whose runs are repeated in the job's scene and group."""
 
     method: str
     spec: MethodSpec
 
 
 class Ladder(Repetitions):
-    """Methods ("rungs"), each of which differs from the one before in a single choice.
+    """Methods ("rungs") that differ in single choices, and a comparison of four kinds of them.
 
     r : basis size of all rungs (the numerical rank if that is smaller)
     signs : number of repetitions of the first rung with other signs of the singular vectors
@@ -260,7 +260,10 @@ class Ladder(Repetitions):
     sizes: tuple[kit.Modes, ...] = ()
 
     def rungs(self, p: int) -> list[tuple[str, MethodSpec, int | None, int]]:
-        """List all runs as (direction, method, seed of signs, size r); elements have ``p`` rows."""
+        """List all runs as ("up", "down", "signs" or "square"; method; seed of signs; size r).
+
+        ``p`` is the number of rows of an element.
+        """
         rows: list[tuple[str, MethodSpec, int | None, int]] = []
         rows += [("up", method, None, self.r) for method in self.up]
         rows += [("down", method, None, self.r) for method in self.down]
@@ -302,7 +305,7 @@ class Noise(NoiseRuns):
 
 
 class Options(ConfigModel):
-    """Settings of a scene with one group reduced; ladder or noise is not run if it is None."""
+    """Settings for one scene and group; a ladder or noise runs that are None are left out."""
 
     scene: SceneConfig
     repetitions: Repetitions
@@ -331,9 +334,9 @@ class Options(ConfigModel):
     },
 )
 def repetitions(settings: Options, **files: paths.File) -> None:
-    """Run repetitions, ladder, and reductions on bases of rounding errors, for a scene and group.
+    """Run repetitions, the ladder, and reductions with bases computed from rounding errors.
 
-    Tables of runs that the configuration does not request have no rows.
+    All runs are of one scene and group. The table of a kind of run that is not requested is empty.
     """
     labels = files["out"].labels
     runs = ReducedRuns(
@@ -405,12 +408,12 @@ def _ladder(runs: ReducedRuns, short: ReducedRuns, ladder: Ladder) -> Iterator[d
 def noisy_runs(
     scene: Scene, group: str, asked: NoiseRuns, methods: Methods, limit: float, file: h5py.File
 ) -> list[dict[str, Any]]:
-    """Run a scene from perturbed starts, compute bases of rounding errors, and rerun with them.
+    """Run a scene from perturbed starts, compute bases from rounding errors, run reduced with them.
 
     Returns the rows of all runs with the ``group`` reduced by each of ``methods``. For each of the
-    `kinds` of perturbed start, the runs of one start are stored in ``file``; for a size r above the
-    rank there is only a mark. A run ends as a blow-up if its bounding box exceeds ``limit`` times
-    that of the rest shape.
+    `kinds` of perturbed start, the runs of one start are stored in ``file``; a size r above the
+    rank is not run, and its stored group has the attribute ``marked``. A run ends as a blow-up if
+    its bounding box exceeds ``limit`` times that of the rest shape.
     """
     rows = []
     for axes in kinds(scene):

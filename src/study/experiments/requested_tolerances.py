@@ -22,8 +22,8 @@ from study.experiments.kit.base import Tolerance, experiment
 
 log = logging.getLogger(__name__)
 
-# Largest change of a coordinate by one more iteration in frames of the true run, relative to the
-# extent; largest number of evaluations of a frame.
+# Convergence of the run that counts as exact: largest change of a coordinate by one more iteration,
+# relative to the mesh's longest side; largest number of evaluations in a frame.
 CONVERGED = 1e-6, 4000
 COLUMNS = [
     "scene", "motion", "tolerance", "vertices", "frames", "reduced", "error", "velocity_error",
@@ -40,7 +40,7 @@ class RequestedRuns(run.ToleranceSettings):
 
 
 class RequestedTolerances(RequestedRuns):
-    """Section ``requested_tolerances``, with ``scenes``; an empty list is all, with large ones."""
+    """Section ``requested_tolerances``; no ``scenes`` means all scenes, the large ones included."""
 
     scenes: tuple[str, ...] = ()
 
@@ -84,10 +84,10 @@ def requested_tolerances(
 def _rows(
     scene: Scene, recorded: np.ndarray, own: run.Calibration, section: RequestedRuns
 ) -> Iterator[dict[str, Any]]:
-    """Rows of the motion of ``scene`` by tolerance; ``recorded``: training run (F + 1, N, 3) m.
+    """Yield a row per tolerance; ``recorded`` (F + 1, N, 3) m is the run of the training motion.
 
-    Errors are those against a run with converged frames. The reference of the requests, a run with
-    many iterations, is compared with it, and replaces it if a frame does not converge.
+    Errors of runs of ``scene`` are those against a run with converged frames. A run with a fixed,
+    large number of iterations is compared with it, and replaces it if a frame does not converge.
     """
     frames = scene.config.frames
     motion = Motion(scene, min(section.errors) / section.factor, "position")
@@ -126,7 +126,7 @@ def _rows(
 
 
 def _error(true: np.ndarray, reached: np.ndarray, end: int, quantity: Quantity) -> float | None:
-    """Error of ``reached`` against ``true`` (F + 1, N, 3) m in ``end`` frames; None for none."""
+    """Error of ``reached`` against ``true`` (F + 1, N, 3) m over ``end`` frames; None if 0."""
     if not end:
         return None
     return float(levels.relative_errors(reached[1:] - true[1:], true, quantity)[end - 1])

@@ -47,7 +47,7 @@ MOTION = "motion"  # column that only the table of held-out motions has
 
 
 class Sweep(ConfigModel):
-    """Basis sizes r of reconstruction errors: all up to ``dense_to``, then every ``step``-th."""
+    """Basis sizes r for reconstruction errors: all up to ``dense_to``, then every ``step``-th."""
 
     dense_to: kit.Count = 10
     step: kit.Count = 10
@@ -117,8 +117,8 @@ def _runs(
 ) -> Iterator[dict[str, Any]]:
     """Run a motion at every basis size r, store the runs in ``file``, and yield their rows.
 
-    For a size above the rank there is no run: the row has no results, the stored group is marked.
-    Positions are stored only for the training motion (in the root group of the file), because
+    A size above the rank is not run: its row has no results, and its HDF5 group is ``marked`` as
+    true. Positions are stored only for the training motion (in the root group of the file), because
     figures show no other motion.
     """
     labels, scene = sampling.labels, yardstick.scene
@@ -218,8 +218,8 @@ class Stability(ShortRuns):
 
     scenes : names of the scenes; those that are not in the study are ignored
     wrong : a finite run counts as wrong if its relative error exceeds this value
-    departure : a run has left the scene if its bounding box exceeds this multiple of the largest
-        one of the full-order run; the key in the configuration is ``left``
+    departure : a run counts as having left the scene if its bounding box exceeds this multiple of
+        the full-order run's largest one; the key in the configuration is ``left``
     """
 
     scenes: tuple[str, ...] = ()

@@ -1,8 +1,9 @@
-"""Drift between full-order runs that should be equal (docs/study.md), and forces of effects.
+"""Differences of full-order runs that should be equal (docs/study.md), and forces of effects.
 
-A run whose start is moved by 1e-10 of the mesh's size drifts away from the original run. No reduced
-model can be expected to be more accurate than this drift. For comparison, other runs have another
-linear solver (another order of summation), number of iterations or time step, or lack an effect.
+A run whose start is moved by 1e-10 of the mesh's size differs more and more from the original run.
+No reduced model can be expected to be more accurate than that. For comparison, other runs have
+another linear solver (another order of summation), number of iterations or time step, or lack an
+effect.
 """
 
 from collections.abc import Iterator
@@ -68,7 +69,7 @@ class Sensitivity(PerturbedRuns):
 def sensitivity(
     mesh: File, config: SceneConfig, chosen: PerturbedRuns, out: File, effects: File
 ) -> None:
-    """Run a scene and its held-out motions with perturbations; write the drifts to ``out``.
+    """Run a scene and its held-out motions from perturbed starts; write differences to ``out``.
 
     Forces and energies of the effects in the scene are written to ``effects``.
     """
@@ -96,7 +97,7 @@ class _Watched:
 
 
 def contributions(scene: Scene) -> pd.DataFrame:
-    """Norm of the force (N) and energy (J) of each effect, by frame of a run of ``scene``.
+    """Table: norm of the force (N) and energy (J) of each effect in each frame of ``scene``.
 
     Effects with the same name count as one. Forces are taken at the end of a frame, on free
     vertices: S^T W (p - S q) for a constraint group, M a for a force, M d / h^2 for a contact that
@@ -194,10 +195,10 @@ def perturbed(
 def sensitivities(
     scene: Scene, perturbations: tuple[float, ...], seeds: tuple[int, ...]
 ) -> pd.DataFrame:
-    """Drift by frame of perturbed runs of ``scene``, and of runs with another change.
+    """Table of differences, by frame, of perturbed and of changed runs from the run of ``scene``.
 
-    The other changes are another solver, four times the iterations, half the time step, and the
-    scene without all effects of one name (unless it would have no constraint group left).
+    The changes are another solver, four times the iterations, half the time step, and the scene
+    without all effects of one name (unless it would have no constraint group left).
     """
     base, config = trajectory(scene), scene.config
     parts: list[pd.DataFrame] = []

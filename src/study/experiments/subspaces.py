@@ -72,7 +72,7 @@ class SubspaceModels(ConfigModel):
     """Settings of models in position subspaces.
 
     bases, sizes : kinds of basis, and numbers of modes k
-    tolerances, norm : tolerances to which elements are sampled, and norm of the errors
+    tolerances, norm : tolerances to which elements are sampled, and norm of their residuals
     hrpd : settings of models with interpolated projections; None for no such models
     """
 
@@ -407,7 +407,7 @@ def _joint(
 
 
 def _models(scene: Scene, chosen: list[Labelled]) -> dict[str, Any]:
-    """Contents of the file for the web page: all bases, and models with an index of a basis."""
+    """Contents of the file for the web page: all bases, and models, each with its basis's index."""
     by_basis: dict[int, list[subspace.SubspaceModel]] = {}
     for _, model in chosen:
         by_basis.setdefault(id(model.columns), []).append(model)

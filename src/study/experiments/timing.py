@@ -1,6 +1,6 @@
 """Times of full-order and reduced runs, of single local steps, and of effects.
 
-`timing` measures on the own mesh of a scene, `scaling` times iterations on meshes of other sizes.
+`timing` measures on a scene's own mesh, `scaling` times iterations on meshes of other sizes.
 """
 
 import logging
@@ -88,7 +88,7 @@ class InterpretedLocalStep:
         return energy
 
 
-# Implementations of local steps that are timed in addition to the compiled one, by name.
+# Name -> implementation of a local step that is timed in addition to the compiled one.
 IMPLEMENTATIONS: dict[str, Callable[[ConstraintGroup], Any]] = {
     "numpy": NumpyLocalStep,
     "interpreted": InterpretedLocalStep,

@@ -24,7 +24,7 @@ OWN = {"color": style.GREY, "linewidth": 1.2}
 BLIND = {"color": style.FAILED, "linewidth": 0.9, "linestyle": "-."}
 RATES = (60, 30)  # frame rates of real time, 1/s, drawn as lines
 LARGE, SMALL = 2.6, 1.6  # heights of the large and of the small panels, inches
-LINE, GAP = 0.145, 0.06  # height of a line of the legend, gap between rows of blocks, inches
+LINE, GAP = 0.145, 0.06  # height of a legend line, gap between rows of legend blocks, inches
 COLUMNS = 4  # number of legend blocks in a row
 # Families of reduced models and of full-order runs, each with its colour.
 FAMILIES = {
@@ -42,9 +42,9 @@ Block = tuple[str, list[Line2D]]
 
 
 def look_of(method: str, position_basis: str, drawn: Drawn) -> Look:
-    """Family of a model (None if its method is not drawn), and its legend entry in the family.
+    """Family of a model (see `FAMILIES`; None if the model is not drawn), and its legend entry.
 
-    All tolerances of a method have the same legend entry. Titles of methods are those in ``drawn``.
+    Models that differ only in a tolerance share an entry. ``drawn`` has the titles of methods.
     """
     if method == FEWER:
         return ITERATIONS, "K iterations"
@@ -57,7 +57,7 @@ def look_of(method: str, position_basis: str, drawn: Drawn) -> Look:
 
 
 def markers(looks: list[Look]) -> dict[Look, str]:
-    """Marker of each pair (family, legend entry), with different markers within a family."""
+    """Mapping of pairs (family, legend entry) to markers, which differ within a family."""
     found: dict[Look, str] = {}
     for look in dict.fromkeys(looks):
         before = sum(family == look[0] for family, _ in found)
@@ -92,7 +92,7 @@ class TradeOffs:
 def trade_offs(
     drawn: Drawn, table: pd.DataFrame, runs: pd.DataFrame
 ) -> tuple[TradeOffs, list[str]]:
-    """Return points (error, time) for scenes and methods in ``drawn``, and scenes with points.
+    """Return points (error, time) of what ``drawn`` selects, and a list of scenes with points.
 
     Raises NothingToDraw if no reduced model has both an error and a time.
 
@@ -114,7 +114,7 @@ def trade_offs(
 
 
 def _drawn(table: pd.DataFrame, drawn: Drawn) -> pd.DataFrame:
-    """Rows of ``table`` that are drawn; new columns have family and legend entry of the model."""
+    """Rows of ``table`` that are drawn, with new columns: family and legend entry of the model."""
     names = zip(table.method, table.position_basis, strict=True)
     looks = pd.DataFrame(
         [look_of(*name, drawn) for name in names], table.index, ["family", "member"], dtype=object
@@ -168,7 +168,7 @@ def _points(ax: Axes, rows: pd.DataFrame, size: float, colour: str, **look: Any)
 
 
 def label_iterations(ax: Axes, found: TradeOffs, scene: str) -> None:
-    """Label full-order runs of ``scene`` with fewer iterations than usual by their number K.
+    """Label full-order runs with fewer iterations than ``scene`` configures by their number K.
 
     The runs are in ``found`` and are drawn on ``ax``; neighbouring runs share a label.
     """
@@ -211,7 +211,7 @@ def accuracy_cost(
     group.
     """
     found, (first, *rest) = trade_offs(drawn, table, runs)
-    groups = {}  # text that names the reduced groups, by scene
+    groups = {}  # scene -> text that names its reduced groups
     for scene in (first, *rest):
         own = [each.group for each in drawn.of(scene)]
         groups[scene] = style.words(own[0]) if len(own) == 1 else "several groups"
@@ -248,7 +248,7 @@ def accuracy_cost(
 
 
 def _draw_rates(ax: Axes) -> None:
-    """Draw vertical lines at the frame rates `RATES`; an arrow names rates outside the axis."""
+    """Draw vertical lines at the frame rates `RATES`; an arrow points to rates beyond the axis."""
     high = ax.get_xlim()[1]
     beyond = [rate for rate in RATES if 1e3 / rate >= high]
     for rate in set(RATES) - set(beyond):
@@ -269,14 +269,14 @@ def _label(ax: Axes, x: float, text: str) -> None:
 LEAST, MOST = 1e-4, 1.0  # limits of the error axis; errors outside are drawn on the limits
 BESIDE = 4  # largest number of panels in a row
 TOLERANCES, TIMES, REACHED = (5e-3, 2e-1), (1e-2, 1e1), (1e-4, 1e0)
-# Kind of run with a requested tolerance -> (colour, factor that shifts its dots along the axis).
+# Kind of run with a requested tolerance -> (colour, factor on tolerances, to set its dots apart).
 KINDS = {
     "reduction": (style.BLUE, 0.85),
     "full order": (style.VERMILLION, 1.0),
     "refused": (style.GREY, 1.15),
 }
 BEST, DOT = ("full order, the best of all methods", style.BLACK), (0.55, 0.55, 0.55)
-# Label of a reduction -> (condition on the number of motions it is trained on, colour).
+# Legend label -> (condition on the number of training motions of a reduction, colour).
 TRAINED = {
     "reduction, one training motion": ("training_motions == 1", style.GREEN),
     "reduction, several training motions": ("training_motions > 1", style.BLUE),

@@ -29,15 +29,16 @@ CURVES = {
     "global_ms": ("global solve", ":"),
     "vertices_ms": ("positions of all vertices", "-."),
 }
-NAMES = {"fom": "full order", "ecsw": "POD subspace, ecsw"}  # methods whose exponent is printed
+# Method -> name that is printed with the exponent of its time as a power of the mesh size.
+NAMES = {"fom": "full order", "ecsw": "POD subspace, ecsw"}
 SCALED = {"fom": (style.BLACK, "o"), "ecsw": ("#1B6E6E", ">")}
-ROOM = 2.6  # the axis ends at this multiple of the largest mesh size: space for exponents
+ROOM = 2.6  # the axis ends at this multiple of the largest mesh size, to leave space for text
 FRAMES = ["effect", "frame", "force"]
 SHOWN = 3  # number of scenes whose forces are drawn
 LOW, HIGH = 1e-12, 1e2
 ROUNDOFF = 1e-14  # smallest drawn force relative to the largest force of the scene
 OTHERS = ("#8C6D31", "#5A5A5A", "#B03A6B", "#2B2B80", "#3E8E7E", "#A0522D", "#7F7F00")
-MARKERS = "*dph8H|"  # markers of effects that are no constraint groups; groups have own markers
+MARKERS = "*dph8H|"  # for effects that are no constraint groups; each group has a fixed marker
 UNLISTED = "forces, holds, contacts"
 COLOURS = {UNLISTED: style.VERMILLION, RIGHT: style.SKY, GLOBAL: "#3A5A78", REST: "#C9C4BA"}
 Looks = dict[str, tuple[str, str]]
@@ -220,7 +221,7 @@ def effects_contribution(
 
 
 def _looks(drawn: Drawn, rows: pd.DataFrame) -> Looks:
-    """Colour and marker of each effect in ``rows``; constraint groups have fixed ones."""
+    """Map each effect in ``rows`` to (colour, marker), which are fixed for constraint groups."""
     known, effects = drawn.looks, list(dict.fromkeys(rows.effect))
     others = [effect for effect in effects if effect not in known]
     groups = {effect: known[effect] for effect in effects if effect in known}
@@ -291,7 +292,7 @@ def effects_cost(options: Scenes, drawn: Drawn, table: pd.DataFrame) -> Figure:
 def _draw_scenes(
     ax: Axes, costs: pd.DataFrame, scenes: list[str], colours: dict[str, str]
 ) -> list[str]:
-    """Draw for each scene a bar with the share of each effect; return effects for the legend."""
+    """Draw for each scene a bar with the share of each effect; return the effects drawn."""
     costs = costs.assign(part=costs.effect.where(costs.effect.isin(list(colours)), UNLISTED))
     parts = [part for part in colours if (costs.part == part).any()]
     for y, scene in enumerate(scenes):

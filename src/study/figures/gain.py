@@ -21,7 +21,7 @@ from study.tables.kit.results import FAILED, judged_runs
 GAINS = (1.0, 1e5)  # limits of the gain axis; points outside are drawn on the limits
 ERRORS, LADDER_ERRORS = (1e-5, 1e2), (1e-4, 1e2)
 ENDS = ("low", "median", "high")
-DECADES = 4  # number of decades of the gain with a bar of their own; another has larger gains
+DECADES = 4  # number of decades of the gain with a bar each; one more bar has all larger gains
 _KEYS = ["scene", "group", "method", "r"]
 
 
@@ -66,7 +66,7 @@ def error_against_gain(options: kit.Methods, drawn: Drawn, **tables: pd.DataFram
 def _draw_method(
     ax: Axes, runs: pd.DataFrame, ranges: pd.DataFrame, colour: str, marker: str
 ) -> None:
-    """Draw a dot at gain and error of each run, and a cross for the ``ranges`` of repeated runs."""
+    """Draw a dot at (gain, error) of each run; crosses show ``ranges`` of both in repeated runs."""
     x, y = runs.gain.to_numpy(float), runs.error.to_numpy(float)
     multiples.rim_arrows(ax, x, y, colour=colour, across=GAINS, along=ERRORS)
     ax.plot(
@@ -176,7 +176,7 @@ Panel = tuple[Axes, Experiment, pd.DataFrame]
 
 
 class Reconstruction(Beside, kit.Methods):
-    """Options of a figure: scenes, methods, panels in a row, experiments of the published code."""
+    """Options of a figure: those of `Beside`, and reduction methods."""
 
 
 def _panels(
@@ -248,9 +248,9 @@ def singular_values(options: Beside, drawn: Drawn, table: pd.DataFrame, publishe
 
 
 def _draw_values(ax: Axes, rows: pd.DataFrame, colour: str, marker: str) -> None:
-    """Draw singular values; those of rounding errors have hollow markers in a shaded region.
+    """Draw singular values; those below round-off have hollow markers in a shaded region.
 
-    The region ends between the largest value of rounding errors and the smallest one above them.
+    The upper edge of the region lies between the largest of them and the smallest other value.
     """
     component = rows.component.to_numpy(float)
     above = rows.above_roundoff.astype(bool).to_numpy()
@@ -318,7 +318,7 @@ def reconstruction_error(
 
 
 def _draw_errors(ax: Axes, rows: pd.DataFrame, method: str) -> bool:
-    """Draw the errors of ``method``, arrows for those above the axis; return if there are any."""
+    """Draw errors of ``method``, arrows for those above the axis; return whether any is finite."""
     colour, marker = style.method_styles([method])[method]
     drawn = False
     for split, dashes in style.SPLITS.items():

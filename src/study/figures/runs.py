@@ -24,10 +24,10 @@ from study.tables.kit.results import trained
 
 NOISY = {"all": "all axes", "plane": "in the plane", "vertex": "one vertex across"}
 WRONG = 0.1  # a run has failed if its relative error exceeds this, or if it cannot start
-DISTANCES = (1e-4, 1.0)  # limits of the colour scale, over the longest side of the bounding box
+DISTANCES = (1e-4, 1.0)  # limits of coloured distances, over the longest side of the bounding box
 FOOTER = 0.55  # height of the colour scale, inches
-TOLERANCE = "ecsw-1e-02"  # method of the run in a position subspace in the figure `teaser`
-MODES = 20  # largest number of modes k of this subspace
+TOLERANCE = "ecsw-1e-02"  # method of the run in a position subspace that figure `teaser` shows
+MODES = 20  # largest allowed number of modes k of the position subspace in figure `teaser`
 Files = list[File]
 RUNS: dict[str, Read] = {
     "meshes": EachOf(MESH, "experiments"),
@@ -44,7 +44,7 @@ full-order run at the same instant; a framed picture is drawn to the smaller sca
 class Shown:
     """A scene at one frame, with what is needed to draw runs at this frame.
 
-    when : text on the frame
+    when : text with the number of the frame
     full : (1, N, 3) positions of the full-order run, m
     colour : RGB colour of the reduced runs
     bodies : meshes of obstacles that are drawn; None without obstacles
@@ -89,7 +89,7 @@ class Shown:
 
 @dataclass(frozen=True)
 class Runs:
-    """Inputs of figures of runs: one file of each kind per scene, of ``reruns`` also per method."""
+    """Inputs of figures of runs: files for each scene, in ``reruns`` for each scene and method."""
 
     options: ReducedRuns
     drawn: Drawn
@@ -105,7 +105,7 @@ class Runs:
 
     @cached_property
     def floors(self) -> Floors:
-        """Drift of perturbed runs of each scene, and frame from which on runs are not compared."""
+        """Sensitivity floor of each scene, and frame from which on its runs are not compared."""
         return Floors(self.sensitivity, self.horizon)
 
     def shown(self, experiment: Experiment) -> Shown:
@@ -124,7 +124,7 @@ class Runs:
         )
 
     def reduced(self, shown: Shown) -> dict[str, list[RunPanel]]:
-        """Return panels of the reduced runs, by method, for the basis sizes in the options."""
+        """Return method -> panels of its reduced runs, for the basis sizes in the options."""
         found = {}
         for method in self.drawn.methods:
             path = shown.experiment.path(self.reruns, method=method)
@@ -156,7 +156,7 @@ class Runs:
 
 
 def nothing_ran(panels: list[RunPanel]) -> bool:
-    """Return whether no run of ``panels`` could start, as all sizes exceed the numerical rank."""
+    """Return whether no run in ``panels`` could start: each basis size exceeds the rank."""
     return all(panel.positions is None and not panel.failure for panel in panels)
 
 
@@ -215,13 +215,13 @@ def bending_runs(
 
 
 def noise_rows(drawn: Drawn, shown: Shown, table: pd.DataFrame, path: str) -> list[Row]:
-    """Return a row for each method and kind of perturbed start.
+    """Return a row of pictures for each method and kind of perturbed start (keys of `NOISY`).
 
-    Pictures have the number of starts from which the run failed. If kinds have equal numbers at
-    every size, they share a row, which shows a run of the first kind.
+    Below a picture stands how many starts of the kind led to failed runs. Kinds with equal numbers
+    at every size share a row, which shows a run of the first of these kinds.
 
     table : rows of table ``noise`` for the experiment in ``shown``
-    path : file with the runs of the experiment on bases made of rounding errors
+    path : file with its runs, whose bases are computed from snapshots of mere rounding errors
     """
     shown, rows = replace(shown, bodies=None), []
     for method in drawn.methods:
@@ -239,7 +239,7 @@ def noise_rows(drawn: Drawn, shown: Shown, table: pd.DataFrame, path: str) -> li
 
 
 def _alike(table: pd.DataFrame) -> dict[tuple[tuple[int, str], ...], list[str]]:
-    """Group kinds of perturbed starts by the numbers of failed runs, as text for each size r."""
+    """Group kinds of perturbed starts that have the same text on failed runs at every size r."""
     table = table[table.r <= table["rank"]]
     failed = ~(table.relative_error <= WRONG)
     kinds: dict[tuple[tuple[int, str], ...], list[str]] = {}
@@ -301,7 +301,7 @@ def _over_time(
 ) -> list[RunPanel] | None:
     """Panels of a reduced run at ``frames``, coloured by the distance to the full-order run.
 
-    ``full`` has its positions. None is returned if no size in the options could run.
+    ``full`` : (F, N, 3) positions of the latter, m. None is returned if no size could run.
     """
     infos = choose_ranks(rerun_infos(path), options.ranks)
     info = next((i for i in infos if not i.marked), None)
@@ -368,7 +368,7 @@ def _teaser_row(
     for method, found in reduced.items() if ran else ():
         own = errors[(errors.group == experiment.group) & (errors.method == method)]
         drawn = [panel for panel in found if panel.positions is not None]
-        # if the options have no sizes, `found` has the largest sizes
+        # without sizes in the options, show one size only: the largest
         sizes = (drawn or found)[-(len(runs.options.ranks) or 1) :]
         own = own[own.position_basis == "full"]
         panels += [_with_error(panel, method, own, "r") for panel in sizes]
@@ -380,7 +380,7 @@ def _teaser_row(
 
 
 def _with_error(panel: RunPanel, method: str, rows: pd.DataFrame, size: str) -> RunPanel:
-    """Return ``panel`` with its method in the title and its error, over compared frames, below."""
+    """Return ``panel`` titled by method and ``size`` (r or k); below it, the error in ``rows``."""
     number = int(panel.title.split()[2])
     error = rows[rows[size] == number].relative_error_within_horizon.dropna()
     remark = f"error {error.iloc[0]:.2g}" if len(error) else panel.remark
@@ -388,10 +388,7 @@ def _with_error(panel: RunPanel, method: str, rows: pd.DataFrame, size: str) -> 
 
 
 def _subspace(frame: int, path: str) -> RunPanel | None:
-    """Return the panel of the run in the largest position subspace of at most `MODES` modes.
-
-    None is returned if there is no such subspace.
-    """
+    """Panel of the run in the largest position subspace of at most `MODES` modes, or None."""
     colour = style.surface_colour(style.GREEN)
     with open_hdf5(path) as file:
         models = file["models"]

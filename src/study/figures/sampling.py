@@ -30,7 +30,7 @@ NEWEST = {
     "markerfacecolor": "none", "markeredgecolor": style.SKY, "markeredgewidth": 1.6,
     "markersize": 8.5,
 }  # fmt: skip
-SEVERAL = "several"  # key of elements in which entries of several axes are sampled
+SEVERAL = "several"  # stands for x, y or z if entries of several axes of an element are sampled
 AXES = {**style.AXES, SEVERAL: "#333333"}
 ROW_HEIGHT = 1.85  # height of a row of panels, inches
 
@@ -145,7 +145,7 @@ def iterations(
         raise StorageError(f"{len(entries)} sampled entries do not fit a basis of {len(V)} rows")
     residual_of = _joint_residual if rows == "joint" else _shared_residual
     per_element = 3 * rows_per_element
-    length = {"scalar": 1, "joint": 3, "element": per_element}[rows]  # entries in one norm
+    length = {"scalar": 1, "joint": 3, "element": per_element}[rows]  # entries in each vector norm
     steps = []
     for k in range(min(count, len(entries) // per_step, V.shape[1])):
         residual = residual_of(V, entries[: k * per_step], k)
@@ -286,7 +286,7 @@ def _draw_evaluations(ax: Axes, samplings: dict[str, list[SamplingView]], per_el
 # (left edge, width, height) of the four drawn matrices, inches; their upper edges are aligned.
 BLOCKS = ((0.75, 1.6, 1.9), (2.8, 1.6, 1.9), (4.8, 0.85, 0.85), (6.0, 0.85, 0.85))
 SIGNS = ((2.575, "="), (4.6, "×"), (5.825, "×"))
-ABOVE, TITLE, FOOTER = 0.36, 0.34, 0.44  # heights, inches: two lines, a title, the colour scale
+ABOVE, TITLE, FOOTER = 0.36, 0.34, 0.44  # heights of two text lines, title, scale, inches
 LEFT, TALLEST = 0.75, 1.45  # left edge and largest height of pictures of the mesh, inches
 
 
@@ -354,7 +354,7 @@ def _height(window: Window, count: int) -> float:
 
 
 def _draw_product(figure: Figure, basis: Basis, centred: np.ndarray, title: str) -> None:
-    """Draw snapshots, modes, singular values and coefficients as matrices; x, y, z in turn."""
+    """Draw snapshots, modes, singular values, coefficients as matrices; rows are sorted by axis."""
     from matplotlib.colors import LogNorm
 
     rank, tiny = basis.rank, np.finfo(float).tiny
@@ -417,7 +417,7 @@ def _row(figure: Figure, count: int, bottom: float, height: float, label: str) -
 def _draw_column(
     ax: Axes, elements: shapes.ElementMap, points: np.ndarray, column: np.ndarray, camera: Camera
 ) -> str:
-    """Draw one entry of each element, divided by the largest; return the name of the entry."""
+    """Colour elements by one entry (see `signed_entry`) over its largest value; return its name."""
     values, words = shapes.signed_entry(column, len(column) // (3 * len(elements.cells)))
     largest = max(float(np.abs(values).max()), np.finfo(float).tiny)
     elements.draw(ax, points, values / largest, camera, shapes.signed())

@@ -1,4 +1,4 @@
-"""Figure of the drift of perturbed full-order runs, which limits the frames that are compared."""
+"""Figure of how far perturbed full-order runs drift apart, which limits the compared frames."""
 
 from collections.abc import Sequence
 
@@ -15,7 +15,7 @@ from study.experiments.kit.base import Horizon, floor_of, horizon
 from study.figures.kit.declaration import Columns, Drawn, NothingToDraw, Scenes, figure
 from study.tables.kit.results import TWIN
 
-# Inputs of figures that use sensitivity floors, the drift of runs with perturbed starts.
+# Inputs of figures that use sensitivity floors (see the class `Floors`).
 FLOORS: dict[str, Read] = {
     "sensitivity": EachOf(SENSITIVITY, "experiments"),
     "horizon": Setting("horizon"),
@@ -26,10 +26,10 @@ COLUMNS = ["scene", "perturbation", "frame", "relative_difference"]
 class Floors:
     """Sensitivity floor and horizon of each scene.
 
-    The floor is the drift of runs with perturbed starts, by frame. The horizon is the first frame
-    at which the floor exceeds a limit; from there on runs cannot be compared. The attribute ``of``
-    maps a scene to its floor: the largest relative difference over all seeds by frame (F,), empty
-    if the scene has no perturbed runs. Raises StorageError if a file is damaged or lacks a column.
+    The floor is the relative difference between full-order runs with perturbed and unperturbed
+    starts, in each frame. The horizon is the first frame in which the floor exceeds a limit; from
+    there on runs cannot be compared. The attribute ``of`` maps a scene to its floor (F,), the
+    maximum over all seeds, empty without perturbed runs. StorageError for a damaged file.
 
     sensitivity : files with tables of the perturbed runs, one per scene
     """
@@ -40,7 +40,7 @@ class Floors:
         self.of = {s: floor_of(table, s, self.perturbation) for s, table in tables.items()}
 
     def horizon(self, scene: str) -> int | None:
-        """First frame at which the drift in ``scene`` exceeds the threshold; None if none does."""
+        """First frame in which the floor of ``scene`` exceeds the threshold; None if none does."""
         end = horizon(self.of[scene], self.threshold)
         return end if end < len(self.of[scene]) else None
 

@@ -13,13 +13,13 @@ from study.figures.kit.declaration import Drawn, Methods, NothingToDraw, Ranks, 
 CELLS = 48  # largest width of a row of blocks, in cells; further blocks go to another row
 ROW = 0.145  # height of a row of cells, inches
 GAP = 0.45  # distance between blocks, in cells
-LEAST = 2.0  # smallest width of the title of a block, in cells
-DENSE = 30  # with more columns than this, labels are vertical and titles have two lines
+LEAST = 2.0  # smallest width of a block, in cells, so that its title fits
+DENSE = 30  # if a row of blocks has more columns, labels are vertical and titles have two lines
 
 
 @dataclass(frozen=True)
 class Look:
-    """Drawing of an outcome: cell colour, symbol in the cell, colour of the symbol, legend text.
+    """Look of an outcome: cell colour, symbol in the cell, colour of the symbol, legend text.
 
     Outcomes can be distinguished without colour: cells differ in lightness, and cells of failed
     runs have a symbol. The symbol of a blow-up is the number of the frame in which it happened.
@@ -182,7 +182,7 @@ def _cells(rows: pd.DataFrame) -> Cells:
 
 
 def _wrapped(rows: dict[tuple[str, str], str], blocks: list[Block], xlabel: str) -> list[Strip]:
-    """Distribute ``blocks`` over strips with common ``rows``, at most `CELLS` cells wide."""
+    """Distribute ``blocks`` over strips of at most `CELLS` cells; all strips have these rows."""
     parts: list[list[Block]] = []
     used = 0
     for block in blocks if rows else ():

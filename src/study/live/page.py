@@ -18,7 +18,7 @@ HEAD = re.compile(r'pdromLive\(\{"format":1,"scene":("\w+"),"title":("(?:[^"\\]|
 
 
 def _write(models: list[File], html: Path, outputs: Mapping[str, str], **parts: Path) -> None:
-    """Write the page from the template ``html`` and ``parts`` (styles, scripts), with a scene list.
+    """Write the page from a template ``html``, ``parts`` (styles, scripts) and a list of scenes.
 
     Raises StorageError if a file of models is damaged or has another format.
     """

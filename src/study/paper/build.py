@@ -33,11 +33,11 @@ PAGES = {"main": 16, "supplement": 30}  # largest allowed number of pages of eac
 class Facts(BaseModel):
     """Facts that the manuscript states and that are not results of experiments.
 
-    captions : titles and captions of the figures, as TeX, by name
+    captions : name of a figure -> its title and caption as TeX
     part : name of the configuration, None for the full study (by default config/default.yaml)
     full_study : name of the configuration of the full study
-    pages : largest allowed number of pages, by document
-    tables : rows of tables about the configuration (scenes, methods, study), by table
+    pages : name of a document -> largest allowed number of pages
+    tables : name of a table about the configuration ("scenes", "methods", "study") -> its rows
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -62,8 +62,8 @@ def write_inputs(
     Inputs are the TeX files ``source``, BibTeX ``references``, CSV ``tables``, the record of the
     ``machine``, and ``facts``. ``outputs`` maps names of the files to paths.
 
-    The file `NUMBERS` has the table cells from which each number is computed (by ``\val`` key), the
-    tables from which each TeX table is made, and the decisions on the sentences of each document.
+    The file `NUMBERS` has, for each ``\val`` key, the table cells from which the number is
+    computed, the tables from which each TeX table is made, and which sentences are shown.
     """
     texts = documents(source[0].parent)
     whole = "".join(texts.values())
@@ -86,9 +86,9 @@ def write_inputs(
 
 
 def fact_tables(machine: Path, facts: Facts) -> dict[str, pd.DataFrame]:
-    """Return the tables of ``facts``, and the record in the file ``machine`` as a table.
+    """Return the tables of ``facts``, and a table of the properties in the file ``machine``.
 
-    This table has one row; versions of libraries are in columns ``version_NAME``.
+    The latter has one row; versions of libraries are in columns ``version_NAME``.
     """
     tables = {name: pd.DataFrame(rows) for name, rows in facts.tables.items()}
     try:
@@ -112,7 +112,7 @@ def build(
     facts: Facts,
     outputs: Mapping[str, str],
 ) -> None:
-    """Build the PDFs of the paper and of its supplement, which must lie in one folder.
+    """Build the PDFs of the paper and of its supplement.
 
     ``source`` are the TeX files; they include ``figures``, and ``inputs`` made by `write_inputs`.
     """
@@ -128,7 +128,7 @@ _CITE = re.compile(r"\\cite\{([^}]*)\}")
 
 
 def bibliography(source: str, references: Path) -> str:
-    """Return the TeX bibliography of what ``source`` cites, in the order of the citations.
+    """Return a TeX bibliography of the works cited in ``source``, in the order of citation.
 
     Raises PaperError if a cited key is not in ``references`` or lacks a field, or the file is not
     BibTeX.

@@ -35,7 +35,7 @@ class Numbers(NamedTuple):
 
 
 def figure_numbers(root: Path) -> dict[str, Numbers]:
-    """Return the numbers of every figure, by name, from the manuscript's source below ``root``.
+    """Return name of a figure -> its numbers, from the manuscript's source below ``root``.
 
     Raises PaperError if a file of the source is missing.
     """
@@ -58,13 +58,13 @@ The keys given here choose in `config/figures.yaml` what it shows.
 
 
 def figures_page(root: Path = Path()) -> str:
-    """Markdown page about all figures, with their numbers in the manuscript below ``root``."""
+    """Markdown page about all figures, with their numbers; the manuscript is below ``root``."""
     parts = [HEAD]
     numbers = figure_numbers(root)
     for name, figure in declarations().items():
         keys = ", ".join(f"`{key}`" for key in figure.options.model_fields)
         read = filter(None, map(_words, figure.reads.values()))
-        caption = re.sub(r"\. (?=[A-Z`])", ".\n", _text(figure.caption))  # one line per sentence
+        caption = re.sub(r"\. (?=[A-Z`])", ".\n", _text(figure.caption))  # each sentence in a line
         parts.append(
             f"## {numbers[name].label(f'`{name}`')}\n\n**{_text(figure.title)}.**\n{caption}\n\n"
             f"Keys: {keys}.\nReads: {', '.join(dict.fromkeys(read))}.\n"
@@ -81,7 +81,7 @@ def _text(marked: str) -> str:
 
 
 def _words(read: Read) -> str | None:
-    """Return a text for a table or files that a figure reads, None for a setting."""
+    """Return a text that names the table or files which a figure reads, None for a setting."""
     match read:
         case TableOf():
             return f"table `{read.name}`"

@@ -61,7 +61,7 @@ def macros(source: str, tables: Mapping[str, pd.DataFrame]) -> str:
 
 
 def _defined(lines: Sequence[str], kind: str, texts: Mapping[str, str]) -> str:
-    """Return TeX: ``lines``, then a macro ``kind@NAME`` for each of ``texts``, by name."""
+    """Return TeX: ``lines``, then macros ``kind@NAME`` with ``texts`` (NAME -> expansion)."""
     made = [rf"\expandafter\def\csname {kind}@{k}\endcsname{{{text}}}" for k, text in texts.items()]
     return "\n".join([*lines, *made, r"\makeatother"]) + "\n"
 
@@ -100,15 +100,16 @@ def number_of(key: str, tables: Mapping[str, pd.DataFrame]) -> Number:
         value = AGGREGATES[aggregate](cells) if aggregate else cells.iloc[0]
         text = str(value) if counts else format_number(value)
         value = value if isinstance(value, str) else float(value)
-        value = value if isinstance(value, str) or np.isfinite(value) else str(value)  # for JSON
+        # JSON has no infinite numbers: store them as text
+        value = value if isinstance(value, str) or np.isfinite(value) else str(value)
     held = [int(row) for row in np.flatnonzero(tables[table].index.isin(cells.index))]
     return Number(text, value, table, held, column, aggregate)
 
 
 def is_held(key: str, tables: Mapping[str, pd.DataFrame]) -> bool:
-    """Return whether ``tables`` have a row that ``key`` selects; its cell may be empty.
+    """Return whether ``tables`` have a row that ``key`` selects; the cell there may be empty.
 
-    A count may be 0: for a count, only filters on the columns `_LABELS` must select a row.
+    A count may be 0. If ``key`` is a count, only its filters on columns `_LABELS` must be met.
     """
     table, filters, _, aggregate = _parse(key, tables)
     if aggregate in _COUNTS:
@@ -184,7 +185,7 @@ SHOWN, NOTED, DROPPED = "shown", "noted", "dropped"
 
 
 class Sentence(NamedTuple):
-    """Block ``known`` or ``row``: its text, number of its paragraph, positions in the source."""
+    """Block ``known`` or ``row``: text, number of its paragraph, positions of its two ends."""
 
     text: str
     paragraph: int

@@ -1,4 +1,4 @@
-r"""TeX source of the manuscript; folder `OWN` has a short variant for studies of own scenes."""
+r"""TeX source of the manuscript; folder `OWN` has a short variant for a user's own scenes."""
 
 import re
 from pathlib import Path
@@ -28,7 +28,7 @@ def whole_source(document: Path) -> str:
 
 
 def documents(folder: Path) -> dict[str, str]:
-    """Source text of each document of the manuscript in ``folder``, by name, with its sections."""
+    """Map each document of the manuscript in ``folder`` to its source text with all sections."""
     return {name: whole_source(folder / f"{name}.tex") for name in DOCUMENTS}
 
 

@@ -24,7 +24,7 @@ FULL = "full"  # position basis of runs whose positions are not reduced
 
 
 def tabular(header: Sequence[str], rows: Sequence[Sequence[str]], columns: str) -> str:
-    """TeX tabular with ``header`` between rules, and ``rows``; cells and ``columns`` are TeX."""
+    """TeX tabular: ``header`` between rules, then ``rows``; ``columns`` has the column types."""
     lines = [rf"\begin{{tabular}}{{{columns}}}", *_head(header), *map(_line, rows)]
     return "\n".join([*lines, r"\hline", r"\end{tabular}"]) + "\n"
 
@@ -70,7 +70,7 @@ def _rows(table: pd.DataFrame, **wanted: object) -> pd.DataFrame:
 
 
 def _cell(rows: pd.DataFrame, text: Callable[[pd.Series], str]) -> str:
-    """Return ``text`` of the first row, or a dash if ``rows`` is empty."""
+    """Return what the function ``text`` makes of the first row; a dash if ``rows`` is empty."""
     return text(rows.iloc[0]) if len(rows) else NONE
 
 
@@ -82,7 +82,7 @@ _SIGNS = {">=": r"$\ge$", "<=": r"$\le$"}
 
 
 def claims(claims_tests: pd.DataFrame, claims: pd.DataFrame) -> Rows:
-    """Both verdicts on each claim, with the number of rows that satisfy each deciding test."""
+    """Both verdicts on each claim, and how many rows satisfy each of its deciding tests."""
     tests = claims_tests[claims_tests.decides.astype(bool)]
     columns = rf"l{LEFT}p{{4.7cm}}{LEFT}p{{3.2cm}}{LEFT}p{{4.1cm}}l"
     yield columns, ["claim", "the preprint says", "as published", "beyond", "shown in"]
@@ -174,7 +174,7 @@ _METHODS = ("deim-joint", "block-deim", "gappy")
 
 
 def break_even(breakeven: pd.DataFrame) -> Rows:
-    """Smallest size r from which a reduced local step takes longer than the full one, by scene."""
+    """Size r from which on a reduced local step takes longer than the full one, in each scene."""
 
     def text(part: pd.DataFrame) -> str:
         crossed = part.breakeven_r.dropna()
@@ -195,7 +195,7 @@ def speedups(speedups: pd.DataFrame) -> Rows:
     ]  # fmt: skip
     for row in speedups.itertuples():
         size = f"r = {int(row.r)}" if row.position_basis == FULL else f"k = {int(row.k)}"
-        frames = row.frames_to_break_even  # rounded to two significant digits below
+        frames = row.frames_to_break_even  # the table shows two significant digits of it
         yield [
             _name(row.scene),
             _name(f"{row.method}, {size}"),
@@ -208,7 +208,7 @@ def speedups(speedups: pd.DataFrame) -> Rows:
 
 
 def payoff(payoff: pd.DataFrame) -> Rows:
-    """Numbers of scenes in which a reduction is accurate, is faster or slower than full order."""
+    """In how many scenes a reduction is accurate, and is faster or slower than full order."""
     yield "lrrrrrrrrrrrr", [
         "reduction", "runs in", "accurate in", "pays in", "loses in", "least", "median", "most",
         "training", "held out (of)", "playback", "accurate", "pays",
@@ -245,10 +245,10 @@ def pays(winners: pd.DataFrame) -> Rows:
 
 
 def training(alternatives: pd.DataFrame) -> Rows:
-    """Errors of the accelerated reduction by its number of training motions.
+    """Errors of the reduction with Anderson acceleration, by the number of its training motions.
 
-    For the smallest and the largest number, the table also has the error of the nearest motion in
-    the subspace, and the time of the training.
+    For the smallest and largest number, the table also has the error of the motion in the subspace
+    that is nearest to the true one, and the time of the training.
     """
     reduced = alternatives[alternatives.method == ACCELERATED]
     reduced = reduced[reduced.iterations == reduced.iterations.max()]
@@ -268,7 +268,7 @@ def training(alternatives: pd.DataFrame) -> Rows:
 
 
 def scenes(reduced_reruns: pd.DataFrame, scenes: pd.DataFrame) -> Rows:
-    """Scenes with constraint groups, sizes, and the frame at which comparison of runs ends."""
+    """Scenes: constraint groups, sizes, and the frame from which on runs are not compared."""
     horizon = trained(reduced_reruns).groupby("scene").horizon_frame.first()
     header = ["scene", "groups (weight)", "vertices", "elements", "frames", "horizon"]
     yield rf"l{LEFT}p{{5.2cm}}rrrr", header
@@ -379,6 +379,6 @@ def tex_rows(name: str, tables: Mapping[str, pd.DataFrame]) -> Rows:
 
 
 def tex_table(name: str, tables: Mapping[str, pd.DataFrame]) -> str:
-    """TeX table ``name``, made from the study's ``tables`` by name."""
+    """Return the TeX table ``name``; ``tables`` maps names to the study's tables."""
     (columns, header), *rows = tex_rows(name, tables)
     return (longtable if name in LONG else tabular)(header, rows, columns)

@@ -22,7 +22,7 @@ LOOKS_ONLY = (
     "list_input_changes", "list_params_changes", "list_untracked", "summary", "detailed_summary",
     "archive", "generate_unit_tests",
 )  # fmt: skip
-# Options that change Snakemake's own output; with one of them, Snakemake's output is not replaced.
+# Options about Snakemake's output; if one is given, our short log lines do not replace this output.
 OWN_OUTPUT = ("logger", "quiet", "verbose", "printshellcmds", "debug_dag")
 YAML = (".yaml", ".yml", ".json")
 TEMPLATE_KEY = "__use_yte__"
@@ -53,7 +53,7 @@ class CommandLine:
 
         found = vars(get_argument_parser().parse_args(list(arguments)))
         if profiles := found["profile"]:
-            # a profile may set cores, jobs and executor if the command line does not
+            # cores, jobs and executor are those of a profile unless the command line sets them
             whole = get_argument_parser(profiles).parse_args(_before_targets(arguments))
             found |= {name: getattr(whole, name) for name in ("cores", "jobs", "executor")}
         looks = [name for name in LOOKS_ONLY if found[name]]
@@ -106,7 +106,7 @@ def _before_targets(arguments: Sequence[str]) -> list[str]:
 
 
 def check_files(paths: Iterable[str | Path]) -> None:
-    """Read all configuration files ``paths``; ConfigurationError if one is no mapping of keys."""
+    """Read the configuration files ``paths``; ConfigurationError if one is no mapping."""
     for path in map(Path, paths):
         content = read_yaml(path)
         if not isinstance(content, dict):
@@ -134,7 +134,7 @@ def remember(command: CommandLine) -> None:
 
 
 def recall() -> list[str]:
-    """Options that name the configuration of the last run; empty for the default one or no run."""
+    """Options that name the last run's configuration; [] if it was the default or none ran."""
     try:
         record = json.loads(RECORD.read_text(encoding="utf-8"))
     except (OSError, ValueError):

@@ -22,12 +22,12 @@ _CRASH = re.compile(
 _FRAME = re.compile(r'^ +File "(?P<file>.*)", line (?P<line>\d+) in (?P<function>.*)$', re.M)
 _IN_RULE = re.compile(r"^\w+ in rule (?P<rule>\w+)\b.*\n(?P<text>.*)", re.MULTILINE)
 _ENDING = re.compile(r"died with <Signals\.(?P<signal>\w+)|exit status (?P<status>\d+)")
-# Messages about the reason for a job's end: by SLURM in the job's log, by the SLURM executor.
+# Messages that say why a job ended: from SLURM in the job's log, from Snakemake's SLURM executor.
 _BY_SLURM = re.compile(
     r"\*\*\* JOB \S+ ON \S+ (?P<status>CANCELLED) AT \S+(?: DUE TO (?P<why>[A-Z ]+?))? \*\*\*"
 )
 _SLURM_STATUS = re.compile(r"SLURM status is: '(?P<status>\w+)'")
-# Message of Snakemake's log after the user has interrupted the run.
+# Part of Snakemake's log message after the user has interrupted the run.
 _INTERRUPTED = "Terminating processes on user request"
 _CAUSES = {
     "SIGKILL": "killed (SIGKILL): out of memory?",
@@ -58,10 +58,10 @@ class Failure:
         return _content(self.log) if path.is_file() and path.stat().st_mtime >= begun else ""
 
     def line(self, begun: float) -> str:
-        """Line with job, cause, and source line of a crash; the run started at ``begun`` (s)."""
+        """Line with job, cause and, after a crash, code line; the run began at ``begun`` (s)."""
         folder = next((p for p in Path(self.output).parents if p.is_dir()), Path())
         errors = _ERROR.findall(_content(self.log))
-        # if the job could not start, its log is of an older run and does not tell the cause
+        # the log of a job that could not start is left from an older run: do not use its errors
         if errors and cause(self.said, folder) not in _STATUSES.values():
             return f"pdrom: job {self.rule} failed: {errors[-1]}"
         return (
@@ -94,7 +94,7 @@ def cause(said: str, folder: Path) -> str:
 
 
 def crash(written: str, log: str) -> str:
-    """Text with the source line of a crash, from the log's text ``written``; empty without one."""
+    """Text with the code line of a crash in the text ``written`` of a log; empty if no crash."""
     found = list(_CRASH.finditer(written))
     if not found:
         return ""
@@ -114,7 +114,7 @@ class Failures(logging.Handler):
         self.batches: list[tuple[str, str]] = []
         self.other: list[str] = []
         self.stopped: str | None = None
-        # last error message by thread: Snakemake logs the cause first, then the name of the job
+        # thread -> its last error message: Snakemake logs a cause first, then the failed job
         self._said: dict[int | None, str] = {}
 
     def emit(self, record: logging.LogRecord) -> None:
@@ -128,7 +128,7 @@ class Failures(logging.Handler):
             files = (getattr(record, name, ()) for name in ("log", "output"))
             log, output = (next(iter(names), "") for names in files)
             failure = Failure(record.rule_name, log, output or "its result", said)
-            # Snakemake reports every job of a failed batch, also jobs that never started
+            # "indent" marks jobs of a failed batch, also unstarted ones: keep those with an error
             if not getattr(record, "indent", False) or _ERROR.search(failure.written(self._begun)):
                 self.jobs.append(failure)
         elif event == LogEvent.ERROR:

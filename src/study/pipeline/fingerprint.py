@@ -32,8 +32,8 @@ def fingerprint(*places: str) -> str:
     """SHA-256 over the given modules and over all modules of `PACKAGES` that they import.
 
     Imports inside functions are found, too. A registry is a mapping of names to strings
-    "module:attribute", which are imported on demand. Its entries are not followed: the caller
-    passes the entries it uses. Raises ConfigurationError if a module does not exist.
+    "module:attribute", which are imported on demand. Modules named there are left out, unless
+    ``places`` has their entries. Raises ConfigurationError if a module does not exist.
 
     places : names of modules, or "module:attribute" for an entry of a registry
     """
@@ -107,7 +107,7 @@ def digest_of_code(tree: ast.Module, module: str = "") -> str:
     for node in _statements(tree):
         if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef)):
             texts = [s for s in node.body if isinstance(getattr(s, "value", None), ast.Constant)]
-            texts = [s for s in texts if isinstance(s, ast.Expr)]  # these are docstrings
+            texts = [s for s in texts if isinstance(s, ast.Expr)]  # docstrings and other constants
             node.body = [s for s in node.body if s not in texts] or [ast.Pass()]
         elif isinstance(node, ast.Assign):
             match node.value:
@@ -120,7 +120,7 @@ def digest_of_code(tree: ast.Module, module: str = "") -> str:
 
 
 def digest(root: Path, *names: str) -> str:
-    """Checksum (16 hexadecimal digits) of the files ``names`` below ``root``, edited by hand.
+    """Checksum (16 hexadecimal digits) of the hand-edited files ``names`` below ``root``.
 
     It is a parameter of rules that read these files, so that jobs are repeated if the content of a
     file changes. Dates, which Snakemake compares, can be set back by a copy or a wrong clock.
@@ -139,7 +139,7 @@ def track_scripts(workflow: Any) -> None:
         if rule.script:
             text = (SCRIPTS / Path(rule.script).name).read_text(encoding="utf-8")
             rule.set_params(script=digest_of_code(ast.parse(text))[:16])
-    # Snakemake sets its triggers of reruns after this call: a property removes one of them later
+    # Snakemake sets its triggers of reruns later; this property then hides the one for scripts
     type(workflow).rerun_triggers = property(
         lambda self: frozenset(self.dag_settings.rerun_triggers) - {RerunTrigger.CODE}
     )

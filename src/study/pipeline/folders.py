@@ -25,7 +25,7 @@ class Folders:
 
     @property
     def documents(self) -> dict[str, str]:
-        """Paths of both PDFs (manuscript and supplement), by the path of their TeX source."""
+        """Name of a document ("main", "supplement") -> path of its PDF."""
         supplement = Path(self.manuscript).with_name("supplement.pdf").as_posix()
         return dict(zip(DOCUMENTS, (self.manuscript, supplement), strict=True))
 
@@ -34,10 +34,9 @@ def folders(configfiles: Iterable[str | Path], settings: Iterable[str]) -> Folde
     """Return the folders of a configuration.
 
     The default configuration has the folders ``results`` and ``paper``. Every other configuration
-    has ``results/studies/NAME``. NAME is its key ``study``, or without this key the stem of its
-    last file. If it consists only of settings from the command line, NAME is `OWN`. Raises
-    ConfigurationError if NAME contains other characters than letters, digits, _ and -, or is too
-    long.
+    has ``results/studies/NAME``. NAME is the value of its key ``study``; without this key, it is
+    the last file's name without suffix; without files, it is `OWN`. Raises ConfigurationError if
+    NAME is longer than 60 characters, or has others than letters, digits, _ and -.
 
     configfiles : files given by the option ``--configfile``, in order
     settings : ``key=value`` pairs given by the option ``--config``

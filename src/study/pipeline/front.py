@@ -39,7 +39,7 @@ def completed(arguments: Sequence[str]) -> list[str]:
     read as the value of an option, or a figure does not exist.
     """
     if arguments[:1] == ["figure"]:
-        from study.pipeline.targets import figure_arguments  # not at the top: it imports a lot
+        from study.pipeline.targets import figure_arguments  # slow, so not imported at the top
 
         arguments = figure_arguments(arguments[1:])
     command = CommandLine(arguments)
@@ -52,7 +52,7 @@ def completed(arguments: Sequence[str]) -> list[str]:
     lines = LINES if replaced and not command.own_output else ()
     own, made = folders(command.configfiles, command.settings), {}
     if command.targets:
-        from study.pipeline.targets import described, files  # not at the top: it imports a lot
+        from study.pipeline.targets import described, files  # slow, so not imported at the top
 
         made = {target: files(target, own) for target in command.targets}
         # print the files if a target is a name and not a path
@@ -63,7 +63,7 @@ def completed(arguments: Sequence[str]) -> list[str]:
 
 
 def _start(command: Sequence[str]) -> NoReturn:
-    """Replace this process by the program ``command[0]``, found on PATH; the rest are arguments."""
+    """Replace this process by program ``command[0]``, found on PATH, with the other arguments."""
     if not command:
         sys.exit(
             "pdrom: run: the name of a program is missing, as in: ./reproduce run pdrom --help"

@@ -27,10 +27,10 @@ _ENVIRONMENT = ("pdrom_version", "python_version", "library_versions")
 
 
 class Entry(ConfigModel):
-    """Entry of a result file in the manifest: size, digests, and origin of the file.
+    """Description of a result file in the manifest: its size, digests and origin.
 
     sha256 : None for an HDF5 file, or a file that was damaged before the manifest was written
-    environment : key in `Manifest.environments`
+    environment : key in `Manifest.environments`; its value has the versions that made the file
     """
 
     bytes: int
@@ -55,8 +55,8 @@ class Manifest(ConfigModel):
     """Entries of all result files.
 
     options : command-line options that name the configuration
-    environments : versions of the package, of Python and of libraries, by a short key
-    files : entries by path of the file, relative to the folder of the manifest
+    environments : short key -> versions of the package, of Python and of libraries
+    files : path of a file, relative to the folder of the manifest -> its entry
     """
 
     format: Literal[1] = 1
@@ -94,7 +94,7 @@ def read_manifest(results: str) -> Manifest:
 def study_files(plan: Plan) -> Iterator[str]:
     """Existing result files of a study, without logs, hidden files and files of other studies.
 
-    Files outside its plan are included if a target on the command line may have requested them.
+    A file outside the plan is included if it may have been requested on the command line.
     """
     yield from (path for path in plan.own_files if Path(path).is_file())
     for folder, below, names in os.walk(plan.results):

@@ -67,7 +67,7 @@ def check_live(study: Study) -> None:
             require_known(study.scene(name))
         except SceneError as error:
             raise ConfigurationError(f"live.scenes: {error}") from error
-        # lower bound of a file's size: vertices, masses and bases (of k + 4 columns) in base 64
+        # a file has at least vertices, masses, bases (k + 4 columns) in base 64: bound its size
         vertices = study.vertices[name]
         section = settings.subspace if name in study.scenes else settings.online
         sizes = [k for k in settings.live.sizes if k in section.sizes and "pod" in section.bases]
@@ -105,10 +105,10 @@ def check_texts(study: Study) -> None:
 class Job:
     """A job: an artifact (function that makes files), with all that its function gets.
 
-    labels : values of scene, group ... in the output paths, by name
-    inputs, outputs : paths of files, by name of the function's parameter
-    settings : JSON data, by name of the function's parameter
-    content : checksum of inputs that are edited by hand: a date does not tell if they changed
+    labels : scene, group ... in the output paths, such as {"scene": "bar_release"}
+    inputs, outputs : parameter of the function -> paths of files
+    settings : parameter of the function -> JSON data
+    content : checksum of hand-edited inputs, as a file's date does not tell if it changed
     code : fingerprint (hash) of the code that the job runs
     """
 
@@ -121,7 +121,7 @@ class Job:
     code: str
 
     def make(self, outputs: Mapping[str, str]) -> None:
-        """Run the job in this process and write its files to the paths ``outputs``, by name."""
+        """Run the job in this process; write its files to ``outputs`` (parameter -> path)."""
         make(
             self.artifact.address,
             settings=self.settings,
@@ -194,7 +194,7 @@ class Plan:
 
     @cached_property
     def fixed(self) -> dict[str, list[Job]]:
-        """Jobs without wildcards (tables, figures, pages, manuscript), by folder of their logs."""
+        """Folder of logs -> jobs without wildcards (tables, figures, pages, manuscript)."""
         return {
             "tables": [self.job(table) for table in self.tables.values()],
             "figures": [self.job(figure) for figure in declarations().values()],
@@ -231,7 +231,7 @@ class Plan:
         own = {name: labels[name] for name in artifact.labels}
         key = (artifact.rule, *own.values())
         if key not in self._jobs:
-            known = {**own, "figure": artifact.name}  # a figure's options are found by its name
+            known = {**own, "figure": artifact.name}  # selects the options of a figure
             settings = artifact.settings(self, known)
             inputs = {k: read.paths(self, known) for k, read in artifact.files.items()}
             edited = [k for k, read in artifact.files.items() if isinstance(read, EditedFiles)]
@@ -252,7 +252,7 @@ class Plan:
     def file(self, place: Place, labels: Labels) -> str:
         """Path of the file of the kind ``place`` for the scene, group ... in ``labels``.
 
-        If ``labels`` lack the mesh, it is that of the scene; a missing basis is that of the method.
+        If ``labels`` lack mesh or basis, the scene's mesh and the method's basis are taken.
         """
         found = dict(labels)
         if "mesh" in place.labels and "mesh" not in found:
@@ -277,7 +277,7 @@ class Plan:
         return TABLE.at(self.results, name=name)
 
     def value(self, key: str, labels: Labels) -> Any:
-        """Value of a dotted ``key``: from the configuration, or by a function of `DERIVED`."""
+        """Value of a dotted ``key``, from the configuration or from a function in `DERIVED`."""
         head, *parts = key.split(".")
         if head not in DERIVED:
             return self.study.value(key)
@@ -285,5 +285,5 @@ class Plan:
 
 
 def listed(paths: Paths) -> list[str]:
-    """Return ``paths``, which is one path or several, as a list."""
+    """Return a list of one or several ``paths``."""
     return [paths] if isinstance(paths, str) else list(paths)

@@ -8,12 +8,12 @@ from itertools import accumulate
 
 from snakemake_interface_logger_plugins.common import LogEvent
 
-# An estimate is shown when this number of jobs and this fraction of the expected work are done.
+# An estimate is shown after this number of jobs and this fraction of the expected total time.
 ENOUGH_JOBS, ENOUGH = 2, 0.05
 # Smallest remaining time of an unfinished job, as a fraction of its expected duration.
 REST = 0.1
-# Beginnings of Snakemake's texts on why it runs a job -> shorter texts. The reason `FOLLOWS` is a
-# consequence of other jobs, and is not shown if a job has another reason as well.
+# Beginning of a reason that Snakemake gives for running a job -> our shorter text. The reason
+# `FOLLOWS` is left out if a job has another reason as well.
 FOLLOWS = "Input files updated by another job"
 REASONS = {
     "Forced execution": "forced",
@@ -51,8 +51,8 @@ class Estimate:
     weighted by expected time: a few jobs that compile kernels first have little effect on it. The
     mean number of parallel jobs follows from the core time that jobs have used until now.
 
-    jobs : expected time of each job, by number of the job
-    begun, ended : times in s at which jobs have started and ended, by number of the job
+    jobs : number of a job -> its expected time
+    begun, ended : number of a job -> time in s at which it started or ended
     """
 
     jobs: Mapping[int, Expected] = field(default_factory=dict)
@@ -83,7 +83,7 @@ class Estimate:
 
 
 def rounded(seconds: float) -> str:
-    """Return a duration of ``seconds`` in words, rounded to the accuracy of the estimate."""
+    """Return ``seconds`` as a rounded duration in words, such as "about 2.5 min"."""
     minutes = seconds / 60
     if minutes < 1:
         return "less than a minute"
@@ -95,7 +95,7 @@ def rounded(seconds: float) -> str:
 class Preview(logging.Handler):
     """Log handler that reads Snakemake's messages in a dry run and counts the jobs.
 
-    seconds : function of the path of a job's log; returns the job's expected processor seconds
+    seconds : function that maps the path of a job's log to its expected processor seconds
     cores : number of cores of the run; a job that measures times needs all of them
     """
 
@@ -137,7 +137,7 @@ class Preview(logging.Handler):
 
 
 def shortened(reason: str) -> set[str]:
-    """Set of the short texts (see `REASONS`) for the reasons that Snakemake's ``reason`` names."""
+    """Set of our short texts (values of `REASONS`) for Snakemake's text ``reason``."""
     found = [text for text in REASONS if reason.startswith(text) or f"; {text}" in reason]
     own = [text for text in found if text != FOLLOWS] or found
     return {REASONS[text] for text in own}

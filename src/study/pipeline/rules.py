@@ -20,9 +20,9 @@ PARAMETERS = ("settings", "content", "code")
 def rules(plan: Plan, cores: int) -> Iterator[SimpleNamespace]:
     """Yield the rule of each artifact of ``plan``; jobs that measure times use all ``cores``.
 
-    The attributes are those of a Snakemake rule. Values that differ between its jobs are functions
-    of the wildcards. The attribute ``shown`` is for the HTML report: it maps names of outputs to
-    arguments of Snakemake's function ``report``.
+    A yielded object has the attributes of a Snakemake rule; values that differ between jobs are
+    functions of the wildcards. Its attribute ``shown``, for the HTML report, maps names of outputs
+    to arguments of Snakemake's function ``report``.
     """
     for experiment in plan.experiments.values():
         yield _experiment(plan, experiment, cores)
@@ -48,7 +48,7 @@ def _experiment(plan: Plan, experiment: Experiment, cores: int) -> SimpleNamespa
             name: f"{plan.results}/{place.pattern}" for name, place in experiment.writes.items()
         },
         log=f"{plan.results}/logs/{experiment.rule}{'/' if labels else ''}{labels}.log",
-        # on a cluster, the jobs of a scene form a batch, as scenes have only mesh jobs in common
+        # on a cluster, the jobs of a scene form a batch: different scenes share only mesh jobs
         group=None if experiment.alone or "scene" not in experiment.labels else "scene",
         threads=cores if experiment.alone else 1,
         # a job that measures times gets a whole node of a cluster
@@ -60,7 +60,7 @@ def _experiment(plan: Plan, experiment: Experiment, cores: int) -> SimpleNamespa
 
 
 def _fixed(plan: Plan, job: Job, folder: str, numbers: Mapping[str, Numbers]) -> SimpleNamespace:
-    """Rule of an artifact with only one ``job``; ``numbers`` are the figures' numbers by name."""
+    """Rule of an artifact with only one ``job``; ``numbers`` maps figures to their numbers."""
     artifact, paths = job.artifact, job.outputs
     params = {"artifact": artifact.address, **{name: getattr(job, name) for name in PARAMETERS}}
     shown: dict[str, dict[str, Any]] = {}
@@ -97,7 +97,7 @@ def _fixed(plan: Plan, job: Job, folder: str, numbers: Mapping[str, Numbers]) ->
 
 
 def _figure(figure: Declaration, numbers: Numbers) -> dict[str, Any]:
-    """Arguments of Snakemake's ``report`` for a figure; the first label sorts the figures."""
+    """Arguments of Snakemake's ``report`` for a figure; the report sorts by the first label."""
     own = {"paper": numbers.manuscript or UNNUMBERED}
     if numbers.preprint is None:
         category, labels = "Figures of this study", {"name": figure.name, **own}

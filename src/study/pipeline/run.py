@@ -30,7 +30,7 @@ RUN_TIMES = Path("config/reference/run_times.csv")
 
 
 def units_of(study: str, root: Path) -> Units:
-    """Speed of the machine that timed ``study`` ("full" or "tiny"), from the file `RUN_TIMES`."""
+    """Speed of the machine on which ``study`` ("full" or "tiny") took the times in `RUN_TIMES`."""
     row = read_table(root / RUN_TIMES, result=False).set_index("study").loc[study]
     return Units(**row[list(Units.model_fields)])
 
@@ -64,7 +64,7 @@ def tell_expectation(workflow: Any, plan: Plan) -> None:
     dag, seconds_of = workflow.dag, expected_seconds(plan)
     expected: dict[int, Expected] = {}
     after: dict[Any, float] = {}
-    # in reverse order, so that the times of the jobs that wait for a job are already known
+    # in reverse order, as the times of the jobs that depend on a job are needed for this job
     for job in reversed([job for level in dag.toposorted() for job in level]):
         if not dag.needrun(job) or not job.log:
             continue
@@ -80,7 +80,7 @@ def tell_expectation(workflow: Any, plan: Plan) -> None:
     )
 
 
-# Folders of the files whose dates Snakemake compares; dates in the future are replaced there.
+# Folders with files whose dates Snakemake compares; files dated in the future get new dates.
 DATED = ("results", "paper", "config", "workflow")
 # Name of the Snakemake executor that runs a batch of jobs on a node of a cluster.
 JOBSTEP = "slurm-jobstep"
@@ -107,7 +107,7 @@ class Run:
         logging.getLogger("snakemake.logging").addHandler(self.failures)
 
     def check(self, plan: Plan, rules: Iterable[Any], cores: int) -> None:
-        """Check that requested targets and the report can be made; let a dry run list its jobs.
+        """Check that requested targets and report can be made; make a dry run list the jobs.
 
         ``rules`` are Snakemake's rules of ``plan``; ``cores`` is the number of cores of the run.
         Raises ConfigurationError if a target or the report cannot be made.

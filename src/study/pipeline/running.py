@@ -31,12 +31,12 @@ LOCK = FOLDER / "run.lock"
 SNAKEMAKE_LOCKS = FOLDER / "locks"
 # Nanoseconds between successive dates that replace dates in the future.
 STEP_NS = 10_000
-# Seconds after SIGTERM at which jobs that still run are killed.
+# Jobs that still run this number of seconds after SIGTERM are killed.
 PATIENCE = 5.0
 
 
 class AtWorkError(PdromError):
-    """Another process runs the workflow in this folder, or the lock file cannot be used."""
+    """Raised if another process runs the workflow in this folder, or the lock file is unusable."""
 
 
 def hold() -> int:
@@ -94,7 +94,7 @@ def settle_dates(folders: Iterable[str | Path]) -> int:
 
 
 def end_at_sigterm() -> None:
-    """Let SIGTERM print one line and end this process (handler for the time before jobs run)."""
+    """Install a handler of SIGTERM that ends this process; it serves until jobs are started."""
 
     def end(number: int, frame: object) -> None:
         _say(b"pdrom: ended by SIGTERM\n")
@@ -104,7 +104,7 @@ def end_at_sigterm() -> None:
 
 
 def stop_at_sigterm(note: Callable[[], None]) -> None:
-    """Let SIGTERM call ``note``, end all jobs, and then end the run as Ctrl-C does."""
+    """Install a handler of SIGTERM: call ``note``, end all jobs, end the run as Ctrl-C does."""
 
     def stop(number: int, frame: object) -> None:
         _say(b"pdrom: SIGTERM: ending the jobs that run\n")
@@ -123,13 +123,13 @@ def _say(line: bytes) -> None:
 
 
 def _end_jobs() -> None:
-    """End the processes of all jobs, also of jobs that start meanwhile, until this one ends."""
+    """End the processes of all jobs, and of jobs that still start, until this process ends."""
     begin, own = time.monotonic(), psutil.Process()
     while True:
         late = time.monotonic() - begin > PATIENCE
         for process in own.children(recursive=True):
             with suppress(psutil.Error, ProcessLookupError):
-                # not the fork server, which has its own session: it ends jobs with dead clients
+                # spare the fork server, whose session differs: it ends jobs whose client is dead
                 if os.getsid(process.pid) == os.getsid(0):
                     process.send_signal(signal.SIGKILL if late else signal.SIGTERM)
         time.sleep(0.5)

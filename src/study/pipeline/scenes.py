@@ -29,10 +29,10 @@ class Coarsen(ConfigModel):
 
 
 class Replicate(ConfigModel):
-    """Changes that turn every scene into a new one, to test rules that were fixed before.
+    """Changes that turn every scene into a new one, on which the rules of claims are tested again.
 
-    frames_factor : factor on the frame numbers of handles, pins and schedules; below 1 the motion
-        is faster
+    frames_factor : factor on the frame numbers of handles, pins and schedules; a factor below 1
+        makes the motion faster
     kick : speed of random initial velocities, m/s, along the axes that the held-out motions use
     seed : seed of these velocities; it is also added to the seeds of the held-out motions
     """

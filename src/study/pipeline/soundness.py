@@ -13,10 +13,10 @@ from typing import Any
 
 from pdrom.core.environment import settle
 
-# Numbers of rows (from one element up to a constraint group) and columns (sizes of a basis).
+# Test matrices: numbers of rows (of an element up to a group) and of columns (sizes of a basis).
 ROWS = (1, 2, 3, 4, 6, 9, 12, 27, 48, 96, 100, 256, 300, 900, 1000, 2700)
 COLUMNS = (1, 2, 3, 4, 6, 8, 12, 16, 20, 25, 32, 50)
-# Tolerance relative to the largest entry; rounding errors of such small matrices are far below.
+# Allowed error relative to the largest entry; rounding errors of such products are far smaller.
 TOLERANCE = 1e-9
 
 
@@ -38,7 +38,7 @@ def calculations() -> Iterator[str]:
     names = [f"{library} {version(library)}" for library in ("numpy", "scipy")]
     for rows, columns in [(rows, columns) for rows in ROWS for columns in COLUMNS]:
         x = random.standard_normal((rows, columns))
-        # reference products, formed without a linear algebra library
+        # reference product for comparison; einsum calls no linear algebra library here
         gram = np.einsum("ij,ik->jk", x, x)
         where = f"with X of {rows} x {columns}"
         yield f"{names[0]}: X.T @ (2 * X) {where}"

@@ -99,7 +99,7 @@ class Study:
         """
         self.root, self.configuration = root, configuration
         self.settings = settings = validate(StudySettings, config, source)
-        self.titles: dict[str, str] = {}  # titles of scenes, for tables and figures
+        self.titles: dict[str, str] = {}  # name of a scene -> title, for tables and figures
         self.vertices: dict[str, int] = {}
         self._known: dict[str, SceneConfig] = {}
         # changes made to every scene read from config/scenes, in this order
@@ -116,7 +116,7 @@ class Study:
 
     @cached_property
     def figures(self) -> dict[str, Options]:
-        """Options of every figure, by its name, from config/figures.yaml."""
+        """Name of each figure -> its options, from config/figures.yaml."""
         known = {"methods": self.every_method, "scenes": scene_kit.scene_names(self.root)}
         return load_choices(self.root / "config" / "figures.yaml", known)
 
@@ -126,7 +126,7 @@ class Study:
 
     @cached_property
     def every_method(self) -> dict[str, MethodSpec]:
-        """Specifications of all methods of config/methods.yaml, by name."""
+        """Name of each method in config/methods.yaml -> its specification."""
         return load_methods(self.root / "config" / "methods.yaml")
 
     def scene(self, name: str) -> SceneConfig:
@@ -136,9 +136,9 @@ class Study:
         return self._known[name]
 
     def _physics(self, scene: Scene) -> SceneConfig:
-        """Return a scene's configuration, its title replaced by its name.
+        """Return a scene's configuration, with its name in place of its title.
 
-        Jobs then do not depend on titles, which tables and figures read from `titles`.
+        Jobs then do not depend on titles; tables and figures read them from `titles`.
         """
         config = scene.config
         self.titles[config.name], self.vertices[config.name] = config.title, scene.mesh.vertices
@@ -146,7 +146,7 @@ class Study:
         return self._known[config.name]
 
     def only(self, scene: str) -> "Study":
-        """Return a copy of the study whose only scene is ``scene``, in the study or not."""
+        """Return a copy of the study with only ``scene``, which need not be in this study."""
         single = copy(self)
         single.scenes = {scene: self.scene(scene)}
         return single
@@ -187,16 +187,16 @@ class Study:
 
     @property
     def meshes(self) -> dict[str, MeshConfig]:
-        """Mesh configurations of the study's scenes, by identifier."""
+        """Identifier of each mesh of the study's scenes -> configuration of the mesh."""
         return {scene.mesh.identifier: scene.mesh for scene in self.scenes.values()}
 
     def mesh(self, identifier: str) -> MeshConfig:
-        """Configuration of the mesh ``identifier``, of a scene in config/scenes or in the study."""
+        """Configuration of mesh ``identifier``, which a scene of config/scenes or the study has."""
         return self.meshes.get(identifier) or self.every_mesh[identifier]
 
     @cached_property
     def every_mesh(self) -> dict[str, MeshConfig]:
-        """Mesh configurations of all scenes in config/scenes and of the study, by identifier."""
+        """Identifier -> configuration, for meshes of scenes in config/scenes and in the study."""
         names = scene_kit.scene_names(self.root)
         meshes = [scene_kit.read_scene(self.root, name, *self._changes).mesh for name in names]
         return {mesh.identifier: mesh for mesh in meshes} | self.meshes
@@ -207,9 +207,9 @@ class Study:
         return BasisSpec(**{key: getattr(method, key) for key in BasisSpec.model_fields})
 
     def named_methods(self, names: Iterable[str], key: str) -> dict[str, MethodSpec]:
-        """Methods ``names`` of config/methods.yaml, by name.
+        """Map the given ``names`` to the methods of config/methods.yaml.
 
-        An unknown name raises a ConfigurationError, which says that it stands under ``key``.
+        Raises ConfigurationError for an unknown name; the message says that ``key`` lists it.
         """
         known = self.every_method
         for name in names:
@@ -219,7 +219,7 @@ class Study:
 
 
 def part_of(value: Any, parts: Iterable[str], key: str) -> Any:
-    """Attribute of ``value`` along the nested names ``parts``; ConfigurationError without one."""
+    """Attribute ``value.a.b`` for ``parts`` ("a", "b"); ConfigurationError if it is missing."""
     for part in parts:
         if not hasattr(value, part):
             known = choices(part, getattr(type(value), "model_fields", ()))
@@ -232,7 +232,7 @@ Labels = dict[str, str]
 
 
 def labels_of(study: Study, place: paths.Place) -> list[Labels]:
-    """Scene, group ... of every file of the kind ``place`` that the study makes, in order."""
+    """Labels (scene, group ...) of every file of the kind ``place`` that the study makes."""
     names = place.labels
     scenes = SCENES[place](study) if place in SCENES else study.scenes
     known: Iterable[Labels] = [{}]
@@ -270,7 +270,7 @@ def _with_subspaces(study: Study) -> list[str]:
     return _held(study, section.scenes or takes)
 
 
-# Kind of file -> names of the tables, figures or TeX inputs of which every study makes such a file.
+# Kind of file -> names of all tables, figures or TeX inputs; every study makes a file for each.
 NAMES: dict[paths.Place, Callable[[], Iterable[str]]] = {
     paths.TABLE: declared,
     paths.FIGURE: declarations,
@@ -281,7 +281,7 @@ NAMES: dict[paths.Place, Callable[[], Iterable[str]]] = {
 MODELS = (
     paths.SUBSPACES, paths.SUBSPACES_TRAIN, paths.SUBSPACES_HELDOUT, paths.SUBSPACES_SECONDS,
 )  # fmt: skip
-# Kind of file -> scenes that have it, possibly as a mapping to factors of each scene's mesh size.
+# Kind of file -> scenes for which it is made, or a mapping scene -> factors on its mesh size.
 SCENES: dict[paths.Place, Callable[[Study], Iterable[str]]] = {
     **dict.fromkeys(MODELS, _with_subspaces),
     paths.SCALING: lambda study: study.settings.scaling.scenes,
@@ -290,7 +290,7 @@ SCENES: dict[paths.Place, Callable[[Study], Iterable[str]]] = {
     paths.ALTERNATIVE_TIMES: lambda study: study.settings.alternatives.scenes,
     paths.ONLINE: lambda study: study.online,
     paths.ONLINE_MODELS: lambda study: study.online,
-    # of the configured scenes, those for which the study makes models in position subspaces
+    # configured scenes for which the study makes models in position subspaces
     paths.LIVE_MODEL: lambda study: [
         scene
         for scene in study.settings.live.scenes
@@ -304,7 +304,7 @@ SCENES: dict[paths.Place, Callable[[Study], Iterable[str]]] = {
         if scene in (study.settings.requested_tolerances.scenes or (*study.scenes, *study.online))
     ],
 }
-# Kind of file -> function of study, scene and group: whether the reduced group has such files.
+# Kind of file -> function that tells whether a study makes it for a scene and a reduced group.
 GROUPS: dict[paths.Place, Callable[[Study, str, str], bool]] = {
     paths.REPETITIONS: lambda study, scene, group: any(
         scene in cell.scenes for cell in study.settings.repetitions.cells

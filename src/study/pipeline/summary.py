@@ -29,7 +29,7 @@ from study.tables import declared
 from study.tables.claims.rules import load_claims
 from study.tables.kit.declaration import Table
 
-# A load average (over five minutes, for each core) above this value shows that other programs ran.
+# If the load average (over five minutes, for each core) exceeds this value, other programs ran.
 BUSY = 1.7
 LISTED = 8  # largest number of targets that the last lines of a run name
 TABLES_HEAD = """# Tables
@@ -61,7 +61,7 @@ def processor_seconds() -> float:
     for process in (own, *own.children(recursive=True)):
         try:
             times = process.cpu_times()
-        except psutil.Error:  # the process has ended meanwhile
+        except psutil.Error:  # the child has ended since the list was made
             continue
         total += times.user + times.system
         total += getattr(times, "children_user", 0.0) + getattr(times, "children_system", 0.0)
@@ -111,7 +111,7 @@ def configuration(command: CommandLine) -> str:
 
 
 def verdicts_in(results: str) -> dict[str, tuple[str, str]]:
-    """Both verdicts on each claim (as published, beyond), by claim; empty without a valid table."""
+    """Claim -> its verdicts (as published, beyond); empty if the table is missing or damaged."""
     path = paths.TABLE.at(results, name="claims")
     # a damaged file is only ignored here: the next job that reads it renames it
     if not Path(path).is_file() or check_file(path) is not Condition.INTACT:
@@ -156,10 +156,10 @@ def _source(read: Read) -> str:
 
 
 class Entry(NamedTuple):
-    """Line of the overview.
+    """Line of the overview: a result of the study.
 
     kind : claim, figure, table, section (TeX file whose text contains numbers) or manuscript
-    files : paths of the files it stands for, in the default configuration
+    files : paths of the files with the result, in the default configuration
     words : arguments of ``./reproduce`` that make these files
     """
 
@@ -179,7 +179,7 @@ def entries() -> Iterator[Entry]:
             "figure", name, (paths.FIGURE.at(paths.RESULTS, name=name),), ("figure", number)
         )
     tables = {name: paths.TABLE.at(paths.RESULTS, name=name) for name in declared()}
-    # if table and figure have equal names, use the table's path: the name would request both
+    # a name that a table and a figure share would request both: request this table by its path
     words = {name: path if name in declarations() else name for name, path in tables.items()}
     for name, path in tables.items():
         yield Entry("table", name, (path,), (words[name],))
@@ -217,9 +217,9 @@ def contents(command: CommandLine, dag: Any, folders: Folders) -> str:
 def costs(
     listed: Sequence[Entry], dag: Any, folders: Folders
 ) -> Iterator[tuple[int, float | None]]:
-    """Yield for each line of the overview the number of jobs it needs, and processor minutes.
+    """Yield for each of the lines ``listed`` the number of its jobs, and their processor minutes.
 
-    Jobs include all prerequisites. The minutes are None if one of the jobs was not measured.
+    Prerequisites count as well. The minutes are None if one of the jobs was not measured.
     ``dag`` is Snakemake's graph of jobs.
     """
     makers = {str(file): job for job in dag.jobs for file in job.output}

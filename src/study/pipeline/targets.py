@@ -69,7 +69,7 @@ def files(target: str, folders: Folders) -> list[str]:
 
 
 def own_file(path: str, folders: Folders) -> str:
-    """Translate a path in the default folders (results, paper) to ``folders``; keep others."""
+    """Path in ``folders`` that stands for a path in the default folders; else ``path`` itself."""
     for document, file in Folders().documents.items():
         if path == file:
             return folders.documents[document]
@@ -120,7 +120,7 @@ def _allowed(study: Study, label: str, before: Mapping[str, str]) -> Collection[
 
 
 def _unknown(plan: Plan, target: str, rules: Collection[str]) -> str:
-    """Second half of the message about an unknown target; ``rules`` are names to suggest."""
+    """Return why ``target`` is unknown, for a message; suggestions may be names of ``rules``."""
     scenes = {*scene_names(plan.study.root), *plan.study.scenes}
     if target in scenes:
         example = paths.FULL_ORDER.at(plan.results, scene=target, run="train")

@@ -9,8 +9,8 @@ its log's path below ``logs``: an experiment, or ``tables``, ``figures`` or ``pa
 ``./reproduce run python -m study.pipeline.tracked replication`` updates the file of the table
 `replication` from the table of claims of the study ``config/replication.yaml``.
 
-``./reproduce run python -m study.pipeline.tracked rows`` updates the tables of long runs from the
-study ``config/extended.yaml``; tables of other studies show their rows, too.
+``./reproduce run python -m study.pipeline.tracked rows`` updates recorded rows from the tables of
+the long study ``config/extended.yaml``; tables of other studies show these rows, too.
 """
 
 import sys
@@ -51,7 +51,7 @@ def kind_of(log: str, results: str) -> str:
 
 
 def measured_costs(results: str, coarse: str) -> pd.DataFrame:
-    """Return a table with a row per kind of job and the `COLUMNS`, from the logs of two studies.
+    """Return a table with columns `COLUMNS` and a row per kind of job, from logs of two studies.
 
     Parameters
     ----------
@@ -73,12 +73,12 @@ def measured_costs(results: str, coarse: str) -> pd.DataFrame:
 
 
 def recorded_verdicts(claims: Path, rules: Path) -> pd.DataFrame:
-    """Return verdicts and measured values of claims, fingerprints of the claims' rules, and date.
+    """Return a table: claim, its verdicts and measured values, date, fingerprint of its rules.
 
     Parameters
     ----------
-    claims : path of the table of claims of the other study
-    rules : path of the file of the claims' rules
+    claims : path of the table ``claims`` of the study with other scenes
+    rules : path of the file with the rules of the claims
 
     Raises
     ------
@@ -91,7 +91,7 @@ def recorded_verdicts(claims: Path, rules: Path) -> pd.DataFrame:
 
 
 def dated(path: Path, column: str) -> pd.DataFrame:
-    """Return the table in the file ``path`` with the day of its last change in a ``column``."""
+    """Return the table in the file ``path``; a new ``column`` has the day the file was changed."""
     day = datetime.fromtimestamp(path.stat().st_mtime, UTC).date().isoformat()
     return read_table(path).assign(**{column: day})
 
@@ -108,7 +108,7 @@ def _used(results: str) -> pd.DataFrame:
 
 
 def main(words: Sequence[str]) -> None:
-    """Update files for ``words``: "costs", "replication", "rows"; ConfigurationError for others."""
+    """Update the files for ``words`` (see the module); ConfigurationError for an unknown word."""
     for word in words or [""]:
         if word == "costs":
             made = {COSTS: measured_costs(folders([], []).results, folders([COARSE], []).results)}

@@ -32,12 +32,12 @@ from study.pipeline.folders import DEFAULT
 from study.pipeline.study import Study, labels_of
 from study.tables.kit.results import FAR
 
-# Basis that is shown if a table shows one basis for each group and a method of the study has it.
+# Basis that a table with one basis per group shows, if a method of the study uses this basis.
 USUAL_BASIS = "none-none-vectorised"
 
 
 def _stability(study: Study, labels: Labels) -> Stability:
-    """Settings of the stability experiment, only with sizes r for which the study has samples."""
+    """Settings of the stability experiment, without sizes r for which the study has no samples."""
     section = study.settings.stability
     held = tuple(r for r in section.ranks if r in study.settings.ranks)
     return section.model_copy(update={"ranks": held})
@@ -64,7 +64,7 @@ def _of_scene(study: Study, place: paths.Place, labels: Labels) -> tuple[OfScene
 
 
 def _joint_rows(study: Study, labels: Labels) -> tuple[JointRows, ...]:
-    """Reduced groups of a scene with the method `JOINT`; empty if the study lacks one of these."""
+    """Reduced groups of the job's scene, for method `JOINT`; empty if the study lacks either."""
     scene = labels["scene"]
     if JOINT not in study.methods or scene not in study.scenes:
         return ()
@@ -79,7 +79,7 @@ def _named(scenes: Mapping[str, SceneConfig]) -> list[NamedScene]:
 
 
 def _subspace_cases(study: Study, labels: Labels) -> tuple[SubspaceCase, ...]:
-    """Models in position subspaces whose frames are timed: the configured ones that exist."""
+    """Models in position subspaces whose frames are timed: those configured that also exist."""
     held = {labels["scene"] for labels in labels_of(study, paths.SUBSPACES)}
     models = study.settings.subspace
     return tuple(
@@ -90,7 +90,7 @@ def _subspace_cases(study: Study, labels: Labels) -> tuple[SubspaceCase, ...]:
 
 
 def _projection_cases(study: Study, labels: Labels) -> tuple[ProjectionCase, ...]:
-    """Reductions whose frames are timed: the configured ones for which the study has samples."""
+    """Reductions whose frames are timed: those configured for which the study has samples."""
     held = labels_of(study, paths.SAMPLING)
     return tuple(
         case
@@ -100,7 +100,7 @@ def _projection_cases(study: Study, labels: Labels) -> tuple[ProjectionCase, ...
 
 
 def scaled_methods(study: Study, labels: Labels) -> dict[str, MethodSpec]:
-    """Methods, by name, that are timed on meshes of increasing size.
+    """Name -> method, for methods that are timed on meshes of increasing size.
 
     They need not be among the methods of the study. ``labels`` are not used.
     """
@@ -126,15 +126,15 @@ class Run(Experiment):
 
     @property
     def labels(self) -> dict[str, str]:
-        """Scene, group and method, by name, which the paths of this run's files contain."""
+        """Mapping of "scene", "group", "method" ... to their values in the paths of files."""
         return {**super().labels, "method": self.method}
 
 
 def _options(study: Study, labels: Labels) -> Options:
     """Options of a figure without the scenes that are not in the study.
 
-    If none of the listed scenes (or methods) is in the study, the list becomes empty: all of the
-    study are shown.
+    If none of the listed scenes (or methods) is in the study, the list becomes empty: then the
+    figure shows all scenes (or methods) of the study.
     """
     chosen = study.figures[labels["figure"]]
     update: dict[str, tuple[str, ...]] = {}
@@ -166,7 +166,7 @@ def _experiments(study: Study, labels: Labels) -> tuple[Experiment, ...]:
 
 
 def _reductions(study: Study, labels: Labels) -> dict[str, Reduction]:
-    """Methods that the options of a figure select, by name, in the configured order."""
+    """Name -> method, for methods that the options of a figure select, in configured order."""
     named = _options(study, labels).names("methods") or tuple(study.methods)
     held = {name: study.methods[name] for name in named if name in study.methods}
     return {name: Reduction(title=spec.title, rows=spec.rows) for name, spec in held.items()}
@@ -183,7 +183,7 @@ def _runs(study: Study, labels: Labels) -> tuple[Run, ...]:
 
 
 def _facts(study: Study, labels: Labels) -> Facts:
-    """Contents of the manuscript that are no results: captions, settings, limits on pages."""
+    """Contents of the manuscript that are no results: captions, settings, page limits."""
     own = study.is_own
     said = [(name, each.words(study.value)) for name, each in declarations().items()]
     return Facts(

@@ -1,8 +1,8 @@
 """Tables of error against time: each method and size, requested tolerances, and where methods pay.
 
-The error of a row has one of two reference runs; only rows with the same one are comparable.
-For ``fom`` and ``fom-anderson`` it is a full-order run with converged frames (K -> infinity local/
-global iterations), for all other methods the scene's own full-order run with its finite number K.
+Errors are taken against one of two reference runs; only rows with the same one are comparable. For
+``fom`` and ``fom-anderson``, the reference is a full-order run with converged frames (K -> infinity
+local/global iterations), for all other methods the scene's own full-order run with its finite K.
 
 Among the other methods, ``full`` without a position subspace is the scene's own full-order run,
 with error zero by definition. ``fewer-iterations`` is the full-order run with fewer iterations,
@@ -60,7 +60,7 @@ def accuracy_cost(
     iterations: Mapping[str, int],
     **files: list[paths.File],
 ) -> pd.DataFrame:
-    """One row per full-order run, and per reduced run with a time and an error.
+    """One row for each full-order run, and for each reduced run with a time and an error.
 
     The column ``pareto`` compares rows of the same scene whose errors have the same reference.
 
@@ -89,7 +89,7 @@ def accuracy_cost(
 
 
 def _sweep(errors: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
-    """Full-order runs by number of iterations; with fewer than the scene's also as `FEWER`."""
+    """Full-order runs; one with fewer iterations than its scene has a second row, as `FEWER`."""
     full = times[times.method.isna() | times.method.isin([FOM, ANDERSON])]
     cost = full[["scene", "method", "iterations", "ms_per_frame"]]
     cost = cost.fillna({"method": FOM})
@@ -106,12 +106,12 @@ def _sweep(errors: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
 
 
 def reference_of(points: pd.DataFrame) -> pd.Series:
-    """Reference run of each error in ``points``: `CONVERGED` frames, or the scene's `OWN` run."""
+    """Reference of the error in each row: `CONVERGED`, or `OWN` for the scene's own run."""
     return points.method.isin([FOM, ANDERSON]).map({True: CONVERGED, False: OWN})
 
 
 def pareto(error: Sequence[float], cost: Sequence[float]) -> list[bool]:
-    """Whether each point is Pareto-optimal: no other is as good in both, and better in one."""
+    """Whether points are Pareto-optimal: no other is as good in both values and better in one."""
     return [
         not any((e <= a) & (c <= b) & ((e < a) | (c < b)) for e, c in zip(error, cost, strict=True))
         for a, b in zip(error, cost, strict=True)
@@ -152,7 +152,7 @@ def pareto(error: Sequence[float], cost: Sequence[float]) -> list[bool]:
     },
 )
 def requested_tolerances(runs: list[paths.File], record: list[Path]) -> pd.DataFrame:
-    """Rows of all scenes, one per run with a requested tolerance, from ``runs`` and ``record``."""
+    """One row per run with a requested tolerance, from ``runs`` and recorded rows (``record``)."""
     rows = results.joined(runs)
     if len(rows):
         met = rows.frames > 0
@@ -192,8 +192,8 @@ def breakeven(own: list[paths.File], sized: list[paths.File]) -> pd.DataFrame:
 
     Files ``own`` are for the configured mesh of each scene, ``sized`` for other mesh sizes.
 
-    ``breakeven_r`` does not depend on r. It is empty if the reduction is still faster at the
-    largest size (the numerical rank), and the smallest size tried if it is never faster.
+    ``breakeven_r`` is the same in all rows that differ only in r. It is empty if the reduction is
+    faster at the largest size (the numerical rank), and the smallest size if it is never faster.
     """
     rows = joined([*own, *(file for file in sized if file["factor"] != OWN_MESH)])
     if rows.empty:
@@ -211,7 +211,7 @@ def break_even(r: Sequence[int], ratio: Sequence[float]) -> int | None:
     """Smallest size from which on the reduced local step costs at least as much as the full one.
 
     The ratio is interpolated linearly between the last size with a ratio below one and the next.
-    Return None if the ratio is below one at the largest size, the smallest size if it never is.
+    Return None if the ratio is below one at the largest size; if it never is, the smallest size.
 
     Parameters
     ----------
@@ -276,7 +276,7 @@ def payoff(reruns: pd.DataFrame, points: pd.DataFrame, effects: pd.DataFrame) ->
         speed = fastest.speedup.to_numpy(float)
         best = own.sort_values(_ERROR, kind="stable").groupby(["scene", "group"]).head(1)
         seen = best[best.error_heldout.notna()]
-        # one run per scene and group, so that medians of all methods cover the same groups
+        # one run per scene and group, accurate or not: medians of all methods cover the same groups
         every = pd.concat([fastest, best[~(best[_ERROR] <= FAILED)]])
         rows.append({
             "position_basis": basis,
@@ -301,7 +301,7 @@ def payoff(reruns: pd.DataFrame, points: pd.DataFrame, effects: pd.DataFrame) ->
 
 
 def _fewer(points: pd.DataFrame) -> pd.DataFrame:
-    """Full-order runs with fewer iterations, with speed-ups over the scene's own full-order run."""
+    """Rows of ``points`` with fewer iterations; speed-ups are over the scene's full-order run."""
     full = points[(points.method == "full") & (points.position_basis == "full")]
     fewer = points[points.method == FEWER]
     speedup = fewer.scene.map(full.set_index("scene").ms_per_frame) / fewer.ms_per_frame

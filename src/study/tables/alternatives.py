@@ -1,6 +1,6 @@
 """Errors and times of projective dynamics, of alternative solvers and of reductions.
 
-Table winners has the fastest method for each allowed error, and meshes where it is a reduction.
+Table winners has the fastest method for each allowed error, and mesh sizes where reductions win.
 """
 
 from collections.abc import Sequence
@@ -21,17 +21,18 @@ SUBSTEPS = integer("substeps", "steps that a frame is divided into")
 ITERATIONS = integer("iterations", "iterations of each substep")
 
 MOTION = text("motion", f"held-out motion, one of: {', '.join(MOTIONS)}")
-# Columns that identify a candidate (a solver with its settings) in all motions.
+# Columns that identify a candidate (a solver with its settings); its rows differ in the motion.
 CANDIDATE = ["scene", "factor", "stiffness", *settings.SETTING]
 
-# Tolerance of errors between machines: rounding decides which iterates two-level methods reject.
+# Relative difference of errors that is allowed between machines: rounding errors decide which steps
+# the two-level methods reject.
 LOOSE = 0.3
 REFERENCES = ("implicit", "continuous")
 CASE = ["scene", "vertices", "stiffness", "motion"]
 SPEEDUP = ("reduced_speedup", "reduced_speedup_low", "reduced_speedup_high")
 CURVE = ["scene", "stiffness", "reference", "limit"]
 PLAIN = "projective"
-KNOWN = 3.0  # allowed errors below this multiple of the reference's own error are not evaluated
+KNOWN = 3.0  # error limits below this multiple of the reference run's own error have no rows
 
 
 @table(
@@ -74,8 +75,7 @@ def alternatives(
 ) -> pd.DataFrame:
     """One row per solver with its settings and held-out motion, in the order of files ``parts``.
 
-    ``times`` has the frame times measured in each process; the table gives their medians. Rows of
-    ``record`` follow.
+    Times are medians over the processes in ``times``. Recorded rows (``record``) follow.
     """
     rows = joined(parts)
     if len(rows):
@@ -89,14 +89,14 @@ def alternatives(
 
 
 def beside(rows: pd.DataFrame, times: pd.DataFrame) -> tuple[pd.DataFrame, list[int]]:
-    """Join ``rows`` with a column of times (ms) per process; also return these columns' names."""
+    """Add to ``rows`` a column of frame times (ms) per process; also return the new names."""
     wide = times.set_index([*CANDIDATE, "process"]).ms_per_frame.unstack("process")
     wide["vertices_ms"] = times.groupby(CANDIDATE, dropna=False).vertices_ms.median()
     own = rows.drop(columns="vertices_ms", errors="ignore")
     return own.merge(wide.reset_index(), on=CANDIDATE, how="left"), list(wide.columns[:-1])
 
 
-# The fastest method depends on measured times, so that all columns about it are marked as timed.
+# All columns about the fastest method are marked as timed: measured times decide which one it is.
 @table(
     title="Who reaches an error in the shortest time",
     columns=(
@@ -170,7 +170,7 @@ def winners(
 
 
 def _best(rows: pd.DataFrame, limit: float, processes: list[int]) -> dict[str, object]:
-    """Columns about the fastest, the second and the reduced method with an error within ``limit``.
+    """Columns about the two fastest full-order methods and the fastest reduction within ``limit``.
 
     A speed-up is the median over ``processes`` of ratios of two times within one process.
     """
@@ -205,8 +205,8 @@ def _best(rows: pd.DataFrame, limit: float, processes: list[int]) -> dict[str, o
 
 
 def _pays(curve: pd.DataFrame) -> dict[str, object]:
-    """Numbers of vertices from which a reduction is faster in all motions, and its speed-ups."""
-    # speed-ups are NaN where a method misses the error limit in one of the motions
+    """Numbers of vertices from which on a reduction is faster in all motions, and speed-ups."""
+    # if a method misses the error limit in one motion, the least speed-up of that mesh is NaN
     every = curve.assign(plain=curve.plain_ms / curve.reduced_ms)
     worst = every.groupby("vertices")[["plain", "reduced_speedup"]].agg(
         lambda speedups: speedups.min(skipna=False)
@@ -226,7 +226,7 @@ def _pays(curve: pd.DataFrame) -> dict[str, object]:
 
 
 def _pays_from(sizes: np.ndarray, speedups: np.ndarray) -> int | None:
-    """Smallest of ``sizes`` from which all ``speedups`` exceed one; None if there is none."""
+    """Smallest of ``sizes`` from which on all ``speedups`` exceed one; None if there is none."""
     losing = np.flatnonzero(~(speedups > 1.0))
     first = int(losing[-1]) + 1 if len(losing) else 0
     return int(sizes[first]) if first < len(sizes) else None

@@ -15,7 +15,7 @@ from study.tables.kit import results
 from study.tables.kit.declaration import flag, integer, interval, number, shared, table, text, timed
 
 KEYS = ["scene", "effect"]
-NOTHING = "nothing"  # value of column effect in the row of a scene with all its effects
+NOTHING = "nothing"  # value of column effect in a row of a scene from which nothing is left out
 PHASE, SEVERAL = "phase", "several"
 IMPLEMENTATIONS = ("interpreted", "numpy", "compiled")
 FEWEST = 3  # smallest number of meshes to which an exponent is fitted
@@ -65,9 +65,9 @@ def effects_cost(
 
     parts, left_out : times of effects, and of scenes without some effects; both are scaled so that
         scenes have the full-order times of table ``frame_times``
-    contributions : forces and energies by frame
-    sensitivity, horizon : drift of runs with perturbed starts, and limit of the drift up to which
-        frames are compared
+    contributions : forces and energies of effects in each frame
+    sensitivity, horizon : how far changed runs (perturbed start, an effect less) differ from the
+        full-order run, and the limit up to which frames are compared
     """
     costs, removed = results.joined(files["parts"]), results.joined(files["left_out"])
     if costs.empty:
@@ -102,20 +102,20 @@ def _absent(rows: pd.DataFrame, others: pd.DataFrame) -> np.ndarray:
 
 
 def _acting(frames: pd.DataFrame, sensitivity: pd.DataFrame, horizon: Horizon) -> pd.DataFrame:
-    """Force and energy of each effect in ``frames``, and drift of the run without the effect."""
+    """Force and energy of each effect in ``frames``; ``moved``: how far runs without it differ."""
     made = frames.groupby([*KEYS, "role"], sort=False, as_index=False).agg(
         force=("force", lambda force: float(np.sqrt(np.mean(np.square(force))))),
         energy=("energy", lambda of: float(of.max() - of.min() if len(of) > 1 else of.iloc[0])),
     )
     length = frames.groupby("scene").frame.max() + 1
-    # effects of the start have a row for the first frame only; divide by the number of all frames
+    # effects of the start have a row for frame 0 only: average their force over all frames, too
     starts = made.role == "start"
     made.loc[starts, "force"] /= np.sqrt(made.scene[starts].map(length).to_numpy(float))
     made["force_share"] = made.force / made.groupby("scene").force.transform("sum")
     ends = horizons(sensitivity, horizon.perturbation, horizon.threshold)
 
     def largest(scene: str, label: float | str) -> float | None:
-        """Largest drift of the run ``label`` over the compared frames; None if there are none."""
+        """Largest difference of run ``label`` in the compared frames; None without such frames."""
         drift = floor_of(sensitivity, scene, label)[: ends[scene]]
         return float(drift.max()) if len(drift) else None
 
@@ -138,7 +138,7 @@ def _acting(frames: pd.DataFrame, sensitivity: pd.DataFrame, horizon: Horizon) -
     reads={"timings": Every(paths.TIMINGS), "frame_times": TableOf("frame_times")},
 )
 def local_share(timings: list[File], frame_times: pd.DataFrame) -> pd.DataFrame:
-    """One row per scene and implementation, with ``timings`` scaled to the table ``frame_times``.
+    """One row per scene and implementation; ``timings`` are scaled to table ``frame_times``.
 
     Shares of the local step include the assembly of the right-hand side, because compiled kernels
     compute projections and right-hand side in one pass.
@@ -174,9 +174,9 @@ def local_share(timings: list[File], frame_times: pd.DataFrame) -> pd.DataFrame:
 def scaling(parts: list[File]) -> pd.DataFrame:
     """One row per scene, mesh size and method, from the files ``parts`` of all scenes.
 
-    Speed-ups compare the time of an iteration with the full-order run. The exponent belongs to a
-    power law, fitted in logarithms over all meshes of a scene and method; each of these rows has
-    it. It is empty if there are fewer than three meshes, as any two points lie on a power law.
+    Speed-ups compare the time of an iteration with the full-order run. The exponent is that of a
+    power law, fitted in logarithms to all meshes of a scene and method, and equal in these rows.
+    It is empty if there are fewer than three meshes, as any two points lie on a power law.
     """
     rows = results.joined(parts)
     if rows.empty:
@@ -277,9 +277,9 @@ def frame_times(parts: list[File]) -> pd.DataFrame:
     },
 )
 def speedups(times: pd.DataFrame, reruns: pd.DataFrame, **files: list[File]) -> pd.DataFrame:
-    """One row per reduction timed in ``parts``; speed-ups compare runs of one and the same process.
+    """One row per timed reduction; speed-ups compare runs of one and the same process.
 
-    times, reruns : tables frame_times and reduced_reruns
+    times, reruns : tables frame_times and reduced_reruns; files ``parts`` have the measured times
     projections, subspaces : processor times of the reductions
     large : errors and processor times of the reductions of large scenes
     """
@@ -351,7 +351,7 @@ def large_errors(large: pd.DataFrame) -> pd.DataFrame:
 
 
 def _first_known(made: pd.DataFrame, sources: list[pd.DataFrame], column: str) -> pd.DataFrame:
-    """Return ``made`` with a ``column``; a cell's value is from the first source that has one."""
+    """Add ``column`` to ``made``; the first of ``sources`` with a value for a row provides it."""
     found = pd.Series(float("nan"), made.index)
     for source in sources:
         keys = [key for key in _LABELS if key in source.columns]
@@ -391,7 +391,7 @@ def online(parts: list[File], measured: list[File], times: pd.DataFrame) -> pd.D
         return rows
     found = pd.DataFrame(list(timed_reductions(results.joined(measured), times)))
     made = rows[rows.motion == results.TRAIN].rename(columns={"r": "elements_sampled"})
-    made = made.drop(columns="playback_error")  # this is zero for the training motion
+    made = made.drop(columns="playback_error")  # zero here: playback shows the training motion
     made = made.merge(large_errors(rows).rename(columns=_ERRORS), on=_MODEL, how="left")
     made = made.merge(found[[*_MODEL, *_TIMES]], on=_MODEL, how="left")
     return made.assign(ms_per_iteration=made.ms_per_frame / made.iterations)

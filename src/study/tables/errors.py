@@ -4,7 +4,7 @@ Table gain_interventions shows whether the error of a run falls if only the gain
 gain is the factor by which sampling amplifies errors.) A mere correlation of gain and error over
 methods could be caused by any difference between the methods. The table therefore compares pairs of
 methods with equal basis and size. They differ in their samples, or in whether the axes x, y and z
-share coefficients (table ladder has the four combinations). The last two of its steps compare
+share coefficients (table ladder has the four combinations). The last two steps (`KINDS`) compare
 methods with the same kind of coefficients. There, too, the error would fall with the gain if
 separate coefficients did harm only by their larger gain.
 """
@@ -37,11 +37,11 @@ _CELL = ["scene", "group", "method", "r", "varied"]
         number("relative", "over the first one"),
         flag("above_roundoff", "larger than the rounding errors of the projections"),
     ),
-    # one basis for each constraint group, that without weights and centring if a method has it
+    # one basis for each constraint group: without weights and centring if a method uses such a one
     reads={"bases": EachOf(paths.BASIS, "usual_bases")},
 )
 def singular_values(bases: list[paths.File]) -> pd.DataFrame:
-    """One row for each mode of each POD basis in the files ``bases``, in their order."""
+    """One row for each mode of each POD basis, in the order of the files ``bases``."""
     parts = []
     for file in bases:
         basis = load_basis(file.path)
@@ -84,7 +84,7 @@ def reconstruction_error(parts: list[paths.File]) -> pd.DataFrame:
     reads={"parts": Every(paths.SENSITIVITY)},
 )
 def sensitivity(parts: list[paths.File]) -> pd.DataFrame:
-    """Largest relative difference over the seeds, per scene, perturbation and frame."""
+    """Relative difference of perturbed runs: largest over seeds, per scene, perturbation, frame."""
     keys = ["scene", "perturbation", "frame"]
     rows = joined(parts).groupby(keys, sort=False, as_index=False)
     return rows["relative_difference"].max()
@@ -102,7 +102,7 @@ def sensitivity(parts: list[paths.File]) -> pd.DataFrame:
         integer("seed", "of the start's round-off"),
         *shared("method r"),
         integer("rank", "modes that the snapshots have without a cutoff", compared="value"),
-        # modes of rounding errors, and thus the gain (error amplification), depend on the machine
+        # the modes of such runs, and thus the gain (error amplification), depend on the machine
         replace(*shared("gain"), compared="skipped"),
         *shared("frames finite blowup_frame"),
         number("relative_error", "error of the positions over all frames up to the horizon"),
@@ -182,7 +182,7 @@ def ladder(parts: list[paths.File]) -> pd.DataFrame:
     return joined(parts)
 
 
-# Steps of the table below: name -> (method before, method after). The samples differ in each.
+# Steps of table gain_interventions that change the samples: name -> (method before, method after).
 STEPS = {
     "whole elements for single entries": ("deim", "block-deim"),
     "three elements a mode for one": ("block-deim", "gappy"),
@@ -195,7 +195,7 @@ SQUARE = {
     "whole elements, separate coefficients": ("single rows, separate", "whole elements, separate"),
     "whole elements, shared coefficients": ("single rows, shared", "whole elements, shared"),
 }
-# Methods with the same kind of coefficients. Of any two, the run with the larger gain is "before".
+# Methods with one kind of coefficients: of any two, the run with the larger gain is "before".
 KINDS = {
     "lower gain, shared coefficients": ("deim", "block-deim", "gappy"),
     "lower gain, separate coefficients": ("deim-joint", "published"),
@@ -203,7 +203,7 @@ KINDS = {
 _PLACE = ["scene", "group", "r"]
 VOLUMES = ("deformation_gradient", "tetrahedron_strain", "volume")  # groups on tetrahedra
 MESHES = ALL, SHEETS, BARS = "all", "sheets", "bars"
-# Constructor of number columns that summarise many runs; machines may differ in them as in shares.
+# Constructs a column of numbers that summarise many runs; it is compared as shares are.
 share = partial(number, compared="share")
 
 
@@ -238,9 +238,9 @@ def gain_interventions(
     """One row for each step (change of method that lowers the gain) and kind of mesh.
 
     A scene and its variant ("twin") form a family, whose results are dependent: the bootstrap
-    resamples families, and the sign test counts families. Errors smaller than the drift of
-    perturbed runs are raised to this drift. A run that ended early has an infinite error; two such
-    runs are not compared.
+    resamples families, and the sign test counts families. Errors below the sensitivity floor, by
+    which perturbed runs differ, are raised to it. A run that ended early has an infinite error; two
+    such runs are not compared.
     """
     runs = judged_runs(reruns, reconstruction)
     rows = []
@@ -274,7 +274,7 @@ def _steps(
 
 
 def _square(ladder: pd.DataFrame, runs: pd.DataFrame) -> pd.DataFrame:
-    """Runs of table ladder with direction "square", at scenes, groups and sizes of ``runs``."""
+    """Rows "square" of table ladder whose scene, group and size r also occur in ``runs``."""
     chosen = ladder[(ladder.direction == "square") & ladder.gain.notna()]
     chosen = chosen.rename(columns={"rung": "method"})
     error = chosen.relative_error_within_horizon.astype(float).fillna(np.inf)
@@ -283,7 +283,7 @@ def _square(ladder: pd.DataFrame, runs: pd.DataFrame) -> pd.DataFrame:
 
 
 def _pairs(runs: pd.DataFrame, before: str, after: str) -> pd.DataFrame:
-    """Pairs of runs by two methods: scene, group, errors, ratios after/before of gain and error."""
+    """Pairs of runs: scene, group, both errors, gain and error of ``after`` over ``before``."""
     error = np.maximum(runs.error, runs.sensitivity_floor)
     runs = runs[[*_PLACE, "method", "gain"]].assign(error=error)
     one, other = (runs[runs.method == m].drop(columns="method") for m in (before, after))
@@ -295,7 +295,7 @@ def _pairs(runs: pd.DataFrame, before: str, after: str) -> pd.DataFrame:
 
 
 def _summary(pairs: pd.DataFrame) -> Mapping[str, float]:
-    # SciPy's import takes a second, so it is not at the top: planning the workflow does without
+    # not imported at the top: SciPy's import takes a second, which planning the workflow saves
     from scipy.stats import binomtest
 
     by_family = pairs.groupby(families(pairs.scene)).error

@@ -1,4 +1,4 @@
-"""Tables of reduced runs: their errors and times, and how they end, also in hard cases."""
+"""Tables of reduced runs: errors, times, and how runs end, also in scenes with extreme settings."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -62,7 +62,7 @@ def reduced_reruns(
     full_order : files of the full-order runs of all motions
     runs, rows, rows_heldout : HDF5 files of the reduced runs, and their tables in the same order
     subspaces, subspace_rows, subspace_rows_heldout : such files for runs in position subspaces
-    sensitivity, horizon : drift of perturbed runs of each motion, and the limit of this drift
+    sensitivity, horizon : differences of perturbed runs, and their limit, which gives the horizon
     """
     judged: list[pd.DataFrame] = []
     for motion in (TRAIN, *MOTIONS):
@@ -90,7 +90,7 @@ def reduced_reruns(
 def _played(full_order: list[File], ends: Mapping[str, int], motion: str) -> pd.DataFrame:
     """Errors of the recorded training motion, taken as a run of ``motion``, one row per scene.
 
-    ``ends`` has for each scene the frame from which on motions are not compared (its horizon).
+    ``ends`` : scene -> its horizon, the frame from which on runs are not compared.
     """
     runs = {(run["scene"], run["run"]): run for run in full_order}
     rows = []
@@ -108,7 +108,7 @@ def _played(full_order: list[File], ends: Mapping[str, int], motion: str) -> pd.
 
 
 def _judged(run: File, row: File, end: int, motion: str) -> pd.DataFrame:
-    """Rows of table ``row`` for one motion, with errors before frame ``end`` from file ``run``."""
+    """Rows of file ``row`` for one motion; file ``run`` yields the errors before frame ``end``."""
     table = read_table(row.path)
     if motion != TRAIN:  # tables of training runs have no column "motion"
         table = table[table.motion == motion]
@@ -128,7 +128,7 @@ def _judged(run: File, row: File, end: int, motion: str) -> pd.DataFrame:
 def _errors(
     runs: Sequence[h5py.Group], reference: Series, end: int, units: Mapping[str, Any]
 ) -> dict[str, list[float | None]]:
-    """Errors of the runs before frame ``end``: name of an error -> values (None without frames)."""
+    """Name of an error -> its values before frame ``end``, one per run (None without frames)."""
     known = {unit: float(units[unit]) for unit in ("extent_norm", "time_step")}
     found = [
         errors_within({series: run[series][...] for series in DEVIATIONS}, reference, end, **known)
@@ -153,7 +153,7 @@ def _with_times(runs: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
     local = runs[runs.position_basis == "full"].merge(
         reduced.loc[~inside, keys + measured], on=keys, how="left"
     )
-    # rows of subspace models match by the size k, not by r: this is a number of elements there
+    # match rows of subspace models by the size k, as their r is the number of sampled elements
     keys = [k for k in KEYS if k != "r"]
     subspace = runs[runs.position_basis != "full"]
     if len(subspace) == 0:
@@ -166,7 +166,7 @@ def _with_times(runs: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
 # Possible outcomes of a run.
 OUTCOMES = ("accurate", "wrong", "left the scene", "blow-up", "not run", "not judged")
 SETTING = ["experiment", "scene", "h", "stiffness_ratio"]  # columns that identify a full-order run
-# Fraction of runs on degenerate meshes whose outcome may depend on rounding errors of the machine.
+# Fraction of runs on degenerate meshes whose outcome may differ between machines (by rounding).
 FRAGILE = 0.005
 
 
@@ -205,8 +205,8 @@ def stability(
     taken over the frames in which perturbed runs still agree, that of a "sweep" row over all.
 
     time_steps : scene -> time step h in seconds
-    wrong, departure : a run fails if its error exceeds ``wrong``, or if its bounding box exceeds
-        ``departure`` times that of the full-order run
+    wrong, departure : limits of the error, and of the size of the bounding box relative to that of
+        the full-order run; beyond them a run fails (see `outcomes`)
     """
     reruns = _rerun_rows(files["reruns"], files["subspaces"], reduced_reruns)
     runs = pd.concat([_full_order_rows(files["full_order"]), reruns], ignore_index=True)
@@ -249,7 +249,7 @@ def _full_order_rows(files: list[File]) -> pd.DataFrame:
 def _rerun_rows(
     reruns: list[File], subspaces: list[File], reduced_reruns: pd.DataFrame
 ) -> pd.DataFrame:
-    """Reduced runs of the training motion; errors use frames in which perturbed runs agree."""
+    """Rows of reduced training-motion runs; errors are over frames where perturbed runs agree."""
     local = joined(reruns).assign(position_basis="full", k=np.nan)
     runs = pd.concat([local, joined(subspaces)], ignore_index=True)
     runs = runs.drop(columns="relative_error")
@@ -274,5 +274,5 @@ def _rerun_rows(
     reads={"parts": Every(paths.HARD_CASES)},
 )
 def hard_cases(parts: list[File]) -> pd.DataFrame:
-    """Rows of the files ``parts``, in the order of the hard cases and methods."""
+    """Rows of the files ``parts``: reductions in scenes with extreme meshes, states, settings."""
     return joined(parts)

@@ -32,7 +32,7 @@ def bundle(arguments: Sequence[str]) -> Status:
         return status
     folder = Path(subject.results)
     names = [*read_manifest(subject.results).files, paths.MANIFEST.pattern]
-    small = {n: folder / n for n in names if not n.endswith(".h5")}  # HDF5 files can be made again
+    small = {n: folder / n for n in names if not n.endswith(".h5")}  # no HDF5: a run makes it again
     results = {os.path.normpath(f"published/results/{name}"): p for name, p in small.items()}
     target = folder / f"{NAME}.tar.gz"
     write_archive(Path(), results, target)

@@ -56,7 +56,7 @@ def update(subject: Subject, reason: str) -> Path:
         write_reference(table, frame, folder)
     for old in [*folder.glob("*.csv"), *folder.glob("*.csv.xz")]:
         if old.name.partition(".")[0] not in declared():
-            old.unlink()  # reference of a table that no longer exists
+            old.unlink()  # delete the expected version of a table that no longer exists
     here = machine()
     note(folder, words, datetime.now(UTC).date(), f"{here.pdrom} ({here.commit})")
     return folder
@@ -80,8 +80,8 @@ def parser() -> argparse.ArgumentParser:
 def verify(arguments: Sequence[str]) -> Status:
     """Run the command with the ``arguments`` of the command line; return its exit code.
 
-    Raises ConfigurationError if the configuration is faulty, or it has no expected tables. Raises
-    StorageError if a file cannot be read or written, or --update is refused.
+    Raises ConfigurationError if the configuration is faulty, or has no expected tables. Raises
+    StorageError if a file cannot be read or written, or --update finds tables out of date.
     """
     asked = parser().parse_args(arguments)
     subject = Subject.of(asked.configfile, asked.config)
@@ -127,7 +127,7 @@ def status_of(lines: Iterable[Line]) -> Status:
 
 
 def counted(lines: Sequence[Line]) -> str:
-    """Text with the number of claims, figures and tables of each outcome."""
+    """Text that says, for claims, figures and tables, how many have each outcome."""
     parts = []
     for kind in dict.fromkeys(line.kind for line in lines):
         own = [line.outcome for line in lines if line.kind == kind]

@@ -18,7 +18,7 @@ from study.tables.kit.results import trained
 
 # Absolute differences of two numbers up to this size are ignored as rounding errors of sums.
 FLOOR = 1e-12
-# Relative tolerances: of numbers of samples chosen by a fit, and of errors of runs above `WRONG`.
+# Relative tolerances: for numbers of samples that a fit chooses, and for errors above `WRONG`.
 FITTED, OF_WRONG_RUNS = 0.25, 0.3
 # Part of the names of methods whose elements are chosen by a non-negative least-squares fit.
 FITTING = "ecsw"
@@ -30,7 +30,7 @@ RUNS, SPECTRA, RECONSTRUCTION = "reduced_reruns", "singular_values", "reconstruc
 WRONG = 0.1
 # Columns with the error of a run; the first one that a table has is compared with `WRONG`.
 OF_RUN = ("relative_error_within_horizon", "relative_error")
-# Columns that identify a sampled reduction of projections (`SAMPLES`), or a reduced run (`RUN`).
+# Columns that identify a sampled reduction of projections; those of `RUN` identify a reduced run.
 SAMPLES = ("scene", "group", "method", "r")
 RUN = (*SAMPLES, "position_basis", "k")
 # Largest number of cells that describe a row in a message.
@@ -45,13 +45,13 @@ CLOSE, OWN, LONE = 1e-5, 50, 0.01
 # difference above which a run differs, columns by which the runs are grouped for counting). In each
 # group, a tenth of the runs may differ by more than a factor of 10, and half by more than 2.
 LOOSE = ((0.1, 1 - 1 / 10, ("scene", "noisy_axes", "method")), (0.5, 1 - 1 / 2, ("scene",)))
-# Number of cells that may always differ in a column of texts or flags with a tolerance.
+# In a text or flag column with a tolerance, at least this number of cells may differ.
 FEW = 3
 Difference = tuple[float, str]  # (distance of two cells, inf if not a number; text of a message)
 
 
 def kept(table: Table) -> dict[str, Column]:
-    """Columns of ``table`` that the expected table stores and that are compared, by name."""
+    """Name -> column, for columns of ``table`` that are stored in its expected version."""
     return {c.name: c for c in table.columns if c.quantity in TOLERANCES}
 
 
@@ -61,7 +61,7 @@ def names_row(column: Column) -> bool:
 
 
 def names(frame: pd.DataFrame, columns: Sequence[str] = SAMPLES) -> list[tuple]:
-    """Return for each row of ``frame`` the cells in ``columns``, as a tuple of texts."""
+    """Return a tuple for each row of ``frame``: its cells in ``columns``, as texts."""
     return list(frame[list(columns)].astype(str).itertuples(index=False, name=None))
 
 
@@ -80,7 +80,7 @@ def pairs(table: Table, expected: pd.DataFrame, found: pd.DataFrame) -> list[tup
         for frame in (expected, found)
     ]
     for columns in ([*named, *counts], named):
-        # equal rows match in order
+        # of several rows with equal cells, the first matches the first, the second the second ...
         e, f = (rows.assign(place=rows.groupby(columns).cumcount()) for rows in left)
         both = e.merge(f, on=[*columns, "place"])
         made += zip(both.row_x, both.row_y, strict=True)
@@ -99,16 +99,16 @@ class Context:
     """Facts from other expected tables that show which rows depend on rounding errors.
 
     chaotic : scenes whose perturbed runs differ too much for a comparison in their last frames
-    modes : number of modes above round-off, by scene and constraint group
-    gains : factor by which sampling amplifies errors, by the cells in the columns `SAMPLES`
-    ended : runs that have no error since they ended early, as cells in the columns `RUN`; one set
-        for the expected table of runs, one for the found table
+    modes : (scene, constraint group) -> number of modes above round-off
+    gains : cells in the columns `SAMPLES` -> factor by which sampling amplifies errors
+    ended : two sets, from the expected and the found table of runs: runs (cells in the columns
+        `RUN`) that have no error because they ended early
     """
 
     def __init__(
         self, tables: Mapping[str, pd.DataFrame], found: pd.DataFrame | None = None
     ) -> None:
-        """Read the facts from the expected ``tables`` (by name) and the ``found`` table `RUNS`."""
+        """Read the facts from expected ``tables``, by name, and the ``found`` table `RUNS`."""
         runs, spectra, errors = (
             tables[name] if name in tables else declared()[name].checked(pd.DataFrame())
             for name in (RUNS, SPECTRA, RECONSTRUCTION)
@@ -136,8 +136,8 @@ class Comparison:
         self.pairs = pairs(table, expected, found)
         self.e = expected.iloc[[i for i, _ in self.pairs]].reset_index(drop=True)
         self.f = found.iloc[[j for _, j in self.pairs]].reset_index(drop=True)
-        self.loose = cache(self._loose)  # function; returns cells that depend on rounding errors
-        self._timed: Sequence = [()] * len(self.e)  # per row, names of columns that depend on time
+        self.loose = cache(self._loose)  # function: `_loose` with cached return values
+        self._timed: Sequence = [()] * len(self.e)  # for each row, columns that depend on timing
         if table.timed_cells is not None:
             reads = table.reads.items()
             files = {name: Path(r.path) for name, r in reads if isinstance(r, ProjectFile)}
@@ -152,7 +152,7 @@ class Comparison:
         return ~np.any([np.zeros(len(self.e)), *self.loose(column).values()], axis=0)
 
     def _loose(self, column: Column) -> dict[str, np.ndarray]:
-        """Boolean arrays (rows), one for each reason why cells depend on rounding errors."""
+        """Reason why cells depend on rounding errors -> boolean array (rows) of such cells."""
         if names_row(column):
             return {}
         chaotic = self.e.filter(items=["scene"]).isin(list(self.context.chaotic)).any(axis=1)
@@ -167,7 +167,7 @@ class Comparison:
         }
 
     def _of_round_off(self) -> np.ndarray:
-        """Boolean array: True for rows with r >= number of modes above round-off minus one."""
+        """Boolean array: True for rows with r + 1 >= number of modes above round-off."""
         rows, modes = self.e, self.context.modes
         if "noisy_axes" in rows or not {"scene", "group", "r"} <= set(rows.columns):
             return np.full(len(rows), "noisy_axes" in rows)
@@ -175,7 +175,7 @@ class Comparison:
         return (rows.r >= np.array(most, dtype=float) - 1).fillna(False).to_numpy(dtype=bool)
 
     def _gains(self) -> np.ndarray:
-        """Largest known gain (factor by which sampling amplifies errors) of each row, else 0."""
+        """Gain (error amplification by sampling) of each row: the largest known one, else 0."""
         found = [np.zeros(len(self.e))]
         for column in self.table.columns:
             if column.name.startswith("gain") and column.quantity == "value":
@@ -215,7 +215,7 @@ class Comparison:
         return limit
 
     def beyond(self, column: Column, wider: float = 0.0) -> np.ndarray:
-        """Boolean array: True for compared cells that differ by more than limit and ``wider``."""
+        """Boolean array: compared cells that differ by more than their limit and than ``wider``."""
         limit = np.maximum(self.limits(column), wider)
         return (self.apart(column) > limit) & self.compared(column)
 
@@ -242,8 +242,8 @@ class Comparison:
 def judge(comparison: Comparison) -> tuple[list[str], str]:
     """Return texts of all differences, largest first, and a text on the compared cells.
 
-    The second text has the number of compared cells, and by reason the number of those that depend
-    on rounding errors: of these cells only the number that differs is limited.
+    The second text has the number of compared cells, and for each reason the number of cells that
+    depend on rounding errors; of such cells, a limited number may differ.
     """
     found = [*_rows(comparison)]
     compared, loose = 0, Counter[str]()
@@ -260,7 +260,7 @@ def judge(comparison: Comparison) -> tuple[list[str], str]:
 def _difference(
     where: str, expected: str, found: str, size: float = np.inf, allowed: float = 0.0
 ) -> Difference:
-    """Return ``size`` and text of a difference; ``where`` names the row and column it is in."""
+    """Return ``size`` and text of a difference in the row and column that ``where`` names."""
     off = f" (off by {size:.2g}, allowed {allowed:.2g})" if np.isfinite(size) else ""
     return size, f"{where}: expected {expected}, found {found}{off}"
 
@@ -307,7 +307,7 @@ def _cells(comparison: Comparison, column: Column) -> Iterator[Difference]:
 
 
 def _shifted(comparison: Comparison, column: Column, firm: np.ndarray) -> Iterator[Difference]:
-    """Yield a difference if most cells of a column have changed by a little (see `MOST`)."""
+    """Yield a difference if most cells of a column have changed slightly (see `MOST`)."""
     there = (comparison.e[column.name].fillna(0) != 0).to_numpy(dtype=bool)
     cells = firm & there & comparison.compared(column)
     own, count = column.tolerance, cells.sum()

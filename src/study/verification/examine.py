@@ -73,7 +73,7 @@ class Examination:
         self.read, self.again = cache(self._read), cache(self._again)
 
     def lines(self) -> list[Line]:
-        """Outcomes of all claims, figures and tables; a CSV file of no known table "differs"."""
+        """Outcomes of all claims, figures, tables; a CSV file that is no known table "differs"."""
         tables = {name: self.table(name) for name in declared()}
         figures = [self._figure(job, tables) for job in self.subject.plan.fixed["figures"]]
         folder = Path(TABLE.at(self.subject.results, name="any")).parent
@@ -102,7 +102,7 @@ class Examination:
 
     @cached_property
     def expected(self) -> dict[str, Reference]:
-        """Expected tables that exist, by name."""
+        """Mapping of names to the expected tables that exist."""
         return read_references(folder_of(self.subject.results))
 
     @cached_property
@@ -235,7 +235,7 @@ def _results(paths: Sequence[str]) -> list[str]:
 
 
 def _first_difference(found: pd.DataFrame, again: pd.DataFrame) -> str | None:
-    """Text on the first cell in which two tables differ, or on their sizes; None if all agree."""
+    """Text on the first cell that differs in two tables, or on unequal sizes; None if all agree."""
     if list(found.columns) != list(again.columns) or len(found) != len(again):
         return f"which have {len(again)} rows of {len(again.columns)} columns"
     other = (found != again) & ~(found.isna() & again.isna())

@@ -36,7 +36,7 @@ FAULTS = (PdromError, ArithmeticError, LookupError, TypeError, ValueError)
 
 
 def verify_files(subject: Subject) -> Status:
-    """Compare the files of a study with its manifest; print faults, and commands that mend them."""
+    """Compare a study's files with its manifest; print faults, and commands to make files again."""
     place = Path(MANIFEST.at(subject.results))
     hint = f"a run that succeeds writes it: {subject.command()}"
     if not place.is_file():
@@ -106,7 +106,7 @@ def made(job: Job) -> Iterator[dict[str, Path]]:
 
 
 def differing(job: Job) -> list[str]:
-    """Repeat a job and return paths of outputs that differ now; all paths if the job fails."""
+    """Repeat a job; return the paths of outputs that change, or all its outputs if it fails."""
     try:
         with made(job) as files:
             return [old for old, new in files.items() if not filecmp.cmp(old, new, shallow=False)]

@@ -31,14 +31,14 @@ Written by `./reproduce verify --update --reason "..."`, newest last.
 
 
 class Reference(NamedTuple):
-    """Expected table: ``frame`` has all declared columns, ``columns`` names those in the file."""
+    """Expected table: ``frame`` has all declared columns; its file has only ``columns``."""
 
     frame: pd.DataFrame
     columns: tuple[str, ...]
 
 
 def folder_of(results: str) -> Path:
-    """Folder of the expected tables to which the folder ``results`` is compared."""
+    """Folder of the expected tables with which those in the folder ``results`` are compared."""
     root = Path(RESULTS)
     return root / "reference" / Path(results).relative_to(root) / "tables"
 
@@ -74,7 +74,7 @@ def read_reference(table: Table, folder: Path) -> Reference | None:
 
 
 def read_references(folder: Path) -> dict[str, Reference]:
-    """Return all expected tables in ``folder`` by name; StorageError if one cannot be read."""
+    """Return name -> expected table in ``folder``; StorageError if one cannot be read."""
     read = {name: read_reference(table, folder) for name, table in declared().items()}
     return {name: reference for name, reference in read.items() if reference is not None}
 

@@ -33,7 +33,7 @@ class Subject:
     def of(cls, configfiles: Sequence[str], settings: Sequence[str]) -> "Subject":
         """Return the results of the configuration that ``configfiles`` and ``settings`` define.
 
-        Without both, it is the configuration of the last run.
+        If both are empty, it is the configuration of the last run.
 
         Raises ConfigurationError if a configuration file is missing or is not a mapping.
         """
@@ -87,7 +87,7 @@ class Status(IntEnum):
 
 
 def ended(command: Callable[[], int]) -> int:
-    """Run ``command`` and return its exit code; report errors and interruption in one line."""
+    """Run ``command``; return its exit code; report an error or an interruption in one line."""
     try:
         return command()
     except (PdromError, OSError) as error:

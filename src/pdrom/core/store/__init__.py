@@ -90,7 +90,7 @@ def atomic_path(path: str | os.PathLike[str], with_checksum: bool = True) -> Ite
             os.replace(temporary, target)
             place = checksum_path(target)
             content = place.read_bytes() if place.is_file() else b""
-            if content and Checksum.parse(content).content == content:  # an older file's checksum
+            if content and Checksum.parse(content).content == content:  # checksum of the old file
                 place.unlink()
     except OSError as error:
         raise StorageError(f"{target}: cannot be written ({reason(error)})") from error
@@ -166,7 +166,7 @@ def _runs(process: int) -> bool:
         os.kill(process, 0)
     except ProcessLookupError:
         return False
-    except PermissionError:  # a process of another user
+    except PermissionError:  # the process exists, but belongs to another user
         pass
     return True
 
@@ -179,9 +179,9 @@ def _bring_to_disk(path: Path) -> None:
 def _rename(temporary: Path, checksum: Path, target: Path) -> None:
     """Rename the ``temporary`` result and its ``checksum`` file to their names, the checksum first.
 
-    A process killed in between leaves no result, or an older one that the checksum does not match:
-    the next run makes either again. If the result were renamed first, such a process would leave a
-    good file without a checksum. If the second renaming fails, the older file keeps its checksum.
+    If the process is killed in between, the result is missing, or an older one that does not match
+    the checksum: the next run makes it again. If the result were renamed first, it would be left
+    without a checksum. If the second renaming fails, the older result keeps its own checksum.
     """
     place = checksum_path(target)
     previous = place.read_bytes() if place.is_file() else None
@@ -219,7 +219,7 @@ def read_table(
 ) -> "pd.DataFrame":
     """Read the CSV table ``path``; StorageError if missing, damaged or without one of ``columns``.
 
-    ``result`` tells that the pipeline wrote the table with a checksum, which is then checked.
+    ``result`` tells whether the pipeline wrote the table, with a checksum, which is then checked.
     """
     import pandas as pd
 
@@ -254,10 +254,7 @@ def require_finite(name: str, array: np.ndarray, error: type[Exception]) -> np.n
 
 @contextmanager
 def write_hdf5(path: str | os.PathLike[str]) -> Iterator[h5py.File]:
-    """Yield a new HDF5 file; when complete it gets a checksum and is renamed to ``path``.
-
-    It contains no time stamps.
-    """
+    """Yield a new HDF5 file without time stamps; then add a checksum and rename it to ``path``."""
     with atomic_path(path, with_checksum=False) as temporary:
         with open(temporary, "w+b", buffering=0) as handle:
             sink = _Sink(handle)

@@ -1,13 +1,13 @@
-"""Checksums of results, stored with their provenance, and comparison of files with them.
+"""Checksums of result files, stored with each file's provenance, and checks of files by them.
 
 An HDF5 file has its checksum in the user block, its first bytes, which readers of HDF5 skip: a
 line that names the format, the checksum of all bytes after the block, and zeros. So a copy of the
 file, in any folder, can be checked for damage before HDF5 reads it.
 
-Every other result has a hidden checksum file next to it: that of ``t.csv`` is ``.t.csv.blake2b``,
-in the format of the program ``b2sum``: the BLAKE2b digest of the file's bytes and the file's name.
-The line before it is a comment to that program; it contains the provenance
-(`pdrom.core.provenance`) with a digest of its own.
+Every other result has a hidden checksum file next to it, for ``t.csv`` named ``.t.csv.blake2b``.
+Its last line has the format of the program ``b2sum``: the BLAKE2b digest of the result's bytes and
+the result's name. The line above is a comment to that program; it contains the provenance
+(`pdrom.core.provenance`) and a digest of the provenance.
 
 The stored checksum is compared with that of the file's bytes. Any difference, in the file or in its
 checksum, counts as damage. If both change, they match only if two 512-bit digests agree by chance.
@@ -50,7 +50,7 @@ def sets_aside() -> bool:
 
 
 CHECKSUM_SUFFIX = ".blake2b"
-_SHORT = 16  # hexadecimal digits of the digest of the provenance comment
+_SHORT = 16  # number of hexadecimal digits that are kept of the digest of the provenance
 SUFFIXES = (".h5", ".hdf5")
 BLOCK = 2048  # bytes of the user block; HDF5 allows powers of two, at least 512
 _LINE = b"pdrom: BLAKE2b of the bytes behind the first 2048, and what made them\n"
@@ -177,8 +177,8 @@ def require_intact(path: str | os.PathLike[str], unchecked: bool = False) -> Non
     Raises
     ------
     StorageError
-        The file is missing, cannot be read, is damaged or has no checksum. In the two latter cases
-        a job of the workflow has renamed it to ``*.damaged``, so that the next run finds it missing
+        The file is missing, cannot be read, is damaged or has no checksum. In the last two cases a
+        job of the workflow renames the file to ``*.damaged``, so that the next run finds it missing
         and makes it again; other readers leave it unchanged.
     """
     path = Path(path)

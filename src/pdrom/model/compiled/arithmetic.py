@@ -1,7 +1,7 @@
-"""SIMD arithmetic of rows: vectors of four numbers ("lanes") in a register.
+"""SIMD arithmetic of rows: vectors of four numbers, each in one "lane" of a register.
 
-Two rows are combined lane by lane. Operations are never reordered: lanes do not affect each other.
-A product and a sum are rounded once (fused) if the processor supports it.
+Rows are combined lane by lane, and operations keep the order of the source code. The sum of a row
+and a product is rounded only once (fused) if the processor supports it.
 """
 
 from functools import wraps
@@ -41,7 +41,7 @@ def _lane(number):
 def _operation(result, *kinds):
     """Return a decorator of functions ``write(builder, *arguments)`` that generate an LLVM value.
 
-    It makes an intrinsic with arguments of types ``kinds`` and a result of type ``result``.
+    A decorated function is an intrinsic: its arguments have types ``kinds``, its result ``result``.
     """
 
     def decorate(write):

@@ -1,8 +1,8 @@
 """Inner products in compiled code.
 
-For three matrix rows at a time, the vector is read only once, and the processor prefetches three
-rows. The order of summation does not depend on the processor: sixteen partial sums are reduced to
-four, these to one, and then the remaining terms are added one by one."""
+`dots` multiplies three matrix rows by a vector, which is read once for all three, and the processor
+prefetches the rows. The order of summation does not depend on the processor: sixteen partial sums
+of a row are reduced to four, these to one, and the remaining terms are then added one by one."""
 
 from pdrom.model.compiled import arithmetic
 from pdrom.model.compiled.arithmetic import add, add_product, constant, of_three
@@ -12,14 +12,15 @@ from pdrom.model.compiled.rows import WIDTH, at, load
 
 @compiled(forceinline=True)
 def _summed(a, b, c):
-    """Return three numbers: the sums of the lanes of three SIMD vectors."""
+    """Return three numbers: the sum of the four lanes of a, that of b and that of c."""
     first, second, third, fourth = arithmetic.transposed(a, b, c, c)
     return arithmetic.first_three(add(add(first, third), add(second, fourth)))
 
 
 @compiled(forceinline=True)
 def _products(matrix, i, j, k, vector, p, sums):
-    """Return three ``sums``, to which products of four numbers from index ``p`` on are added."""
+    """Return the three rows ``sums``, each plus the products, lane by lane, of entries p to p + 3
+    of one matrix row and of ``vector``."""
     v = load(vector, p)
     return (
         add_product(sums[0], load(matrix, i + p), v),

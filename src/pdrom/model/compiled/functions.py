@@ -34,7 +34,7 @@ def _mark(function):
 
 
 def compiled(function=None, **options):
-    """Compile ``function``, cached on disk, without checks for division by zero or fast-math.
+    """Compile ``function``, cached on disk, with neither checks for division by zero nor fast-math.
 
     ``options`` are passed to Numba's ``njit`` and may enable fast-math; without a function, a
     decorator is returned. Numba's wrapper for callers in C is left out, as there are none.
@@ -65,7 +65,7 @@ def template(function):
 
 
 class Callback:
-    """Function that compiled code calls by its `address`; it is compiled when that is first read.
+    """Function that compiled code calls by its `address`; first access to `address` compiles it.
 
     Attributes
     ----------
@@ -84,7 +84,7 @@ class Callback:
 
 
 def caller(result):
-    """Return an intrinsic (address, integers) that calls a `Callback` with this ``result`` type."""
+    """Return an intrinsic f(address, integers) that calls a `Callback`; f returns a ``result``."""
 
     def typed(_context, address, arguments):
         def generate(context, builder, _signature, values):

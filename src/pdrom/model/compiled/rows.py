@@ -3,7 +3,7 @@
 The step loop stores positions and right-hand sides as (N, 4) arrays with a last column of zeros;
 other code uses (N, 3) views of these "padded" arrays. Compiled code uses the flat array (4 N,) and
 loads a row into a register of four lanes. A row may also hold one number of each of four elements
-(`pdrom.model.compiled.arithmetic.transposed` converts between the two).
+(`pdrom.model.compiled.arithmetic.transposed` converts between the two layouts).
 
 Arrays of this module begin at multiples of the size of a row in memory. NumPy's arrays may not, so
 that every second row may lie in two cache lines.
@@ -43,7 +43,7 @@ def empty(numbers: int, dtype: type = np.float64) -> np.ndarray:
     """Return an uninitialised array (numbers,) of ``dtype``, aligned to the size of a row."""
     kind = np.dtype(dtype)
     memory = np.empty(numbers * kind.itemsize + ROW_BYTES, np.uint8)
-    # made from the memoryview: the base of its views is then the returned array, not ``memory``
+    # made from a memoryview, so that views of the returned array have this array as their base
     start = -memory.ctypes.data % ROW_BYTES
     return np.frombuffer(memory.data, kind, numbers, start)
 

@@ -138,7 +138,7 @@ class ConstraintGroup(Effect):
         raise NotImplementedError(f"{self.name} has no sampler")
 
     def project_elements(self, y: np.ndarray, elements: np.ndarray) -> np.ndarray:
-        """Return projections (m p, 3) of ``elements`` (m,), in their order, at ``y`` (N, 3) m."""
+        """Return projections (m p, 3) at ``y`` (N, 3) m, in the order of ``elements`` (m,)."""
         elements = np.ascontiguousarray(elements, dtype=np.int64)
         return projections(self.sampler(elements), y, self.rows_per_element * len(elements))
 
@@ -158,7 +158,7 @@ class ConstraintGroup(Effect):
     def restricted(
         self, elements: np.ndarray, factors: np.ndarray
     ) -> tuple["ConstraintGroup", np.ndarray]:
-        """Return a group of some ``elements`` only, on a smaller set of vertices: those they use.
+        """Return a group of the given ``elements`` only, on the vertices that these elements use.
 
         Parameters
         ----------
@@ -224,7 +224,7 @@ def require_cells(mesh: Mesh, kind: str, effect: str) -> np.ndarray:
 
 
 def directions(a: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return unit vectors, or zero vectors, and lengths (..., 1) of vectors ``a`` (..., 3)."""
+    """Return the unit vectors (zero for a zero vector) and lengths (..., 1) of ``a`` (..., 3)."""
     # scale the vectors so that their squares neither overflow nor underflow
     largest = np.abs(a).max(axis=-1, keepdims=True)
     part = a / np.where(largest > 0.0, largest, 1.0)

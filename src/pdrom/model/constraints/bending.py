@@ -17,24 +17,25 @@ from pdrom.model.constraints.base import ConstraintGroup, GroupConfig, direction
 from pdrom.model.constraints.local_kernel import FIRST, OWN, VERTICES, LocalKernel
 from pdrom.model.mesh.types import Mesh, barycentric_areas, boundary_edges
 
-# A unit vector's projection on the plane of the rim (equator) is round-off if shorter than this.
+# A unit vector's component in the plane of a half sphere's rim is round-off if below this.
 RIM = 1e-15
-# If the projection on the plane of the rim is longer than this, it is orthogonal to the normal up
-# to 2e-12. A shorter one has lost digits by cancellation and is orthogonalised again.
+# A unit vector's component in the plane of a half sphere's rim is orthogonal to the normal up to
+# 2e-12 if longer than this. A shorter one has lost digits and is made orthogonal once more.
 NEAR_POLE = 1e-4
 
-# Offsets of an element's weight, rest magnitude, rest curvature, side times normal; their count
+# Offsets of an element's weight, curvature at rest (magnitude and vector) and pole (side times
+# normal) among its MANIFOLD packed numbers
 WEIGHT, MAGNITUDE, REST, POLE, MANIFOLD = 0, 1, 2, 5, 8
-# Offsets in the working array: curvature, projection p, height of its direction over the equator
+# Offsets in the working array, SIZE numbers per lane: curvature, projection p, cosine to the pole
 H, P, HEIGHT, SIZE = 0, 3, 6, 7
-# Indices into a kernel's record: number of elements, number of elements to project; addresses of
-# CSR operator, the packed numbers, working arrays, elements to project and their packed numbers.
+# Indices into a kernel's record: numbers of all elements and of those to project; addresses of the
+# CSR arrays of S, packed numbers, working arrays, elements to project, memory for their numbers.
 ELEMENTS, COUNT, START, INDICES, DATA, SPHERES, WORK, SAMPLED, TAKEN, ARRAYS = range(OWN, OWN + 10)
 
 
 @lanes.kernel
 def put_poles(manifold, elements, side, normals):
-    """Write ``side`` (m,) times ``normals`` (m, 3) of ``elements`` to the packed ``manifold``."""
+    """Write ``side`` (m,) * ``normals`` (m, 3) of ``elements`` to the packed array ``manifold``."""
     for e in elements:
         place = (e // lanes.LANES * MANIFOLD + POLE) * lanes.LANES + e % lanes.LANES
         lanes.save(
@@ -53,7 +54,7 @@ def _curvature(y, e, start, indices, data):
 
 @lanes.lane_function
 def _without(a, part, n):
-    """Return direction and length of the vector a - part n (``part`` is a number)."""
+    """Return direction and length of a - part n, from vectors a and n and a number ``part``."""
     rest = lanes.mix(1.0, a, -part, n)
     length = np.sqrt(lanes.dot(rest, rest))
     return lanes.scaled(1.0 / length, rest), length
@@ -61,7 +62,7 @@ def _without(a, part, n):
 
 @lanes.lane_function
 def _half_spheres(work, manifold, block):
-    """Project the curvature vector of each element of a block onto its half sphere."""
+    """Project the curvature vectors of a block onto their half spheres (see `VertexBending`)."""
     first, wrong = block * MANIFOLD, 0.0
     for lane in range(lanes.LANES):
         h, n = lanes.load(work, H, lane), lanes.load(manifold, first + POLE, lane)
@@ -89,13 +90,13 @@ def _half_spheres(work, manifold, block):
 
 @lanes.lane_function
 def _to_rims(work, manifold, first):
-    """Replace directions below the equator of the half sphere by the nearest ones on it (rim)."""
+    """Replace directions below the rim (equator) of their half sphere by the nearest on the rim."""
     for lane in range(lanes.LANES):
         n, unit = lanes.load(manifold, first + POLE, lane), lanes.load(work, P, lane)
         height = work[HEIGHT * lanes.LANES + lane]
         rim, length = _without(unit, height, n)
         again, left = _without(rim, lanes.dot(rim, n), n)
-        # a tiny difference, or one mostly parallel to n, is round-off: take any rim direction
+        # if the component in the plane of the rim is only round-off, take any direction on the rim
         again = lanes.choose(length > RIM and left > 0.5, again, lanes.perpendicular(n))
         rim = lanes.choose(length > NEAR_POLE, rim, again)
         lanes.save(work, P, lane, lanes.choose(height < 0.0, rim, unit))
@@ -113,7 +114,7 @@ def _operator(y_place, record):
 
 @lanes.lane_function
 def _spheres(record, part):
-    """Return the packed numbers of all elements and the working array of a ``part``."""
+    """Return the packed numbers of all elements and the working array of ``part`` (0 or 1)."""
     entries = rows.indices(record, ARRAYS)
     return (
         rows.doubles(entries[SPHERES], entries[FIRST + 2] * MANIFOLD * lanes.LANES),
@@ -123,7 +124,7 @@ def _spheres(record, part):
 
 @kernels.local_kernel
 def project_vertices(y_place, p_place, record, part):
-    """Write the projections p (m, 3) of the elements to project of a ``record``; return 0.
+    """Write the projections p (m, 3) of the m elements that the ``record`` lists; return 0.
 
     ``y_place``, ``p_place``, ``record`` are addresses; ``part`` selects the working array.
     """
@@ -150,7 +151,7 @@ def project_vertices(y_place, p_place, record, part):
 
 @kernels.local_kernel
 def accumulate_vertices(y_place, rhs_place, record, part):
-    """Add S^T W p of one ``part`` of the blocks to the right-hand side; return its energy in J.
+    """Add S^T W p of the blocks of a ``part`` to the right-hand side; return their energy in J.
 
     ``y_place``, ``rhs_place``, ``record`` are addresses of positions, right-hand side and record.
     """
@@ -190,7 +191,7 @@ def accumulate_vertices(y_place, rhs_place, record, part):
 def project_gradients(d_pointer, manifold_pointer, p_pointer, m):
     """Write the projections p (m, 3) of the curvature vectors S q (m, 3) onto the half spheres.
 
-    The arguments are pointers to S q, to the packed numbers of the elements and to p.
+    The first three arguments are pointers to S q, to the packed numbers and to p.
     """
     d, p = carray(d_pointer, (m, 3)), carray(p_pointer, (m, 3))
     blocks = (m + lanes.LANES - 1) // lanes.LANES
@@ -285,7 +286,7 @@ def fan_normals(q, vertices, elements, start, fan, triangles, normals):
         normals[i, 0], normals[i, 1], normals[i, 2] = nx, ny, nz
 
 
-# A vertex counts as flat if its rest curvature is below this fraction of the terms of its sum.
+# A vertex counts as flat if its rest curvature |S q| is at most this fraction of || |S| |q| ||.
 FLAT = 1e-9
 
 
@@ -295,10 +296,10 @@ class VertexBending(ConstraintGroup):
     S q is the mean-curvature vector H(q) = 1/(2 A_v) sum_j (cot a_j + cot b_j)(q_v - q_j). Its rest
     value has the magnitude m and lies on side s = +1 or -1 of the surface. p is the point nearest
     to H on the half sphere { |p| = m, s p.n >= 0 }. The vertex normal n is that at the beginning of
-    the frame: the half sphere is fixed during iterations, so that the objective cannot rise. If H
-    is outside that half space, p is on the rim of the half sphere and pulls the vertex back, which
-    thus does not flip. A flat rest shape has m = 0 up to round-off and s = 0. If H = 0, p is the
-    pole m s n; if moreover the triangles around the vertex have no area, p is the rest vector.
+    the frame: the half sphere is fixed during iterations, so that the objective cannot rise. If
+    s H.n < 0, p is on the rim of the half sphere and pulls the vertex back, so that it does not
+    flip. A flat rest shape has m = 0 up to round-off and s = 0. If H = 0, p is the pole m s n; if
+    moreover the triangles around the vertex have no area, p is the rest value of H.
     """
 
     class Config(GroupConfig):
@@ -345,7 +346,7 @@ class VertexBending(ConstraintGroup):
         return interior_vertices(mesh.triangles, mesh.vertices)[:, None]
 
     def begin_frame(self, q: np.ndarray, elements: np.ndarray | None = None) -> None:
-        """Compute vertex normals at ``q`` (N, 3) m for curved elements among ``elements`` (m,)."""
+        """Compute normals at ``q`` (N, 3) m for all curved elements or those in ``elements``."""
         curved = self._curved
         if elements is not None:
             curved = elements[self.side[elements] != 0.0]
@@ -359,7 +360,7 @@ class VertexBending(ConstraintGroup):
         return self._kernel(project_vertices, elements)
 
     def _kernel(self, function: Any, elements: np.ndarray, touched: Any = None) -> LocalKernel:
-        """Return the kernel of ``function``, which projects ``elements`` or accumulates all."""
+        """Return the kernel of a function that projects ``elements`` or adds the forces of all."""
         operator = self.S.indptr, self.S.indices, self.S.data
         arrays = (*operator, self._manifold, self._work, elements, self._taken)
         numbers, count = (self.elements, len(elements)), lanes.blocks(self.elements)
@@ -419,7 +420,7 @@ class VertexBending(ConstraintGroup):
 
 
 def _crossing(n: np.ndarray) -> np.ndarray:
-    """Return a unit vector orthogonal to each row of n; equal rows give equal vectors."""
+    """Return for each row of n a unit vector orthogonal to it; equal rows give equal vectors."""
     k = np.argmin(np.abs(n), axis=1)
     i, j = (k + 1) % 3, (k + 2) % 3
     rows = np.arange(len(n))

@@ -4,8 +4,8 @@ A lane is the place of one element in a block. The k numbers of each element are
 array as [block][number][lane]: number i of element e is entry
 ``(e // LANES * k + i) * LANES + e % LANES``. The last block is filled up with copies of the last
 element. The working array of a kernel has this layout with a single block. Functions of one lane
-are inlined into the loop over lanes and have selections instead of branches. Fast-math is off, so
-that the result of an element does not depend on its lane.
+are inlined into the loop over lanes and select between values instead of branching. Fast-math is
+off, so that the result of an element does not depend on its lane.
 """
 
 import numpy as np
@@ -55,9 +55,9 @@ def workspaces(numbers: int) -> np.ndarray:
 
 @lane_function
 def take(packed, numbers, elements, start, out):
-    """Copy the block of ``elements[start:]`` to ``out``, filled up with copies of the last one.
+    """Copy the packed numbers of a block of ``elements``, from index ``start`` on, to ``out``.
 
-    ``packed`` is an array from `pack` with k = ``numbers`` per element.
+    ``packed``, from `pack`, has k = ``numbers`` per element. Copies of the last one fill the block.
     """
     last = elements.shape[0] - 1
     for lane in range(LANES):

@@ -14,7 +14,7 @@ from numba import types
 from pdrom.model.compiled import rows
 from pdrom.model.compiled.functions import Callback, caller, compiled, inner
 
-# Indices into every record: the number of vertices; FIRST + k is the first unit of part k, and
+# Indices into every record: the number of vertices; at FIRST + k the first unit of part k, and at
 # FIRST + k + 1 the end of its units. Entries that differ between kernels begin at OWN.
 VERTICES, FIRST, OWN = 0, 1, 4
 # Values of a kernel's argument `part`: do the first or second part, or prepare data for both.
@@ -41,13 +41,13 @@ _call_local, _call_gradients = caller(types.float64), caller(types.void)
 
 @inner(forceinline=True)
 def call(address, y, rhs, record, part):
-    """Call a local kernel by its ``address``: positions y, right-hand side, its data, and part."""
+    """Call the local kernel at ``address`` with the arguments that `local_kernel` describes."""
     return _call_local(address, (y, rhs, record, part))
 
 
 @compiled(nogil=True)
 def add_part(table, y, rhs):
-    """Call all kernels of a ``table``, each of which adds to ``rhs``; return their energy in J.
+    """Call all kernels of a `Table`, each of which adds to ``rhs``; return the sum of energies, J.
 
     ``y`` and ``rhs`` are addresses of arrays (N, 4) with a last column of zeros.
     """

@@ -7,10 +7,10 @@ of their equations, and a single equation remains (for areas without t_2):
     f(t) = t t_1(t) t_2(t) - c = 0
 
 If the product of the s_i is below c, there is one solution. If it is far above c (more than six
-times for three equal values), there are several: for the largest t all values shrink, for the
-smallest t mainly the last value. f is convex near the largest and concave near the smallest
-solution. Newton's iteration thus converges monotonically to each from outside, and the nearer of
-the two is the result. Bouaziz et al. 2014, appendix A, iterate on these equations from s only.
+times for three equal values), there are several: that with the largest t shrinks all values, that
+with the smallest t mainly the last one. As f is convex near the largest and concave near the
+smallest t, Newton's iteration converges monotonically to the largest from above and to the smallest
+from below; the nearer is the result. Bouaziz et al. 2014, appendix A, start only from s.
 
 Values are divided by the larger of s_1 and c^(1/3), so that neither huge nor tiny ones overflow.
 """
@@ -30,7 +30,7 @@ LAST_STEP, ROUNDOFF = 1e-15, 1e-10
 
 @lane_function
 def _partner(t, s, last):
-    """Return the larger root x of x (x - s) = t (t - last), ``last`` s_3, and dx/dt."""
+    """Return the larger root x of x (x - s) = t (t - last) and dx/dt; ``last`` is s_3."""
     square = s * s + 4.0 * t * (t - last)
     root = np.sqrt(square if square > 0.0 else 0.0)
     return 0.5 * (s + root), (2.0 * t - last) / root if root > 0.0 else 1.0
@@ -38,7 +38,7 @@ def _partner(t, s, last):
 
 @lane_function
 def _product(t, values, solid):
-    """Return the product t t_1(t) t_2(t), its derivative by t, t_1(t) and t_2(t)."""
+    """Return t t_1(t) t_2(t), its derivative by t, t_1(t) and t_2(t) (= 1 if not ``solid``)."""
     first, first_slope = _partner(t, values[0], values[2])
     second, second_slope = _partner(t, values[1], values[2])
     second = second if solid else 1.0
@@ -49,7 +49,7 @@ def _product(t, values, solid):
 
 @lane_function
 def _start(work, low, high, solid):
-    """Scale the values and set starting points; return how many elements have two solutions."""
+    """Scale values, set starting points; return how many elements may have several solutions."""
     low_root = low ** (1.0 / 3.0) if solid else np.sqrt(low)
     high_root = high ** (1.0 / 3.0) if solid else np.sqrt(high)
     several = 0.0
@@ -83,7 +83,7 @@ def _start(work, low, high, solid):
 
 @lane_function
 def _advance(work, place, side, solid):
-    """Do a Newton step from above (side 1) or below (-1); return how many elements go on."""
+    """Do a Newton step from above (side 1) or below (-1); return how many elements need more."""
     left = 0.0
     for lane in range(LANES):
         t, target = work[place * LANES + lane], work[TARGET * LANES + lane]
@@ -192,7 +192,7 @@ def _values_at(t: np.ndarray, values: np.ndarray) -> np.ndarray:
 def _bisected(
     below: np.ndarray, above: np.ndarray, values: np.ndarray, target: np.ndarray
 ) -> np.ndarray:
-    """Return values at t, bisected between ``below`` (n,) (product too small) and ``above``."""
+    """Return values with product ``target``, by bisection of t from ``below`` to ``above`` (n,)."""
     for _ in range(120):
         middle = 0.5 * (below + above)
         small = _values_at(middle, values).prod(axis=1) < target

@@ -39,7 +39,7 @@ class SimplexGroup(StencilGroup):
     A subclass sets two kernels. It overrides `_extra` if it stores other numbers than operators.
 
     accumulate_kernel : a `pdrom.model.constraints.local_kernel.local_kernel` whose units are blocks
-    project_kernel : local kernel that writes the projections of some elements, see `samples`
+    project_kernel : local kernel that writes projections of the elements that its record lists
     """
 
     accumulate_kernel: Any
@@ -80,7 +80,7 @@ class SimplexGroup(StencilGroup):
         return self._kernel(self.project_kernel, places)
 
     def _kernel(self, function: Any, elements: np.ndarray, touched: Any = None) -> LocalKernel:
-        """Return the kernel of ``function``, which projects ``elements`` or accumulates all."""
+        """Return the kernel of a function that projects ``elements`` or adds the forces of all."""
         data = (self._corners, self._geometry, np.array(self.allowed), self._work)
         arrays = (*data, elements, *self._taken, *self._own_arrays)
         numbers = self._work.shape[1], len(elements)
@@ -88,15 +88,15 @@ class SimplexGroup(StencilGroup):
         return LocalKernel(function, self.S.shape[1], count, arrays, numbers, touched)
 
     def _extra(self) -> list[np.ndarray]:
-        """Return the packed numbers after the weight: the operator without corner 0's column."""
+        """Return the numbers packed after each weight: the operator without corner 0's column."""
         return [self.operator[:, :, 1:].reshape(self.elements, self.rows_per_element**2)]
 
 
 @lane_function
 def arguments(y, rhs, record, part, corners, numbers):
-    """Return y, rhs, corners, geometry, constants, work, first block and end of the blocks.
+    """Return arrays y, rhs, corners, geometry, constants, work; first block and end of ``part``.
 
-    They are arrays from addresses ``y``, ``rhs``, ``record`` of a `local_kernel`. An element has
+    ``y``, ``rhs`` and ``record`` are the addresses that a `local_kernel` gets. An element has
     ``corners`` vertices and ``numbers`` packed numbers.
     """
     entries = rows.indices(record, ARRAYS)
@@ -143,7 +143,7 @@ def corner_rows(y, corners, place):
 
 @lane_function
 def edge_columns(start, end):
-    """Return rows x, y, z of four edges, from rows ``start``, ``end`` of their four vertices."""
+    """Return rows with x, y, z, padding of four edges, from vertex rows ``start`` to ``end``."""
     return transposed(
         subtract(end[0], start[0]),
         subtract(end[1], start[1]),
@@ -169,7 +169,7 @@ def gather_edges(y, corners, block, edges, work):
 
 @lane_function
 def copy_rows(d, count, start, work, first):
-    """Copy S q of a block, ``d`` (m count, 3) from element ``start`` on, to offset ``first``."""
+    """Copy a block of S q from element ``start`` of ``d`` (m count, 3) to ``first`` in ``work``."""
     last = d.shape[0] // count - 1
     for lane in range(LANES):
         base = count * min(start + lane, last)
@@ -179,7 +179,7 @@ def copy_rows(d, count, start, work, first):
 
 @lane_function
 def add_to(rhs, corners, place, forces):
-    """Add four ``forces`` to ``rhs`` at ``corners[place:place + 4]``; corners may repeat."""
+    """Add four ``forces`` to ``rhs`` at ``corners[place:place + 4]``; a corner may occur twice."""
     for lane in range(WIDTH):
         v = WIDTH * at(corners, place + lane)
         rows.store(rhs, v, add(rows.load(rhs, v), forces[lane]))
@@ -187,7 +187,7 @@ def add_to(rhs, corners, place, forces):
 
 @lane_function
 def take_from(rhs, corners, place, forces):
-    """Subtract four ``forces`` from ``rhs`` at ``corners[place:place + 4]``; they may repeat."""
+    """Subtract four ``forces`` from ``rhs`` at ``corners[place:place + 4]``; corners may repeat."""
     for lane in range(WIDTH):
         v = WIDTH * at(corners, place + lane)
         rows.store(rhs, v, subtract(rows.load(rhs, v), forces[lane]))

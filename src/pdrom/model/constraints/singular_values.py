@@ -27,7 +27,7 @@ from pdrom.model.mesh.types import Mesh
 
 @template
 def project(y_place, p_place, record, part, rows, gradients, nearest):
-    """Write projections of some elements, whose S_e has ``rows`` rows, to memory at ``p_place``.
+    """Write projections of the elements that ``record`` lists; each S_e has ``rows`` rows.
 
     Parameters
     ----------
@@ -59,7 +59,8 @@ def accumulate(y_place, rhs_place, record, part, rows, gradients, nearest, force
     Parameters
     ----------
     y_place, rhs_place, record : addresses of positions, right-hand side and record
-    rows, gradients, nearest, forces : rows of S_e; functions of a block for S q, p, and the forces
+    rows : number of rows of S_e
+    gradients, nearest, forces : functions of a block, which compute S q, p and the forces
     """
     y, rhs, corners, geometry, allowed, work, first, last = simplex.arguments(
         y_place, rhs_place, record, part, rows + 1, 1 + rows * rows
@@ -81,7 +82,7 @@ def accumulate(y_place, rhs_place, record, part, rows, gradients, nearest, force
 
 @template
 def project_gradients(d_pointer, range_pointer, p_pointer, m, rows, work_size, nearest):
-    """Write projections of m elements from their S q; working memory has ``work_size`` per lane.
+    """Write projections of m elements from S q; the working array has ``work_size`` numbers a lane.
 
     Parameters
     ----------
@@ -99,7 +100,7 @@ def project_gradients(d_pointer, range_pointer, p_pointer, m, rows, work_size, n
 
 
 class StrainConfig(GroupConfig):
-    """Range [``minimum``, ``maximum``] of the allowed values; ``minimum`` > 0."""
+    """Range [``minimum`` > 0, ``maximum``] of singular values, or of area or volume ratios."""
 
     minimum: Annotated[float, Field(gt=0.0, le=1.0)] = 0.99
     maximum: Annotated[float, Field(ge=1.0, le=1e3)] = 1.01
@@ -118,7 +119,7 @@ class SingularValueGroup(simplex.SimplexGroup):
 
     @property
     def allowed(self) -> tuple[float, float]:
-        """Least and largest allowed singular value, or product of them."""
+        """Least and largest allowed singular value, or allowed product of the singular values."""
         return self.config.minimum, self.config.maximum
 
     def _set_up(self, mesh: Mesh, inverse: np.ndarray) -> None:

@@ -14,7 +14,7 @@ from pdrom.model.constraints.lanes import LANES, SMALLEST, lane_function, pack, 
 from pdrom.model.constraints.local_kernel import gradient_kernel, local_kernel
 from pdrom.model.mesh.types import Mesh
 
-# offset of the rest length after the weight, and count of both; REST numbers are a rest edge's own
+# an edge has GEOMETRY packed numbers (weight; rest length at LENGTH) and REST of its rest vector
 LENGTH, GEOMETRY = 1, 2
 REST = 3
 # further indices into the record: addresses of all rest edges, and of memory for a block of them
@@ -30,7 +30,7 @@ def _squares(x, y, z):
 
 @lane_function
 def _rest_lengths(x, y, z, length, rest, place):
-    """Return four edges scaled to their rest ``length``; rest edges if they have length zero."""
+    """Return four edges scaled to their rest ``length``; edges of length zero get rest edges."""
     square = _squares(x, y, z)
     factor = divide(length, arithmetic.square_root(square))
     px, py, pz = multiply(factor, x), multiply(factor, y), multiply(factor, z)

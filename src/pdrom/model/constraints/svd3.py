@@ -14,9 +14,9 @@ from pdrom.model.constraints.lanes import LANES, absolute_sum, choose, dot, load
 SWEEPS = 12
 # two columns count as orthogonal if the cosine of their angle is smaller
 ORTHOGONAL = 1e-15
-# if all tangents of a sweep's rotations are below this, the cosines left are about their squares
+# a sweep is the last one if all its rotations have a smaller tangent (then cosines are ~1e-16)
 LAST_TANGENT = 1e-8
-# if the second singular value is below this fraction of the first, its vector is inaccurate
+# a second singular value below this fraction of the first is round-off: its vector is replaced
 RANK = 1e-15
 
 
@@ -43,7 +43,7 @@ def jacobi_rotation(a, b, done):
 
 @lanes.lane_function
 def _sweep(work):
-    """Rotate each pair of columns once; return the number of matrices not yet orthogonal."""
+    """Rotate each pair of columns once; return how many matrices need a further sweep."""
     for lane in range(LANES):
         b0, b1, b2 = lanes.load_matrix(work, B, lane)
         v0, v1, v2 = lanes.load_matrix(work, V, lane)
@@ -66,9 +66,9 @@ def _sweep(work):
 
 @lanes.lane_function
 def _larger_first(a, v, b, w):
-    """Return (a, v, b, w) with the longer of the columns a, b first; v, w are singular vectors.
+    """Return (a, v, b, w), or (b, w, -a, -v) if column b of B is longer than column a.
 
-    If the pairs are swapped, one of them changes its sign, so that V stays a rotation.
+    v and w are the columns of V that belong to a and b. Due to the sign, V stays a rotation.
     """
     swap = dot(a, a) < dot(b, b)
     return (

@@ -1,4 +1,4 @@
-"""Groups on tetrahedra: operator S q = F^T (deformation gradient) and kernels that clamp it.
+"""Groups on tetrahedra: operator S q = F^T (deformation gradient) and kernels that project F.
 
 The iteration X <- (X + X^-T) / 2 converges quadratically to the orthogonal polar factor (Higham
 1986). It is used for well-conditioned matrices with positive determinant, the decomposition of
@@ -44,7 +44,7 @@ def _start(work):
 
 @lanes.lane_function
 def _advance(work):
-    """Do one step of the iteration for elements that still iterate; converged ones stay."""
+    """Do one step of the iteration for elements that still iterate; others do not change."""
     for lane in range(LANES):
         x0, x1, x2 = lanes.load_matrix(work, P, lane)
         c0, c1, c2 = cross(x1, x2), cross(x2, x0), cross(x0, x1)
@@ -60,7 +60,7 @@ def _advance(work):
 
 @lanes.lane_function
 def _rotations(work):
-    """Write nearest rotations to P; set FOUND to 1 for well-conditioned F, to 0 for other F."""
+    """Write the rotations nearest to F to P; set FOUND to 1 if they have converged, else to 0."""
     _start(work)
     for _ in range(STEPS):
         _advance(work)
@@ -126,7 +126,7 @@ def _nearest(work, low, high):
 
 @lanes.lane_function
 def forces(work, geometry, block):
-    """Write the forces S^T W p on the corners to ``work`` and add w |S q - p|^2 to its energy.
+    """Write forces S^T W p on the corners and add w |S q - p|^2 to the energies, all in ``work``.
 
     ``geometry`` has the packed numbers of all blocks, ``block`` is the index of one.
     """

@@ -5,7 +5,7 @@ that the constraint is invariant under rotations in space. S q = F^T has two row
 
 The singular values sigma_i of F are square roots of the eigenvalues m +- h of F^T F. The nearest
 matrix is F (g_1 v_1 v_1^T + g_2 v_2 v_2^T) with g_i = clamp(sigma_i) / sigma_i and eigenvectors
-v_i; they are not computed, since v_1 v_1^T - v_2 v_2^T is the traceless part of F^T F over h. The
+v_i, which are not computed, since v_1 v_1^T - v_2 v_2^T is the traceless part of F^T F over h. The
 smaller singular value comes from the cross product of the columns, without cancellation. If F is
 nearly rank deficient ("flat"), a one-sided Jacobi rotation is used instead (module `svd3`). Vector
 k of a stored matrix is column k of F (S q = F^T). See module `lanes` for the layout.
@@ -28,13 +28,13 @@ from pdrom.model.mesh.types import Mesh
 FLAT = 1e-2
 # if the mean square is in this range, the closed form neither overflows nor loses digits
 LOW, HIGH = 1e-60, 1e60
-# EQUAL times the mean eigenvalue m is added to h, which is zero if sigma_1 = sigma_2
+# EQUAL times the mean eigenvalue m is added to h, a divisor that is zero if sigma_1 = sigma_2
 EQUAL = 1e-17
 
 
 @lanes.lane_function
 def _closed_form(f0, f1, low, high):
-    """Return the columns of the nearest matrix, and whether this closed form is accurate."""
+    """Return the columns of the matrix nearest to [f0, f1], and whether they are accurate."""
     a, b, off = dot(f0, f0), dot(f1, f1), dot(f0, f1)
     mean, half = 0.5 * (a + b), 0.5 * (a - b)
     h = np.sqrt(half * half + off * off) + EQUAL * mean
@@ -59,7 +59,7 @@ def _closed_form(f0, f1, low, high):
 
 @lanes.lane_function
 def _rotated(f0, f1, low, high):
-    """Return the columns of the nearest matrix, by a rotation that makes the columns orthogonal."""
+    """Return the columns of the matrix nearest to [f0, f1], by a Jacobi rotation of f0 and f1."""
     scale, c, s, swapped, pair = rotated_pair(f0, f1, 1.0)
     u0, u1, s0, s1 = pair
     # the term 0 * scale makes the result nan where F is not finite
@@ -89,7 +89,7 @@ def gradients(work, geometry, block):
 
 @lanes.lane_function
 def forces(work, geometry, block):
-    """Write the forces S^T W p on the corners to ``work`` and add w |S q - p|^2 to its energy.
+    """Write forces S^T W p on the corners and add w |S q - p|^2 to the energies, all in ``work``.
 
     ``geometry`` has the packed numbers of all blocks, ``block`` is the index of one.
     """

@@ -21,7 +21,7 @@ VALUES, WORK = svd3.SIZE, svd3.SIZE + products.SIZE
 
 @lanes.lane_function
 def _nearest(work, low, high):
-    """Write the projections of a block to ``work``; it is F itself if det F is in the range."""
+    """Write the projections of a block to ``work``: F itself if det F is in the range."""
     for lane in range(lanes.LANES):
         f0, f1, f2 = lanes.load_matrix(work, F, lane)
         volume = lanes.dot(f0, lanes.cross(f1, f2))

@@ -16,7 +16,7 @@ from pdrom.model.compiled.rows import flat, write
 # Relative Tikhonov term of the small least-squares problem. It bounds the weights if residual
 # differences are nearly parallel, which happens close to convergence.
 REGULARISATION = 1e-14
-# Index, in the counters of a history, of the number of stored differences; -1: no iterate yet.
+# Index in a history's counters of the number of stored differences, which is -1 without iterate.
 DIFFERENCES = 0
 
 
@@ -147,7 +147,7 @@ class Anderson:
 
     def refuse(self, y: np.ndarray, objective: float) -> bool:
         """Return whether iterate ``y`` is rejected, as its ``objective``, J, has risen. It is then
-        overwritten by the last image G(y) and the history deleted; if nan, y is accepted.
+        overwritten by the last image G(y) and the history deleted; nan counts as not risen.
         """
         return refuse(self.history, _numbers(y), objective)
 

@@ -146,10 +146,11 @@ def all_iterations(
     which : (first, end, K): compute iterations first, ..., end - 1 of the K iterations of a frame
     y, s, base, rhs : iterate, prediction, (M/h^2) s, working array; flat rows of four numbers
     inertia : (N,) M/h^2, kg/s^2
-    tables, second : tables of the local kernels; (array, first row, end) for their second parts
+    tables : first, preparing and second table of a `LocalPass`
+    second : array to which its second parts add, first and end of the vertices that they change
     factor : triangular factor of the global system (`pdrom.model.dynamics.solvers.Factor`)
     history : history of the acceleration; with `NO_HISTORY` its code is not compiled
-    objective, seconds : written: (K,) objective, J, or empty; (4,) s, entries 1, 2 for the steps
+    objective, seconds : arrays that receive results, as in `CompiledIterations.run`
     watch : buffer for the clock, from `pdrom.model.compiled.functions.clock`
     """
     first, end, iterations = which
@@ -183,7 +184,7 @@ def all_iterations(
                 objective[k] = objective[k - 1]
         else:
             sweep(panels, vertices, loads, work, rhs, y)
-            # the last image G(y) ends the frame unchanged: its objective cannot exceed that of y
+            # a frame ends with the image G(y) itself, whose objective cannot exceed that of y
             if history is not None and k < iterations - 1:
                 combine(history, y)
         seconds[2] += now(watch) - between
@@ -204,8 +205,7 @@ class WholeFrames:
     ----------
     space : space whose ``held_path`` and ``system`` are used
     loop : the compiled iterations
-    forces : forces, each with a ``rate`` (not None)
-    contacts : contacts, each with a ``height`` (not None)
+    forces, contacts : effects of a scene; every force has a ``rate``, every contact a ``height``
     """
 
     def __init__(
@@ -253,7 +253,7 @@ class WholeFrames:
     def run(
         self, q: np.ndarray, v: np.ndarray, frames: range, h: float, iterations: int, track: bool
     ) -> Blocks | None:
-        """Run the first of ``frames``, as many as a call can; return None for an uncompiled solver.
+        """Run as many of the first ``frames`` as one call can; None if the solver is not compiled.
 
         Parameters
         ----------

@@ -2,9 +2,9 @@
 
 Panels (supernodes) are consecutive columns of a factor that substitution ("sweep") treats together.
 A panel stores, of the rows below its columns, those in which any of its columns has an entry; the
-other columns get explicit zeros. In wider panels, fewer numbers are read twice and substitution
-waits less often for the preceding column, but more zeros are stored. Dynamic programming finds the
-partition of the columns with the smallest estimated number of processor cycles.
+other columns get explicit zeros. With wider panels, substitution reads the right-hand side less
+often and waits less often for a preceding column, but more zeros are stored. Dynamic programming
+finds the partition of the columns with the smallest estimated number of processor cycles.
 """
 
 from typing import Any
@@ -37,7 +37,7 @@ def panels(lower: sparse.csc_array, diagonal: np.ndarray) -> tuple[Any, ...]:
 
     first : (P + 1,) first column of each panel
     row_start, value_start : (P + 1,) first index of each panel in ``rows`` and in ``values``
-    rows : rows below each panel, times `pdrom.model.compiled.rows.WIDTH`
+    rows : indices of the rows below each panel, times `pdrom.model.compiled.rows.WIDTH`
     values : for each panel of w columns with m rows below: 1 / D (w,), the strict lower triangle of
         its part of L row by row, then its rows below (m, w)
     """
@@ -66,7 +66,7 @@ def panels(lower: sparse.csc_array, diagonal: np.ndarray) -> tuple[Any, ...]:
 
 @compiled
 def _count_rows_below(indptr, indices, seen, below):
-    """Write to below[w, j] the number of rows below a panel of w columns that ends with column j.
+    """Write to below[w, j] how many rows below row j have an entry in columns j - w + 1 to j.
 
     ``seen`` (n,) is working memory, filled with -1. Python allocates all arrays, because an
     allocation in compiled code takes a tenth of a second to compile.
@@ -143,7 +143,7 @@ SOLVERS = Registry(
     },
 )
 
-# A factor is the first arguments of `sweeps.sweep`: panels, vertices, loads, working array.
+# A factor is a tuple of the first four arguments of `sweeps.sweep`: panels, vertices, loads, x.
 Factor = tuple[tuple[Any, ...], np.ndarray, np.ndarray, np.ndarray]
 NOTHING_FREE: Factor = (
     (np.zeros(1, np.int32), *(np.zeros(1, np.int64),) * 2, np.zeros(0, np.int32), np.zeros(0), 0),

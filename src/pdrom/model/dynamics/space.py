@@ -36,15 +36,15 @@ class Space(ABC):
         return s.copy()
 
     def end(self, y: np.ndarray, before: np.ndarray, h: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return coordinates and velocities at a frame's end; ``before`` are those at its start."""
+        """Return coordinates and velocities after a frame; ``before``: coordinates at its start."""
         return y, (y - before) / h
 
     def compiled(
         self, local_steps: Sequence[Any], acceleration: Anderson | None = None
     ) -> tuple[CompiledIterations | None, WholeFrames | None]:
-        """Return compiled iterations of ``local_steps``, with ``acceleration``, and whole frames.
+        """Return compiled code for the iterations of a frame and for whole frames.
 
-        Each of the two is None if it is not available in these coordinates.
+        Either is None if these coordinates or ``local_steps`` lack it; both use ``acceleration``.
         """
         return None, None
 
@@ -76,7 +76,7 @@ class Space(ABC):
 
     @abstractmethod
     def correct(self, y: np.ndarray, before: np.ndarray, frame: int) -> None:
-        """Apply all contacts to ``y`` at the end of ``frame``; ``before`` is y at its beginning."""
+        """Apply contacts to ``y`` at the end of ``frame``; ``before``: coordinates at its start."""
 
 
 class VertexSpace(Space):

@@ -105,7 +105,7 @@ class Stepper:
     def run(self, state: State, frames: range) -> Iterator[tuple[State, FrameReport]]:
         """Yield the state and report after each of ``frames``, several of them per compiled call.
 
-        Changes that the caller makes between two frames do not affect the following frames.
+        A change that the caller makes between two frames may come too late for the next frames.
         """
         while frames:
             # if a subclass overrides `step`, it is called for every frame
@@ -116,7 +116,7 @@ class Stepper:
                 yield after
 
     def _at_once(self, state: State, frames: range) -> Sequence[tuple[State, FrameReport]]:
-        """Compute as many of the first ``frames`` as one compiled call can; () if it cannot."""
+        """Compute as many of the first ``frames`` as one compiled call can; () if no call can."""
         if self._whole is None:
             return ()
         q, v, h = state.positions, state.velocities, self.time_step
@@ -149,7 +149,8 @@ class Stepper:
     ) -> tuple[np.ndarray, np.ndarray]:
         """Compute all iterations of a frame from y = s; return the last y and the objective (K,).
 
-        The computation times of local and global steps are added to ``seconds``.
+        The times of local and global steps are added to ``seconds``; ``watch`` is called with the y
+        with which the last iteration begins.
         """
         y = self.space.copy(s)
         objective = np.full(self.iterations if self._track else 0, np.nan)
@@ -173,7 +174,7 @@ class Stepper:
     def _in_python(
         self, k: int, vectors: Vectors, system: Solve, objective: np.ndarray, seconds: np.ndarray
     ) -> None:
-        """Compute iteration k with any local steps; update y, objective and seconds in place.
+        """Compute iteration k without compiled code; update y, objective and seconds in place.
 
         ``vectors`` are s, (M/h^2) s and y.
         """
@@ -195,7 +196,7 @@ class Stepper:
             objective[k : k + 1] = objective[k - 1 : k]
         else:
             system.solve(rhs, y)
-            # the last image G(y) ends the frame unchanged: its objective cannot exceed that of y
+            # a frame ends with the image G(y) itself, whose objective cannot exceed that of y
             if k < self.iterations - 1:
                 acceleration.combine(y)
         seconds[2] += perf_counter() - before

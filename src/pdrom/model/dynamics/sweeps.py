@@ -70,7 +70,7 @@ class _Panel:
         return multiply_add(self.builder, self.builder.fneg(entry), b, a)
 
     def rows_below(self):
-        """Loop over the rows below; yield the address and a function: column -> entry of L."""
+        """Loop over the rows below; yield a row's address and a function: column -> entry of L."""
         builder = self.builder
         with cgutils.for_range_slice(builder, self._start, self._stop, self._index(1)) as (k, _):
             row = builder.sext(builder.load(builder.gep(self._rows, [k])), _INDEX)
@@ -80,7 +80,7 @@ class _Panel:
 
 
 def _panel_intrinsic(write):
-    """Return an intrinsic whose LLVM instructions for a panel the function ``write`` generates."""
+    """Return an intrinsic for a panel; the function ``write`` generates its LLVM instructions."""
 
     def typed(_context, width, x, first, rows, start, stop, values, value_start):
         def generate(context, builder, signature, arguments):
@@ -166,7 +166,7 @@ def load(beside, indptr, indices, data, targets, loads):
 def _sweep(
     count, first, row_start, value_start, rows, values, size, vertices, loads, x, rhs, y
 ):  # fmt: skip
-    """Substitute in ``count`` panels of ``size`` unknowns like `sweep`; the rest are addresses."""
+    """Compute `sweep` for ``count`` panels, ``size`` unknowns; other arguments are addresses."""
     first, vertices = integers(first, count + 1), integers(vertices, size)
     row_start, value_start = indices(row_start, count + 1), indices(value_start, count + 1)
     rows, values = integers(rows, row_start[count]), doubles(values, value_start[count])

@@ -68,7 +68,7 @@ class EffectConfig(ConfigModel):
     def tilted(self, degrees: float, axes: Sequence[int], place: int) -> Self:
         """Return the effect; gravity is turned by ``degrees``, other effects do not change.
 
-        It turns towards ``axes[place]`` (0, 1 or 2) after removal of an axis along gravity.
+        Gravity turns towards ``axes[place]``; an axis (0, 1 or 2) parallel to it is not counted.
         """
         return self
 
@@ -152,8 +152,8 @@ class Boundary(Effect):
     def targets(self, frame: int, current: np.ndarray) -> np.ndarray:
         """Return the positions (n, 3) m of the held vertices at the end of ``frame``.
 
-        ``current`` (n, 3) m are their positions at its beginning, which the effect stores in the
-        first frame of a hold.
+        ``current`` (n, 3) m are their positions at the frame's beginning, which the effect stores
+        in the first frame of a hold.
         """
 
     def takes_hold(self, frame: int) -> bool:
@@ -223,7 +223,7 @@ class Contact(Effect):
 
 
 def effect_config(entry: Any, index: int) -> EffectConfig:
-    """Return the typed configuration of ``entry`` ``index`` in effects; ValueError if invalid."""
+    """Return the configuration of effect ``entry``, number ``index``; ValueError if invalid."""
     if isinstance(entry, EffectConfig):
         return entry
     if not isinstance(entry, dict) or not isinstance(entry.get("effect"), str):
@@ -270,7 +270,7 @@ def held_path(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return held vertices (m,) and their targets (n, m, 3) m in the first n >= 1 ``frames``.
 
-    They end before the first frame in which the set of held vertices changes or a hold begins,
+    These frames end before the first in which the set of held vertices changes or a hold begins,
     since targets of that hold depend on positions that are not yet known.
 
     Parameters

@@ -55,7 +55,7 @@ class Hold(Boundary):
 
     @abstractmethod
     def _moved(self, anchor: np.ndarray, frame: int) -> np.ndarray:
-        """Return targets (n, 3) m in ``frame``; ``anchor`` (n, 3) m is where the hold began."""
+        """Return targets (n, 3) m in ``frame``; the hold began at positions ``anchor`` (n, 3) m."""
 
 
 class Pins(Hold):

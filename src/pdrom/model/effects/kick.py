@@ -17,7 +17,7 @@ class Kick(Start):
     """
 
     class Config(EffectConfig):
-        """``speed`` is the largest vertex speed in m/s; only ``axes`` get a velocity."""
+        """``speed`` is the largest vertex speed in m/s; velocities are along ``axes`` only."""
 
         effect: Literal["kick"] = "kick"
         speed: Annotated[float, Field(gt=0.0, le=1e3, allow_inf_nan=False)]

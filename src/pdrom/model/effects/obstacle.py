@@ -10,7 +10,7 @@ from pdrom.model.effects.base import Contact, EffectConfig, Vector
 from pdrom.model.mesh.selection import require_direction, require_ordered
 from pdrom.model.mesh.types import Length, Mesh, PositiveLength
 
-# A vertex that is inside by at most this fraction of the mesh's longest side counts as outside.
+# A vertex inside an obstacle by at most this fraction of the mesh's longest side counts as outside.
 SLACK = 1e-9
 
 Entries = tuple[np.ndarray, np.ndarray, np.ndarray]
@@ -61,7 +61,7 @@ class Obstacle(Contact):
             positions[inside] = lifted - along + self._braked(along, depth)
 
     def _braked(self, along: np.ndarray, depth: np.ndarray) -> np.ndarray:
-        """Return tangential motion ``along`` (n, 3) m, shortened by friction; ``depth`` (n,) m."""
+        """Return tangential motion ``along`` (n, 3) m, shortened by mu times ``depth`` (n,) m."""
         mu = self.config.friction
         if mu == 0.0:
             return along

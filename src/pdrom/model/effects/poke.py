@@ -12,7 +12,7 @@ from pdrom.model.effects.hold import AXES
 from pdrom.model.mesh.selection import Selection, farthest_points, select_vertices
 from pdrom.model.mesh.types import Length, Mesh
 
-# displacement over amplitude at equally spaced times
+# displacements, divided by the amplitude, at equally spaced times
 KNOTS = (0.0, -1.0, 1.0, -1.0, 0.0)
 
 

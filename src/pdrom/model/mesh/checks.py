@@ -37,7 +37,7 @@ def check_mesh(mesh: Mesh, name: str) -> Mesh:
 
 
 def mesh_of(points: np.ndarray, cells: np.ndarray, name: str) -> Mesh:
-    """Return a mesh of points (N, 3) m and triangles (T, 3) or tetrahedra (E, 4), then oriented.
+    """Return a mesh of ``points`` (N, 3) m and ``cells`` (n, 3 or 4); tetrahedra are oriented.
 
     Raises
     ------
@@ -151,8 +151,8 @@ def _check_measures(mesh: Mesh, cells: np.ndarray, kind: str, name: str) -> None
     corner = mesh.points[cells]
     edges = corner[:, 1:] - corner[:, :1]
     longest = np.linalg.norm(edges, axis=2).max(axis=1)
-    # scale edges to length one, then compute area or volume, not the Gram determinant: that is the
-    # square, and consists of round-off for values below 1e-8
+    # scale the longest edge to one; the Gram determinant is not used: as the square of area or
+    # volume, it would consist of round-off where these are below 1e-8
     edges = edges / longest[:, None, None]
     normal = np.cross(edges[:, 0], edges[:, 1])
     if kind == "triangle":

@@ -19,9 +19,9 @@ def cloth(
 ) -> Mesh:
     """Return a sheet of ``rows`` x ``columns`` vertices; square cells with two triangles each.
 
-    Vertex (i, j) has index ``i * columns + j``. Each cell is split into [ll, ur, ul] and
-    [ll, lr, ur] with ul = ll + 1, lr = ll + columns, ur = lr + 1. The sheet is centred, its longer
-    side measures ``extent`` metres, and it is lifted by ``lift`` metres along y.
+    Vertex (i, j) has index ``i * columns + j``. A cell with corners ll (lower left), ul = ll + 1,
+    lr = ll + columns and ur = lr + 1 is split into [ll, ur, ul] and [ll, lr, ur]. The sheet is
+    centred, its longer side measures ``extent`` metres, and it is lifted by ``lift`` m along y.
 
     Parameters
     ----------

@@ -30,7 +30,7 @@ import numpy as np
 
 REFUSED = 3
 NO_MEMORY = 4
-# Format -> first byte of its files, for formats with a common extension.
+# Format -> first byte of its files, for formats that share an extension.
 OPENINGS = {"ansys": b"(", "gmsh": b"$"}
 
 
@@ -92,7 +92,7 @@ def read(path: str, formats: list[str], max_vertices: int, max_cells: int) -> tu
     name = next((name for name in formats if OPENINGS.get(name) == begins), formats[0])
     try:
         points, cells = read_obj(Path(path)) if name == "obj" else _by_meshio(path, name)
-        # for a damaged file a reader may return no arrays, which the conversion rejects
+        # the points of a damaged file may be no array, which is rejected by the conversion below
         _check_size("vertices", len(np.atleast_1d(points)), max_vertices)
         _check_size("cells", len(cells), max_cells)
         points = np.ascontiguousarray(points, dtype=np.float64)
@@ -167,7 +167,7 @@ class RefusedError(ValueError):
 
 
 class CutError(UnreadableError):
-    """A file that is truncated, before the end of its mesh."""
+    """A truncated file, which stops before the end of its mesh."""
 
     def __init__(self, why: str) -> None:
         super().__init__(f"cut off: {why}")
@@ -216,9 +216,9 @@ PIECE, PATIENCE = 4096, 100
 ENDS = {
     "ansys": rb"\)\s*\Z",
     "gmsh": rb"^\$End\w+\s*\Z",
-    "medit": rb"\A\x01\0\0\0|^\s*End\s*\Z",  # a binary file has no end mark
+    "medit": rb"\A\x01\0\0\0|^\s*End\s*\Z",  # a binary file (its first bytes) has no end mark
     "nastran": rb"^ENDDATA",
-    "netgen": rb"^\s*endmesh\s*$",  # a section with the geometry may follow it
+    "netgen": rb"^\s*endmesh\s*$",  # a section with the geometry may follow
     "permas": rb"^\s*\$FIN",
     "stl": rb"^\s*endsolid[^\n]*\s*\Z",
     "vtu": rb"</VTKFile>\s*\Z",
@@ -249,8 +249,8 @@ def check_before(name: str, content: bytes) -> None:
     CutError
         The end mark of this format is missing.
     UnreadableError
-        The reader would ignore a line that changes the mesh, or the numbers given to vertices,
-        which are not in ascending order.
+        The reader would ignore a line that changes the mesh, or vertex numbers that are
+        not in ascending order.
     """
     binary = name == "stl" and 84 + 50 * int.from_bytes(content[80:84], "little") == len(content)
     if name in ENDS and not binary and not re.search(ENDS[name], content, re.M):
@@ -284,7 +284,7 @@ def check_after(name: str, content: bytes, mesh: Any) -> None:
         counts = re.findall(rb"^[ \t]*(?:NELEM|MARKER_ELEMS)[ \t]*=[ \t]*(\d+)", content, re.M)
         announced = {sum(map(int, counts))}
     elif name == "vtk":
-        offsets = content.startswith(b"# vtk DataFile Version 5")  # its CELLS number is one larger
+        offsets = content.startswith(b"# vtk DataFile Version 5")  # CELLS: number of cells + 1
         counts = re.findall(rb"^(CELLS|CELL_TYPES)[ \t]+(\d+)", content, re.M)
         announced = {int(count) - (offsets and word == b"CELLS") for word, count in counts}
     if announced - {there}:
@@ -407,7 +407,7 @@ IGNORED = frozenset(
 
 
 def read_obj(path: Path) -> tuple[np.ndarray, np.ndarray]:
-    """Return points (N, 3), without weights w, and triangles (E, 3), from 0, of the file ``path``.
+    """Return points (N, 3), without weights w, and triangles (E, 3), counted from 0, of a file.
 
     Raises
     ------

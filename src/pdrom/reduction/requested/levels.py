@@ -23,20 +23,20 @@ from pdrom.reduction.subspace.model import SubspaceModel
 from pdrom.reduction.subspace.space import projector
 
 WINDOW = 5  # number of differences of iterates that Anderson acceleration combines
-# Full-order cost in ns: a projection takes PROJECTION times its squared number of rows, an entry of
-# the factor ENTRY, acceleration ACCELERATED per vertex and iteration, a frame in Python IN_PYTHON
-# more than a compiled FRAME.
+# Full-order costs in ns: a projection, PROJECTION times its squared number of rows; an entry of the
+# Cholesky factor, ENTRY; acceleration, ACCELERATED per vertex and iteration; a frame, FRAME if its
+# loop is compiled, IN_PYTHON more if not.
 PROJECTION, ENTRY, ACCELERATED = 5.0, 0.9, 6.5
 FRAME, IN_PYTHON = 2.3e4, 1.2e5
-# Reduced cost in ns: a projection takes SAMPLED times its squared number of rows, an entry of a
-# dense product DENSE, the rest of an iteration ITERATION.
+# Reduced costs in ns: a projection, SAMPLED times its squared number of rows; an entry of a dense
+# product, DENSE; the rest of an iteration, ITERATION; a frame, two constants as in full order.
 SAMPLED, DENSE, ITERATION = 12.5, 0.23, 1.2e3
 REDUCED_FRAME, REDUCED_IN_PYTHON = 4e4, 2.3e5
-# Estimated number of entries of the Cholesky factor: FILL n log2 N for n entries in N rows.
+# The Cholesky factor of a matrix with n entries in N rows has about FILL n log2 N entries.
 FILL = 0.35
 # Size of the random shift of a perturbed start, relative to the mesh's longest side, and its seed.
 MOVED, SEED = 1e-10, 0
-CONVERGED, MOST = 80, 320  # iterations of a reference: CONVERGED at first, doubled up to MOST
+CONVERGED, MOST = 80, 320  # first and largest number of iterations per frame of a reference run
 Quantity = Literal["position", "velocity"]
 QUANTITIES: tuple[Quantity, ...] = get_args(Quantity)
 
@@ -45,7 +45,7 @@ OnFrame = Callable[[str], None]
 
 
 def silent(title: str) -> None:
-    """Do nothing: default of the callback that receives the ``title`` of a level."""
+    """Do nothing: default of the callback that receives the ``title`` of a level of accuracy."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class Level:
 
     @property
     def title(self) -> str:
-        """Name of the level in messages and tables."""
+        """Name of this level of accuracy in messages and tables."""
         count = f"K = {self.iterations}"
         if self.model is None:
             return f"full order, {'Anderson, ' if self.window else ''}{count}"
@@ -152,9 +152,7 @@ class Trajectory:
     def check(self, exact: "Trajectory") -> float:
         """Compute the next frame twice from the same state, by this level and by that of ``exact``.
 
-        Returns
-        -------
-        The defect (error made in one frame): the distance, m, between the two results.
+        Return the defect (error made in one frame): the distance, m, between the two results.
         """
         frame = self.frames
         before = State(self.ends[-1], self._of_vertices(self._state.velocities))

@@ -5,11 +5,12 @@ variation of it. The scene is run by the cheapest level whose error on both, tim
 is within the tolerance.
 
 The defect of a frame is the distance to the result of a more accurate level from the same state. A
-run accumulates defects and amplifies them. The error of the run is estimated as its error in the
-calibration times a ratio (run / calibration), if that exceeds 1: of the defects in checked frames,
-or of the distances to the run of a second level with a perturbed initial state. The tolerance
-counts as met for the first frames over which the estimate is within it. A reduction that fails is
-replaced by a full-order level, and that by the most accurate one. No decision depends on timings.
+run accumulates defects and amplifies them. The error of a run is estimated as the error of its
+level in the calibration, times the larger of two ratios (run over calibration) if above 1: of the
+defects in checked frames, and of the distances to a run of a second level with a perturbed start.
+The tolerance counts as met for the first frames over which the estimate is within it. A reduction
+that fails is replaced by a full-order level, and that by the most accurate one. No decision depends
+on timings.
 """
 
 import logging
@@ -50,7 +51,7 @@ AMPLIFIED = "a second run, of another accuracy and moved by round-off, departs a
 
 
 class Request(ConfigModel):
-    """Largest relative error of a run against its implicit step, solved to convergence.
+    """Largest allowed relative error of a run against the implicit step solved to convergence.
 
     error : largest relative error, such as 0.01 for one per cent
     quantity : "position" or "velocity", whose error over all frames is limited
@@ -141,7 +142,7 @@ class Outcome:
         level can meet it: the most accurate full-order level has run instead
     limit : reason why later frames are not within the tolerance; empty if all frames are
     expected : error of the chosen level on the motions of the calibration, times the safety factor
-    estimate : estimated error over these frames, times the safety factor; None if ``frames`` is 0
+    estimate : estimated error over the first ``frames``, times the safety factor; None if that is 0
     level : title of the level that computed the positions
     reduced : whether that level is a reduced model
     failed : titles of the levels that were run before and did not meet the tolerance
@@ -165,16 +166,16 @@ class Outcome:
 
     @property
     def met(self) -> bool:
-        """Whether the tolerance counts as met for any frames."""
+        """Whether the tolerance counts as met for at least one frame."""
         return self.frames > 0
 
 
 @dataclass(frozen=True)
 class Calibration:
-    """Calibrated ``levels``, ordered by work, and the reference ``motions`` they were run on.
+    """Calibrated ``levels`` of accuracy, the cheapest first, and the ``motions`` they have run.
 
-    All errors are those of positions, or of velocities. A tolerance may not be below that of the
-    calibration.
+    All errors are those of one quantity, positions or velocities. Methods take the requested
+    tolerance as ``error``; it may not be below the one for which the levels were calibrated.
     """
 
     levels: list[Calibrated]
@@ -188,9 +189,9 @@ class Calibration:
         return max(full, key=lambda each: (each.level.iterations, each.level.window))
 
     def horizon(self, error: float) -> tuple[int, str]:
-        """Number of first frames in which an error of ``error`` can be measured; reason of the end.
+        """Number of first frames in which an error of ``error`` is measurable, and why not in more.
 
-        It ends where the reference runs are less accurate, or rounding errors decide.
+        In later frames the reference runs are less accurate than this, or rounding errors decide.
         """
         least = error / self.settings.factor
         converged = min(levels.last_within(motion.unconverged, least) for motion in self.motions)
@@ -210,17 +211,17 @@ class Calibration:
         return self.settings.factor * float(max(errors[end - 1] for errors in known))
 
     def admissible(self, error: float) -> list[Calibrated]:
-        """Levels with an expected error of at most ``error``; none if all of them are reduced."""
+        """Levels of accuracy with an expected error up to ``error``; [] if none is full-order."""
         good = [each for each in self.levels if self.expected(each, error) <= error]
         return good if any(not each.reduced for each in good) else []
 
     def full_order(self, error: float) -> Calibrated:
-        """Cheapest admissible full-order level, or the most accurate one if none is admissible."""
+        """Cheapest `admissible` full-order level of accuracy, else the most accurate level."""
         full = (each for each in self.admissible(error) if not each.reduced)
         return next(full, self.most_accurate)
 
     def second(self, level: Calibrated, error: float) -> Calibrated:
-        """Level with which a run of ``level`` is compared: the cheapest other one of its kind.
+        """Cheapest other level of accuracy, reduced or not like ``level``, to compare a run with.
 
         Its expected error is at most ``error`` times the safety factor; ``level`` if there is none.
         """
@@ -230,10 +231,10 @@ class Calibration:
         return next(others, level)
 
     def attempts(self, error: float) -> list[Calibrated]:
-        """Levels to run in turn until one meets the tolerance ``error``.
+        """Levels of accuracy to run in turn until one meets the tolerance ``error``.
 
-        First the cheapest reduction, if it saves time even with its second run and checks, then the
-        cheapest admissible full-order level, if there is one, last the most accurate one.
+        First the cheapest reduction, if it saves time even with the run to compare with and checks;
+        then the cheapest admissible full-order level, if there is one; last the most accurate one.
         """
         full = self.full_order(error)
         most = WORTH * (full.work + self.second(full, error).work)
@@ -245,7 +246,7 @@ class Calibration:
 
 
 class CheckedRun:
-    """Run of ``scene`` within the tolerance ``error``, by the levels of a ``calibration``."""
+    """Run of ``scene`` within the tolerance ``error`` by one of the levels of ``calibration``."""
 
     def __init__(
         self, calibration: Calibration, scene: Scene, error: float, on_frame: OnFrame = silent
@@ -288,11 +289,11 @@ class CheckedRun:
         return self._started[-1]
 
     def _estimated(self, level: Calibrated) -> tuple[Trajectory, np.ndarray]:
-        """Run ``level`` until it ends or a check fails; return the run and estimated errors (F,).
+        """Run ``level`` to the end or to a failed check; return the run and estimated errors (F,).
 
         The expected error is multiplied by the root mean square of the run's defects (errors made
-        in one frame) over that of the calibration, if above 1. Errors are inf if none is known or a
-        check failed.
+        in one frame) over the largest defect in the calibration, if this ratio is above 1. All
+        errors are inf if the expected error is, or if a check failed.
         """
         own, frames, full = self._own, self._frames, self._own.full_order(self._error).level
         largest = BLOWUP_EXTENT * self._scene.mesh.extent
@@ -305,7 +306,7 @@ class CheckedRun:
         for frame in check_frames(frames, frames // own.settings.every if level.reduced else 0):
             run.to(frame).check(exact)
             size = np.sqrt(np.mean(np.square(list(run.defects.values())))) / own.motions[0].unit
-            with np.errstate(divide="ignore", invalid="ignore"):  # errors of frames may be zero
+            with np.errstate(divide="ignore", invalid="ignore"):  # both defects may be zero
                 estimate = expected * float(np.fmax(1.0, np.divide(size, level.defect)))
             if not (estimate <= self._error and np.ptp(run.ends[-1], axis=0).max() <= largest):
                 return run, hopeless
@@ -316,7 +317,7 @@ class CheckedRun:
     def _amplified(self, level: Calibrated, run: Trajectory) -> np.ndarray:
         """Estimate errors (F,) over the first frames of ``run`` by comparison with a second level.
 
-        The expected error is multiplied by the distance of the two runs over its expected value.
+        The expected error is multiplied by the runs' distance over the expected distance, if > 1.
         """
         own, second = self._own, self._own.second(level, self._error)
         other = self._start(second.level, moved=True).to(self._frames)
@@ -364,8 +365,10 @@ def calibrate(
 
 
 def _reduced(training: Scene, motion: Motion, settings: ToleranceSettings) -> Iterator[Level]:
-    """Yield reduced levels, trained on the converged reference of ``motion`` and on runs of other
-    motions with 20 accelerated iterations; none if the scene is not reducible.
+    """Yield the reduced levels of accuracy; none if a model of the scene cannot be made.
+
+    They are trained on the converged reference run of ``motion`` and on runs of other motions with
+    20 accelerated iterations.
     """
     frames = np.arange(0, training.config.frames, 2)
     few = frames[:: -(-len(frames) // settings.frames)]
@@ -408,7 +411,7 @@ def _calibrated(level: Level, motions: Sequence[Motion], on_frame: OnFrame) -> C
 
 
 def transferred(trained: Scene, scene: Scene) -> Scene:
-    """Return ``trained`` with the material, masses, step, frames and obstacles of ``scene``.
+    """Return ``trained`` with the material, masses, time step, frames, obstacles of ``scene``.
 
     Errors of levels depend on these, so that the calibration uses those of the scene to be run.
     Held vertices, their paths and the initial velocity remain those of ``trained``.

@@ -47,7 +47,7 @@ TIE = 1e-6
 
 
 def deim_entries(v: np.ndarray) -> np.ndarray:
-    """Greedy DEIM entries of the basis ``v`` (n, r): min(n, r) indices, nested in r.
+    """Greedy DEIM entries of the basis ``v`` (n, r): min(n, r) indices, the first k for k modes.
 
     The k-th residual v_k - V_{k-1} (P^T V_{k-1})^-1 P^T v_k vanishes at all earlier entries; the
     entry where its magnitude, times `tie_weights`, is largest comes next. These are the pivots of
@@ -70,13 +70,13 @@ def tie_weights(n: int) -> np.ndarray:
     """Factors w (n,), falling from 1 to almost 1 - TIE, that break ties between n magnitudes.
 
     In a symmetric motion residuals are equal up to round-off, and the largest of them would depend
-    on the order of operations. After multiplication by the factors, the first one is the largest. A
-    later entry, by d places, is selected only if it is larger by more than the fraction TIE d / n.
+    on the order of operations. After multiplication by the factors, the first one is the largest.
+    An entry d places later is selected only if it is larger by more than the fraction TIE d / n.
     """
     return 1.0 - TIE * np.arange(n) / n
 
 
-BLOCK = 16  # columns that LAPACK eliminates at a time
+BLOCK = 16  # number of columns that LAPACK eliminates at a time
 
 
 class GrowingFit:
@@ -110,7 +110,7 @@ class GrowingFit:
 
 
 def block_elements(v: np.ndarray, size: int) -> np.ndarray:
-    """Greedy DEIM elements of the basis ``v`` (size e, r): min(e, r) indices, nested in r.
+    """Greedy DEIM elements of ``v`` (size e, r), a basis: min(e, r) indices, first k for k modes.
 
     Each of the e elements has ``size`` rows. Mode k is fitted by the earlier modes on the rows of
     the elements selected so far, by least squares. The element with the largest residual norm,
@@ -121,17 +121,14 @@ def block_elements(v: np.ndarray, size: int) -> np.ndarray:
 
 
 def joint_rows(v: np.ndarray, active: tuple[bool, ...], repeat: bool) -> np.ndarray:
-    """Greedy row indices (r,) for the basis ``v`` (3 rows, r), nested in r; a row has x, y and z.
+    """Greedy indices (r,) of rows (x, y, z) of a basis ``v`` (3 rows, r), the first k for k modes.
 
     For mode k each axis a has its own system (P^T V_a) c_a = P^T v_{k,a}, where P^T selects rows.
+    An axis without modes, False in ``active``, is left out.
     The row with the largest sum of squared residuals of the axes (times `tie_weights`) is selected
     for all axes. As it may be useless for one axis, that system may be singular: it is solved in
     the least-squares sense. With ``repeat`` a row may be selected again, as in the program of the
     preprint's authors; without it, the result has at most as many entries as the basis has rows.
-
-    Parameters
-    ----------
-    active : for each of the three axes, whether the basis has modes on it
     """
     rows, r = len(v) // 3, v.shape[1]
     axes = [v[a::3] for a in np.flatnonzero(active)]
@@ -141,8 +138,8 @@ def joint_rows(v: np.ndarray, active: tuple[bool, ...], repeat: bool) -> np.ndar
 def _greedy(parts: Sequence[np.ndarray], total: int, count: int, repeat: bool) -> np.ndarray:
     """Select ``count`` of ``total`` blocks of rows by residuals of the modes, the largest first.
 
-    ``parts`` are the modes, or their rows of each axis. Each part is fitted by coefficients of its
-    own, and is divided into ``total`` blocks of rows; squared residuals of all parts are added.
+    ``parts`` is the matrix of the modes, or one matrix per axis. The modes of each part are fitted
+    by coefficients of their own. A part has ``total`` blocks; squared residuals of parts are added.
     """
     fits = [(np.asfortranarray(part), GrowingFit(part.shape[1])) for part in parts]
     weights = tie_weights(total) ** 2

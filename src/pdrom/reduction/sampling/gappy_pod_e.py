@@ -86,7 +86,7 @@ class _Growing:
         self._decompose()
 
     def _decompose(self) -> None:
-        """Set G's smallest eigenvalue, its eigenvector, the gap to the next one (inf if r = 1)."""
+        """Find G's smallest eigenvalue, its eigenvector, the gap to the next one (inf if r = 1)."""
         last = min(1, len(self._gram) - 1)
         values, vectors = linalg.eigh(
             self._gram, subset_by_index=(0, last), check_finite=False, driver="evr"
@@ -98,9 +98,9 @@ class _Growing:
         """Return the unsampled element with the largest `eigenvalue_growth`.
 
         Two upper bounds, for rows B and eigenvector u, exclude elements before their growth is
-        computed. |B u|^2 must exceed the growth of the element with the largest |B u|^2, which wins
-        ties (all growths are zero if the smallest eigenvalue is double). `_growth_at_most` must not
-        be below the growth of the element for which it is largest.
+        computed. |B u|^2 must exceed the growth of the element with the largest |B u|^2 (returned
+        if no growth is larger, as when the smallest eigenvalue is double). `_growth_at_most` must
+        not be below the growth of the element for which it is largest.
         """
         products = (self._rows @ self._weakest).reshape(self.total, -1)
         strength = np.einsum("es,es->e", products, products)

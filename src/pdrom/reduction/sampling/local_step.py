@@ -23,7 +23,7 @@ from pdrom.model.scene import Scene
 from pdrom.reduction.rerun import Rerun, compare
 from pdrom.reduction.sampling.reduction import Reduction
 
-SPLIT_FROM = 1 << 17  # with at least this many vertices times modes, S^T W V c has two parts
+SPLIT_FROM = 1 << 17  # product of vertices and modes from which S^T W V c is computed in two parts
 
 # Indices into the kernel's record, an array of integers: numbers of modes, sets, columns, sampled
 # values; addresses of the sampler and of its record, then of the arrays of `Lift` and the clocks.
@@ -61,7 +61,7 @@ class Lift:
     seconds: np.ndarray
 
     def kernel(self, sampler: LocalKernel, sampled: int) -> LocalKernel:
-        """Local kernel that calls ``sampler``, which writes ``sampled`` numbers, and then lifts."""
+        """Kernel that calls ``sampler`` (it writes ``sampled`` numbers), then reconstructs."""
         columns, vertices, modes = self.lifted.shape
         split = vertices * modes >= SPLIT_FROM
         numbers = (

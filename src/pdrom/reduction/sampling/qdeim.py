@@ -7,7 +7,7 @@ import numpy as np
 from pdrom.reduction.sampling.deim import Selection, tie_weights
 
 EPS = np.finfo(float).eps
-# Pivots are searched among this many rows per mode; twice as many if fewer than FEW are found.
+# Pivots are searched among ROWS_A_MODE rows per mode; if fewer than FEW are found, twice as many.
 ROWS_A_MODE, FEW = 2, 8
 
 
@@ -22,7 +22,7 @@ def qdeim_elements(v: np.ndarray, size: int) -> np.ndarray:
     The removed directions are orthonormal and lie in the span of the selected groups, so
     that the sampled rows of V have full column rank.
 
-    Selections are not nested in r. Cost O(n r^2), n = size e.
+    The elements for fewer modes need not be among those for r. Cost O(n r^2), n = size e.
     """
     left = _Left(v, size)
     candidates = min(left.total, ROWS_A_MODE * v.shape[1] // size + 1)
@@ -36,9 +36,9 @@ def qdeim_elements(v: np.ndarray, size: int) -> np.ndarray:
 class _Left:
     """Groups of columns after removal of the selected directions, with bounds on their norms.
 
-    Norms only decrease, so that old norms are upper bounds. The largest group among those with the
-    largest bounds is the pivot of all groups if its norm exceeds the other bounds; if not, all are
-    updated. The matrix is thus read only a few times, while LAPACK reads it once per pivot.
+    Norms only decrease, so that old norms are upper bounds. The norms of groups with the largest
+    bounds are updated; the largest of them gives the next pivot if it exceeds all other bounds. If
+    not, all are updated. The matrix is thus read a few times, while LAPACK reads it once per pivot.
     """
 
     def __init__(self, v: np.ndarray, size: int) -> None:
@@ -101,7 +101,7 @@ class _Left:
 
 
 class PivotedQR(Selection):
-    """Q-DEIM; the samples for different numbers r of modes are not nested."""
+    """Q-DEIM; the samples for fewer modes need not be among those for more modes."""
 
     def one_a_mode(self, v: np.ndarray, size: int, ranks: Sequence[int]) -> dict[int, np.ndarray]:
         return {r: qdeim_elements(v[:, :r], size) for r in ranks}

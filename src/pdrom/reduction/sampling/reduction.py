@@ -190,7 +190,7 @@ class Reduction:
 
     @property
     def rows_sampled(self) -> int:
-        """Number of distinct operator rows with a sampled entry."""
+        """Number of distinct rows (x, y, z) of the projections with at least one sampled entry."""
         return len(np.unique(self.sampling.entries // 3))
 
     def reconstruct(self, snapshots: np.ndarray) -> np.ndarray:

@@ -22,9 +22,9 @@ DEPENDENT = 1e-12
 def s_opt_path(v: np.ndarray, size: int) -> np.ndarray:
     """Elements for which S(A) = (sqrt(det A^T A) / prod_j |A_j|)^(1/r) is largest, by greedy steps.
 
-    Return min(e, r) indices, nested in r. In step k, A is the first k modes at k elements.
-    In the first step S is 1 for every element; it selects the element with the largest norm of the
-    first mode, as classical DEIM does.
+    Return min(e, r) indices, the first k for k modes. In step k, A is the first k modes at k
+    elements. In the first step S is 1 for every element; this step selects the element with the
+    largest norm of the first mode, as classical DEIM does.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ def s_opt_path(v: np.ndarray, size: int) -> np.ndarray:
 
 
 class SOpt(Selection):
-    """S-OPT: one element per mode (nested selections), then further ones, all by the S-measure."""
+    """S-OPT: one element for each mode in turn, then further ones, all by the S-measure."""
 
     def one_a_mode(self, v: np.ndarray, size: int, ranks: Sequence[int]) -> dict[int, np.ndarray]:
         path = s_opt_path(v, size)
@@ -52,8 +52,8 @@ class SOpt(Selection):
     def extend(self, v: np.ndarray, size: int, chosen: np.ndarray, count: int) -> np.ndarray:
         """Extend ``chosen`` to ``count`` elements, each maximising the S-measure of all modes.
 
-        Return all e elements if there are fewer. Raise SamplingError if the modes are linearly
-        dependent at the ``chosen`` elements.
+        Return all elements if ``count`` exceeds their number. Raise SamplingError if the modes are
+        linearly dependent at the ``chosen`` elements.
         """
         count = min(count, len(v) // size)
         if count <= len(chosen):
@@ -67,13 +67,13 @@ class SOpt(Selection):
 class _Sampled:
     """Sampled elements, with data from which the S-measure with one more element is computed.
 
-    With G the Gram matrix of the sampled rows and B (s, k) the rows of a candidate,
-    det(G + B^T B) = det G det(I + M), M = B G^-1 B^T. Sampling an element D updates all M at once
+    With G the Gram matrix of the sampled rows and B (s, k) the rows of an element to be added,
+    det(G + B^T B) = det G det(I + M), M = B G^-1 B^T. Adding an element with rows D changes all M
     (Woodbury): M <- M - X (I + D G^-1 D^T)^-1 X^T, X = B G^-1 D^T. A mode d that is added to the
-    columns multiplies the determinant by the squared norm of its least-squares residual. With a
-    candidate this is q + z^T (I + M)^-1 z: q from the rows that are sampled already, z the
-    candidate's rows of the residual; afterwards M <- M + z z^T / q. One step costs O(s e (s + k))
-    instead of a determinant for each element.
+    columns multiplies the determinant by the squared norm of its least-squares residual. With the
+    rows B this is q + z^T (I + M)^-1 z: q is the squared norm at the rows sampled so far, z the
+    residual at the rows B; afterwards M <- M + z z^T / q. One step costs O(s e (s + k)) instead
+    of a determinant for each element.
 
     picked : sampled elements in order of selection
     """
@@ -95,7 +95,7 @@ class _Sampled:
             self._products = self._blocks @ self._inverse() @ self._blocks.transpose(0, 2, 1)
 
     def best(self, mode: int | None = None) -> int:
-        """Element with the largest S-measure of the columns, to which ``mode`` is added if given.
+        """Element that gives the columns, with ``mode`` if that is given, the largest S-measure.
 
         Ties go to the first element. SamplingError if no element makes the modes independent.
         """
@@ -139,7 +139,7 @@ class _Sampled:
             self._modes = mode + 1
 
     def _residual(self) -> tuple[np.ndarray, float]:
-        """Residual (e, s) of the next mode, fitted at sampled rows; its squared norm there."""
+        """Residual (e, s) of the next mode after a fit at the sampled rows; squared norm there."""
         known, new = self._blocks[:, :, : self._modes], self._blocks[:, :, self._modes]
         z = new - known @ self._fit.coefficients(self._modes)
         return z, float(np.sum(z[self.picked] ** 2))

@@ -84,8 +84,8 @@ def build_columns(
 ) -> Columns:
     """Build a subspace from ``modes`` (N, k) of the free vertices and own columns of each atom.
 
-    Each of ``atoms``, vertices fixed and released together, gets affine columns. If its motion in
-    ``trajectory`` (n, N, 3) m is not affine, POD modes of the rest are added (`OWN_MOTION`).
+    Each of ``atoms``, vertices fixed and released together, gets affine columns, and POD modes of
+    the non-affine part of its motion in ``trajectory`` (n, N, 3) m, up to the error `OWN_MOTION`.
 
     Parameters
     ----------
@@ -138,8 +138,8 @@ def orthonormal(columns: np.ndarray) -> np.ndarray:
 def atoms(boundaries: Sequence[Boundary], vertices: int) -> list[np.ndarray]:
     """Divide all vertices that boundary conditions ever fix into disjoint sets ("atoms").
 
-    A boundary condition fixes its vertices in units. Two vertices share an atom if they belong to
-    the same units, so that every unit is a union of atoms.
+    The units of a boundary condition are sets of vertices that it always fixes together. Vertices
+    that belong to the same units form an atom, so that every unit is a union of atoms.
     """
     units = [unit for boundary in boundaries for unit in boundary.units()]
     if not units:

@@ -75,11 +75,7 @@ def training_run(
     """Run ``scene`` in a subspace with all projections; return the iterates of some ``frames``.
 
     ``frames`` are ascending. The run begins at ``start``, a state in coordinates (K, 3), or at the
-    scene's initial state if that is None.
-
-    Parameters
-    ----------
-    norm : norm in which residuals of the training equations are measured
+    scene's initial state if that is None. ``norm`` measures residuals of the training equations.
     """
     watched = _Watched(scene.groups[0], columns)
     steps = [watched, *(SubspaceLocalStep(group, columns) for group in scene.groups[1:])]
@@ -96,7 +92,7 @@ def training_run(
         first = state.positions
         state, _ = loop.step(state, frame)
         if frame in wanted:
-            # a single iterate is no pair: the end of the frame, after contacts, is the second one
+            # with one iteration, the end of the frame, after contacts, is the pair's second iterate
             if len(iterates) == 1:
                 iterates.append(state.positions)
             pairs = np.stack([iterates[:-1], iterates[1:]], axis=1)
@@ -120,7 +116,7 @@ class _Watched(SubspaceLocalStep):
 
 
 def _measure(space: ReducedSpace, fixed: np.ndarray, norm: Norm, frames: int) -> np.ndarray:
-    """Matrix (K', K), K' of K coordinates not ``fixed``: |matrix r| is residual r in ``norm``."""
+    """Matrix (K', K) as `TrainingFrame.measure` in ``norm``, for K' coordinates not ``fixed``."""
     size = len(space.matrix)
     free = np.setdiff1d(np.arange(size), fixed)
     block, inertia = (m[np.ix_(free, free)] for m in (space.matrix, space.inertia_matrix))
@@ -137,8 +133,8 @@ def _measure(space: ReducedSpace, fixed: np.ndarray, norm: Norm, frames: int) ->
     return measure
 
 
-# Training equations are hashed to SKETCH rows per coordinate of the subspace. There must be several
-# times more rows than selected elements, or the factors would fit the random hashing.
+# Training equations are added up at random (hashed) to SKETCH rows per coordinate of the subspace.
+# There must be several times more rows than selected elements, or factors would fit the hashing.
 SKETCH = 60
 # First and largest number of elements among which samples are chosen: the equations of all elements
 # of a large mesh would not fit into memory, and neighbouring elements are similar.
@@ -153,10 +149,7 @@ def ecsw_elements(
 
     In a large group they are chosen from a random (seeded) subset, which is doubled, up to `MOST`,
     until all tolerances are met. They always approximate the sum over all elements of the group.
-
-    Parameters
-    ----------
-    tolerances : relative residuals tau of the training equations, at which the fit stops
+    A tolerance is the relative residual tau of the training equations at which the fit stops.
     """
     count = CANDIDATES
     while True:
@@ -177,7 +170,7 @@ def ecsw_elements(
 def training_equations(
     group: ConstraintGroup, columns: Columns, training: Training, elements: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return m equations (m, len(elements)), one column per element; and sums (m,) over all.
+    """Return m equations (m, len(elements)) for ``elements``; and sums (m,) over the whole group.
 
     For each pair (z, z') of iterates and each coordinate there is one equation with the entries
     g_e = B^T S_e^T w_e (S_e B z' - p_e(B z)), multiplied by `TrainingFrame.measure`. All are scaled
@@ -245,8 +238,8 @@ log = logging.getLogger(__name__)
 # A unit column depends on the active columns if its part orthogonal to them is below this.
 DEPENDENT = 1e-7
 
-# Columns are added together if their correlation with the residual is above CLOSE x the largest, at
-# most BLOCK x as many as are active.
+# Columns are added at the same time if their correlation with the residual is at least CLOSE times
+# the largest one; at most one more than BLOCK times the number of active columns.
 CLOSE = 0.7
 BLOCK = 0.2
 

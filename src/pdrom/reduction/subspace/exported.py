@@ -86,9 +86,7 @@ def require_known(config: SceneConfig) -> None:
 def export_basis(scene: Scene, columns: Columns, needed: np.ndarray) -> dict[str, Any]:
     """Export ``columns`` of a subspace of ``scene`` and further data that samples do not affect.
 
-    Parameters
-    ----------
-    needed : (n,) vertices whose rows iterations use; these rows are always exported as doubles
+    Rows of the ``needed`` vertices (n,), which iterations use, are always exported as doubles.
     """
     space = ReducedSpace(scene, columns, [])
     start = reduced_state(scene, columns)

@@ -39,8 +39,8 @@ from pdrom.reduction.subspace.space import DenseElimination, ReducedSpace
 class FusedStepper(Stepper):
     """Step loop with compiled, fused iterations; results equal those of `Stepper` up to round-off.
 
-    All its time counts as local step, as there is no separate global step. It iterates
-    like `Stepper` if a local step is no `SubspaceLocalStep` or a group has no gradient kernel.
+    The whole time of iterations counts as that of the local step. If a local step is no
+    `SubspaceLocalStep` or a group has no gradient kernel, this class iterates like `Stepper`.
     """
 
     def __init__(self, scene: Scene, space: ReducedSpace, local_steps: Sequence[LocalStep]) -> None:
@@ -114,9 +114,9 @@ class _Fused:
     def run(
         self, q: np.ndarray, v: np.ndarray, frames: range, h: float, iterations: int, track: bool
     ) -> Blocks | None:
-        """Run the first of ``frames``, as many as one compiled call can, without the objective.
+        """Run as many of the first ``frames`` as one compiled call can, without the objective.
 
-        Return None for a frame that meets a floor and, as contacts last, for some frames after it.
+        Return None for a frame that meets a floor and, since a contact lasts, for some after it.
         """
         if self._waiting and frames.start:
             self._waiting -= 1

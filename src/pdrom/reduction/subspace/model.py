@@ -22,7 +22,7 @@ from pdrom.reduction.subspace.fused import FusedStepper
 from pdrom.reduction.subspace.interpolation import Interpolation
 from pdrom.reduction.subspace.space import ReducedSpace, reduced_state
 
-# Largest number of frames per training motion whose iterates are used to sample elements.
+# Number of frames, divided among the training motions, whose iterates are used to sample elements.
 FRAMES = 70
 ECSW = "ecsw"
 
@@ -159,10 +159,10 @@ def sample_elements(
 ) -> list[dict[str, Samples]]:
     """Select energy-conserving samples of every constraint group for each of ``tolerances``.
 
-    They are trained on iterates of a run in the subspace with all projections, in up to `FRAMES` of
-    the training ``frames``. The run begins at ``start``, a state in subspace coordinates, or at the
-    scene's initial state if None. Each scene of ``others``, further training motions, adds as many
-    frames. Residuals of the training equations are measured in ``norm`` (module `ecsw`).
+    They are trained on iterates of runs in the subspace with all projections: of ``scene`` and of
+    ``others``, further training motions, with an equal share of `FRAMES` from ``frames`` for each.
+    The run of ``scene`` begins at ``start``, a state in subspace coordinates, or at its initial
+    state if None. Residuals of the training equations are measured in ``norm`` (module `ecsw`).
     """
     count = -(-FRAMES // (1 + len(others)))
     chosen = frames[np.unique(np.linspace(0, len(frames) - 1, count).round().astype(int))]
@@ -214,7 +214,7 @@ def store_model(
 
 
 def load_models(path: str | os.PathLike[str]) -> list[tuple[dict[str, object], SubspaceModel]]:
-    """Read the models in the file ``path``, with attributes: method, position_basis, k."""
+    """Read pairs (attributes method, position_basis and k; model) from the file ``path``."""
     with open_hdf5(path) as file:
         columns = {base: _columns(store) for base, store in file["columns"].items()}
         models = []

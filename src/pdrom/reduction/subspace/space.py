@@ -71,11 +71,11 @@ class DenseElimination:
         return result
 
     def lift(self, rows: np.ndarray) -> np.ndarray:
-        """Responses (m, K') to unit forces on ``rows`` (m, K): their free part times A^-1."""
+        """Product (m, K') of the free columns of ``rows`` (m, K) and the system's inverse."""
         return rows[:, self.free] @ self._inverse
 
 
-# Largest number of vertices at which contacts are detected.
+# Largest number of probes, the vertices at which contacts are detected.
 PROBES = 200
 
 
@@ -129,11 +129,11 @@ class ReducedSpace(Space):
 
     @property
     def whole_frames(self) -> bool:
-        """Whether all contacts are floors, so that one call can compute several whole frames."""
+        """Whether all contacts are floors, so that one compiled call can compute several frames."""
         return all(contact.height is not None for contact in self._contacts)
 
     def free_frames(self, path: np.ndarray) -> int:
-        """Number of frames in ``path`` (n, K, 3) before a tested vertex is below a floor."""
+        """Number of frames in ``path`` (n, K, 3) before a probe (vertex) is below a floor."""
         first = len(path)
         for contact in self._contacts:
             first = contact.free_frames(path[:first])
@@ -143,7 +143,7 @@ class ReducedSpace(Space):
         return base.held_targets(self._boundaries, frame, positions)
 
     def held_path(self, frames: range, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Coordinates (m,) fixed in the first n of ``frames``, and their values (n, m, 3)."""
+        """Coordinates (m,) fixed in the first n ``frames`` with known targets; values (n, m, 3)."""
         return base.held_path(self._boundaries, frames, positions)
 
     def elimination(self, fixed: np.ndarray) -> DenseElimination:
@@ -224,7 +224,7 @@ def _reduce_force(force: base.Force, columns: Columns, scene: Scene) -> tuple[np
 
 
 class _ReducedBoundary:
-    """Boundary condition in the subspace, exact since vertices fixed together have coordinates."""
+    """Boundary condition in the subspace, exact: vertices fixed together have own coordinates."""
 
     def __init__(self, boundary: base.Boundary, columns: Columns) -> None:
         self.boundary = boundary
@@ -237,12 +237,12 @@ class _ReducedBoundary:
         return self._of(frame)[0]
 
     def path(self, frames: range, current: np.ndarray) -> np.ndarray:
-        """Values (n, m, 3) of the fixed coordinates in n ``frames``; they begin at ``current``."""
+        """Values (n, m, 3) of fixed coordinates in n ``frames``; those before are ``current``."""
         _, rows, inverse = self._of(frames.start)
         return inverse @ self.boundary.path(frames, rows @ current)
 
     def _of(self, frame: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Coordinates fixed in ``frame``, rows of B at the fixed vertices, and their inverse."""
+        """Coordinates fixed in ``frame``, rows of B at fixed vertices, pseudo-inverse of these."""
         vertices = self.boundary.held(frame)
         key = vertices.tobytes()
         if key not in self._parts:
@@ -271,7 +271,7 @@ class _ReducedContact:
         self._project = projector(columns, scene.masses)
 
     def free_frames(self, path: np.ndarray) -> int:
-        """Number of frames in ``path`` (n, K, 3) before a tested vertex is below this floor."""
+        """Number of frames in ``path`` (n, K, 3) before a probe (vertex) is below this floor."""
         lowest = (path[:, :, 1] @ self._probes.T).min(axis=1)
         # a frame with non-finite coordinates counts as one with contact
         above = lowest >= self.height

@@ -39,9 +39,9 @@ from study.experiments.kit.base import experiment
 from study.experiments.kit.measurement import Processes, Variant, in_processes
 
 REDUCED, ACCELERATED = REDUCTIONS = "ecsw", "ecsw-anderson"  # names of the reduced methods
-TWO_LEVEL: Final = "two-level"  # full order, with a trained subspace for its coarse level
+TWO_LEVEL: Final = "two-level"  # full-order method whose coarse level is a trained subspace
 TRAINED: Final = (TWO_LEVEL, *REDUCTIONS)
-CONVERGED: Final = "converged"  # the implicit step solved to convergence
+CONVERGED: Final = "converged"  # name of the reference: the implicit step solved to convergence
 TRAINING: Final = "training"  # key in `Comparison.work` for runs on which reductions are trained
 
 # Columns that together identify a candidate (method with its settings) in a scene.
@@ -117,9 +117,9 @@ class ImplicitReference(ConfigModel):
 class Comparison(Processes):
     """Settings of the comparison of methods on one scene and one mesh.
 
-    Each of ``processes`` new processes times ``frames`` frames, spread over the first motion.
+    Each of ``processes`` new processes times ``frames`` frames of the first of ``motions``.
 
-    stiffness : scene -> factors on all its weights, on its own mesh (1 for other scenes)
+    stiffness : scene -> factors on the weights of its groups; only 1 for all other scenes
     steps : method -> pairs (substeps of a frame, iterations of each substep)
     work : method -> largest product vertices x substeps x iterations (for ``training``: vertices x
         motions); runs with more work are left out
@@ -204,10 +204,10 @@ class Trained:
 class Candidate:
     """A method with its settings, ready to run on one scene.
 
-    steps : number of steps of the loop in a frame
-    positions : function that computes positions of all vertices from the loop's coordinates
-    output : the same in single precision, which is timed; None if coordinates are positions
-    columns : columns of the loop's position subspace; None if coordinates are positions
+    steps : number of steps in a frame
+    positions : function that maps coordinates in a position subspace to positions of all vertices
+    output : the same function in single precision, which is timed; None without a subspace
+    columns : columns of the position subspace; None without a subspace
     """
 
     labels: dict[str, object]
@@ -219,7 +219,7 @@ class Candidate:
     columns: Columns | None = None
 
     def state(self, state: State, scene: Scene) -> State:
-        """Convert a ``state`` of all vertices of ``scene`` to coordinates of this method's loop."""
+        """Return ``state`` of all vertices of ``scene`` in the method's subspace, if it has one."""
         if self.columns is None:
             return state
         own = (self.columns, scene.masses)
@@ -343,7 +343,7 @@ def substepped(scene: Scene, substeps: int, iterations: int, window: int = 0) ->
 
 @dataclass(frozen=True)
 class Timed:
-    """A scene in the motion that is timed, its reduced models, and first columns (``labels``)."""
+    """A scene in the motion that is timed, its reduced models, and first columns of its rows."""
 
     labels: dict[str, object]
     scene: Scene
@@ -359,7 +359,7 @@ class Timed:
         held = [tuple(b.active(frame) for b in scene.boundaries) for frame in places]
         first = [held.index(kind) for kind in dict.fromkeys(held)]
         places = np.concatenate([places[first], np.delete(places, first)])
-        # this run starts at the first frame, where boundaries store positions that they need later
+        # the run needs all frames: in the first one, boundaries store positions that they use later
         states = [
             scene.initial_state(),
             *(end for end, _ in simulate(scene, track_objective=False)),
@@ -388,7 +388,7 @@ class Options(ConfigModel):
     alone=True,
 )
 def alternatives(sources: list[Path], settings: Options, out: File, times: File) -> None:
-    """Compare all methods on one mesh, with a factor on the vertices along each side.
+    """Compare all methods on a mesh with a factor times the scene's vertices along each side.
 
     sources : files of the mesh, on which the job depends
     settings : scene, methods and limits
@@ -432,9 +432,9 @@ def _rows(
 ) -> Iterator[dict[str, Any]]:
     """Yield rows with errors in the motion of ``scene``: two references, then every candidate.
 
-    The first row is the converged implicit step, the second the ``recorded`` training motion, taken
-    as a solution. Errors against the implicit step are None if one of its frames did not converge
-    or if it would be too expensive. All errors of a run that blew up are None.
+    The first row is the converged implicit step. In the second the ``recorded`` training motion is
+    taken for the run. Errors against the implicit step are None if one of its frames did not
+    converge or if it would be too expensive. All errors of a run that blew up are None.
     """
     section, name, vertices = settings.alternatives, scene.config.name, scene.mesh.vertices
     frames, wanted, implicit = scene.config.frames, section.continuous, None

@@ -1,4 +1,4 @@
-"""Catalogue of the hard cases (scenes with extreme meshes, states or settings), by name."""
+"""Catalogue of the hard cases: scenes, each with a name, of extreme meshes, states or settings."""
 
 from functools import partial
 from typing import Any
@@ -26,7 +26,7 @@ ROTATION = {"effect": "deformation_gradient", "weight": 1e8}
 VOLUME = {"effect": "volume", "weight": 1e6}
 AREA = {"effect": "area", "weight": 1e6}
 
-# Names of checks: for free bodies, for free bodies without forces that start at rest, for the rest.
+# Names of checks: FREE for free bodies, CALM if these start at rest without forces, FORCED else.
 FREE = ("finite", "bounded", "objective", "momentum", "determinism")
 CALM = (*FREE, "energy")
 FORCED = ("finite", "bounded", "objective", "determinism")

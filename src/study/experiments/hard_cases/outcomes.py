@@ -157,7 +157,7 @@ class ReducedRun:
 
 
 def names(methods: Methods) -> list[str]:
-    """Names of all reductions: those of ``methods``, then BASIS-SAMPLING for position subspaces."""
+    """Names of all reductions: ``methods``, then those in position subspaces (such as pod-ecsw)."""
     return [*methods, *(f"{basis}-{sampling}" for basis in BASES for sampling in BASES[basis])]
 
 
@@ -243,7 +243,7 @@ class HardCases(ConfigModel):
 
     @property
     def modules(self) -> list[str]:
-        """Classes of effects in the hard cases ("module:attribute"), for fingerprints of jobs."""
+        """Classes ("module:attribute") of effects in the hard cases, to detect changes of code."""
         chosen = self.cases or reducible_cases()
         effects = {effect["effect"] for name in chosen for effect in CASES[name].effects}
         return sorted(EFFECTS[effect] for effect in effects)

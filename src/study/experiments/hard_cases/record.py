@@ -194,8 +194,8 @@ class Roundoff:
     def allowance(self, before: State, after: State, first: float) -> float:
         """Bound (J) for the rise of the objective by rounding errors in one frame.
 
-        ``first`` is the objective (J) at its beginning. The size of the iterates is estimated from
-        the states ``before`` and ``after`` the frame.
+        ``first`` is the objective (J) at the beginning of the frame. The size of the iterates is
+        estimated from the states ``before`` and ``after`` the frame.
         """
         h = self.loop.time_step
         acceleration = self.loop.space.acceleration(before.positions, before.velocities)
@@ -228,7 +228,7 @@ class Roundoff:
 
     def _dense(self, b: np.ndarray, size: float, largest: np.ndarray) -> float:
         matrix = b.T @ (self.scene.masses[:, None] * b) / self.loop.time_step**2
-        steps: Sequence[Any] = self.loop.local_steps  # local steps in a subspace have matrices
+        steps: Sequence[Any] = self.loop.local_steps  # in a subspace, each has a stiffness matrix
         matrix = matrix + sum(step.matrix for step in steps)
         # columns are scaled to length one: the result does not depend on units of coordinates
         scale = np.sqrt(np.diag(matrix))
@@ -273,7 +273,7 @@ class Watched:
         self._step, self._group = step, group
 
     def begin_frame(self, q: np.ndarray) -> None:
-        """Let both steps compute their data for a frame, from positions ``q`` (N, 3) m."""
+        """Let the reduced and the full step compute a frame's data at positions ``q`` (N, 3) m."""
         self._step.begin_frame(q)
         self._group.begin_frame(q)
 
@@ -293,7 +293,7 @@ def record(
 ) -> Record:
     """Run all frames of ``scene`` with ``loop`` from ``state``.
 
-    model : model in whose position subspace ``loop`` runs; None if its coordinates are positions
+    model : model in whose position subspace ``loop`` runs; None if it runs without a subspace
     limit : longest side of the bounding box, in m, above which the run ends as a blow-up
     observe : function that is called with the number of every frame, and the iterate at which the
         last local step of the frame computes projections
@@ -338,7 +338,7 @@ def record(
 def full_order(
     case: HardCase, scene: Scene, observe: Callable[[int, np.ndarray], None] | None = None
 ) -> Record:
-    """Run ``scene`` in full order from the start of ``case``; ``observe`` gets last iterates."""
+    """Run ``scene`` in full order from the start of ``case``; ``observe`` as in `record`."""
     return record(scene, scene.stepper(), case.start(scene), observe=observe)
 
 
@@ -377,8 +377,8 @@ def objective(case: HardCase, scene: Scene, run: Record) -> str:
 def energy(case: HardCase, scene: Scene, run: Record) -> str:
     """Check that kinetic plus potential energy never exceeds its value at the start.
 
-    If the start is at rest, this is so in the first frame after any number of iterations, because
-    its objective is this energy; in later frames it is so because the implicit step damps.
+    For a start at rest this holds in the first frame, whose objective is this energy, which no
+    iteration raises; in later frames it holds because the implicit step damps.
     """
     start, largest = run.energy[0], run.energy.max()
     elastic = float(np.abs(run.positions).max()) ** 2 * float(abs(scene.system.matrix).sum())

@@ -2,10 +2,10 @@
 
 An experiment is a function that runs models and writes its results to files.
 
-The sensitivity floor of a scene is the drift of its full-order run, by frame, after a small random
-displacement of the start: the largest over all seeds (`study.experiments.sensitivity`). The horizon
-is the first frame in which the floor exceeds a threshold: from this frame on, errors of reduced
-runs say nothing about a method.
+The sensitivity floor of a scene is the relative difference, in each frame, between its full-order
+run and one from a slightly displaced start, the largest over several random displacements (module
+`study.experiments.sensitivity`). The horizon is the first frame in which the floor exceeds a
+threshold: from this frame on, errors of reduced runs say nothing about a method.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -49,7 +49,7 @@ def experiment(
 
 
 def experiments() -> dict[str, Experiment]:
-    """Return every experiment of the study by name."""
+    """Return a mapping of names to all experiments of the study."""
     return declared_in("study.experiments", Experiment)
 
 
@@ -77,14 +77,14 @@ class OfScene(ConfigModel):
 
     @property
     def labels(self) -> dict[str, str]:
-        """Scene, group ... in the path of the file, by name: all settings that are texts."""
+        """Map names (scene, group ...) to their values in the file's path: all text settings."""
         return {name: text for name, text in self if isinstance(text, str)}
 
 
 def floor_of(table: pd.DataFrame, scene: str, perturbation: float | str) -> np.ndarray:
-    """Drift (F,) of perturbed runs of a scene, by frame, for a size or name of the perturbation.
+    """Sensitivity floor (F,) of a scene, by frame, for one size or name of the perturbation.
 
-    The array is empty if the scene has no such runs. The largest drift over all seeds is returned.
+    It is the largest difference over all seeds. The array is empty if the scene has no such runs.
 
     table : perturbed runs, with columns scene, perturbation, frame and relative_difference; rows
         may be those of single seeds, or the largest over all seeds
@@ -96,15 +96,15 @@ def floor_of(table: pd.DataFrame, scene: str, perturbation: float | str) -> np.n
 
 
 def horizon(floor: np.ndarray, threshold: float) -> int:
-    """First frame in which the drift ``floor`` (F,) exceeds ``threshold``; F if none does."""
+    """First frame in which the sensitivity ``floor`` (F,) exceeds ``threshold``; F if none does."""
     above = np.flatnonzero(~(floor <= threshold))
     return int(above[0]) if len(above) else len(floor)
 
 
 def horizons(table: pd.DataFrame, perturbation: float | str, threshold: float) -> dict[str, int]:
-    """Return scene -> first frame in which the drift of its perturbed runs exceeds ``threshold``.
+    """Map names of scenes to the first frame in which the sensitivity floor exceeds ``threshold``.
 
-    table, perturbation : drift of perturbed runs, and size or name of the perturbation that counts
+    table, perturbation : arguments of `floor_of`
     """
     scenes = table.scene.unique()
     return {s: horizon(floor_of(table, s, perturbation), threshold) for s in scenes}
@@ -135,7 +135,7 @@ class Horizon(ConfigModel):
 
 
 def resolve_ranks(ranks: Sequence[Rank], rank: int) -> list[int]:
-    """Sort basis sizes ``ranks``; "full" is replaced by the numerical ``rank``, or omitted if 0."""
+    """Sort basis sizes ``ranks``; "full" becomes the numerical ``rank`` (left out if it is 0)."""
     full = [rank] if "full" in ranks and rank > 0 else []
     return sorted({*(int(r) for r in ranks if r != "full"), *full})
 
@@ -164,7 +164,7 @@ def followed(loop: Stepper, state: State, frames: int) -> np.ndarray:
 
 
 def perturbation_field(scene: Scene, size: float, seed: int) -> np.ndarray:
-    """Random vectors (N, 3) m by ``seed``, ``size`` times the longest side of the mesh long."""
+    """Random vectors (N, 3) m by ``seed``; length: ``size`` times the mesh's longest side."""
     field = np.random.default_rng(seed).standard_normal((scene.mesh.vertices, 3))
     return size * scene.mesh.extent * field / np.linalg.norm(field, axis=1, keepdims=True)
 

@@ -32,13 +32,13 @@ COLUMNS = [
 ]  # fmt: skip
 COSTS = ["scene", "effect", "elements", "ms_per_frame", "share"]
 LEFT_OUT = ["scene", "left_out", "groups", "elements", "ms_per_frame", "own_ms"]
-# Methods that the step loop calls of constraint groups, forces, boundaries and contacts, in turn.
+# Methods that the step loop calls: one tuple each for groups, forces, boundaries and contacts.
 _QUESTIONS = (
     ("begin_frame", "accumulate"), ("acceleration",), ("active", "held", "takes_hold", "path"),
     ("apply",),
 )  # fmt: skip
-# Places in the record (array of integers) of a timed kernel: address and record of the kernel
-# without timers, addresses of its seconds and clocks (of two parts and the preparation), and size.
+# Indices into the record (array of integers) of a timed kernel: addresses of the kernel without
+# timers, of its record, of its seconds and clocks (two parts and preparation); the record's length.
 KERNEL, RECORD, SECONDS, CLOCKS, SIZE = range(OWN, OWN + 5)
 
 
@@ -140,9 +140,9 @@ def effect_costs(
 ) -> pd.DataFrame:
     """Times per frame of the full-order run: effects, right-hand side, global solve, the rest.
 
-    The table has the columns `COSTS`; several effects of one name have one row. ``elements`` is the
-    number of elements of a group, of vertices that pins or handles may fix, or else of all
-    vertices. The time of the right-hand side is that of the compiled local pass without the groups.
+    The table has the columns `COSTS`; several effects of one name have one row. ``elements`` counts
+    the elements of a group, the vertices that pins or handles may fix, or else all vertices. The
+    time of the right-hand side is that of the compiled local pass without the groups.
 
     warmup, repeats : numbers of unmeasured and of measured runs
     """
@@ -215,9 +215,9 @@ def left_out(
 ) -> pd.DataFrame:
     """Times per frame of the scene built without some of its effects; columns are `LEFT_OUT`.
 
-    Column ``own_ms`` is the time of these effects in the complete scene, from the table ``costs``
-    (made by `effect_costs`). ``solver`` names the linear solver; ``warmup`` and ``repeats`` are
-    numbers of unmeasured and of measured runs.
+    Column ``own_ms`` is the time that the effects left out take in the complete scene, from the
+    table ``costs`` (made by `effect_costs`). ``solver`` names the linear solver; ``warmup`` and
+    ``repeats`` are numbers of unmeasured and of measured runs.
     """
     sets = left_out_sets(scene)
     if not sets:

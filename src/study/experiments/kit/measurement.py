@@ -5,8 +5,8 @@ initial state, so that changes of the processor's clock rate affect all variants
 frame, the time of the median repeat is used: an interruption by another program affects one frame
 of one repeat only.
 
-Times also depend on the addresses of arrays and code in a process, by more than repeats scatter.
-Only new processes (`in_processes`) show this scatter, since a fork inherits the addresses.
+Times also depend on the addresses of arrays and code in a process, by more than repeats differ.
+Only new processes (`in_processes`) show this dependence, since a fork inherits the addresses.
 """
 
 import logging
@@ -62,7 +62,7 @@ class Processes(Protocol):
 class Variant:
     """A step loop to time.
 
-    labels : first columns of its row
+    labels : first columns of its row in the table of times
     loop, start, frames : step loop, state before the first frame, number of frames
     share : fraction of a frame's iterations that the loop does; the times of phases inside the
         iterations are divided by it
@@ -159,10 +159,10 @@ def _time_once(variant: Variant, frames: int) -> np.ndarray:
 
 
 def median_frames(samples: np.ndarray) -> np.ndarray:
-    """Mean over frames of ``samples`` (repeats, frames, phases), of each frame one repeat.
+    """Mean (phases,) over frames of ``samples`` (repeats, frames, phases), from one repeat each.
 
-    This is the repeat with the median total (first phase). All phases of a frame are from this
-    repeat, since medians of single phases would not add up to the total.
+    For each frame this is the repeat with the median total (first phase). All its phases are from
+    this repeat, since medians of single phases would not add up to the total.
     """
     order = np.argsort(samples[:, :, 0], axis=0, kind="stable")[len(samples) // 2]
     return samples[order, np.arange(samples.shape[1])].mean(axis=0)

@@ -27,9 +27,9 @@ def load_reduction(
 
 
 def basis_of(sampling: File, method: MethodSpec, bases: Sequence[File]) -> File:
-    """Return the one of the files ``bases`` to which samples by ``method`` in a file belong.
+    """Return the file in ``bases`` from whose basis the samples in ``sampling`` were selected.
 
-    Raises StorageError if the basis is not among them.
+    ``method`` selected them. Raises StorageError if the basis is not among the files.
     """
     wanted = {"scene": sampling["scene"], "group": sampling["group"], "basis": method.basis_id}
     for basis in bases:
@@ -45,7 +45,7 @@ def run_error(run: np.ndarray, reference: np.ndarray) -> float | None:
 
 
 def store_end(store: h5py.Group, outcome: Rerun, with_positions: bool = True) -> None:
-    """Store blow-up frame, largest size and, in single precision, positions of a run."""
+    """Store a run's blow-up frame, `Rerun.max_extent` and, if asked, single-precision positions."""
     blowup = -1 if outcome.blowup_frame is None else outcome.blowup_frame
     store.attrs.update(blowup_frame=blowup, max_extent=outcome.max_extent)
     if with_positions:

@@ -34,9 +34,10 @@ from study.artifact.paths import FIGURE, FIGURE_PICTURE, File
 from study.artifact.reads import Read, Setting, Settings
 
 Names = tuple[str, ...]
-Ranks = tuple[Annotated[int, Field(ge=0)] | Literal["full"], ...]  # "full" is the numerical rank
+# Basis sizes; "full" stands for the largest one, the numerical rank of the snapshots.
+Ranks = tuple[Annotated[int, Field(ge=0)] | Literal["full"], ...]
 Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
-Instants = Annotated[tuple[Fraction, ...], Field(min_length=1)]  # fractions of a run's length
+Instants = Annotated[tuple[Fraction, ...], Field(min_length=1)]  # fractions of a run's duration
 Columns = Annotated[int, Field(ge=1, le=6)]  # number of panels in a row
 Count = Annotated[int, Field(ge=1, le=12)]  # number of modes or iterations
 AZIMUTH = 30.0  # azimuth of every camera, degrees
@@ -94,9 +95,9 @@ class View(Methods):
 
 
 class Beside(Scenes):
-    """Options of a figure: panels in a row, and scene -> experiment of the published code.
+    """Options of a figure: scenes, panels in a row, and experiments of the published code.
 
-    The published code is the program that the authors of the preprint published.
+    ``published`` maps a scene to a similar experiment of the preprint authors' own program.
     """
 
     columns: Columns = 3
@@ -134,7 +135,7 @@ class Experiment(_Plain):
 
     @property
     def labels(self) -> dict[str, str]:
-        """Scene, group and mesh, by name, which the paths of files contain."""
+        """Mapping of "scene", "group" and "mesh" to their values in the paths of files."""
         return {"scene": self.scene, "group": self.group, "mesh": self.mesh}
 
     @property
@@ -144,7 +145,7 @@ class Experiment(_Plain):
         return name if self.only else f"{name}: {self.group.replace('_', ' ')}"
 
     def find(self, files: Sequence[File], **labels: str) -> str | None:
-        """Path of the first file of this scene, group, mesh and ``labels``; None without one."""
+        """Path of the first file that fits scene, group, mesh and ``labels``; None without one."""
         own = self.labels | labels
         found = (f.path for f in files if all(own.get(k, v) == v for k, v in f.labels.items()))
         return next(found, None)
@@ -167,8 +168,8 @@ class Reduction(_Plain):
 class Drawn(_Plain):
     """Experiments and methods that the options of a figure select, in the order of drawing.
 
-    experiments : a scene with a reduced group each
-    reductions : methods by name
+    experiments : each is a scene with one of its reduced groups
+    reductions : name of a method -> its description
     groups : names of all constraint groups that exist; their order determines their colours
     """
 
@@ -209,7 +210,7 @@ class Drawn(_Plain):
         ]
 
     def scenes_of(self, table: pd.DataFrame, nothing: str) -> list[str]:
-        """Scenes with a row in ``table``; raise NothingToDraw (text ``nothing``) without one."""
+        """Scenes that have rows in ``table``; NothingToDraw with text ``nothing`` if none has."""
         scenes = [scene for scene in self.scenes if (table.scene == scene).any()]
         if not scenes:
             raise NothingToDraw(nothing)

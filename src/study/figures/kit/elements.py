@@ -54,9 +54,9 @@ class ElementMap:
     def face_values(self, values: np.ndarray) -> np.ndarray:
         """Transfer ``values`` of elements (e,) to the triangles of the surface, (T,).
 
-        If elements are triangles or tetrahedra, a triangle has their value. If they are vertices or
-        edges, it has the mean value of its vertices (NaN if none has a value); the value of a
-        vertex is then its own, or the mean over its edges.
+        If elements are triangles or tetrahedra, a surface triangle gets the value of its element.
+        If they are vertices or edges, it gets the mean over its three vertices (NaN if none has a
+        value). The value of a vertex is its own, or the mean over the edges that meet there.
         """
         triangles = self.mesh.triangles
         if self.kind == "triangle":
@@ -86,7 +86,7 @@ class ElementMap:
         camera: Camera,
         colours: ScalarMappable,
     ) -> None:
-        """Draw the mesh, its vertices at ``points`` (N, 3) in m, as seen by ``camera``.
+        """Draw the mesh with vertices at ``points`` (N, 3), m, as seen by ``camera``.
 
         ``values`` (e,) has a value for each element, which ``colours`` maps to a colour.
         """
@@ -103,7 +103,7 @@ class ElementMap:
 
 
 def element_map(group: str, mesh: Mesh, elements: int, source: str) -> ElementMap:
-    """Return the elements of the constraint ``group`` on ``mesh``, in the order of their rows.
+    """Return the elements of the constraint ``group`` on ``mesh``, in the order of snapshot rows.
 
     Raises StorageError if the effect ``group`` is no constraint group, or its number of elements on
     ``mesh`` is not ``elements``, the number in the file ``source``. Raises ConfigurationError if no
@@ -119,10 +119,10 @@ def element_map(group: str, mesh: Mesh, elements: int, source: str) -> ElementMa
 
 
 def signed_entry(vector: np.ndarray, rows_per_element: int) -> tuple[np.ndarray, str]:
-    """Find the entry with the largest absolute value; return it of all elements, and its name.
+    """Return one of the 3 p entries of each element (e,), and the name of this entry.
 
-    ``vector`` has 3 p entries for each of e elements, p = ``rows_per_element``. The returned values
-    (e,) have the place of that entry in each element; the name consists of axis and row.
+    ``vector`` has 3 p entries for each of e elements, p = ``rows_per_element``. The entry is the
+    one that is largest in absolute value in any element; its name has axis and row ("x, row 2").
     """
     entries = vector.reshape(-1, 3 * rows_per_element)
     slot = int(np.argmax(np.abs(vector))) % (3 * rows_per_element)

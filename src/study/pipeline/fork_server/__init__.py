@@ -22,7 +22,7 @@ from pathlib import Path
 
 from study.pipeline.fork_server.client import ADDRESS, PIPE, place_of
 
-# Path of the Python interpreter; the workflow itself uses the command that `interpreter` returns.
+# Path of the Python interpreter. The workflow starts scripts by the command `interpreter` instead.
 PYTHON = sys.executable
 
 # On macOS, forks of a process that has loaded system frameworks are unsafe.
@@ -53,7 +53,7 @@ def hold_pipe(place: Path) -> None:
     """
     place.unlink(missing_ok=True)
     os.mkfifo(place)
-    reader = os.open(place, os.O_RDONLY | os.O_NONBLOCK)  # a FIFO must have a reader to be opened
+    reader = os.open(place, os.O_RDONLY | os.O_NONBLOCK)  # writing needs a reader at the other end
     os.open(place, os.O_WRONLY)
     os.close(reader)
     os.environ[PIPE] = str(place.absolute())

@@ -22,7 +22,7 @@ def main() -> int:
     """Run the job and return its exit code; if a signal ended the job, end by the same signal."""
     name = os.environ.get(ADDRESS)
     script = len(sys.argv) == 2 and not sys.argv[1].startswith("-")
-    # block signals until the process number of the job is known, to which they are forwarded
+    # signals are forwarded to the job: block them until its process number is known
     signal.pthread_sigmask(signal.SIG_BLOCK, FORWARDED)
     connection = connect(name) if name and script else None
     answer = ask(connection) if connection else b""
@@ -105,7 +105,7 @@ def forward(job: int, number: int) -> None:
 
 
 def run_alone() -> None:
-    """Run the script ``sys.argv[2]`` as the main module; it is killed when the run ends."""
+    """Run the script ``sys.argv[2]`` as main module; kill this process when the run ends."""
     import runpy
     import threading
 
@@ -117,9 +117,9 @@ def run_alone() -> None:
 
 
 def end_with(pipe: str) -> None:
-    """Kill this job when ``pipe`` closes: only the run has it open for writing, so it has ended."""
+    """Wait until the run, the only writer of ``pipe``, has ended; then kill this process."""
     try:
-        # if the run has already ended, open would wait forever for a writer without O_NONBLOCK
+        # without O_NONBLOCK, open would wait forever if the run, the only writer, has ended
         number = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
         os.set_blocking(number, True)
         os.read(number, 1)

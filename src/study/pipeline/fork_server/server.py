@@ -41,16 +41,16 @@ class Server:
         self.owner = owner
         # clients that have sent no request yet
         self.silent: list[socket.socket] = []
-        # clients that wait for the end of their job, by the process number of the job
+        # process number of a job -> client that waits for the job's end
         self.jobs: dict[int, socket.socket] = {}
-        # when a job ends, its signal SIGCHLD writes a byte into this pipe, for which the loop waits
+        # the signal SIGCHLD at a job's end writes a byte into this pipe, which wakes the loop
         self.wake, self._waker = os.pipe()
         os.set_blocking(self._waker, False)
         self._process = os.getpid()
         self._libc = ctypes.CDLL(None)
 
     def serve(self) -> str | None:
-        """Serve requests; return the script's path in a fork, None in the server at its end."""
+        """Serve requests; in a fork, return its script's path; in the server, None at its end."""
         signal.set_wakeup_fd(self._waker, warn_on_full_buffer=False)
         signal.signal(signal.SIGCHLD, lambda number, frame: None)
         while True:
@@ -62,7 +62,7 @@ class Server:
                 return None
             if self.wake in ready:
                 os.read(self.wake, 4096)
-            # send exit statuses of jobs that have ended to their clients, which may be gone
+            # send the exit status of each ended job to its client, which may have ended as well
             for process in list(self.jobs):
                 done, status = os.waitpid(process, os.WNOHANG)
                 if done:
@@ -102,7 +102,7 @@ class Server:
         if process is None:
             client.close()
             return None
-        # the fork sets its process group, too: it must exist before either process continues
+        # server and fork both do this, so that the process group exists before either continues
         os.setpgid(process, process)
         self.jobs[process] = client
         try:
@@ -112,9 +112,9 @@ class Server:
         return None
 
     def _become_job(self, client: socket.socket, streams: list[int]) -> str:
-        """Prepare this fork for its job, without descriptors of the server; return the script."""
+        """Prepare this fork for its job, close the server's files; return the script's path."""
         os.setpgid(0, 0)
-        # the system shall kill this job when the server ends; if it has ended already, exit
+        # let the system kill this job when the server ends; exit if the server has ended already
         self._libc.prctl(_DIES_WITH_PARENT, signal.SIGKILL)
         if os.getppid() != self._process:
             os._exit(1)
@@ -129,7 +129,7 @@ class Server:
         with open(streams[3], encoding="utf-8", errors="surrogateescape", newline="") as request:
             content = request.read()
         if not content.endswith("\0\0"):
-            os._exit(1)  # the client was killed while it wrote
+            os._exit(1)  # the client was killed while it wrote the request
         folder, script, *environment = content.removesuffix("\0\0").split("\0")
         os.chdir(folder)
         os.environ.clear()
@@ -165,7 +165,7 @@ def main() -> None:
     atexit._run_exitfuncs()
     sys.stdout.flush()
     sys.stderr.flush()
-    # exit without freeing the memory of the libraries, which takes long (as `multiprocessing` does)
+    # do not free the memory of the libraries, which takes long (`multiprocessing` does so, too)
     os._exit(0)
 
 

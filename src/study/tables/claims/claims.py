@@ -48,7 +48,7 @@ class Outcome:
 
 
 def values_of(test: TestRule, tables: Tables) -> pd.DataFrame:
-    """Table of the rows that ``test`` selects: their scene, group, method ..., and a `VALUE`."""
+    """Table of the rows that ``test`` selects: scene, group, method ..., and the metric `VALUE`."""
     return METRICS[test.metric].values(tables, dict(test.where), test.accuracy)
 
 
@@ -65,7 +65,7 @@ def close(test: TestRule, values: np.ndarray) -> np.ndarray:
 
 
 def answer(share: float, good: int, total: int) -> str:
-    """Verdict of a test for which a fraction ``share`` of rows must agree.
+    """Verdict of a test: it holds, or fails, if at least a fraction ``share`` of rows says so.
 
     Of ``total`` rows, ``good`` rows satisfy the comparison of the test.
     """
@@ -121,7 +121,7 @@ def _broken_down(test: TestRule, rows: pd.DataFrame, passed: np.ndarray) -> str:
 
 
 def _range(values: np.ndarray) -> str:
-    """Text with smallest and largest of ``values``, and with the median if there are three."""
+    """Text with the least and largest of ``values``, and the median if there are at least three."""
     low, high = _text(values.min()), _text(values.max())
     if low == high:
         return low
@@ -138,7 +138,7 @@ def _text(value: float) -> str:
 
 
 def combined(verdicts: Sequence[str]) -> str:
-    """Verdict of a claim from the ``verdicts`` of its tests: the claim holds if all tests hold.
+    """Verdict of a claim from the ``verdicts`` of its tests; it holds if all tests hold.
 
     Without any tests, the claim is "not tested".
     """
@@ -151,7 +151,7 @@ def combined(verdicts: Sequence[str]) -> str:
 
 
 def timed_columns(rule: ClaimRule) -> set[str]:
-    """Columns of table claims whose cell depends on measured times for the claim of ``rule``."""
+    """Columns of table claims that depend on measured times in the row of the claim ``rule``."""
     found: set[str] = set()
     for part, suffix in PARTS.items():
         timed = [test for test in getattr(rule, part) if test.timed]
@@ -166,7 +166,7 @@ def timed_columns(rule: ClaimRule) -> set[str]:
 def by_rules(timed: Callable[[ClaimRule, Any], set[str]]) -> TimedCells:
     """Return a function for `Table.timed_cells`, which calls ``timed`` for each row of a table.
 
-    The arguments of ``timed`` are the rule of the row's claim, and the row.
+    ``timed`` gets the rule of the row's claim, and the row; it returns the names of columns.
     """
 
     def timed_cells(table: pd.DataFrame, **files: Path) -> list[set[str]]:
@@ -177,7 +177,7 @@ def by_rules(timed: Callable[[ClaimRule, Any], set[str]]) -> TimedCells:
 
 
 def timed_parts(*cells: str) -> TimedCells:
-    """Return a function for `Table.timed_cells`: ``cells``, in rows whose verdict uses times."""
+    """Return a function for `Table.timed_cells`; rows whose verdict uses times get ``cells``."""
     return by_rules(
         lambda rule, row: {*cells} if f"verdict{PARTS[row.part]}" in timed_columns(rule) else set()
     )
@@ -188,15 +188,15 @@ WORDS = {"source", "paper", "figure_or_table", "section", "shown", "text", "qual
 SAID = {"what", "metric", "decides", "compare", "threshold", "share"}
 FOUND = ("satisfied", "of", "close", "least", "median", "most", "verdict")
 ONE_OF = f"one of: {', '.join(VERDICTS)}"
-# Constructor of columns that may depend on times and are not compared with expected tables.
+# Constructs a column that may depend on times and is not compared with the expected table.
 skipped = partial(Column, timed=True, compared="skipped")
 FACTORS = (0.5, 0.8, 1.25, 2.0)  # multiples of each threshold that are tried
 SHARES = (0.5, 0.6, 0.75, 0.9, 1.0)
 MARGINS = (1.0, 1.25, 1.5, 2.0, 3.0, 5.0)  # margins tried for tests that compare times; 1: none
-SMALL = 10  # verdicts are tried with sizes r up to this one only, and with larger ones only
+SMALL = 10  # verdicts are tried with only sizes r up to this one, and with only larger sizes
 SPLITS = ("train", "test", "heldout")
 VARIED = ("threshold", "share", "margin", "sizes", "splits", "scenes")
-# Fraction of rows whose verdict may differ between machines, as few runs determine the verdict.
+# Fraction of rows whose verdict may differ between machines: some verdicts rest on a few runs.
 FRAGILE = 0.01
 _Rows = list[pd.DataFrame]
 _Keep = Callable[[pd.Series], pd.Series]
@@ -229,7 +229,7 @@ _Variation = tuple[str, str, Sequence[TestRule], _Rows]  # (kind, name, changed 
     timed_cells=by_rules(lambda rule, row: timed_columns(rule)),
 )
 def claims(rules: Path, added: Added, **tables: pd.DataFrame) -> pd.DataFrame:
-    """One row for each claim, in the order of the file ``rules``; ``added`` extends its sets."""
+    """One row for each claim, in the order of file ``rules``; for ``added``, see `load_claims`."""
     found = load_claims(rules, added)
     return pd.DataFrame([_row(name, rule, tables) for name, rule in found.items()])
 
@@ -290,7 +290,7 @@ def _timed_of_test(rule: ClaimRule, row: Any) -> set[str]:
     timed_cells=by_rules(_timed_of_test),
 )
 def claims_tests(rules: Path, added: Added, **tables: pd.DataFrame) -> pd.DataFrame:
-    """One row for each claim, kind of verdict and test; ``added`` extends sets in ``rules``."""
+    """One row per claim, kind of verdict and test; for ``added``, see `load_claims`."""
     rows = [
         {"claim": name, "part": part, **test.model_dump(include=SAID), **_found(test, tables)}
         for name, rule in load_claims(rules, added).items()
@@ -301,7 +301,7 @@ def claims_tests(rules: Path, added: Added, **tables: pd.DataFrame) -> pd.DataFr
 
 
 def _found(test: TestRule, tables: Tables) -> dict[str, Any]:
-    """Result of a test for its columns: margin, counts of rows, range of values, and verdict."""
+    """Cells of table claims_tests with the result of ``test``: margin, counts, range, verdict."""
     values = values_of(test, tables)[VALUE].to_numpy(float)
     good, total = int(satisfied(test, values).sum()), len(values)
     spread = (values.min(), np.median(values), values.max()) if total else (None, None, None)
@@ -360,7 +360,7 @@ def _with(test: TestRule, **changes: Any) -> TestRule:
 
 
 def _variations(tests: Sequence[TestRule], rows: _Rows, tables: Tables) -> Iterator[_Variation]:
-    """Yield variations: tests with other limits, with fewer rows, or on other snapshots."""
+    """Yield variations of ``tests``: other limits, fewer rows, other snapshots."""
     for factor in FACTORS:
         changed = [_with(test, threshold=factor * test.threshold) for test in tests]
         yield "threshold", f"x {factor:g}", changed, rows
@@ -386,9 +386,9 @@ def _variations(tests: Sequence[TestRule], rows: _Rows, tables: Tables) -> Itera
 def _kept(
     tests: Sequence[TestRule], rows: _Rows, varied: str, column: str, keeps: Mapping[str, _Keep]
 ) -> Iterator[_Variation]:
-    """Yield one variation for each filter in ``keeps`` (name -> function of ``column``).
+    """Yield one variation for each name in ``keeps`` (name -> function).
 
-    The function returns True for the rows that are kept.
+    The function gets the cells of ``column`` and returns True for each row to be kept.
     """
     for name, keep in keeps.items():
         kept = [values[keep(values[column])] if column in values else values for values in rows]
@@ -417,7 +417,7 @@ def _kept(
     timed_cells=timed_parts("verdict", "same", "measured"),
 )
 def replication(claims: pd.DataFrame, rules: Path, recorded: Path) -> pd.DataFrame:
-    """One row for each kind of verdict of each claim that the file ``recorded`` has, too."""
+    """One row for each kind of verdict and each claim that also stands in file ``recorded``."""
     loaded = load_claims(rules)
     both = claims.merge(pd.read_csv(recorded), on="claim", suffixes=("", "_replication"))
     unchanged = [

@@ -26,7 +26,7 @@ _RERUN = ("motion", "frames", "blowup_frame", _ERROR, *_RUN, "position_basis", "
 
 
 def filtered(table: pd.DataFrame, where: Where) -> pd.DataFrame:
-    """Rows of ``table`` with allowed values; ``where`` maps column names to allowed values."""
+    """Rows of ``table`` whose cells are allowed by ``where`` (column -> allowed values)."""
     for column, allowed in where.items():
         table = table[table[column].isin(allowed)]
     return table
@@ -51,7 +51,7 @@ def reruns(table: pd.DataFrame, where: Where) -> pd.DataFrame:
 
 
 def by_axis(table: pd.DataFrame, where: Where) -> pd.DataFrame:
-    """Selected rows of ``table`` three times: ``relative_error`` is the error in x, in y, in z."""
+    """Rows that ``where`` selects, once for each axis x, y, z with ``relative_error`` in it."""
     parts = [table.assign(axis=a, relative_error=table[f"relative_error_{a}"]) for a in AXES]
     return filtered(pd.concat(parts, ignore_index=True), where)
 
@@ -68,7 +68,7 @@ def held_out(
 
 
 def decay(rows: pd.DataFrame, accuracy: float) -> pd.Series:
-    """Singular values over the largest one, without groups that have only rounding errors."""
+    """Singular values over the largest of their group, without groups of mere rounding errors."""
     rows = rows[rows.groupby(["scene", "group"]).above_roundoff.transform("any")]
     return rows.relative
 
@@ -99,8 +99,8 @@ def elements_per_entry(rows: pd.DataFrame, accuracy: float) -> pd.Series:
 def local_ratio(name: str, rows: pd.DataFrame, accuracy: float) -> pd.Series:
     """Time of a reduced local step, or of a part of it, over that of the full compiled local step.
 
-    Returned is column ``name`` at the largest size r of each scene, group, method and mesh, where
-    the dense solve for the coefficients is the most expensive.
+    This is column ``name``, taken at the largest size r of each scene, group, method and mesh:
+    there the dense solve for the coefficients is the most expensive.
     """
     rows = rows.dropna(subset=[name]).sort_values("r")
     return rows.groupby(CURVE, sort=False).tail(1).sort_index()[name]
@@ -142,7 +142,7 @@ def trend_p_value(name: str, rows: pd.DataFrame, accuracy: float) -> pd.DataFram
     number of sizes are used. The result has one row, or none if there are fewer than two blocks or
     fewer than three sizes.
     """
-    # SciPy's import takes a second, so it is not at the top: planning the workflow does without
+    # not imported at the top: SciPy's import takes a second, which planning the workflow saves
     from scipy.stats import page_trend_test, rankdata
 
     runs = [run for _, run in rows.sort_values("r").groupby(_RUN, sort=False)]
@@ -159,7 +159,7 @@ def trend_p_value(name: str, rows: pd.DataFrame, accuracy: float) -> pd.DataFram
 
 
 def noise_error(rows: pd.DataFrame, accuracy: float) -> pd.Series:
-    """Error of runs with a basis of rounding errors; infinite if a run ended early or not began."""
+    """Error of runs whose snapshots are mere rounding errors; inf if a run blew up or never ran."""
     return rows[rows.r <= rows["rank"]].relative_error.fillna(np.inf)
 
 
@@ -176,7 +176,7 @@ def position_basis_ratio(rows: pd.DataFrame, accuracy: float) -> pd.DataFrame:
 
 
 def over_the_rest(share: np.ndarray) -> np.ndarray:
-    """Time of a part over the remaining time, from the ``share`` of the part in the whole time."""
+    """Ratio of the time of a part to the rest of the time, from the ``share`` of the part."""
     with np.errstate(divide="ignore"):
         return np.divide(share, np.subtract(1.0, share))
 
@@ -188,7 +188,7 @@ class Metric:
     of : function of the selected rows and ``accuracy``; returns values of some of these rows, or a
         table with a column `VALUE` and columns such as scene and group
     choose : function of the table and ``where`` (column -> allowed values) that selects the rows
-    labels : columns allowed in ``where`` in addition to the columns of the table
+    labels : columns that ``where`` may name although the table lacks them
     ratio : function that converts a value to a ratio of two times, for metrics based on times
     """
 
@@ -222,7 +222,7 @@ METRICS = {
     "local_share": Metric(
         lambda rows, _: rows.local_share, "local_share", ("local_share",), ratio=over_the_rest
     ),
-    # error over the frames in which perturbed runs agree; infinite for a run that blew up in them
+    # error over the frames in which perturbed runs agree; infinite if the run blew up earlier
     "rerun_error": _of_reruns(lambda rows, _: rows[_ERROR].fillna(np.inf)),
     "useful_speedup": _of_reruns(useful_speedup, "speedup"),
     "best_useful_speedup": _of_reruns(best_useful_speedup, "speedup"),

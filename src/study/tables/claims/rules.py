@@ -17,12 +17,12 @@ from study.tables import declared
 from study.tables.claims.metrics import METRICS, Value
 
 SETS = "sets"
-_NAMED = "@"  # prefix of a name of a set, which stands in ``where`` for the values of the set
+_NAMED = "@"  # "@name" in ``where`` stands for all values of the set ``name``
 Added = Mapping[str, Sequence[Value]]
 NONE_ADDED: Added = MappingProxyType({})
 MARGIN = 1.5  # default of `TestRule.margin` for tests that compare times
 PARTS = {"published": "", "beyond": "_beyond"}  # name of a verdict -> suffix of its columns
-# Inputs of the tables about claims: the file of rules, a setting, and all tables with metrics.
+# Inputs of the tables about claims: the file of rules, a setting, and tables that metrics read.
 READS: dict[str, Read] = {
     "rules": ProjectFile("config/claims.yaml"),
     "added": Setting("claim_sets"),
@@ -36,7 +36,7 @@ class TestRule(ConfigModel):
     what : description of the compared rows, quoted in the reason of the verdict
     metric : name in `METRICS`
     where : column -> allowed values
-    accuracy : largest error of a run that counts as accurate, for metrics that depend on it
+    accuracy : a run counts as accurate up to this error, in metrics that need accurate runs
     margin : a ratio of times that differs from the threshold by less than this factor counts
         neither for nor against the claim; None for the default, see `factor`
     share : the test holds if at least this fraction of rows satisfies the comparison, does not hold
@@ -152,7 +152,7 @@ class ClaimRule(ConfigModel):
 
 
 def load_claims(path: Path, added: Added = NONE_ADDED) -> dict[str, ClaimRule]:
-    """Read claims from the file ``path``, by identifier; replace names of sets by their values.
+    """Read identifier -> claim from the file ``path``; replace names of sets by their values.
 
     Raises ConfigurationError if the file is invalid, or has no set of a name in ``added``.
 

@@ -27,8 +27,8 @@ from study.artifact.artifact import Artifact, declare, declared_in
 from study.artifact.paths import TABLE
 from study.artifact.reads import Read
 
-# Kinds of content of a column. The kind determines how far the results of two machines may differ.
-# The limits are based on measurements (docs/decisions/0010-six-kinds.md).
+# Kinds of content of a column. The kind limits how far the results of two machines may differ; the
+# limits are based on measurements (docs/decisions/0010-six-kinds.md).
 Quantity = Literal["exact", "value", "error", "share", "timed", "skipped"]
 QUANTITIES: dict[Quantity, str] = {
     "exact": "names, parameters, sizes, truth values: equal",
@@ -92,7 +92,7 @@ class Column:
         if self.kind == "text":
             return values
         if self.kind == "flag":
-            # pandas may have turned flags into numbers while joining tables
+            # pandas may have turned True and False into numbers while joining tables
             others = values[values.notna() & ~values.isin([True, False])]
             if len(others):
                 raise ValueError(f"'{others.iloc[0]}'")
@@ -101,12 +101,12 @@ class Column:
         return values.astype(_DTYPES[self.kind])
 
 
-# Constructors of columns of strings, of integers, of booleans and of floating-point numbers.
+# Functions that make a column of strings, of integers, of booleans, of floating-point numbers.
 text = partial(Column, "text")
 integer = partial(Column, "integer")
 flag = partial(Column, "flag")
 number = partial(Column, "number")
-# Constructor of columns with numbers of runs or scenes, which may differ a little between machines.
+# Makes a column that counts runs or scenes; its values may differ a little between machines.
 count = partial(integer, compared="share")
 
 
@@ -116,10 +116,10 @@ def timed(column: Column) -> Column:
 
 
 def interval(names: str, make: Callable[..., Column] = number, unit: str = "") -> list[Column]:
-    """Return two columns: bounds of the median that stands in the column before (95 % bootstrap).
+    """Return two columns with the 95 % bootstrap interval of the median in the column before.
 
     names : names of both columns, separated by a space
-    make : constructor of the columns
+    make : function that makes a column
     """
     low, high = names.split()
     meaning = "2.5 % quantile of this median (bootstrap)"
@@ -195,7 +195,7 @@ _SHARED = (
 
 
 def shared(names: str) -> list[Column]:
-    """Columns of `_SHARED` with the space-separated ``names``; KeyError if a name is not there."""
+    """Columns of `_SHARED` with the space-separated ``names``; KeyError for an unknown name."""
     by_name = {column.name: column for column in _SHARED}
     return [by_name[name] for name in names.split()]
 
@@ -236,7 +236,7 @@ class Table(Artifact):
 
     @property
     def timing_columns(self) -> tuple[str, ...]:
-        """Names of columns that depend on timing and thus differ even between runs on a machine."""
+        """Names of columns that depend on timing: they differ even between runs on one machine."""
         return tuple(column.name for column in self.columns if column.timed)
 
     def checked(self, table: pd.DataFrame) -> pd.DataFrame:
@@ -262,7 +262,7 @@ class Table(Artifact):
 def table(
     *, title: str, columns: Sequence[Column], reads: Mapping[str, Read], **more: Any
 ) -> Callable[[Callable[..., pd.DataFrame]], Table]:
-    """Return a decorator for the function that computes a table; the table gets its name.
+    """Return a decorator for a function that computes a table; the table is named after it.
 
     Raises TypeError if a column is declared twice, or the function's parameters do not match
     ``reads``.
@@ -284,5 +284,5 @@ def table(
 
 
 def declared() -> dict[str, Table]:
-    """Return all tables of the study by name."""
+    """Return a mapping of names to all tables of the study."""
     return declared_in("study.tables", Table)

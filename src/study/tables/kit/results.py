@@ -1,4 +1,4 @@
-"""Helpers for tables: times on a common scale, rows of reduced_reruns, medians over motions.
+"""Helpers for tables: times on a common scale, selections of reduced runs, medians over motions.
 
 Each job times the full-order run of its scene together with the variants, but machine speed differs
 between jobs. All times of a job are therefore multiplied by one factor: the time of the full-order
@@ -29,12 +29,12 @@ COLUMNS = (
     integer(COUNT, "held-out motions that were run, can be judged and are far enough"),
     number("playback_error", "median error of playback on these motions, see reduced_reruns"),
 )
-# A held-out motion is used as a test only if showing the training motion has a larger error.
+# A held-out motion counts only if the recorded training motion, shown instead, has a larger error.
 FAR = 0.3
 _WHOLE = {"k": "Int64", "r": "Int64"}
 EXPERIMENT = ["scene", "group"]
-ORTHOGONAL = "pod"  # method of orthogonal projection, which evaluates all elements
-FAILED = 0.1  # error before the horizon above which a run counts as failed
+ORTHOGONAL = "pod"  # method that evaluates all elements and projects onto the basis orthogonally
+FAILED = 0.1  # a run whose error over the compared frames exceeds this counts as failed
 TWIN = "_twin"
 
 
@@ -48,13 +48,13 @@ DAY = text("recorded", "day on which config/extended.yaml recorded the row; empt
 
 
 def with_recorded(rows: pd.DataFrame, record: list[Path]) -> pd.DataFrame:
-    """Add rows of ``record`` to ``rows``, but for scenes, weights and meshes that have rows."""
+    """Add rows of ``record`` whose scene, stiffness and mesh size do not occur in ``rows``."""
     if not record:
         return rows.assign(recorded=None)
     others = read_table(record[0], result=False)
     if rows.empty:
         return others
-    # requested tolerances have no stiffness: their scenes run with their own weights only
+    # table requested_tolerances has no column stiffness: its scenes keep their own weights
     keys = [key for key in ("scene", "stiffness", "vertices") if key in rows]
     own = pd.MultiIndex.from_frame(rows[keys].astype(object))
     others = others[~pd.MultiIndex.from_frame(others[keys].astype(object)).isin(own)]
@@ -66,7 +66,7 @@ def in_one_time(
 ) -> pd.DataFrame:
     """Return ``table`` with its time ``columns`` scaled to the times of the table frame_times.
 
-    Scenes that the table frame_times lacks retain the times measured in their job.
+    The times of scenes that are missing in the table frame_times are not scaled.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ def median_interval(values: Sequence[float] | np.ndarray) -> tuple[float, float,
 
     For a single value, or equal values, both quantiles are that value.
     """
-    # imported here because it takes a second, which planning the workflow does not need
+    # not imported at the top: SciPy's import takes a second, which planning the workflow saves
     from scipy.stats import bootstrap
 
     x = np.asarray(values, float)
@@ -130,9 +130,9 @@ def trained(reruns: pd.DataFrame) -> pd.DataFrame:
 def over_motions(reruns: pd.DataFrame, keys: Sequence[str] = KEYS) -> pd.DataFrame:
     """Median, least and largest error of each run over its held-out motions, and their number.
 
-    A run that ended before the horizon has an infinite error. Left out are sizes above the
-    numerical rank, which cannot run, motions with the horizon in frame 0, and motions so close to
-    the training motion that playing the latter has an error of at most `FAR`.
+    Errors use the frames before the horizon, in which perturbed runs agree; a run that ended there
+    has an infinite error. Left out are sizes above the numerical rank, which cannot run, motions
+    without such frames, and motions that the training motion matches with an error <= `FAR`.
 
     Parameters
     ----------
@@ -164,9 +164,9 @@ def judged_runs(reruns: pd.DataFrame, reconstruction: pd.DataFrame) -> pd.DataFr
     result has the columns of ``reruns`` and
 
     gain : amplification of errors by the samples of the reduction
-    error : error of the run before the horizon; inf if it blew up before
-    orthogonal_error : error of orthogonal projection at its largest size up to r; other methods may
-        have one mode more, if their bases are not centred
+    error : error over frames in which perturbed runs agree; inf if the run blew up in one of them
+    orthogonal_error : error of the run with orthogonal projection at the largest size that is at
+        most r; other methods may have one mode more, if their bases are not centred
     failed : whether the error exceeds `FAILED`
     """
     runs = trained(reruns)

@@ -1,8 +1,8 @@
 """Methods with n substeps per frame, the implicit ones with K iterations in each substep.
 
-They are the plain local/global iteration (with K = 1 as in Macklin et al. 2019), the same with
-Anderson acceleration, with Anderson acceleration and a coarse level, and with Chebyshev's
-semi-iteration (Wang 2015, alg. 1), and explicit integration.
+They are explicit integration, and the local/global iteration: plain (with K = 1 as in Macklin et
+al. 2019), with Anderson acceleration, with Anderson acceleration and a coarse level, and with
+Chebyshev's semi-iteration (Wang 2015, alg. 1).
 """
 
 from dataclasses import dataclass
@@ -133,7 +133,7 @@ def _chebyshev(
         end(y, before, step, v)
 
 
-INNER = 10  # number of iterations on the coarse level, which have Anderson acceleration
+INNER = 10  # number of iterations (with Anderson acceleration) on the coarse level
 
 
 class TwoLevel(Alternative):
@@ -220,7 +220,7 @@ def _two_level(
 
 @compiled(nogil=True)
 def _correct(coarse, start, image):
-    """Correct ``image`` = G(y), ``start`` = y: minimise the sampled objective in the span."""
+    """Correct ``image`` = G(y), ``start`` = y: make the sampled objective minimal in the span."""
     span, duals, rows, steps, inverse, vertices, tables, history = coarse
     size, sampled = WIDTH * span.shape[1], WIDTH * len(vertices)
     step, x, at_start = np.zeros(size), np.empty(sampled), np.zeros(sampled)
