@@ -1,4 +1,4 @@
-"""Snakemake's logger for the option ``--logger pdrom``, found by the name of this package."""
+"""Logger for Snakemake's option ``--logger pdrom``; Snakemake finds it by this package's name."""
 
 import logging
 import sys
@@ -35,7 +35,7 @@ class LogHandler(LogHandlerBase):
         self._estimate = Estimate()
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Print a log ``record`` if it concerns the user; update the estimate of remaining time."""
+        """Print a ``record`` about a job or problem; update the estimate of remaining time."""
         event, text = getattr(record, "event", None), record.getMessage()
         news = event is None and (record.levelno >= logging.WARNING or NOTHING in text)
         if event == LogEvent.RUN_INFO:

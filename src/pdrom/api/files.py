@@ -165,7 +165,7 @@ def load(path: str | os.PathLike[str], unchecked: bool = False) -> AnyRun:
 
 
 def _require_sound(found: AnyRun) -> None:
-    """Raise ValueError if an array of the run is not finite or not of the shape of its scene."""
+    """Raise ValueError if an array of the run is not finite or not of the shape its scene gives."""
     if isinstance(found, RequestedRun):
         full = FullRun(found.scene, found.outcome.positions, found.ms, {})
         if not 0 <= found.outcome.frames <= len(found.ms):
@@ -221,13 +221,13 @@ def _reduced(scene: Scene, file: h5py.File) -> ReducedRun:
 
 
 def _scene(file: h5py.File, path: Path) -> Scene:
-    """Scene of the run in ``file``; the mesh is stored in it, or is read from the mesh file."""
+    """Scene of the run in ``file`` at ``path``; its mesh is the stored one, else as configured."""
     settings = json.loads(file.attrs["configuration"])
     # the pipeline stores the scene under the key "config", `save` and `run` under "scene"
     scene = validate(SceneConfig, settings.get("config") or settings["scene"], str(path))
     if "mesh" in file:
         return Scene.build(scene, stored_mesh(file["mesh"]))
-    # a relative path of a mesh file may start at any folder above the file of the run
+    # a relative path of a mesh starts at the nearest folder above the run's file that has the mesh
     mesh, above = scene.mesh, path.resolve().parents
     named = [f for f in above if isinstance(mesh, MeshFile) and (f / mesh.path).is_file()]
     return bound(scene, [*named, Path()][0], str(path))

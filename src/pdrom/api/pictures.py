@@ -108,7 +108,7 @@ def _alike(scene: Scene) -> SceneConfig:
 
 
 def _viewed(runs: list[AnyRun]) -> ViewedScene:
-    """Prepare ``runs`` of one scene for a page, the full-order run first if there is one."""
+    """Prepare ``runs`` of a scene; the first shown is full-order or, if none, a `RequestedRun`."""
     full = [run.full if isinstance(run, ReducedRun) else run for run in runs]
     known: list[FullRun | RequestedRun] = [run for run in full if isinstance(run, FullRun)]
     first = [*known, *(run for run in runs if isinstance(run, RequestedRun))][0]

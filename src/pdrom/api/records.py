@@ -1,4 +1,4 @@
-"""Records that `pdrom.api.run` and `pdrom.api.reduce` return."""
+"""Classes of the runs that `pdrom.api.run` and `pdrom.api.reduce` return."""
 
 from dataclasses import dataclass
 
@@ -14,7 +14,7 @@ from pdrom.reduction.rerun import Rerun, mean_motion
 
 @dataclass(frozen=True, eq=False)
 class Snapshots:
-    """n training snapshots of a group: projections p (n, rows, 3) and their round-off (n,)."""
+    """n training snapshots of a group: projections p (n, rows, 3), norms of round-off in p (n,)."""
 
     p: np.ndarray
     roundoff: np.ndarray
@@ -91,7 +91,7 @@ class RequestedRun:
     scene : scene that was run
     request : requested tolerance and the quantity that it bounds
     outcome : positions (F + 1, N, 3) m, number of frames that meet the tolerance, solver used
-    ms : (F,) milliseconds per frame, all equal: the mean over frames, checks and failed attempts
+    ms : (F,), all equal: milliseconds of all frames, checks and failed attempts, divided by F
     offline_s : seconds of the calibration before the run
     error : true error, over the frames that meet the tolerance, against the converged implicit
         step; None (unknown) if the scene is not the one of the calibration

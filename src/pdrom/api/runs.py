@@ -33,7 +33,7 @@ from pdrom.reduction.sampling import Reduction, select
 from pdrom.reduction.sampling.local_step import ReducedLocalStep, replace_group
 from pdrom.reduction.snapshots import row_masses, training_frames
 
-SNAPSHOTS = 100  # default of the largest number of training snapshots of a group
+SNAPSHOTS = 100  # largest number of training snapshots of a group if the scene sets none
 # A reduced run ends when its bounding box is larger than that of the mesh at rest by this factor.
 BLOWUP_EXTENT = 100.0
 GROUP = "the name of a constraint group"
@@ -233,7 +233,7 @@ def _method_spec(method: str | MethodSpec) -> MethodSpec:
 
 
 def _fitting_basis(made: Any, group: ConstraintGroup, spec: MethodSpec) -> Basis:
-    """Return ``made`` if the method ``spec`` can use it as a basis of the group, else raise."""
+    """Return ``made`` if ``spec`` can use it as a basis of ``group``, else ConfigurationError."""
     known = arguments.require(Basis, made, "basis_of_group", source="pdrom.api.basis makes one")
     found, needed = ((each.elements, each.rows_per_element) for each in (known, group))
     if found != needed:
@@ -254,7 +254,7 @@ def _fitting_basis(made: Any, group: ConstraintGroup, spec: MethodSpec) -> Basis
 
 
 def _within(full: FullRun, error: Wish, scene: Scene, on_frame: OnFrame) -> RequestedRun:
-    """Calibrate solvers (levels of accuracy) on the motion of ``full``, then run ``scene`` by one.
+    """Calibrate solvers on the motion of ``full``; run ``scene`` by the cheapest within ``error``.
 
     The calibration uses the material, masses, time step and number of frames of ``scene``.
     """

@@ -1,4 +1,4 @@
-"""Declaration of a command."""
+"""Declaration of a command of ``pdrom``, exit codes, and paths of a command's files."""
 
 import argparse
 from collections.abc import Callable, Mapping, Sequence
@@ -47,7 +47,7 @@ UNCHECKED = {
 
 
 def files_of(file: str, scene: "Scene") -> list[str]:
-    """Paths of the files of a ``scene``: its own ``file`` and the mesh file, if any."""
+    """Paths of the files of a ``scene``: the scene's ``file`` and, if it has one, its mesh file."""
     from pdrom.model.mesh.config import MeshFile
 
     mesh = scene.config.mesh

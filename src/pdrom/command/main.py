@@ -1,6 +1,6 @@
 """``pdrom COMMAND ...``: the parser, messages and exit codes; each command is a module of its own.
 
-A command's module declares its arguments as a `Command`, and imports all else only when it runs.
+A command's module declares its arguments as a `Command`; running it imports all else.
 """
 
 import argparse

@@ -58,7 +58,7 @@ VOLUME = """\
   - {effect: tetrahedron_strain, weight: 1.0e+6}
   # - {effect: volume, weight: 1.0e+6}
 """
-KILOGRAMS = 10.0  # mass of a vertex for which the weights in these templates are set
+KILOGRAMS = 10.0  # mass of a vertex of a new scene; the constraint weights above suit it
 ENOUGH = 3  # smallest number of fixed vertices with which a body cannot turn about a line
 
 
@@ -160,7 +160,7 @@ def _sides(mesh: "Mesh") -> dict[str, int]:
 
 
 def _side(mesh: "Mesh", axis: int) -> str:
-    """YAML of vertices to pin: the first side with `ENOUGH` vertices, or `ENOUGH` at the top."""
+    """YAML of pinned vertices: a side with at least `ENOUGH`, else the `ENOUGH` nearest the top."""
     for side, count in _sides(mesh).items():
         if count >= ENOUGH:
             return side

@@ -1,4 +1,4 @@
-"""Progress lines of runs and calibrations, on stderr; on a terminal one line is rewritten."""
+"""Progress of runs on stderr: on a terminal one line is rewritten, elsewhere lines are added."""
 
 import os
 import sys
@@ -14,7 +14,7 @@ PAUSE = 2.0  # seconds between two lines of `LevelProgress` where stderr is no t
 
 
 class _Line:
-    """Progress line of the run ``name`` on ``stream``; says first if kernels must be compiled."""
+    """Progress of the run ``name`` on ``stream``; announces first if code must be compiled."""
 
     def __init__(self, name: str, stream: TextIO | None = None) -> None:
         self._name, self._stream = name, stream or sys.stderr
@@ -47,13 +47,13 @@ class Progress(_Line):
         self._frames, self._ends = frames, [self._began]
 
     def __call__(self, frame: int, report: FrameReport) -> None:
-        """Show that frame number ``frame``, counted from 0, has been computed."""
+        """Show that frame ``frame`` (0-based) has been computed, and its time from ``report``."""
         done, now = frame + 1, monotonic()
         self._ends.append(now)
         early = now - self._shown < EVERY if self._terminal else done % max(1, self._frames // 10)
         if early and done < self._frames:
             return
-        # the time left is estimated from the later half, since early frames include compilation
+        # time left by the later half of the computed frames, since early ones include compilation
         half = done // 2
         left = (now - self._ends[half]) / (done - half) * (self._frames - done)
         full, ms = WIDTH * done // self._frames, 1e3 * float(report.seconds.sum())
@@ -65,7 +65,7 @@ class Progress(_Line):
 
 
 class LevelProgress(_Line):
-    """Line with the title of the solver (level of accuracy) in use and the time since the start."""
+    """Line with the solver in use, such as "full order, K = 20", and the time since the start."""
 
     def __enter__(self) -> Self:
         return self
@@ -74,7 +74,7 @@ class LevelProgress(_Line):
         self._end()
 
     def __call__(self, title: str) -> None:
-        """Show ``title``, the solver that has computed a frame, every `EVERY` or `PAUSE` s."""
+        """Show the solver ``title`` at intervals of at least `EVERY` s (no terminal: `PAUSE` s)."""
         now = monotonic()
         if now - self._shown >= (EVERY if self._terminal else PAUSE):
             self._show(f"{self._name}: {title}, {now - self._began:.0f} s", now)

@@ -1,4 +1,4 @@
-"""``pdrom reduce SCENE.yaml``: run with one group reduced, or within a requested tolerance."""
+"""``pdrom reduce SCENE.yaml``: run with one constraint group reduced, or within an error limit."""
 
 import argparse
 import sys
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from pdrom.model.scene import Scene
 
 WRONG = 0.1  # relative error above which the command calls a run "wrong" instead of "accurate"
-# Kind of picture -> key of its metadata that names the program which made it.
+# File format of a picture -> key of its metadata that names the program which made it.
 PICTURES = {"pdf": "Creator", "png": "Software", "svg": "Creator"}
 
 
@@ -24,7 +24,10 @@ def _size(text: str) -> int:
 
 
 def perform(arguments: argparse.Namespace) -> Status:
-    """Run in full order unless a run is given, then run reduced; print errors and times."""
+    """Run the scene with one group reduced, or within an error limit; print its error and time.
+
+    With a group, the full-order run is computed first, unless a file of it is given.
+    """
     if arguments.group is None:
         return _perform_request(arguments)
     from pdrom.api import FullRun, load, load_scene, plot, reduce, run, save
@@ -57,7 +60,7 @@ def perform(arguments: argparse.Namespace) -> Status:
 
 
 def _check_outputs(arguments: argparse.Namespace, out: str, scene: "Scene") -> None:
-    """Refuse outputs that cannot be written, before anything runs."""
+    """Raise StorageError or ConfigurationError if ``out`` or the picture cannot be written."""
     from pdrom.core.errors import ConfigurationError, choices
 
     read = [*files_of(arguments.scene, scene), *([arguments.run] if arguments.run else [])]
@@ -92,7 +95,7 @@ def _told(reduced: "ReducedRun") -> str:
 
 
 def _perform_request(arguments: argparse.Namespace) -> Status:
-    """Calibrate on a training run, run the scene within the tolerance; print errors and times."""
+    """Find the cheapest solver within the error limit on a training run; run the scene by it."""
     from pdrom.api import FullRun, load, load_scene, reduce, save
     from pdrom.command.progress import LevelProgress
     from pdrom.core.errors import ConfigurationError, StorageError

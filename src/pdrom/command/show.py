@@ -1,4 +1,4 @@
-"""``pdrom show FILE``: print the kind, origin and contents of a result file."""
+"""``pdrom show FILE``: print what a result file contains, how it was made, whether it is intact."""
 
 import argparse
 import json
@@ -9,7 +9,7 @@ from typing import Any
 
 from pdrom.command.base import Command, Status
 
-LONGEST = 100  # largest number of characters shown of an attribute's value
+LONGEST = 100  # largest number of characters shown of an HDF5 attribute's value
 
 
 def perform(arguments: argparse.Namespace) -> Status:

@@ -30,7 +30,7 @@ DATE = "1767225600"
 CPUINFO = Path("/proc/cpuinfo")
 # instruction sets that OpenBLAS's Haswell kernels need in addition to those that NumPy needs
 HASWELL = {"avx2", "fma"}
-# instruction sets of the compiler's Haswell target: Linux's name of each -> the compiler's name
+# instruction sets of code that Numba compiles for Haswell: Linux's name -> the compiler's (LLVM's)
 COMPILED_HASWELL = {
     "abm": "lzcnt", "avx2": "avx2", "bmi1": "bmi", "bmi2": "bmi2", "f16c": "f16c", "fma": "fma",
     "movbe": "movbe", "popcnt": "popcnt",
@@ -41,14 +41,15 @@ TARGET, FEATURES = "NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES"
 def settled(
     environment: Mapping[str, str], kernels: str | None, target: Mapping[str, str]
 ) -> dict[str, str]:
-    """Return ``environment`` without inherited settings and with this project's settings.
+    """Return a copy of ``environment`` with this project's settings in place of inherited ones.
 
-    Variables named in ``PDROM_KEEP`` are neither cleared nor set.
+    Variables with a prefix of `CLEARED` are removed, except for `KEPT`, then the project's are set.
+    A variable named in ``PDROM_KEEP`` is neither removed nor set.
 
     Parameters
     ----------
     kernels : OpenBLAS's name of the kernels to use; None leaves the choice to OpenBLAS
-    target : variables that set the compiler's target processor, from `compiled_for`
+    target : variables that set the processor for which Numba compiles, from `compiled_for`
     """
     asked = environment.get(KEEP, "").split()
     kept = {
@@ -66,13 +67,13 @@ def settled(
     }
     if kernels:
         fixed["OPENBLAS_CORETYPE"] = kernels
-    if TARGET not in asked:  # a user who keeps the target name keeps its features, too
+    if TARGET not in asked:  # if the user keeps TARGET, set no FEATURES either: they depend on it
         fixed |= target
     return kept | {name: value for name, value in fixed.items() if name not in asked}
 
 
 def settle() -> None:
-    """Set the `settled` environment in this process and its jobs; call before loading NumPy."""
+    """Give this process and its child processes the `settled` environment, before NumPy loads."""
     system, machine, features = platform.system(), platform.machine(), features_here()
     environment = settled(
         os.environ, core_type(system, machine, features), compiled_for(machine, features)
@@ -85,8 +86,8 @@ def settle() -> None:
 def core_type(system: str, machine: str, features: set[str]) -> str | None:
     """OpenBLAS's name of kernels that a whole processor family supports; None to set no kernels.
 
-    Haswell (2013; also AMD's Zen) if the processor has its instructions, otherwise Nehalem, whose
-    instructions NumPy requires anyway; on ARM the kernels of the base architecture. None on other
+    On Linux, x86-64: Haswell (2013; also AMD's Zen) if the processor has its instructions, or else
+    Nehalem, whose instructions NumPy requires anyway; ARM: the base architecture. None on other
     systems: their library is not OpenBLAS, or they do not list the processor's instructions.
 
     Parameters
@@ -102,10 +103,10 @@ def core_type(system: str, machine: str, features: set[str]) -> str | None:
 
 
 def compiled_for(machine: str, features: set[str]) -> dict[str, str]:
-    """Variables that set a compiler target common to a whole family of processors.
+    """Environment variables that make Numba compile for a whole family of processors.
 
-    Haswell if an x86-64 processor has the instruction sets that the compiler uses for it; on ARM
-    the base architecture. Otherwise empty: the compiler then targets the machine's own processor.
+    Haswell if an x86-64 processor has the instruction sets `COMPILED_HASWELL`; on ARM the base
+    architecture. Otherwise empty: Numba then compiles for the processor on which it runs.
 
     Parameters
     ----------

@@ -22,7 +22,7 @@ def suggestion(value: object, allowed: Iterable[str]) -> str:
 
 
 def reason(error: OSError) -> str:
-    """Operating system's message for ``error``, whose number HDF5 puts only into a longer text."""
+    """Operating system's message for ``error``, even if HDF5 gives its number only in the text."""
     hidden = re.search(r"errno = (\d+)", str(error))
     number = error.errno or (int(hidden[1]) if hidden else 0)
     return os.strerror(number) if number in errno.errorcode else " ".join(str(error).split())[:200]
@@ -47,11 +47,11 @@ class ConfigurationError(PdromError):
 
 
 class MeshError(PdromError):
-    """A mesh is unreadable, not finite, or has unreferenced or repeated vertices."""
+    """A mesh is unreadable or invalid: for example, it has vertices that no element uses."""
 
 
 class DegenerateElementError(MeshError):
-    """An element at rest has zero length, area or volume, so that its operator does not exist."""
+    """An element at rest has zero length, area or volume, so that its strain is not defined."""
 
 
 class SceneError(PdromError):

@@ -41,7 +41,7 @@ class Units(ConfigModel):
 
     @property
     def unit_s(self) -> float:
-        """Geometric mean of the three times, s; unit for run times of different machines."""
+        """Geometric mean of the benchmark times, s; expected run times are proportional to it."""
         return (self.unit_scalar_s * self.unit_vector_s * self.unit_memory_s) ** (1 / 3)
 
 

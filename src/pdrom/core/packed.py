@@ -1,4 +1,4 @@
-"""Encoding of arrays for scripts of a web page, and one-line descriptions of records."""
+"""Arrays encoded as text for scripts of a web page, and one-line descriptions of dataclasses."""
 
 import base64
 import zlib
@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-LEVELS = 65535  # number of steps into which a side of the bounding box is divided
+LEVELS = 65535  # steps into which `pack_positions` divides each side of the bounding box
 
 
 def pack_text(values: np.ndarray) -> str:
@@ -16,7 +16,7 @@ def pack_text(values: np.ndarray) -> str:
 
 
 def pack_array(values: np.ndarray, kind: str) -> dict[str, Any]:
-    """Pack ``values`` of any shape as JSON; number type ``kind`` is "f8", "f4", "u4" or "u1"."""
+    """Dict for JSON: number type ``kind`` ("f8", "f4", "u4" or "u1"), shape, packed ``values``."""
     shape, data = list(np.shape(values)), np.asarray(values).astype(f"<{kind}")
     return {"kind": kind, "shape": shape, "data": pack_text(data)}
 

@@ -1,8 +1,8 @@
 """Provenance of a result: the job that made it, its settings, code and libraries.
 
-Inside the context `made_by`, `pdrom.core.store` records the job with the checksum of every file it
-writes, in HDF5 files also as attributes. Two equal runs have equal records: these contain no date,
-no folder and no commit, since a commit may change only documentation.
+Inside the context `made_by`, `pdrom.core.store` stores the provenance beside the checksum of every
+file it writes, in HDF5 files also as attributes. Two runs of one job have equal provenance: it
+contains no date, no folder and no commit, since a commit may change only documentation.
 """
 
 import hashlib
@@ -51,7 +51,7 @@ def made_by(name: str, configuration: Any, code: str = "") -> Iterator[None]:
 
 @cache
 def library_versions() -> dict[str, str]:
-    """Versions of the numerical libraries; "absent" for one that is not installed."""
+    """Versions of the packages in `LIBRARIES`; "absent" for one that is not installed."""
     found = {}
     for name in LIBRARIES:
         try:
@@ -62,7 +62,7 @@ def library_versions() -> dict[str, str]:
 
 
 def attributes() -> dict[str, str]:
-    """Attributes of an HDF5 file: its provenance and the whole configuration of the job."""
+    """Attributes of an HDF5 file that the job writes: provenance, configuration, units (SI)."""
     return {
         **_JOB.get(),
         "pdrom_version": __version__,

@@ -67,7 +67,7 @@ def _require_plain(text: str) -> None:
 
 
 def read_yaml(path: Path) -> Any:
-    """Content of the YAML file ``path``; ConfigurationError if missing or not plain YAML."""
+    """Read the YAML file ``path``; ConfigurationError if unreadable, invalid or with aliases."""
     try:
         if not path.is_file():
             whole = Path(f"{path}.yaml")
@@ -100,7 +100,7 @@ def validate(model: type[M], data: Any, source: str) -> M:
 
 def describe(error: ValidationError, model: type[BaseModel]) -> str:
     """Message about the first fault that ``model`` found, as ``key = value: what is required``."""
-    # a misspelt key is reported as unknown and as missing: the less helpful "missing" comes last
+    # a misspelt required key causes two faults, unknown and missing: "missing" helps less, so last
     faults = sorted(error.errors(), key=lambda fault: fault["type"] == "missing")
     fault = faults[0]
     location = fault["loc"]
@@ -119,7 +119,7 @@ def describe(error: ValidationError, model: type[BaseModel]) -> str:
     if fault["type"] == "union_tag_not_found":
         return f"{key}: key {fault['ctx']['discriminator']} is missing"
     if fault["type"] == "value_error" and isinstance(fault["input"], (dict, list, BaseModel)):
-        # leave out the value, which may be long: the validator's message names the fault within it
+        # the value, which may be long, is left out: the message says which part of it is wrong
         return f"{key}: {message}" if location and not message.startswith(key) else message
     return f"{key} = {shown(fault['input'], 80)}: {message}"
 
@@ -138,7 +138,7 @@ def keys_of(model: type[BaseModel]) -> list[str]:
 
 
 def _model_at(model: type[BaseModel], location: tuple[int | str, ...]) -> type[BaseModel] | None:
-    """Model of the value at ``location`` (keys, indices) in ``model``; None if not exactly one."""
+    """Model of the value at ``location`` (keys, indices); None if it has none, or several."""
     current: type[BaseModel] | None = model
     for part in location:
         if isinstance(part, int) or current is None:
@@ -155,7 +155,7 @@ def _inner_model(annotation: Any) -> type[BaseModel] | None:
     return models[0] if len(models) == 1 else None
 
 
-# Longest file name and longest path that systems accept, in bytes.
+# Longest file name and longest path that operating systems accept, in bytes.
 MAX_NAME, MAX_PATH = 255, 4095
 _SCENE_NAME = re.compile(r"[a-z][a-z0-9_]{0,63}")
 
@@ -170,7 +170,7 @@ def _scene_name(name: str) -> str:
 
 
 def check_lengths(path: str) -> None:
-    """Raise ValueError if ``path`` or a name in it is longer than systems accept."""
+    """Raise ValueError if ``path`` exceeds `MAX_PATH` bytes or a name in it `MAX_NAME` bytes."""
     if len(os.fsencode(path)) > MAX_PATH:
         raise ValueError(f"a path of at most {MAX_PATH} bytes is required")
     for name in PurePath(path).parts:

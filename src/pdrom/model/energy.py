@@ -36,7 +36,7 @@ class EnergyScale:
 
     zero : smallest potential of the forces in the full-order run, J
     peak : largest total energy of the full-order run, J, minus ``zero``
-    own : `energies` of the full-order run, minus ``zero``, divided by ``peak``
+    own : (`energies` of the full-order run - ``zero``) / ``peak``; empty if ``peak`` is round-off
     """
 
     scene: Scene

@@ -21,20 +21,20 @@ MOTIONS: tuple[HeldOutMotion, ...] = get_args(HeldOutMotion)
 FIRST = MOTIONS[0]
 PLAYBACK = "playback"  # name, in tables, of the recorded training motion used as a prediction
 FASTER = 0.75  # duration of handle motions in "kick", relative to the training motion
-# Motion -> degrees by which gravity turns, and index in the allowed axes: 0 the first, -1 the last.
+# Motion -> degrees by which gravity turns towards an axis, and index of the axis in ``kick_axes``.
 TILTS = {"heldout": (-20.0, 0), "kick": (30.0, 0), "stiffness": (20.0, -1)}
-# Motion -> direction (sign) in which pins move, and index in the allowed axes: 0 first, -1 last.
+# Motion -> sign of the pins' displacement along an axis, and index of the axis in ``kick_axes``.
 CARRIED = {"heldout": (1.0, 0), "stiffness": (-1.0, -1)}
 CARRY_S = 0.5  # duration of the motion of pins, s
-FURTHER = 20261125  # first part of the seeds of further training motions
+FURTHER = 20261125  # first of the three numbers that seed a motion of `HeldOut.further`
 
 
 class HeldOut(ConfigModel):
     """Settings of the held-out (test) motions of a scene; changes are along axes ``kick_axes``.
 
-    Motion "heldout" multiplies frame numbers by ``frames_factor``, moves pins by ``carry`` (m) and
-    turns gravity. Motion "kick" adds a random initial velocity of ``kick`` (m/s, by ``seed``),
-    makes handles faster (`FASTER`), turns gravity more and in the opposite sense. "stiffness"
+    Motion "heldout" multiplies frame numbers of effects by ``frames_factor``, moves pins by
+    ``carry`` (m), turns gravity. Motion "kick" adds a random initial velocity of ``kick`` (m/s, by
+    ``seed``), makes handles faster (`FASTER`), turns gravity more and the other way. "stiffness"
     multiplies the weights of all constraints by ``stiffness``, moves handles and pins in other
     directions, turns gravity towards another axis and adds an initial velocity by another seed.
     Changes of gravity, handles or pins do not apply to scenes without them.

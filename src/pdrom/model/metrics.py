@@ -4,7 +4,7 @@ import numpy as np
 
 
 def squared_norms(p: np.ndarray) -> np.ndarray:
-    """Return squared Frobenius norms (4,) of p (n, rows, 3): of all entries, of x, of y, of z."""
+    """Return squared Frobenius norms (4,) of p (n frames, rows, 3): of all entries, x, y, z."""
     axes = np.einsum("nra,nra->a", p, p)
     return np.concatenate([[axes.sum()], axes])
 
@@ -31,9 +31,9 @@ def relative_errors(p: np.ndarray, p_hat: np.ndarray, roundoff: float) -> list[f
 
 
 def shape_residuals(positions: np.ndarray, reference: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return differences R q + t - q_ref, where R, t is the best rigid motion of each frame.
+    """Return differences R q + t - q_ref in each of F frames after the best rigid motion R, t.
 
-    R is the optimal rotation, never a reflection (Kabsch 1976), t aligns the centroids.
+    R is the least-squares rotation, never a reflection (Kabsch 1976), t aligns the centroids.
 
     Parameters
     ----------
@@ -42,7 +42,8 @@ def shape_residuals(positions: np.ndarray, reference: np.ndarray) -> tuple[np.nd
     Returns
     -------
     residuals, scale
-        (F, N, 3) differences divided by the scale (F,) m, as squares in metres may overflow.
+        (F, N, 3) differences divided by ``scale`` (F,) m, which is at least 1 m and at least every
+        coordinate of the frame, as squares of differences in metres may overflow.
     """
     # scale both runs, since products of positions in an unstable run would overflow
     largest = np.abs(positions).max(initial=0.0, axis=(1, 2), keepdims=True)
@@ -56,11 +57,9 @@ def shape_residuals(positions: np.ndarray, reference: np.ndarray) -> tuple[np.nd
 
 
 def shape_differences(positions: np.ndarray, reference: np.ndarray) -> np.ndarray:
-    """Return norms (F,) m of the differences of two runs in each frame after the best rigid motion.
+    """Return norms (F,) m of two runs' differences in each frame after the best rigid motion.
 
-    Parameters
-    ----------
-    positions, reference : (F, N, 3) m, finite
+    ``positions`` and ``reference`` are (F, N, 3) m, finite.
     """
     residuals, scale = shape_residuals(positions, reference)
     return np.linalg.norm(residuals, axis=(1, 2)) * scale

@@ -21,7 +21,7 @@ log = logging.getLogger(__name__)
 def simulate(
     scene: Scene, perturbation: np.ndarray | None = None, **stepper: Any
 ) -> Iterator[tuple[State, FrameReport]]:
-    """Yield the state and the report after each frame of ``scene``.
+    """Run ``scene`` and yield the state and the step loop's report after each frame.
 
     Parameters
     ----------
@@ -35,10 +35,7 @@ def simulate(
 def trajectory(scene: Scene, perturbation: np.ndarray | None = None, **stepper: Any) -> np.ndarray:
     """Return positions (F + 1, N, 3) m of a run of ``scene``, the initial positions first.
 
-    Parameters
-    ----------
-    perturbation : (N, 3) m, added to the initial positions
-    stepper : options of `Scene.stepper`
+    Parameters are those of `simulate`.
     """
     positions = [scene.initial_state(perturbation).positions]
     positions += [state.positions for state, _ in simulate(scene, perturbation, **stepper)]
@@ -118,7 +115,7 @@ class _SnapshotRecorder:
             self._targets.append((group, position, data, roundoff))
 
     def observer(self, frame: int) -> Callable[[np.ndarray], None] | None:
-        """Return a function that stores snapshots of an iterate; None if ``frame`` needs none."""
+        """Return a function that stores p(y) of an iterate y; None in frames without snapshots."""
         wanted = [t for t in self._targets if frame in t[1]]
         if not wanted:
             return None
@@ -137,7 +134,7 @@ Run = Callable[[State, range], Iterator[tuple[State, FrameReport]]]
 
 
 def frame_by_frame(advance: Advance) -> Run:
-    """Return a `Run` that calls ``advance`` once for each frame that is requested."""
+    """Return a function of state and frames (`Run`) that computes each frame by ``advance``."""
 
     def run(state: State, frames: range) -> Iterator[tuple[State, FrameReport]]:
         for frame in frames:
@@ -151,7 +148,7 @@ def frame_by_frame(advance: Advance) -> Run:
 class Frame:
     """State at the end of a frame in which all positions are finite.
 
-    state : state in the coordinates of the step loop
+    state : state as the step loop has it: positions, or coordinates in a position subspace
     positions : (N, 3) m of the vertices
     extent : longest side of the bounding box, divided by `BoundedRun.unit`
     """
@@ -165,11 +162,11 @@ class Frame:
 
 @dataclass
 class BoundedRun:
-    """Iterator over the frames of a run, which ends with the first that exceeds a limit.
+    """Iterator over the frames of a run, which ends if the run blows up.
 
     run : function that computes frames, possibly more than are yielded
-    limit : the run ends if the longest side of the bounding box over ``unit`` (m) exceeds this
-    positions : function that maps the coordinates of ``run`` to vertex positions (N, 3) m
+    limit : largest allowed ratio of the longest side of the bounding box to ``unit`` (m)
+    positions : function that maps the positions in states of ``run`` to vertex positions (N, 3) m
     blowup_frame : first frame that is not finite (not yielded) or exceeds the limit, else None
     """
 

@@ -32,7 +32,7 @@ log = logging.getLogger(__name__)
 
 # A body that is held (fixed) at fewer vertices than this can rotate about a line.
 FEW = 3
-# A target inside an obstacle by at most this fraction of the mesh's longest side counts as on it.
+# Held vertices inside an obstacle by up to this fraction of the mesh's extent cause no warning.
 SLACK = 1e-9
 # Largest number of vertices that are listed in a message.
 NAMED = 10
@@ -157,7 +157,7 @@ class SceneConfig(ConfigModel):
         return sorted({EFFECTS[e.effect] for e in self.effects})
 
     def coarsened(self, resolution: float, frames: float) -> Self:
-        """Return the scene with vertices per side times ``resolution``, frames times ``frames``."""
+        """Return the scene with vertices per side and frames multiplied by these two factors."""
         count = max(4, round(self.frames * frames))
         even = (count + 1) // 2
         plans = {
@@ -179,14 +179,14 @@ class SceneConfig(ConfigModel):
         return self.model_copy(update={"effects": effects})
 
     def training_variant(self, seed: int) -> Self:
-        """Configuration of the scene with a further training motion, random by ``seed``."""
+        """Configuration of the scene with another training motion, drawn at random by ``seed``."""
         effects = self.held_out.further(self.effects, seed, self.time_step)
         return self.model_copy(update={"effects": effects})
 
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A scene bound to its mesh; it has an object for each effect of the configuration, by role."""
+    """A scene bound to its mesh, with its effects as objects in one list for each role."""
 
     config: SceneConfig
     mesh: Mesh
@@ -203,7 +203,7 @@ class Scene:
         return f"Scene('{self.config.name}', {size}: {effects})"
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Copy and unpickle by building the scene anew, since kernels cannot be pickled."""
+        """Make copying and unpickling build the scene anew: compiled kernels cannot be pickled."""
         return Scene.build, (self.config, self.mesh, self.masses)
 
     @classmethod
@@ -258,7 +258,7 @@ class Scene:
         Raises
         ------
         MeshError, SceneError
-            The changed effects are faulty.
+            A changed effect does not suit the mesh or is in conflict with another effect.
         """
         config = self.config.model_copy(update=keys)
         return self._bound(config, self.mesh, self.masses)
@@ -279,10 +279,10 @@ class Scene:
                     )
 
     def log_holds(self) -> None:
-        """Log how many vertices each effect holds; warn if targets are inside an obstacle.
+        """Log how many vertices each boundary condition holds (prescribes); call `log_obstructed`.
 
-        Also warn if a selected side has fewer than `FEW` vertices: on an unstructured mesh the side
-        is often a single vertex.
+        Warn if a selected side has fewer than `FEW` vertices: on an unstructured mesh the side is
+        often a single vertex.
         """
         for boundary in self.boundaries:
             count, side = len(boundary.vertices), boundary.side
@@ -298,7 +298,7 @@ class Scene:
         log_obstructed(self)
 
     def log_contacts(self) -> None:
-        """Log the warnings of all contacts (`doubt`), for example that one moves vertices at rest.
+        """Log the warnings of all contacts (`doubt`), for example: a contact moves the rest shape.
 
         Vertices that are held (fixed) in the first frame are ignored.
         """
@@ -360,12 +360,12 @@ class Scene:
         return Anderson(window) if window else None
 
     def space(self, system: GlobalSystem) -> VertexSpace:
-        """Return the unknowns of a full-order run, all positions, with this linear ``system``."""
+        """Return the unknowns of a full-order run: all positions, which ``system`` solves for."""
         return VertexSpace(system, self.forces, self.boundaries, contacts=self.contacts)
 
 
 def _place(boundary: base.Boundary) -> base.EffectConfig:
-    """Configuration of ``boundary`` without ``select``, ``until``; equal only for equal motions."""
+    """Configuration that sets the motion of ``boundary``: all but its vertices and last frame."""
     return boundary.config.model_copy(update={"select": None, "until": None})
 
 
@@ -377,7 +377,7 @@ def log_obstructed(scene: Scene) -> None:
     """
     obstacles = [contact for contact in scene.contacts if contact.each_alone]
     inside, blocked = np.zeros(scene.mesh.vertices, dtype=bool), dict[str, None]()
-    # a copy, since boundary conditions store positions when a hold begins
+    # copies, since boundary conditions store positions when a hold begins
     boundaries, positions = deepcopy(scene.boundaries), scene.mesh.points.copy()
     slack = SLACK * scene.mesh.extent
     for frame in range(scene.config.frames if obstacles and boundaries else 0):

@@ -20,10 +20,10 @@ class Basis:
     The group has e elements with p rows of three numbers (x, y, z) each. Entry i of a vector is
     axis i % 3 of row i // 3, which belongs to element i // (3 p).
 
-    V : (3 e p, rank); orthonormal (in the weighted inner product), or orthonormal axis by axis if
-        ``separate_axes``
+    V : (3 e p, rank); orthonormal (with mass weighting in the inner product of the row masses), or
+        orthonormal axis by axis if ``separate_axes``
     mean : (3 e p,), zero unless the snapshots are centred
-    singular_values : all singular values of the weighted, centred train matrix
+    singular_values : all singular values of the matrix of weighted, centred training snapshots
     rank : number of singular values above round-off, which is the number of columns of V
     roundoff : singular values up to this absolute size are noise
     active_axes : for each axis x, y, z, whether its snapshots exceed round-off
@@ -112,25 +112,25 @@ def compute_basis(
     """
     _check(snapshots, row_mass, rows_per_element, spec)
     matrix = snapshots.reshape(len(snapshots), -1).T
-    scale = np.ones(3 * len(row_mass))  # square root of the inner product's diagonal
+    scale = np.ones(3 * len(row_mass))  # square roots of the weights of the modes' inner product
     if spec.weighting == "mass":
         scale = np.repeat(np.sqrt(row_mass), 3)
     mean, error, shown = np.zeros(len(matrix)), roundoff, matrix
     if spec.centring == "affine":
-        # The mean of n snapshots has a rounding error of at most n eps/2 times the sum of the
-        # terms' magnitudes (Higham 2002, section 4.2). The error is equal in all columns; `rounded`
-        # bounds its Frobenius norm. Otherwise constant snapshots would get modes of round-off.
-        # Subtracting the first snapshot makes no such error.
+        # The mean of n snapshots has a rounding error of at most n eps/2 times the mean of their
+        # magnitudes (Higham 2002, section 4.2). Every centred snapshot has this error; `rounded`
+        # bounds its Frobenius norm over all n. Without this bound, constant snapshots would get
+        # modes of round-off. Subtracting the first snapshot makes no such error.
         rounded = 0.5 * np.finfo(float).eps * matrix.shape[1] * float(np.linalg.norm(matrix))
         mean, error = matrix.mean(axis=1), max(roundoff, rounded)
-        # an axis with constant snapshots is inactive with this centring, active with the others
+        # only with centring "affine" is an axis with constant snapshots inactive (``active`` below)
         shown = matrix - mean[:, None]
     elif spec.centring == "mean-in-modes":
         mean = matrix[:, 0].copy()
     centred = (matrix - mean[:, None]) * scale[:, None]
     noise = error * float(scale.max())
-    # an axis is active if the norm of its snapshots exceeds both the round-off of the data and the
-    # round-off that belongs to the largest norm of an axis
+    # an axis is active if the norm of its snapshots exceeds both the round-off of the data and that
+    # of an SVD, which is relative to the largest of the three norms
     norms = np.array([np.linalg.norm(shown[axis::3]) for axis in range(3)])
     least = max(error, max(shown.shape) * np.finfo(float).eps * norms.max())
     active = tuple(bool(norm > least) for norm in norms)
@@ -196,8 +196,8 @@ def _check(
 def _per_axis(centred: np.ndarray, noise: float) -> tuple[np.ndarray, np.ndarray, list[int]]:
     """Return one POD basis per axis as (modes, singular values, rank of each axis).
 
-    Modes beyond an axis's rank are zero. The returned singular value k is the 2-norm of the k-th
-    singular values of the three axes.
+    Singular values of an axis up to ``noise`` do not count for its rank, and modes beyond the rank
+    are zero. The returned singular value k is the 2-norm of the k-th ones of the three axes.
     """
     n, m = centred.shape
     modes = np.zeros((n, min(n // 3, m)))
@@ -218,10 +218,11 @@ def _mean_in_modes(
     active: tuple[bool, ...],
     signs: np.random.Generator | None,
 ) -> np.ndarray:
-    """Rescale modes ``v``, add the snapshot ``first`` to each, and orthonormalise per axis by QR.
+    """Scale modes ``v``, add the snapshot ``first`` to each, and orthonormalise per axis by QR.
 
-    As in the program published with the preprint, an axis with fewer independent columns than modes
-    is completed by Householder vectors, which are orthonormal but do not come from the data.
+    The scale is the standard deviation of all entries of ``centred``. An axis with fewer
+    independent columns than modes is completed by Householder vectors, which are orthonormal but do
+    not come from the data. The program published with the preprint does the same.
     """
     if v.shape[1] == 0:
         return v
@@ -271,11 +272,11 @@ def thin_qr(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Factor A = ``matrix`` (n, m), n > m, as (Q_1 R_2^-1) R; return Q_1, R_2 (m, m), R (m, m).
 
     Q_1 R_2^-1 has orthonormal columns up to round-off, also where A has no full rank. The product
-    is not formed: a caller multiplies it by a small matrix, and R_2^-1 times that costs less.
+    is not formed: a caller needs Q_1 R_2^-1 C with a small matrix C, and R_2^-1 C costs less.
 
     Householder reflections read A once per column and wait for memory. Here (Terao, Ozaki and
     Ogita 2020) LU with partial pivoting, A = P L U, leaves a well-conditioned L, and two Cholesky
-    factorisations of Gram matrices make it orthonormal: L = Q_1 R_1, Q_1 = Q R_2, R = R_2 R_1 U.
+    factorisations of Gram matrices make it orthonormal: P L = Q_1 R_1, Q_1 = Q R_2, R = R_2 R_1 U.
     If L is ill-conditioned, so that Q_1 is not orthonormal up to `DEPARTURE`, Householder
     reflections factor A instead. If L is well-conditioned, R has the error of the LU factorisation,
     about eps cond(L) relative to each column of A.

@@ -48,15 +48,15 @@ class Yardstick:
 
     @cached_property
     def scale(self) -> EnergyScale:
-        """Zero point and unit of energies: lowest potential, largest energy of the full order."""
+        """Full-order energies that count as 0 (least potential of forces) and 1 (largest total)."""
         return EnergyScale.of(self.scene, self.reference)
 
     @cached_property
     def series(self) -> dict[str, np.ndarray]:
         """Per-frame series of the full-order run for the argument ``reference`` of `errors_within`.
 
-        ``displacement`` (F,) m; ``step`` (F,) m, norm of the time step times the velocities;
-        ``energy`` relative to `scale`; ``contact`` is 1 in frames in which an obstacle is touched.
+        ``displacement`` (F,) m; ``step`` (F,) m, norm of time step times velocities; ``energy`` in
+        every `STRIDE`-th frame, scaled by `scale`; ``contact`` (F,), 1 at contact, else 0.
         """
         blocks = [q for q, _ in _blocks(self.reference, self.reference)]
         return {
@@ -77,13 +77,13 @@ class Yardstick:
         return {"extent_norm": norm, "time_step": self.scene.config.time_step}
 
     def deviations(self, outcome: Rerun) -> dict[str, np.ndarray]:
-        """Per-frame deviations of a run with the result ``outcome``.
+        """Deviations in each of the F' frames of the run ``outcome`` from the full-order run.
 
         Returns
         -------
-        ``difference``, ``shape_difference``, ``step_difference`` : (F',) m, for positions, shapes
-        and steps; ``energy`` : of every `STRIDE`-th frame relative to `scale`, empty if the scene
-        has no energy; ``contact`` : (F',), 1 in frames in which an obstacle is touched.
+        ``difference``, ``shape_difference``, ``step_difference`` : (F',) m, norms of differences of
+        positions, shapes (without rigid motion), moves in a frame; ``energy`` : relative to `scale`
+        in every `STRIDE`-th frame, empty if round-off; ``contact`` : (F',), 1 if obstacle touched.
         """
         steps, shapes, contacts = [], [], []
         with np.errstate(over="ignore", invalid="ignore"):
@@ -100,7 +100,7 @@ class Yardstick:
         }
 
     def errors(self, outcome: Rerun) -> dict[str, float | None]:
-        """Map column names of tables to the errors over all frames of the run ``outcome``."""
+        """Map column names to errors of ``outcome`` over all frames; None if it ended earlier."""
         end = len(self.displacement)
         return errors_within(self.deviations(outcome), self.series, end, **self.units)
 
@@ -133,7 +133,7 @@ def errors_within(
     if len(run["difference"]) < end:
         return dict.fromkeys(ERRORS)
     displacement, shape = reference["displacement"], run["shape_difference"]
-    drift, count = None, end // STRIDE + 1  # number of energies, of which the first is initial
+    drift, count = None, end // STRIDE + 1  # count: number of energies, the initial one first
     if count > 1 and len(reference["energy"]):
         drift = float(np.abs(run["energy"][:count] - reference["energy"][:count]).max())
     # first frame with contact of this run and of the full-order run; inf if there is no contact
@@ -143,7 +143,7 @@ def errors_within(
     )
 
     def over_extent(difference: np.ndarray) -> float | None:
-        """Root mean square of ``difference`` before frame ``end``, divided by ``extent_norm``."""
+        """Root mean square of ``difference`` / ``extent_norm`` over ``end`` frames (none: None)."""
         return float(np.sqrt(np.mean(np.square(difference[:end] / extent_norm)))) if end else None
 
     found = (
@@ -159,7 +159,7 @@ def errors_within(
 
 
 def error_within(difference: np.ndarray, displacement: np.ndarray, end: int) -> float | None:
-    """Relative error over the frames before ``end``; None if the run ended earlier.
+    """Relative error over the first ``end`` frames; None if the run has fewer or nothing moved.
 
     Parameters
     ----------
@@ -172,7 +172,7 @@ def error_within(difference: np.ndarray, displacement: np.ndarray, end: int) -> 
 
 
 def _blocks(positions: np.ndarray, reference: np.ndarray) -> list[tuple[Any, Any]]:
-    """Split both runs into blocks; a block begins with the last frame of the previous block."""
+    """Split both runs into parts of `BLOCK` frames, each with the state before its first frame."""
     starts = range(0, max(len(positions) - 1, 1), BLOCK)
     ends = (min(start + BLOCK + 1, len(positions)) for start in starts)
     return [(positions[s:e], reference[s:e]) for s, e in zip(starts, ends, strict=True)]

@@ -31,7 +31,7 @@ class BasisSpec(ConfigModel):
     """Recipe of a basis from snapshots.
 
     weighting : "mass" makes modes orthonormal in the inner product with the lumped mass of each row
-    centring : "affine" subtracts the mean and adds it back online; "mean-in-modes" follows the
+    centring : "affine" subtracts the mean, and reconstructions add it; "mean-in-modes" follows the
         program published with the preprint: it subtracts the first snapshot, rescales the modes,
         adds that snapshot to every mode and orthogonalises the modes again per axis
     layout : "vectorised" stacks x, y, z of a snapshot in one column, so that they share the
@@ -44,7 +44,7 @@ class BasisSpec(ConfigModel):
 
     @property
     def basis_id(self) -> str:
-        """Name of the recipe, which is part of the path of the basis's file."""
+        """Name of this basis recipe, made of its three settings; part of the basis file's path."""
         return f"{self.weighting}-{self.centring}-{self.layout}"
 
     @property
@@ -67,7 +67,7 @@ class MethodSpec(BasisSpec):
     gain_bound : samples are added (GappyPOD+E) until the gain, the factor by which sampling can
         amplify the error of the best approximation in the basis, is at most this; None: no bound
     coefficients : "shared" by x, y, z or "per-axis"; None: as ``rows`` and the basis imply
-    repeat_rows : whether the greedy selection may repeat a row, as in the authors' program
+    repeat_rows : whether the greedy selection may repeat a row, as in the preprint authors' program
     title : name of the method in figures and tables
     """
 
@@ -122,7 +122,7 @@ class MethodSpec(BasisSpec):
 
     @property
     def modules(self) -> list[str]:
-        """Import paths "module:attribute" of the selection rules used, to detect changed code."""
+        """Import paths "module:attribute" of the selection rules on whose code samples depend."""
         selects = self.rows in ("scalar", "element") or self.oversampling > 1
         return [SELECTIONS[self.selection]] if selects else []
 

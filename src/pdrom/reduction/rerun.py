@@ -12,12 +12,12 @@ from pdrom.model.runs import BoundedRun
 
 @dataclass(frozen=True)
 class Rerun:
-    """Result of a reduced run; a run that blows up ends in that frame and is also a result.
+    """Result of a reduced run; one that blows up ends in the frame `blowup_frame`.
 
     positions : (F' + 1, N, 3) m of the initial state and of F' finite frames
     difference : (F',) m, || Q_red - Q_fom ||_F of reduced and full-order positions in each frame
-    extent : (F',) longest side of the bounding box in each frame over that of the rest shape
-    blowup_frame : first frame whose extent exceeds the limit or is not finite, else None
+    extent : (F',) longest side of the bounding box in each frame, divided by that of the rest shape
+    blowup_frame : first frame whose extent exceeds `BoundedRun.limit` or is not finite, else None
     coordinates : (F' + 1, K, 3) K unknowns of the step loop: subspace coordinates, or positions
     """
 
@@ -41,7 +41,7 @@ class Rerun:
 
     @property
     def max_extent(self) -> float:
-        """Longest side of the bounding box in any frame over that at rest; 0 without frames."""
+        """Longest side of any frame's bounding box, divided by that at rest; 0 without frames."""
         return float(self.extent.max(initial=0.0))
 
     def row(self, displacement: np.ndarray) -> dict[str, Any]:
@@ -55,9 +55,9 @@ class Rerun:
         }
 
     def error(self, displacement: np.ndarray) -> float | None:
-        """Relative error over the whole run; None if the run ended early.
+        """Error || Q_red - Q_fom || / || Q_fom - Q_0 ||; None if the run ended early.
 
-        ``displacement`` (F,) m is the norm of the full-order run's displacement in each frame.
+        ``displacement`` (F,) m is || Q_fom - Q_0 ||_F of the full-order run in each frame.
         """
         if not self.finite or self.frames < len(displacement):
             return None

@@ -32,8 +32,8 @@ def stored_frames(frames: int, count: int) -> np.ndarray:
 def row_masses(group: ConstraintGroup, masses: np.ndarray) -> np.ndarray:
     """Lumped mass (e p,) kg of each operator row: e elements of p rows, vertex ``masses`` (N,) kg.
 
-    Every vertex divides its mass equally among the elements that touch it, so that the element
-    masses sum to the mass of the touched vertices; each row has the mass of its element.
+    Every vertex divides its mass equally among the elements that contain it, so that the element
+    masses sum to the mass of all vertices of elements; each row has the mass of its element.
     """
     element = touched_vertices(group)
     valence = np.asarray(element.sum(axis=0)).ravel()
@@ -42,7 +42,7 @@ def row_masses(group: ConstraintGroup, masses: np.ndarray) -> np.ndarray:
 
 
 def touched_vertices(group: ConstraintGroup) -> sparse.csr_array:
-    """Matrix (e, N): 1 where an element of ``group`` touches a vertex, else 0."""
+    """Matrix (e, N): 1 where the operator of an element of ``group`` uses a vertex, else 0."""
     rows = group.rows_per_element
     touches = (group.S != 0).astype(np.float64)
     return (sum(touches[row::rows] for row in range(rows)) != 0).astype(np.float64)

@@ -1,4 +1,4 @@
-"""Matplotlib types for annotations of figures; at run time they are placeholders.
+"""Matplotlib types for type annotations in modules of figures; at run time they are `Any`.
 
 Every run of the workflow imports all modules of figures, but only a job that draws one needs
 Matplotlib. Modules of figures thus import its types from here and its functions when they draw.

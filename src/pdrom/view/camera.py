@@ -25,12 +25,12 @@ class Window(NamedTuple):
 
     @property
     def width(self) -> float:
-        """Width, m."""
+        """Width of the rectangle, m."""
         return self.right - self.left
 
     @property
     def height(self) -> float:
-        """Height, m."""
+        """Height of the rectangle, m."""
         return self.top - self.bottom
 
     def contains(self, flat: np.ndarray) -> np.ndarray:
@@ -46,10 +46,10 @@ class Window(NamedTuple):
 
 @dataclass(frozen=True)
 class Camera:
-    """Parallel projection.
+    """Parallel projection; with another ``up`` than y, the whole camera is turned by `rotation_to`.
 
     azimuth : degrees about the upward axis; if that is y, 0 looks along -z and 90 along -x
-    elevation : degrees above the horizon
+    elevation : degrees of the eye above the plane normal to ``up``; 90 looks straight down
     up : unit vector that points up in the picture
     """
 
@@ -75,14 +75,14 @@ class Camera:
 
 
 def bounds(flat: np.ndarray, margin: float = 0.08) -> Window:
-    """Smallest window around picture points ``flat`` (n, 2) m, widened by a relative ``margin``."""
+    """Bounding window of points ``flat`` (n, 2) m, widened by ``margin`` times its longer side."""
     low, high = flat.min(axis=0), flat.max(axis=0)
     pad = margin * max(float((high - low).max()), 1e-12)
     return Window(low[0] - pad, high[0] + pad, low[1] - pad, high[1] + pad)
 
 
 def window_of(camera: Camera, clouds: Iterable[np.ndarray], margin: float = 0.08) -> Window:
-    """Window of all points of ``clouds``, (n, 3) m each, by ``camera``; ``margin`` is relative."""
+    """Window, with a margin as in `bounds`, of all points of ``clouds``, (n, 3) m each."""
     return bounds(np.concatenate([camera.project(cloud) for cloud in clouds]), margin)
 
 
@@ -114,8 +114,8 @@ def shown_region(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Low and high corner, m, of a cube with a margin around ``positions`` (F, N, 3) m of a run.
 
-    An obstacle among the ``effects`` that is near the run is inside as a whole, unless it is larger
-    than the run. Parts of runs and bodies outside the cube are not shown.
+    An obstacle among the ``effects`` that reaches into the margin is inside the cube as a whole,
+    unless it is larger than the run. Parts of runs and obstacles outside the cube are not shown.
     """
     low, high = positions.min(axis=(0, 1)), positions.max(axis=(0, 1))
     size = float((high - low).max())

@@ -23,9 +23,9 @@ from pdrom.view.text import plain_words
 
 INSTANTS = (0.25, 0.5, 0.75, 1.0)  # times of the pictures, as fractions of the run
 CAMERA = Camera(30.0, 20.0)
-NO_LIMIT = 100.0  # inches, largest height of the picture
+NO_LIMIT = 100.0  # inches, limit of the picture's height: practically none
 NAME = "frame_{:05d}.vtu"
-SHOWN = 20  # a picture shows runs with at most this many modes r
+SHOWN = 20  # runs with up to this many modes r are preferred in the picture
 
 
 def write_frames(scene: ViewedScene, png: Path) -> None:
@@ -72,7 +72,7 @@ def _draw(scene: ViewedScene) -> Figure:
 
 
 def _panel(run: ViewedRun, frame: int) -> RunPanel:
-    """Panel of ``run`` at ``frame``; if it ended earlier, of its last frame with the reason."""
+    """Panel of ``run`` at ``frame``, or at its last frame with the reason why it ended before."""
     last, failure, remark = len(run.positions) - 1, None, None
     if frame > last:
         failure = "ended" if run.blowup_frame is None else f"blew up at frame {run.blowup_frame}"

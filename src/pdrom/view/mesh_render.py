@@ -12,12 +12,12 @@ from pdrom.view.camera import Camera, Window
 
 AMBIENT = 0.45  # least brightness of a face
 RASTER_ABOVE = 1000  # surfaces with more faces are rasterised, to keep the PDF small
-SHARP = np.cos(np.radians(80.0))  # an edge is outlined if its faces' normals have a smaller cosine
+SHARP = np.cos(np.radians(80.0))  # an edge is outlined if normals of its faces differ by more
 # lights: (direction towards the light in camera coordinates, strength)
 LIGHTS = (((-0.35, 0.45, 0.82), 0.85), ((0.80, -0.10, 0.59), 0.30))
 BACK = 0.78  # factor that darkens the back of an open surface
 FLOOR, FLOOR_LINE, SHADOW = "#F4F2EE", "#DEDAD2", "#D3CFC6"
-GHOST = "#4D4D4D"  # outline of a reference shape
+GHOST = "#4D4D4D"  # colour of the outline of a reference shape
 
 Colour = str | tuple[float, float, float]
 
@@ -29,10 +29,7 @@ def face_normals(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 
 def smooth_normals(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Unit normals (T, 3) of faces, averaged over neighbouring faces; zero for zero area.
-
-    ``points`` are (N, 3), ``triangles`` (T, 3).
-    """
+    """Unit normals (T, 3) like those of `face_normals`, but averaged over neighbouring faces."""
     a, b, c = (points[triangles[:, i]] for i in range(3))
     weighted = np.repeat(np.cross(b - a, c - a), 3, axis=0)
     vertex = np.zeros_like(points, dtype=float)
@@ -41,9 +38,9 @@ def smooth_normals(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 
 def shade(normals: np.ndarray, camera: Camera) -> np.ndarray:
-    """Brightness (T,) of faces with unit ``normals`` (T, 3), in [AMBIENT, 1], two-sided.
+    """Brightness (T,), in [AMBIENT, 1], of faces with unit ``normals`` (T, 3).
 
-    The lights are fixed relative to the ``camera``.
+    It is equal for both sides of a face. The lights are fixed relative to the ``camera``.
     """
     view = normals @ camera.basis.T
     lit = np.zeros(len(normals))

@@ -1,4 +1,4 @@
-"""Figures of many small panels with equal axes and one legend, and helpers for their axes."""
+"""Figures of many small panels that share the y axis and a legend, and helpers for axes."""
 
 from collections.abc import Iterable
 
@@ -74,7 +74,7 @@ def log_axes(ax: Axes, across: tuple[float, float], along: tuple[float, float]) 
 
 
 def time_axis(ax: Axes, times: np.ndarray) -> None:
-    """Make x of ``ax`` logarithmic, from before to after all ``times``, with plain numbers."""
+    """Make x of ``ax`` logarithmic, with limits around ``times`` and plain labels, such as 20."""
     ax.set_xscale("log")
     low, high = np.log10(np.nanmin(times)), np.log10(np.nanmax(times))
     pad = max(0.1, 0.08 * (high - low))
@@ -83,7 +83,7 @@ def time_axis(ax: Axes, times: np.ndarray) -> None:
 
 
 def plain_ticks(axis: Axis, decades: float) -> None:
-    """Label at least two ticks of a logarithmic ``axis``, ``decades`` long, with plain numbers."""
+    """Label two or more ticks of a log ``axis``, ``decades`` long, by numbers, not powers."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
     steps = [(0.4, (1, 1.5, 2, 3, 5, 7)), (0.7, (1, 2, 3, 5)), (1.3, (1, 2, 5)), (2.0, (1, 3))]
@@ -132,11 +132,11 @@ def clipped(values: np.ndarray, low: float, high: float) -> np.ndarray:
 def label_counts(
     ax: Axes, x: Iterable[float], y: Iterable[float], counts: Iterable[float], prefix: str = ""
 ) -> None:
-    """Write the count of each marker below and to the left of it, one label for close markers.
+    """Label each marker at ``x``, ``y`` with its number in ``counts``, to the lower left of it.
 
-    ``ax`` has markers at ``x``, ``y`` with ``counts``; a label is ``prefix`` and the counts.
+    Markers closer than `NEAR` share one label. A label is ``prefix`` and the number or numbers.
 
-    x : ascending; the limits of the x axis must have been set before
+    x : ascending; the limits of the x axis, which is logarithmic, must have been set before
     """
     low, high = np.log10(ax.get_xlim())
     groups: list[list[tuple[float, float, float]]] = []

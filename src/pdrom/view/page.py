@@ -1,6 +1,6 @@
 """HTML page that shows scenes with their runs: scripts and data in one file.
 
-It contains only surface vertices and a selection of frames, positions quantised to 16 bits."""
+The file has only the surface vertices of a run, in some of its frames, quantised to 16 bits."""
 
 import json
 import os
@@ -22,12 +22,12 @@ from pdrom.view.camera import rotation_to, shown_region, up_of
 
 @dataclass(frozen=True)
 class ViewedRun:
-    """A reduced run.
+    """A reduced run of F' frames.
 
     group, method, title : names of the reduced group and of the method, title of the method
-    positions : (F' + 1, N, 3) m, finite, the initial state first; F' < F if the run ended early
+    positions : (F' + 1, N, 3) m, finite, the initial state first
     error : (F',) relative error of each frame
-    blowup_frame : frame in which the run blew up; None if it reached its end
+    blowup_frame : frame in which the run blew up and ended; None if all frames of the scene ran
     ms : milliseconds per frame, None if not measured
     """
 
@@ -48,8 +48,8 @@ class ViewedScene:
     time_step : time step of a frame, s
     positions : (F + 1, N, 3) m of the full-order run
     ms : milliseconds per frame of the full-order run, None if not measured
-    floor : (F,) relative error that perturbations by round-off cause, empty if unknown
-    horizon : first frame from which on rounding errors decide and no run is compared, or None
+    floor : (F,) relative difference of runs that differ by rounding errors only; empty if unknown
+    horizon : frame from which on ``floor`` is too large to compare runs; None if unknown
     runs : reduced runs, sorted by group, method and basis size r
     effects : effects of the scene; obstacles among them are drawn
     velocities : (F + 1, N, 3) m/s of the full-order run, None if they were not stored
@@ -74,7 +74,7 @@ class ViewedScene:
         return [run for run in self.runs if (run.group, run.method) == (group, method)]
 
 
-LARGEST = 25_000_000  # bytes of a page, at most
+LARGEST = 25_000_000  # largest number of bytes of a page
 
 
 def write_page(scenes: Sequence[ViewedScene], path: str | os.PathLike[str]) -> None:
@@ -114,8 +114,8 @@ def filled(template: str, parts: dict[str, str]) -> str:
     return "".join(pieces)
 
 
-EYE = np.array([0.85, 0.55, 1.45])  # direction to the viewer where y points up
-FRAMES = 75  # largest number of frames of a run on the page
+EYE = np.array([0.85, 0.55, 1.45])  # direction to the viewer if y points up, else it is rotated
+FRAMES = 75  # largest number of frames of a run on the page, which skips the others
 
 
 def pack_scene(scene: ViewedScene) -> dict[str, Any]:
@@ -162,5 +162,5 @@ def pack_scene(scene: ViewedScene) -> dict[str, Any]:
 
 
 def _numbers(values: np.ndarray) -> list[float | None]:
-    """Round ``values`` to four digits; None for values that are not finite."""
+    """Round ``values`` to four significant digits; None for values that are not finite."""
     return [float(f"{v:.4g}") if np.isfinite(v) else None for v in values]

@@ -41,7 +41,7 @@ class RunPanel:
     obstacles: Sequence[Mesh] | None = None
 
     def zoomed(self, window: Window, camera: Camera) -> Window:
-        """Return ``window`` of ``camera``, enlarged in its aspect ratio if the run exceeds it."""
+        """Return ``window`` of ``camera``, enlarged with equal aspect ratio to contain the run."""
         flat = None if self.positions is None else camera.project(self.positions)
         if flat is None or window.contains(flat).all():
             return window
@@ -54,7 +54,7 @@ class RunPanel:
 def shared_window(
     camera: Camera, reference: np.ndarray, panels: list[RunPanel], margin: float = 0.1
 ) -> Window:
-    """Window around ``reference`` (N, 3) m and the ``panels`` not much larger, by ``camera``."""
+    """Window of ``reference`` (N, 3) m and unfailed runs that widen it at most by `SAME_SCALE`."""
     base = window_of(camera, [reference], margin)
     size = SAME_SCALE * max(base.width, base.height)
     clouds = [reference]
@@ -68,16 +68,16 @@ def shared_window(
 
 
 def fit_aspect(window: Window) -> Window:
-    """Enlarge ``window`` in one direction until its aspect ratio is allowed for a panel."""
+    """Enlarge ``window`` in one direction until height / width is in [`SHORTEST`, `TALLEST`]."""
     height = np.clip(window.height, SHORTEST * window.width, None)
     width = max(window.width, height / TALLEST)
     return window.resized(width, height)
 
 
 def draw_run(ax: Axes, row: "Row", i: int) -> None:
-    """Draw run ``i`` of a ``row`` on ``ax``, at a smaller scale if it exceeds the row's window.
+    """Draw panel ``i`` of a ``row`` on ``ax``, at a smaller scale if its run exceeds its window.
 
-    The outline of the reference shape is drawn for comparison, unless the run is the reference.
+    Behind any run but the reference run, the outline of the latter (``row.ghosts``) is drawn.
     """
     from matplotlib.collections import LineCollection
 
@@ -92,7 +92,7 @@ def draw_run(ax: Axes, row: "Row", i: int) -> None:
         centre_note(ax, note, FAILED if panel.failure else "#666666")
         return
     shown = panel.zoomed(window, camera)
-    zoom = shown.width / window.width  # the run is drawn smaller by this factor
+    zoom = shown.width / window.width  # scale of ``window`` / scale at which the run is drawn
     for body in panel.obstacles or ():
         look = {"colour": mesh_render.FLOOR, "wire": 0.05}
         mesh_render.draw_surface(ax, body.points, body, camera, **look).set_zorder(0.1)
@@ -110,7 +110,7 @@ def draw_run(ax: Axes, row: "Row", i: int) -> None:
     texts = [text for text in (panel.failure, panel.remark) if text]
     if zoom > SLACK:
         texts.append(f"scale 1 : {zoom:.{1 if zoom < 10.0 else 0}f}")
-        # a red frame: this picture has another scale than its neighbours
+        # a red border: this picture has another scale than its neighbours
         _cover(ax, zorder=8, facecolor="none", edgecolor=FAILED, linewidth=0.6)
     if texts:
         colour = FAILED if panel.failure or zoom > SLACK else "#555555"
@@ -135,14 +135,15 @@ def centre_note(ax: Axes, text: str, colour: str = "#666666") -> None:
 
 HEIGHT_LIMIT = 9.3  # inches, text height of a page
 LEFT = 1.0  # inches, width of the row labels
-ABOVE, LINE, BELOW = 0.19, 0.13, 0.07  # inches: heights of title, line of remarks, gap
+ABOVE, LINE, BELOW = 0.19, 0.13, 0.07  # inches: heights of a title, a text line, a gap
 NOTHING_RAN = "not run: the projections are round-off, there is nothing to reduce"
 
 
 @dataclass(frozen=True)
 class Row:
-    """Row of n panels; shapes ``ghosts`` (n, N, 3) m are outlined behind the reduced runs.
+    """Row of n panels, each with a window of its own.
 
+    ghosts : (n, N, 3) m, shapes of the reference run, outlined behind the reduced runs
     camera : camera of all panels of the row
     note : text in place of the reduced runs, for an experiment in which none ran
     """

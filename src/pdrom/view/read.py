@@ -1,4 +1,4 @@
-"""Readers of result files for figures: positions of runs, and sampled entries of methods."""
+"""Read result files for figures: positions of runs, indices of sampled projection entries."""
 
 from dataclasses import dataclass
 
@@ -42,7 +42,9 @@ def positions_at(
 class RerunInfo:
     """Reduced run of one basis size r in a result file.
 
-    marked : whether r exceeds the numerical rank of the snapshots, so that nothing ran
+    label : path of the run's group in the HDF5 file
+    full : whether r is the numerical rank of the snapshots
+    marked : whether r exceeds that rank, so that nothing ran
     blowup_frame : frame at which the run blew up, -1 if it did not
     entries : number of stored frames, including the initial state
     """
@@ -85,7 +87,7 @@ def _is_size(label: str) -> bool:
 
 
 def choose_ranks(infos: list[RerunInfo], asked: tuple[int | str, ...]) -> list[RerunInfo]:
-    """Select runs with the basis sizes ``asked``, in that order; all runs if none match."""
+    """Select runs by basis sizes ``asked`` ("full": the rank), in that order; all if none match."""
     chosen: dict[str, RerunInfo] = {}
     for rank in asked:
         for info in infos:
@@ -110,7 +112,7 @@ def rerun_positions(path: str, info: RerunInfo, frame: int) -> tuple[int, np.nda
 
 @dataclass(frozen=True)
 class SamplingView:
-    """Entries and elements that a method selected for one basis size r."""
+    """Indices of the entries of projections, and of their elements, sampled for r modes."""
 
     r: int
     entries: np.ndarray
@@ -118,7 +120,7 @@ class SamplingView:
 
 
 def read_samplings(path: str) -> list[SamplingView]:
-    """Selections of all basis sizes in the file ``path``, ascending in r."""
+    """Sampled entries and elements for each basis size r in the file ``path``, ascending in r."""
     with open_hdf5(path) as file:
         views = [
             SamplingView(int(label[1:]), group["entries"][...], group["elements"][...])

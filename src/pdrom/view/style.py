@@ -41,7 +41,7 @@ METHODS: dict[str, tuple[str, str]] = {
 }
 _RESERVE = (("#5A5A5A", "1"), ("#9A6A00", "2"), ("#6B3F00", "3"), ("#2B2B80", "4"))
 
-# Colours and markers of constraint groups, by their index among all groups.
+# Colours and markers of the constraint groups in the order of `EFFECTS`; they repeat if too few.
 GROUP_LOOKS = (
     (GREEN, "^"), (ORANGE, "s"), (BLUE, "o"), (SKY, "D"), (PURPLE, "v"), (VERMILLION, "P"),
     ("#7A5C00", "X"), ("#5A5A5A", "<"), ("#2B2B80", ">"),
@@ -122,7 +122,7 @@ def surface_colour(colour: str) -> tuple[float, float, float]:
 
 
 def words(name: str) -> str:
-    """Convert a ``name`` of the configuration to plain words."""
+    """Return a ``name`` of the configuration with spaces in place of underscores."""
     return name.replace("_", " ")
 
 
@@ -174,7 +174,7 @@ def handles(looks: Mapping[str, tuple[str, str]], **common: Any) -> list[Line2D]
 
 
 def split_handles(splits: Iterable[str]) -> list[Line2D]:
-    """Legend entries for sets of snapshots, ``splits`` (train, test, ...), with line styles."""
+    """Legend entries of sets of snapshots, ``splits`` (train, test, heldout): a line style each."""
     return [handle(SPLIT_NAMES[s], color="#555555", linestyle=SPLITS[s]) for s in splits]
 
 

@@ -42,7 +42,7 @@ def escape(text: str) -> str:
 
 
 def require_typeset(text: str, place: str) -> None:
-    """Raise ConfigurationError, beginning with ``place``, if ``text`` cannot be typeset."""
+    """Raise ConfigurationError, which names ``place`` (a key), if ``text`` cannot be typeset."""
     for character in unicodedata.normalize("NFC", text):
         if _typeset(character) is None:
             raise ConfigurationError(

@@ -33,15 +33,15 @@ from study.tables.claims.metrics import METRICS
 from study.tables.claims.rules import Added, ClaimRule, TestRule, load_claims
 from study.tables.kit.declaration import QUANTITIES, TOLERANCES
 
-# Sizes in bytes: larger pictures are compressed with losses, larger PDFs are left out of the pages.
+# Bytes: larger pictures are compressed with losses; larger PDFs are not copied to the web pages.
 LOSSLESS, COPIED = 150_000, 200_000
-MANY = 4  # two figures with the same type of options are related if it has this many keys or more
+MANY = 4  # figures with the same type of options are related if it has at least so many options
 
 
 def shown_figure(
     name: str, node: Node, size: tuple[int, int], with_pdf: bool, pages: Mapping[str, str]
 ) -> Node:
-    """Return a figure as a node of pandoc's syntax tree: picture, caption, command, and links.
+    """Return a figure as a node of pandoc's syntax tree: picture, caption, shell command, links.
 
     node : node that pandoc made from the figure in the TeX source
     size : width and height of the picture, pixels
@@ -50,9 +50,9 @@ def shown_figure(
     """
     attribute, caption, _ = node["c"]
     picture = attributes("", "", width=str(size[0]), height=str(size[1]), loading="lazy")
+    # merged into one node: pandoc hides a caption whose nodes are those of the alternative text
     alternative = words(plain(caption[1]).strip())
     image = {"t": "Image", "c": [picture, alternative, [f"figures/{name}.webp", ""]]}
-    # the alternative text is plain: pandoc would hide a caption that equals it exactly
     made = {"t": "RawInline", "c": ["html", _origin(name, with_pdf, pages)]}
     origin = [{"t": "Plain", "c": [*words("Command: "), made]}]
     told = [caption[0], [*caption[1], boxed("Div", origin, "", "origin")]]
@@ -60,7 +60,7 @@ def shown_figure(
 
 
 def _origin(name: str, with_pdf: bool, pages: Mapping[str, str]) -> str:
-    """HTML with the command of a figure, and links to its tables, its PDF and related figures."""
+    """HTML: shell command that makes a figure; links to its tables, its PDF and related figures."""
     reads = declarations()[name].reads.values()
     tables = [read.name for read in reads if isinstance(read, TableOf)]
     data = ", ".join(f'<a href="tables/{table}.html">{table}</a>' for table in tables)
@@ -79,9 +79,9 @@ def _origin(name: str, with_pdf: bool, pages: Mapping[str, str]) -> str:
 
 
 def _kin(name: str, pages: Mapping[str, str]) -> list[str]:
-    """Names of related figures in ``pages``, which show other scenes in the same form.
+    """Names of figures in ``pages`` related to figure ``name``: of the same form, other scenes.
 
-    Two figures are related if their options have the same type and this has at least `MANY` keys,
+    Two figures are related if their options have the same type and this type at least `MANY` keys,
     or if the name of one figure begins with the name of the other.
     """
     listed = declarations()
@@ -108,7 +108,7 @@ FACTS = {
 
 
 def table_page(name: str, csv: bytes, template: str) -> str:
-    """HTML page of table ``name``: its data (``csv``), command, and the meaning of its columns."""
+    """HTML page of table ``name``: data (``csv``), shell command to make it, column meanings."""
     table = declared().get(name)
     columns = "".join(
         f"<tr data-column='{c.name}'><th scope=row>{c.name}</th>"
@@ -130,7 +130,7 @@ def table_page(name: str, csv: bytes, template: str) -> str:
 
 
 def argument(name: str) -> str:
-    """Argument of ``./reproduce`` that makes table ``name``; all tables in `FACTS` share one."""
+    """Argument with which ``./reproduce`` makes table ``name`` (of results, or one of `FACTS`)."""
     if name in FACTS:
         return "paper_inputs"
     return TABLE.at(RESULTS, name=name) if name in declarations() else name
@@ -224,8 +224,8 @@ VERIFIED, INDEX = "verified.js", "index.html"
 def write_verified(found: Mapping[str, str], folder: Path) -> None:
     """Write the outcomes of ``./reproduce verify`` to a file in ``folder`` that all pages load.
 
-    ``found`` maps kind and name, such as "table payoff", to the outcome. The file is a script,
-    because a page opened from a disk can load scripts but no data.
+    ``found`` maps kind and name of a result, such as "table payoff", to its outcome. The file is a
+    script, because a page opened from a disk can load scripts but no data.
     """
     write_text(f"window.pdromVerified={safe_json(dict(found))};\n", folder / VERIFIED)
 
@@ -263,10 +263,10 @@ def write_article(
 
     source, references : TeX sources of the manuscript and its bibliography
     tables, machine : CSV files of the tables, and the file that describes the machine
-    inputs : generated files that the manuscript includes, and the file `NUMBERS`
+    inputs : generated files that the manuscript includes; numbers.json: table cells of its numbers
     figures, pictures : PDF and PNG of each figure
-    facts, claims : facts about the configuration, and the file with the rules of the claims
-    added : name of a set of values in the file ``claims`` -> values that the study adds to it
+    facts, claims : captions and tables of settings; the file with the rules of the claims
+    added : name of a list of values in the file ``claims`` -> values that the study adds to it
     assets : templates, style and script (files of `ASSETS`)
     """
     made = {file["name"]: file.path for file in inputs}
@@ -311,7 +311,7 @@ def write_article(
 def _write_figures(
     figures: list[File], pictures: list[File], outputs: Mapping[str, str]
 ) -> dict[str, tuple[tuple[int, int], bool]]:
-    """Write figures as WebP and small PDFs; return name -> (size in pixels, whether it has PDF)."""
+    """Write figures as WebP, small PDFs too; return name -> (size in pixels, whether with PDF)."""
     folder = Path(outputs["main"]).parent / "figures"
     png = {picture["name"]: Path(picture.path) for picture in pictures}
     made = {}

@@ -1,7 +1,8 @@
 r"""Conversion of the manuscript's source to LaTeX that pandoc can read, with numbers as links.
 
 Commands that TeX would evaluate are replaced here by their results: ``\val``, ``\known``, ``\row``,
-``\ifpart``, captions of figures. A number becomes a link to the address ``origin:KEY``.
+``\ifpart``, captions of figures. A number becomes a link to ``origin:KEY``, where KEY names a
+table and rows, in hexadecimal.
 """
 
 import re
@@ -30,8 +31,8 @@ _NUMBER = re.compile(
 )
 _TAIL = re.compile(r"(\(|, )(\d[\d/, ]*)([)}]?)$")  # number at the end of a cell: "holds (20/20)"
 _FIGURE = r"\begin{figure}\includegraphics{%s.pdf}\caption{%s}\label{fig:%s}\end{figure}"
-# Finds definitions of commands in the preamble that take one line, which pandoc can read. Those
-# about the layout are left out: `REPLACED` has simple definitions of the same commands.
+# Finds one-line definitions of TeX commands and theorems in the preamble; pandoc can read these.
+# Definitions of layout commands are left out: `REPLACED` has simple ones of the same commands.
 _SHORT = re.compile(r"(?m)^\\(?:newcommand\{\\(?!longtableof|tablefile)\w+\}.*\}|newtheorem.*)$")
 REPLACED = r"""
 \newcommand{\longtableof}[4]{\begin{table}\caption{#3}\label{#2}\input{#4}\end{table}}
@@ -43,8 +44,8 @@ REPLACED = r"""
 def prepared(source: str, document: str, origins: Mapping[str, Any], facts: Facts) -> str:
     """Return the ``source`` of a ``document`` for pandoc, with numbers as links to tables.
 
-    ``origins`` is the content of numbers.json: the table cells of each number, and decisions on
-    which sentences are shown.
+    ``origins`` is the content of numbers.json: for each number the table cells, for each document
+    the decisions whether its ``\\known`` sentences are shown. ``facts`` has the captions.
     """
     preamble, begin, text = source.partition(r"\begin{document}")
     left_out = rf"\emph{{[{note(facts.part, facts.full_study)}]}}"
@@ -72,7 +73,7 @@ def _title(preamble: str) -> str:
 
 
 def _decided(source: str, known: Sequence[str], left_out: str) -> str:
-    r"""Keep, drop or replace (by ``left_out``) ``\known`` and ``\row`` blocks as ``known`` says."""
+    r"""Show, drop or replace by ``left_out`` ``\known`` and ``\row`` blocks; ``known`` decides."""
     pieces, start = [], 0
     for sentence, decision in zip(sentences(source), known, strict=True):
         shown = {SHOWN: sentence.text, NOTED: left_out}.get(decision, "")
@@ -125,14 +126,14 @@ def _agreeing(table: pd.DataFrame, header: Sequence[str], cells: Sequence[str]) 
 
 
 def _linked_cell(cell: str, key: str) -> str:
-    """Return ``cell`` with a link on its number: the whole cell, or a number at its end."""
+    """Return ``cell`` with its number, the whole cell or a number at its end, linked to ``key``."""
     if _NUMBER.fullmatch(cell):
         return _link(key, cell)
     return _TAIL.sub(lambda found: found[1] + _link(key, found[2]) + found[3], cell)
 
 
 def _plain(cell: str) -> str:
-    """Text of a cell without backslashes; only the name if the cell begins with ``\\texttt``."""
+    """Text of a cell without backslashes; if it begins with ``\\texttt{x}``, only the x."""
     name = re.match(r"\\texttt\{([^{}]*)\}", cell)
     return (name[1] if name else cell).replace("\\", "")
 

@@ -1,4 +1,4 @@
-"""Functions on pandoc's syntax tree: nodes, numbers of sections, figures etc., and links."""
+"""Functions on pandoc's syntax tree: they make nodes, number sections and figures, set links."""
 
 import re
 from collections import Counter
@@ -14,7 +14,10 @@ Node = dict[str, Any]  # a node of the syntax tree, or the whole tree
 
 
 def attributes(identifier: str = "", classes: str = "", **keys: str) -> list[Any]:
-    """Return pandoc's attributes of a node; ``classes`` are separated by spaces."""
+    """Return the attributes of a node in the form of pandoc's syntax tree.
+
+    ``classes`` are separated by spaces; ``keys`` are further attributes, with "_" in place of "-".
+    """
     return [identifier, classes.split(), [[k.replace("_", "-"), v] for k, v in keys.items()]]
 
 
@@ -77,7 +80,7 @@ _LABEL = re.compile(r"\\label\{([^{}]*)\}")
 _EQUATION = re.compile(r"\\begin\{(equation|align)\}")
 _CLAIM = re.compile(r"(\W*)(C\d+)\b(.*)")
 _COLOUR = re.compile(r"color: (ok\w+)")
-PARAGRAPH = 4  # level of the headings that pandoc makes of LaTeX paragraphs
+PARAGRAPH = 4  # level of the heading that pandoc makes of LaTeX's \paragraph
 
 
 @dataclass
@@ -94,12 +97,12 @@ class Labels:
     counts: Counter[str] = field(default_factory=Counter)
 
     def next(self, kind: str, label: str = "") -> str:
-        """Count the next figure, table etc. (``kind``); return its number, stored by ``label``."""
+        """Return the next number of a ``kind`` (figure, table ...); store it under ``label``."""
         self.counts[kind] += 1
         return self.note(label, f"{self.prefix}{self.counts[kind]}")
 
     def section(self, level: int, label: str) -> str:
-        """Count the next section of a ``level``; return its number and store it by ``label``."""
+        """Return the number of the next section of a ``level`` and store it under ``label``."""
         self.counts[f"level{level}"] += 1
         for deeper in range(level + 1, PARAGRAPH):
             self.counts[f"level{deeper}"] = 0
@@ -107,14 +110,14 @@ class Labels:
         return self.note(label, self.prefix + ".".join(parts))
 
     def note(self, label: str, number: str) -> str:
-        """Store ``number`` and page by ``label``, unless this is empty; return ``number``."""
+        """Store ``number`` and page under ``label``, unless this is empty; return ``number``."""
         if label:
             self.numbers[label] = (number, self.page)
         return number
 
 
 def numbered(tree: Node, labels: Labels, shown: Callable[[str, Node], Node]) -> Node:
-    """Number sections, figures, tables, equations and theorems of ``tree``; adapt their layout.
+    """Number sections, figures, tables, equations and theorems of ``tree``; lay them out for HTML.
 
     labels : counters, which receive the number of every TeX label
     shown : function of a figure's name and numbered node; returns the node that replaces it
@@ -136,7 +139,7 @@ def numbered(tree: Node, labels: Labels, shown: Callable[[str, Node], Node]) -> 
             title = {"t": "Header", "c": [1, attributes("references"), words("References")]}
             return [title, node]
         if kind == "Div" and (which := {"theorem", "proposition"} & set(content[0][1])):
-            # pandoc's heading has a number without the prefix of the document: replace the number
+            # pandoc's number lacks the document's prefix: replace it in the theorem's heading
             content[1][0]["c"][0]["c"][-1]["c"] = labels.next(which.pop(), content[0][0])
         if kind == "Math" and content[0]["t"] == "DisplayMath":
             return _equation(node, labels)
@@ -149,7 +152,7 @@ def _table(label: str, node: Node, labels: Labels) -> Node:
     """Return the table ``node`` in a region that can be scrolled; its caption is above."""
 
     def headed(node: Node) -> Node | None:
-        """Return a formula with its text for screen readers; None if ``node`` is no formula."""
+        """Return a formula followed by its TeX for screen readers; None for any other node."""
         return boxed("Span", [node, _heard(plain(node))]) if node["t"] == "Math" else None
 
     content = _captioned(node, f"Table {labels.next('table', label)}.")["c"]
@@ -190,7 +193,7 @@ def _equation(node: Node, labels: Labels) -> Node:
 
 
 def resolved(tree: Node, labels: Mapping[str, tuple[str, str]], claims: Mapping[str, Any]) -> Node:
-    """Resolve references to numbers; make numbers and claims links; set headings of paragraphs.
+    """Turn references, table values and claim names into links; put paragraph headings in line.
 
     Raises PaperError if the text refers to a label that no document has.
 
@@ -214,7 +217,7 @@ def resolved(tree: Node, labels: Mapping[str, tuple[str, str]], claims: Mapping[
 
 
 def _run_in(blocks: list[Node]) -> list[Node]:
-    """Replace the headings of paragraphs by bold words at the beginning of each paragraph."""
+    """Replace each heading of a paragraph by bold words at the beginning of that paragraph."""
     made: list[Node] = []
     heading: list[Node] = []
     for block in blocks:
@@ -234,7 +237,7 @@ def _resolved_link(node: Node, labels: Mapping[str, tuple[str, str]]) -> Node | 
     attribute, inlines, (address, _) = node["c"]
     if address.startswith(ORIGIN):
         key = bytes.fromhex(address.removeprefix(ORIGIN)).decode()
-        # the key has the name of a table and filters for rows; the table's page marks these rows
+        # the key has a table's name and filters; the table's page shows rows that satisfy them
         table, _, rows = key.partition("|")
         place = re.sub(r'[% "<>#]', lambda sign: quote(sign[0]), rows)
         return link(inlines, f"tables/{table}.html" + (f"#{place}" if place else ""), "val")

@@ -35,8 +35,8 @@ A = TypeVar("A", bound="Artifact")
 class Artifact:
     """A function that makes files of the study, with its input and output files.
 
-    A function with a parameter ``outputs`` gets a mapping of names to all output paths in it. This
-    serves functions with many output files, or with files in configurable folders.
+    A function has a parameter for each output file, or one, ``outputs``, for a mapping of names to
+    the paths of all output files: if these are many, or lie in configurable folders.
 
     name : name of the function
     title : message when a job starts; ``{scene}`` etc. stand for scene etc. of the job
@@ -86,19 +86,19 @@ class Artifact:
         return self.function(*arguments, **named)
 
     def settings(self, sources: Sources, labels: Labels) -> dict[str, Any]:
-        """Map parameters to the job's validated settings; ConfigurationError for unknown keys."""
+        """Map parameters to the job's valid settings; a missing one raises ConfigurationError."""
         reads = [(name, read) for name, read in self.reads.items() if isinstance(read, SettingRead)]
         values = {name: read.value(sources, labels) for name, read in reads}
         return {name: self.types[name].validate_python(value) for name, value in values.items()}
 
     def plain(self, settings: Mapping[str, Any]) -> dict[str, Any]:
-        """Convert ``settings`` to JSON data with only the fields of the parameters' types."""
+        """Convert ``settings`` to JSON data; fields that the parameters' types lack are dropped."""
         return {k: self.types[k].dump_python(v, mode="json") for k, v in settings.items()}
 
     def perform(
         self, settings: Mapping[str, Any], inputs: Mapping[str, Any], outputs: Mapping[str, str]
     ) -> None:
-        """Run a job. The arguments map parameters to JSON data, input paths and output paths.
+        """Run a job; arguments map the parameters to settings (JSON data), input and output paths.
 
         Raises ValidationError if a setting does not have the type of the function's annotation.
         """
@@ -108,7 +108,7 @@ class Artifact:
         self.function(**self.read(settings, inputs), **made)
 
     def read(self, settings: Mapping[str, Any], inputs: Mapping[str, Any]) -> dict[str, Any]:
-        """Map parameters of the function to the contents of ``inputs`` and valid ``settings``."""
+        """Map parameters of the function to contents of ``inputs`` and validated ``settings``."""
         content = {name: read.content(inputs[name]) for name, read in self.files.items()}
         return content | {k: t.validate_python(settings[k]) for k, t in self.types.items()}
 
@@ -126,7 +126,7 @@ def make(address: str, code: str, labels: Labels, **job: Mapping[str, Any]) -> N
 
 
 def declare(made: A, *parameters: str) -> A:
-    """Return ``made``; TypeError unless its function takes ``made.reads`` and ``parameters``."""
+    """Return artifact ``made``; TypeError if its function cannot take ``reads``, ``parameters``."""
     try:
         inspect.signature(made.function).bind(**made.reads, **dict.fromkeys(parameters))
     except TypeError as error:
@@ -160,7 +160,7 @@ def declared_in(package: str, kind: type[A]) -> dict[str, A]:
 
 
 def modules_in(value: Any) -> Iterator[str]:
-    """Yield the names in the attribute ``modules`` of all models (such as effects) in ``value``."""
+    """Yield names of modules from the attribute ``modules`` of Pydantic models inside ``value``."""
     if isinstance(value, BaseModel):
         yield from getattr(value, "modules", ())
         for name in type(value).model_fields:

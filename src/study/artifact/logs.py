@@ -54,7 +54,7 @@ def job_log(path: str) -> Iterator[logging.Logger]:
     if memory or disk space was lacking. The last line of the log has time and memory of a job that
     succeeds, or Python's stack trace if a signal ends the job.
 
-    Damaged results that the job reads are renamed.
+    Damaged results that the job reads are renamed, so that the next run makes them again.
     """
     start = time.monotonic()
     loggers = [logging.getLogger(name) for name in PACKAGES]

@@ -1,7 +1,7 @@
 r"""Conversion of the mark-up of titles and captions to TeX, plain text and reStructuredText.
 
-In the mark-up, ```name``` is set in typewriter, ``$r \le 20$`` is mathematics, and ``{key}`` stands
-for the value of a setting of the configuration.
+In the mark-up, a name between backticks is set in typewriter, ``$r \le 20$`` is mathematics, and
+``{key}`` stands for the value of a setting of the configuration.
 """
 
 import re

@@ -15,7 +15,7 @@ from pdrom.core.errors import StorageError
 
 RESULTS = "results"
 
-# Name of a wildcard in paths -> regular expression for its values; the workflow uses them, too.
+# Name of a wildcard in the paths of results -> regular expression for its values.
 LABELS = {
     "mesh": r"[A-Za-z0-9_.-]+",
     "scene": r"[a-z][a-z0-9_]*",
@@ -40,7 +40,7 @@ class Place:
         return f"{results}/{self.pattern.format(**labels)}"
 
     def where(self, **labels: str) -> "Place":
-        """Return a kind of file: each wildcard in ``labels`` is replaced by its value there."""
+        """Return the kind of file whose pattern has the values ``labels`` in place of wildcards."""
         pattern = self.pattern
         for label, value in labels.items():
             pattern = pattern.replace(f"{{{label}}}", value)
@@ -63,11 +63,11 @@ class Place:
         return [self.file(path) for path in paths]
 
     def paths(self, sources: Any, labels: Mapping[str, str]) -> str:
-        """Return the path of the file of this kind for a job with these ``labels`` (scene ...)."""
+        """Path, found by the plan ``sources``, of this kind of file for a job's ``labels``."""
         return str(sources.file(self, labels))
 
     def content(self, paths: Any) -> "File":
-        """Return the `File` at the path ``paths``, which the function of an artifact receives."""
+        """Return the path ``paths`` as the `File` that the function of an artifact receives."""
         return self.file(str(paths))
 
     @cached_property
@@ -80,7 +80,7 @@ class Place:
 
 @dataclass(frozen=True)
 class File:
-    """A file: its path and the labels in the path; ``file["scene"]`` is the scene, for example."""
+    """A file: its path, and the values of the path's wildcards (labels), as ``file["scene"]``."""
 
     path: str
     labels: dict[str, str]
@@ -143,7 +143,7 @@ PLACES = tuple(place for place in vars().copy().values() if isinstance(place, Pl
 
 
 def labels_in(path: str, results: str) -> Iterator[dict[str, str]]:
-    """Yield the labels in ``path``, as {"scene": "bar140"}, for each kind of file that fits it."""
+    """Yield labels, as {"scene": "bar140"}, for each kind of file whose pattern ``path`` fits."""
     for place in PLACES:
         with suppress(StorageError):
             labels = place.file(path).labels

@@ -23,7 +23,7 @@ Sources = Any
 
 @dataclass(frozen=True)
 class Every:
-    """All files of the kind ``place`` that the study makes for the scene, group ... of the job."""
+    """All files of the study whose paths fit ``place`` and the scene, group ... of the job."""
 
     place: Place
 
@@ -36,7 +36,7 @@ class Every:
 
 @dataclass(frozen=True)
 class EachOf(Every):
-    """One file of the kind ``place`` for each scene, group ... that the setting ``key`` lists."""
+    """For each entry (scene, group ...) of setting ``key``, the file whose path fits ``place``."""
 
     key: str
 
@@ -59,7 +59,7 @@ class TableOf:
 
 
 class EditedFiles:
-    """Base class for files edited by hand: jobs rerun if their content, not only date, changes."""
+    """Base class for files edited by hand: a job reruns if content changed, whatever the date."""
 
     def content(self, paths: Any) -> Any:
         return Path(paths) if isinstance(paths, str) else [Path(path) for path in paths]
@@ -87,7 +87,7 @@ class ProjectFiles(EditedFiles):
 
 @dataclass(frozen=True)
 class Recorded(EditedFiles):
-    """File of recorded rows of the table ``name``; no file if the setting ``recorded`` is off."""
+    """File `RECORD` with recorded rows of table ``name``; none if setting ``recorded`` is off."""
 
     name: str
 

@@ -21,8 +21,8 @@ from study.experiments.kit.base import Solver, experiment, scene_of
 def mesh(sources: list[Path], config: MeshConfig, out: File) -> None:
     """Build the mesh of ``config``, check it and save it to ``out``.
 
-    ``sources`` are files it is built from. Paths are relative to the folder of the project. Raises
-    MeshError, which names the fault.
+    ``sources`` are the files from which the mesh is built. Paths in ``config`` are relative to the
+    folder of the project. Raises MeshError if the mesh is not valid.
     """
     made = check_mesh(config.build(Path()), config.label)
     save_mesh(made, out.path, {"label": config.label})
@@ -54,7 +54,7 @@ def fom(mesh: File, config: SceneConfig, solver: Solver, **runs: File) -> None:
     writes={"out": SNAPSHOTS},
 )
 def snapshots(mesh: File, train: File, heldout: File, config: SceneConfig, out: File) -> None:
-    """Select projections of a group from the runs ``train`` and ``heldout``; save to ``out``."""
+    """Collect snapshots of the group ``out["group"]`` from two full-order runs into ``out``."""
     group = out["group"]
     scene = scene_of(config, mesh)
     frames = sets.training_frames(scene.config.frames, scene.config.reduce[group].train)

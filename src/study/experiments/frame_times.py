@@ -1,7 +1,7 @@
 """Frame times, in several processes, of full-order runs and of reductions.
 
-Every process times all runs in another random order. As a control, the full-order run of each scene
-is timed twice: speed-ups as small as the difference between these two times mean nothing.
+Every process times all runs, in a random order of its own. As a control, the full-order run of each
+scene is timed twice: speed-ups as small as the difference between these two times mean nothing.
 """
 
 from collections import defaultdict
@@ -56,9 +56,9 @@ class ProjectionCase(OfScene):
 
 
 class FrameTimes(Processes):
-    """Section ``frame_times``: numbers of runs, and reductions whose speed-up the manuscript cites.
+    """Section ``frame_times`` of the configuration: reductions whose speed-up the manuscript cites.
 
-    Full-order runs of all scenes, and all models of large scenes, are timed in any case.
+    Whatever is listed, full-order runs of all scenes and all models of large scenes are timed, too.
     """
 
     subspaces: tuple[SubspaceCase, ...] = ()
@@ -142,7 +142,7 @@ class TimedScene:
     alone=True,
 )
 def frame_times(settings: Options, times: File, seconds: File, **files: list[File]) -> None:
-    """Run the timing processes one by one; write frame times, and times of making reductions."""
+    """Run the timing processes one by one; write times of frames, and of selecting the samples."""
     asked = settings.frame_times
     scenes: dict[str, TimedScene] = {}
     for named, file in zip(settings.timed_scenes, files["meshes"], strict=True):
@@ -160,7 +160,7 @@ def frame_times(settings: Options, times: File, seconds: File, **files: list[Fil
     for case, file in zip(settings.subspace_cases, files["subspaces"], strict=True):
         chosen[file.path].append((case.method, case.position_basis, case.k))
         scenes[case.scene].models[file.path] = chosen[file.path]
-    # a large scene may be one of the scenes above
+    # time all models in the file of a large scene, also if ``timed_scenes`` lists this scene, too
     for named, file in zip(settings.large_scenes, files["large"], strict=True):
         scene = TimedScene(named.config, settings.solver, asked.frames)
         scenes.setdefault(named.scene, scene).models[file.path] = None

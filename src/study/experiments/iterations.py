@@ -40,7 +40,7 @@ COLUMNS = [
 class IterationCounts(ConfigModel):
     """Numbers of local/global iterations per frame (``counts``) of full-order runs.
 
-    Each number is also run with Anderson acceleration over ``anderson_window`` iterates, if > 0.
+    Counts above 2 are also run with Anderson acceleration of window ``anderson_window``, unless 0.
     """
 
     counts: tuple[Annotated[int, Field(ge=1, le=10_000)], ...] = (1, 2, 5, 10, 20, 40)
@@ -48,10 +48,10 @@ class IterationCounts(ConfigModel):
 
 
 class IterationSweep(IterationCounts):
-    """Section ``iterations``: numbers of iterations, and limits of the converged run.
+    """Section ``iterations`` of the configuration: counts, and limits of the converged run.
 
     In the converged run, a frame ends when one more iteration would move no vertex by more than
-    ``tolerance`` times the longest side of the mesh, or after ``limit`` evaluations.
+    ``tolerance`` times the mesh's longest side, or after ``limit`` evaluations of its objective.
     """
 
     tolerance: kit.Tolerance = 1e-8
@@ -82,14 +82,15 @@ def iterations(
 ) -> None:
     """Run a scene with every number K of iterations, and once to convergence.
 
-    Runs end before the frame in which perturbed runs differ too much to be compared. Each K is run
-    without (``window`` 0) and with Anderson acceleration. A row has the errors for one K against
-    the converged run, and against the run with the scene's own K. The last row is the converged run
-    itself (empty ``iterations``) with its largest residual: the change by one more iteration, over
-    the longest side of the mesh. If a frame did not converge, errors against this run are empty.
+    Runs end before the first frame in which perturbed full-order runs differ too much. Each K is
+    run without (``window`` 0) and, if above 2, with Anderson acceleration. A row has the errors for
+    one K against the converged run, and against the run with the scene's K. The last row is the
+    converged run itself (empty ``iterations``) with its largest residual: the change by one more
+    iteration, divided by the longest side of the mesh. If one of its frames did not converge,
+    errors against this run are empty.
 
-    The table ``models`` has the errors of runs in position subspaces against the converged run;
-    their iterations and training frames are those of the scene.
+    The table ``models`` has the errors of stored reduced runs in position subspaces (training
+    motion, the scene's K) against the converged run.
     """
     scene = kit.scene_of(config, files["mesh"])
     system = scene.system_with(solver)
@@ -131,7 +132,7 @@ def iterations(
 
 
 def accelerated(counts: list[int], window: int) -> list[tuple[int, int]]:
-    """Pairs (iterations, window): ``counts`` with 0, then those above 2 with a ``window`` > 0."""
+    """Pairs (K, window): all ``counts`` without acceleration (0), then K > 2 with a ``window``."""
     plain = [(count, 0) for count in counts]
     return plain + [(count, window) for count in counts if window and count > 2]
 
@@ -144,8 +145,8 @@ def stepper_of(scene: Scene, system: GlobalSystem, iterations: int, window: int)
 
 
 MEMORY = 8  # number of steps that L-BFGS stores
-SUFFICIENT = 1e-4  # constant of Armijo's condition: least decrease, over slope times step length
-SHORTEST = 1e-4  # shorter L-BFGS steps are replaced by a local/global iteration
+SUFFICIENT = 1e-4  # Armijo's constant: a step must lower the objective by this x slope x length
+SHORTEST = 1e-4  # least fraction of the L-BFGS step to try; then a local/global iteration is made
 
 Evaluate = Callable[[np.ndarray], tuple[float, np.ndarray]]
 
@@ -169,7 +170,7 @@ def minimise(
     """Minimise the objective of a frame by L-BFGS in the metric of ``matrix``, with backtracking.
 
     evaluate : function of y; returns the objective, and the result G(y) of one local/global
-        iteration from y. The gradient is A (y - G(y)); G(y) equals y on fixed rows.
+        iteration from y. The gradient is A (y - G(y)); G(y) equals y at fixed vertices.
     matrix : A, (n, n) symmetric positive definite
     y : (n, 3) start, m
     tolerance : the minimisation ends when no entry of G(y) - y exceeds this, m
@@ -209,7 +210,7 @@ def minimise(
 
 
 class _Pair(NamedTuple):
-    """L-BFGS step, change of A^-1 times the gradient by it, both times A, and their curvature."""
+    """L-BFGS step s; change c, by this step, of A^-1 times the gradient; A s; A c; s^T A c."""
 
     step: np.ndarray
     change: np.ndarray
@@ -273,8 +274,8 @@ class ConvergedStepper(Stepper):
 def converged_run(scene: Scene, tolerance: float, limit: int) -> np.ndarray | None:
     """Positions (F + 1, N, 3) m of a run of ``scene`` in which every frame has converged.
 
-    The initial positions come first. None is returned if a frame does not reach the ``tolerance``
-    within ``limit`` evaluations.
+    Initial positions come first. None if, after ``limit`` evaluations of a frame's objective, one
+    more iteration would move a vertex by over ``tolerance`` times the mesh's longest side.
     """
     best = ConvergedStepper(scene, scene.system, tolerance, limit)
     positions = kit.followed(best, scene.initial_state(), scene.config.frames)

@@ -31,14 +31,14 @@ REPEATS = 15
     "Record of the machine and the library versions", reads={}, writes={"out": MACHINE}, alone=True
 )
 def machine(out: File) -> None:
-    """Measure the units of time; write them to ``out`` with data about machine and libraries."""
+    """Write to ``out`` the times of benchmark loops, and data about machine and libraries."""
     write_text(this.machine(units()).model_dump_json(indent=2) + "\n", out.path)
 
 
 def units() -> Units:
     """Measure the units of time of this machine, each as the minimum over some repeats."""
     numbers = np.ones(MEMORY_BYTES // 8)
-    # pairs (work of a whole call, in units of 1e9; function of n that does 1/n of this work)
+    # pairs: work in units of 1e9; function of n that does 1/n of this work (reading: all of it)
     trials: list[tuple[float, Callable[[int], object]]] = [
         (1e-9 * SCALAR_STEPS, lambda share: _chain(SCALAR_STEPS // share)),
         (

@@ -60,9 +60,8 @@ Rungs = Annotated[tuple[MethodSpec, ...], Field(min_length=1)]
 class Repetitions(ConfigModel):
     """Settings of repeated runs.
 
-    repetitions : number of random draws, with seeds 1, 2, ...
-    perturbation : length of random displacements of the initial positions, relative to the extent
-        (longest side of the bounding box of the mesh)
+    repetitions : number of runs with different random choices, drawn by the seeds 1, 2, ...
+    perturbation : length of random displacements of the start, relative to the mesh's longest side
     """
 
     repetitions: Annotated[int, Field(ge=1, le=1000)] = 5
@@ -76,8 +75,7 @@ class ReducedRuns:
     data : snapshots of the group's projections
     reference : (F + 1, N, 3) m, positions of the full-order run
     end : first frame that is not compared, because perturbed full-order runs differ too much in it
-    blowup_extent : a run ends as a blow-up if the longest side of its bounding box exceeds this
-        multiple of that at rest
+    blowup_extent : a run ends as a blow-up if its bounding box exceeds this times that at rest
     """
 
     scene: Scene
@@ -94,7 +92,7 @@ class ReducedRuns:
         return displacement_norms(self.reference)
 
     def until_the_end(self) -> "ReducedRuns":
-        """Return a copy with only the frames before ``end``, but with at least two frames."""
+        """Return a copy whose runs have only the frames that are compared, but at least two."""
         frames = min(self.scene.config.frames, max(2, self.end))
         scene = self.scene.changed(frames=frames)
         return replace(self, scene=scene, reference=self.reference[: frames + 1])
@@ -104,8 +102,8 @@ class ReducedRuns:
     ) -> Basis:
         """Return the basis for ``method``.
 
-        With a seed ``frames``, the training frames are drawn at random; with a seed ``signs``, the
-        signs of the singular vectors are drawn.
+        With a seed ``frames``, training frames are drawn from all snapshots of the group; with a
+        seed ``signs``, the signs of the singular vectors are drawn.
         """
         key = (method.basis_id, frames, signs)
         if key not in self._bases:
@@ -150,11 +148,11 @@ class ReducedRuns:
     def on_motions(
         self, method: MethodSpec, sizes: Sequence[int], counts: Sequence[int]
     ) -> Iterator[dict[str, Any]]:
-        """Yield rows of runs of the held-out motions, for each of ``counts`` training motions.
+        """Yield a row for each number of training motions in ``counts``, size and held-out motion.
 
-        The first training motion is that of the scene, others are drawn by seeds; of n motions,
-        every n-th training snapshot is used. Errors are over the frames before ``end``, inf for a
-        run that stopped earlier.
+        The first training motion is the scene's own, further ones are variants of it drawn by
+        seeds. Of each of n training motions, every n-th training snapshot is used. Errors are over
+        the frames before frame ``self.end``, inf for a run that stopped earlier.
         """
         config, mesh = self.scene.config, self.scene.mesh
         frames = self.data.frames["train"]
@@ -181,8 +179,8 @@ def recorded(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return positions (F + 1, N, 3) m of the full-order run, and projections (F, e p, 3).
 
-    The projections are those of the constraint ``group`` with e elements of p rows each. ``start``
-    (N, 3) m is added to the initial positions.
+    The projections are those of the constraint ``group`` (e elements of p rows each) at the last
+    iterate of every frame. ``start`` (N, 3) m is added to the initial positions.
     """
     own, projections = scene.group(group), list[np.ndarray]()
     loop, state = scene.stepper(), scene.initial_state(start)
@@ -194,10 +192,7 @@ def recorded(
 
 
 def drawn(data: sets.SnapshotSet, seed: int) -> np.ndarray:
-    """Draw snapshots (n, e p, 3) by ``seed`` from training and test snapshots of ``data``.
-
-    Their number n is that of the training snapshots.
-    """
+    """Draw n from all snapshots of ``data``, of which n are for training; result: (n, e p, 3)."""
     frames = np.concatenate([data.frames["train"], data.frames["test"]])
     chosen = np.random.default_rng(seed).choice(len(frames), len(data.train), replace=False)
     chosen = chosen[np.argsort(frames[chosen])]
@@ -209,8 +204,8 @@ class Cell(ConfigModel):
     """Settings of runs that are repeated.
 
     sizes : basis sizes of the runs
-    varied : what is drawn at random: initial positions, training frames, or held-out motions
-    training_motions : numbers of training motions, with each of which held-out motions are run
+    varied : what differs in repetitions: initial positions, training frames, or held-out motion
+    training_motions : all held-out motions are run with each of these numbers of training motions
     """
 
     sizes: Annotated[tuple[kit.Modes, ...], Field(min_length=1)]
@@ -226,7 +221,7 @@ class Cells(Cell):
 
 
 class RepetitionSection(Repetitions):
-    """Section ``repetitions``: settings of all repetitions, and the repeated runs (``cells``)."""
+    """Section ``repetitions`` of the configuration; ``cells`` lists the runs to repeat."""
 
     cells: tuple[Cells, ...] = ()
 
@@ -239,7 +234,7 @@ class Repeated(Cell):
 
 
 class Ladder(Repetitions):
-    """Methods ("rungs") that differ in single choices, and a comparison of four kinds of them.
+    """Methods ("rungs") that differ in single choices, and four kinds of methods (``square``).
 
     r : basis size of all rungs (the numerical rank if that is smaller)
     signs : number of repetitions of the first rung with other signs of the singular vectors
@@ -260,9 +255,9 @@ class Ladder(Repetitions):
     sizes: tuple[kit.Modes, ...] = ()
 
     def rungs(self, p: int) -> list[tuple[str, MethodSpec, int | None, int]]:
-        """List all runs as ("up", "down", "signs" or "square"; method; seed of signs; size r).
+        """List all runs as (setting; method; seed for the modes' signs or None; basis size r).
 
-        ``p`` is the number of rows of an element.
+        The setting asks for the run: "up", "down", "signs" or "square". ``p``: rows of an element.
         """
         rows: list[tuple[str, MethodSpec, int | None, int]] = []
         rows += [("up", method, None, self.r) for method in self.up]
@@ -278,7 +273,7 @@ class Ladder(Repetitions):
 
 
 class LadderSection(Ladder):
-    """Section ``ladder``: methods of the ladder, and ``scenes`` whose groups are run with them."""
+    """Section ``ladder`` of the configuration; all methods are run for all groups of ``scenes``."""
 
     scenes: tuple[str, ...] = ()
 
@@ -288,8 +283,7 @@ class NoiseRuns(ConfigModel):
 
     sizes : numbers of modes
     repetitions : number of randomly displaced initial positions
-    perturbation : displacement of a vertex (a few units of round-off), relative to the longest
-        side of the bounding box
+    perturbation : displacement of a vertex (a few round-offs), relative to the mesh's longest side
     """
 
     sizes: Annotated[tuple[kit.Modes, ...], Field(min_length=1)] = (6, 10, 20)
@@ -298,14 +292,17 @@ class NoiseRuns(ConfigModel):
 
 
 class Noise(NoiseRuns):
-    """Section ``noise``: ``cases`` maps a scene to a group; scenes not in the study are ignored."""
+    """Section ``noise`` of the configuration; ``cases``: scene -> the group that is reduced in it.
+
+    Scenes that are not in the study are ignored.
+    """
 
     cases: dict[str, str] = Field(default_factory=dict)
     methods: tuple[str, ...] = ("deim-joint", "published")
 
 
 class Options(ConfigModel):
-    """Settings for one scene and group; a ladder or noise runs that are None are left out."""
+    """Settings for one scene and group; ``own_ladder`` or ``own_noise``: None for no such runs."""
 
     scene: SceneConfig
     repetitions: Repetitions
@@ -334,7 +331,7 @@ class Options(ConfigModel):
     },
 )
 def repetitions(settings: Options, **files: paths.File) -> None:
-    """Run repetitions, the ladder, and reductions with bases computed from rounding errors.
+    """Run repetitions, a `Ladder` of methods, and reductions with bases made of rounding errors.
 
     All runs are of one scene and group. The table of a kind of run that is not requested is empty.
     """
@@ -372,7 +369,7 @@ def repetitions(settings: Options, **files: paths.File) -> None:
 
 
 def _ladder(runs: ReducedRuns, short: ReducedRuns, ladder: Ladder) -> Iterator[dict[str, Any]]:
-    """Yield a row for every method of the ladder; ``short`` are shorter runs for repetitions."""
+    """Yield a row per run of ``ladder``; its repetitions use ``short``, which has fewer frames."""
     data = runs.data
     for direction, method, seed, r in ladder.rungs(data.rows_per_element):
         rung = method.title if seed is None else f"signs {seed}"
@@ -408,12 +405,13 @@ def _ladder(runs: ReducedRuns, short: ReducedRuns, ladder: Ladder) -> Iterator[d
 def noisy_runs(
     scene: Scene, group: str, asked: NoiseRuns, methods: Methods, limit: float, file: h5py.File
 ) -> list[dict[str, Any]]:
-    """Run a scene from perturbed starts, compute bases from rounding errors, run reduced with them.
+    """Run a scene from perturbed starts, and reduced by bases made of those runs' rounding errors.
 
     Returns the rows of all runs with the ``group`` reduced by each of ``methods``. For each of the
-    `kinds` of perturbed start, the runs of one start are stored in ``file``; a size r above the
-    rank is not run, and its stored group has the attribute ``marked``. A run ends as a blow-up if
-    its bounding box exceeds ``limit`` times that of the rest shape.
+    `kinds` of perturbed start, ``file`` gets the runs of the first start with `irregular` outcomes
+    (if there is none: of the first start). A size r above the rank is not run: its row has no
+    results, and the attribute ``marked`` of its HDF5 group is True. A run ends as a blow-up if its
+    bounding box is longer than ``limit`` times that of the rest shape.
     """
     rows = []
     for axes in kinds(scene):
@@ -454,8 +452,8 @@ def kinds(scene: Scene) -> tuple[str, ...]:
 def roundoff_field(scene: Scene, axes: str, size: float, seed: int) -> np.ndarray:
     """Random displacement (N, 3) m; ``axes`` is the kind of perturbed start, one of `kinds`.
 
-    Its length is ``size`` times the longest side of the bounding box. ``seed`` draws the
-    displacement and, for the kind `VERTEX`, the vertex.
+    A vertex moves by ``size`` times the longest side of the bounding box, before displacements that
+    the kind does not allow are removed. ``seed`` draws directions and, for `VERTEX`, the vertex.
     """
     field = kit.perturbation_field(scene, size, seed)
     if axes != ALL:
@@ -472,10 +470,10 @@ def _noisy(
 ) -> Iterator[tuple[dict[str, Any], Rerun | None]]:
     """Yield (row, run) of all reductions, with initial positions displaced by ``start`` (N, 3) m.
 
-    The reductions are trained on projections of the full-order run from this start, even if these
-    are rounding errors: no mode is cut off, and no axis is left out. As published, a method with a
-    system of equations for each axis has one for an axis in which nothing moves, too; elsewhere in
-    this study, such an axis has none.
+    The run is None at a size above the rank. The reductions are trained on projections of the
+    full-order run from this start, even if these are rounding errors: no mode is cut off. Where a
+    method has a system of equations for each axis, an axis in which nothing moves has one, too, as
+    published; elsewhere in this study, such an axis has none.
     """
     group, plan, frames = scene.group(name), scene.config.reduce[name], scene.config.frames
     reference, projections = recorded(scene, name, start)

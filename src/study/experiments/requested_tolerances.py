@@ -1,4 +1,4 @@
-"""Runs within requested tolerances, on motions that are not used for the calibration."""
+"""Runs of held-out motions within requested tolerances, by solvers calibrated on other motions."""
 
 import logging
 from collections.abc import Iterator
@@ -22,8 +22,8 @@ from study.experiments.kit.base import Tolerance, experiment
 
 log = logging.getLogger(__name__)
 
-# Convergence of the run that counts as exact: largest change of a coordinate by one more iteration,
-# relative to the mesh's longest side; largest number of evaluations in a frame.
+# Arguments of `converged_run` for the run against which errors are computed: tolerance, relative to
+# the mesh's longest side, and largest number of evaluations of a frame's objective.
 CONVERGED = 1e-6, 4000
 COLUMNS = [
     "scene", "motion", "tolerance", "vertices", "frames", "reduced", "error", "velocity_error",
@@ -40,7 +40,7 @@ class RequestedRuns(run.ToleranceSettings):
 
 
 class RequestedTolerances(RequestedRuns):
-    """Section ``requested_tolerances``; no ``scenes`` means all scenes, the large ones included."""
+    """Section ``requested_tolerances``; no ``scenes`` means all of the study and of ``online``."""
 
     scenes: tuple[str, ...] = ()
 
@@ -57,13 +57,10 @@ class RequestedTolerances(RequestedRuns):
 def requested_tolerances(
     sources: list[Path], config: SceneConfig, section: RequestedRuns, out: File
 ) -> None:
-    """Calibrate a scene, and run every held-out motion within every requested tolerance.
+    """Calibrate full-order and reduced solvers; run held-out motions within requested tolerances.
 
-    Parameters
-    ----------
     sources : files of the mesh; the job depends on them
-    config : settings of the scene
-    section : tolerances, motions, and settings of the levels of accuracy to choose from
+    section : tolerances, motions, and settings of the solvers to choose from
     out : table of the runs
     """
     training = Scene.build(config, config.mesh.build(Path()))
@@ -86,8 +83,8 @@ def _rows(
 ) -> Iterator[dict[str, Any]]:
     """Yield a row per tolerance; ``recorded`` (F + 1, N, 3) m is the run of the training motion.
 
-    Errors of runs of ``scene`` are those against a run with converged frames. A run with a fixed,
-    large number of iterations is compared with it, and replaces it if a frame does not converge.
+    Errors are those against a run of ``scene`` with converged frames or, if a frame does not
+    converge, with a large, fixed number of iterations (whose own error is ``reference_error``).
     """
     frames = scene.config.frames
     motion = Motion(scene, min(section.errors) / section.factor, "position")
@@ -126,7 +123,7 @@ def _rows(
 
 
 def _error(true: np.ndarray, reached: np.ndarray, end: int, quantity: Quantity) -> float | None:
-    """Error of ``reached`` against ``true`` (F + 1, N, 3) m over ``end`` frames; None if 0."""
+    """Error of ``reached`` against ``true`` (F + 1, N, 3) m in ``end`` frames; None if end = 0."""
     if not end:
         return None
     return float(levels.relative_errors(reached[1:] - true[1:], true, quantity)[end - 1])

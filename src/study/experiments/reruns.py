@@ -1,4 +1,4 @@
-"""Sampling of a constraint group by one method, and runs with the group reduced, at all sizes r.
+"""Samples of a constraint group by one method, and runs reduced by them, at all basis sizes r.
 
 `stability` runs one scene with several time steps and stiffnesses, with every method.
 """
@@ -53,7 +53,7 @@ class Sweep(ConfigModel):
     step: kit.Count = 10
 
     def ranks(self, largest: int) -> list[int]:
-        """Return these sizes between 1 and ``largest``, always including ``largest``."""
+        """Return the basis sizes from 1 to ``largest``, always including ``largest``."""
         dense = range(1, min(self.dense_to, largest) + 1)
         coarse = range(self.dense_to + self.step, largest + 1, self.step)
         return sorted({*dense, *coarse, largest} - {0})
@@ -91,7 +91,7 @@ class Options(ConfigModel):
 def reruns(motions: list[File], settings: Options, **files: File) -> None:
     """Sample the group, then run training and held-out motions with reductions of every size r.
 
-    One job does both, because the start of another process takes longer than the sampling.
+    One job does the sampling and the runs, as sampling takes less time than starting a process.
     """
     space, data = load_basis(files["basis"].path), load_snapshots(files["snapshots"].path)
     _sample(space, data, settings, files["sampling"], files["errors"])
@@ -115,11 +115,11 @@ def reruns(motions: list[File], settings: Options, **files: File) -> None:
 def _runs(
     yardstick: Yardstick, sampling: File, basis: Basis, settings: Options, file: h5py.Group
 ) -> Iterator[dict[str, Any]]:
-    """Run a motion at every basis size r, store the runs in ``file``, and yield their rows.
+    """Run a motion at every basis size r, store the runs in ``file``, and yield their table rows.
 
-    A size above the rank is not run: its row has no results, and its HDF5 group is ``marked`` as
-    true. Positions are stored only for the training motion (in the root group of the file), because
-    figures show no other motion.
+    A size above the rank is not run: its row has no results, and the attribute ``marked`` of its
+    HDF5 group is True. Positions are stored only for the training motion, whose ``file`` is the
+    root group, because figures show no other motion.
     """
     labels, scene = sampling.labels, yardstick.scene
     system = scene.system_with(settings.solver)
@@ -148,11 +148,11 @@ def _runs(
 def _sample(
     basis: Basis, data: SnapshotSet, settings: Options, sampling: File, errors: File
 ) -> None:
-    """Select samples at all sizes r that are reconstructed or run; write samples and errors.
+    """Select samples at all basis sizes r; write them, and errors of reconstructed snapshots.
 
     basis, data : basis of the group, from its training snapshots, and all of its snapshots
-    sampling, errors : files of samples and of reconstruction errors; scene, group ... in their
-        paths are the first columns of the table
+    sampling, errors : files for the samples, and for the table of errors, whose first columns are
+        the scene, group and method that the path of ``sampling`` names
     """
     labels = sampling.labels
     asked = kit.resolve_ranks(settings.ranks, basis.rank)
@@ -166,7 +166,7 @@ def _sample(
             sizes = (reduction.gain, reduction.rows_sampled, len(reduction.elements))
             for split in SPLITS:
                 p = getattr(data, split)
-                # the rounding errors of n snapshots grow like sqrt(n)
+                # the norm of the rounding errors of n snapshots grows like sqrt(n)
                 roundoff = data.roundoff * np.sqrt(len(p) / len(data.train))
                 found = relative_errors(p, reduction.reconstruct(p), roundoff)
                 own = (*labels.values(), r, split, *found, *sizes)
@@ -182,19 +182,20 @@ SHORT_COLUMNS = [
     "scene", "method", "r", "h", "stiffness_ratio", "finite", "blowup_frame", "max_extent",
     "energy_ratio", "gain", "group", "position_basis", "k", "frames", "relative_error",
 ]  # fmt: skip
-Local = list[tuple[dict[str, Any], Reduction | None]]  # pairs (first columns of rows, reduction)
+Local = list[tuple[dict[str, Any], Reduction | None]]  # pairs (columns that name a run, reduction)
 Models = list[tuple[dict[str, Any], SubspaceModel]]
 
 
 class ShortRuns(ConfigModel):
     """Settings of short runs with other time steps and other stiffnesses of the reduced groups.
 
-    Bases and samples remain those of the scene's own time step and stiffness.
+    Bases and samples remain those of the scene's own time step and stiffness, so that the runs show
+    how far from these values a reduction can be used.
 
-    ranks : basis sizes r, as far as the study has them; subspaces are run at their largest size
+    ranks : basis sizes r of reductions; position subspaces are run at their largest size only
     time_steps : time steps in seconds, in addition to the scene's own one
-    stiffness_ratios : factors on the weights of the reduced groups, in addition to 1
-    duration : simulated time in seconds, between ``min_frames`` and ``max_frames`` frames
+    stiffness_ratios : factors by which weights of reduced groups are multiplied, in addition to 1
+    duration : simulated seconds; a run has at least ``min_frames``, at most ``max_frames`` frames
     """
 
     ranks: tuple[kit.Rank, ...] = ()
@@ -214,7 +215,7 @@ class ShortRuns(ConfigModel):
 
 
 class Stability(ShortRuns):
-    """Section ``stability``: short runs, and limits that determine the outcome of a run.
+    """Section ``stability``: short runs, and limits by which a run is judged.
 
     scenes : names of the scenes; those that are not in the study are ignored
     wrong : a finite run counts as wrong if its relative error exceeds this value
@@ -228,7 +229,7 @@ class Stability(ShortRuns):
 
     @property
     def left(self) -> float:
-        """Value of `departure` under the name that its key has in the configuration."""
+        """Value of `departure`, which the configuration calls ``left``."""
         return self.departure
 
 
@@ -257,11 +258,7 @@ def stability(
     out: File,
     **files: list[File],
 ) -> None:
-    """Run full order, reductions and largest subspaces with every time step and stiffness.
-
-    Bases and samples are those of the scene's own time step and stiffness: the runs show how far
-    from these they can be used.
-    """
+    """Run full order, reductions, subspace models of largest k; vary time step, then stiffness."""
     scene = kit.scene_of(config, mesh)
     local: Local = []
     for file in files["samplings"]:
@@ -277,7 +274,7 @@ def stability(
         found: Models = load_models(file.path)
         largest = max(labels["k"] for labels, _ in found)
         models += [(labels, model) for labels, model in found if labels["k"] == largest]
-    # either the time step or the stiffness is varied
+    # time step and stiffness are varied one at a time, never both
     h, limits = scene.config.time_step, (short.min_frames, short.max_frames)
     ratios = sorted({1.0, *short.stiffness_ratios} - {1.0})
     grid = [(step, 1.0) for step in sorted({h, *short.time_steps})] + [(h, own) for own in ratios]
@@ -299,7 +296,7 @@ def _rows(
     """Yield rows of the full-order run of ``scene`` and, if it is finite, of all reduced runs.
 
     A run ends as a blow-up if its bounding box exceeds ``limit`` times that of the rest shape.
-    A reduction in ``local`` is None if the basis has fewer modes than requested.
+    A reduction in ``local`` is None if the basis has too few modes; its row then has no results.
     """
     system = scene.system_with(solver)
     nothing = np.zeros((scene.config.frames + 1, *scene.mesh.points.shape))

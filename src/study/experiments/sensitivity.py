@@ -1,9 +1,9 @@
 """Differences of full-order runs that should be equal (docs/study.md), and forces of effects.
 
 A run whose start is moved by 1e-10 of the mesh's size differs more and more from the original run.
-No reduced model can be expected to be more accurate than that. For comparison, other runs have
-another linear solver (another order of summation), number of iterations or time step, or lack an
-effect.
+No reduced model can be expected to have a smaller error than this difference. For comparison, other
+runs have another linear solver (another order of summation), number of iterations or time step, or
+lack an effect.
 """
 
 from collections.abc import Iterator
@@ -40,8 +40,8 @@ class PerturbedRuns(ConfigModel):
     """Settings of runs from randomly moved initial positions, for all ``seeds``.
 
     ``perturbations`` are lengths of the displacement relative to the longest side of the mesh.
-    ``reference`` is the one that decides up to which frame runs are compared (the horizon), and the
-    only one for held-out motions.
+    ``reference`` is the perturbation whose runs decide up to which frame (the horizon) runs of the
+    study are compared, and the only one with which held-out motions are run.
     """
 
     perturbations: tuple[Perturbation, ...] = (1e-12, 1e-10, 1e-8)
@@ -56,7 +56,7 @@ class PerturbedRuns(ConfigModel):
 
 
 class Sensitivity(PerturbedRuns):
-    """Section ``sensitivity``: runs are compared until perturbed ones differ by ``threshold``."""
+    """Section ``sensitivity``; ``threshold``: difference of perturbed runs at the horizon."""
 
     threshold: Annotated[float, Field(gt=0.0, allow_inf_nan=False)] = 1e-3
 
@@ -69,13 +69,13 @@ class Sensitivity(PerturbedRuns):
 def sensitivity(
     mesh: File, config: SceneConfig, chosen: PerturbedRuns, out: File, effects: File
 ) -> None:
-    """Run a scene and its held-out motions from perturbed starts; write differences to ``out``.
+    """Run a scene and its held-out motions from perturbed starts; also vary the scene's settings.
 
-    Forces and energies of the effects in the scene are written to ``effects``.
+    Differences from unchanged runs go to ``out``, forces and energies of effects to ``effects``.
     """
     scene = scene_of(config, mesh)
     parts = [sensitivities(scene, chosen.perturbations, chosen.seeds)]
-    for motion in MOTIONS:  # each held-out motion is compared up to a frame of its own
+    for motion in MOTIONS:  # each held-out motion has a horizon of its own
         other = scene_of(config, mesh, motion)
         parts += perturbed(other, trajectory(other), chosen.reference, chosen.seeds, motion)
     write_table(pd.concat(parts, ignore_index=True), out.path)
@@ -99,13 +99,13 @@ class _Watched:
 def contributions(scene: Scene) -> pd.DataFrame:
     """Table: norm of the force (N) and energy (J) of each effect in each frame of ``scene``.
 
-    Effects with the same name count as one. Forces are taken at the end of a frame, on free
-    vertices: S^T W (p - S q) for a constraint group, M a for a force, M d / h^2 for a contact that
-    moves vertices by d. Pins or handles exert M (q' - q - h v) / h^2 minus all other forces, on the
-    vertices that they hold. Initial velocities v exert M v / h in the first frame.
-
-    The energy is W_j for a group, the potential with an arbitrary zero for a force, and the added
-    kinetic energy for initial velocities. It is nan for effects without an energy.
+    Effects with the same name count as one. A frame of h seconds leads from positions q and
+    velocities v to positions q'; M are the masses (other symbols: docs/study.md). The force on free
+    vertices is S^T W (p - S q') for a constraint group, M a for an acceleration a, and M d / h^2
+    for a contact that moves vertices by d. Pins or handles exert M (q' - q - h v) / h^2, less the
+    forces of groups and accelerations, on the vertices that they hold; initial velocities v exert
+    M v / h. The energy is that of the constraints, the potential of a force, or the kinetic energy
+    that initial velocities add; it is nan for other effects.
     """
     watched = [_Watched(contact) for contact in scene.contacts]
     space = VertexSpace(scene.system, scene.forces, scene.boundaries, contacts=watched)  # type: ignore[arg-type]
@@ -142,7 +142,7 @@ def _frame(
         forces[key] = forces.get(key, 0.0) + np.broadcast_to(force, after.positions.shape)
         energies[effect.name] = energies.get(effect.name, 0.0) + energy
 
-    for group in scene.groups:  # groups still have the data that they computed for this frame
+    for group in scene.groups:  # a group still has the data computed for ``frame``
         missing = group.project(after.positions) - group.S @ after.positions
         weighted = group.row_weights[:, None] * missing
         energy = 0.5 * float(np.sum(missing * weighted))
@@ -169,10 +169,10 @@ def _frame(
 
 
 def relative_difference(other: np.ndarray, base: np.ndarray) -> np.ndarray:
-    """Relative difference (F,) of two trajectories (F + 1, N, 3) in each frame.
+    """Relative difference (F,) of trajectory ``other`` from ``base``, (F + 1, N, 3) each, by frame.
 
-    It is the norm of the difference in a frame, || Q'_f - Q_f ||_F, over the root mean square of
-    || Q_f - Q_0 ||_F of ``base`` over all frames. A common denominator avoids division by almost
+    It is the norm of the difference in frame f, || Q'_f - Q_f ||_F, divided by the root mean square
+    of || Q_f - Q_0 ||_F of ``base`` over all frames. A common denominator avoids division by almost
     zero in slow first frames.
     """
     difference = (other - base)[1:].reshape(len(base) - 1, -1)
@@ -195,7 +195,7 @@ def perturbed(
 def sensitivities(
     scene: Scene, perturbations: tuple[float, ...], seeds: tuple[int, ...]
 ) -> pd.DataFrame:
-    """Table of differences, by frame, of perturbed and of changed runs from the run of ``scene``.
+    """Table by frame: relative differences of perturbed and changed runs from the run of ``scene``.
 
     The changes are another solver, four times the iterations, half the time step, and the scene
     without all effects of one name (unless it would have no constraint group left).
@@ -214,7 +214,7 @@ def sensitivities(
     variants = {
         "solver": trajectory(scene, system=scene.system_with(solver)),
         "iterations x4": trajectory(scene.changed(iterations=4 * config.iterations)),
-        # built from its configuration, which checks that there are not too many frames
+        # the scene is built anew, which checks that there are not too many frames
         "h/2": trajectory(Scene.build(halved.config, halved.mesh))[::2],
     }
     for effect in removable(config):

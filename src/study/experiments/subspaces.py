@@ -72,7 +72,7 @@ class SubspaceModels(ConfigModel):
     """Settings of models in position subspaces.
 
     bases, sizes : kinds of basis, and numbers of modes k
-    tolerances, norm : tolerances to which elements are sampled, and norm of their residuals
+    tolerances, norm : relative residuals of energy-conserving sampling (ecsw), and their norm
     hrpd : settings of models with interpolated projections; None for no such models
     """
 
@@ -83,7 +83,7 @@ class SubspaceModels(ConfigModel):
     hrpd: Hrpd | None = None
 
     def methods(self, kind: str, k: int) -> list[str]:
-        """Names of the models on a basis of ``kind`` with k modes."""
+        """Names of the models on a basis of ``kind`` with k modes; empty if none is asked for."""
         if kind not in self.bases or k not in self.sizes:
             return []
         tolerances = self.tolerances if kind == "pod" else ()
@@ -98,14 +98,14 @@ class Subspace(SubspaceModels):
 
 
 class LargeModels(SubspaceModels):
-    """Settings of models of a large scene; none has full projections, which take too long."""
+    """Settings of models of a large scene; none computes all projections: it takes too long."""
 
     bases: tuple[kit.PositionBasis, ...] = ("pod",)
     sizes: tuple[kit.Modes, ...] = (20,)
     tolerances: tuple[kit.Tolerance, ...] = (1e-2,)
 
     def methods(self, kind: str, k: int) -> list[str]:
-        """Names of the models on a basis of ``kind`` with k modes."""
+        """Names of the models on a basis of ``kind`` with k modes, except with full projections."""
         return [method for method in super().methods(kind, k) if method != FULL]
 
 
@@ -177,7 +177,7 @@ def online(
 ) -> None:
     """Build every model of a large scene, and run all motions with each model.
 
-    The mesh is built from the ``sources``; the full-order runs are made here and not stored.
+    The mesh is built here, from the files ``sources``; full-order runs are made, but not stored.
     """
     mesh = config.mesh.build(Path())
     variants = {kit.TRAIN: config} | {str(name): config.heldout_variant(name) for name in MOTIONS}
@@ -211,7 +211,8 @@ def _runs(
 
     file : file that receives the models
     limit : a run ends as a blow-up if its bounding box exceeds this multiple of that at rest
-    compared : True to store coordinates and deviations of each run in ``file``, too
+    compared : True to store in ``file`` also the subspace coordinates of each run, and its
+        deviations from the full-order run
     """
     rows: list[dict[str, Any]] = []
     played = {
@@ -223,7 +224,7 @@ def _runs(
         subspace.store_columns(file.create_group(f"columns/{base}"), columns)
         spent: dict[str, float] = defaultdict(float)
         for of_model, (method, samples) in clocked(models):
-            # all tolerances share one sampling: its time is part of that of the first model
+            # ECSW samples for all tolerances during its first model: add that time to later models
             family = subspace.ECSW if method.startswith(subspace.ECSW) else method
             spent[family] += of_model
             model = subspace.SubspaceModel(kind, columns, samples)
@@ -265,7 +266,7 @@ def _subspaces(
         spaces = {g.name: sampled_space(g, points, settings.hrpd) for g in scene.groups}
 
     def samplings(columns: Columns, methods: list[str]) -> Iterator[tuple[str, Sampled]]:
-        """Yield pairs (method, samples) of the models with these ``columns``."""
+        """Yield pairs (method, samples) of all models in the subspace spanned by ``columns``."""
         if FULL in methods:
             yield FULL, {}
         if any(method.startswith(subspace.ECSW) for method in methods):
@@ -283,8 +284,8 @@ def _subspaces(
             yield f"{kind}_k{k:03d}", columns, kind, k, models
 
 
-LARGEST = 3_000_000  # largest size of a file of models, bytes
-GHOST = 250_000  # approximate number of positions of the full-order run in such a file
+LARGEST = 3_000_000  # largest size of the file for the web page, bytes
+GHOST = 250_000  # the file has at most about so many vertex positions of the full-order run
 JOINT = "deim-joint"
 FORMAT = 1
 Labelled = tuple[dict[str, Any], subspace.SubspaceModel]
@@ -311,7 +312,7 @@ class Live(LiveModels):
 
 
 class JointRows(kit.OfScene):
-    """A constraint group that is sampled by joint rows: by one index for x, y and z of a row."""
+    """A constraint group sampled by joint rows: a chosen row is sampled in x, y and z at once."""
 
     group: str
     method: str = JOINT
@@ -341,10 +342,10 @@ class Options(ConfigModel):
     writes={"out": paths.LIVE_MODEL},
 )
 def live(mesh: File, train: File, settings: Options, out: File, **files: list[File]) -> None:
-    """Write the models of a scene and its full-order run to the file that the web page loads.
+    """Write reduced models of a scene and its full-order run to the file that the web page loads.
 
-    ``bases`` and ``samplings`` are files of groups sampled by joint rows (of x, y and z), listed in
-    ``settings.joint_rows``. Raises StorageError if the file would be larger than `LARGEST`.
+    ``bases`` and ``samplings`` are files of groups in ``settings.joint_rows``; a row sampled there
+    serves x, y and z. Raises StorageError if the file would be larger than `LARGEST`.
     """
     scene = kit.scene_of(settings.scene, mesh)
     reference = kit.positions_of(train)
@@ -395,9 +396,10 @@ def live(mesh: File, train: File, settings: Options, out: File, **files: list[Fi
 def _joint(
     scene: Scene, group: str, reduction: Reduction, beside: list[Labelled]
 ) -> Iterator[Labelled]:
-    """Yield a model with interpolated projections of ``group`` in each subspace of ``beside``.
+    """Yield a model for each subspace in ``beside``, with ``group`` interpolated by ``reduction``.
 
-    ``beside`` are models with sampled elements; ``reduction`` samples rows of x, y and z together.
+    ``beside`` are models with sampled elements, which other groups keep; ``reduction`` selects rows
+    for x, y and z together.
     """
     for model in {id(model.columns): model for _, model in beside}.values():
         joint = interpolation_of(scene.group(group), model.columns, reduction)

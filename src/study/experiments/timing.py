@@ -52,7 +52,7 @@ class NumpyLocalStep:
         self._lift = sparse.csr_array(group.S.T.multiply(group.row_weights[None, :]))
 
     def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
-        """Add S^T W p(y) of ``y`` (N, 3) m to ``rhs`` (N, 3) and return the energy, J."""
+        """Add S^T W p(y), p the projections at ``y`` (N, 3) m, to ``rhs``; return the energy, J."""
         d = self.group.S @ y
         p = self.group.reference_project(d.reshape(self._shape), self._all).reshape(d.shape)
         energy = 0.5 * float(np.sum(self._weights * (d - p) ** 2))
@@ -76,7 +76,7 @@ class InterpretedLocalStep:
             self._blocks.append((columns, block.toarray()[:, columns], group.weights[e]))
 
     def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
-        """Add S^T W p(y) of ``y`` (N, 3) m to ``rhs`` (N, 3) and return the energy, J."""
+        """Add S^T W p(y), p the projections at ``y`` (N, 3) m, to ``rhs``; return the energy, J."""
         energy = 0.0
         for e, (columns, block, weight) in enumerate(self._blocks):
             d = block @ y[columns]
@@ -106,7 +106,7 @@ ITERATIONS = [
     "scene", "method", "vertices", "elements", "r", "k", "elements_sampled",
     "ms_per_iteration", "local_ms", "global_ms", "vertices_ms", "local_share",
 ]  # fmt: skip
-STATES, SIZED_STATES = 5, 4  # numbers of states at which `timing` and `scaling` time local steps
+STATES, SIZED_STATES = 5, 4  # `timing`, `scaling` time local steps at positions of so many frames
 TrainingFrames = Annotated[int, Field(ge=3, le=1000)]
 
 
@@ -155,7 +155,7 @@ class Options(ConfigModel):
     alone=True,
 )
 def timing(mesh: File, fom: File, settings: Options, **files: Any) -> None:
-    """Measure times of frames, local steps and effects, and of frames without some effects."""
+    """Measure times of frames, local steps and effects, and of frames with an effect left out."""
     scene, asked = kit.scene_of(settings.scene, mesh), settings.timing
     system, name = scene.system_with(settings.solver), scene.config.name
     frames = min(asked.frames, scene.config.frames)
@@ -192,7 +192,7 @@ def timing(mesh: File, fom: File, settings: Options, **files: Any) -> None:
     write_table(pd.DataFrame(results, columns=COLUMNS), files["out"].path)
     log.info("%s: %d reduced local steps alone", name, len(alone))
     often = {"warmup": asked.warmup, "repeats": asked.breakeven_repeats}
-    with open_hdf5(fom.path) as file:  # read states spread over the run
+    with open_hdf5(fom.path) as file:  # take `STATES` frames, spread evenly over the run
         positions = file["positions"]
         ends = [positions[i * (len(positions) - 1) // STATES] for i in range(STATES)]
     times = local_costs(scene, alone, np.stack(ends), **often)
@@ -207,7 +207,7 @@ def timing(mesh: File, fom: File, settings: Options, **files: Any) -> None:
 def _full_order(
     scene: Scene, system: GlobalSystem, frames: int, asked: Timing, common: dict[str, Any]
 ) -> tuple[Variant, list[Variant]]:
-    """Full-order runs to time: the slowest implementation (few iterations), and all others."""
+    """Full-order runs to time: the slowest implementation, with fewer iterations; all others."""
     quick = variant(scene, system, scene.groups, frames, {**common, "implementation": "compiled"})
     made = [quick]
     for name, step in IMPLEMENTATIONS.items():
@@ -223,7 +223,7 @@ def _full_order(
 def _other_counts(
     scene: Scene, system: GlobalSystem, frames: int, asked: IterationCounts, common: dict[str, Any]
 ) -> list[Variant]:
-    """Compiled full-order runs with other iteration counts, also with Anderson acceleration."""
+    """Full-order runs with iteration counts other than the scene's, or Anderson acceleration."""
     variants = []
     counts = sorted({*asked.counts, scene.config.iterations})
     own = (scene.config.iterations, scene.config.anderson_window)
@@ -266,7 +266,7 @@ class Sized(Protocol):
 
 
 class Scaling(Sized):
-    """Section ``scaling``: ``scenes`` maps a scene to factors on the vertices along a side."""
+    """Section ``scaling``; ``scenes``: scene -> factors that multiply the vertex count per side."""
 
     scenes: kit.Sizes = Field(default_factory=dict)
 
@@ -287,7 +287,7 @@ class SizedOptions(ConfigModel):
     alone=True,
 )
 def scaling(sources: list[Path], settings: SizedOptions, iterations: File, breakeven: File) -> None:
-    """Time a scene on one mesh; a factor in the paths multiplies the vertices along each side."""
+    """Time a scene on its mesh remade with ``iterations["factor"]`` times the vertices per side."""
     config, sized = settings.scene, settings.scaling
     specs, alone = settings.scaled_methods, settings.scaling.breakeven
     factor = float(iterations["factor"])
@@ -363,7 +363,7 @@ def _reductions(
     spec: MethodSpec,
     asked: Sequence[int],
 ) -> list[Reduction]:
-    """Reductions of the first group at the sizes ``asked``, or at the rank where it is smaller."""
+    """Reductions of the first group to r modes (at most the basis's rank) for each r ``asked``."""
     group = scene.groups[0]
     basis = compute_basis(
         projections,

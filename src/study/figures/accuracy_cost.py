@@ -1,4 +1,4 @@
-"""Figures of error against time, for reductions, other methods, and requested tolerances."""
+"""Figures of error and time: reductions, alternatives to projective dynamics, requested errors."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -19,7 +19,7 @@ from study.tables.accuracy_cost import FEWER, pareto
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "*")
 ERROR, TIME = "relative_error_within_horizon", "ms_per_frame"
 LOW, HIGH = 1e-3, 1e2  # limits of the error axis; errors outside are arrows at the limits
-ABOVE, BELOW, BLOWN_UP = 6, 7, "x"  # Matplotlib markers: errors off the axis, runs that blew up
+ABOVE, BELOW, BLOWN_UP = 6, 7, "x"  # Matplotlib markers: error above axis, below it, blow-up
 OWN = {"color": style.GREY, "linewidth": 1.2}
 BLIND = {"color": style.FAILED, "linewidth": 0.9, "linestyle": "-."}
 RATES = (60, 30)  # frame rates of real time, 1/s, drawn as lines
@@ -74,8 +74,8 @@ class TradeOffs:
     points : rows of table accuracy_cost; errors are against the scene's own full-order run
     blown_up : reduced runs that blew up before an error could be computed
     own_ms : scene -> time per frame of its own full-order run, ms
-    own_error : scene -> error of its own full-order run against the converged run
-    marker : (family, legend entry) -> Matplotlib marker
+    own_error : scene -> error of its own full-order run against one of converged iterations
+    marker : (name in `FAMILIES`, legend entry) -> Matplotlib marker
     """
 
     points: pd.DataFrame
@@ -85,7 +85,7 @@ class TradeOffs:
     marker: dict[Look, str]
 
     def members(self, family: str) -> dict[str, str]:
-        """Return a mapping of the legend entries in ``family`` to markers."""
+        """Return legend entry -> marker for models of a ``family`` (see `FAMILIES`)."""
         return {name: marker for (own, name), marker in self.marker.items() if own == family}
 
 
@@ -168,9 +168,9 @@ def _points(ax: Axes, rows: pd.DataFrame, size: float, colour: str, **look: Any)
 
 
 def label_iterations(ax: Axes, found: TradeOffs, scene: str) -> None:
-    """Label full-order runs with fewer iterations than ``scene`` configures by their number K.
+    """Write K beside full-order runs with K iterations, fewer than ``scene`` configures.
 
-    The runs are in ``found`` and are drawn on ``ax``; neighbouring runs share a label.
+    The runs are in ``found`` and already drawn on ``ax``; neighbouring runs share a label.
     """
     rows = found.points[(found.points.scene == scene) & (found.points.method == FEWER)]
     rows = rows.sort_values(TIME)
@@ -178,7 +178,7 @@ def label_iterations(ax: Axes, found: TradeOffs, scene: str) -> None:
 
 
 def handles(found: TradeOffs) -> list[Block]:
-    """Return a block of the legend for each family in ``found``: one colour, several markers."""
+    """Return blocks of the legend: full-order runs, then the models in ``found`` by `FAMILIES`."""
     common = {"linewidth": 1.0, "markersize": 4.0}
     entries = [
         ("full order", [
@@ -248,7 +248,7 @@ def accuracy_cost(
 
 
 def _draw_rates(ax: Axes) -> None:
-    """Draw vertical lines at the frame rates `RATES`; an arrow points to rates beyond the axis."""
+    """Draw vertical lines at the times per frame of `RATES`, arrows to those beyond the axis."""
     high = ax.get_xlim()[1]
     beyond = [rate for rate in RATES if 1e3 / rate >= high]
     for rate in set(RATES) - set(beyond):
@@ -269,7 +269,7 @@ def _label(ax: Axes, x: float, text: str) -> None:
 LEAST, MOST = 1e-4, 1.0  # limits of the error axis; errors outside are drawn on the limits
 BESIDE = 4  # largest number of panels in a row
 TOLERANCES, TIMES, REACHED = (5e-3, 2e-1), (1e-2, 1e1), (1e-4, 1e0)
-# Kind of run with a requested tolerance -> (colour, factor on tolerances, to set its dots apart).
+# Kind of run -> (colour, factor of the tolerance at which its dots are drawn: avoids overlap).
 KINDS = {
     "reduction": (style.BLUE, 0.85),
     "full order": (style.VERMILLION, 1.0),

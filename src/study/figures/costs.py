@@ -22,14 +22,14 @@ PHASES = {
     "global_ms": ("global solve", style.BLUE),
 }
 TITLES = {"interpreted": "interpreted loop", "numpy": "vectorised NumPy", "compiled": "compiled"}
-CLAIM = 70.0  # share of the local step in a frame, per cent, by claim C1 of the preprint
+CLAIM = 70.0  # per cent of the time of a frame in the local step, by claim C1 of the preprint
 CURVES = {
     "ms_per_iteration": ("whole iteration", "-"),
     "local_ms": ("local step", "--"),
     "global_ms": ("global solve", ":"),
     "vertices_ms": ("positions of all vertices", "-."),
 }
-# Method -> name that is printed with the exponent of its time as a power of the mesh size.
+# Method -> legend entry; beside its curve stands p of the fit time ~ (number of vertices)^p.
 NAMES = {"fom": "full order", "ecsw": "POD subspace, ecsw"}
 SCALED = {"fom": (style.BLACK, "o"), "ecsw": ("#1B6E6E", ">")}
 ROOM = 2.6  # the axis ends at this multiple of the largest mesh size, to leave space for text
@@ -221,7 +221,7 @@ def effects_contribution(
 
 
 def _looks(drawn: Drawn, rows: pd.DataFrame) -> Looks:
-    """Map each effect in ``rows`` to (colour, marker), which are fixed for constraint groups."""
+    """Map effects in ``rows`` to (colour, marker), always the same for constraint groups."""
     known, effects = drawn.looks, list(dict.fromkeys(rows.effect))
     others = [effect for effect in effects if effect not in known]
     groups = {effect: known[effect] for effect in effects if effect in known}
@@ -292,7 +292,7 @@ def effects_cost(options: Scenes, drawn: Drawn, table: pd.DataFrame) -> Figure:
 def _draw_scenes(
     ax: Axes, costs: pd.DataFrame, scenes: list[str], colours: dict[str, str]
 ) -> list[str]:
-    """Draw for each scene a bar with the share of each effect; return the effects drawn."""
+    """Draw for each scene a bar of parts of frame time (effects etc.); return the parts' names."""
     costs = costs.assign(part=costs.effect.where(costs.effect.isin(list(colours)), UNLISTED))
     parts = [part for part in colours if (costs.part == part).any()]
     for y, scene in enumerate(scenes):

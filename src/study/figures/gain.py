@@ -66,7 +66,7 @@ def error_against_gain(options: kit.Methods, drawn: Drawn, **tables: pd.DataFram
 def _draw_method(
     ax: Axes, runs: pd.DataFrame, ranges: pd.DataFrame, colour: str, marker: str
 ) -> None:
-    """Draw a dot at (gain, error) of each run; crosses show ``ranges`` of both in repeated runs."""
+    """Draw dots (gain, error) of runs; crosses span the ``ranges`` of both in repeated runs."""
     x, y = runs.gain.to_numpy(float), runs.error.to_numpy(float)
     multiples.rim_arrows(ax, x, y, colour=colour, across=GAINS, along=ERRORS)
     ax.plot(
@@ -205,9 +205,10 @@ def _panels(
 
 
 def _published(path: Path, columns: list[str], options: Beside, each: Experiment) -> pd.DataFrame:
-    """Rows of the file ``path`` for the scene and group of ``each``.
+    """Rows of file ``path`` for the group of ``each`` and a published experiment like its scene.
 
-    The file has output of the published code, the program that the preprint's authors published.
+    The file has output of the preprint authors' own code, and must have ``columns``;
+    `Beside.published` names the experiment of that code which is similar to the scene.
     """
     output = read_table(path, ["experiment", "group", *columns], result=False)
     name = options.published.get(each.scene)
@@ -250,7 +251,7 @@ def singular_values(options: Beside, drawn: Drawn, table: pd.DataFrame, publishe
 def _draw_values(ax: Axes, rows: pd.DataFrame, colour: str, marker: str) -> None:
     """Draw singular values; those below round-off have hollow markers in a shaded region.
 
-    The upper edge of the region lies between the largest of them and the smallest other value.
+    The upper edge of the region lies between the largest hollow and the smallest other value.
     """
     component = rows.component.to_numpy(float)
     above = rows.above_roundoff.astype(bool).to_numpy()

@@ -23,8 +23,8 @@ from study.figures.sensitivity_floor import FLOORS, Floors
 from study.tables.kit.results import trained
 
 NOISY = {"all": "all axes", "plane": "in the plane", "vertex": "one vertex across"}
-WRONG = 0.1  # a run has failed if its relative error exceeds this, or if it cannot start
-DISTANCES = (1e-4, 1.0)  # limits of coloured distances, over the longest side of the bounding box
+WRONG = 0.1  # a run has failed if its relative error exceeds this, or if it blew up
+DISTANCES = (1e-4, 1.0)  # limits of colours: distance from full order / longest side of mesh
 FOOTER = 0.55  # height of the colour scale, inches
 TOLERANCE = "ecsw-1e-02"  # method of the run in a position subspace that figure `teaser` shows
 MODES = 20  # largest allowed number of modes k of the position subspace in figure `teaser`
@@ -72,7 +72,8 @@ class Shown:
     ) -> Row:
         """Return a row of pictures: the full-order run, then ``panels``.
 
-        The title of the row is that of the experiment, with ``label`` below.
+        The title of the row is that of the experiment, with ``label`` below. The text ``note``
+        stands to the right of the panels.
         """
         first = RunPanel("full order", style.FULL_ORDER, self.full[0], reference=True)
         panels = [replace(panel, obstacles=self.bodies) for panel in (first, *panels)]
@@ -89,7 +90,7 @@ class Shown:
 
 @dataclass(frozen=True)
 class Runs:
-    """Inputs of figures of runs: files for each scene, in ``reruns`` for each scene and method."""
+    """Inputs of figures of runs: one file per scene; ``reruns``: per scene, group and method."""
 
     options: ReducedRuns
     drawn: Drawn
@@ -105,11 +106,11 @@ class Runs:
 
     @cached_property
     def floors(self) -> Floors:
-        """Sensitivity floor of each scene, and frame from which on its runs are not compared."""
+        """Sensitivity floor (difference of perturbed full-order runs) and horizon of each scene."""
         return Floors(self.sensitivity, self.horizon)
 
     def shown(self, experiment: Experiment) -> Shown:
-        """Return the scene of ``experiment`` at the last instant in the options."""
+        """Return the scene of ``experiment`` at the last of the instants listed in the options."""
         path, instant = experiment.path(self.full_order), self.options.frames[-1:]
         (frame,), full = positions_at(path, instant)
         return Shown(
@@ -133,7 +134,7 @@ class Runs:
         return found
 
     def rows(self, experiment: Experiment) -> list[Row]:
-        """Return a row for each method, or a single row with a note if no method could run."""
+        """Return a row for each method, or one row with a note if no reduced run could start."""
         shown = self.shown(experiment)
         reduced = self.reduced(shown)
         everything = [panel for panels in reduced.values() for panel in panels]
@@ -149,7 +150,7 @@ class Runs:
         """Draw a row for each scene and method: the full-order run, then reduced runs by size.
 
         All pictures of a scene show the last instant in the options with the same camera. A picture
-        that does not fit has a frame and a scale of its own, printed below. The grey outline is the
+        too large for the common scale has a border, and its scale below. The grey outline is the
         full-order run.
         """
         return view.draw_rows([row for each in self.drawn.experiments for row in self.rows(each)])
@@ -218,10 +219,10 @@ def noise_rows(drawn: Drawn, shown: Shown, table: pd.DataFrame, path: str) -> li
     """Return a row of pictures for each method and kind of perturbed start (keys of `NOISY`).
 
     Below a picture stands how many starts of the kind led to failed runs. Kinds with equal numbers
-    at every size share a row, which shows a run of the first of these kinds.
+    at every basis size share a row, whose pictures are of the first of these kinds.
 
     table : rows of table ``noise`` for the experiment in ``shown``
-    path : file with its runs, whose bases are computed from snapshots of mere rounding errors
+    path : file of these runs, whose bases are computed from snapshots of mere rounding errors
     """
     shown, rows = replace(shown, bodies=None), []
     for method in drawn.methods:
@@ -239,7 +240,7 @@ def noise_rows(drawn: Drawn, shown: Shown, table: pd.DataFrame, path: str) -> li
 
 
 def _alike(table: pd.DataFrame) -> dict[tuple[tuple[int, str], ...], list[str]]:
-    """Group kinds of perturbed starts that have the same text on failed runs at every size r."""
+    """Map each list of (r, text on failed runs) to the kinds of perturbed starts that have it."""
     table = table[table.r <= table["rank"]]
     failed = ~(table.relative_error <= WRONG)
     kinds: dict[tuple[tuple[int, str], ...], list[str]] = {}
@@ -301,7 +302,7 @@ def _over_time(
 ) -> list[RunPanel] | None:
     """Panels of a reduced run at ``frames``, coloured by the distance to the full-order run.
 
-    ``full`` : (F, N, 3) positions of the latter, m. None is returned if no size could run.
+    ``full`` : (F, N, 3) positions of the latter, m. Returns None if all sizes r exceed the rank.
     """
     infos = choose_ranks(rerun_infos(path), options.ranks)
     info = next((i for i in infos if not i.marked), None)
@@ -388,7 +389,7 @@ def _with_error(panel: RunPanel, method: str, rows: pd.DataFrame, size: str) -> 
 
 
 def _subspace(frame: int, path: str) -> RunPanel | None:
-    """Panel of the run in the largest position subspace of at most `MODES` modes, or None."""
+    """Panel of the run in the largest position subspace up to `MODES` modes; None without one."""
     colour = style.surface_colour(style.GREEN)
     with open_hdf5(path) as file:
         models = file["models"]

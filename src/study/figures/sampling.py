@@ -36,14 +36,14 @@ ROW_HEIGHT = 1.85  # height of a row of panels, inches
 
 
 class Steps(kit.View):
-    """Options of the figure: camera, number of iterations; the first scene and method are drawn."""
+    """Options of the figure: camera, and ``count`` first steps of the selection of elements."""
 
     count: kit.Count = 6
     columns: kit.Columns = 3
 
 
 class Entries(kit.View):
-    """Options of the figure: camera, and basis sizes; the first size that exists is drawn."""
+    """Options of the figure: camera, and basis sizes, of which the first with samples is drawn."""
 
     ranks: kit.Ranks = ()
 
@@ -145,7 +145,7 @@ def iterations(
         raise StorageError(f"{len(entries)} sampled entries do not fit a basis of {len(V)} rows")
     residual_of = _joint_residual if rows == "joint" else _shared_residual
     per_element = 3 * rows_per_element
-    length = {"scalar": 1, "joint": 3, "element": per_element}[rows]  # entries in each vector norm
+    length = {"scalar": 1, "joint": 3, "element": per_element}[rows]  # residual entries per norm
     steps = []
     for k in range(min(count, len(entries) // per_step, V.shape[1])):
         residual = residual_of(V, entries[: k * per_step], k)
@@ -164,7 +164,7 @@ def iterations(
 
 
 def _shared_residual(V: np.ndarray, entries: np.ndarray, k: int) -> np.ndarray:
-    """Residual of mode k; coefficients are common to x, y, z (least squares if oversampled)."""
+    """Residual of fitting mode k by earlier modes at ``entries``; x, y, z share coefficients."""
     if k == 0:
         return V[:, 0]
     coefficients = np.linalg.lstsq(V[entries, :k], V[entries, k], rcond=None)[0]
@@ -172,7 +172,7 @@ def _shared_residual(V: np.ndarray, entries: np.ndarray, k: int) -> np.ndarray:
 
 
 def _joint_residual(V: np.ndarray, entries: np.ndarray, k: int) -> np.ndarray:
-    """Residual of mode k; x, y and z have separate coefficients, from samples in the same rows."""
+    """Residual of mode k, fitted by earlier modes at sampled rows, separately for x, y and z."""
     split = V.reshape(-1, 3, V.shape[1])
     residual = np.empty(split.shape[:2])
     for axis in range(3):
@@ -234,7 +234,7 @@ def deim_entries(options: Entries, drawn: kit.Drawn, **files: list[File]) -> Fig
 def _draw_hits(
     ax: Axes, elements: shapes.ElementMap, entries: np.ndarray, per_element: int, camera: Camera
 ) -> None:
-    """Draw a dot on each element in which ``entries`` are sampled, in the colour of their axis."""
+    """Draw a dot on each element with sampled ``entries``, coloured by their axis or `SEVERAL`."""
     hit: dict[int, str] = {}
     for entry in entries:
         element, axis = int(entry) // per_element, "xyz"[int(entry) % 3]
@@ -286,7 +286,7 @@ def _draw_evaluations(ax: Axes, samplings: dict[str, list[SamplingView]], per_el
 # (left edge, width, height) of the four drawn matrices, inches; their upper edges are aligned.
 BLOCKS = ((0.75, 1.6, 1.9), (2.8, 1.6, 1.9), (4.8, 0.85, 0.85), (6.0, 0.85, 0.85))
 SIGNS = ((2.575, "="), (4.6, "×"), (5.825, "×"))
-ABOVE, TITLE, FOOTER = 0.36, 0.34, 0.44  # heights of two text lines, title, scale, inches
+ABOVE, TITLE, FOOTER = 0.36, 0.34, 0.44  # inches: two lines of text, a title, the colour scale
 LEFT, TALLEST = 0.75, 1.45  # left edge and largest height of pictures of the mesh, inches
 
 
@@ -354,7 +354,7 @@ def _height(window: Window, count: int) -> float:
 
 
 def _draw_product(figure: Figure, basis: Basis, centred: np.ndarray, title: str) -> None:
-    """Draw snapshots, modes, singular values, coefficients as matrices; rows are sorted by axis."""
+    """Draw snapshots = modes x singular values x coefficients as matrices; rows sorted by axis."""
     from matplotlib.colors import LogNorm
 
     rank, tiny = basis.rank, np.finfo(float).tiny
@@ -400,7 +400,7 @@ def _draw_matrix(ax: Axes, matrix: np.ndarray, title: str) -> None:
 
 
 def _row(figure: Figure, count: int, bottom: float, height: float, label: str) -> list[Axes]:
-    """Return ``count`` axes for a row of pictures, ``bottom`` inches above the lower edge."""
+    """Return ``count`` axes in a row, ``bottom`` inches above the lower edge of the ``figure``."""
     whole, step = figure.get_figheight(), (style.WIDTH - LEFT) / max(count, 1) / style.WIDTH
     middle = (bottom + 0.5 * height) / whole
     figure.text(0.008, middle, label, va="center", fontsize=7.5)
@@ -417,7 +417,7 @@ def _row(figure: Figure, count: int, bottom: float, height: float, label: str) -
 def _draw_column(
     ax: Axes, elements: shapes.ElementMap, points: np.ndarray, column: np.ndarray, camera: Camera
 ) -> str:
-    """Colour elements by one entry (see `signed_entry`) over its largest value; return its name."""
+    """Colour elements by `signed_entry` of ``column`` / largest |value|; return the entry name."""
     values, words = shapes.signed_entry(column, len(column) // (3 * len(elements.cells)))
     largest = max(float(np.abs(values).max()), np.finfo(float).tiny)
     elements.draw(ax, points, values / largest, camera, shapes.signed())

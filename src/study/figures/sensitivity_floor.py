@@ -1,4 +1,4 @@
-"""Figure of how far perturbed full-order runs drift apart, which limits the compared frames."""
+"""Figure of how far full-order runs from slightly different starts drift apart, by frame."""
 
 from collections.abc import Sequence
 
@@ -26,12 +26,13 @@ COLUMNS = ["scene", "perturbation", "frame", "relative_difference"]
 class Floors:
     """Sensitivity floor and horizon of each scene.
 
-    The floor is the relative difference between full-order runs with perturbed and unperturbed
-    starts, in each frame. The horizon is the first frame in which the floor exceeds a limit; from
-    there on runs cannot be compared. The attribute ``of`` maps a scene to its floor (F,), the
-    maximum over all seeds, empty without perturbed runs. StorageError for a damaged file.
+    The floor (F,) is the relative difference between full-order runs with perturbed and unperturbed
+    starts in each of F frames, the largest over all random seeds; it is empty without perturbed
+    runs. The horizon is the first frame in which it exceeds a threshold; from there on runs cannot
+    be compared. Attribute ``of`` maps scenes to floors. StorageError for a damaged file.
 
     sensitivity : files with tables of the perturbed runs, one per scene
+    horizon : settings, with the perturbation whose runs are used and the threshold
     """
 
     def __init__(self, sensitivity: Sequence[File], horizon: Horizon) -> None:
@@ -40,7 +41,7 @@ class Floors:
         self.of = {s: floor_of(table, s, self.perturbation) for s, table in tables.items()}
 
     def horizon(self, scene: str) -> int | None:
-        """First frame in which the floor of ``scene`` exceeds the threshold; None if none does."""
+        """First frame in which the floor of ``scene`` exceeds `threshold`; None if none does."""
         end = horizon(self.of[scene], self.threshold)
         return end if end < len(self.of[scene]) else None
 

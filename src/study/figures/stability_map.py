@@ -10,16 +10,16 @@ from pdrom.view.artists import Axes, Figure
 from study.artifact.reads import TableOf
 from study.figures.kit.declaration import Drawn, Methods, NothingToDraw, Ranks, figure
 
-CELLS = 48  # largest width of a row of blocks, in cells; further blocks go to another row
+CELLS = 48  # largest panel width, in cells; blocks of columns that do not fit go to another panel
 ROW = 0.145  # height of a row of cells, inches
-GAP = 0.45  # distance between blocks, in cells
-LEAST = 2.0  # smallest width of a block, in cells, so that its title fits
-DENSE = 30  # if a row of blocks has more columns, labels are vertical and titles have two lines
+GAP = 0.45  # distance between blocks of columns, in widths of a cell
+LEAST = 2.0  # smallest width of a block of columns, in widths of a cell, so that its title fits
+DENSE = 30  # panels with more columns than this have vertical labels and titles of two lines
 
 
 @dataclass(frozen=True)
 class Look:
-    """Look of an outcome: cell colour, symbol in the cell, colour of the symbol, legend text.
+    """Look of the cells of runs with one outcome: cell colour, symbol, its colour, legend text.
 
     Outcomes can be distinguished without colour: cells differ in lightness, and cells of failed
     runs have a symbol. The symbol of a blow-up is the number of the frame in which it happened.
@@ -41,7 +41,7 @@ LOOKS = {
 }
 
 
-Cells = dict[tuple[str, str], pd.Series]  # (scene, group) -> row of the table stability
+Cells = dict[tuple[str, str], pd.Series]  # one column: (scene, group) -> row of table stability
 
 
 @dataclass(frozen=True)
@@ -55,14 +55,14 @@ class Block:
 
 @dataclass(frozen=True)
 class Strip:
-    """Blocks side by side with common rows of cells: ``rows`` maps (scene, group) to a label."""
+    """Panel of columns in blocks side by side; ``rows`` maps a row (scene, group) to its label."""
 
     rows: dict[tuple[str, str], str]
     blocks: Sequence[Block]
     xlabel: str
 
     def outcomes(self) -> set[str]:
-        """Outcomes of the runs in the strip."""
+        """Outcomes of all runs that have a cell in this panel."""
         cells = [column.get(key) for b in self.blocks for column in b.columns for key in self.rows]
         return {str(cell.outcome) for cell in cells if cell is not None}
 
@@ -182,7 +182,7 @@ def _cells(rows: pd.DataFrame) -> Cells:
 
 
 def _wrapped(rows: dict[tuple[str, str], str], blocks: list[Block], xlabel: str) -> list[Strip]:
-    """Distribute ``blocks`` over strips of at most `CELLS` cells; all strips have these rows."""
+    """Distribute ``blocks`` of columns to strips of at most `CELLS` columns, with all ``rows``."""
     parts: list[list[Block]] = []
     used = 0
     for block in blocks if rows else ():

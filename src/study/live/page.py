@@ -18,9 +18,9 @@ HEAD = re.compile(r'pdromLive\(\{"format":1,"scene":("\w+"),"title":("(?:[^"\\]|
 
 
 def _write(models: list[File], html: Path, outputs: Mapping[str, str], **parts: Path) -> None:
-    """Write the page from a template ``html``, ``parts`` (styles, scripts) and a list of scenes.
+    """Write the page: template ``html`` with ``parts`` (styles, scripts) and a list of scenes.
 
-    Raises StorageError if a file of models is damaged or has another format.
+    The list omits scenes without models. StorageError if a file is damaged or not of format 1.
     """
     texts = {name.upper(): path.read_text("utf-8") for name, path in parts.items()}
     texts["SCENES"] = safe_json([scene for file in models if (scene := _listed(file))])
@@ -30,7 +30,7 @@ def _write(models: list[File], html: Path, outputs: Mapping[str, str], **parts: 
 def _listed(file: File) -> dict[str, str] | None:
     """Entry of the page's list of scenes for a file of models; None if the file has no models.
 
-    Raises StorageError if the file has another format.
+    Raises StorageError if the file is damaged or not of format 1, which the page reads.
     """
     text = read_text(file.path)
     if '"models":[]' in text:

@@ -31,11 +31,11 @@ PAGES = {"main": 16, "supplement": 30}  # largest allowed number of pages of eac
 
 
 class Facts(BaseModel):
-    """Facts that the manuscript states and that are not results of experiments.
+    """Contents of the manuscript that are not results of experiments.
 
     captions : name of a figure -> its title and caption as TeX
-    part : name of the configuration, None for the full study (by default config/default.yaml)
-    full_study : name of the configuration of the full study
+    part : name of the configuration of a study that is only a part of the full study, else None
+    full_study : name of the full study's configuration; for a user's own scenes, of their study
     pages : name of a document -> largest allowed number of pages
     tables : name of a table about the configuration ("scenes", "methods", "study") -> its rows
     """
@@ -59,11 +59,11 @@ def write_inputs(
 ) -> None:
     r"""Write macros.tex, figures.tex, TeX tables, bibliographies and the file `NUMBERS`.
 
-    Inputs are the TeX files ``source``, BibTeX ``references``, CSV ``tables``, the record of the
-    ``machine``, and ``facts``. ``outputs`` maps names of the files to paths.
+    Inputs are TeX files ``source``, BibTeX ``references``, CSV ``tables``, the description of the
+    ``machine`` of the run, and ``facts``. ``outputs`` maps names of the written files to paths.
 
-    The file `NUMBERS` has, for each ``\val`` key, the table cells from which the number is
-    computed, the tables from which each TeX table is made, and which sentences are shown.
+    `NUMBERS` (JSON) has the table cells from which the number of each ``\val`` key is computed, the
+    tables from which each TeX table is made, and `decisions` on the ``\known`` and ``\row`` blocks.
     """
     texts = documents(source[0].parent)
     whole = "".join(texts.values())
@@ -86,9 +86,9 @@ def write_inputs(
 
 
 def fact_tables(machine: Path, facts: Facts) -> dict[str, pd.DataFrame]:
-    """Return the tables of ``facts``, and a table of the properties in the file ``machine``.
+    """Return name -> table: those of ``facts``, and one named "machine" from file ``machine``.
 
-    The latter has one row; versions of libraries are in columns ``version_NAME``.
+    The latter has one row: properties of the machine, versions of libraries (``version_NAME``).
     """
     tables = {name: pd.DataFrame(rows) for name, rows in facts.tables.items()}
     try:
@@ -112,9 +112,9 @@ def build(
     facts: Facts,
     outputs: Mapping[str, str],
 ) -> None:
-    """Build the PDFs of the paper and of its supplement.
+    """Build the PDFs of the paper and of its supplement at the paths in ``outputs``.
 
-    ``source`` are the TeX files; they include ``figures``, and ``inputs`` made by `write_inputs`.
+    TeX files ``source`` include ``figures``, and ``inputs`` that `write_inputs` has made.
     """
     results = [Path(file.path) for file in (*figures, *inputs)]
     for path in results:

@@ -64,7 +64,7 @@ def figures_page(root: Path = Path()) -> str:
     for name, figure in declarations().items():
         keys = ", ".join(f"`{key}`" for key in figure.options.model_fields)
         read = filter(None, map(_words, figure.reads.values()))
-        caption = re.sub(r"\. (?=[A-Z`])", ".\n", _text(figure.caption))  # each sentence in a line
+        caption = re.sub(r"\. (?=[A-Z`])", ".\n", _text(figure.caption))  # a line per sentence
         parts.append(
             f"## {numbers[name].label(f'`{name}`')}\n\n**{_text(figure.title)}.**\n{caption}\n\n"
             f"Keys: {keys}.\nReads: {', '.join(dict.fromkeys(read))}.\n"
@@ -73,7 +73,7 @@ def figures_page(root: Path = Path()) -> str:
 
 
 def _text(marked: str) -> str:
-    """Convert mark-up to Markdown; a setting ``{key}`` becomes its key, not its value."""
+    """Convert a title or caption from mark-up to Markdown; ``{key}`` of a setting becomes `key`."""
     plain = re.sub(r"\{([a-z_.]+)\}", r"@\1@", marked)
     pieces = re.split(r"(`[^`]*`)", plain)
     words = "".join(p if p.startswith("`") else to_plain(p) for p in pieces)
@@ -81,7 +81,7 @@ def _text(marked: str) -> str:
 
 
 def _words(read: Read) -> str | None:
-    """Return a text that names the table or files which a figure reads, None for a setting."""
+    """Return the name of the table or files that ``read`` declares as input; None for a setting."""
     match read:
         case TableOf():
             return f"table `{read.name}`"

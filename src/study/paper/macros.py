@@ -29,7 +29,7 @@ _FILTER = re.compile(r"(.*?)(!?=)(.*)")
 Filter = tuple[str, str, str]  # (column, "=" or "!=", value)
 MISSING = "n/a"
 _COUNTS = ("count", "distinct")
-# Columns that identify a run; all other columns are results of the run.
+# Columns of names: a study without a scene, method ... has no row with its name; see `is_held`.
 _LABELS = ("scene", "group", "method", "position_basis", "variant", "direction", "experiment")
 AGGREGATES: dict[str, Callable[[pd.Series], Any]] = {
     "max": pd.Series.max,
@@ -109,7 +109,7 @@ def number_of(key: str, tables: Mapping[str, pd.DataFrame]) -> Number:
 def is_held(key: str, tables: Mapping[str, pd.DataFrame]) -> bool:
     """Return whether ``tables`` have a row that ``key`` selects; the cell there may be empty.
 
-    A count may be 0. If ``key`` is a count, only its filters on columns `_LABELS` must be met.
+    For a count, only filters on columns `_LABELS` matter: if others match no row, the count is 0.
     """
     table, filters, _, aggregate = _parse(key, tables)
     if aggregate in _COUNTS:
@@ -185,7 +185,7 @@ SHOWN, NOTED, DROPPED = "shown", "noted", "dropped"
 
 
 class Sentence(NamedTuple):
-    """Block ``known`` or ``row``: text, number of its paragraph, positions of its two ends."""
+    r"""Block ``\known`` or ``\row``: content, paragraph number, and its slice of the TeX source."""
 
     text: str
     paragraph: int
@@ -213,7 +213,11 @@ def sentences(source: str) -> list[Sentence]:
 
 
 def decisions(source: str, tables: Mapping[str, pd.DataFrame]) -> list[str]:
-    r"""Decide for each ``\known`` or ``\row`` block: show it, replace it by a note, or drop it."""
+    r"""Decide for each ``\known`` or ``\row`` block: show it, replace it by a note, or drop it.
+
+    Blocks are shown if ``tables`` have all their numbers. Of those that are not shown, a note
+    replaces the first ``\known`` block in each paragraph, and the rest is dropped.
+    """
     made, noted = [], set()
     for sentence in sentences(source):
         if all(is_held(key, tables) for key in keys_of(sentence.text)):
@@ -227,11 +231,10 @@ def decisions(source: str, tables: Mapping[str, pd.DataFrame]) -> list[str]:
 
 
 def provenance(decided: Mapping[str, Sequence[str]], part: str | None, full_study: str) -> str:
-    r"""Return the TeX definitions of ``\known``, ``\row``, ``\ifpart`` and configuration names.
+    r"""TeX definitions of ``\known``, ``\row``, ``\ifpart`` and of the two configurations' names.
 
-    decided : name of a document (``\jobname`` in TeX) -> decisions on its blocks
-    part : name of the configuration of the results; None for the full study (``\ifpart`` is false)
-    full_study : name of the configuration of the full study
+    decided : name of a document (``\jobname`` in TeX) -> result of `decisions` for its source
+    part, full_study : as in class `Facts`; ``\ifpart`` is false if ``part`` is None
     """
     lines = [
         r"\newif\ifpart",
@@ -256,7 +259,7 @@ def provenance(decided: Mapping[str, Sequence[str]], part: str | None, full_stud
 
 
 def note(part: str | None, full_study: str) -> str:
-    """Note (TeX) that replaces omitted sentences; ``part`` is None if the study is the full one."""
+    """TeX note that replaces an omitted sentence; ``part`` and ``full_study`` are as in `Facts`."""
     if part is None:
         return "Sentences are left out here whose numbers this study does not hold."
     full = rf"\texttt{{{escape(full_study)}}}"

@@ -33,9 +33,9 @@ def documents(folder: Path) -> dict[str, str]:
 
 
 def source_files(root: Path, own: bool = False) -> list[str]:
-    """Paths of the manuscript's TeX files: documents, preamble, sections (none if ``own``).
+    """Paths of the manuscript's TeX files, relative to ``root``: documents, preamble, sections.
 
-    If ``own``, the documents are those of the variant `OWN`. Paths are relative to ``root``.
+    If ``own``, the documents are the short ones about a user's own scenes, without section files.
     """
     folder = root / "paper"
     files = [(root / OWN if own else folder) / f"{name}.tex" for name in DOCUMENTS]

@@ -56,7 +56,7 @@ def find_pdflatex(packages: list[str], scratch: Path) -> Path:
     copy.parent.mkdir(parents=True, exist_ok=True)
     shutil.copyfile(binary.resolve(), copy)
     copy.chmod(0o755)
-    # the copy looks for TeX's files in folders relative to its own path: link them there
+    # the copied pdflatex looks for TeX's files in folders relative to its path: link them there
     for name in ("texmf-dist", "texmf-var"):
         link = scratch / "tinytex" / name
         if not link.exists() and (tree / name).exists():

@@ -1,4 +1,4 @@
-"""TeX tables of the manuscript; parameters of their functions are names of the study's tables."""
+"""TeX tables of the manuscript, each made by a function from tables that its parameters name."""
 
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -20,7 +20,7 @@ LEFT = r">{\raggedright\arraybackslash}"
 # Iterator over a table: first (column definitions, header), then the rows; all cells are TeX.
 Rows = Iterator[Any]
 LONG = ("tab_scenes", "tab_ranks", "tab_local_share")  # tables that may break across pages
-FULL = "full"  # position basis of runs whose positions are not reduced
+FULL = "full"  # value of column position_basis for runs with unreduced positions
 
 
 def tabular(header: Sequence[str], rows: Sequence[Sequence[str]], columns: str) -> str:
@@ -82,7 +82,7 @@ _SIGNS = {">=": r"$\ge$", "<=": r"$\le$"}
 
 
 def claims(claims_tests: pd.DataFrame, claims: pd.DataFrame) -> Rows:
-    """Both verdicts on each claim, and how many rows satisfy each of its deciding tests."""
+    """Claims: verdicts on published and on sound methods, counts of rows that satisfy the tests."""
     tests = claims_tests[claims_tests.decides.astype(bool)]
     columns = rf"l{LEFT}p{{4.7cm}}{LEFT}p{{3.2cm}}{LEFT}p{{4.1cm}}l"
     yield columns, ["claim", "the preprint says", "as published", "beyond", "shown in"]
@@ -102,7 +102,7 @@ def claims(claims_tests: pd.DataFrame, claims: pd.DataFrame) -> Rows:
 
 
 def claims_in_full(claims_tests: pd.DataFrame) -> Rows:
-    """Tests that decide a verdict: limit, number of rows that satisfy it, range of the values."""
+    """Tests that decide a verdict: limit, number of rows within it, range of the tested values."""
     tests = claims_tests[claims_tests.decides.astype(bool)]
     yield "llrrrrr", ["", "test", "limit", "rows", "least", "median", "most"]
     for (claim, part), found in tests.groupby(["claim", "part"], sort=False):
@@ -118,7 +118,7 @@ _RUNS = (("fom", 1), ("fom", 5), ("fom", 10), ("fom", 40), ("fom-anderson", 10))
 
 
 def iterations(accuracy_cost: pd.DataFrame) -> Rows:
-    """Full-order runs with K iterations: error against the converged run, and time per frame."""
+    """Full-order runs with K iterations: error against converged iterations, time per frame."""
 
     def text(run: pd.Series) -> str:
         error, time = map(format_number, (run.relative_error_within_horizon, run.ms_per_frame))
@@ -137,7 +137,7 @@ _TOLERANCE = "ecsw-1e-02"
 
 
 def positions(reduced_reruns: pd.DataFrame) -> Rows:
-    """Errors and speed-ups of runs in position subspaces of the largest dimension k."""
+    """Errors and speed-ups of runs in position subspaces, for the largest dimension k per scene."""
 
     def error(run: pd.Series) -> str:
         return format_number(run.relative_error_within_horizon)
@@ -174,7 +174,7 @@ _METHODS = ("deim-joint", "block-deim", "gappy")
 
 
 def break_even(breakeven: pd.DataFrame) -> Rows:
-    """Size r from which on a reduced local step takes longer than the full one, in each scene."""
+    """Basis size r from which on a reduced local step takes longer than the full one, by scene."""
 
     def text(part: pd.DataFrame) -> str:
         crossed = part.breakeven_r.dropna()
@@ -195,7 +195,7 @@ def speedups(speedups: pd.DataFrame) -> Rows:
     ]  # fmt: skip
     for row in speedups.itertuples():
         size = f"r = {int(row.r)}" if row.position_basis == FULL else f"k = {int(row.k)}"
-        frames = row.frames_to_break_even  # the table shows two significant digits of it
+        frames = row.frames_to_break_even  # frames until time saved repays training; 2 digits shown
         yield [
             _name(row.scene),
             _name(f"{row.method}, {size}"),
@@ -208,7 +208,7 @@ def speedups(speedups: pd.DataFrame) -> Rows:
 
 
 def payoff(payoff: pd.DataFrame) -> Rows:
-    """In how many scenes a reduction is accurate, and is faster or slower than full order."""
+    """Numbers of scenes in which a reduction is accurate, and faster or slower than full order."""
     yield "lrrrrrrrrrrrr", [
         "reduction", "runs in", "accurate in", "pays in", "loses in", "least", "median", "most",
         "training", "held out (of)", "playback", "accurate", "pays",
@@ -224,7 +224,7 @@ def payoff(payoff: pd.DataFrame) -> Rows:
 
 
 def pays(winners: pd.DataFrame) -> Rows:
-    """Mesh sizes from which on a reduction beats full-order methods with the same error limit."""
+    """Numbers of vertices from which on a reduction is faster than full order, by error limit."""
     header = ["scene", "against", "error", "vertices", "plain", "all", "speed-up", "motions"]
     yield "lllrrrrr", header
     for _, curve in winners.groupby(CURVE, sort=False):
@@ -247,8 +247,8 @@ def pays(winners: pd.DataFrame) -> Rows:
 def training(alternatives: pd.DataFrame) -> Rows:
     """Errors of the reduction with Anderson acceleration, by the number of its training motions.
 
-    For the smallest and largest number, the table also has the error of the motion in the subspace
-    that is nearest to the true one, and the time of the training.
+    For the smallest and largest number, the table also has the time of training, and the error of
+    the mass-orthogonal projection of the full-order motion onto the subspace.
     """
     reduced = alternatives[alternatives.method == ACCELERATED]
     reduced = reduced[reduced.iterations == reduced.iterations.max()]
@@ -268,7 +268,7 @@ def training(alternatives: pd.DataFrame) -> Rows:
 
 
 def scenes(reduced_reruns: pd.DataFrame, scenes: pd.DataFrame) -> Rows:
-    """Scenes: constraint groups, sizes, and the frame from which on runs are not compared."""
+    """Scenes: groups, mesh size, number of frames, first frame in which runs are not compared."""
     horizon = trained(reduced_reruns).groupby("scene").horizon_frame.first()
     header = ["scene", "groups (weight)", "vertices", "elements", "frames", "horizon"]
     yield rf"l{LEFT}p{{5.2cm}}rrrr", header
@@ -282,7 +282,7 @@ def scenes(reduced_reruns: pd.DataFrame, scenes: pd.DataFrame) -> Rows:
 
 
 def methods(methods: pd.DataFrame) -> Rows:
-    """Parts of each reduction method: centring, rows, selection, number of samples, solver."""
+    """Reduction methods: centring, rows, choice and number of samples, solver for coefficients."""
     header = ["method", "title", "centring", "rows", "selection", "samples", "solve"]
     yield rf"l{LEFT}p{{3.3cm}}lllll", header
     for row in methods.itertuples():
@@ -306,7 +306,7 @@ def ranks(singular_values: pd.DataFrame) -> Rows:
 
 
 def reruns(reduced_reruns: pd.DataFrame, methods: pd.DataFrame) -> Rows:
-    """Error of each method at the largest size r with a run, over the frames that are compared."""
+    """Error of each method at its largest basis size r, over the frames that can be compared."""
 
     def text(run: pd.Series) -> str:
         if not pd.isna(run.relative_error_within_horizon):
@@ -324,7 +324,7 @@ def reruns(reduced_reruns: pd.DataFrame, methods: pd.DataFrame) -> Rows:
 
 
 def local_share(local_share: pd.DataFrame) -> Rows:
-    """Share of the local step in the time of a frame, by implementation."""
+    """Time of a frame and share of the local step in it: interpreted, NumPy and compiled code."""
     yield "lrrrrrr", ["scene", "interp.\\ ms", "share", "NumPy ms", "share", "compiled ms", "share"]
     for scene, part in local_share.groupby("scene", sort=False):
         by = part.set_index("implementation")
@@ -340,9 +340,9 @@ _OUTCOMES = ("accurate", "wrong", "left the scene", "blow-up")
 
 
 def stability(stability: pd.DataFrame) -> Rows:
-    """Numbers of runs by method and outcome; the last two columns are of short runs.
+    """Numbers of runs by method and outcome, and their energies relative to the full-order run.
 
-    The short runs have other time steps and other stiffness.
+    The last two columns are about short runs with other time steps h or stiffness.
     """
     full_order = (stability.method == "full") & (stability.position_basis == FULL)
     table = stability[(stability.outcome != "not run") & ~full_order]

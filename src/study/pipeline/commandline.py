@@ -88,10 +88,7 @@ class CommandLine:
         return [*files, *(["--config", *self.settings] if self.settings else [])]
 
     def rewritten(self, more: Sequence[str], made: Mapping[str, Sequence[str]]) -> list[str]:
-        """Return the arguments with the options ``more``; each target is replaced by its files.
-
-        ``made`` maps targets to paths of files.
-        """
+        """Arguments plus the options ``more``; the files ``made[target]`` replace each target."""
         targets = dict.fromkeys(file for target in self.targets for file in made[target])
         options = _before_targets(self.arguments)
         # without "--", targets may stand anywhere among the options: remove each of them once
@@ -106,7 +103,7 @@ def _before_targets(arguments: Sequence[str]) -> list[str]:
 
 
 def check_files(paths: Iterable[str | Path]) -> None:
-    """Read the configuration files ``paths``; ConfigurationError if one is no mapping."""
+    """Raise ConfigurationError if a configuration file is no mapping or has key `TEMPLATE_KEY`."""
     for path in map(Path, paths):
         content = read_yaml(path)
         if not isinstance(content, dict):
@@ -126,7 +123,7 @@ def one_line() -> Iterator[None]:
 
 
 def remember(command: CommandLine) -> None:
-    """Record the configuration options of ``command``, which is about to run, in `RECORD`."""
+    """Write the configuration options of ``command``, which is about to run, to file `RECORD`."""
     # not imported at the top: it loads NumPy, and environment variables must be set before
     from pdrom.core.store import write_text
 
@@ -134,7 +131,7 @@ def remember(command: CommandLine) -> None:
 
 
 def recall() -> list[str]:
-    """Options that name the last run's configuration; [] if it was the default or none ran."""
+    """Options that name the last run's configuration; [] for the default, or without a last run."""
     try:
         record = json.loads(RECORD.read_text(encoding="utf-8"))
     except (OSError, ValueError):

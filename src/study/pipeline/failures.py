@@ -22,10 +22,11 @@ _CRASH = re.compile(
 _FRAME = re.compile(r'^ +File "(?P<file>.*)", line (?P<line>\d+) in (?P<function>.*)$', re.M)
 _IN_RULE = re.compile(r"^\w+ in rule (?P<rule>\w+)\b.*\n(?P<text>.*)", re.MULTILINE)
 _ENDING = re.compile(r"died with <Signals\.(?P<signal>\w+)|exit status (?P<status>\d+)")
-# Messages that say why a job ended: from SLURM in the job's log, from Snakemake's SLURM executor.
+# Message of SLURM in the log of a batch of jobs, if SLURM cancelled the batch.
 _BY_SLURM = re.compile(
     r"\*\*\* JOB \S+ ON \S+ (?P<status>CANCELLED) AT \S+(?: DUE TO (?P<why>[A-Z ]+?))? \*\*\*"
 )
+# Part of the error message of Snakemake's SLURM executor about a failed job.
 _SLURM_STATUS = re.compile(r"SLURM status is: '(?P<status>\w+)'")
 # Part of Snakemake's log message after the user has interrupted the run.
 _INTERRUPTED = "Terminating processes on user request"
@@ -42,10 +43,7 @@ _FULL_DISK = 1 << 18  # free bytes below which the disk counts as full
 
 @dataclass(frozen=True)
 class Failure:
-    """A failed job: name of its rule, paths of its log and of its first output.
-
-    said : Snakemake's message about the failure
-    """
+    """A failed job: rule name, paths of log and first output, Snakemake's error message (said)."""
 
     rule: str
     log: str
@@ -58,7 +56,7 @@ class Failure:
         return _content(self.log) if path.is_file() and path.stat().st_mtime >= begun else ""
 
     def line(self, begun: float) -> str:
-        """Line with job, cause and, after a crash, code line; the run began at ``begun`` (s)."""
+        """Line with job, cause and, after a crash, crashed code line; ``begun`` as in `written`."""
         folder = next((p for p in Path(self.output).parents if p.is_dir()), Path())
         errors = _ERROR.findall(_content(self.log))
         # the log of a job that could not start is left from an older run: do not use its errors
@@ -94,7 +92,7 @@ def cause(said: str, folder: Path) -> str:
 
 
 def crash(written: str, log: str) -> str:
-    """Text with the code line of a crash in the text ``written`` of a log; empty if no crash."""
+    """Code line of the crash that ``written``, the text of file ``log``, reports; empty if none."""
     found = list(_CRASH.finditer(written))
     if not found:
         return ""
@@ -114,7 +112,7 @@ class Failures(logging.Handler):
         self.batches: list[tuple[str, str]] = []
         self.other: list[str] = []
         self.stopped: str | None = None
-        # thread -> its last error message: Snakemake logs a cause first, then the failed job
+        # thread -> its last error message: Snakemake logs the cause before it names the failed job
         self._said: dict[int | None, str] = {}
 
     def emit(self, record: logging.LogRecord) -> None:
@@ -128,7 +126,7 @@ class Failures(logging.Handler):
             files = (getattr(record, name, ()) for name in ("log", "output"))
             log, output = (next(iter(names), "") for names in files)
             failure = Failure(record.rule_name, log, output or "its result", said)
-            # "indent" marks jobs of a failed batch, also unstarted ones: keep those with an error
+            # "indent" marks all jobs of a failed batch: store only those with an error in the log
             if not getattr(record, "indent", False) or _ERROR.search(failure.written(self._begun)):
                 self.jobs.append(failure)
         elif event == LogEvent.ERROR:
@@ -147,11 +145,10 @@ class Failures(logging.Handler):
     def end(self) -> tuple[str, int]:
         """Return the last lines of a failed run, and its exit status.
 
-        The lines list every failed job with the error from its log, because Snakemake's own message
-        about a failed job is followed by many others.
+        They repeat each failed job's error, as Snakemake prints many lines after its own message.
         """
         lines = []
-        for name, log in self.batches:  # batches of jobs on a cluster; the cause is in the log
+        for name, log in self.batches:  # batches of cluster jobs; the log says why one failed
             found = _BY_SLURM.search(_content(log))
             how = (found["why"] or found["status"]).lower() if found else "a job of it failed"
             lines.append(f"pdrom: batch {name} failed: {how} (log: {log})")

@@ -31,9 +31,9 @@ SCRIPTS = Path("workflow/scripts")
 def fingerprint(*places: str) -> str:
     """SHA-256 over the given modules and over all modules of `PACKAGES` that they import.
 
-    Imports inside functions are found, too. A registry is a mapping of names to strings
-    "module:attribute", which are imported on demand. Modules named there are left out, unless
-    ``places`` has their entries. Raises ConfigurationError if a module does not exist.
+    Imports inside functions are found, too. A registry maps names to strings "module:attribute",
+    which are imported on demand. Modules named in a registry are left out unless ``places`` has
+    their entries. Raises ConfigurationError if a module does not exist.
 
     places : names of modules, or "module:attribute" for an entry of a registry
     """
@@ -46,7 +46,7 @@ def fingerprint(*places: str) -> str:
 
 
 def closure(*places: str) -> list[str]:
-    """Sorted names of all modules whose code the fingerprint of ``places`` contains."""
+    """Sorted names of modules in the `fingerprint`: those of ``places`` and all they import."""
     reached: set[str] = set()
     waiting = [place.partition(":")[0] for place in places]
     while waiting:
@@ -100,14 +100,15 @@ def _statements(tree: ast.AST) -> list[ast.AST]:
 
 
 def digest_of_code(tree: ast.Module, module: str = "") -> str:
-    """Hash of parsed code without comments, layout, docstrings and entries of registries.
+    """Hash of parsed code without comments, layout, docstrings and most registry entries.
 
-    An entry "module:attribute" of a registry counts only if it lies in ``module`` itself.
+    Entries "module:attribute" of registries are left out, except those of ``module``, whose code
+    this is.
     """
     for node in _statements(tree):
         if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef)):
             texts = [s for s in node.body if isinstance(getattr(s, "value", None), ast.Constant)]
-            texts = [s for s in texts if isinstance(s, ast.Expr)]  # docstrings and other constants
+            texts = [s for s in texts if isinstance(s, ast.Expr)]  # docstrings and lone constants
             node.body = [s for s in node.body if s not in texts] or [ast.Pass()]
         elif isinstance(node, ast.Assign):
             match node.value:
@@ -122,8 +123,8 @@ def digest_of_code(tree: ast.Module, module: str = "") -> str:
 def digest(root: Path, *names: str) -> str:
     """Checksum (16 hexadecimal digits) of the hand-edited files ``names`` below ``root``.
 
-    It is a parameter of rules that read these files, so that jobs are repeated if the content of a
-    file changes. Dates, which Snakemake compares, can be set back by a copy or a wrong clock.
+    It is a parameter of rules that read these files: jobs are repeated if their content changes.
+    Dates, which Snakemake compares, can be set back by a copy or a wrong clock.
     """
     files = [root / name for name in names]
     content = b"".join(hashlib.sha256(f.read_bytes()).digest() for f in files if f.is_file())
@@ -139,7 +140,7 @@ def track_scripts(workflow: Any) -> None:
         if rule.script:
             text = (SCRIPTS / Path(rule.script).name).read_text(encoding="utf-8")
             rule.set_params(script=digest_of_code(ast.parse(text))[:16])
-    # Snakemake sets its triggers of reruns later; this property then hides the one for scripts
+    # Snakemake sets its triggers of reruns later; this property leaves out `CODE` (changed scripts)
     type(workflow).rerun_triggers = property(
         lambda self: frozenset(self.dag_settings.rerun_triggers) - {RerunTrigger.CODE}
     )

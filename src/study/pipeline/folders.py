@@ -35,8 +35,8 @@ def folders(configfiles: Iterable[str | Path], settings: Iterable[str]) -> Folde
 
     The default configuration has the folders ``results`` and ``paper``. Every other configuration
     has ``results/studies/NAME``. NAME is the value of its key ``study``; without this key, it is
-    the last file's name without suffix; without files, it is `OWN`. Raises ConfigurationError if
-    NAME is longer than 60 characters, or has others than letters, digits, _ and -.
+    the name of the last of ``configfiles`` without suffix; without files, it is `OWN`. Raises
+    ConfigurationError if NAME has over 60 characters or others than letters, digits, _ and -.
 
     configfiles : files given by the option ``--configfile``, in order
     settings : ``key=value`` pairs given by the option ``--config``

@@ -4,7 +4,7 @@
 does what the console command ``snakemake`` does. Some first arguments are special: ``figure``
 selects figures by their number in the manuscript or in the preprint; ``verify`` compares results
 with the expected ones; ``bundle`` writes an archive; ``test`` passes the other arguments to pytest;
-``run`` starts a program of the environment.
+``run`` starts a program found on PATH, such as pdrom.
 """
 
 import os
@@ -24,7 +24,7 @@ OPTIONS = ("--scheduler", "greedy", "--rerun-incomplete")
 
 LINES = ("--logger", "pdrom")
 
-# First argument -> module that is run with the remaining arguments.
+# First argument of ``./reproduce`` -> module that is run with the remaining arguments.
 HANDED_ON = {
     "test": "pytest",
     "verify": "study.verification.command",

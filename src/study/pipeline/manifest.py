@@ -30,7 +30,7 @@ class Entry(ConfigModel):
     """Description of a result file in the manifest: its size, digests and origin.
 
     sha256 : None for an HDF5 file, or a file that was damaged before the manifest was written
-    environment : key in `Manifest.environments`; its value has the versions that made the file
+    environment : key of `Manifest.environments` for the software versions that made the file
     """
 
     bytes: int
@@ -107,7 +107,7 @@ def study_files(plan: Plan) -> Iterator[str]:
 def asked_for(found: Iterable[str], plan: Plan) -> Iterator[str]:
     """Yield those of the paths ``found`` that a target on the command line may have requested.
 
-    These are paths outside the plan whose scene and method exist.
+    They fit a path pattern of results, are not in the plan, and their scene and method exist.
     """
     scenes, methods = set(scene_names(plan.study.root)), {*plan.study.methods, ""}
     for path in found:

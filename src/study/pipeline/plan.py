@@ -1,7 +1,6 @@
 """Plan of a study: the jobs of every artifact (function declared to make files).
 
-A job has paths of input and output files, settings, and a fingerprint (hash) of its code. The
-workflow turns jobs into those of Snakemake.
+The workflow turns each `Job` (files, settings, fingerprint of its code) into one of Snakemake.
 """
 
 import logging
@@ -67,7 +66,7 @@ def check_live(study: Study) -> None:
             require_known(study.scene(name))
         except SceneError as error:
             raise ConfigurationError(f"live.scenes: {error}") from error
-        # a file has at least vertices, masses, bases (k + 4 columns) in base 64: bound its size
+        # least size of the scene's web file, bytes, base 64: points, masses, k + 4 columns a basis
         vertices = study.vertices[name]
         section = settings.subspace if name in study.scenes else settings.online
         sizes = [k for k in settings.live.sizes if k in section.sizes and "pod" in section.bases]
@@ -83,7 +82,7 @@ def check_live(study: Study) -> None:
 
 
 def check_texts(study: Study) -> None:
-    """Raise ConfigurationError if figures or TeX cannot typeset a text of ``study``."""
+    """Raise ConfigurationError if figures or TeX cannot typeset a title or claim."""
     folder, ladder = study.root / "config", study.settings.ladder
     for name, method in study.methods.items():
         require_typeset(method.title, f"{folder / 'methods.yaml'}: {name}.title")
@@ -164,10 +163,7 @@ def load_plan(
 
 
 class Plan:
-    """Jobs and files of a study.
-
-    For the inputs that artifacts declare, the plan finds the paths and the settings.
-    """
+    """Jobs and files of a study; it finds paths and settings for the inputs of artifacts."""
 
     def __init__(self, study: Study, folders: Folders = OF_STUDY) -> None:
         self.study, self.folders, self.results = study, folders, folders.results
@@ -194,7 +190,7 @@ class Plan:
 
     @cached_property
     def fixed(self) -> dict[str, list[Job]]:
-        """Folder of logs -> jobs without wildcards (tables, figures, pages, manuscript)."""
+        """Subfolder of logs -> jobs for the study as a whole (tables, figures, manuscript ...)."""
         return {
             "tables": [self.job(table) for table in self.tables.values()],
             "figures": [self.job(figure) for figure in declarations().values()],
@@ -208,7 +204,7 @@ class Plan:
 
     @property
     def made(self) -> list[str]:
-        """Paths of all files that the jobs of `fixed` write."""
+        """Paths of all tables, figures and documents (files that the jobs in `fixed` write)."""
         jobs = [job for jobs in self.fixed.values() for job in jobs]
         return [path for job in jobs for path in job.outputs.values()]
 
@@ -231,7 +227,7 @@ class Plan:
         own = {name: labels[name] for name in artifact.labels}
         key = (artifact.rule, *own.values())
         if key not in self._jobs:
-            known = {**own, "figure": artifact.name}  # selects the options of a figure
+            known = {**own, "figure": artifact.name}  # selects a figure's options
             settings = artifact.settings(self, known)
             inputs = {k: read.paths(self, known) for k, read in artifact.files.items()}
             edited = [k for k, read in artifact.files.items() if isinstance(read, EditedFiles)]
@@ -250,7 +246,7 @@ class Plan:
     # The following methods belong to the protocol `Sources`, by which declared inputs are found.
 
     def file(self, place: Place, labels: Labels) -> str:
-        """Path of the file of the kind ``place`` for the scene, group ... in ``labels``.
+        """Path that the pattern of ``place`` gives for the scene, group ... in ``labels``.
 
         If ``labels`` lack mesh or basis, the scene's mesh and the method's basis are taken.
         """
@@ -262,7 +258,7 @@ class Plan:
         return place.at(self.results, **{name: found[name] for name in place.labels})
 
     def files(self, place: Place, labels: Labels) -> list[str]:
-        """Paths of all files of the kind ``place`` for the scene, group ... in ``labels``."""
+        """All paths of the study of the kind ``place`` whose labels agree with ``labels``."""
         study = self.study.only(labels["scene"]) if "scene" in labels else self.study
         return [
             place.at(self.results, **held)
@@ -277,7 +273,7 @@ class Plan:
         return TABLE.at(self.results, name=name)
 
     def value(self, key: str, labels: Labels) -> Any:
-        """Value of a dotted ``key``, from the configuration or from a function in `DERIVED`."""
+        """Value of setting ``key`` ("a.b"), configured or computed by a function in `DERIVED`."""
         head, *parts = key.split(".")
         if head not in DERIVED:
             return self.study.value(key)

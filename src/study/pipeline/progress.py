@@ -8,12 +8,12 @@ from itertools import accumulate
 
 from snakemake_interface_logger_plugins.common import LogEvent
 
-# An estimate is shown after this number of jobs and this fraction of the expected total time.
+# An estimate needs this number of finished jobs, and this share of the total expected time in them.
 ENOUGH_JOBS, ENOUGH = 2, 0.05
 # Smallest remaining time of an unfinished job, as a fraction of its expected duration.
 REST = 0.1
-# Beginning of a reason that Snakemake gives for running a job -> our shorter text. The reason
-# `FOLLOWS` is left out if a job has another reason as well.
+# A reason of Snakemake for running a job; left out if a job has another reason as well. `REASONS`
+# maps the beginnings of all reasons to our shorter texts.
 FOLLOWS = "Input files updated by another job"
 REASONS = {
     "Forced execution": "forced",
@@ -47,9 +47,10 @@ class Expected:
 class Estimate:
     """Estimate of the remaining seconds of a run.
 
-    The slowdown of this machine is the median ratio of measured to expected time of finished jobs,
-    weighted by expected time: a few jobs that compile kernels first have little effect on it. The
-    mean number of parallel jobs follows from the core time that jobs have used until now.
+    It is the remaining core time divided by the mean number of cores in use until now, but at least
+    the time of the longest chain of jobs. Expected times are multiplied by the slowdown of this
+    machine: the median ratio of measured to expected time of finished jobs, weighted by expected
+    time, on which a few jobs that compile kernels first have little effect.
 
     jobs : number of a job -> its expected time
     begun, ended : number of a job -> time in s at which it started or ended
@@ -108,7 +109,7 @@ class Preview(logging.Handler):
         self._ended = False
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Add the job that a log ``record`` announces to the counts, reasons and times."""
+        """Count the job that a log ``record`` announces; add why it runs, and its expected time."""
         self._ended = self._ended or END in record.getMessage()
         if getattr(record, "event", None) != LogEvent.JOB_INFO:
             return

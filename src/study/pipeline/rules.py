@@ -48,7 +48,7 @@ def _experiment(plan: Plan, experiment: Experiment, cores: int) -> SimpleNamespa
             name: f"{plan.results}/{place.pattern}" for name, place in experiment.writes.items()
         },
         log=f"{plan.results}/logs/{experiment.rule}{'/' if labels else ''}{labels}.log",
-        # on a cluster, the jobs of a scene form a batch: different scenes share only mesh jobs
+        # on a cluster, a scene's jobs form a batch; those that measure times or lack a scene do not
         group=None if experiment.alone or "scene" not in experiment.labels else "scene",
         threads=cores if experiment.alone else 1,
         # a job that measures times gets a whole node of a cluster

@@ -30,7 +30,7 @@ RUN_TIMES = Path("config/reference/run_times.csv")
 
 
 def units_of(study: str, root: Path) -> Units:
-    """Speed of the machine on which ``study`` ("full" or "tiny") took the times in `RUN_TIMES`."""
+    """Benchmark times, from `RUN_TIMES`, of the machine that ran ``study`` ("full", "tiny")."""
     row = read_table(root / RUN_TIMES, result=False).set_index("study").loc[study]
     return Units(**row[list(Units.model_fields)])
 
@@ -38,8 +38,8 @@ def units_of(study: str, root: Path) -> Units:
 def expected_seconds(plan: Plan) -> Callable[[str], float]:
     """Return a function that maps the path of a job's log to its expected processor seconds.
 
-    Kinds of jobs that were never measured get the median of all kinds. Times are scaled by the
-    speed of this machine if an earlier run has measured the speed.
+    Kinds of jobs that were never measured get the median of all kinds. Times are multiplied by the
+    benchmark time of this machine, if known, divided by that of the machine that measured them.
     """
     root, full = plan.study.root, plan.study.settings.coarsen == Coarsen()
     study, column = ("full", "seconds") if full else ("tiny", "coarse_seconds")
@@ -59,7 +59,7 @@ def expected_seconds(plan: Plan) -> Callable[[str], float]:
 def tell_expectation(workflow: Any, plan: Plan) -> None:
     """Log the expected seconds of every job of ``workflow``, for the progress lines of a run.
 
-    A job that measures times has the whole machine for itself, as has every job on a cluster.
+    Jobs that measure times are taken to use all cores; on a cluster, this holds for all jobs.
     """
     dag, seconds_of = workflow.dag, expected_seconds(plan)
     expected: dict[int, Expected] = {}
@@ -87,7 +87,7 @@ JOBSTEP = "slurm-jobstep"
 
 
 class Run:
-    """Run of the workflow in this process: lock on the folder, fork server, reported outcome."""
+    """Run of the workflow in this process: its lock on the folder, fork server, last messages."""
 
     def __init__(self) -> None:
         """Lock the working directory, or end the process with a message if it is locked already.
@@ -107,7 +107,7 @@ class Run:
         logging.getLogger("snakemake.logging").addHandler(self.failures)
 
     def check(self, plan: Plan, rules: Iterable[Any], cores: int) -> None:
-        """Check that requested targets and report can be made; make a dry run list the jobs.
+        """Check that requested targets and report can be made; let a dry run print a list of jobs.
 
         ``rules`` are Snakemake's rules of ``plan``; ``cores`` is the number of cores of the run.
         Raises ConfigurationError if a target or the report cannot be made.

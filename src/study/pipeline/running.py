@@ -42,8 +42,7 @@ class AtWorkError(PdromError):
 def hold() -> int:
     """Lock the working directory until the process ends; return the descriptor of the lock file.
 
-    Raises AtWorkError if another process (named in the message) has the lock, or the lock file
-    cannot be used.
+    Raises AtWorkError if the lock is unusable or held by another process (named in the message).
     """
     try:
         FOLDER.mkdir(exist_ok=True)

@@ -18,7 +18,7 @@ Fraction = Annotated[float, Field(gt=0.0, le=1.0)]
 
 
 class Coarsen(ConfigModel):
-    """Factors on the resolution of meshes (vertices along a side) and on all numbers of frames."""
+    """Factors that multiply the vertices along a mesh's side, and all numbers of frames."""
 
     resolution: Fraction = 1.0
     frames: Fraction = 1.0
@@ -31,8 +31,8 @@ class Coarsen(ConfigModel):
 class Replicate(ConfigModel):
     """Changes that turn every scene into a new one, on which the rules of claims are tested again.
 
-    frames_factor : factor on the frame numbers of handles, pins and schedules; a factor below 1
-        makes the motion faster
+    frames_factor : number that multiplies the frame numbers of handles, pins and schedules; below
+        1, the motion gets faster
     kick : speed of random initial velocities, m/s, along the axes that the held-out motions use
     seed : seed of these velocities; it is also added to the seeds of the held-out motions
     """
@@ -42,7 +42,7 @@ class Replicate(ConfigModel):
     seed: Seed = 0
 
     def of(self, scene: SceneConfig) -> SceneConfig:
-        """Return ``scene`` with another speed of motion, initial velocities and held-out seeds."""
+        """Return ``scene`` with these changes of speed, initial velocities and held-out seeds."""
         if self == Replicate():
             return scene
         effects = [effect.with_frames_scaled(self.frames_factor) for effect in scene.effects]
@@ -80,7 +80,7 @@ def load_bound_scene(root: Path, name: str, *changes: Change) -> Scene:
     try:
         mesh = scene.mesh.build(root)
         bound = Scene.build(scene, mesh)
-        # the held-out variant has the same constraint groups: build only its other effects
+        # the held-out variant has the same constraint groups: build it without them
         heldout = scene.heldout_variant()
         other = tuple(e for e in heldout.effects if not isinstance(e, GroupConfig))
         Scene.build(heldout.model_copy(update={"effects": other}), mesh)

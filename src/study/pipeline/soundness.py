@@ -13,10 +13,10 @@ from typing import Any
 
 from pdrom.core.environment import settle
 
-# Test matrices: numbers of rows (of an element up to a group) and of columns (sizes of a basis).
+# Test matrices: numbers of rows (of one element up to a whole group) and columns (basis sizes).
 ROWS = (1, 2, 3, 4, 6, 9, 12, 27, 48, 96, 100, 256, 300, 900, 1000, 2700)
 COLUMNS = (1, 2, 3, 4, 6, 8, 12, 16, 20, 25, 32, 50)
-# Allowed error relative to the largest entry; rounding errors of such products are far smaller.
+# Allowed error divided by max(1, largest expected entry); rounding errors are far smaller.
 TOLERANCE = 1e-9
 
 

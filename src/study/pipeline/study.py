@@ -70,7 +70,7 @@ class StudySettings(ConfigModel):
     live: Live = Live()
     alternatives: Alternatives = Alternatives()
     requested_tolerances: RequestedTolerances = RequestedTolerances()
-    recorded: bool = True  # whether tables also have recorded rows of long runs
+    recorded: bool = True  # whether tables also get stored rows of the study config/extended.yaml
     study: str | None = None
 
     @model_validator(mode="after")
@@ -91,11 +91,10 @@ class Study:
         source: str = f"configuration ({DEFAULT})",
         configuration: str = DEFAULT,
     ) -> None:
-        """Build all scenes of ``config``, the merged configuration, in the project folder ``root``.
+        """Build all scenes of the merged configuration ``config`` from files below ``root``.
 
         Error messages begin with ``source``; the manuscript shows the name ``configuration``.
-        Raises ConfigurationError if a setting is wrong; the message names file, key, value and the
-        allowed values.
+        Raises ConfigurationError (with file, key, value, allowed values) if a setting is wrong.
         """
         self.root, self.configuration = root, configuration
         self.settings = settings = validate(StudySettings, config, source)
@@ -232,7 +231,7 @@ Labels = dict[str, str]
 
 
 def labels_of(study: Study, place: paths.Place) -> list[Labels]:
-    """Labels (scene, group ...) of every file of the kind ``place`` that the study makes."""
+    """Labels (scene, group ...) of every file of the study with the pattern of ``place``."""
     names = place.labels
     scenes = SCENES[place](study) if place in SCENES else study.scenes
     known: Iterable[Labels] = [{}]
@@ -262,7 +261,10 @@ def _held(study: Study, listed: Iterable[str]) -> list[str]:
 
 
 def _with_subspaces(study: Study) -> list[str]:
-    """Scenes with models in position subspaces: the configured ones, else all that allow them."""
+    """Scenes with models in position subspaces: configured ones, else all that allow such models.
+
+    The list is empty if the study has no position basis or no size of one.
+    """
     section = study.settings.subspace
     if not (section.bases and section.sizes):
         return []
@@ -270,7 +272,7 @@ def _with_subspaces(study: Study) -> list[str]:
     return _held(study, section.scenes or takes)
 
 
-# Kind of file -> names of all tables, figures or TeX inputs; every study makes a file for each.
+# Kind of file that exists once per table, figure or TeX input -> function that returns their names.
 NAMES: dict[paths.Place, Callable[[], Iterable[str]]] = {
     paths.TABLE: declared,
     paths.FIGURE: declarations,
@@ -281,7 +283,8 @@ NAMES: dict[paths.Place, Callable[[], Iterable[str]]] = {
 MODELS = (
     paths.SUBSPACES, paths.SUBSPACES_TRAIN, paths.SUBSPACES_HELDOUT, paths.SUBSPACES_SECONDS,
 )  # fmt: skip
-# Kind of file -> scenes for which it is made, or a mapping scene -> factors on its mesh size.
+# Kind of file -> function that returns the scenes for which a study makes it; for files of several
+# mesh sizes, a mapping scene -> factors that multiply the number of vertices along a mesh's side.
 SCENES: dict[paths.Place, Callable[[Study], Iterable[str]]] = {
     **dict.fromkeys(MODELS, _with_subspaces),
     paths.SCALING: lambda study: study.settings.scaling.scenes,
@@ -290,14 +293,14 @@ SCENES: dict[paths.Place, Callable[[Study], Iterable[str]]] = {
     paths.ALTERNATIVE_TIMES: lambda study: study.settings.alternatives.scenes,
     paths.ONLINE: lambda study: study.online,
     paths.ONLINE_MODELS: lambda study: study.online,
-    # configured scenes for which the study makes models in position subspaces
+    # scenes listed in section `live` for which the study makes models in position subspaces
     paths.LIVE_MODEL: lambda study: [
         scene
         for scene in study.settings.live.scenes
         if scene in {*_with_subspaces(study), *study.online}
     ],
     paths.STABILITY: lambda study: _held(study, study.settings.stability.scenes),
-    # the configured scenes, or if none is configured all scenes, including the large ones
+    # scenes that section `requested_tolerances` lists; if none, those of the study and of `online`
     paths.REQUESTED_TOLERANCES: lambda study: [
         scene
         for scene in (*study.scenes, *study.online)

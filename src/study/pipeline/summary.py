@@ -1,7 +1,7 @@
 """Texts about a finished run: the last lines it prints, and the overview results/contents.md.
 
-The overview lists every claim, figure, table and section of the text, with the command that makes
-it and the processor minutes this needs. Captions of figures and columns of tables follow.
+The overview lists every claim, figure, table and section of the manuscript, with the processor
+minutes of its jobs and the command line that makes it. Figure captions and table columns follow.
 """
 
 import os
@@ -29,7 +29,7 @@ from study.tables import declared
 from study.tables.claims.rules import load_claims
 from study.tables.kit.declaration import Table
 
-# If the load average (over five minutes, for each core) exceeds this value, other programs ran.
+# A run calls its times worthless if the load average (five minutes, per core) exceeds this value.
 BUSY = 1.7
 LISTED = 8  # largest number of targets that the last lines of a run name
 TABLES_HEAD = """# Tables
@@ -69,7 +69,7 @@ def processor_seconds() -> float:
 
 
 def summary(command: CommandLine, plan: Plan) -> str:
-    """Return the last lines of a successful run, from its command line and its plan."""
+    """Return the last lines that a successful run prints, from its command line and its plan."""
     folders, apart = plan.folders, plan.study.apart
     wall = time.time() - psutil.Process().create_time()
     lines = [f"configuration: {configuration(command)}"]
@@ -111,7 +111,7 @@ def configuration(command: CommandLine) -> str:
 
 
 def verdicts_in(results: str) -> dict[str, tuple[str, str]]:
-    """Claim -> its verdicts (as published, beyond); empty if the table is missing or damaged."""
+    """Claim -> verdicts on published and on sound methods; {} if table claims is not intact."""
     path = paths.TABLE.at(results, name="claims")
     # a damaged file is only ignored here: the next job that reads it renames it
     if not Path(path).is_file() or check_file(path) is not Condition.INTACT:
@@ -156,7 +156,7 @@ def _source(read: Read) -> str:
 
 
 class Entry(NamedTuple):
-    """Line of the overview: a result of the study.
+    """Line of the overview results/contents.md: a result of the study and how to make it.
 
     kind : claim, figure, table, section (TeX file whose text contains numbers) or manuscript
     files : paths of the files with the result, in the default configuration
@@ -170,7 +170,7 @@ class Entry(NamedTuple):
 
 
 def entries() -> Iterator[Entry]:
-    """Yield lines of the overview: claims, figures, tables, sections and the manuscript."""
+    """Yield the lines of the overview: claims, figures, tables, sections and the manuscript."""
     for name in load_claims(Path("config/claims.yaml")):
         yield Entry("claim", name, (paths.TABLE.at(paths.RESULTS, name="claims"),), ("claims",))
     for name, figure in declarations().items():
@@ -193,7 +193,7 @@ def entries() -> Iterator[Entry]:
 
 
 def contents(command: CommandLine, dag: Any, folders: Folders) -> str:
-    """Return the text of the overview after a run that has made all files.
+    """Return the text of results/contents.md after a run that has made all files.
 
     command : command line that started the run
     dag : Snakemake's graph of all jobs of the study
@@ -217,10 +217,10 @@ def contents(command: CommandLine, dag: Any, folders: Folders) -> str:
 def costs(
     listed: Sequence[Entry], dag: Any, folders: Folders
 ) -> Iterator[tuple[int, float | None]]:
-    """Yield for each of the lines ``listed`` the number of its jobs, and their processor minutes.
+    """Yield for each entry the number of jobs that make its files, and their processor minutes.
 
-    Prerequisites count as well. The minutes are None if one of the jobs was not measured.
-    ``dag`` is Snakemake's graph of jobs.
+    Jobs that make inputs of these jobs count as well. The minutes are None if the log of one of the
+    jobs does not report its time. ``dag`` is Snakemake's graph of jobs.
     """
     makers = {str(file): job for job in dag.jobs for file in job.output}
     used = {job: usage_of(job.log[0]) for job in makers.values()}

@@ -34,7 +34,7 @@ def figure_arguments(arguments: Sequence[str]) -> list[str]:
     options = [word for word in arguments[len(named) :] if word != "--"]
     numbers = figure_numbers(Path())
     by_place = {n.manuscript: name for name, n in numbers.items() if n.manuscript}
-    # order of suggestions: first the numbers of the paper, then those of the supplement
+    # suggestions in error messages list numbers of the paper before those of the supplement
     ordered = sorted(by_place, key=lambda n: (SUPPLEMENT in n, int(n.removeprefix(SUPPLEMENT))))
     known = {number: by_place[number] for number in ordered}
     known |= {f"{PREPRINT}{n.preprint}": name for name, n in numbers.items() if n.preprint}
@@ -69,7 +69,7 @@ def files(target: str, folders: Folders) -> list[str]:
 
 
 def own_file(path: str, folders: Folders) -> str:
-    """Path in ``folders`` that stands for a path in the default folders; else ``path`` itself."""
+    """Return ``path`` with a default folder replaced by the one in ``folders``, else unchanged."""
     for document, file in Folders().documents.items():
         if path == file:
             return folders.documents[document]
@@ -79,7 +79,7 @@ def own_file(path: str, folders: Folders) -> str:
 
 
 def check_targets(plan: Plan, targets: Iterable[str], rules: Sequence[Any]) -> None:
-    """Raise ConfigurationError, with a suggestion, if no rule of Snakemake makes a target.
+    """Raise ConfigurationError if no rule makes a target, or its scene, group ... is unknown.
 
     targets : names of rules, and paths, from the command line
     rules : Snakemake's rules
@@ -102,8 +102,8 @@ def check_targets(plan: Plan, targets: Iterable[str], rules: Sequence[Any]) -> N
 def _allowed(study: Study, label: str, before: Mapping[str, str]) -> Collection[str] | None:
     """Allowed values of ``label`` in a path, or None if every value is allowed.
 
-    The label is scene, group, method, basis or mesh. ``before`` has the labels to the left of it
-    with their values: the allowed groups depend on the scene.
+    ``label`` is a wildcard of the path; only scene, group, method, basis and mesh are restricted.
+    ``before`` maps wildcards of the path to their values: allowed groups depend on its scene.
     """
     match label:
         case "scene":

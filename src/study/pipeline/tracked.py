@@ -1,4 +1,4 @@
-"""Update of results stored in git: costs of jobs, and verdicts on claims for other scenes.
+"""Update of results stored in git: costs of jobs, verdicts for other scenes, rows of a long study.
 
 ``./reproduce run python -m study.pipeline.tracked costs`` updates `config/reference/job_costs.csv`
 from the logs of the full and of the tiny study in ``results``. The file holds, for each kind of
@@ -9,8 +9,8 @@ its log's path below ``logs``: an experiment, or ``tables``, ``figures`` or ``pa
 ``./reproduce run python -m study.pipeline.tracked replication`` updates the file of the table
 `replication` from the table of claims of the study ``config/replication.yaml``.
 
-``./reproduce run python -m study.pipeline.tracked rows`` updates recorded rows from the tables of
-the long study ``config/extended.yaml``; tables of other studies show these rows, too.
+``./reproduce run python -m study.pipeline.tracked rows`` updates copies of some tables of the long
+study ``config/extended.yaml``; the same tables of other studies show these recorded rows, too.
 """
 
 import sys
@@ -46,12 +46,12 @@ def write_tracked(path: Path, content: bytes) -> None:
 
 
 def kind_of(log: str, results: str) -> str:
-    """Kind of a job, given the path of its log and the results folder of its study."""
+    """Kind of a job: first part of the path of its ``log`` below the folder ``results``/logs."""
     return Path(log).relative_to(Path(results, "logs")).parts[0].removesuffix(".log")
 
 
 def measured_costs(results: str, coarse: str) -> pd.DataFrame:
-    """Return a table with columns `COLUMNS` and a row per kind of job, from logs of two studies.
+    """Return a row for each kind of job (see `kind_of`), with columns `COLUMNS`, from job logs.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def measured_costs(results: str, coarse: str) -> pd.DataFrame:
     Raises
     ------
     PdromError
-        No log reports what a job used, as before the first run.
+        No log reports the time and memory of a job, for example before the first run.
     """
     full = _used(results).groupby("kind")
     columns = [
@@ -73,11 +73,11 @@ def measured_costs(results: str, coarse: str) -> pd.DataFrame:
 
 
 def recorded_verdicts(claims: Path, rules: Path) -> pd.DataFrame:
-    """Return a table: claim, its verdicts and measured values, date, fingerprint of its rules.
+    """Return for each claim: verdicts, measured values, day of the run, fingerprint of its rules.
 
     Parameters
     ----------
-    claims : path of the table ``claims`` of the study with other scenes
+    claims : path of the table ``claims`` of the study ``config/replication.yaml``
     rules : path of the file with the rules of the claims
 
     Raises
@@ -108,7 +108,7 @@ def _used(results: str) -> pd.DataFrame:
 
 
 def main(words: Sequence[str]) -> None:
-    """Update the files for ``words`` (see the module); ConfigurationError for an unknown word."""
+    """Update the files for each of ``words``, see the module; ConfigurationError if unknown."""
     for word in words or [""]:
         if word == "costs":
             made = {COSTS: measured_costs(folders([], []).results, folders([COARSE], []).results)}

@@ -1,10 +1,11 @@
 """Settings that functions compute from the configuration for a job; `DERIVED` lists their names.
 
-All other settings are keys of the configuration. If a job's parameter is annotated with a base
-class of the section's type, the job gets the fields of the base class and depends on no others.
+All other settings are keys or sections of the configuration. If a job's function annotates its
+parameter for a section with a base class of the section's class, the job depends only on the
+settings that this base class declares.
 
-The parameter ``labels`` of all functions has scene, group ... of the job, by name; for a figure it
-has the name of the figure, which selects the options of the figure.
+Functions in `DERIVED` get ``labels``, a map of "scene", "group" ... to values for the job. For a
+figure it maps "figure" to the figure's name, which selects the options of the figure.
 """
 
 from collections.abc import Callable, Mapping
@@ -32,7 +33,7 @@ from study.pipeline.folders import DEFAULT
 from study.pipeline.study import Study, labels_of
 from study.tables.kit.results import FAR
 
-# Basis that a table with one basis per group shows, if a method of the study uses this basis.
+# Name of the basis shown by tables with one basis per group; if no method uses it, the first basis.
 USUAL_BASIS = "none-none-vectorised"
 
 
@@ -44,7 +45,7 @@ def _stability(study: Study, labels: Labels) -> Stability:
 
 
 def _usual_bases(study: Study, labels: Labels) -> list[paths.File]:
-    """One basis file per scene and reduced group: that of `USUAL_BASIS`, else the first one."""
+    """One basis file per scene and reduced group: of `USUAL_BASIS`, else of the first basis."""
     chosen: dict[tuple[str, str], Labels] = {}
     for held in labels_of(study, paths.BASIS):
         group = (held["scene"], held["group"])
@@ -54,17 +55,17 @@ def _usual_bases(study: Study, labels: Labels) -> list[paths.File]:
 
 
 def _holds(study: Study, place: paths.Place, labels: Labels) -> bool:
-    """Return whether the study makes a file of kind ``place`` for scene, group ... of the job."""
+    """Return whether the study makes a file with path pattern ``place`` for the job's scene etc."""
     return {name: labels[name] for name in place.labels} in labels_of(study, place)
 
 
 def _of_scene(study: Study, place: paths.Place, labels: Labels) -> tuple[OfScene, ...]:
-    """Tuple with the job's scene; empty if the study makes no file of kind ``place`` for it."""
+    """Tuple with the job's scene; empty if the study makes no file of pattern ``place`` for it."""
     return (OfScene(scene=labels["scene"]),) if _holds(study, place, labels) else ()
 
 
 def _joint_rows(study: Study, labels: Labels) -> tuple[JointRows, ...]:
-    """Reduced groups of the job's scene, for method `JOINT`; empty if the study lacks either."""
+    """One `JointRows` per reduced group of the job's scene; () if the study lacks it or `JOINT`."""
     scene = labels["scene"]
     if JOINT not in study.methods or scene not in study.scenes:
         return ()
@@ -79,7 +80,7 @@ def _named(scenes: Mapping[str, SceneConfig]) -> list[NamedScene]:
 
 
 def _subspace_cases(study: Study, labels: Labels) -> tuple[SubspaceCase, ...]:
-    """Models in position subspaces whose frames are timed: those configured that also exist."""
+    """Models to be timed: entries of ``frame_times.subspaces`` that the study also makes."""
     held = {labels["scene"] for labels in labels_of(study, paths.SUBSPACES)}
     models = study.settings.subspace
     return tuple(
@@ -90,7 +91,7 @@ def _subspace_cases(study: Study, labels: Labels) -> tuple[SubspaceCase, ...]:
 
 
 def _projection_cases(study: Study, labels: Labels) -> tuple[ProjectionCase, ...]:
-    """Reductions whose frames are timed: those configured for which the study has samples."""
+    """Reductions to be timed: entries of ``frame_times.projections`` that the study samples."""
     held = labels_of(study, paths.SAMPLING)
     return tuple(
         case
@@ -110,7 +111,7 @@ def scaled_methods(study: Study, labels: Labels) -> dict[str, MethodSpec]:
 
 
 def _repeated(study: Study, labels: Labels) -> tuple[Repeated, ...]:
-    """Repeated runs of a scene: one for each method of each entry of ``repetitions.cells``."""
+    """Runs to repeat for the job's scene, by the ``repetitions.cells`` entries that list it."""
     cells = [c for c in study.settings.repetitions.cells if labels["scene"] in c.scenes]
     return tuple(
         Repeated(method=name, spec=spec, **cell.model_dump(include={*Cell.model_fields}))
@@ -285,7 +286,7 @@ DERIVED: dict[str, Callable[[Study, Labels], Any]] = {
     "reductions": _reductions,
     "runs": _runs,
     "first_run": lambda study, labels: _runs(study, labels)[:1],
-    # reduced groups that a figure shows, in scenes with models in position subspaces
+    # of the groups that a figure shows, those in scenes with models in position subspaces
     "drawn_subspaces": lambda study, labels: tuple(
         each
         for each in _experiments(study, labels)

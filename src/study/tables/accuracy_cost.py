@@ -1,4 +1,4 @@
-"""Tables of error against time: each method and size, requested tolerances, and where methods pay.
+"""Tables of error and time: each method and size, requested tolerances, where reductions save time.
 
 Errors are taken against one of two reference runs; only rows with the same one are comparable. For
 ``fom`` and ``fom-anderson``, the reference is a full-order run with converged frames (K -> infinity
@@ -64,8 +64,6 @@ def accuracy_cost(
 
     The column ``pareto`` compares rows of the same scene whose errors have the same reference.
 
-    Parameters
-    ----------
     iterations : scene -> number K of local/global iterations per frame in the scene's settings
     """
     times = results.timings_in_one_time(files["timings"], frame_times)
@@ -89,7 +87,7 @@ def accuracy_cost(
 
 
 def _sweep(errors: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
-    """Full-order runs; one with fewer iterations than its scene has a second row, as `FEWER`."""
+    """Full-order runs; `FOM` with fewer iterations than configured has a second row, `FEWER`."""
     full = times[times.method.isna() | times.method.isin([FOM, ANDERSON])]
     cost = full[["scene", "method", "iterations", "ms_per_frame"]]
     cost = cost.fillna({"method": FOM})
@@ -106,7 +104,7 @@ def _sweep(errors: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
 
 
 def reference_of(points: pd.DataFrame) -> pd.Series:
-    """Reference of the error in each row: `CONVERGED`, or `OWN` for the scene's own run."""
+    """Reference run of the error in each row: `CONVERGED`, or `OWN` (the scene's own run)."""
     return points.method.isin([FOM, ANDERSON]).map({True: CONVERGED, False: OWN})
 
 
@@ -152,7 +150,7 @@ def pareto(error: Sequence[float], cost: Sequence[float]) -> list[bool]:
     },
 )
 def requested_tolerances(runs: list[paths.File], record: list[Path]) -> pd.DataFrame:
-    """One row per run with a requested tolerance, from ``runs`` and recorded rows (``record``)."""
+    """One row per run with a requested largest error: this study's, then those in ``record``."""
     rows = results.joined(runs)
     if len(rows):
         met = rows.frames > 0
@@ -165,10 +163,10 @@ def requested_tolerances(runs: list[paths.File], record: list[Path]) -> pd.DataF
     return results.with_recorded(rows, record)
 
 
-# Columns that identify a curve; the rows of a curve differ only in size r.
+# Columns that identify a curve (time of the local step over size r); its rows differ only in r.
 CURVE = ["scene", "group", "method", "factor"]
 OWN_MESH = "1"  # value of the column ``factor`` for a scene's configured mesh
-SHARE = 1e-3  # groups with at most this share of the force of a scene are negligible
+SHARE = 1e-3  # table payoff omits groups with at most this share of all forces in a scene
 _ERROR = "relative_error_within_horizon"
 
 
@@ -192,8 +190,9 @@ def breakeven(own: list[paths.File], sized: list[paths.File]) -> pd.DataFrame:
 
     Files ``own`` are for the configured mesh of each scene, ``sized`` for other mesh sizes.
 
-    ``breakeven_r`` is the same in all rows that differ only in r. It is empty if the reduction is
-    faster at the largest size (the numerical rank), and the smallest size if it is never faster.
+    ``breakeven_r``, the size from which on the reduction is not faster, is equal in rows that only
+    differ in r. It is empty if the reduction is faster at the largest size (full rank), and the
+    smallest size if it is never faster.
     """
     rows = joined([*own, *(file for file in sized if file["factor"] != OWN_MESH)])
     if rows.empty:
@@ -213,10 +212,8 @@ def break_even(r: Sequence[int], ratio: Sequence[float]) -> int | None:
     The ratio is interpolated linearly between the last size with a ratio below one and the next.
     Return None if the ratio is below one at the largest size; if it never is, the smallest size.
 
-    Parameters
-    ----------
     r : sizes, ascending
-    ratio : time of the reduced local step over that of the full one, at each size
+    ratio : time of the reduced local step divided by that of the full one, at each size
     """
     sizes, values = np.asarray(r, dtype=float), np.asarray(ratio, dtype=float)
     below = np.flatnonzero(values < 1.0)
@@ -256,12 +253,13 @@ def break_even(r: Sequence[int], ratio: Sequence[float]) -> int | None:
     },
 )
 def payoff(reruns: pd.DataFrame, points: pd.DataFrame, effects: pd.DataFrame) -> pd.DataFrame:
-    """One row per position basis and method, over all scenes and sizes that ran and were timed.
+    """One row per position basis and method, which summarises its timed runs of all scenes.
 
-    Sizes are chosen by the error on the training motion and evaluated on held-out motions. Groups
-    with at most `SHARE` of the force of a scene are left out. The first row is the full order with
-    fewer iterations (from ``points``). As it needs no training, it has no held-out columns. All
-    speed-ups are over the scene's own full-order run.
+    For each scene and group, a size is chosen in the training motion (that of the fastest accurate
+    run, or else of the most accurate run) and evaluated on held-out motions. Groups with at most
+    `SHARE` of all forces in a scene are left out. The first row is the full order with fewer
+    iterations (from ``points``); as it needs no training, its held-out columns are empty. Speed-ups
+    are relative to the scene's own full-order run.
     """
     shares = effects.set_index(["scene", "effect"]).force_share
     weak = shares.index[shares <= SHARE]
@@ -301,7 +299,7 @@ def payoff(reruns: pd.DataFrame, points: pd.DataFrame, effects: pd.DataFrame) ->
 
 
 def _fewer(points: pd.DataFrame) -> pd.DataFrame:
-    """Rows of ``points`` with fewer iterations; speed-ups are over the scene's full-order run."""
+    """Rows of method `FEWER` in ``points``, with speed-ups over the scene's own full-order run."""
     full = points[(points.method == "full") & (points.position_basis == "full")]
     fewer = points[points.method == FEWER]
     speedup = fewer.scene.map(full.set_index("scene").ms_per_frame) / fewer.ms_per_frame

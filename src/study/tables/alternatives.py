@@ -32,7 +32,7 @@ CASE = ["scene", "vertices", "stiffness", "motion"]
 SPEEDUP = ("reduced_speedup", "reduced_speedup_low", "reduced_speedup_high")
 CURVE = ["scene", "stiffness", "reference", "limit"]
 PLAIN = "projective"
-KNOWN = 3.0  # error limits below this multiple of the reference run's own error have no rows
+KNOWN = 3.0  # no row for error limits below this times the error of reference "continuous"
 
 
 @table(
@@ -73,9 +73,9 @@ KNOWN = 3.0  # error limits below this multiple of the reference run's own error
 def alternatives(
     parts: list[paths.File], times: list[paths.File], record: list[Path]
 ) -> pd.DataFrame:
-    """One row per solver with its settings and held-out motion, in the order of files ``parts``.
+    """One row per held-out motion and solver with its settings, in the order of files ``parts``.
 
-    Times are medians over the processes in ``times``. Recorded rows (``record``) follow.
+    Times are medians over the processes in ``times``. `with_recorded` appends rows of ``record``.
     """
     rows = joined(parts)
     if len(rows):
@@ -89,7 +89,7 @@ def alternatives(
 
 
 def beside(rows: pd.DataFrame, times: pd.DataFrame) -> tuple[pd.DataFrame, list[int]]:
-    """Add to ``rows`` a column of frame times (ms) per process; also return the new names."""
+    """Add one column per process with frame times (ms) to ``rows``; also return their names."""
     wide = times.set_index([*CANDIDATE, "process"]).ms_per_frame.unstack("process")
     wide["vertices_ms"] = times.groupby(CANDIDATE, dropna=False).vertices_ms.median()
     own = rows.drop(columns="vertices_ms", errors="ignore")
@@ -143,8 +143,8 @@ def winners(
 ) -> pd.DataFrame:
     """One row per scene, mesh, stiffness, motion, reference and error limit.
 
-    The method is empty if no method reaches the limit. Limits below `KNOWN` times the error of the
-    continuous-time reference have no row. Some methods were run in the first motion only.
+    The method is empty if no full-order method (some ran in the first motion only) reaches the
+    limit. For reference "continuous", limits below `KNOWN` times its own error have no row.
     """
     found = []
     rows = rows[rows.recorded.isna()]
@@ -170,9 +170,9 @@ def winners(
 
 
 def _best(rows: pd.DataFrame, limit: float, processes: list[int]) -> dict[str, object]:
-    """Columns about the two fastest full-order methods and the fastest reduction within ``limit``.
+    """Columns about the fastest methods with errors up to ``limit``: two full-order, one reduced.
 
-    A speed-up is the median over ``processes`` of ratios of two times within one process.
+    A speed-up is the median over ``processes`` of full-order time / time of the reduction.
     """
     reaching = rows[rows.error <= limit].sort_values("ms_per_frame", kind="stable")
     inside = reaching.method.isin(settings.REDUCTIONS)
@@ -205,8 +205,8 @@ def _best(rows: pd.DataFrame, limit: float, processes: list[int]) -> dict[str, o
 
 
 def _pays(curve: pd.DataFrame) -> dict[str, object]:
-    """Numbers of vertices from which on a reduction is faster in all motions, and speed-ups."""
-    # if a method misses the error limit in one motion, the least speed-up of that mesh is NaN
+    """Mesh sizes from which on reductions beat the full order; speed-ups on the largest mesh."""
+    # the least speed-up on a mesh is NaN if a method misses the error limit in one motion
     every = curve.assign(plain=curve.plain_ms / curve.reduced_ms)
     worst = every.groupby("vertices")[["plain", "reduced_speedup"]].agg(
         lambda speedups: speedups.min(skipna=False)

@@ -1,4 +1,4 @@
-"""Tables of times: of effects and local steps of full-order runs, by mesh size, and speed-ups."""
+"""Tables of times: of effects, local steps and frames, on meshes of several sizes; speed-ups."""
 
 from collections.abc import Iterator
 
@@ -18,7 +18,7 @@ KEYS = ["scene", "effect"]
 NOTHING = "nothing"  # value of column effect in a row of a scene from which nothing is left out
 PHASE, SEVERAL = "phase", "several"
 IMPLEMENTATIONS = ("interpreted", "numpy", "compiled")
-FEWEST = 3  # smallest number of meshes to which an exponent is fitted
+FEWEST = 3  # smallest number of meshes to which table scaling fits a power law
 
 
 @table(
@@ -61,13 +61,14 @@ def effects_cost(
 ) -> pd.DataFrame:
     """One row per effect or phase of a scene, then one per set of effects left out together.
 
-    Column ``moved`` is empty for the only constraint group of a scene, which cannot be left out.
+    Phases are right-hand side, global solve and the rest. Column ``moved`` (largest difference of
+    runs with and without the effect) is empty for a scene's only constraint group, which must stay.
 
     parts, left_out : times of effects, and of scenes without some effects; both are scaled so that
         scenes have the full-order times of table ``frame_times``
     contributions : forces and energies of effects in each frame
-    sensitivity, horizon : how far changed runs (perturbed start, an effect less) differ from the
-        full-order run, and the limit up to which frames are compared
+    sensitivity, horizon : how far runs from a perturbed start, or without an effect, differ from
+        the full-order run, and the limit of this difference, above which frames are not compared
     """
     costs, removed = results.joined(files["parts"]), results.joined(files["left_out"])
     if costs.empty:
@@ -102,20 +103,20 @@ def _absent(rows: pd.DataFrame, others: pd.DataFrame) -> np.ndarray:
 
 
 def _acting(frames: pd.DataFrame, sensitivity: pd.DataFrame, horizon: Horizon) -> pd.DataFrame:
-    """Force and energy of each effect in ``frames``; ``moved``: how far runs without it differ."""
+    """Per effect: RMS force, energy range in ``frames``, largest change of positions without it."""
     made = frames.groupby([*KEYS, "role"], sort=False, as_index=False).agg(
         force=("force", lambda force: float(np.sqrt(np.mean(np.square(force))))),
         energy=("energy", lambda of: float(of.max() - of.min() if len(of) > 1 else of.iloc[0])),
     )
     length = frames.groupby("scene").frame.max() + 1
-    # effects of the start have a row for frame 0 only: average their force over all frames, too
+    # effects that set the start have only a row for frame 0: average their force over all frames
     starts = made.role == "start"
     made.loc[starts, "force"] /= np.sqrt(made.scene[starts].map(length).to_numpy(float))
     made["force_share"] = made.force / made.groupby("scene").force.transform("sum")
     ends = horizons(sensitivity, horizon.perturbation, horizon.threshold)
 
     def largest(scene: str, label: float | str) -> float | None:
-        """Largest difference of run ``label`` in the compared frames; None without such frames."""
+        """Largest deviation of run ``label`` in the compared frames; None without such frames."""
         drift = floor_of(sensitivity, scene, label)[: ends[scene]]
         return float(drift.max()) if len(drift) else None
 
@@ -138,7 +139,7 @@ def _acting(frames: pd.DataFrame, sensitivity: pd.DataFrame, horizon: Horizon) -
     reads={"timings": Every(paths.TIMINGS), "frame_times": TableOf("frame_times")},
 )
 def local_share(timings: list[File], frame_times: pd.DataFrame) -> pd.DataFrame:
-    """One row per scene and implementation; ``timings`` are scaled to table ``frame_times``.
+    """One row per scene and implementation of the local step; `in_one_time` scales the times.
 
     Shares of the local step include the assembly of the right-hand side, because compiled kernels
     compute projections and right-hand side in one pass.
@@ -174,9 +175,9 @@ def local_share(timings: list[File], frame_times: pd.DataFrame) -> pd.DataFrame:
 def scaling(parts: list[File]) -> pd.DataFrame:
     """One row per scene, mesh size and method, from the files ``parts`` of all scenes.
 
-    Speed-ups compare the time of an iteration with the full-order run. The exponent is that of a
-    power law, fitted in logarithms to all meshes of a scene and method, and equal in these rows.
-    It is empty if there are fewer than three meshes, as any two points lie on a power law.
+    Speed-ups compare the time of an iteration with the full-order run. The exponent is that of the
+    time of an iteration as a power of the number of vertices, fitted in logarithms to all meshes
+    of a scene and method. It is empty for fewer than three meshes: any two points fit a power law.
     """
     rows = results.joined(parts)
     if rows.empty:
@@ -225,7 +226,11 @@ _TIMES = ["ms_per_frame", "vertices_ms", "speedup", "speedup_low", "speedup_high
     reads={"parts": Every(paths.FRAME_TIMES)},
 )
 def frame_times(parts: list[File]) -> pd.DataFrame:
-    """One row per scene: medians over processes of frame times and of ratios of two such times."""
+    """One row per scene: medians over processes of the time of a full-order frame, and of ratios.
+
+    The ratios divide two times by this one: that of the same run, measured once more (control), and
+    that of the scene's variant ("twin").
+    """
     rows = results.joined(parts)
     if rows.empty:
         return rows
@@ -280,8 +285,8 @@ def speedups(times: pd.DataFrame, reruns: pd.DataFrame, **files: list[File]) -> 
     """One row per timed reduction; speed-ups compare runs of one and the same process.
 
     times, reruns : tables frame_times and reduced_reruns; files ``parts`` have the measured times
-    projections, subspaces : processor times of the reductions
-    large : errors and processor times of the reductions of large scenes
+    projections, subspaces : processor times of making the reductions (basis and sampling)
+    large : errors of reductions of large scenes, and processor times of making these
     """
     rows = results.joined(files["parts"])
     if rows.empty or not (rows.role == REDUCED).any():
@@ -345,13 +350,13 @@ def _errors(reruns: pd.DataFrame, keys: list[str]) -> pd.DataFrame:
 
 
 def large_errors(large: pd.DataFrame) -> pd.DataFrame:
-    """Errors over all frames of each model in table ``large``, which has rows for all motions."""
+    """Errors over all frames by model of ``large``: training; median, range of held-out motions."""
     whole = large.rename(columns={"relative_error": _ERROR}).assign(horizon_frame=1)
     return _errors(whole, _MODEL)
 
 
 def _first_known(made: pd.DataFrame, sources: list[pd.DataFrame], column: str) -> pd.DataFrame:
-    """Add ``column`` to ``made``; the first of ``sources`` with a value for a row provides it."""
+    """Add ``column`` to ``made``: each row's value in the first of ``sources`` that has one."""
     found = pd.Series(float("nan"), made.index)
     for source in sources:
         keys = [key for key in _LABELS if key in source.columns]
@@ -385,13 +390,13 @@ def _first_known(made: pd.DataFrame, sources: list[pd.DataFrame], column: str) -
     },
 )
 def online(parts: list[File], measured: list[File], times: pd.DataFrame) -> pd.DataFrame:
-    """One row per model of large scenes, with errors (``parts``) and times (``measured``)."""
+    """One row per reduced model of large scenes: errors of ``parts``, times of ``measured``."""
     rows = results.joined(parts)
     if rows.empty:
         return rows
     found = pd.DataFrame(list(timed_reductions(results.joined(measured), times)))
     made = rows[rows.motion == results.TRAIN].rename(columns={"r": "elements_sampled"})
-    made = made.drop(columns="playback_error")  # zero here: playback shows the training motion
+    made = made.drop(columns="playback_error")  # zero, as playback repeats the training motion
     made = made.merge(large_errors(rows).rename(columns=_ERRORS), on=_MODEL, how="left")
     made = made.merge(found[[*_MODEL, *_TIMES]], on=_MODEL, how="left")
     return made.assign(ms_per_iteration=made.ms_per_frame / made.iterations)

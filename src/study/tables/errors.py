@@ -1,12 +1,11 @@
 """Tables of errors: of reconstructions, of perturbed runs, and of runs with one changed choice.
 
-Table gain_interventions shows whether the error of a run falls if only the gain is lowered. (The
-gain is the factor by which sampling amplifies errors.) A mere correlation of gain and error over
-methods could be caused by any difference between the methods. The table therefore compares pairs of
-methods with equal basis and size. They differ in their samples, or in whether the axes x, y and z
-share coefficients (table ladder has the four combinations). The last two steps (`KINDS`) compare
-methods with the same kind of coefficients. There, too, the error would fall with the gain if
-separate coefficients did harm only by their larger gain.
+The gain is the factor by which sampling amplifies errors. Table gain_interventions shows whether
+the error of a run falls if only its gain is lowered; a correlation of both over all methods could
+have other causes. So each step of the table compares two methods with equal basis and size r that
+differ in their samples, or in whether the axes x, y and z share coefficients (table ladder has the
+four combinations). If separate coefficients raise errors only by their larger gain, a lower gain
+lowers errors also between two methods with separate, or with shared ones (tested by `KINDS`).
 """
 
 from collections.abc import Iterator, Mapping
@@ -37,7 +36,7 @@ _CELL = ["scene", "group", "method", "r", "varied"]
         number("relative", "over the first one"),
         flag("above_roundoff", "larger than the rounding errors of the projections"),
     ),
-    # one basis for each constraint group: without weights and centring if a method uses such a one
+    # per group, the basis without weights and centring if a method uses it, else another basis
     reads={"bases": EachOf(paths.BASIS, "usual_bases")},
 )
 def singular_values(bases: list[paths.File]) -> pd.DataFrame:
@@ -84,7 +83,7 @@ def reconstruction_error(parts: list[paths.File]) -> pd.DataFrame:
     reads={"parts": Every(paths.SENSITIVITY)},
 )
 def sensitivity(parts: list[paths.File]) -> pd.DataFrame:
-    """Relative difference of perturbed runs: largest over seeds, per scene, perturbation, frame."""
+    """Relative difference of perturbed and unperturbed runs: largest over seeds, for each frame."""
     keys = ["scene", "perturbation", "frame"]
     rows = joined(parts).groupby(keys, sort=False, as_index=False)
     return rows["relative_difference"].max()
@@ -102,7 +101,7 @@ def sensitivity(parts: list[paths.File]) -> pd.DataFrame:
         integer("seed", "of the start's round-off"),
         *shared("method r"),
         integer("rank", "modes that the snapshots have without a cutoff", compared="value"),
-        # the modes of such runs, and thus the gain (error amplification), depend on the machine
+        # modes made of round-off, and thus their gain (error amplification), depend on the machine
         replace(*shared("gain"), compared="skipped"),
         *shared("frames finite blowup_frame"),
         number("relative_error", "error of the positions over all frames up to the horizon"),
@@ -110,7 +109,7 @@ def sensitivity(parts: list[paths.File]) -> pd.DataFrame:
     reads={"parts": Every(paths.NOISE)},
 )
 def noise(parts: list[paths.File]) -> pd.DataFrame:
-    """Rows of the files ``parts``, one file for each scene, in order."""
+    """Rows of files ``parts``, one per scene and group: runs with bases made of round-off."""
     return joined(parts)
 
 
@@ -130,7 +129,7 @@ def noise(parts: list[paths.File]) -> pd.DataFrame:
     reads={"parts": Every(paths.REPETITIONS)},
 )
 def repetitions(parts: list[paths.File]) -> pd.DataFrame:
-    """Statistics over repeated runs: one row per scene, group, method, r and kind of variation.
+    """One row per scene, group, method, r and ``varied``, the choice in which repeated runs differ.
 
     The median of any distribution lies outside the range of n independent draws with probability
     2^(1 - n): five draws enclose it with probability 15/16.
@@ -178,7 +177,7 @@ def repetitions(parts: list[paths.File]) -> pd.DataFrame:
     reads={"parts": Every(paths.LADDER)},
 )
 def ladder(parts: list[paths.File]) -> pd.DataFrame:
-    """Rows of the files ``parts``, one file for each scene, in order."""
+    """Join the tables in the files ``parts``, one for each scene and group, in their order."""
     return joined(parts)
 
 
@@ -187,15 +186,15 @@ STEPS = {
     "whole elements for single entries": ("deim", "block-deim"),
     "three elements a mode for one": ("block-deim", "gappy"),
 }
-# Pairs of methods in table ladder that differ only in the coefficients, or only in the samples. A
-# step whose name begins with "whole elements" needs elements that have more than one row.
+# Steps between methods of table ladder that change only whether x, y and z share coefficients, or
+# only the samples. Steps named "whole elements ..." need elements that have more than one row.
 SQUARE = {
     "shared coefficients, single rows": ("single rows, separate", "single rows, shared"),
     "shared coefficients, whole elements": ("whole elements, separate", "whole elements, shared"),
     "whole elements, separate coefficients": ("single rows, separate", "whole elements, separate"),
     "whole elements, shared coefficients": ("single rows, shared", "whole elements, shared"),
 }
-# Methods with one kind of coefficients: of any two, the run with the larger gain is "before".
+# Step -> methods, compared in pairs, from the larger amplification of errors (gain) to the smaller.
 KINDS = {
     "lower gain, shared coefficients": ("deim", "block-deim", "gappy"),
     "lower gain, separate coefficients": ("deim-joint", "published"),
@@ -203,7 +202,7 @@ KINDS = {
 _PLACE = ["scene", "group", "r"]
 VOLUMES = ("deformation_gradient", "tetrahedron_strain", "volume")  # groups on tetrahedra
 MESHES = ALL, SHEETS, BARS = "all", "sheets", "bars"
-# Constructs a column of numbers that summarise many runs; it is compared as shares are.
+# Constructs a column of numbers that summarise many runs, with the tolerance of "share" columns.
 share = partial(number, compared="share")
 
 
@@ -237,10 +236,10 @@ def gain_interventions(
 ) -> pd.DataFrame:
     """One row for each step (change of method that lowers the gain) and kind of mesh.
 
-    A scene and its variant ("twin") form a family, whose results are dependent: the bootstrap
-    resamples families, and the sign test counts families. Errors below the sensitivity floor, by
-    which perturbed runs differ, are raised to it. A run that ended early has an infinite error; two
-    such runs are not compared.
+    The gain is the factor by which sampling amplifies errors. A scene and its variant ("twin") are
+    a family with dependent results: the bootstrap resamples families, the sign test counts them.
+    Errors below the sensitivity floor, by which perturbed runs differ, are raised to it. A run that
+    ended early has an infinite error; two such runs are not compared.
     """
     runs = judged_runs(reruns, reconstruction)
     rows = []
@@ -256,7 +255,7 @@ def gain_interventions(
 def _steps(
     runs: pd.DataFrame, square: pd.DataFrame
 ) -> Iterator[tuple[str, str, str, pd.DataFrame]]:
-    """Yield for each step: name, method before, method after, and table of the compared runs."""
+    """Yield per change of method: name, method before, method after, table of compared runs."""
     for name, methods in STEPS.items():
         yield name, *methods, _pairs(runs, *methods)
     for name, (before, after) in SQUARE.items():
@@ -274,7 +273,7 @@ def _steps(
 
 
 def _square(ladder: pd.DataFrame, runs: pd.DataFrame) -> pd.DataFrame:
-    """Rows "square" of table ladder whose scene, group and size r also occur in ``runs``."""
+    """Rows of table ladder with direction "square" whose scene, group and r occur in ``runs``."""
     chosen = ladder[(ladder.direction == "square") & ladder.gain.notna()]
     chosen = chosen.rename(columns={"rung": "method"})
     error = chosen.relative_error_within_horizon.astype(float).fillna(np.inf)
@@ -283,7 +282,7 @@ def _square(ladder: pd.DataFrame, runs: pd.DataFrame) -> pd.DataFrame:
 
 
 def _pairs(runs: pd.DataFrame, before: str, after: str) -> pd.DataFrame:
-    """Pairs of runs: scene, group, both errors, gain and error of ``after`` over ``before``."""
+    """Pairs of runs by two methods: errors, and ratios ``after`` / ``before`` of gain and error."""
     error = np.maximum(runs.error, runs.sensitivity_floor)
     runs = runs[[*_PLACE, "method", "gain"]].assign(error=error)
     one, other = (runs[runs.method == m].drop(columns="method") for m in (before, after))
@@ -301,7 +300,7 @@ def _summary(pairs: pd.DataFrame) -> Mapping[str, float]:
     by_family = pairs.groupby(families(pairs.scene)).error
     fallen = int((by_family.median() < 1.0).sum())
     values = [own.to_numpy(float) for _, own in by_family]
-    # bootstrap of the median over all values; whole families are drawn with replacement
+    # bootstrap of the median error ratio: families of scenes are drawn with replacement
     drawn = np.random.default_rng(SEED).integers(len(values), size=(RESAMPLES, len(values)))
     medians = [np.median(np.concatenate([values[i] for i in row])) for row in drawn]
     low, high = np.percentile(medians, [2.5, 97.5], method="inverted_cdf")

@@ -55,9 +55,8 @@ def reduced_reruns(
     There is one row per motion, scene, group, method and r. Rows of runs in position subspaces
     follow; all groups are reduced there, and r is the number of evaluated elements. The horizon of
     a scene and motion is the first frame at which perturbed runs differ too much for a comparison.
-    Errors "within the horizon" use earlier frames only; they are empty for a run that blew up
-    before. Rows of the method `PLAYBACK` show how far the recorded training motion is from each
-    held-out one.
+    Errors "within the horizon" use earlier frames only, and are empty for a run that blew up in
+    these. Rows of method `PLAYBACK`: distance of the training recording from a held-out motion.
 
     full_order : files of the full-order runs of all motions
     runs, rows, rows_heldout : HDF5 files of the reduced runs, and their tables in the same order
@@ -88,9 +87,9 @@ def reduced_reruns(
 
 
 def _played(full_order: list[File], ends: Mapping[str, int], motion: str) -> pd.DataFrame:
-    """Errors of the recorded training motion, taken as a run of ``motion``, one row per scene.
+    """Errors if the recorded training motion is played back in place of a run of ``motion``.
 
-    ``ends`` : scene -> its horizon, the frame from which on runs are not compared.
+    One row per scene. ``ends`` : scene -> horizon, the frame from which on runs are not compared.
     """
     runs = {(run["scene"], run["run"]): run for run in full_order}
     rows = []
@@ -108,7 +107,7 @@ def _played(full_order: list[File], ends: Mapping[str, int], motion: str) -> pd.
 
 
 def _judged(run: File, row: File, end: int, motion: str) -> pd.DataFrame:
-    """Rows of file ``row`` for one motion; file ``run`` yields the errors before frame ``end``."""
+    """Table ``row`` for ``motion``, with errors of the runs in ``run`` before frame ``end``."""
     table = read_table(row.path)
     if motion != TRAIN:  # tables of training runs have no column "motion"
         table = table[table.motion == motion]
@@ -128,7 +127,10 @@ def _judged(run: File, row: File, end: int, motion: str) -> pd.DataFrame:
 def _errors(
     runs: Sequence[h5py.Group], reference: Series, end: int, units: Mapping[str, Any]
 ) -> dict[str, list[float | None]]:
-    """Name of an error -> its values before frame ``end``, one per run (None without frames)."""
+    """Name of an error -> its values over frames before ``end``, one per run.
+
+    A value is None if the run ended earlier. ``units`` has values extent_norm, m, and time_step, s.
+    """
     known = {unit: float(units[unit]) for unit in ("extent_norm", "time_step")}
     found = [
         errors_within({series: run[series][...] for series in DEVIATIONS}, reference, end, **known)
@@ -166,7 +168,7 @@ def _with_times(runs: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
 # Possible outcomes of a run.
 OUTCOMES = ("accurate", "wrong", "left the scene", "blow-up", "not run", "not judged")
 SETTING = ["experiment", "scene", "h", "stiffness_ratio"]  # columns that identify a full-order run
-# Fraction of runs on degenerate meshes whose outcome may differ between machines (by rounding).
+# `verify` lets at most this fraction of runs on degenerate meshes end differently (round-off).
 FRAGILE = 0.005
 
 
@@ -199,7 +201,7 @@ def stability(
     departure: float,
     **files: list[File],
 ) -> pd.DataFrame:
-    """Outcomes of the study's reduced runs (experiment "rerun"), then of short runs ("sweep").
+    """Outcomes of reduced runs ("rerun"), then of short runs with other h or stiffness ("sweep").
 
     Method "full" with position basis "full" is the full-order run. The error of a "rerun" row is
     taken over the frames in which perturbed runs still agree, that of a "sweep" row over all.
@@ -218,8 +220,9 @@ def stability(
 def outcomes(runs: pd.DataFrame, wrong: float, departure: float) -> list[str]:
     """Outcome of each run, one of `OUTCOMES`.
 
-    A run is "wrong" if its error exceeds ``wrong``; it "left the scene" if its extent (longest side
-    of the bounding box) exceeds ``departure`` times that of the full-order run.
+    It is the first that fits: "not run", "blow-up", "left the scene" if the extent (longest side of
+    the bounding box) exceeds ``departure`` times the full-order run's, "not judged" if there is no
+    error, "wrong" if the error exceeds ``wrong``, and else "accurate".
     """
     full = runs[(runs.method == "full") & (runs.position_basis == "full")]
     extents = full.set_index(SETTING).max_extent.rename("full_extent")

@@ -78,7 +78,7 @@ def parser() -> argparse.ArgumentParser:
 
 
 def verify(arguments: Sequence[str]) -> Status:
-    """Run the command with the ``arguments`` of the command line; return its exit code.
+    """Run ``./reproduce verify`` with these command-line ``arguments``; return its exit code.
 
     Raises ConfigurationError if the configuration is faulty, or has no expected tables. Raises
     StorageError if a file cannot be read or written, or --update finds tables out of date.
@@ -118,7 +118,7 @@ def verify_tables(subject: Subject) -> Status:
 
 
 def status_of(lines: Iterable[Line]) -> Status:
-    """Exit code: `MISSING` if a result is missing, `DIFFERS` if one differs, else `HOLDS`."""
+    """Return `MISSING` if a result is missing, `DIFFERS` if one differs or is new, else `HOLDS`."""
     outcomes = {line.outcome for line in lines}
     if Outcome.MISSING in outcomes:
         return Status.MISSING

@@ -1,6 +1,6 @@
 """Comparison of a table with its expected version: rows are paired, then cells are compared.
 
-Of the cells that depend on rounding errors (chaotic or ill-conditioned runs), some may differ.
+Cells that depend on rounding errors (chaotic or ill-conditioned runs) may differ in limited number.
 """
 
 from collections import Counter
@@ -22,8 +22,8 @@ FLOOR = 1e-12
 FITTED, OF_WRONG_RUNS = 0.25, 0.3
 # Part of the names of methods whose elements are chosen by a non-negative least-squares fit.
 FITTING = "ecsw"
-# Limits of the gain, by which sampling amplifies errors. Above the first, errors of a run on two
-# processors share few or no digits; above the second, nor do reconstruction errors and gains.
+# Limits of the gain (error amplification by sampling). Above the first, errors of one run on two
+# processors share few or no digits; above the second, so do reconstruction errors and gains.
 OF_RUNS, DIRECT = 1e2, 1e5
 RUNS, SPECTRA, RECONSTRUCTION = "reduced_reruns", "singular_values", "reconstruction_error"
 # A run whose relative error exceeds this value counts as wrong, as in all tables of the study.
@@ -35,17 +35,17 @@ SAMPLES = ("scene", "group", "method", "r")
 RUN = (*SAMPLES, "position_basis", "k")
 # Largest number of cells that describe a row in a message.
 NAMED = 6
-# A small shift of a whole column is reported, too: a share of its cells must differ by less than
-# `CLOSE`, or than 1/`OWN` of the tolerance that the column declares. The share is `MOST` for a
-# column of at least `TEN` errors without a declared tolerance, else `HALF`. In a column of fewer
-# than `LEAST` cells without a declared tolerance, all cells must differ by less than `LONE`.
+# A small shift of a whole column is reported, too: a share of its compared cells must differ by at
+# most `CLOSE` or, if the column declares a tolerance, tolerance / `OWN`. The share is `MOST` if a
+# column of errors has at least `TEN` cells and declares no tolerance, else `HALF`. Fewer than
+# `LEAST` cells must all differ by at most `LONE`; with a declared tolerance they are not checked.
 MOST, HALF, TEN, LEAST = 0.9, 0.5, 10, 3
 CLOSE, OWN, LONE = 1e-5, 50, 0.01
 # Limits for cells that depend on rounding errors: (share of the runs that may differ, relative
 # difference above which a run differs, columns by which the runs are grouped for counting). In each
 # group, a tenth of the runs may differ by more than a factor of 10, and half by more than 2.
 LOOSE = ((0.1, 1 - 1 / 10, ("scene", "noisy_axes", "method")), (0.5, 1 - 1 / 2, ("scene",)))
-# In a text or flag column with a tolerance, at least this number of cells may differ.
+# In a text or flag column with a tolerance, this many cells may differ in tables of any length.
 FEW = 3
 Difference = tuple[float, str]  # (distance of two cells, inf if not a number; text of a message)
 
@@ -96,19 +96,19 @@ def _key(cell: object) -> str:
 
 
 class Context:
-    """Facts from other expected tables that show which rows depend on rounding errors.
+    """Properties of scenes, groups and runs that show which rows depend on rounding errors.
 
     chaotic : scenes whose perturbed runs differ too much for a comparison in their last frames
     modes : (scene, constraint group) -> number of modes above round-off
     gains : cells in the columns `SAMPLES` -> factor by which sampling amplifies errors
-    ended : two sets, from the expected and the found table of runs: runs (cells in the columns
+    ended : two sets, from the expected and the last run's table `RUNS`: runs (cells in the columns
         `RUN`) that have no error because they ended early
     """
 
     def __init__(
         self, tables: Mapping[str, pd.DataFrame], found: pd.DataFrame | None = None
     ) -> None:
-        """Read the facts from expected ``tables``, by name, and the ``found`` table `RUNS`."""
+        """Read expected ``tables``, by name; ``found`` is table `RUNS` of the last run, if any."""
         runs, spectra, errors = (
             tables[name] if name in tables else declared()[name].checked(pd.DataFrame())
             for name in (RUNS, SPECTRA, RECONSTRUCTION)
@@ -124,7 +124,7 @@ class Context:
 
 
 class Comparison:
-    """Comparison of an expected and a found table, cell by cell.
+    """Comparison of an expected table with the table found in the results, cell by cell.
 
     e, f : matching rows of the expected table (e) and of the found table (f), in equal order
     """
@@ -167,7 +167,7 @@ class Comparison:
         }
 
     def _of_round_off(self) -> np.ndarray:
-        """Boolean array: True for rows with r + 1 >= number of modes above round-off."""
+        """True for rows with r + 1 >= the modes above round-off, and all rows of table noise."""
         rows, modes = self.e, self.context.modes
         if "noisy_axes" in rows or not {"scene", "group", "r"} <= set(rows.columns):
             return np.full(len(rows), "noisy_axes" in rows)
@@ -175,7 +175,7 @@ class Comparison:
         return (rows.r >= np.array(most, dtype=float) - 1).fillna(False).to_numpy(dtype=bool)
 
     def _gains(self) -> np.ndarray:
-        """Gain (error amplification by sampling) of each row: the largest known one, else 0."""
+        """Array (rows): largest error amplification in the row or in `Context.gains`; else 0."""
         found = [np.zeros(len(self.e))]
         for column in self.table.columns:
             if column.name.startswith("gain") and column.quantity == "value":
@@ -185,9 +185,9 @@ class Comparison:
         return np.fmax.reduce(found)
 
     def wrong(self, column: Column) -> np.ndarray:
-        """Boolean array: True for cells that get the wider tolerance of errors in wrong runs.
+        """Boolean array (rows): True if cells of ``column`` get the wider tolerance of wrong runs.
 
-        Both the error of the run and the error in the cell of ``column`` must exceed `WRONG`.
+        In the expected table, the error of the run and that in the cell must both exceed `WRONG`.
         """
         judged = [name for name in OF_RUN if name in self.e][:1]
         judged += [column.name] if "error" in column.name else []
@@ -197,10 +197,10 @@ class Comparison:
         return (self.e[judged] > WRONG).all(axis=1).to_numpy(dtype=bool)
 
     def fitted(self) -> np.ndarray:
-        """Boolean array: True for rows of reductions whose samples are chosen by a fit.
+        """Boolean array: True for rows of reductions whose elements a least-squares fit selects.
 
-        In tables without a column ``method``, a column ``tau`` (tolerance of the fit) shows that
-        all rows belong to such reductions.
+        A table without a column ``method`` has only such rows if it has a column ``tau``, the
+        tolerance of this fit; otherwise it has none.
         """
         if "method" not in self.e:
             return np.full(len(self.e), "tau" in self.e)
@@ -222,8 +222,8 @@ class Comparison:
     def apart(self, column: Column) -> np.ndarray:
         """Array (rows) with the distance of the expected and the found cell of ``column``.
 
-        It is the absolute difference for shares, and the difference over the larger number for
-        other numbers. It is 0 for equal cells, inf for unequal texts or if one value is missing.
+        It is the absolute difference for shares, and for other numbers the difference divided by
+        the larger one. It is 0 for equal cells, inf for unequal texts or if one value is missing.
         """
         e, f = self.e[column.name], self.f[column.name]
         numbers = all(pd.api.types.is_numeric_dtype(cells) for cells in (e, f))
@@ -260,7 +260,7 @@ def judge(comparison: Comparison) -> tuple[list[str], str]:
 def _difference(
     where: str, expected: str, found: str, size: float = np.inf, allowed: float = 0.0
 ) -> Difference:
-    """Return ``size`` and text of a difference in the row and column that ``where`` names."""
+    """Return ``size`` of a difference, and its text: place ``where``, values, limit ``allowed``."""
     off = f" (off by {size:.2g}, allowed {allowed:.2g})" if np.isfinite(size) else ""
     return size, f"{where}: expected {expected}, found {found}{off}"
 
@@ -307,7 +307,7 @@ def _cells(comparison: Comparison, column: Column) -> Iterator[Difference]:
 
 
 def _shifted(comparison: Comparison, column: Column, firm: np.ndarray) -> Iterator[Difference]:
-    """Yield a difference if most cells of a column have changed slightly (see `MOST`)."""
+    """Yield a difference if most cells that ``firm`` selects have changed slightly (see `MOST`)."""
     there = (comparison.e[column.name].fillna(0) != 0).to_numpy(dtype=bool)
     cells = firm & there & comparison.compared(column)
     own, count = column.tolerance, cells.sum()
@@ -324,7 +324,7 @@ def _shifted(comparison: Comparison, column: Column, firm: np.ndarray) -> Iterat
 
 
 def _loose(comparison: Comparison, column: Column, cells: np.ndarray) -> Iterator[Difference]:
-    """Yield a difference where more runs differ than `LOOSE` allows.
+    """Yield a difference for each group in which more runs differ than `LOOSE` allows.
 
     Only the given ``cells``, which depend on rounding errors, are counted. A value that is missing
     in one of the two tables counts as a difference. Several cells of one run count once.

@@ -27,7 +27,7 @@ PARTS = {"verdict": ("published", "as published"), "verdict_beyond": ("beyond", 
 
 
 class Outcome(StrEnum):
-    """Outcome of the comparison of one claim, figure or table."""
+    """Result of comparing a claim, figure or table of a run with the expected one in git."""
 
     REPRODUCED = "reproduced"
     DIFFERS = "differs"
@@ -37,7 +37,7 @@ class Outcome(StrEnum):
 
 
 class Line(NamedTuple):
-    """Outcome of one claim, figure or table.
+    """Outcome of comparing one claim, figure or table with the expected one.
 
     kind : claim, figure or table
     text : largest difference with its row and column, or the reason for the outcome
@@ -73,7 +73,7 @@ class Examination:
         self.read, self.again = cache(self._read), cache(self._again)
 
     def lines(self) -> list[Line]:
-        """Outcomes of all claims, figures, tables; a CSV file that is no known table "differs"."""
+        """Outcomes of claims, figures, tables; a CSV file that is no declared table "differs"."""
         tables = {name: self.table(name) for name in declared()}
         figures = [self._figure(job, tables) for job in self.subject.plan.fixed["figures"]]
         folder = Path(TABLE.at(self.subject.results, name="any")).parent
@@ -85,7 +85,7 @@ class Examination:
         return [*self.claims(), *figures, *tables.values(), *strangers]
 
     def found(self, name: str) -> pd.DataFrame:
-        """Return table ``name`` with all declared columns.
+        """Return table ``name`` of the results folder with all declared columns.
 
         Raises StorageError if its file is missing or damaged, or has columns not declared.
         """
@@ -107,7 +107,7 @@ class Examination:
 
     @cached_property
     def context(self) -> compare.Context:
-        """Facts that show which rows depend on rounding errors (see `compare.Context`)."""
+        """Properties that show which rows depend on rounding errors (see `compare.Context`)."""
         tables = {name: reference.frame for name, reference in self.expected.items()}
         try:
             return compare.Context(tables, self.found(compare.RUNS))
@@ -163,7 +163,7 @@ class Examination:
         return line(Outcome.REPRODUCED, compared)
 
     def claims(self) -> list[Line]:
-        """Outcome for each claim: whether the verdicts of this run are the expected ones."""
+        """Outcome of each claim: whether its verdicts equal those of the expected table."""
         line = self.table(CLAIMS)
         try:
             found = self.found(CLAIMS).set_index("claim")
@@ -208,7 +208,7 @@ class Examination:
 
 
 def _claim(name: str, expected: pd.DataFrame, found: pd.DataFrame, decided: pd.DataFrame) -> Line:
-    """Compare verdicts on claim ``name``: expected, found, and computed again (``decided``)."""
+    """Compare verdicts on claim ``name``: expected, found, recomputed from tables (``decided``)."""
     if name not in expected.index or name not in found.index:
         text = "the claim is new" if name in found.index else "the claim is gone"
         return Line("claim", name, Outcome.DIFFERS, text)

@@ -31,7 +31,7 @@ Written by `./reproduce verify --update --reason "..."`, newest last.
 
 
 class Reference(NamedTuple):
-    """Expected table: ``frame`` has all declared columns; its file has only ``columns``."""
+    """Expected table: ``frame`` has all declared columns, its file has only ``columns`` of them."""
 
     frame: pd.DataFrame
     columns: tuple[str, ...]

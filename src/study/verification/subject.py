@@ -31,10 +31,9 @@ class Subject:
 
     @classmethod
     def of(cls, configfiles: Sequence[str], settings: Sequence[str]) -> "Subject":
-        """Return the results of the configuration that ``configfiles`` and ``settings`` define.
+        """Return the results of the configuration that files and ``settings`` (KEY=VALUE) define.
 
         If both are empty, it is the configuration of the last run.
-
         Raises ConfigurationError if a configuration file is missing or is not a mapping.
         """
         files = ["--configfile", *configfiles] if configfiles else []
@@ -55,7 +54,7 @@ class Subject:
 
     @cached_property
     def plan(self) -> Plan:
-        """Plan of the configuration, merged from its files and settings as by Snakemake."""
+        """Plan of the study; configuration files and settings are merged as in Snakemake."""
         # Snakemake is imported only here, so that ``--help`` and argument errors come at once.
         from snakemake.cli import parse_config
         from snakemake.settings.types import ConfigSettings
@@ -78,7 +77,7 @@ def options_parser(command: str, about: str, epilog: str | None = None) -> argpa
 
 
 class Status(IntEnum):
-    """Exit code of a command; code 2 is argparse's code for an unknown option."""
+    """Exit code of ``verify`` and ``bundle``; code 2 is argparse's code for an unknown option."""
 
     HOLDS = 0
     FAULTY = 1

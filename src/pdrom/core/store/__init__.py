@@ -90,8 +90,8 @@ def atomic_path(path: str | os.PathLike[str], with_checksum: bool = True) -> Ite
             os.replace(temporary, target)
             place = checksum_path(target)
             content = place.read_bytes() if place.is_file() else b""
-            if content and Checksum.parse(content).content == content:  # checksum of the old file
-                place.unlink()
+            if content and Checksum.parse(content).content == content:
+                place.unlink()  # checksum of the file that was just replaced
     except OSError as error:
         raise StorageError(f"{target}: cannot be written ({reason(error)})") from error
     finally:
@@ -117,7 +117,7 @@ def require_place(path: str | os.PathLike[str]) -> None:
 
 
 def require_own(path: str | os.PathLike[str]) -> None:
-    """Check that writing to ``path`` would not replace a file from outside this package.
+    """Check that writing to ``path`` would not replace a file that pdrom has not made.
 
     Raises
     ------
@@ -181,7 +181,7 @@ def _rename(temporary: Path, checksum: Path, target: Path) -> None:
 
     If the process is killed in between, the result is missing, or an older one that does not match
     the checksum: the next run makes it again. If the result were renamed first, it would be left
-    without a checksum. If the second renaming fails, the older result keeps its own checksum.
+    without a checksum. If the second renaming fails, the older result gets its checksum back.
     """
     place = checksum_path(target)
     previous = place.read_bytes() if place.is_file() else None
@@ -209,7 +209,7 @@ def read_text(path: str | os.PathLike[str]) -> str:
 
 
 def write_table(table: "pd.DataFrame", path: str | os.PathLike[str]) -> None:
-    """Write ``table`` as CSV to ``path``: floats with 10 digits, an empty cell if missing."""
+    """Write ``table`` as CSV to ``path``: floats with 10 digits, missing values as empty cells."""
     with atomic_path(path) as temporary:
         table.to_csv(temporary, index=False, float_format="%.10g", lineterminator="\n")
 
@@ -244,7 +244,7 @@ def read_table(
 
 
 def require_finite(name: str, array: np.ndarray, error: type[Exception]) -> np.ndarray:
-    """Return ``array``; raise ``error`` with ``name`` and the first entry that is not finite."""
+    """Return ``array`` if finite, else raise ``error`` with ``name`` and the first bad entry."""
     finite = np.isfinite(array)
     if not finite.all():
         first = tuple(int(i) for i in np.argwhere(~finite)[0])
@@ -269,8 +269,8 @@ def write_hdf5(path: str | os.PathLike[str]) -> Iterator[h5py.File]:
 class _Sink:
     """File object for HDF5 that never reports a failed write.
 
-    HDF5 does not survive an error while it writes: it cannot close the file and crashes when the
-    process ends. The first error (no space, say) is stored and all later writes are discarded.
+    After a failed write HDF5 cannot close the file, and it crashes when the process ends. So the
+    first error (no space, say) is stored for `write_hdf5` to raise; later writes are discarded.
     """
 
     def __init__(self, handle: io.FileIO) -> None:
@@ -304,9 +304,7 @@ class _Sink:
 
 @contextmanager
 def open_hdf5(path: str | os.PathLike[str], unchecked: bool = False) -> Iterator[h5py.File]:
-    """Open the HDF5 file ``path`` of the results for reading.
-
-    Its checksum is checked first, so that a damaged file is reported before HDF5 fails on it.
+    """Open the result ``path`` (HDF5) for reading, if it matches its checksum.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
 """Checksums of result files, stored with each file's provenance, and checks of files by them.
 
-An HDF5 file has its checksum in the user block, its first bytes, which readers of HDF5 skip: a
-line that names the format, the checksum of all bytes after the block, and zeros. So a copy of the
-file, in any folder, can be checked for damage before HDF5 reads it.
+An HDF5 file begins with a user block, which readers of HDF5 skip. It consists of a line that names
+its format, the checksum of all bytes after the block, and zeros. So a copy of the file, in any
+folder, can be checked for damage before HDF5 reads it.
 
 Every other result has a hidden checksum file next to it, for ``t.csv`` named ``.t.csv.blake2b``.
 Its last line has the format of the program ``b2sum``: the BLAKE2b digest of the result's bytes and
@@ -32,7 +32,7 @@ _ASIDE: ContextVar[bool] = ContextVar("damaged results are set aside", default=F
 
 @contextmanager
 def damaged_set_aside() -> Iterator[None]:
-    """Context in which a damaged result that is read is renamed to ``NAME.damaged``.
+    """Context in which an attempt to read a damaged result renames it to ``NAME.damaged``.
 
     Only jobs of the workflow use it: the next run makes the missing result again. Other readers
     never rename a file, since it may be a user's only copy of a run.
@@ -103,7 +103,7 @@ def new_checksum(digest: str, name: str) -> Checksum:
 
 
 def is_hdf5(path: Path) -> bool:
-    """Whether suffix or first bytes of ``path`` are those of HDF5, with or without user block."""
+    """Whether ``path`` has a suffix or the signature of HDF5, or the user block of pdrom."""
     with open(path, "rb") as handle:
         head = handle.read(BLOCK + len(_SIGNATURE))
     named = path.suffix in SUFFIXES or head.startswith((_SIGNATURE, _LINE))

@@ -39,9 +39,9 @@ def _lane(number):
 
 
 def _operation(result, *kinds):
-    """Return a decorator of functions ``write(builder, *arguments)`` that generate an LLVM value.
+    """Return a decorator that makes a Numba intrinsic of a function ``write(builder, *arguments)``.
 
-    A decorated function is an intrinsic: its arguments have types ``kinds``, its result ``result``.
+    ``write`` generates an LLVM value of type ``result`` from arguments of the types ``kinds``.
     """
 
     def decorate(write):
@@ -62,7 +62,7 @@ def constant(builder, number):
 
 @_operation(ROW, ROW, ROW)
 def add(builder, a, b):
-    """Sum a + b of two rows."""
+    """Return the row a + b: each of the four numbers of row a plus that of row b."""
     return builder.fadd(a, b)
 
 
@@ -98,7 +98,7 @@ def add_scaled(builder, a, s, b):
 
 @_operation(ROW, ROW, ROW, ROW)
 def add_product(builder, a, b, c):
-    """Sum a + b c of rows a, b and c, lane by lane."""
+    """Return the row with a + b c, computed for each of the four numbers of rows a, b and c."""
     return multiply_add(builder, b, c, a)
 
 
@@ -110,7 +110,7 @@ def square_root(builder, a):
 
 @_operation(ROW, ROW)
 def magnitude(builder, a):
-    """Absolute value of a row, lane by lane."""
+    """Return the row with the absolute value of each of the four numbers of row a."""
     return _call(builder, "fabs", a)
 
 

@@ -2,7 +2,7 @@
 
 `dots` multiplies three matrix rows by a vector, which is read once for all three, and the processor
 prefetches the rows. The order of summation does not depend on the processor: sixteen partial sums
-of a row are reduced to four, these to one, and the remaining terms are then added one by one."""
+of a row are reduced to four and these to one, to which the last terms (at most 15) are added."""
 
 from pdrom.model.compiled import arithmetic
 from pdrom.model.compiled.arithmetic import add, add_product, constant, of_three
@@ -19,8 +19,8 @@ def _summed(a, b, c):
 
 @compiled(forceinline=True)
 def _products(matrix, i, j, k, vector, p, sums):
-    """Return the three rows ``sums``, each plus the products, lane by lane, of entries p to p + 3
-    of one matrix row and of ``vector``."""
+    """Return the three rows ``sums`` plus, lane by lane, the products of entries p to p + 3 of the
+    matrix rows that begin at i, j and k with these entries of ``vector``."""
     v = load(vector, p)
     return (
         add_product(sums[0], load(matrix, i + p), v),

@@ -11,7 +11,7 @@ from numba import cfunc, njit, types
 from numba.extending import intrinsic
 
 _INTEGER = ir.IntType(types.intp.bitwidth)
-KERNELS = ("compiled", "constraints", "dynamics")  # folders whose functions may be inlined
+KERNELS = ("compiled", "constraints", "dynamics")  # folders of pdrom.model with inlined functions
 
 
 @cache
@@ -84,7 +84,7 @@ class Callback:
 
 
 def caller(result):
-    """Return an intrinsic f(address, integers) that calls a `Callback`; f returns a ``result``."""
+    """Return f(address, integers): it passes ``integers`` to a `Callback` of type ``result``."""
 
     def typed(_context, address, arguments):
         def generate(context, builder, _signature, values):

@@ -40,23 +40,23 @@ class _RowModel(models.PrimitiveModel):  # type: ignore[misc]
 
 
 def empty(numbers: int, dtype: type = np.float64) -> np.ndarray:
-    """Return an uninitialised array (numbers,) of ``dtype``, aligned to the size of a row."""
+    """Return an uninitialised array (numbers,) at an address divisible by `ROW_BYTES`."""
     kind = np.dtype(dtype)
     memory = np.empty(numbers * kind.itemsize + ROW_BYTES, np.uint8)
-    # made from a memoryview, so that views of the returned array have this array as their base
+    # the result is made from a memoryview, so that it, and not ``memory``, is the base of its views
     start = -memory.ctypes.data % ROW_BYTES
     return np.frombuffer(memory.data, kind, numbers, start)
 
 
 def zeros(numbers: int) -> np.ndarray:
-    """Return an array (numbers,) of zeros, aligned to the size of a row."""
+    """Return an array (numbers,) of zeros at an address divisible by `ROW_BYTES`."""
     made = empty(numbers)
     made.fill(0.0)
     return made
 
 
 def copied(numbers: np.ndarray) -> np.ndarray:
-    """Return a copy of the flat array ``numbers``, aligned to the size of a row."""
+    """Return a copy of the flat array ``numbers`` at an address divisible by `ROW_BYTES`."""
     made = empty(len(numbers), numbers.dtype.type)
     made[...] = numbers
     return made
@@ -79,14 +79,14 @@ def vertices(count: int) -> np.ndarray:
 
 
 def as_vertices(values: np.ndarray) -> np.ndarray:
-    """Return a copy of ``values`` (N, 3), a view of an array (N, 4) with a last column of zeros."""
+    """Return a copy (N, 3) of ``values``, a view of a new array (N, 4) with a last column of 0."""
     copy = vertices(len(values))
     copy[...] = values
     return copy
 
 
 def flat(values: np.ndarray) -> np.ndarray:
-    """Return ``values`` (N, 3) flat, (4 N,), with a zero after each row; no copy if possible."""
+    """Return ``values`` (N, 3) as (4 N,), a zero after each row: a view if so stored, or a copy."""
     rows = values.base
     if (
         isinstance(rows, np.ndarray)
@@ -108,7 +108,7 @@ def unflat(rows: np.ndarray) -> np.ndarray:
 
 
 def shares(values: np.ndarray, rows: np.ndarray) -> bool:
-    """Return whether ``values`` (N, 3) is a view of ``rows``, which `flat` returned for it."""
+    """Return whether ``rows``, which `flat` returned for ``values`` (N, 3), shares their memory."""
     return len(values) > 0 and _same_start(values, rows)
 
 
@@ -129,7 +129,7 @@ def _place(context, builder, kind, array, index):
 
 @intrinsic
 def at(_context, array, index):
-    """Return array[index], without a bounds check; integers are converted to the index type."""
+    """Return array[index] without a bounds check; an integer entry is converted to intp."""
     result = types.intp if isinstance(array.dtype, types.Integer) else array.dtype
 
     def generate(context, builder, signature, arguments):

@@ -1,6 +1,6 @@
-"""Base classes of constraint groups, with the operator S, the weights W and the projection p.
+"""Base classes of constraint groups, with operator S, weights w_e (matrix W) and projection p.
 
-Energy of a group (Bouaziz et al. 2014, eq. 4): W(q) = 1/2 sum_e w_e || S_e q - p_e(q) ||_F^2.
+Energy of a group (Bouaziz et al. 2014, eq. 4): 1/2 sum_e w_e || S_e q - p_e(q) ||_F^2.
 """
 
 from abc import abstractmethod
@@ -19,7 +19,7 @@ from pdrom.model.effects.base import Effect, EffectConfig
 from pdrom.model.mesh.selection import Selection, select_vertices
 from pdrom.model.mesh.types import Mesh
 
-# Kind of mesh cell that has constraints -> function that returns the vertices of all such cells.
+# Kind of mesh cell that can carry a constraint -> function: vertex indices (c, m) of all c cells.
 CELLS: dict[str, Callable[[Mesh], np.ndarray]] = {
     "vertex": lambda mesh: np.arange(mesh.vertices)[:, None],
     "edge": lambda mesh: mesh.edges(),
@@ -30,16 +30,16 @@ Weight = Annotated[float, Field(gt=0.0, le=1e16, allow_inf_nan=False)]
 
 
 class WeightFactor(ConfigModel):
-    """Factor on the weight of elements all of whose vertices are in a selection."""
+    """A ``factor`` multiplies the weights of the elements whose vertices are all in ``select``."""
 
     select: Selection
     factor: Weight
 
 
 class GroupConfig(EffectConfig):
-    """``weight`` w of a constraint; some kinds multiply it by the element's rest area or volume.
+    """``weight`` w of a constraint; some groups multiply it by the element's rest area or volume.
 
-    ``factors`` multiply the weights of some elements, one factor after the other.
+    Each of ``factors`` multiplies the weights of the elements that it selects.
     """
 
     weight: Weight
@@ -55,7 +55,7 @@ class ConstraintGroup(Effect):
     elements : number e of elements
     rows_per_element : number p of rows of each element's operator
     S : (e p, N) CSR, the unweighted differential operator on N vertices
-    weights : (e,) weights of the elements, including rest area or volume if the kind has it
+    weights : (e,) weights of the elements; some groups multiply them by rest area or volume
     """
 
     rows_per_element: int
@@ -86,7 +86,7 @@ class ConstraintGroup(Effect):
         return CELLS[cls.cells](mesh)
 
     def element_weights(self, mesh: Mesh) -> float | np.ndarray:
-        """Return the weights (e,) of the elements, or one number, without the rest area or volume.
+        """Return weights not yet multiplied by rest area or volume: (e,), or one for all elements.
 
         Raises
         ------
@@ -117,7 +117,8 @@ class ConstraintGroup(Effect):
         return np.repeat(self.weights, self.rows_per_element)
 
     def begin_frame(self, q: np.ndarray, elements: np.ndarray | None = None) -> None:
-        """Compute once-per-frame data at ``q`` (N, 3) m, for ``elements`` (m,) or all if None."""
+        """Compute data that are fixed during a frame, such as normals, at ``q`` (N, 3) m for
+        ``elements`` (m,); None: all."""
 
     def kernel_parameters(self) -> np.ndarray:
         """Return the numbers that ``gradient_kernel`` needs besides S q, in the order it expects.
@@ -214,7 +215,8 @@ class StencilGroup(ConstraintGroup):
 
 
 def require_cells(mesh: Mesh, kind: str, effect: str) -> np.ndarray:
-    """Return the cells of ``kind``; SceneError, naming ``effect``, if ``mesh`` has none."""
+    """Return the cells ``kind`` ("triangles" or "tetrahedra") of ``mesh`` as an int32 array;
+    SceneError if the mesh has none, or if it is a volume mesh and ``kind`` is "triangles"."""
     cells = getattr(mesh, kind)
     if kind == "triangles" and len(mesh.tetrahedra):
         raise SceneError(f"effect '{effect}' needs a surface mesh, this mesh is a volume")

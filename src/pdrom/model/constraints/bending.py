@@ -17,25 +17,25 @@ from pdrom.model.constraints.base import ConstraintGroup, GroupConfig, direction
 from pdrom.model.constraints.local_kernel import FIRST, OWN, VERTICES, LocalKernel
 from pdrom.model.mesh.types import Mesh, barycentric_areas, boundary_edges
 
-# A unit vector's component in the plane of a half sphere's rim is round-off if below this.
+# A unit vector's component in the plane of a half sphere's rim is round-off if shorter than this.
 RIM = 1e-15
-# A unit vector's component in the plane of a half sphere's rim is orthogonal to the normal up to
-# 2e-12 if longer than this. A shorter one has lost digits and is made orthogonal once more.
+# A unit vector's component in the plane of a half sphere's rim, if longer than this, is orthogonal
+# to the vertex normal up to 2e-12. A shorter one has lost digits and is made orthogonal once more.
 NEAR_POLE = 1e-4
 
-# Offsets of an element's weight, curvature at rest (magnitude and vector) and pole (side times
-# normal) among its MANIFOLD packed numbers
+# Offsets of an element's weight, curvature at rest (magnitude and vector) and pole of its half
+# sphere (normal times side +1, -1 or 0) among the MANIFOLD numbers that `lanes.pack` packs for it
 WEIGHT, MAGNITUDE, REST, POLE, MANIFOLD = 0, 1, 2, 5, 8
-# Offsets in the working array, SIZE numbers per lane: curvature, projection p, cosine to the pole
+# Offsets in a working array, SIZE numbers per lane: H(q), projection p, cosine of H's angle to pole
 H, P, HEIGHT, SIZE = 0, 3, 6, 7
-# Indices into a kernel's record: numbers of all elements and of those to project; addresses of the
-# CSR arrays of S, packed numbers, working arrays, elements to project, memory for their numbers.
+# Indices into a kernel's record: number of all elements, of those to project; addresses of the CSR
+# arrays of S, packed numbers, working arrays, elements to project, memory for their packed numbers.
 ELEMENTS, COUNT, START, INDICES, DATA, SPHERES, WORK, SAMPLED, TAKEN, ARRAYS = range(OWN, OWN + 10)
 
 
 @lanes.kernel
 def put_poles(manifold, elements, side, normals):
-    """Write ``side`` (m,) * ``normals`` (m, 3) of ``elements`` to the packed array ``manifold``."""
+    """Write poles, ``side`` (m,) * ``normals`` (m, 3), of ``elements`` to packed ``manifold``."""
     for e in elements:
         place = (e // lanes.LANES * MANIFOLD + POLE) * lanes.LANES + e % lanes.LANES
         lanes.save(
@@ -96,7 +96,7 @@ def _to_rims(work, manifold, first):
         height = work[HEIGHT * lanes.LANES + lane]
         rim, length = _without(unit, height, n)
         again, left = _without(rim, lanes.dot(rim, n), n)
-        # if the component in the plane of the rim is only round-off, take any direction on the rim
+        # if ``rim`` is only round-off, take any direction on the rim (orthogonal to n) instead
         again = lanes.choose(length > RIM and left > 0.5, again, lanes.perpendicular(n))
         rim = lanes.choose(length > NEAR_POLE, rim, again)
         lanes.save(work, P, lane, lanes.choose(height < 0.0, rim, unit))
@@ -104,7 +104,7 @@ def _to_rims(work, manifold, first):
 
 @lanes.lane_function
 def _operator(y_place, record):
-    """Return the positions y and the three arrays of S (CSR) from the addresses in the record."""
+    """Return positions y (at address ``y_place``) and CSR arrays of S that ``record`` points to."""
     entries = rows.indices(record, ARRAYS)
     y = rows.doubles(y_place, WIDTH * entries[VERTICES])
     start = rows.integers(entries[START], entries[ELEMENTS] + 1)
@@ -114,7 +114,7 @@ def _operator(y_place, record):
 
 @lanes.lane_function
 def _spheres(record, part):
-    """Return the packed numbers of all elements and the working array of ``part`` (0 or 1)."""
+    """Return all half spheres and working array ``part`` (0 or 1), at addresses in ``record``."""
     entries = rows.indices(record, ARRAYS)
     return (
         rows.doubles(entries[SPHERES], entries[FIRST + 2] * MANIFOLD * lanes.LANES),
@@ -126,7 +126,7 @@ def _spheres(record, part):
 def project_vertices(y_place, p_place, record, part):
     """Write the projections p (m, 3) of the m elements that the ``record`` lists; return 0.
 
-    ``y_place``, ``p_place``, ``record`` are addresses; ``part`` selects the working array.
+    ``y_place``, ``p_place``, ``record`` are addresses; ``part`` (0 or 1) selects a working array.
     """
     y, start, indices, data = _operator(y_place, record)
     manifold, work = _spheres(record, part)
@@ -151,7 +151,7 @@ def project_vertices(y_place, p_place, record, part):
 
 @kernels.local_kernel
 def accumulate_vertices(y_place, rhs_place, record, part):
-    """Add S^T W p of the blocks of a ``part`` to the right-hand side; return their energy in J.
+    """Add S^T W p of the blocks of ``part`` (0 or 1) to the right-hand side; return the energy, J.
 
     ``y_place``, ``rhs_place``, ``record`` are addresses of positions, right-hand side and record.
     """
@@ -189,9 +189,9 @@ def accumulate_vertices(y_place, rhs_place, record, part):
 
 @kernels.gradient_kernel
 def project_gradients(d_pointer, manifold_pointer, p_pointer, m):
-    """Write the projections p (m, 3) of the curvature vectors S q (m, 3) onto the half spheres.
+    """Project the curvature vectors S q (m, 3) onto half spheres (`VertexBending`): write p (m, 3).
 
-    The first three arguments are pointers to S q, to the packed numbers and to p.
+    The first three arguments are pointers to S q, to the numbers from `lanes.pack`, and to p.
     """
     d, p = carray(d_pointer, (m, 3)), carray(p_pointer, (m, 3))
     blocks = (m + lanes.LANES - 1) // lanes.LANES
@@ -346,7 +346,7 @@ class VertexBending(ConstraintGroup):
         return interior_vertices(mesh.triangles, mesh.vertices)[:, None]
 
     def begin_frame(self, q: np.ndarray, elements: np.ndarray | None = None) -> None:
-        """Compute normals at ``q`` (N, 3) m for all curved elements or those in ``elements``."""
+        """Compute normals at ``q`` (N, 3) m for those ``elements`` (None: all) not flat at rest."""
         curved = self._curved
         if elements is not None:
             curved = elements[self.side[elements] != 0.0]
@@ -360,7 +360,8 @@ class VertexBending(ConstraintGroup):
         return self._kernel(project_vertices, elements)
 
     def _kernel(self, function: Any, elements: np.ndarray, touched: Any = None) -> LocalKernel:
-        """Return the kernel of a function that projects ``elements`` or adds the forces of all."""
+        """Return a `LocalKernel` with a ``function`` that either writes the projections of
+        ``elements`` or adds the forces of all elements; for ``touched``, see `LocalKernel`."""
         operator = self.S.indptr, self.S.indices, self.S.data
         arrays = (*operator, self._manifold, self._work, elements, self._taken)
         numbers, count = (self.elements, len(elements)), lanes.blocks(self.elements)

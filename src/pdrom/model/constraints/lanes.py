@@ -55,9 +55,10 @@ def workspaces(numbers: int) -> np.ndarray:
 
 @lane_function
 def take(packed, numbers, elements, start, out):
-    """Copy the packed numbers of a block of ``elements``, from index ``start`` on, to ``out``.
+    """Copy the packed numbers of ``elements[start:start + LANES]`` to the block ``out``.
 
-    ``packed``, from `pack`, has k = ``numbers`` per element. Copies of the last one fill the block.
+    ``packed``, from `pack`, has k = ``numbers`` per element. If fewer than `LANES` elements are
+    left, copies of the last one fill the block.
     """
     last = elements.shape[0] - 1
     for lane in range(LANES):

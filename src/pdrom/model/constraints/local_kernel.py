@@ -2,8 +2,9 @@
 
 A local kernel reads its data from a record (an array of addresses and numbers), so that one loop
 can call any combination of constraint groups and reduced local steps. The units of work (blocks of
-elements or rows) of a large local step are divided into two fixed parts. The first part adds to the
-right-hand side, the second to a separate array that is added afterwards.
+elements or rows) of a large local step are divided into two parts, which were made for two threads
+(docs/decisions/0018-what-was-given-up.md) and now run one after the other. The first part adds to
+the right-hand side, the second to a separate array that is added afterwards.
 """
 
 from collections.abc import Callable, Sequence
@@ -14,10 +15,10 @@ from numba import types
 from pdrom.model.compiled import rows
 from pdrom.model.compiled.functions import Callback, caller, compiled, inner
 
-# Indices into every record: the number of vertices; at FIRST + k the first unit of part k, and at
-# FIRST + k + 1 the end of its units. Entries that differ between kernels begin at OWN.
+# Indices into every kernel's record. VERTICES: number of vertices; FIRST + k: first unit of work of
+# part k, which ends before the unit at FIRST + k + 1; OWN: first entry specific to a kernel.
 VERTICES, FIRST, OWN = 0, 1, 4
-# Values of a kernel's argument `part`: do the first or second part, or prepare data for both.
+# Values of a kernel's argument `part`: do part 0 or 1 of its work, or prepare data for both parts.
 PARTS, PREPARE = (0, 1), 2
 
 Table = tuple[np.ndarray, np.ndarray, int]
@@ -29,9 +30,9 @@ _SIGNATURE = types.float64(types.intp, types.intp, types.intp, types.intp)
 def local_kernel(function):
     """Compile ``function(y, rhs, record, part) -> energy``; y, rhs and record are addresses.
 
-    y, rhs : (N, 4), a column of zeros last; S^T W p(y) of the units of the part is added to rhs
+    y, rhs : (N, 4), a column of zeros last; S^T W p(y) of the part's units of work is added to rhs
     record : int64 array with the data of the kernel, see `VERTICES`, `FIRST`, `OWN`
-    part : one of `PARTS`, or `PREPARE`
+    part : one of the two `PARTS` of the work, or `PREPARE`: only prepare data for both
     """
     return Callback(function, _SIGNATURE)
 
@@ -47,7 +48,7 @@ def call(address, y, rhs, record, part):
 
 @compiled(nogil=True)
 def add_part(table, y, rhs):
-    """Call all kernels of a `Table`, each of which adds to ``rhs``; return the sum of energies, J.
+    """Call each kernel of a `Table` with the table's ``part``; add to ``rhs``; return energy, J.
 
     ``y`` and ``rhs`` are addresses of arrays (N, 4) with a last column of zeros.
     """
@@ -64,15 +65,15 @@ class LocalKernel:
     Parameters
     ----------
     function : result of `local_kernel`; it is compiled when its address is first needed
-    vertices, units : number of vertices and number of units (blocks of elements or rows)
+    vertices, units : number of vertices; number of units of work (blocks of elements or rows)
     arrays, numbers : the record contains, from `OWN` on, the numbers and the arrays' addresses
-    touched : function that maps a unit's number to the vertices of this and all later units; a
-        kernel with this function is divided into two parts, a kernel without it has one part
+    touched : function that maps the index of a unit to the vertices to which it and all later units
+        add; with it, units are divided into two parts (see the module), without it there is one
     prepares : whether the kernel must be called with `PREPARE` before its parts
 
     Attributes
     ----------
-    record : int64 array; the ``arrays`` to which it points exist as long as this object
+    record : int64 array that is passed to the function; the object keeps the ``arrays`` alive
     touched : range of vertices to which the second part adds; empty without a second part
     """
 
@@ -118,7 +119,8 @@ class LocalPass:
 
     Attributes
     ----------
-    first, second, preparing : tables for `add_part`: first parts, second parts, preparation
+    first, second, preparing : tables by which `add_part` calls kernels for the first part of their
+        units of work, for the second part (see the module), or to prepare data for both
     """
 
     def __init__(self, kernels: Sequence[LocalKernel]) -> None:
@@ -182,8 +184,6 @@ def gradient_kernel(function):
 
 @inner(forceinline=True)
 def call_gradients(address, d, parameters, p, m):
-    """Call a gradient kernel by its ``address``.
-
-    ``d`` (S q of ``m`` elements), ``parameters`` of the group, ``p`` (projections) are addresses.
-    """
+    """Call the result of `gradient_kernel` at ``address`` for ``m`` elements; ``d``, ``parameters``
+    and ``p`` are addresses of S q, of the parameters, and of the projections to be written."""
     _call_gradients(address, (d, parameters, p, m))

@@ -10,7 +10,7 @@ If the product of the s_i is below c, there is one solution. If it is far above 
 times for three equal values), there are several: that with the largest t shrinks all values, that
 with the smallest t mainly the last one. As f is convex near the largest and concave near the
 smallest t, Newton's iteration converges monotonically to the largest from above and to the smallest
-from below; the nearer is the result. Bouaziz et al. 2014, appendix A, start only from s.
+from below; the nearer to the s_i is the result. Bouaziz et al. 2014, app. A, start from s_i only.
 
 Values are divided by the larger of s_1 and c^(1/3), so that neither huge nor tiny ones overflow.
 """
@@ -19,18 +19,18 @@ import numpy as np
 
 from pdrom.model.constraints.lanes import LANES, SMALLEST, lane_function, load, save
 
-# offsets in the working array: the values (input, then result), and intermediate numbers
+# offsets in the working array: singular values (input, then result) and intermediate numbers
 VALUES, SCALE, TARGET, LARGEST, LEAST, MARK, SIZE = 0, 3, 4, 5, 6, 7, 8
 STEPS = 60
 # state of one element: still iterating; converged or diverged; its product was already in the range
 _OPEN, _CLOSED, _INSIDE = 1.0, 0.0, 2.0
-# Newton steps below LAST_STEP * t and residuals of f below ROUNDOFF * c are round-off
+# round-off (symbols: see top): Newton steps of t up to LAST_STEP * t, |f(t)| up to ROUNDOFF * c
 LAST_STEP, ROUNDOFF = 1e-15, 1e-10
 
 
 @lane_function
 def _partner(t, s, last):
-    """Return the larger root x of x (x - s) = t (t - last) and dx/dt; ``last`` is s_3."""
+    """Return t_i(t), the larger root x of x (x - s_i) = t (t - s_3), and dx/dt; ``last``: s_3."""
     square = s * s + 4.0 * t * (t - last)
     root = np.sqrt(square if square > 0.0 else 0.0)
     return 0.5 * (s + root), (2.0 * t - last) / root if root > 0.0 else 1.0
@@ -38,7 +38,7 @@ def _partner(t, s, last):
 
 @lane_function
 def _product(t, values, solid):
-    """Return t t_1(t) t_2(t), its derivative by t, t_1(t) and t_2(t) (= 1 if not ``solid``)."""
+    """Return t t_1 t_2 for ``values`` s_i, its derivative by t, t_1, t_2 (1 if not ``solid``)."""
     first, first_slope = _partner(t, values[0], values[2])
     second, second_slope = _partner(t, values[1], values[2])
     second = second if solid else 1.0
@@ -49,7 +49,7 @@ def _product(t, values, solid):
 
 @lane_function
 def _start(work, low, high, solid):
-    """Scale values, set starting points; return how many elements may have several solutions."""
+    """Scale singular values, set initial t; return how many elements may have several solutions."""
     low_root = low ** (1.0 / 3.0) if solid else np.sqrt(low)
     high_root = high ** (1.0 / 3.0) if solid else np.sqrt(high)
     several = 0.0
@@ -61,10 +61,10 @@ def _start(work, low, high, solid):
         scale = s[0] if s[0] > root else root
         inverse = 1.0 / scale
         target = bound * inverse * inverse * (inverse if solid else 1.0)
-        # raise a tiny target to SMALLEST: it is negligible compared with the scaled values
+        # raise a tiny target to SMALLEST, negligible compared with the scaled singular values
         target = target if target > SMALLEST else SMALLEST
         first, second = s[0] * inverse, s[1] * inverse if solid else 1.0
-        # bounds on t if the values must grow: t_1 >= s_1, t_2 >= s_2, t_1 >= t_2 >= t
+        # bounds on t = t_3 if the s_i must grow: t_1 >= s_1, t_2 >= s_2, t_1 >= t_2 >= t
         least = target / (first * second)
         largest = root * inverse
         other = np.sqrt(target / first) if solid else least
@@ -83,7 +83,8 @@ def _start(work, low, high, solid):
 
 @lane_function
 def _advance(work, place, side, solid):
-    """Do a Newton step from above (side 1) or below (-1); return how many elements need more."""
+    """Do a Newton step for t (offset ``place``) of each element in the block, from above (``side``
+    1) or below (-1); return how many elements need another."""
     left = 0.0
     for lane in range(LANES):
         t, target = work[place * LANES + lane], work[TARGET * LANES + lane]
@@ -103,7 +104,7 @@ def _advance(work, place, side, solid):
 
 @lane_function
 def _distance(t, values, target, solid):
-    """Return the squared distance of s from (t_1(t), t_2(t), t); inf if t is no solution."""
+    """Squared distance of ``values`` from (t_1, t_2, t); inf unless t_1 t_2 t = ``target``."""
     product, _, first, second = _product(t, values, solid)
     m = t * (t - values[2])
     a, b = m / (first + SMALLEST), m / (second + SMALLEST) if solid else 0.0
@@ -113,7 +114,7 @@ def _distance(t, values, target, solid):
 
 @lane_function
 def _finish(work, solid):
-    """Write the nearer of two solutions, in the original scale, to the values in ``work``."""
+    """Write each element's nearest values, by the nearer solution t, unscaled, to `VALUES`."""
     for lane in range(LANES):
         values, target = load(work, VALUES, lane), work[TARGET * LANES + lane]
         t, other = work[LARGEST * LANES + lane], work[LEAST * LANES + lane]
@@ -140,17 +141,15 @@ def nearest_block(work, low, high, solid):
     Parameters
     ----------
     work : `SIZE` numbers per lane; at `VALUES` s_1 >= s_2 >= |s_3|, or for areas s_1, 1, s_3 with
-        s_1 >= s_3 >= 0, where the 1 is not changed
+        s_1 >= s_3 >= 0, where the 1 is not changed; values that are not finite give nan
     solid : whether there are three values (volume) instead of two (area)
-
-    Values that are not finite give nan.
     """
     several = _start(work, low, high, solid)
     for _ in range(STEPS):
         if _advance(work, LARGEST, 1.0, solid) == 0.0:
             break
     if several > 0.0:
-        # for elements that may have a second solution, iterate again, from below
+        # elements that may have a second solution t: iterate again, from below it
         for lane in range(LANES):
             mark = work[MARK * LANES + lane]
             again = mark == _CLOSED and work[LEAST * LANES + lane] > 0.0
@@ -162,13 +161,9 @@ def nearest_block(work, low, high, solid):
 
 
 def reference_nearest(values: np.ndarray, low: float, high: float) -> np.ndarray:
-    """Return the nearest values (e, 2 or 3) with a product in a range, by bisection with NumPy.
+    """Return the nearest values (e, 2 or 3) with a product in [low, high], by bisection with NumPy.
 
     If several solutions are possible, each is bracketed on a grid, and the nearest is returned.
-
-    Parameters
-    ----------
-    low, high : least and largest allowed product
     """
     product = values.prod(axis=1)
     bound = np.clip(product, low, high)
@@ -192,7 +187,7 @@ def _values_at(t: np.ndarray, values: np.ndarray) -> np.ndarray:
 def _bisected(
     below: np.ndarray, above: np.ndarray, values: np.ndarray, target: np.ndarray
 ) -> np.ndarray:
-    """Return values with product ``target``, by bisection of t from ``below`` to ``above`` (n,)."""
+    """Return `_values_at` t with product ``target``; bisect t from ``below`` to ``above`` (n,)."""
     for _ in range(120):
         middle = 0.5 * (below + above)
         small = _values_at(middle, values).prod(axis=1) < target
@@ -205,7 +200,7 @@ def _nearest_of_several(values: np.ndarray, target: float) -> np.ndarray:
     smallest = min(target / values[:-1].prod(), last)
     grid = np.union1d(np.geomspace(smallest, last, 500), np.linspace(smallest, last, 500))
     same = np.tile(values, (len(grid), 1))
-    # no solution is smaller than the first grid point, up to round-off
+    # up to round-off, no solution t is smaller than grid[0]: the product there is too small
     small = _values_at(grid, same).prod(axis=1) < target
     small[0] = True
     crossed = np.flatnonzero(small[:-1] & ~small[1:])

@@ -28,7 +28,8 @@ EDGE, F, P, FORCE, ENERGY, SIZE = 0, 9, 18, 27, 36, 37
 # offsets in the packed geometry: weight, then the operator or other numbers of an element
 WEIGHT, OPERATOR = 0, 1
 # Indices into a kernel's record: size of a working array, number of elements to project; addresses
-# of corners, geometry, constants, working arrays, elements to project, their corners and geometry.
+# of corners, geometry, constants, working arrays, elements to project, memory for a block's corners
+# and memory for its geometry.
 WORK_SIZE, COUNT, CORNERS, GEOMETRY, CONSTANTS, WORK, ELEMENTS = range(OWN, OWN + 7)
 TAKEN, TAKEN_GEOMETRY, ARRAYS = range(OWN + 7, OWN + 10)
 
@@ -36,7 +37,7 @@ TAKEN, TAKEN_GEOMETRY, ARRAYS = range(OWN + 7, OWN + 10)
 class SimplexGroup(StencilGroup):
     """A group of simplices whose kernels work on packed blocks of elements.
 
-    A subclass sets two kernels. It overrides `_extra` if it stores other numbers than operators.
+    A subclass sets two kernels. It overrides `_extra` if they do not read the operator S_e.
 
     accumulate_kernel : a `pdrom.model.constraints.local_kernel.local_kernel` whose units are blocks
     project_kernel : local kernel that writes projections of the elements that its record lists
@@ -80,7 +81,8 @@ class SimplexGroup(StencilGroup):
         return self._kernel(self.project_kernel, places)
 
     def _kernel(self, function: Any, elements: np.ndarray, touched: Any = None) -> LocalKernel:
-        """Return the kernel of a function that projects ``elements`` or adds the forces of all."""
+        """Return a `LocalKernel` with a ``function`` that either writes the projections of
+        ``elements`` or adds the forces of all elements; for ``touched``, see `LocalKernel`."""
         data = (self._corners, self._geometry, np.array(self.allowed), self._work)
         arrays = (*data, elements, *self._taken, *self._own_arrays)
         numbers = self._work.shape[1], len(elements)
@@ -88,13 +90,13 @@ class SimplexGroup(StencilGroup):
         return LocalKernel(function, self.S.shape[1], count, arrays, numbers, touched)
 
     def _extra(self) -> list[np.ndarray]:
-        """Return the numbers packed after each weight: the operator without corner 0's column."""
+        """Return arrays (e, n) to pack after the weights: S_e without the column of corner 0."""
         return [self.operator[:, :, 1:].reshape(self.elements, self.rows_per_element**2)]
 
 
 @lane_function
 def arguments(y, rhs, record, part, corners, numbers):
-    """Return arrays y, rhs, corners, geometry, constants, work; first block and end of ``part``.
+    """Return arrays y, rhs, corners, geometry, constants, work; ``part``'s first block and end.
 
     ``y``, ``rhs`` and ``record`` are the addresses that a `local_kernel` gets. An element has
     ``corners`` vertices and ``numbers`` packed numbers.
@@ -117,10 +119,10 @@ def arguments(y, rhs, record, part, corners, numbers):
 
 @lane_function
 def samples(record, corners, numbers):
-    """Return the elements to project, from a ``record``, and memory for their corners and geometry.
+    """Return three arrays of a kernel's ``record``: elements to project, corners, and geometry.
 
-    The memory is for one block, see `pdrom.model.constraints.lanes.take`, with ``corners`` vertices
-    and ``numbers`` packed numbers per element.
+    The last two are memory for one block of elements, see `pdrom.model.constraints.lanes.take`,
+    with ``corners`` vertices and ``numbers`` packed numbers per element.
     """
     entries = rows.indices(record, ARRAYS)
     return (
@@ -143,7 +145,7 @@ def corner_rows(y, corners, place):
 
 @lane_function
 def edge_columns(start, end):
-    """Return rows with x, y, z, padding of four edges, from vertex rows ``start`` to ``end``."""
+    """Return four rows: x, y, z and padding of four edges from vertices ``start`` to ``end``."""
     return transposed(
         subtract(end[0], start[0]),
         subtract(end[1], start[1]),
@@ -169,7 +171,8 @@ def gather_edges(y, corners, block, edges, work):
 
 @lane_function
 def copy_rows(d, count, start, work, first):
-    """Copy a block of S q from element ``start`` of ``d`` (m count, 3) to ``first`` in ``work``."""
+    """Copy a block of S q to ``work`` at offset ``first``: the elements from ``start`` on of
+    ``d`` (m count, 3), in which each of m elements has ``count`` rows."""
     last = d.shape[0] // count - 1
     for lane in range(LANES):
         base = count * min(start + lane, last)
@@ -215,18 +218,16 @@ def scatter(work, corners, block, edges, rhs):
 
 @lane_function
 def store_projections(work, count, start, p):
-    """Copy the projections of a block, in ``work``, to ``p`` from element ``start`` on.
-
-    p : flat array with three numbers per row and ``count`` rows per element
-    """
+    """Copy the projections of a block, in ``work``, to the flat array ``p`` from element ``start``
+    on; each element has ``count`` rows of three numbers."""
     for lane in range(min(LANES, len(p) // (3 * count) - start)):
         for i in range(count):
             at_p = 3 * (count * (start + lane) + i)
             p[at_p], p[at_p + 1], p[at_p + 2] = load(work, P + 3 * i, lane)
 
 
-# Elements are visited in the order of the mesh if its blocks have at most KEPT times as many
-# vertices as blocks in the sorted order, which is true of grids.
+# Kernels visit elements in mesh order if blocks of `LANES` elements then have at most KEPT times
+# as many vertices as blocks in the order of `visiting_order`, which is true of grids.
 KEPT = 1.5
 
 

@@ -54,13 +54,13 @@ def project(y_place, p_place, record, part, rows, gradients, nearest):
 
 @template
 def accumulate(y_place, rhs_place, record, part, rows, gradients, nearest, forces):
-    """Add S^T W p of all blocks of a ``part`` to the right-hand side; return their energy in J.
+    """Add S^T W p of all elements in a ``part`` to the right-hand side; return their energy in J.
 
     Parameters
     ----------
-    y_place, rhs_place, record : addresses of positions, right-hand side and record
+    y_place, rhs_place, record : addresses of positions, right-hand side and record of a kernel
     rows : number of rows of S_e
-    gradients, nearest, forces : functions of a block, which compute S q, p and the forces
+    gradients, nearest, forces : functions of a block of elements; they compute S q, p, the forces
     """
     y, rhs, corners, geometry, allowed, work, first, last = simplex.arguments(
         y_place, rhs_place, record, part, rows + 1, 1 + rows * rows
@@ -82,13 +82,13 @@ def accumulate(y_place, rhs_place, record, part, rows, gradients, nearest, force
 
 @template
 def project_gradients(d_pointer, range_pointer, p_pointer, m, rows, work_size, nearest):
-    """Write projections of m elements from S q; the working array has ``work_size`` numbers a lane.
+    """Write projections of m elements; the working array has ``work_size`` numbers an element.
 
     Parameters
     ----------
-    d_pointer, p_pointer : pointers to S q and to the projections, both (rows m, 3)
-    range_pointer : pointer to the least and the largest allowed value
-    nearest : function of a block, which computes the projections
+    d_pointer, p_pointer : pointers to deformation gradients S q, and to projections: (rows m, 3)
+    range_pointer : pointer to the least and the largest allowed singular value, or product of them
+    nearest : function that computes the projections of a block of elements in the working array
     """
     d, p = carray(d_pointer, (rows * m, 3)), carray(p_pointer, (3 * rows * m,))
     allowed = carray(range_pointer, (2,))
@@ -100,7 +100,7 @@ def project_gradients(d_pointer, range_pointer, p_pointer, m, rows, work_size, n
 
 
 class StrainConfig(GroupConfig):
-    """Range [``minimum`` > 0, ``maximum``] of singular values, or of area or volume ratios."""
+    """Allowed range [``minimum``, ``maximum``]: singular values, or area or volume / rest value."""
 
     minimum: Annotated[float, Field(gt=0.0, le=1.0)] = 0.99
     maximum: Annotated[float, Field(ge=1.0, le=1e3)] = 1.01
@@ -113,7 +113,7 @@ class StrainConfig(GroupConfig):
 
 
 class SingularValueGroup(simplex.SimplexGroup):
-    """Group on triangles or tetrahedra that projects F by its singular values."""
+    """Group on triangles or tetrahedra that projects F by changing only its singular values."""
 
     manifold = "clamped"
 
@@ -123,7 +123,7 @@ class SingularValueGroup(simplex.SimplexGroup):
         return self.config.minimum, self.config.maximum
 
     def _set_up(self, mesh: Mesh, inverse: np.ndarray) -> None:
-        """Set the operator from the inverse rest edge matrices D^-1 (e, p, p)."""
+        """Set the matrices S_e, which yield F^T, from inverse rest edge matrices D^-1 (e, p, p)."""
         # F = [q_1 - q_0, ..., q_p - q_0] D^-1, hence F^T = D^-T [q_1 - q_0; ...; q_p - q_0]
         transposed = inverse.transpose(0, 2, 1)
         self.operator = np.concatenate([-transposed.sum(axis=2, keepdims=True), transposed], axis=2)
@@ -135,12 +135,12 @@ class SingularValueGroup(simplex.SimplexGroup):
     def reference_project(self, d: np.ndarray, elements: np.ndarray) -> np.ndarray:
         u, sigma, vt = np.linalg.svd(d, full_matrices=False)
         if self.rows_per_element == 3:
-            # the smallest singular value gets the sign of the determinant
+            # the smallest singular value gets the sign of det F
             turned = np.sign(np.linalg.det(u) * np.linalg.det(vt))
             sigma[:, 2] *= turned
             u[:, :, 2] *= turned[:, None]
         return (u * self._reference_values(sigma)[:, None, :]) @ vt
 
     def _reference_values(self, sigma: np.ndarray) -> np.ndarray:
-        """Return the singular values (e, p) of the projections, which are signed for tetrahedra."""
+        """Singular values (e, p) of projections from those of F, the last with a sign if p = 3."""
         return np.clip(sigma, *self.allowed)

@@ -14,10 +14,10 @@ from pdrom.model.constraints.lanes import LANES, SMALLEST, lane_function, pack, 
 from pdrom.model.constraints.local_kernel import gradient_kernel, local_kernel
 from pdrom.model.mesh.types import Mesh
 
-# an edge has GEOMETRY packed numbers (weight; rest length at LENGTH) and REST of its rest vector
+# numbers packed per edge: GEOMETRY (weight, rest length at LENGTH) and REST (x, y, z at rest)
 LENGTH, GEOMETRY = 1, 2
 REST = 3
-# further indices into the record: addresses of all rest edges, and of memory for a block of them
+# indices into a kernel's record, of two addresses: all rest edges, memory for a block of them
 REST_EDGES, TAKEN_REST = simplex.ARRAYS, simplex.ARRAYS + 1
 # squared lengths in this range neither overflow nor lose digits
 LOW, HIGH = 1e-280, 1e280
@@ -30,7 +30,7 @@ def _squares(x, y, z):
 
 @lane_function
 def _rest_lengths(x, y, z, length, rest, place):
-    """Return four edges scaled to their rest ``length``; edges of length zero get rest edges."""
+    """Scale four edges x, y, z to rest ``length``; one of length zero becomes its ``rest`` edge."""
     square = _squares(x, y, z)
     factor = divide(length, arithmetic.square_root(square))
     px, py, pz = multiply(factor, x), multiply(factor, y), multiply(factor, z)
@@ -53,7 +53,7 @@ def _rest_lengths(x, y, z, length, rest, place):
 
 @lane_function
 def _project_block(work, geometry, geometry_block, rest, rest_block):
-    """Write the projections of the edges in ``work`` to ``work``."""
+    """Project the block of edges in ``work``; write p to ``work``; ``rest`` has edges at rest."""
     for lane in range(0, LANES, WIDTH):
         edge, p = simplex.EDGE * LANES + lane, simplex.P * LANES + lane
         px, py, pz = _rest_lengths(
@@ -145,7 +145,7 @@ class EdgeSpring(simplex.SimplexGroup):
     unit = "m"
     rows_per_element = 1
     per_element = ("rest",)
-    reordered = False  # edges are sorted by vertices already, and all cost the same
+    reordered = False  # the edges of a mesh are sorted by their vertices already
     split_from = 8192
     project_kernel = _project
     accumulate_kernel = _accumulate

@@ -12,13 +12,12 @@ from pdrom.model.constraints import lanes, simplex
 from pdrom.model.constraints.lanes import LANES, absolute_sum, choose, dot, load, mix, save, scaled
 
 SWEEPS = 12
-# two columns count as orthogonal if the cosine of their angle is smaller
+# two columns count as orthogonal if the cosine of their angle is below this
 ORTHOGONAL = 1e-15
-# a sweep is the last one if all its rotations have a smaller tangent (then cosines are ~1e-16)
+# a sweep is the last if all its rotations have a tangent below this: columns are then orthogonal
 LAST_TANGENT = 1e-8
 # a second singular value below this fraction of the first is round-off: its vector is replaced
 RANK = 1e-15
-
 
 # further offsets in the working array: B, V, scale, DONE (1: columns are orthogonal), the signed
 # singular values, FOUND (1: a cheaper method has already computed this lane's projection)
@@ -66,7 +65,7 @@ def _sweep(work):
 
 @lanes.lane_function
 def _larger_first(a, v, b, w):
-    """Return (a, v, b, w), or (b, w, -a, -v) if column b of B is longer than column a.
+    """Return (a, v, b, w), or (b, w, -a, -v) if column b of B = F V is longer than column a.
 
     v and w are the columns of V that belong to a and b. Due to the sign, V stays a rotation.
     """
@@ -87,7 +86,7 @@ def orthonormal_pair(b0, b1):
     """
     s0 = np.sqrt(dot(b0, b0))
     u0 = choose(s0 > 0.0, scaled(1.0 / s0, b0), (1.0, 0.0, 0.0))
-    # remove the round-off along the long column, which would change the direction of the short one
+    # remove the round-off of b1 along b0, which would change the direction of the shorter column b1
     b1 = mix(1.0, b1, -dot(u0, b1), u0)
     s1 = np.sqrt(dot(b1, b1))
     u1 = choose(s1 > RANK * s0, scaled(1.0 / s1, b1), lanes.perpendicular(u0))
@@ -98,9 +97,9 @@ def orthonormal_pair(b0, b1):
 def rotated_pair(f0, f1, sign):
     """Singular value decomposition of two columns by one rotation, without forming F^T F.
 
-    Return a scale, cosine and sine of the rotation, whether the rotated columns were swapped since
-    the second is longer, and their directions and norms (over the scale), longer column first. If
-    they are swapped, the first column is multiplied by ``sign``.
+    Return the scale by which columns are divided, cosine and sine of the rotation, whether rotated
+    columns were swapped since the second is longer, and their directions and norms (divided by the
+    scale), longer column first. If they were swapped, the shorter one is multiplied by ``sign``.
     """
     scale = absolute_sum(f0) + absolute_sum(f1) + lanes.SMALLEST
     f0, f1 = scaled(1.0 / scale, f0), scaled(1.0 / scale, f1)

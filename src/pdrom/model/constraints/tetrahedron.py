@@ -1,8 +1,8 @@
 """Groups on tetrahedra: operator S q = F^T (deformation gradient) and kernels that project F.
 
-The iteration X <- (X + X^-T) / 2 converges quadratically to the orthogonal polar factor (Higham
-1986). It is used for well-conditioned matrices with positive determinant, the decomposition of
-module `svd3` for others. A matrix with all singular values in the range is its own projection.
+If F is well-conditioned and det F > 0, the iteration X <- (X + X^-T) / 2 from X = F converges
+quadratically to the nearest rotation (Higham 1986). Module `svd3` decomposes any other F. If all
+singular values of F are in the allowed range, F is its own projection.
 """
 
 from typing import Literal
@@ -19,10 +19,10 @@ from pdrom.model.constraints.svd3 import FOUND
 from pdrom.model.mesh.types import Mesh
 
 STEPS = 16
-# the SVD is used if det F over the cube of the root mean square of the singular values is below
-# this
+# the SVD replaces the iteration if det F, divided by the cube of the root mean square of the
+# singular values of F, is below this
 WELL_CONDITIONED = 1e-2
-# the iteration ends if the squared norm of a step is below this: the error left is about 1e-18
+# the iteration ends after a step s if |s|^2, about the error of its result, is below this
 LAST_STEP = 1e-18
 
 _OPEN, _FOUND, _UNSUITED = 0.0, 1.0, 2.0
@@ -35,7 +35,7 @@ def _start(work):
         square = (dot(f0, f0) + dot(f1, f1) + dot(f2, f2)) / 3.0
         inverse = 1.0 / np.sqrt(square)
         # F is scaled first, since products in the determinant could overflow; if the mean square
-        # itself overflows or vanishes, the SVD is used
+        # of the singular values of F overflows or vanishes, the SVD is used
         x0, x1, x2 = scaled(inverse, f0), scaled(inverse, f1), scaled(inverse, f2)
         suited = square > lanes.SMALLEST and dot(x0, cross(x1, x2)) > WELL_CONDITIONED
         lanes.save_matrix(work, P, lane, (x0, x1, x2))
@@ -44,7 +44,7 @@ def _start(work):
 
 @lanes.lane_function
 def _advance(work):
-    """Do one step of the iteration for elements that still iterate; others do not change."""
+    """Do a step of X <- (X + X^-T) / 2 for the elements in ``work`` that still need one."""
     for lane in range(LANES):
         x0, x1, x2 = lanes.load_matrix(work, P, lane)
         c0, c1, c2 = cross(x1, x2), cross(x2, x0), cross(x0, x1)
@@ -60,7 +60,7 @@ def _advance(work):
 
 @lanes.lane_function
 def _rotations(work):
-    """Write the rotations nearest to F to P; set FOUND to 1 if they have converged, else to 0."""
+    """Write the rotation nearest to F of each element to P; set FOUND to 1 if converged, or 0."""
     _start(work)
     for _ in range(STEPS):
         _advance(work)
@@ -73,10 +73,10 @@ def _rotations(work):
 
 @lanes.lane_function
 def _within_range(work, low, high):
-    """Copy F to P; set FOUND to 1 if the singular values of F are certainly in [low, high].
+    """Copy F to P; set FOUND to 1 if the singular values of F are surely in [low, high], else to 0.
 
-    A sufficient condition is det F > 0 and a small |F^T F - I|_F, an upper bound of the distance of
-    every squared singular value from 1.
+    They are if det F > 0 and |F^T F - I|_F, a bound on the distance of every squared singular value
+    from 1, is smaller than the distances of low^2 and high^2 from 1.
     """
     slack = min(1.0 - low * low, high * high - 1.0)
     for lane in range(LANES):
@@ -95,7 +95,7 @@ GEOMETRY = 10
 
 @lanes.lane_function
 def gradients(work, geometry, block):
-    """Write S q = F^T of a ``block`` to ``work``, from its edges and the packed ``geometry``."""
+    """Write S q = F^T of block number ``block`` to ``work``, from its edges and ``geometry``."""
     start = block * GEOMETRY + OPERATOR
     for lane in range(LANES):
         e0, e1, e2 = lanes.load_matrix(work, EDGE, lane)
@@ -106,9 +106,10 @@ def gradients(work, geometry, block):
 
 @lanes.lane_function
 def _nearest(work, low, high):
-    """Write the projections of a block; compute the SVD only if cheaper methods do not suffice.
+    """Write the projections of a block, with singular values in [low, high], to ``work``.
 
-    The projection of a matrix with an entry that is not finite is nan.
+    The SVD is computed only if `_rotations` or `_within_range` leaves the projection of an element
+    open. The projection of a matrix with an entry that is not finite is nan.
     """
     if low == high == 1.0:
         _rotations(work)
@@ -160,7 +161,7 @@ def _project_gradients(d, allowed, p, m):
 
 
 class TetrahedronGroup(singular_values.SingularValueGroup):
-    """One constraint per tetrahedron on F; weight w V_t with the rest volume V_t."""
+    """One constraint per tetrahedron on its deformation gradient; weight w times rest volume."""
 
     cells = "tetrahedron"
     rows_per_element = 3
@@ -180,10 +181,10 @@ class TetrahedronGroup(singular_values.SingularValueGroup):
 
 
 class TetrahedronStrain(TetrahedronGroup):
-    """Strain of tetrahedra: singular values are clamped to [minimum, maximum] > 0, det p > 0."""
+    """Projection of F to the nearest p with det p > 0, singular values in [minimum, maximum]."""
 
     class Config(singular_values.StrainConfig):
-        """Weight w per volume, N/m^2."""
+        """Weight w per volume, N/m^2, and the range of singular values."""
 
         effect: Literal["tetrahedron_strain"] = "tetrahedron_strain"
 

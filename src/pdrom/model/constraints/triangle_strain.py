@@ -24,17 +24,17 @@ from pdrom.model.constraints.simplex import EDGE, ENERGY, FORCE, OPERATOR, SIZE,
 from pdrom.model.constraints.svd3 import rotated_pair
 from pdrom.model.mesh.types import Mesh
 
-# F is nearly rank deficient if sigma_1 sigma_2 over the mean of their squares is below this
+# F is nearly rank deficient if sigma_1 sigma_2 / ((sigma_1^2 + sigma_2^2) / 2) is below this
 FLAT = 1e-2
-# if the mean square is in this range, the closed form neither overflows nor loses digits
+# if (sigma_1^2 + sigma_2^2) / 2 is between these, `_closed_form` does not overflow or lose digits
 LOW, HIGH = 1e-60, 1e60
-# EQUAL times the mean eigenvalue m is added to h, a divisor that is zero if sigma_1 = sigma_2
+# EQUAL * m is added to h, a divisor that is zero if the eigenvalues m +- h of F^T F are equal
 EQUAL = 1e-17
 
 
 @lanes.lane_function
 def _closed_form(f0, f1, low, high):
-    """Return the columns of the matrix nearest to [f0, f1], and whether they are accurate."""
+    """Return [f0, f1] with singular values clamped to [low, high], and whether it is accurate."""
     a, b, off = dot(f0, f0), dot(f1, f1), dot(f0, f1)
     mean, half = 0.5 * (a + b), 0.5 * (a - b)
     h = np.sqrt(half * half + off * off) + EQUAL * mean
@@ -59,7 +59,7 @@ def _closed_form(f0, f1, low, high):
 
 @lanes.lane_function
 def _rotated(f0, f1, low, high):
-    """Return the columns of the matrix nearest to [f0, f1], by a Jacobi rotation of f0 and f1."""
+    """Return [f0, f1] with singular values clamped to [low, high], by a Jacobi rotation."""
     scale, c, s, swapped, pair = rotated_pair(f0, f1, 1.0)
     u0, u1, s0, s1 = pair
     # the term 0 * scale makes the result nan where F is not finite
@@ -77,7 +77,7 @@ FOUND, WORK = SIZE, SIZE + 1
 
 @lanes.lane_function
 def gradients(work, geometry, block):
-    """Write S q = F^T of a ``block`` to ``work``, from its edges and the packed ``geometry``."""
+    """Write S q = F^T of block number ``block`` to ``work``, from its edges and ``geometry``."""
     first = (block * GEOMETRY + OPERATOR) * LANES
     for lane in range(LANES):
         e0, e1 = load(work, EDGE, lane), load(work, EDGE + 3, lane)
@@ -110,7 +110,7 @@ def forces(work, geometry, block):
 
 @lanes.lane_function
 def _nearest(work, low, high):
-    """Write the projections of a block to ``work``; nan for a matrix that is not finite."""
+    """Write each F of a block, singular values clamped to [low, high], to P; nan if not finite."""
     for lane in range(LANES):
         p0, p1, suited = _closed_form(load(work, F, lane), load(work, F + 3, lane), low, high)
         save(work, P, lane, p0)
@@ -161,7 +161,7 @@ def rest_frames(points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, 
 
 
 class TriangleStrain(singular_values.SingularValueGroup):
-    """One constraint per triangle on the singular values of F; weight w A_t with the rest area."""
+    """One constraint per triangle on the singular values of F; weight w A_t with rest area A_t."""
 
     class Config(singular_values.StrainConfig):
         """Weight w per area, N/m, and the range of singular values."""

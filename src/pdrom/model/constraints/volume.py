@@ -1,8 +1,8 @@
-"""Volume constraints of tetrahedra: det F lies in a range (Bouaziz et al. 2014, 5.1).
+"""Constraints on the volume of tetrahedra and the area of triangles (Bouaziz et al. 2014, 5.1).
 
-In area constraints of triangles, the product of the two singular values of F lies in a range. As an
-element may become arbitrarily long and thin, both sets of allowed matrices are unbounded: the
-projections have no bound.
+Allowed deformation gradients F have det F (volume) or the product of their two singular values
+(area) in a range. As an element may become arbitrarily long and thin without a change of volume or
+area, the entries of allowed matrices, and thus of projections, have no bound.
 """
 
 from typing import Literal
@@ -15,13 +15,13 @@ from pdrom.model.constraints.simplex import SIZE, F, P
 from pdrom.model.constraints.svd3 import FOUND, SIGMA, rotated_pair
 from pdrom.model.constraints.tetrahedron import TetrahedronGroup, forces, gradients
 
-# offset of module `products`' part of the working array, and total size
+# offset of module `products`' numbers in the working array of volume constraints; size of the array
 VALUES, WORK = svd3.SIZE, svd3.SIZE + products.SIZE
 
 
 @lanes.lane_function
 def _nearest(work, low, high):
-    """Write the projections of a block to ``work``: F itself if det F is in the range."""
+    """Write to P, for each F of a block, the nearest matrix with determinant in [low, high]."""
     for lane in range(lanes.LANES):
         f0, f1, f2 = lanes.load_matrix(work, F, lane)
         volume = lanes.dot(f0, lanes.cross(f1, f2))
@@ -75,15 +75,15 @@ class TetrahedronVolume(TetrahedronGroup):
         return products.reference_nearest(sigma, *self.allowed)
 
 
-# further offsets in the working array of areas: columns of U, cosine and sine of the rotation V,
-# followed by the part of module `products`
+# further offsets in the working array of area constraints: columns of U, cosine and sine of the
+# rotation V, followed by the numbers of module `products`
 U, COSINE, SINE = SIZE, SIZE + 6, SIZE + 7
 AREA_VALUES, AREA_WORK = SIZE + 8, SIZE + 8 + products.SIZE
 
 
 @lanes.lane_function
 def _nearest_area(work, low, high):
-    """Write the projections of a block of triangles to ``work``."""
+    """Write to P, for each F of a block, the nearest matrix with sigma_1 sigma_2 in [low, high]."""
     values = work[AREA_VALUES * lanes.LANES :]
     for lane in range(lanes.LANES):
         f0, f1 = lanes.load(work, F, lane), lanes.load(work, F + 3, lane)
@@ -91,7 +91,7 @@ def _nearest_area(work, low, high):
         u0, u1, s0, s1 = pair
         lanes.save(work, U, lane, u0)
         lanes.save(work, U + 3, lane, u1)
-        # a further rotation by 90 degrees puts the longer column first
+        # if columns were swapped, V includes the rotation by 90 degrees that swaps them
         work[COSINE * lanes.LANES + lane] = s if swapped else c
         work[SINE * lanes.LANES + lane] = -c if swapped else s
         lanes.save(values, products.VALUES, lane, (scale * s0, 1.0, scale * s1))

@@ -1,1 +1,1 @@
-"""The step loop of projective dynamics, its global system and its acceleration."""
+"""The step loop of projective dynamics with its global system and Anderson acceleration."""

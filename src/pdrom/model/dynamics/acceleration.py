@@ -1,10 +1,10 @@
 """Anderson acceleration of the local/global iteration (Peng et al. 2018, section 3).
 
-One local and one global step define a map G of the positions; its fixed point solves the frame.
-Instead of y <- G(y), the next iterate is the affine combination of the last few images G(y) for
-which the same combination of the residuals f = G(y) - y is smallest. An iterate whose objective is
-larger than that of the last one is rejected and replaced by the last image G(y), whose objective
-cannot be larger. The objective thus never rises, and the fixed point is the same.
+A local and a global step define a map G of the positions; at its fixed point the objective of the
+frame is stationary. Instead of y <- G(y), the next iterate is the affine combination of the last
+few images G(y) for which the same combination of the residuals f = G(y) - y is smallest. An iterate
+whose objective is larger than that of the last one is rejected and replaced by the last image G(y),
+whose objective cannot be larger. The objective never rises, and the fixed point is that of G.
 """
 
 import numpy as np
@@ -13,17 +13,17 @@ from pdrom.model.compiled.dots import dot
 from pdrom.model.compiled.functions import compiled, inner
 from pdrom.model.compiled.rows import flat, write
 
-# Relative Tikhonov term of the small least-squares problem. It bounds the weights if residual
-# differences are nearly parallel, which happens close to convergence.
+# Tikhonov term, relative to the diagonal, of the least-squares problem for the weights of a
+# combination. It bounds them if residual differences are nearly parallel, as near convergence.
 REGULARISATION = 1e-14
-# Index in a history's counters of the number of stored differences, which is -1 without iterate.
+# Index, in array 6 of `_history`, of the number of differences; this is -1 before any iterate.
 DIFFERENCES = 0
 
 
 @inner
 def _weights(gram, projection, count):
-    """Return the weights (count,) that solve the regularised normal equations, by Cholesky; zeros,
-    so that the next iterate is G(y), if the matrix ``gram`` is not positive definite."""
+    """Return weights (count,) of differences of images G(y), by regularised least squares; zeros,
+    so that the next iterate is G(y), if the Gram matrix ``gram`` is not positive definite."""
     factor, weights = np.zeros((count, count)), np.zeros(count)
     for i in range(count):
         for j in range(i + 1):
@@ -61,8 +61,8 @@ def forget(history):
 def refuse(history, y, objective, plain=1):
     """Reject iterate ``y`` (n,) if its ``objective`` has risen; compiled form of `Anderson.refuse`.
 
-    The first ``plain`` iterates after a start or a rejection are not tested: they are images G(y),
-    whose objective cannot rise. ``history`` has the earlier iterates.
+    Without a test it accepts the first iterate of ``history``, an image G(y) that replaces a
+    rejected iterate, and ``plain`` iterates after each of these: G does not raise the objective.
     """
     start, _, image, _, _, _, numbers, last = history
     if numbers[DIFFERENCES] >= plain and objective > last[0]:
@@ -76,7 +76,7 @@ def refuse(history, y, objective, plain=1):
 
 @compiled
 def combine(history, image):
-    """Overwrite ``image`` G(y), (n,), by the next iterate; compiled form of `Anderson.combine`."""
+    """Overwrite ``image`` = G(y) (n,) by the next iterate; compiled form of `Anderson.combine`."""
     start, residual, last_image, residuals, images, gram, numbers, _ = history
     numbers[DIFFERENCES] += 1
     differences, window = numbers[DIFFERENCES], len(gram)
@@ -109,8 +109,8 @@ def _history(window: int, n: int) -> History:
     """Return an empty history: arrays for the iterates of a frame, which have n numbers each.
 
     They are: the last accepted iterate, its residual and image (n,); ``window`` differences of
-    residuals and of images (window, n); Gram matrix of the residual differences; the number of
-    stored differences (1,); the objective of the accepted iterate (1,).
+    residuals and of images (window, n); Gram matrix of the residual differences; the number (1,)
+    of differences since the history was emptied; the objective of the accepted iterate (1,).
     """
     vectors = [np.empty(n) for _ in range(3)]
     differences = [np.empty((window, n)) for _ in range(2)]
@@ -147,8 +147,7 @@ class Anderson:
 
     def refuse(self, y: np.ndarray, objective: float) -> bool:
         """Return whether iterate ``y`` is rejected, as its ``objective``, J, has risen. It is then
-        overwritten by the last image G(y) and the history deleted; nan counts as not risen.
-        """
+        overwritten by the last image G(y) and the history deleted; nan counts as not risen."""
         return refuse(self.history, _numbers(y), objective)
 
     def combine(self, image: np.ndarray) -> None:

@@ -98,7 +98,7 @@ class CompiledIterations:
         self.compiled_arguments = inertia, tables, second, clock()
 
     def takes(self, elimination: object) -> TypeGuard[Elimination]:
-        """Return whether compiled code can solve the linear system of an ``elimination``."""
+        """Return whether ``elimination`` is a factored system that compiled code can solve."""
         return isinstance(elimination, Elimination) and elimination.factor is not None
 
     def run(
@@ -146,8 +146,8 @@ def all_iterations(
     which : (first, end, K): compute iterations first, ..., end - 1 of the K iterations of a frame
     y, s, base, rhs : iterate, prediction, (M/h^2) s, working array; flat rows of four numbers
     inertia : (N,) M/h^2, kg/s^2
-    tables : first, preparing and second table of a `LocalPass`
-    second : array to which its second parts add, first and end of the vertices that they change
+    tables : tables of a `LocalPass`: first parts of its kernels, their preparations, second parts
+    second : array to which second parts add; first and end index of the vertices that they change
     factor : triangular factor of the global system (`pdrom.model.dynamics.solvers.Factor`)
     history : history of the acceleration; with `NO_HISTORY` its code is not compiled
     objective, seconds : arrays that receive results, as in `CompiledIterations.run`
@@ -184,14 +184,14 @@ def all_iterations(
                 objective[k] = objective[k - 1]
         else:
             sweep(panels, vertices, loads, work, rhs, y)
-            # a frame ends with the image G(y) itself, whose objective cannot exceed that of y
+            # the last iterate is G(y), not a combination, as its objective cannot exceed that of y
             if history is not None and k < iterations - 1:
                 combine(history, y)
         seconds[2] += now(watch) - between
     return 0.0
 
 
-# Largest number of frames per call, so that little work is wasted if the caller ends the run early.
+# Largest number of frames that one compiled call computes: few are wasted if a run ends early.
 BLOCK = 16
 
 Blocks = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
@@ -205,7 +205,7 @@ class WholeFrames:
     ----------
     space : space whose ``held_path`` and ``system`` are used
     loop : the compiled iterations
-    forces, contacts : effects of a scene; every force has a ``rate``, every contact a ``height``
+    forces, contacts : of a scene; every force has a (damping) ``rate``, every contact is a floor
     """
 
     def __init__(
@@ -253,7 +253,8 @@ class WholeFrames:
     def run(
         self, q: np.ndarray, v: np.ndarray, frames: range, h: float, iterations: int, track: bool
     ) -> Blocks | None:
-        """Run as many of the first ``frames`` as one call can; None if the solver is not compiled.
+        """Run the first n ``frames``, as many as one call can, and return the results; return None,
+        without a run, if the solver is not compiled.
 
         Parameters
         ----------
@@ -285,7 +286,7 @@ class WholeFrames:
 
 @inner
 def _accelerate(constants, rates, velocities, result):
-    """Write the sum of all accelerations to ``result``, (N, 3), or (1, 3) if it is uniform."""
+    """Write the acceleration by all forces to ``result``: (N, 3), or (1, 3) if it is uniform."""
     for i in range(len(result)):
         for axis in range(3):
             total = 0.0

@@ -1,10 +1,10 @@
 """Factorisations of the global system: factor once, solve often.
 
 Panels (supernodes) are consecutive columns of a factor that substitution ("sweep") treats together.
-A panel stores, of the rows below its columns, those in which any of its columns has an entry; the
-other columns get explicit zeros. With wider panels, substitution reads the right-hand side less
-often and waits less often for a preceding column, but more zeros are stored. Dynamic programming
-finds the partition of the columns with the smallest estimated number of processor cycles.
+A panel stores, of the rows below its columns, those in which any of its columns has an entry, with
+explicit zeros for its columns that have none. With wider panels, substitution reads the right-hand
+side less often and waits less often for a preceding column, but more zeros are stored. Dynamic
+programming finds the partition of the columns with the fewest estimated processor cycles.
 """
 
 from typing import Any
@@ -33,7 +33,7 @@ def panels(lower: sparse.csc_array, diagonal: np.ndarray) -> tuple[Any, ...]:
     Returns
     -------
     The first argument of `pdrom.model.dynamics.sweeps.sweep`: these arrays for P panels, and the
-    address of a compiled function.
+    address of the compiled code of `sweep`.
 
     first : (P + 1,) first column of each panel
     row_start, value_start : (P + 1,) first index of each panel in ``rows`` and in ``values``
@@ -85,7 +85,7 @@ def _count_rows_below(indptr, indices, seen, below):
 
 @compiled
 def _choose(below, widths, cost, chosen):
-    """Write to chosen[k] the width of the last panel in the cheapest partition of k columns.
+    """Write to chosen[k] the last panel's width in the cheapest partition of the first k columns.
 
     ``cost`` (n + 1,) is working memory, filled with inf.
     """
@@ -101,7 +101,7 @@ def _choose(below, widths, cost, chosen):
 
 @compiled
 def _fill(indptr, indices, data, inverse, first, row_start, value_start, rows, values, place):
-    """Write ``rows`` and ``values`` of all panels; the work array ``place`` (n,) is all -1."""
+    """Fill ``rows`` and ``values`` for `panels`; ``place`` (n,) is working memory, all -1."""
     for panel in range(len(first) - 1):
         a, b = first[panel], first[panel + 1]
         width, start = b - a, row_start[panel]
@@ -110,7 +110,7 @@ def _fill(indptr, indices, data, inverse, first, row_start, value_start, rows, v
             row = indices[k]
             if row >= b and place[row] < 0:
                 place[row] = 0
-                # insertion sort: rows are nearly sorted, and NumPy's sort takes a second to compile
+                # insertion sort: row indices come nearly sorted; NumPy's sort compiles for a second
                 new = start + count
                 while new > start and rows[new - 1] > row:
                     rows[new] = rows[new - 1]
@@ -196,7 +196,7 @@ class SuperLUSolver:
 
 
 class ColumnOrderedSolver(SuperLUSolver):
-    """SuperLU with the column ordering COLAMD, to measure the effect of the summation order."""
+    """SuperLU with the column ordering COLAMD, to measure how results depend on summation order."""
 
     ordering = "COLAMD"
 

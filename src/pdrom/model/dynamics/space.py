@@ -14,7 +14,7 @@ from pdrom.model.effects import base
 
 
 class Solve(Protocol):
-    """A factored system with the fixed coordinates eliminated."""
+    """A factored global system from which coordinates with prescribed values are eliminated."""
 
     def solve(self, rhs: np.ndarray, y: np.ndarray) -> None:
         """Overwrite the free coordinates of ``y`` (n, 3) by the solution for ``rhs`` (n, 3)."""
@@ -44,7 +44,7 @@ class Space(ABC):
     ) -> tuple[CompiledIterations | None, WholeFrames | None]:
         """Return compiled code for the iterations of a frame and for whole frames.
 
-        Either is None if these coordinates or ``local_steps`` lack it; both use ``acceleration``.
+        Either is None if none exists for these coordinates or steps; both use ``acceleration``.
         """
         return None, None
 
@@ -57,7 +57,7 @@ class Space(ABC):
 
     @abstractmethod
     def fixed(self, frame: int, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the coordinates (m,) fixed in ``frame``, ascending, and their values (m, 3).
+        """Return indices (m,), ascending, and values (m, 3) of coordinates prescribed in ``frame``.
 
         ``positions`` (n, 3) are the coordinates at the beginning of the frame.
         """
@@ -72,7 +72,7 @@ class Space(ABC):
 
     @abstractmethod
     def inertia_energy(self, difference: np.ndarray) -> float:
-        """Return 1/(2 h^2) |M^1/2 difference|^2, J, for the ``difference`` (n, 3) y - s."""
+        """Return 1/(2 h^2) |M^1/2 difference|^2, J; ``difference`` (n, 3): y minus prediction s."""
 
     @abstractmethod
     def correct(self, y: np.ndarray, before: np.ndarray, frame: int) -> None:
@@ -104,7 +104,7 @@ class VertexSpace(Space):
     def held_path(self, frames: range, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the vertices (m,) held in the first n ``frames``, and their targets (n, m, 3) m.
 
-        ``positions`` (N, 3) m are those at the beginning of the first frame.
+        ``positions`` (N, 3) m: at the start of the first frame; n: see `effects.base.held_path`.
         """
         return base.held_path(self._boundaries, frames, positions)
 

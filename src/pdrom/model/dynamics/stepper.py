@@ -26,7 +26,7 @@ Vectors = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 class LocalStep(Protocol):
-    """Local step of one constraint group, or its approximation; every group is a local step.
+    """Local step of a constraint group, or an approximation of it; groups have these methods, too.
 
     In a position subspace y and rhs have the shape (k, 3) of k coordinates instead of (N, 3).
     Compiled iterations need an attribute ``local_kernel`` in every local step.
@@ -35,10 +35,13 @@ class LocalStep(Protocol):
     name: str
 
     def begin_frame(self, q: np.ndarray) -> None:
-        """Prepare a frame whose first positions are ``q`` (N, 3) m; called once per frame."""
+        """Prepare a frame that begins at positions ``q`` (N, 3) m; called once per frame."""
 
     def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
-        """Add S^T W p(y), projections p, to ``rhs`` (N, 3); return the energy, J (nan: unknown)."""
+        """Add S^T W p(y) to ``rhs`` (N, 3), with the projections p of the group.
+
+        Return the energy of the group, J; nan if an approximation does not compute it.
+        """
 
 
 @dataclass(frozen=True)
@@ -54,8 +57,8 @@ class FrameReport:
     """Objective and computation times of a frame with K iterations.
 
     objective : (K,) J, 1/(2 h^2) |M^1/2 (y - s)|^2 + sum_j W_j(y), energies W_j of the constraint
-        groups, at the iterate y of each local step (a rejected one is replaced by the last accepted
-        one); nan if an energy is unknown, empty if it was not tracked
+        groups, at the iterate y of each local step (for one that Anderson acceleration rejects: at
+        the last accepted one); nan if an energy is unknown, empty if it was not tracked
     seconds : (4,) time of each of `PHASES`
     """
 
@@ -105,7 +108,7 @@ class Stepper:
     def run(self, state: State, frames: range) -> Iterator[tuple[State, FrameReport]]:
         """Yield the state and report after each of ``frames``, several of them per compiled call.
 
-        A change that the caller makes between two frames may come too late for the next frames.
+        Later frames may have been computed already when the caller changes, say, an effect.
         """
         while frames:
             # if a subclass overrides `step`, it is called for every frame
@@ -116,7 +119,7 @@ class Stepper:
                 yield after
 
     def _at_once(self, state: State, frames: range) -> Sequence[tuple[State, FrameReport]]:
-        """Compute as many of the first ``frames`` as one compiled call can; () if no call can."""
+        """Compute as many of ``frames`` as one compiled call can; return results, () if none."""
         if self._whole is None:
             return ()
         q, v, h = state.positions, state.velocities, self.time_step
@@ -124,7 +127,7 @@ class Stepper:
         done = self._whole.run(q, v, frames, h, self.iterations, self._track)
         if done is None:
             return ()
-        # time outside compiled code is added to phase 0, divided equally among the frames
+        # time outside compiled code is added to phase "inertia", divided equally among the frames
         beside = perf_counter() - started - float(done[3].sum())
         done[3][:, 0] += max(beside, 0.0) / len(done[3])
         return [
@@ -133,7 +136,7 @@ class Stepper:
         ]
 
     def _begin(self, state: State, frame: int) -> tuple[np.ndarray, Solve, np.ndarray]:
-        """Return s with fixed coordinates at their targets, the factored system and (M/h^2) s."""
+        """Return prediction s (fixed rows are targets), the factored system, and (M/h^2) s."""
         space, h = self.space, self.time_step
         s = space.predict(state.positions, state.velocities, h)
         fixed, targets = space.fixed(frame, state.positions)
@@ -196,7 +199,7 @@ class Stepper:
             objective[k : k + 1] = objective[k - 1 : k]
         else:
             system.solve(rhs, y)
-            # a frame ends with the image G(y) itself, whose objective cannot exceed that of y
+            # the last solution is not combined with earlier ones, as this could raise the objective
             if k < self.iterations - 1:
                 acceleration.combine(y)
         seconds[2] += perf_counter() - before

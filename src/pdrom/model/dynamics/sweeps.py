@@ -1,8 +1,8 @@
 """Forward and backward substitution by panels, for three right-hand sides (x, y, z) at once.
 
-A row of the right-hand side fills a register of four numbers ("lanes"), so that an
-entry of the factor is read once for x, y and z. The instructions of each panel width are unrolled,
-so that the panel's columns stay in registers during the loop over the rows below.
+A panel is a set of consecutive columns of L in A = L D L^T, see module `solvers`. A row of the
+right-hand side fills a register of four numbers, so that an entry of L is read once for x, y and z.
+Instructions are unrolled for each width, to keep the unknowns of a panel in registers.
 """
 
 from llvmlite import ir
@@ -21,7 +21,7 @@ WIDTHS = (1, 2, 3, 4, 6, 8)
 
 
 class _Panel:
-    """Generator of the LLVM instructions of a panel of ``width`` columns.
+    """Writer of the LLVM instructions for a panel of ``width`` columns of the factor L.
 
     ``arguments`` are those of `_panel_intrinsic`, as LLVM values.
     """
@@ -44,7 +44,7 @@ class _Panel:
         return spread(self.builder, self.builder.load(self.builder.gep(pointer, [offset])))
 
     def inverse(self, column):
-        """Return 1 / D of a ``column`` of the panel, repeated in all numbers of a register."""
+        """Return 1 / (entry of D) for ``column`` of the panel, in all numbers of a register."""
         return self._spread(self._own, self._index(column))
 
     def triangle(self, row, column):
@@ -52,7 +52,7 @@ class _Panel:
         return self._spread(self._own, self._index(self.width + row * (row - 1) // 2 + column))
 
     def pointer(self, offset):
-        """Return the address of the right-hand side's row that begins at number ``offset``."""
+        """Return the address of number ``offset`` of the right-hand side, where a row begins."""
         return self.builder.bitcast(self.builder.gep(self._x, [offset]), NUMBERS.as_pointer())
 
     def column(self, k):
@@ -70,7 +70,10 @@ class _Panel:
         return multiply_add(self.builder, self.builder.fneg(entry), b, a)
 
     def rows_below(self):
-        """Loop over the rows below; yield a row's address and a function: column -> entry of L."""
+        """Generate a loop over the rows of factor L below the panel's triangle; callers add a body.
+
+        Yield the address of that row of the right-hand side and a function: panel column -> entry.
+        """
         builder = self.builder
         with cgutils.for_range_slice(builder, self._start, self._stop, self._index(1)) as (k, _):
             row = builder.sext(builder.load(builder.gep(self._rows, [k])), _INDEX)
@@ -80,7 +83,7 @@ class _Panel:
 
 
 def _panel_intrinsic(write):
-    """Return an intrinsic for a panel; the function ``write`` generates its LLVM instructions."""
+    """Return a Numba intrinsic for one panel, of LLVM instructions that ``write`` generates."""
 
     def typed(_context, width, x, first, rows, start, stop, values, value_start):
         def generate(context, builder, signature, arguments):
@@ -103,7 +106,7 @@ def _panel_intrinsic(write):
 
 
 def _write_forward(panel):
-    """Generate the panel's part of x <- L^-1 x: solve for its columns, update the rows below."""
+    """Generate code that does x <- L^-1 x for the panel's columns, then updates the rows below."""
     columns: list[ir.Value] = []
     for row in range(panel.width):
         value = panel.load(panel.column(row))
@@ -125,7 +128,7 @@ def _write_forward(panel):
 
 
 def _write_backward(panel):
-    """Generate the panel's part of x <- L^-T D^-1 x: subtract rows below, solve for its columns."""
+    """Generate code of x <- L^-T D^-1 x for the panel: scale by D, subtract rows below, solve."""
     builder = panel.builder
     slots = []
     for k in range(panel.width):
@@ -152,8 +155,9 @@ _backward = _panel_intrinsic(_write_backward)
 def load(beside, indptr, indices, data, targets, loads):
     """Write the product of a coupling matrix and ``targets`` to the rows ``beside`` of ``loads``.
 
-    The matrix, CSR (``indptr``, ``indices``, ``data``), couples unknowns to held vertices, which
-    have ``targets`` (m, 3) m. ``loads`` is a flat array of rows of four numbers, zero elsewhere.
+    The CSR matrix (``indptr``, ``indices``, ``data``) couples unknowns to held vertices, which have
+    ``targets`` (m, 3) m; its rows ``beside`` are those with entries. ``loads`` is a flat array of
+    rows of four numbers, one for each unknown; other rows are zero.
     """
     for i in beside:
         for axis in range(3):

@@ -21,8 +21,8 @@ class Elimination:
 
     Attributes
     ----------
-    factor : arguments of `pdrom.model.dynamics.sweeps.sweep`; None if the solver is not compiled
-    coupling : first arguments of `pdrom.model.dynamics.sweeps.load`
+    factor : first arguments of `sweeps.sweep`; None if the solver is not compiled
+    coupling : first arguments of `sweeps.load`
     """
 
     def __init__(self, matrix: sparse.csr_array, fixed: np.ndarray, solver: str) -> None:
@@ -51,7 +51,7 @@ class Elimination:
             self._solver.set_targets(targets)
 
     def solve(self, rhs: np.ndarray, y: np.ndarray) -> None:
-        """Overwrite the rows of ``y`` (N, 3) that are not fixed by the solution for ``rhs``."""
+        """Overwrite free vertices' rows of ``y`` (N, 3) by the solution for ``rhs`` (N, 3)."""
         if self._solver is not None:
             self._solver.solve(rhs, y)
 

@@ -51,7 +51,7 @@ class EffectConfig(ConfigModel):
         changes: dict[str, Any] = {}
         for name, field in type(self).model_fields.items():
             value = getattr(self, name)
-            # a field of type ``FrameNumber | None`` has the marker inside the union
+            # in type ``FrameNumber | None`` the marker `ScaledWithFrames` is inside the union
             inside = getattr(field.annotation, "__args__", ())
             nested = [m for part in inside for m in getattr(part, "__metadata__", ())]
             if value and any(isinstance(m, ScaledWithFrames) for m in (*field.metadata, *nested)):
@@ -62,22 +62,22 @@ class EffectConfig(ConfigModel):
         """Raise ValueError if the effect is unstable with a time step of ``time_step`` s."""
 
     def redirected(self, axes: Sequence[int]) -> Self:
-        """Return the effect; a handle gets another direction of motion within ``axes``."""
+        """Return the effect; handles reverse their motion or turn it in the plane of ``axes``."""
         return self
 
     def tilted(self, degrees: float, axes: Sequence[int], place: int) -> Self:
         """Return the effect; gravity is turned by ``degrees``, other effects do not change.
 
-        Gravity turns towards ``axes[place]``; an axis (0, 1 or 2) parallel to it is not counted.
+        Gravity turns towards entry ``place`` of those ``axes`` (0, 1, 2) not parallel to gravity.
         """
         return self
 
     def carried(self, offset: Sequence[float], over: int) -> "EffectConfig":
-        """Return the effect; pins become a handle that moves by ``offset`` m in ``over`` frames."""
+        """Return the effect; only pins change: they move by ``offset`` m in ``over`` frames."""
         return self
 
     def body(self, low: np.ndarray, high: np.ndarray) -> Mesh | None:
-        """Return a surface that shows the effect between ``low`` and ``high`` (3,) m, or None."""
+        """Return a surface to draw the effect near a box ``low`` to ``high`` m; None: not drawn."""
         return None
 
 
@@ -129,7 +129,7 @@ class Force(Effect):
 
 
 class Boundary(Effect):
-    """Boundary condition: "holds" vertices, by elimination, at prescribed positions."""
+    """Boundary condition: holds vertices at given positions by eliminating them from the system."""
 
     vertices: np.ndarray
     """All vertices that the effect holds in any frame, ascending (n,) int64."""
@@ -161,7 +161,7 @@ class Boundary(Effect):
         return True
 
     def path(self, frames: range, current: np.ndarray) -> np.ndarray:
-        """Return targets (f, n, 3) m in f ``frames``, of which only the first may begin a hold."""
+        """Return `targets` (f, n, 3) m in f ``frames``; a hold may begin only in the first."""
         first = self.targets(frames.start, current)
         if not self.moves:
             return np.broadcast_to(first, (len(frames), *first.shape))
@@ -182,7 +182,7 @@ class Contact(Effect):
     """Height y, m, for a floor: a contact that only moves lower vertices up to y; else None."""
 
     def gaps(self, points: np.ndarray) -> np.ndarray:
-        """Return distances (n,) m of ``points`` (n, 3) m to the obstacle; inf if there is none."""
+        """Return distances (n,) m of ``points`` (n, 3) m to an obstacle (inf: none), < 0 inside."""
         return np.full(len(points), np.inf)
 
     def apply(self, positions: np.ndarray, before: np.ndarray, held: np.ndarray) -> None:
@@ -208,7 +208,7 @@ class Contact(Effect):
     def doubt(self, rest: np.ndarray, free: np.ndarray) -> str:
         """Return a warning if the contact does not suit the rest shape ``rest`` (N, 3) m, else "".
 
-        By default it warns if the contact moves vertices of ``free`` (n,) in the first frame.
+        By default it warns if the contact moves ``free`` (not held) vertices (n,) in frame 0.
         """
         moved = rest.copy()
         self.correct(moved, rest)
@@ -223,7 +223,7 @@ class Contact(Effect):
 
 
 def effect_config(entry: Any, index: int) -> EffectConfig:
-    """Return the configuration of effect ``entry``, number ``index``; ValueError if invalid."""
+    """Return the configuration of ``entry``, effect number ``index``; ValueError if invalid."""
     if isinstance(entry, EffectConfig):
         return entry
     if not isinstance(entry, dict) or not isinstance(entry.get("effect"), str):
@@ -271,11 +271,8 @@ def held_path(
     """Return held vertices (m,) and their targets (n, m, 3) m in the first n >= 1 ``frames``.
 
     These frames end before the first in which the set of held vertices changes or a hold begins,
-    since targets of that hold depend on positions that are not yet known.
-
-    Parameters
-    ----------
-    positions : (N, 3) m at the beginning of the first frame
+    since targets of that hold depend on positions that are not yet known. ``positions`` (N, 3) m
+    are those at the beginning of the first frame.
     """
     active = [b for b in boundaries if b.active(frames.start)]
     held = [b.held(frames.start) for b in active]
@@ -294,5 +291,5 @@ def held_path(
         known += 1
     paths = [b.path(frames[:known], q) for b, q in zip(active, current, strict=True)]
     if single:
-        return vertices, np.array(paths[0], order="C")  # for a view, Numba would compile code again
+        return vertices, np.array(paths[0], order="C")  # a copy: for views, Numba compiles anew
     return vertices, np.concatenate([np.empty((known, 0, 3)), *paths], axis=1)[:, first]

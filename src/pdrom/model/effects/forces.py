@@ -46,7 +46,7 @@ class Damping(Force):
     """Acceleration -c v, with the velocity v at the beginning of the frame (explicit)."""
 
     class Config(EffectConfig):
-        """``rate`` c in 1/s; a time step h must be stable: c h < 2, larger rates are refused."""
+        """Damping ``rate`` c in 1/s; a time step h must be stable: c h < 2, larger c is refused."""
 
         effect: Literal["damping"] = "damping"
         rate: Annotated[float, Field(ge=0.0, le=1e3, allow_inf_nan=False)]
@@ -102,13 +102,13 @@ class Wind(Force):
 
     As an explicit step would overshoot in strong wind, the force is divided by 1 + h kappa |w_n|.
     kappa is the largest rho C A_v / (2 m_v) of the corners, and A_v a third of the area around a
-    vertex. The result is exact for a free flat sheet. In general, velocities relative to the wind
-    are multiplied by the identity minus a symmetric positive matrix smaller than one (in the inner
-    product of the masses). Their energy thus never grows, for any wind, time step and masses.
+    vertex. A free flat sheet with equal A_v / m_v gets its exact velocity. In general, velocities
+    relative to the wind are multiplied by a matrix that is symmetric in the inner product of the
+    masses, with eigenvalues from 0 to 1: their energy never grows, for any wind, step and masses.
     """
 
     class Config(EffectConfig):
-        """``velocity`` in m/s, ``density`` rho in kg/m^3, ``coefficient`` C without unit."""
+        """Wind ``velocity`` in m/s, air ``density`` rho in kg/m^3, ``coefficient`` C (no unit)."""
 
         effect: Literal["wind"] = "wind"
         velocity: Vector

@@ -1,4 +1,4 @@
-"""Boundary conditions that prescribe vertices in some frames: pins at rest, moving handles."""
+"""Boundary conditions on the positions of vertices in some frames: pins, and moving handles."""
 
 from abc import abstractmethod
 from collections.abc import Sequence
@@ -77,7 +77,7 @@ class Pins(Hold):
 
 
 class HandleConfig(HoldConfig):
-    """Handle: vertices move for ``over`` frames from frame ``start``, then are held at rest."""
+    """Handle: vertices move for ``over`` frames from frame ``start`` and are then held in place."""
 
     over: Annotated[FrameNumber, Field(ge=1)]
 
@@ -96,7 +96,7 @@ class Translate(Hold):
         offset: Vector
 
         def redirected(self, axes: Sequence[int]) -> Self:
-            """Turn the offset by 90 degrees, from the first of ``axes`` (0, 1, 2) to the second."""
+            """Turn the offset by 90 degrees in the plane of two ``axes``; along one, reverse it."""
             offset = list(self.offset)
             first, second = axes[0], axes[min(1, len(axes) - 1)]
             offset[first], offset[second] = offset[second], -offset[first]
@@ -118,7 +118,7 @@ AXES = {"x": 0, "y": 1, "z": 2}
 
 
 class Rotate(Hold):
-    """Held vertices that rotate at constant speed about an axis through the rest shape's centre."""
+    """Held vertices that rotate at constant speed about an axis through the centre of the mesh."""
 
     class Config(HandleConfig):
         """Angle ``degrees``, right-handed about the direction ``axis``."""

@@ -19,7 +19,7 @@ class Key(ConfigModel):
 
     offset : displacement since the beginning of the hold, m
     turn : rotation vector in degrees (its direction is the axis, its length the angle),
-        right-handed about the centre of the bounding box when the hold begins
+        right-handed about the centre of the held vertices' bounding box when the hold begins
     """
 
     at: Annotated[int, Field(ge=1, le=1_000_000)]
@@ -50,7 +50,7 @@ class Keyframes(Hold):
             return self
 
         def with_frames_scaled(self, factor: float) -> Self:
-            """Return the effect with frames of poses times ``factor``, at least one frame apart."""
+            """Return the effect, frame numbers times ``factor``; poses stay >= 1 frame apart."""
             keys: list[Key] = []
             for key in self.keys:
                 first = keys[-1].at + 1 if keys else 1

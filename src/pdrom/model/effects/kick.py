@@ -10,10 +10,10 @@ from pdrom.model.mesh.types import Mesh
 
 
 class Kick(Start):
-    """Random initial velocity: seeded combination of 1, x, y, z, xy, yz, zx (scaled coordinates).
+    """Random initial velocity: combination of 1, x, y, z, xy, yz, zx with seeded coefficients.
 
-    Low-degree polynomials excite slow motions of the whole body, without noise at the scale of
-    elements.
+    Coordinates are relative to the mean vertex and to half the longest side. Such polynomials
+    excite slow motions of the whole body, without noise at the scale of elements.
     """
 
     class Config(EffectConfig):

@@ -142,14 +142,14 @@ class Sphere(Obstacle):
         return np.where(length > 0.0, arm / np.where(length > 0.0, length, 1.0), UP)
 
     def entries(self, start: np.ndarray, end: np.ndarray) -> Entries:
-        """Return `Entries` at the smaller root t in [0, 1] of |start + t (end - start) - c| = r."""
+        """`Entries` for the smaller root t of |start + t (end - start) - centre| = radius."""
         arm, path = start - self.config.centre, end - start
         square = np.einsum("ij,ij->i", path, path)
         inwards = -np.einsum("ij,ij->i", arm, path)
         outside = np.einsum("ij,ij->i", arm, arm) - self.config.radius**2
         root = inwards**2 - square * outside
         meets = (inwards > 0.0) & (root >= 0.0)
-        # inwards - sqrt(root), the usual form, would cancel near the surface
+        # the usual form, (inwards - sqrt(root)) / square, would lose digits near the surface
         divisor = np.where(meets, inwards + np.sqrt(np.where(meets, root, 0.0)), 1.0)
         fraction = np.clip(np.where(meets, outside / divisor, 0.0), 0.0, None)
         points = start + fraction[:, None] * path
@@ -195,7 +195,7 @@ class Box(Obstacle):
         lower, upper = np.array(self.config.lower), np.array(self.config.upper)
         near_face = np.where(path > 0.0, lower, upper)
         far_face = np.where(path > 0.0, upper, lower)
-        # a path that is (nearly) parallel to a pair of faces is between them for all t, or for no t
+        # parallel to two faces, a path is between them for all t (near = -inf) or none (near = inf)
         with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
             near, far = (near_face - start) / path, (far_face - start) / path
             within = (start >= lower) & (start <= upper)
@@ -217,7 +217,7 @@ def _axis_vectors(axes: np.ndarray, signs: np.ndarray) -> np.ndarray:
 
 
 RINGS = 24  # intervals of a drawn sphere from pole to pole; there are twice as many around it
-# Corners of the faces of a drawn box; the bits of a corner's number are 1 on upper sides x, y, z.
+# Corners of the faces of a drawn box; corner 4 i + 2 j + k is at the upper x if i = 1, and so on.
 FACES = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
 
 

@@ -24,7 +24,7 @@ class Poke(Boundary):
     """
 
     class Config(EffectConfig):
-        """``amplitude`` in m along ``axis``; ``over`` frames of motion, then ``rest`` frames."""
+        """``amplitude``, m; a vertex moves for ``over`` frames, the next ``rest`` frames later."""
 
         effect: Literal["poke"] = "poke"
         amplitude: Length = 0.2

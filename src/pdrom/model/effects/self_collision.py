@@ -11,9 +11,9 @@ from pdrom.model.mesh.types import MAX_LENGTH, MIN_LENGTH, Mesh
 
 # Largest number of searches for close pairs per frame, and of passes over the pairs per search.
 SEARCHES, SWEEPS = 20, 100
-# Radius of the search for pairs, relative to the thickness: passes may bring farther pairs closer.
+# Radius of the search for pairs, in thicknesses: separating a pair may bring others too close.
 REACH = 1.25
-# Passes end when no pair is closer than this fraction of the thickness.
+# Passes over the pairs end when no pair of vertices is closer than this times the thickness.
 ENOUGH = 0.95
 # Largest distance of a point of an equilateral triangle with unit edges from its nearest corner.
 COVER = 1.0 / np.sqrt(3.0)
@@ -33,7 +33,7 @@ class SelfCollision(Contact):
     """
 
     class Config(EffectConfig):
-        """``thickness`` in metres."""
+        """``thickness`` in metres: vertices that are closer collide."""
 
         effect: Literal["self_collision"] = "self_collision"
         thickness: Annotated[float, Field(ge=MIN_LENGTH, le=MAX_LENGTH)]
@@ -49,7 +49,7 @@ class SelfCollision(Contact):
         self._needed = COVER * np.linalg.norm(edges[:, 0] - edges[:, 1], axis=1).max()
 
     def doubt(self, rest: np.ndarray, free: np.ndarray) -> str:
-        """Return a warning with the required thickness, or "" if that of the scene is sufficient.
+        """Return a warning if a vertex can pass between others, with the thickness needed; else "".
 
         The result depends only on the edges of the rest shape, not on ``rest`` and ``free``.
         """
@@ -91,7 +91,7 @@ class SelfCollision(Contact):
 
 @njit(cache=True)
 def _separate(q, before, pairs, inverse_masses, thickness, enough, sweeps):
-    """Move close ``pairs`` of q apart in place; return the smallest distance in the first pass."""
+    """Separate vertex ``pairs`` to ``thickness``; return the least distance in the first sweep."""
     first = thickness
     for sweep in range(sweeps):
         closest = thickness
@@ -107,7 +107,7 @@ def _separate(q, before, pairs, inverse_masses, thickness, enough, sweeps):
             length = np.sqrt(ex * ex + ey * ey + ez * ez)
             gap = thickness - distance
             if length > 0.0 and dx * ex + dy * ey + dz * ez <= 0.0:
-                # the connecting line has reversed or has no direction: restore the old direction
+                # line from i to j turned by 90 degrees or more, or zero: use that before the frame
                 along = (dx * ex + dy * ey + dz * ez) / length
                 dx, dy, dz, distance, gap = ex, ey, ez, length, thickness - along
             elif distance == 0.0:

@@ -37,7 +37,7 @@ def check_mesh(mesh: Mesh, name: str) -> Mesh:
 
 
 def mesh_of(points: np.ndarray, cells: np.ndarray, name: str) -> Mesh:
-    """Return a mesh of ``points`` (N, 3) m and ``cells`` (n, 3 or 4); tetrahedra are oriented.
+    """Return a mesh of ``points`` (N, 3) m, ``cells`` (n, 3 or 4); tetrahedra get volumes > 0.
 
     Raises
     ------
@@ -76,7 +76,7 @@ def check_indices(cells: np.ndarray, vertices: int, kind: str, name: str) -> Non
 
 
 def check_range(points: np.ndarray, scale: float, name: str) -> None:
-    """Raise MeshError if coordinates or the longest side, times ``scale``, are too large or small.
+    """Raise MeshError if a coordinate exceeds `MAX_LENGTH` or the longest side is < `MIN_LENGTH`.
 
     Squares of such lengths would overflow or lose all digits.
 

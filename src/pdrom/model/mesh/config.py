@@ -66,7 +66,7 @@ class GeneratedMesh(MeshModel):
         return self
 
     def coarsened(self, factor: float) -> Self:
-        """Return the mesh with ``factor`` times the vertices along each side, at least `least`."""
+        """Return the mesh with ``factor`` times the vertices along each side, `least` or more."""
         sizes = {name: max(self.least, round(getattr(self, name) * factor)) for name in self.sides}
         return self.model_copy(update=sizes)
 
@@ -236,7 +236,7 @@ def given_mesh(points: Any, cells: Any, name: str) -> Mesh:
 
 
 def _array(values: Any, name: str, kind: type[np.generic], widths: tuple[int, ...]) -> np.ndarray:
-    """Return ``values`` as a new array of type ``kind``, with one of ``widths`` as row length."""
+    """Return ``values`` (n, one of ``widths``) as a new array of ``kind``, or raise MeshError."""
     required = " or ".join(f"(n, {width})" for width in widths)
     try:
         array = np.array(values)

@@ -19,7 +19,7 @@ from pdrom.model.mesh import reader
 from pdrom.model.mesh.checks import mesh_of
 from pdrom.model.mesh.types import Mesh
 
-# The computation of the operators of a cloth with this many vertices needs about 1 GB.
+# Limit: the operators of a cloth with this many vertices need about 1 GB of memory.
 MAX_VERTICES = 1_000_000
 VARIABLE = "PDROM_MESH_LIMITS"
 MAX_FACTOR = 1000.0

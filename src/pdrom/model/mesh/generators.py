@@ -47,7 +47,8 @@ def cloth(
     return Mesh(points, pairs.reshape(-1, 3).astype(np.int32))
 
 
-# Five tetrahedra of a cell, the inner one first; the bits of a corner's number are (di, dj, dk).
+# Five tetrahedra, inner one first, of a cell (i, j, k) with even i + j + k; _ODD: with odd. Corner
+# 4 di + 2 dj + dk of the cell is the vertex (i + di, j + dj, k + dk).
 _EVEN = ((0, 3, 5, 6), (1, 0, 3, 5), (2, 0, 6, 3), (4, 0, 5, 6), (7, 3, 6, 5))
 _ODD = ((1, 2, 4, 7), (0, 1, 2, 4), (3, 1, 7, 2), (5, 1, 4, 7), (6, 2, 7, 4))
 
@@ -79,7 +80,7 @@ def bar(nx: int, ny: int, nz: int, extent: float = 1.0, lift: float = 2.0) -> Me
 
 
 def orient(points: np.ndarray, tetrahedra: np.ndarray) -> np.ndarray:
-    """Return ``tetrahedra`` (E, 4), int32, reordered so that their volumes are positive."""
+    """Return ``tetrahedra`` (E, 4), int32, corners reordered so that their volumes are positive."""
     a, b, c, d = (points[tetrahedra[:, i]] for i in range(4))
     negative = np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a) < 0.0
     oriented = tetrahedra.astype(np.int32)

@@ -10,9 +10,10 @@ reads .obj files itself (Advanced Visualizer manual, appendix B1, Alias/Wavefron
 
 usage: reader.py FILE FORMATS SECONDS MEMORY VERTICES CELLS
 
-``FORMATS`` are names of readers, joined by commas, one of which is chosen by the first byte of the
-file. Standard output is points (N, 3) float64 and cells (E, 3 or 4) int64 as two arrays in NumPy's
-format .npy, or, with the exit status `REFUSED`, a sentence that states the fault.
+``FORMATS`` are meshio's names of possible formats, joined by commas; the first byte of the file
+decides between them. The next four are limits: seconds, bytes, numbers of vertices and of cells.
+Standard output is points (N, 3) float64 and cells (E, 3 or 4) int64 as two arrays in NumPy's format
+.npy, or, with the exit status `REFUSED`, a sentence that states the fault.
 """
 
 import builtins
@@ -35,17 +36,16 @@ OPENINGS = {"ansys": b"(", "gmsh": b"$"}
 
 
 def main(path: str, formats: str, *numbers: str) -> int:
-    """Write the arrays of the file ``path`` to standard output; return the exit status.
+    """Write points and cells of the mesh file ``path`` to standard output; return the exit status.
 
-    ``formats`` are meshio's names, separated by commas; ``numbers`` are the limits: seconds, bytes,
-    vertices, cells.
+    The parameters are the arguments of the script, in the order that the module's text states.
     """
     seconds, memory, vertices, cells = map(int, numbers)
     _limit("RLIMIT_CPU", seconds)
     _limit("RLIMIT_AS", memory)
     _limit("RLIMIT_CORE", 0)
     try:
-        # catch what readers print; some end the process after printing the fault
+        # what meshio prints is discarded, as standard output must hold nothing but the arrays
         with redirect_stdout(io.StringIO()) as said, redirect_stderr(said):
             arrays = read(path, formats.split(","), vertices, cells)
         # np.save asks a file object for its position, which a pipe lacks
@@ -116,7 +116,7 @@ def read(path: str, formats: list[str], max_vertices: int, max_cells: int) -> tu
 
 
 def _by_meshio(path: str, name: str) -> tuple:
-    """Return points and cells from meshio's reader ``name``, with checks before and after it."""
+    """Read points and cells by meshio's reader ``name``; call `check_before` and `check_after`."""
     import meshio
     from meshio.gmsh import _gmsh40
     from meshio.gmsh import main as gmsh
@@ -142,7 +142,7 @@ def _by_meshio(path: str, name: str) -> tuple:
 
 
 def _last_line(path: str) -> str:
-    """Return a hint for a message if the last line of a text file has no end of line, else ""."""
+    """Return a remark that a text file without a final newline may be truncated, else ""."""
     end = Path(path).read_bytes()[-80:]
     cut = end and b"\0" not in end and not end.endswith((b"\n", b"\r"))
     return "; cut off? The last line has no end" if cut else ""
@@ -174,7 +174,7 @@ class CutError(UnreadableError):
 
 
 def only_kind(kinds: Iterable[str]) -> str:
-    """Return the one kind in ``kinds``; `RefusedError` if none, several, or not in `CORNERS`."""
+    """Return the only cell kind in ``kinds``; `RefusedError` unless it is one kind of `CORNERS`."""
     found = list(dict.fromkeys(kinds))
     if len(found) != 1 or found[0] not in CORNERS:
         raise RefusedError(
@@ -212,11 +212,11 @@ def reason(error: BaseException) -> str:
 
 # More than PATIENCE reads, of less than PIECE bytes, past the end of a file mean an endless loop.
 PIECE, PATIENCE = 4096, 100
-# Format -> pattern that only complete files match; files of other formats state their item counts.
+# Format -> pattern in complete files only; `check_after`, `ends_noticed` check other formats.
 ENDS = {
     "ansys": rb"\)\s*\Z",
     "gmsh": rb"^\$End\w+\s*\Z",
-    "medit": rb"\A\x01\0\0\0|^\s*End\s*\Z",  # a binary file (its first bytes) has no end mark
+    "medit": rb"\A\x01\0\0\0|^\s*End\s*\Z",  # or a binary file, which has no end mark
     "nastran": rb"^ENDDATA",
     "netgen": rb"^\s*endmesh\s*$",  # a section with the geometry may follow
     "permas": rb"^\s*\$FIN",
@@ -274,7 +274,7 @@ def check_after(name: str, content: bytes, mesh: Any) -> None:
     CutError
         There are fewer elements than announced, or the last number may be truncated.
     UnreadableError
-        Vertices are given in a coordinate system other than the basic one.
+        A Nastran file gives vertices in another coordinate system than Nastran's basic one.
     """
     if name == "nastran" and np.any(mesh.point_data.get("nastran:ref", 0)):
         raise UnreadableError("GRID with a coordinate system (CP): only the basic one is read")
@@ -284,7 +284,7 @@ def check_after(name: str, content: bytes, mesh: Any) -> None:
         counts = re.findall(rb"^[ \t]*(?:NELEM|MARKER_ELEMS)[ \t]*=[ \t]*(\d+)", content, re.M)
         announced = {sum(map(int, counts))}
     elif name == "vtk":
-        offsets = content.startswith(b"# vtk DataFile Version 5")  # CELLS: number of cells + 1
+        offsets = content.startswith(b"# vtk DataFile Version 5")  # in "CELLS n", n is cells + 1
         counts = re.findall(rb"^(CELLS|CELL_TYPES)[ \t]+(\d+)", content, re.M)
         announced = {int(count) - (offsets and word == b"CELLS") for word, count in counts}
     if announced - {there}:
@@ -307,7 +307,7 @@ def _check_order(content: bytes) -> None:
 
 
 def without_faces(cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Return ``cells`` (kind -> array) without triangles if all are faces of its tetrahedra.
+    """Return ``cells`` (kind -> array) without the triangles if all are faces of tetrahedra.
 
     Mesh generators often also write the boundary faces, which follow from the tetrahedra.
     """
@@ -392,7 +392,7 @@ class _Bytes(_Noticing, io.BufferedReader):
 
     def read(self, size: int | None = -1, /) -> bytes:
         content = super().read(size)
-        # only small reads are recorded: those of the whole file or large pieces may exceed its end
+        # only small reads count: readers of large pieces may rightly ask for more than the file has
         if size and len(content) < size < PIECE:
             self.note()
         return content
@@ -407,7 +407,7 @@ IGNORED = frozenset(
 
 
 def read_obj(path: Path) -> tuple[np.ndarray, np.ndarray]:
-    """Return points (N, 3), without weights w, and triangles (E, 3), counted from 0, of a file.
+    """Return an .obj file's points (N, 3), without weights w, and triangles (E, 3), indices from 0.
 
     Raises
     ------
@@ -418,7 +418,7 @@ def read_obj(path: Path) -> tuple[np.ndarray, np.ndarray]:
     content = re.sub(rb"#[^\n]*", b"", path.read_bytes())
     vertices: list[bytes] = []
     faces: list[bytes] = []
-    before: list[int] = []  # number of vertices before each face; negative indices count from it
+    before: list[int] = []  # number of vertices before each face; index -1 is the last of them
     whole_lines = re.sub(rb"\\[ \t]*\r?\n", b" ", content)
     for line in whole_lines.splitlines():
         words = line.split(None, 1)

@@ -1,4 +1,4 @@
-"""Selections of mesh vertices by the rest shape: their configuration, and selected vertices."""
+"""Selections of mesh vertices by name of a side, index, rest position or connected part."""
 
 from abc import abstractmethod
 from functools import reduce
@@ -33,7 +33,7 @@ def require_direction(plane: Any) -> Any:
 
 
 class Shape(ConfigModel):
-    """Base class of selections by position or connection."""
+    """Base class of selections by rest position, by connected part or by other selections."""
 
     @abstractmethod
     def chosen(self, mesh: Mesh) -> np.ndarray:
@@ -105,7 +105,7 @@ class BoundaryLoop(Shape):
     def chosen(self, mesh: Mesh) -> np.ndarray:
         border = boundary_edges(mesh.triangles)
         lengths = np.linalg.norm(mesh.points[border[:, 0]] - mesh.points[border[:, 1]], axis=1)
-        # each vertex gets half of the lengths of its edges
+        # each vertex gets half of the lengths of its edges; their sum over a loop is its length
         shares = np.bincount(border.ravel(), np.repeat(lengths / 2.0, 2), minlength=mesh.vertices)
         return _part(mesh, border, np.unique(border), shares, "boundary loop", self.index)
 
@@ -158,7 +158,7 @@ KINDS = (
 
 
 def _tag(value: Any) -> str | None:
-    """Return the kind of selection that ``value`` describes; None if it is not a selection."""
+    """Return "side", "vertices" or one of `KINDS`: the kind of selection ``value``, or None."""
     if isinstance(value, str):
         return "side"
     if isinstance(value, (list, tuple)):
@@ -204,7 +204,7 @@ TOLERANCE = 1e-6  # tolerance of coordinates of a side, relative to the mesh's l
 
 
 def select_vertices(mesh: Mesh, selection: Selection) -> np.ndarray:
-    """Return vertex indices (n,) int64, ascending, of a side (`SIDES`), a list, or a `Shape`.
+    """Return vertex indices (n,) int64, ascending, of a side (`SIDES`), index list or `Shape`.
 
     Raises
     ------
@@ -245,9 +245,10 @@ def _side(mesh: Mesh, side: str) -> np.ndarray:
 def _part(
     mesh: Mesh, edges: np.ndarray, among: np.ndarray, sizes: np.ndarray, what: str, index: int
 ) -> np.ndarray:
-    """Return the vertices of connected component ``index`` of a graph on the vertices ``among``.
+    """Return the vertices of component ``index`` of the graph of ``edges`` on vertices ``among``.
 
     Components are sorted by the sum of their ``sizes`` (N,), largest first; ties: smallest vertex.
+    If there is no such component, the message of the SceneError calls it ``what``.
     """
     n = mesh.vertices
     graph = sparse.coo_array((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(n, n))
@@ -261,13 +262,10 @@ def _part(
 
 
 def farthest_points(points: np.ndarray, candidates: np.ndarray, count: int) -> np.ndarray:
-    """Return ``count`` of ``candidates`` (n,) by farthest-point sampling from the centre.
+    """Return ``count`` of the vertices ``candidates`` (n,) by farthest-point sampling.
 
-    The first point is nearest to the centre of the bounding box. Ties: the first of ``candidates``.
-
-    Parameters
-    ----------
-    points : (N, 3) m
+    The first is nearest to the centre of the bounding box of all ``points`` (N, 3) m, each next one
+    is farthest from those chosen. Ties: the first of ``candidates``.
     """
     centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
     chosen = [int(candidates[np.argmin(_distance(points[candidates], centre))])]

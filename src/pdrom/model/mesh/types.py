@@ -79,7 +79,7 @@ def stored_mesh(group: h5py.Group) -> Mesh:
 
 
 def barycentric_areas(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Return areas (N,) m^2 of ``points`` (N, 3) m: a third of the triangles around each."""
+    """Return areas (N,) m^2 of ``points`` (N, 3) m: a third of those of the triangles around."""
     a, b, c = (points[triangles[:, i]] for i in range(3))
     area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
     return np.bincount(triangles.ravel(), np.repeat(area / 3.0, 3), minlength=len(points))

@@ -1,11 +1,11 @@
-"""Levels of accuracy, their runs and errors: full-order or reduced solvers with K iterations.
+"""Levels of accuracy (full-order or reduced solvers with K iterations), their runs and errors.
 
-The reference run of a motion solves the implicit step by accelerated iterations. Their number is
-large enough if a run with half as many differs from it by less than the tolerance. This difference
-is used as the error of the reference.
+The reference run of a motion solves the implicit step by iterations with Anderson acceleration. It
+has enough of them if a run with half as many differs from it by less than the tolerance. This
+difference is used as the error of the reference run.
 
 The cost of a frame is computed from operation counts, not timed, so that the choice of a level is
-reproducible. The constants were measured on one thread of a 2024 processor; only ratios matter.
+reproducible. Constants were measured on one thread of a 2024 processor; only their ratios matter.
 """
 
 from collections.abc import Callable, Iterator
@@ -23,13 +23,13 @@ from pdrom.reduction.subspace.model import SubspaceModel
 from pdrom.reduction.subspace.space import projector
 
 WINDOW = 5  # number of differences of iterates that Anderson acceleration combines
-# Full-order costs in ns: a projection, PROJECTION times its squared number of rows; an entry of the
-# Cholesky factor, ENTRY; acceleration, ACCELERATED per vertex and iteration; a frame, FRAME if its
-# loop is compiled, IN_PYTHON more if not.
+# Full-order costs in ns. An iteration: PROJECTION p^2 per element of p rows, ENTRY per entry of the
+# Cholesky factor, ACCELERATED per vertex (Anderson acceleration). A frame, besides its iterations:
+# FRAME, and IN_PYTHON more unless one compiled call computes several frames.
 PROJECTION, ENTRY, ACCELERATED = 5.0, 0.9, 6.5
 FRAME, IN_PYTHON = 2.3e4, 1.2e5
-# Reduced costs in ns: a projection, SAMPLED times its squared number of rows; an entry of a dense
-# product, DENSE; the rest of an iteration, ITERATION; a frame, two constants as in full order.
+# Costs of reduced models in ns. An iteration: ITERATION, SAMPLED p^2 per sampled element of p rows,
+# DENSE per entry of dense matrices. A frame: REDUCED_FRAME, REDUCED_IN_PYTHON as for full order.
 SAMPLED, DENSE, ITERATION = 12.5, 0.23, 1.2e3
 REDUCED_FRAME, REDUCED_IN_PYTHON = 4e4, 2.3e5
 # The Cholesky factor of a matrix with n entries in N rows has about FILL n log2 N entries.
@@ -54,7 +54,7 @@ class Level:
 
     iterations, window : iterations per frame; window of Anderson acceleration (0: none)
     model : position subspace with sampled elements; None for a full-order level
-    tau : tolerance at which the elements of ``model`` were sampled
+    tau : tolerance of the energy-conserving sampling (module `ecsw`) by which ``model`` was made
     """
 
     iterations: int
@@ -72,7 +72,7 @@ class Level:
 
     @property
     def exact(self) -> "Level":
-        """Full-order level, more accurate than this one, whose frames check those of this level."""
+        """More accurate full-order level, with whose frames those of this level are compared."""
         return Level(CONVERGED if self.model is not None else 2 * self.iterations, WINDOW)
 
     def scene(self, scene: Scene) -> Scene:
@@ -81,7 +81,7 @@ class Level:
         return replace(scene, config=scene.config.model_copy(update=changes))
 
     def work(self, scene: Scene) -> float:
-        """Estimated cost, ns, of a frame of ``scene``; reduced models treat contacts in Python."""
+        """Estimated time, ns, of a frame; contacts add `REDUCED_IN_PYTHON` to a reduced model's."""
         effects = scene.groups, scene.forces, scene.boundaries, scene.contacts
         slow = not WholeFrames.suits(*effects)
         if self.model is None:
@@ -106,7 +106,7 @@ class Trajectory:
     Parameters
     ----------
     moved : whether to perturb the initial positions by `MOVED` times the mesh's longest side
-    on_frame : callback after each frame
+    on_frame : called with the title of ``level`` after each frame
 
     Attributes
     ----------
@@ -181,10 +181,7 @@ def relative_errors(
 
     Errors are divided by the norm of the reference's displacement. Velocities are differences of
     frames. An error is infinite if the run is not finite, or differs from a reference at rest.
-
-    Parameters
-    ----------
-    differences : (F', N, 3) m, positions minus ``reference`` (F + 1, N, 3) m, initial ones left out
+    ``differences`` (F', N, 3) m are positions of frames minus those of ``reference`` (F + 1, N, 3).
     """
     moved = reference[1 : len(differences) + 1] - reference[0]
     with np.errstate(over="ignore", invalid="ignore"):
@@ -199,7 +196,7 @@ def relative_errors(
 
 
 def last_within(errors: np.ndarray, tolerance: float) -> int:
-    """Largest n with errors[n - 1], the error over the first n frames, at most ``tolerance``."""
+    """Largest n such that errors[n - 1], over the first n frames, is <= ``tolerance``; else 0."""
     within = np.flatnonzero(errors <= tolerance)
     return int(within[-1]) + 1 if len(within) else 0
 

@@ -1,16 +1,16 @@
-"""Runs within a requested tolerance by the cheapest level of accuracy (`Level`) that suffices.
+"""Runs with an error within a requested tolerance, by the cheapest solver that suffices.
 
-Calibration runs every level on two motions with converged reference runs: the training motion and a
-variation of it. The scene is run by the cheapest level whose error on both, times a safety factor,
-is within the tolerance.
+A level of accuracy (`Level`) is a full-order or reduced solver. Calibration runs every level on two
+motions with converged reference runs: the training motion and a variation of it. The scene is run
+by the cheapest level whose error on both, times a safety factor, is within the tolerance.
 
 The defect of a frame is the distance to the result of a more accurate level from the same state. A
-run accumulates defects and amplifies them. The error of a run is estimated as the error of its
-level in the calibration, times the larger of two ratios (run over calibration) if above 1: of the
-defects in checked frames, and of the distances to a run of a second level with a perturbed start.
-The tolerance counts as met for the first frames over which the estimate is within it. A reduction
-that fails is replaced by a full-order level, and that by the most accurate one. No decision depends
-on timings.
+run accumulates defects and amplifies them. The error of a run is estimated as its level's error in
+the calibration, times the larger of two ratios if that is above 1: of the defect in checked frames
+to that in the calibration, and of the distance to a run of a second level, with a perturbed start,
+to that expected from the calibration. The tolerance counts as met for the first frames over which
+the estimate is within it. If it is missed in later frames, a full-order level replaces a reduced
+one, and the most accurate level replaces that. No decision depends on timings.
 """
 
 import logging
@@ -33,15 +33,15 @@ log = logging.getLogger(__name__)
 
 Count = Annotated[int, Field(ge=1, le=10_000)]
 
-# Seed of the second motion on which levels are calibrated, a random variation of the training one
-# (`HeldOut.further`). The motions that train reductions have smaller seeds.
+# Seed of the second motion for the calibration of levels of accuracy: the training motion, varied
+# at random (`HeldOut.further`). The motions that train reductions have smaller seeds.
 CALIBRATED = 100
-# An error counts as unknown unless it can be estimated in at least this fraction of the frames.
+# A tolerance counts as missed if it is met, or can be judged, in less than this part of the frames.
 JUDGED = 0.1
-PROBED = 6  # number of frames of a calibration run in which the defect is computed
-CHECKS = 2  # smallest number of checked frames of a run
+PROBED = 6  # number of frames of a calibration run that `Trajectory.check` checks
+CHECKS = 2  # smallest number of frames of a run that `Trajectory.check` checks
 # A reduction is run only if its estimated cost, with checks, is less than this fraction of the full
-# order's cost. A larger fraction would be within the error of the estimates.
+# order's cost. A smaller saving could be an error of the estimates.
 WORTH = 2.0 / 3.0
 # A run counts as blown up if its bounding box is larger than that at rest by more than this factor.
 BLOWUP_EXTENT = 100.0
@@ -92,10 +92,10 @@ class ToleranceSettings(ConfigModel):
     """Levels of accuracy that are calibrated, and the safety factor of their errors.
 
     modes, tolerances : numbers of modes k and sampling tolerances tau of the reductions
-    frames : largest number of frames of the training motions for which elements are sampled
+    frames : largest number of frames of each training motion from which elements are sampled
     training_motions : number of motions that train the reductions, the training motion included
-    plain, accelerated : numbers of full-order iterations, without and with acceleration
-    iterations : numbers of iterations of the reductions, all accelerated
+    plain, accelerated : numbers of full-order iterations, without and with Anderson acceleration
+    iterations : numbers of iterations of the reductions, all with Anderson acceleration
     factor : safety factor by which estimated errors are multiplied
     every : a reduction is checked in one of this many frames
     """
@@ -142,7 +142,7 @@ class Outcome:
         level can meet it: the most accurate full-order level has run instead
     limit : reason why later frames are not within the tolerance; empty if all frames are
     expected : error of the chosen level on the motions of the calibration, times the safety factor
-    estimate : estimated error over the first ``frames``, times the safety factor; None if that is 0
+    estimate : estimated error over ``frames`` frames, times the safety factor; None without frames
     level : title of the level that computed the positions
     reduced : whether that level is a reduced model
     failed : titles of the levels that were run before and did not meet the tolerance
@@ -172,10 +172,10 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Calibration:
-    """Calibrated ``levels`` of accuracy, the cheapest first, and the ``motions`` they have run.
+    """Solvers (``levels`` of accuracy), the cheapest first, and ``motions`` on which they ran.
 
-    All errors are those of one quantity, positions or velocities. Methods take the requested
-    tolerance as ``error``; it may not be below the one for which the levels were calibrated.
+    All errors are those of one quantity, positions or velocities. The argument ``error`` of a
+    method is a requested tolerance, not below the one for which the levels were calibrated.
     """
 
     levels: list[Calibrated]
@@ -189,9 +189,10 @@ class Calibration:
         return max(full, key=lambda each: (each.level.iterations, each.level.window))
 
     def horizon(self, error: float) -> tuple[int, str]:
-        """Number of first frames in which an error of ``error`` is measurable, and why not in more.
+        """Number of first frames in which an error of ``error`` is measurable; why no more are.
 
-        In later frames the reference runs are less accurate than this, or rounding errors decide.
+        In later frames the error of a reference run, or its change by a tiny shift of the start, is
+        larger than ``error`` divided by the safety factor.
         """
         least = error / self.settings.factor
         converged = min(levels.last_within(motion.unconverged, least) for motion in self.motions)
@@ -211,7 +212,7 @@ class Calibration:
         return self.settings.factor * float(max(errors[end - 1] for errors in known))
 
     def admissible(self, error: float) -> list[Calibrated]:
-        """Levels of accuracy with an expected error up to ``error``; [] if none is full-order."""
+        """Levels with an expected error up to ``error``; [] if none of them is of full order."""
         good = [each for each in self.levels if self.expected(each, error) <= error]
         return good if any(not each.reduced for each in good) else []
 
@@ -221,9 +222,9 @@ class Calibration:
         return next(full, self.most_accurate)
 
     def second(self, level: Calibrated, error: float) -> Calibrated:
-        """Cheapest other level of accuracy, reduced or not like ``level``, to compare a run with.
+        """Cheapest other level of the kind (reduced or not) of ``level``, to compare its run with.
 
-        Its expected error is at most ``error`` times the safety factor; ``level`` if there is none.
+        Its expected error is at most ``error`` times the safety factor; without one: ``level``.
         """
         most = error * self.settings.factor
         alike = [each for each in self.levels if each.reduced == level.reduced]
@@ -233,8 +234,9 @@ class Calibration:
     def attempts(self, error: float) -> list[Calibrated]:
         """Levels of accuracy to run in turn until one meets the tolerance ``error``.
 
-        First the cheapest reduction, if it saves time even with the run to compare with and checks;
-        then the cheapest admissible full-order level, if there is one; last the most accurate one.
+        First the cheapest admissible reduction that, with checks and a comparison run (`second`),
+        costs less than `WORTH` times the full order with its comparison run; then the cheapest
+        admissible full-order level, if there is one; last the most accurate full-order level.
         """
         full = self.full_order(error)
         most = WORTH * (full.work + self.second(full, error).work)
@@ -291,9 +293,11 @@ class CheckedRun:
     def _estimated(self, level: Calibrated) -> tuple[Trajectory, np.ndarray]:
         """Run ``level`` to the end or to a failed check; return the run and estimated errors (F,).
 
-        The expected error is multiplied by the root mean square of the run's defects (errors made
-        in one frame) over the largest defect in the calibration, if this ratio is above 1. All
-        errors are inf if the expected error is, or if a check failed.
+        Each error is the larger of two estimates: that of `_amplified`, and the expected error
+        times the ratio, if above 1, of the run's root mean square defect (error made in one frame)
+        to the largest defect in the calibration. A check fails if the second estimate exceeds the
+        tolerance, or the mesh blows up. All errors are inf if a check failed or the expected error
+        is inf.
         """
         own, frames, full = self._own, self._frames, self._own.full_order(self._error).level
         largest = BLOWUP_EXTENT * self._scene.mesh.extent
@@ -306,7 +310,7 @@ class CheckedRun:
         for frame in check_frames(frames, frames // own.settings.every if level.reduced else 0):
             run.to(frame).check(exact)
             size = np.sqrt(np.mean(np.square(list(run.defects.values())))) / own.motions[0].unit
-            with np.errstate(divide="ignore", invalid="ignore"):  # both defects may be zero
+            with np.errstate(divide="ignore", invalid="ignore"):  # for 0 / 0, fmax gives 1
                 estimate = expected * float(np.fmax(1.0, np.divide(size, level.defect)))
             if not (estimate <= self._error and np.ptp(run.ends[-1], axis=0).max() <= largest):
                 return run, hopeless
@@ -317,7 +321,8 @@ class CheckedRun:
     def _amplified(self, level: Calibrated, run: Trajectory) -> np.ndarray:
         """Estimate errors (F,) over the first frames of ``run`` by comparison with a second level.
 
-        The expected error is multiplied by the runs' distance over the expected distance, if > 1.
+        The second run has a perturbed start. The expected error is multiplied by the ratio of the
+        runs' distance to the sum of both levels' errors in the calibration, if that is above 1.
         """
         own, second = self._own, self._own.second(level, self._error)
         other = self._start(second.level, moved=True).to(self._frames)
@@ -340,10 +345,8 @@ def calibrate(
 ) -> Calibration:
     """Run every level of ``settings`` on the ``training`` motion and on a variation of it.
 
-    Parameters
-    ----------
-    request : quantity, and smallest error for which the calibration will be used
-    on_frame : callback after each frame
+    The calibration is for the quantity of ``request``, and for its error or larger ones.
+    ``on_frame`` is called after each frame.
     """
     far = training.config.training_variant(CALIBRATED).effects
     scenes, least = (training, training.changed(effects=far)), request.error / settings.factor
@@ -368,7 +371,7 @@ def _reduced(training: Scene, motion: Motion, settings: ToleranceSettings) -> It
     """Yield the reduced levels of accuracy; none if a model of the scene cannot be made.
 
     They are trained on the converged reference run of ``motion`` and on runs of other motions with
-    20 accelerated iterations.
+    20 iterations per frame and Anderson acceleration.
     """
     frames = np.arange(0, training.config.frames, 2)
     few = frames[:: -(-len(frames) // settings.frames)]
@@ -413,7 +416,7 @@ def _calibrated(level: Level, motions: Sequence[Motion], on_frame: OnFrame) -> C
 def transferred(trained: Scene, scene: Scene) -> Scene:
     """Return ``trained`` with the material, masses, time step, frames, obstacles of ``scene``.
 
-    Errors of levels depend on these, so that the calibration uses those of the scene to be run.
+    Errors of accuracy levels depend on these quantities: levels are calibrated with ``scene``'s.
     Held vertices, their paths and the initial velocity remain those of ``trained``.
     ConfigurationError, naming ``scene``, if it has another mesh or other constraint groups.
     """

@@ -1,4 +1,4 @@
-"""Interface of all selections of samples, and greedy discrete empirical interpolation (DEIM).
+"""Interface of all rules that select samples; greedy discrete empirical interpolation (DEIM).
 
 DEIM (Chaturantabut and Sorensen 2010, algorithm 1) selects single entries or whole elements (all
 3p entries of an element of p rows). The preprint's variant selects whole rows of three entries
@@ -24,10 +24,8 @@ class Selection(ABC):
     def one_a_mode(self, v: np.ndarray, size: int, ranks: Sequence[int]) -> dict[int, np.ndarray]:
         """Select r distinct blocks (all, if fewer exist) for each number r of modes in ``ranks``.
 
-        Parameters
-        ----------
-        v : (size e, R) modes, ``size`` consecutive rows for each of e blocks; R is at least the
-            largest of ``ranks``
+        ``v`` (size e, R) has R modes, at least the largest of ``ranks``, and ``size`` consecutive
+        rows for each of e blocks.
         """
 
     def extend(self, v: np.ndarray, size: int, chosen: np.ndarray, count: int) -> np.ndarray:
@@ -42,17 +40,18 @@ class Selection(ABC):
         return oversample(v, size, chosen, count=count)
 
 
-# Residuals that differ by less than this fraction may count as equal; the first one is then chosen.
+# Residuals whose relative difference is below this may count as equal: the lowest index is chosen.
 TIE = 1e-6
 
 
 def deim_entries(v: np.ndarray) -> np.ndarray:
     """Greedy DEIM entries of the basis ``v`` (n, r): min(n, r) indices, the first k for k modes.
 
-    The k-th residual v_k - V_{k-1} (P^T V_{k-1})^-1 P^T v_k vanishes at all earlier entries; the
-    entry where its magnitude, times `tie_weights`, is largest comes next. These are the pivots of
-    an LU factorisation of diag(w) V with partial pivoting (Sorensen and Embree 2016, section 3),
-    which LAPACK does in blocks. Multiplying row i by w_i multiplies its residuals by w_i only.
+    The k-th residual v_k - V_{k-1} (P^T V_{k-1})^-1 P^T v_k, where P^T selects the k - 1 earlier
+    entries, vanishes at these. The entry where its magnitude, times the weights w of `tie_weights`,
+    is largest comes next. These are the pivots of an LU factorisation of diag(w) V with partial
+    pivoting (Sorensen and Embree 2016, section 3), which LAPACK does in blocks: multiplying row i
+    by w_i multiplies its residuals by w_i only.
 
     The entries are always distinct. For a mode that depends on the earlier ones, the residual is
     round-off and its entry is arbitrary.
@@ -70,7 +69,7 @@ def tie_weights(n: int) -> np.ndarray:
     """Factors w (n,), falling from 1 to almost 1 - TIE, that break ties between n magnitudes.
 
     In a symmetric motion residuals are equal up to round-off, and the largest of them would depend
-    on the order of operations. After multiplication by the factors, the first one is the largest.
+    on the order of operations. After multiplication by the factors, the first of them is largest.
     An entry d places later is selected only if it is larger by more than the fraction TIE d / n.
     """
     return 1.0 - TIE * np.arange(n) / n
@@ -85,7 +84,7 @@ class GrowingFit:
     The coefficients c of mode v_k in the earlier modes V_k solve (S V_k) c = S v_k; S selects rows.
 
     The triangular QR factor R (r, r) of the sampled rows of all modes is stored and updated when s
-    rows are added, at a cost O(s r^2) instead of O(m k^2) for factoring all m rows again.
+    rows are added, at a cost O(s r^2); factoring all m sampled rows again would cost O(m r^2).
     R[:k, :k] c = R[:k, k] has the same least-squares solutions as the sampled equations.
     """
 
@@ -93,7 +92,7 @@ class GrowingFit:
         self._factor = np.zeros((modes, modes), order="F")
 
     def add(self, rows: np.ndarray) -> None:
-        """Add the sampled ``rows`` (s, r) of the modes to the fit."""
+        """Add ``rows`` (s, r) of the modes to the sampled rows, at which modes are fitted."""
         block = min(BLOCK, len(self._factor))
         self._factor = linalg.lapack.dtpqrt(0, block, self._factor, rows, overwrite_a=True)[0]
 
@@ -126,7 +125,7 @@ def joint_rows(v: np.ndarray, active: tuple[bool, ...], repeat: bool) -> np.ndar
     For mode k each axis a has its own system (P^T V_a) c_a = P^T v_{k,a}, where P^T selects rows.
     An axis without modes, False in ``active``, is left out.
     The row with the largest sum of squared residuals of the axes (times `tie_weights`) is selected
-    for all axes. As it may be useless for one axis, that system may be singular: it is solved in
+    for all axes. It may be useless for one axis, whose system may then be singular: it is solved in
     the least-squares sense. With ``repeat`` a row may be selected again, as in the program of the
     preprint's authors; without it, the result has at most as many entries as the basis has rows.
     """
@@ -136,10 +135,11 @@ def joint_rows(v: np.ndarray, active: tuple[bool, ...], repeat: bool) -> np.ndar
 
 
 def _greedy(parts: Sequence[np.ndarray], total: int, count: int, repeat: bool) -> np.ndarray:
-    """Select ``count`` of ``total`` blocks of rows by residuals of the modes, the largest first.
+    """Select ``count`` of ``total`` blocks of rows, each by the largest residual of the next mode.
 
-    ``parts`` is the matrix of the modes, or one matrix per axis. The modes of each part are fitted
-    by coefficients of their own. A part has ``total`` blocks; squared residuals of parts are added.
+    It is the residual of a fit by the earlier modes at the blocks selected so far. ``parts`` is the
+    matrix of the modes, or one matrix per axis. Each has ``total`` blocks and is fitted separately;
+    their squared residuals are added. With ``repeat`` a block may be selected more than once.
     """
     fits = [(np.asfortranarray(part), GrowingFit(part.shape[1])) for part in parts]
     weights = tie_weights(total) ** 2

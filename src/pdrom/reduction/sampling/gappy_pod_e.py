@@ -3,7 +3,8 @@
 B. Peherstorfer, Z. Drmac, S. Gugercin, Stability of discrete empirical interpolation and gappy
 proper orthogonal decomposition with randomized and deterministic sampling points, SIAM J. Sci.
 Comput. 42 (2020), section 4. Points are generalised to blocks of rows (elements). Their number
-is given or follows from a bound on the gain 1 / sigma_min(P^T V) of the sampled rows of modes V.
+is given, or follows from a bound on the gain 1 / sigma_min(P^T V), by which the sampled rows P^T V
+of modes V can amplify errors.
 """
 
 import numpy as np
@@ -11,7 +12,7 @@ from scipy import linalg
 
 from pdrom.core.errors import SamplingError
 
-# Bound on the rounding errors of the product B B^T of a block B, relative to its trace.
+# Bound on the rounding errors of B B^T, B the rows of an element, relative to the trace of B B^T.
 ROUNDOFF = 1e-11
 
 
@@ -35,10 +36,11 @@ def oversample(v: np.ndarray, size: int, elements: np.ndarray, count: int) -> np
 
 
 def bound_gain(v: np.ndarray, size: int, elements: np.ndarray, bound: float) -> np.ndarray:
-    """Extend ``elements`` until the gain || (P^T V)^+ ||_2 of their rows is at most ``bound``.
+    """Extend ``elements`` until the gain || (P^T V)^+ ||_2 is at most ``bound``.
 
-    Return all elements if even these do not meet the bound. With orthonormal columns all elements
-    have the gain 1, so that every bound of at least 1 can be met. The basis ``v`` (size e, r) has
+    The gain is the factor by which the elements' rows P^T V of the basis V can amplify errors.
+    Return all elements if even these do not meet the bound. With orthonormal columns the set of all
+    elements has the gain 1, so that every bound of at least 1 can be met. ``v`` (size e, r) has
     ``size`` rows for each element. SamplingError if an element is repeated or out of range.
     """
     growing = _Growing(v, size, elements)
@@ -48,7 +50,7 @@ def bound_gain(v: np.ndarray, size: int, elements: np.ndarray, bound: float) -> 
 
 
 class _Growing:
-    """Sampled elements and the Gram matrix G = (P^T V)^T P^T V of their rows.
+    """Sampled elements and the Gram matrix G = (P^T V)^T P^T V of their rows P^T V of a basis V.
 
     picked : sampled elements in order of selection
     total : number of all elements
@@ -57,7 +59,7 @@ class _Growing:
     def __init__(self, v: np.ndarray, size: int, elements: np.ndarray) -> None:
         self._rows = np.ascontiguousarray(v)
         self._blocks = self._rows.reshape(-1, size, v.shape[1])
-        # these products B B^T, a tenth as large as the blocks B, give bounds in `_growth_at_most`
+        # products B B^T (a tenth of the memory of the rows B), for the bounds in `_growth_at_most`
         self._squares = self._blocks @ self._blocks.transpose(0, 2, 1)
         self._sizes = np.trace(self._squares, axis1=1, axis2=2)
         self.picked, self.total = [int(e) for e in elements], len(self._blocks)
@@ -74,19 +76,19 @@ class _Growing:
 
     @property
     def gain(self) -> float:
-        """Amplification of errors 1 / sigma_min(P^T V); inf if G is singular up to round-off."""
+        """Amplification of errors 1 / sigma_min(P^T V); inf if P^T V lacks full column rank."""
         roundoff = len(self._gram) * np.finfo(float).eps * np.trace(self._gram)
         return 1.0 / np.sqrt(self._smallest) if self._smallest > roundoff else np.inf
 
     def add(self) -> None:
-        """Add the element with the largest lower bound on the growth of G's smallest eigenvalue."""
+        """Add the element that most raises a lower bound of G's least eigenvalue (G: see class)."""
         self.picked.append(self._strongest())
         block = self._blocks[self.picked[-1]]
         self._gram += block.T @ block
         self._decompose()
 
     def _decompose(self) -> None:
-        """Find G's smallest eigenvalue, its eigenvector, the gap to the next one (inf if r = 1)."""
+        """Compute least eigenpair of the sampled rows' Gram matrix, gap to the next (none: inf)."""
         last = min(1, len(self._gram) - 1)
         values, vectors = linalg.eigh(
             self._gram, subset_by_index=(0, last), check_finite=False, driver="evr"
@@ -97,10 +99,11 @@ class _Growing:
     def _strongest(self) -> int:
         """Return the unsampled element with the largest `eigenvalue_growth`.
 
-        Two upper bounds, for rows B and eigenvector u, exclude elements before their growth is
-        computed. |B u|^2 must exceed the growth of the element with the largest |B u|^2 (returned
-        if no growth is larger, as when the smallest eigenvalue is double). `_growth_at_most` must
-        not be below the growth of the element for which it is largest.
+        Two upper bounds exclude most elements, so that their growth is not computed. The first is
+        |B u|^2, with the rows B of an element and the eigenvector u of the smallest eigenvalue. Let
+        g be the growth of the element with the largest |B u|^2; elements with |B u|^2 <= g are
+        excluded. So are those whose bound `_growth_at_most` is below the growth of the element with
+        the largest such bound. If none of the rest exceeds g, the element of g is returned.
         """
         products = (self._rows @ self._weakest).reshape(self.total, -1)
         strength = np.einsum("es,es->e", products, products)
@@ -118,7 +121,7 @@ class _Growing:
         return int(others[np.argmax(growth)]) if growth.max(initial=0.0) > bound else first
 
     def _growth_at_most(self, elements: np.ndarray, products: np.ndarray) -> np.ndarray:
-        """Upper bounds on `eigenvalue_growth` of ``elements``, from products B B^T without B."""
+        """Upper bounds on `eigenvalue_growth` by ``elements``, from B B^T for their rows B."""
         products = products[elements]
         squared = np.einsum("es,es->e", products, products)
         stretched = np.einsum("est,et->es", self._squares[elements], products)
@@ -145,11 +148,12 @@ def eigenvalue_growth(
     it is accurate to all digits, while the usual form, with n = |B^T b|^2 / |b|^2 and the square
     root of (g + n)^2 - 4 g |b|^2, loses half of them.
 
-    For a single row n = |B|^2 and t is the bound of Ipsen and Nadler (2009), the paper's eq. (4.3).
-    For blocks: if all other eigenvalues are lowered to the second smallest, the growth is the root
-    of t = sum_i beta_i^2 f(mu_i), f(mu) = (g - t) / (g - t + mu), where mu_i are the eigenvalues of
-    C C^T and beta_i the components of b in its eigenvectors. As f is convex, Jensen's inequality
-    gives a lower bound with the mean c of all mu_i. An infinite gap gives t = |b|^2.
+    For a single row n = |B|^2 and t is the bound of Ipsen and Nadler (2009), eq. (4.3) in
+    Peherstorfer et al. (2020). For several rows: if all other eigenvalues are lowered to the second
+    smallest, the growth is the root of t = sum_i beta_i^2 f(mu_i), f(mu) = (g - t) / (g - t + mu),
+    where mu_i are the eigenvalues of C C^T and beta_i the components of b in its eigenvectors. As f
+    is convex, Jensen's inequality gives a lower bound with the mean c of the mu_i, weighted by
+    beta_i^2. An infinite gap gives t = |b|^2.
 
     Parameters
     ----------
@@ -166,7 +170,7 @@ def eigenvalue_growth(
 
 
 def _smaller_root(squared: np.ndarray, beside: np.ndarray, gap: float) -> np.ndarray:
-    """Smaller root t (m,) of t^2 - (g + n) t + g |b|^2, n = |b|^2 + c, from |b|^2, c and g."""
+    """Root t (m,) as in `eigenvalue_growth`, for |b|^2 ``squared``, c ``beside`` and g ``gap``."""
     if np.isinf(gap):
         return squared
     mean = squared + beside

@@ -1,8 +1,9 @@
-"""The reduced local step: S^T W p(y) is replaced by S^T W (mean + V c(y)), with r modes V.
+"""The reduced local step: projections p(y) in S^T W p(y) become mean + V c(y), with r modes V.
 
-Compiled code computes the coefficients c from sampled entries of p(y), then the reconstruction
-("lift"). All axes x, y, z share one set of coefficients, or each has its own set. A column of the
-lift adds the reconstruction by one set of coefficients to one axis of the right-hand side."""
+S has the operators of all elements, W their weights. Compiled code computes the coefficients c from
+sampled entries of p(y), then the reconstruction ("lift"). All axes x, y, z share one set of
+coefficients, or each has its own set. A column of the lift adds the reconstruction by one set of
+coefficients to one axis of the right-hand side."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -23,10 +24,10 @@ from pdrom.model.scene import Scene
 from pdrom.reduction.rerun import Rerun, compare
 from pdrom.reduction.sampling.reduction import Reduction
 
-SPLIT_FROM = 1 << 17  # product of vertices and modes from which S^T W V c is computed in two parts
+SPLIT_FROM = 1 << 17  # vertices times modes from which the kernel's work is done in two `PARTS`
 
-# Indices into the kernel's record, an array of integers: numbers of modes, sets, columns, sampled
-# values; addresses of the sampler and of its record, then of the arrays of `Lift` and the clocks.
+# Indices into the record (int64 array) of the kernel of `Lift`: numbers of modes, coefficient sets,
+# columns and sampled values; addresses of the sampling kernel, of its record and of all arrays.
 MODES, SETS, COLUMNS, SAMPLED, SAMPLER, SAMPLER_RECORD = range(OWN, OWN + 6)
 STARTS, POSITIONS, PACKED, OPERATORS, SHIFTS, COEFFICIENTS = range(OWN + 6, OWN + 12)
 AXES, OWN_SETS, LIFTED, OFFSET, SECONDS, PROJECTIONS, CLOCK, SIZE = range(OWN + 12, OWN + 20)
@@ -36,16 +37,16 @@ AXES, OWN_SETS, LIFTED, OFFSET, SECONDS, PROJECTIONS, CLOCK, SIZE = range(OWN + 
 class Lift:
     """Arrays of a reduced local step with r modes, N vertices and c columns of the reconstruction.
 
-    starts : (sets + 1,) index at which the sampled entries of each set of coefficients begin
+    starts : (sets + 1,) indices in ``positions`` at which the entries of each coefficient set begin
     positions : index of each sampled entry in the projections of the sampled elements
     packed : working memory for the sampled entries of one set
-    operators : solution operators (r, m) of all sets, flattened, one after the other
+    operators : matrix (r, m) of each set that maps m samples to coefficients, all flattened
     shifts : (sets, r) operator times the mean at sampled entries, subtracted from coefficients
     coefficients : (sets, r) coefficients of the last evaluation
     axes, own_sets : (c,) axis to which each column adds, and set whose coefficients it uses
     lifted : (c, N, r) S^T W V of each column
     offset : (4 N,) S^T W mean, flat, with a zero after the three numbers of each vertex
-    seconds : (2,) s, accumulated time of the two parts of the lift
+    seconds : (2,) s, accumulated time of the reconstruction in each of the two `PARTS`
     """
 
     starts: np.ndarray
@@ -61,7 +62,7 @@ class Lift:
     seconds: np.ndarray
 
     def kernel(self, sampler: LocalKernel, sampled: int) -> LocalKernel:
-        """Kernel that calls ``sampler`` (it writes ``sampled`` numbers), then reconstructs."""
+        """Compiled local step; ``sampler`` computes the samples, which are ``sampled`` numbers."""
         columns, vertices, modes = self.lifted.shape
         split = vertices * modes >= SPLIT_FROM
         numbers = (
@@ -84,10 +85,8 @@ class Lift:
 
 @compiled(nogil=True)
 def coefficients(sampled, starts, positions, packed, operators, shifts, result):
-    """Compute the coefficients of all sets from the projections of the sampled elements.
+    """Compute the coefficients, one set for all axes or one per axis, from sampled projections.
 
-    Parameters
-    ----------
     sampled : flat array of projections of the sampled elements, one element after the other
     starts, positions, packed, operators, shifts : arrays of `Lift`
     result : (sets, r) output
@@ -95,7 +94,7 @@ def coefficients(sampled, starts, positions, packed, operators, shifts, result):
     sets, modes = shifts.shape
     for k in range(sets):
         first, last = starts[k], starts[k + 1]
-        # copy the set's sampled entries to contiguous memory, for products with the operator
+        # copy the sampled entries of set k to contiguous memory, for products with its operator
         for j in range(last - first):
             packed[j] = at(sampled, at(positions, first + j))
         size = last - first
@@ -117,8 +116,6 @@ def coefficients(sampled, starts, positions, packed, operators, shifts, result):
 def lift(values, axes, own_sets, lifted, offset, first, last, rhs):
     """Add S^T W (mean + V c) to the rows ``first`` to ``last`` - 1 of the right-hand side.
 
-    Parameters
-    ----------
     values : (sets, r) coefficients
     axes, own_sets, lifted, offset : arrays of `Lift`
     rhs : (4 N,) right-hand side, flat, with a zero after the three numbers of each vertex
@@ -183,12 +180,12 @@ class ReducedLocalStep:
     """Local step that evaluates sampled elements and adds a reconstruction of S^T W p to rhs.
 
     Before the run, the offset S^T W mean (N, 3), the reconstruction S^T W V for each set of
-    coefficients and the solution operators are computed. Online steps are the projections of the
-    sampled elements, a small dense product for c, and the dense reconstruction.
+    coefficients and the matrices that map samples to c are computed. An iteration computes the
+    projections of sampled elements, c by a small dense product, and the dense reconstruction.
 
     Attributes
     ----------
-    local_kernel : compiled online steps; None if the group has no kernel for sampled elements
+    local_kernel : the iteration in compiled form; None if the group has no compiled projections
     frame_lagged : whether the group has data that are computed once per frame (``begin_frame``)
     """
 
@@ -223,7 +220,7 @@ class ReducedLocalStep:
         return self._group.project_elements(y, self._elements).ravel()
 
     def solve(self, sampled: np.ndarray) -> None:
-        """Set the coefficients from ``sampled``, the result of `sample`."""
+        """Compute the coefficients of the reconstruction from ``sampled``, result of `sample`."""
         data = self._lift
         coefficients(
             sampled, data.starts, data.positions, data.packed, data.operators, data.shifts,
@@ -299,7 +296,7 @@ def rerun(
 
     Parameters
     ----------
-    reference : (F + 1, N, 3) positions of the full-order run
+    reference : (F + 1, N, 3) m, positions of the full-order run
     blowup_extent : the run ends if its bounding box exceeds this multiple of that at rest
     offset : (N, 3) m, added to the initial positions
     system : factored system of the scene's global step

@@ -1,4 +1,4 @@
-"""Q-DEIM: blocks of rows by a pivoted QR factorisation (Drmac and Gugercin 2016)."""
+"""Q-DEIM: blocks of rows selected by a pivoted QR factorisation (Drmac and Gugercin 2016)."""
 
 from collections.abc import Sequence
 
@@ -7,7 +7,8 @@ import numpy as np
 from pdrom.reduction.sampling.deim import Selection, tie_weights
 
 EPS = np.finfo(float).eps
-# Pivots are searched among ROWS_A_MODE rows per mode; if fewer than FEW are found, twice as many.
+# Pivots are searched among ROWS_A_MODE rows per mode. After a search that finds fewer than FEW
+# pivots, the next is among twice as many rows.
 ROWS_A_MODE, FEW = 2, 8
 
 
@@ -34,11 +35,12 @@ def qdeim_elements(v: np.ndarray, size: int) -> np.ndarray:
 
 
 class _Left:
-    """Groups of columns after removal of the selected directions, with bounds on their norms.
+    """Groups of columns of V^T, one per element; directions of earlier pivots are projected out.
 
-    Norms only decrease, so that old norms are upper bounds. The norms of groups with the largest
-    bounds are updated; the largest of them gives the next pivot if it exceeds all other bounds. If
-    not, all are updated. The matrix is thus read a few times, while LAPACK reads it once per pivot.
+    Their norms only decrease, so that old norms are upper bounds. The norms of the groups with the
+    largest bounds are computed. The group with the largest of these is the next pivot if its norm
+    exceeds the bounds of all other groups; otherwise the bounds of all groups are updated. V is
+    thus read a few times, while LAPACK reads it once per pivot.
     """
 
     def __init__(self, v: np.ndarray, size: int) -> None:
@@ -51,9 +53,9 @@ class _Left:
         self._error = self._rounding(self._squares)
 
     def pick_among(self, count: int, most: int) -> int:
-        """Add pivots among the ``count`` elements with the largest bounds; return their number.
+        """Add pivots among the ``count`` elements of largest norm bound; return how many are added.
 
-        At most ``most`` pivots are selected in all.
+        At most ``most`` elements are selected in total, those of earlier calls included.
         """
         candidates, rest = self._highest(count)
         left = self._rows.reshape(self.total, self._size, -1)[candidates]
@@ -68,7 +70,7 @@ class _Left:
                 break
             weights[best] = -1.0
             self.picked.append(int(candidates[best]))
-            # the dominant direction of the group; zero if dependent modes leave no remainder
+            # direction in R^r that dominates the element's rows; zero if nothing is left of them
             group = left[self._size * best : self._size * (best + 1)]
             direction = np.linalg.svd(group, full_matrices=False)[2][0] if group.any() else group[0]
             direction = direction - self._directions.T @ (self._directions @ direction)
@@ -82,7 +84,7 @@ class _Left:
         return len(new)
 
     def _highest(self, count: int) -> tuple[np.ndarray, float]:
-        """The ``count`` elements with the largest bounds, and the next largest bound (-1: none)."""
+        """``count`` elements with largest bounds of squared norms; others' largest (none: -1)."""
         bounds = self._weights * (self._squares + self._error)
         bounds[self.picked] = -1.0
         if count == self.total:
@@ -92,7 +94,7 @@ class _Left:
         return np.sort(split[self.total - count :]), float(rest)
 
     def _norms(self, rows: np.ndarray) -> np.ndarray:
-        """Squared Frobenius norm of each group of ``rows``."""
+        """Squared Frobenius norm of the rows of each element, which are consecutive in ``rows``."""
         return np.einsum("nk,nk->n", rows, rows).reshape(-1, self._size).sum(axis=1)
 
     def _rounding(self, squares: np.ndarray) -> np.ndarray:

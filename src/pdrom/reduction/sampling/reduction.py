@@ -18,7 +18,7 @@ def solution_operator(a: np.ndarray, solve: Solve, tikhonov: float) -> np.ndarra
     """Matrix (r, m) that maps m sampled values b to coefficients c with A c = b, A = ``a`` (m, r).
 
     ``solve`` is one of these methods:
-    square : A^-1; nan if A is not square or singular to working precision, so that a run blows up
+    square : A^-1; nan, so that a run blows up, if A is singular to working precision or not square
     qr : least squares A^+ by a QR factorisation; nan if A has not full column rank
     tikhonov : (A^T A + t I)^-1 A^T with t = ``tikhonov``, as in the preprint authors' program
     """
@@ -44,7 +44,7 @@ def _singular(diagonal: np.ndarray) -> bool:
 
 
 def norm_and_condition(a: np.ndarray, operator: np.ndarray) -> tuple[float, float]:
-    """2-norm of ``operator`` (the gain), condition number of ``a`` (m, r); inf if singular."""
+    """2-norm of ``operator`` and condition number of ``a`` (m, r); inf if ``a`` is singular."""
     if not np.isfinite(operator).all():
         return np.inf, np.inf
     sigma = linalg.svdvals(a, check_finite=False)
@@ -151,7 +151,7 @@ class Reduction:
             orthonormal = np.allclose(gram, np.eye(len(gram)), rtol=0.0, atol=1e-12)
             return Block(axis, entries, matrix, matrix.T if orthonormal else np.linalg.pinv(matrix))
         entries = self.sampling.entries
-        if self.spec.rows == "joint":  # one index represents the whole row
+        if self.spec.rows == "joint":  # each index stands for x, y and z of its row
             axes = np.arange(3) if axis is None else np.array([axis])
             entries = (3 * (entries // 3)[:, None] + axes).ravel()
         elif axis is not None:
@@ -194,7 +194,7 @@ class Reduction:
         return len(np.unique(self.sampling.entries // 3))
 
     def reconstruct(self, snapshots: np.ndarray) -> np.ndarray:
-        """Reconstruct ``snapshots`` (n, e p, 3) from their sampled entries; nan if singular."""
+        """Reconstruct ``snapshots`` (n, e p, 3) from samples; nan if these do not suffice."""
         matrix = snapshots.reshape(len(snapshots), -1)
         result = np.tile(self.basis.mean, (len(matrix), 1))
         for block in self.blocks:
@@ -246,7 +246,7 @@ def select_path(basis: Basis, spec: MethodSpec, ranks: Sequence[int]) -> dict[in
 
 
 def reductions(basis: Basis, spec: MethodSpec, sizes: Sequence[int]) -> dict[int, Reduction]:
-    """Map r -> reduction by method ``spec``, for each r of ``sizes`` up to the basis's rank."""
+    """Map r -> reduction by ``spec`` for r of ``sizes``; r above the basis's rank are left out."""
     known = [r for r in sizes if r <= basis.rank]
     path = select_path(basis, spec, known)
     return {r: Reduction(basis, path[r], spec, r=r) for r in known}

@@ -2,7 +2,8 @@
 
 J. T. Lauzon, S. W. Cheung, Y. Shin, Y. Choi, D. M. Copeland, K. Huynh, S-OPT: A points selection
 algorithm for hyper-reduction in reduced order models, SIAM J. Sci. Comput. 46 (2024), after Shin
-and Xiu (2016). Points are generalised to blocks of rows (the elements).
+and Xiu (2016). Points are generalised to blocks of rows (the elements). The S-measure, see
+`s_opt_path`, is 1 if the sampled columns are orthogonal and 0 if they are dependent.
 """
 
 from collections.abc import Sequence
@@ -43,7 +44,7 @@ def s_opt_path(v: np.ndarray, size: int) -> np.ndarray:
 
 
 class SOpt(Selection):
-    """S-OPT: one element for each mode in turn, then further ones, all by the S-measure."""
+    """S-OPT: one element for each mode in turn by the S-measure; `extend` adds more elements."""
 
     def one_a_mode(self, v: np.ndarray, size: int, ranks: Sequence[int]) -> dict[int, np.ndarray]:
         path = s_opt_path(v, size)
@@ -67,13 +68,13 @@ class SOpt(Selection):
 class _Sampled:
     """Sampled elements, with data from which the S-measure with one more element is computed.
 
-    With G the Gram matrix of the sampled rows and B (s, k) the rows of an element to be added,
-    det(G + B^T B) = det G det(I + M), M = B G^-1 B^T. Adding an element with rows D changes all M
-    (Woodbury): M <- M - X (I + D G^-1 D^T)^-1 X^T, X = B G^-1 D^T. A mode d that is added to the
-    columns multiplies the determinant by the squared norm of its least-squares residual. With the
-    rows B this is q + z^T (I + M)^-1 z: q is the squared norm at the rows sampled so far, z the
-    residual at the rows B; afterwards M <- M + z z^T / q. One step costs O(s e (s + k)) instead
-    of a determinant for each element.
+    G is the Gram matrix (k, k) of the sampled rows of k modes, B (s, k) the s rows of one of the e
+    elements: det(G + B^T B) = det G det(I + M), M = B G^-1 B^T. After an element with rows D is
+    sampled, M of each element becomes M - X (I + D G^-1 D^T)^-1 X^T, X = B G^-1 D^T (Woodbury). A
+    new mode is fitted by the k modes at the sampled rows: z (s,) is the residual at the rows B, q
+    the squared norm of the residual at the sampled rows. It multiplies det(G + B^T B) by
+    q + z^T (I + M)^-1 z, and M becomes M + z z^T / q. One step costs O(s e (s + k)), instead of a
+    determinant for each element.
 
     picked : sampled elements in order of selection
     """
@@ -95,13 +96,14 @@ class _Sampled:
             self._products = self._blocks @ self._inverse() @ self._blocks.transpose(0, 2, 1)
 
     def best(self, mode: int | None = None) -> int:
-        """Element that gives the columns, with ``mode`` if that is given, the largest S-measure.
+        """Element with which the sampled rows of the modes used so far have the largest S-measure.
 
-        Ties go to the first element. SamplingError if no element makes the modes independent.
+        ``mode``, if given, is added to these modes. Ties go to the first element. SamplingError if
+        the modes are dependent whichever element is added.
         """
         if not self.picked and mode is not None:
             return int(np.argmax(self._squares[:, mode]))
-        shifted = self._products + np.eye(self._products.shape[1])  # I + M, M = B G^-1 B^T
+        shifted = self._products + np.eye(self._products.shape[1])  # I + M, see the class
         modes, residual = self._modes, np.ones(self.total)
         if mode is not None:
             z, q = self._residual()
@@ -120,7 +122,7 @@ class _Sampled:
         return int(np.argmax(measure))
 
     def add(self, element: int, mode: int | None = None) -> None:
-        """Add ``element`` to the samples and ``mode``, if given, to the columns."""
+        """Add ``element`` to the samples and ``mode``, if given, to the modes of the S-measure."""
         inverse, columns = self._inverse(), self._blocks[:, :, : self._modes]
         rows = columns[element]
         small = np.eye(len(rows)) + rows @ inverse @ rows.T
@@ -139,7 +141,7 @@ class _Sampled:
             self._modes = mode + 1
 
     def _residual(self) -> tuple[np.ndarray, float]:
-        """Residual (e, s) of the next mode after a fit at the sampled rows; squared norm there."""
+        """Residual (e, s) of the next mode fitted at the sampled rows; its squared norm at them."""
         known, new = self._blocks[:, :, : self._modes], self._blocks[:, :, self._modes]
         z = new - known @ self._fit.coefficients(self._modes)
         return z, float(np.sum(z[self.picked] ** 2))

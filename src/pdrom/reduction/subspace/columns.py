@@ -17,12 +17,10 @@ from pdrom.model.effects.base import Boundary
 from pdrom.model.mesh.selection import farthest_points
 from pdrom.reduction.basis import fix_signs, pod
 
-# A column is dropped if its part orthogonal to the earlier ones is below this fraction of it.
+# A column is dropped if its part orthogonal to the earlier ones has at most this share of its norm.
 DEPENDENT = 1e-9
-
 # Relative error up to which POD modes represent the non-affine motion of vertices fixed together.
 OWN_MOTION = 1e-3
-
 # Motion smaller than this fraction of the positions counts as round-off.
 ROUNDOFF = 100.0 * np.finfo(float).eps
 
@@ -35,7 +33,7 @@ class Columns:
     free : indices of the columns of the free vertices
     atoms : sets of vertices that boundary conditions fix and release together
     atom_columns : for each atom, the indices of its columns
-    modes : number k of modes of the free vertices, without the affine columns
+    modes : number k of modes of the free vertices; their four columns 1, x, y, z do not count
     """
 
     B: np.ndarray
@@ -56,12 +54,8 @@ def displacement_modes(
     """First k mass-weighted POD modes (N, k) of displacements minus their affine part.
 
     Each axis of each frame of ``trajectory`` (n, N, 3) is one snapshot, so that x, y and z share
-    the modes (Monem et al. 2023). If the data have fewer modes, all are returned.
-
-    Parameters
-    ----------
-    points : (N, 3) m, rest shape
-    masses : (N,) kg
+    the modes (Monem et al. 2023). If the data have fewer modes, all are returned. ``points`` (N, 3)
+    m is the rest shape, ``masses`` (N,) are in kg.
     """
     displacements = (trajectory - points).transpose(1, 0, 2).reshape(len(points), -1)
     weight = np.sqrt(masses)[:, None]
@@ -69,7 +63,7 @@ def displacement_modes(
     rest = weight * displacements
     rest = rest - affine @ (affine.T @ rest)
     modes, sigma = pod(rest)
-    # singular values up to this are round-off: those of an entirely affine motion, for example
+    # singular values up to ``noise`` are round-off, such as all those of an affine motion
     noise = ROUNDOFF * float(np.linalg.norm(weight[:, :, None] * trajectory.transpose(1, 0, 2)))
     useful = int(np.count_nonzero(sigma > max(DEPENDENT * sigma[0], noise)))
     return modes[:, : min(k, useful)] / weight
@@ -86,11 +80,7 @@ def build_columns(
 
     Each of ``atoms``, vertices fixed and released together, gets affine columns, and POD modes of
     the non-affine part of its motion in ``trajectory`` (n, N, 3) m, up to the error `OWN_MOTION`.
-
-    Parameters
-    ----------
-    points : (N, 3) m, rest shape
-    masses : (N,) kg
+    ``points`` (N, 3) m is the rest shape, ``masses`` (N,) are in kg.
     """
     n = len(points)
     free_vertices = np.setdiff1d(np.arange(n), np.concatenate([np.empty(0, np.int64), *atoms]))
@@ -158,8 +148,9 @@ def skinning_weights(points: np.ndarray, handles: int) -> np.ndarray:
     """Smooth weights (N, handles) in [0, 1] at ``points`` (N, 3) m, with sum 1 at every vertex.
 
     Handles are vertices from farthest-point sampling. At distance d a handle has Wendland's kernel
-    (1 - d/R)^4 (4 d/R + 1), zero for d > R. R is three times the largest distance of a vertex from
-    its nearest handle: at every vertex a kernel is positive. Kernels are divided by their sum.
+    (1 - d/R)^4 (4 d/R + 1), zero for d > R. R is three times (for one handle: twice) the largest
+    distance of a vertex from its nearest handle, so that a kernel is positive at every vertex.
+    Kernels are divided by their sum.
     """
     chosen = farthest_points(points, np.arange(len(points)), handles)
     distance = np.linalg.norm(points[:, None, :] - points[chosen][None], axis=2)

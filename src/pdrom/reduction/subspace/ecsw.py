@@ -11,10 +11,11 @@ iteration from z to z', A z' = (M/h^2) s + sum_e B^T S_e^T w_e p_e(B z), with th
 masses M and prediction s in coordinates of the subspace and the time step h, can be written as
 sum_e g_e = (M/h^2)(s - z') with g_e = B^T S_e^T w_e (S_e B z' - p_e(B z)). Sampled elements whose
 factors satisfy sum_e xi_e g_e = sum_e g_e map z to the same z'. The factors are therefore fitted to
-the pairs (z, z') of a run. A residual r of the equations changes the next iterate by A^-1 r and
-raises the iteration's quadratic objective by 1/2 r^T A^-1 r above its minimum. The norm "energy"
-measures residuals by this amount: in the Euclidean norm the stiff coordinates would hide errors of
-the soft ones, which determine the motion.
+the pairs (z, z') of a run, by sparse non-negative least squares (`nnls_path`), stopped early. A
+residual r of the equations changes the next iterate by A^-1 r and raises the iteration's quadratic
+objective by 1/2 r^T A^-1 r above its minimum. The norm "energy" measures residuals by this amount:
+in the Euclidean norm the stiff coordinates would hide errors of the soft ones, which determine the
+motion.
 
 The norm "response" measures the effect of r on the run. In each eigenmode (frequency omega) of
 stiffness and mass, the positions x_n at the ends of frames obey x_{n+1} / c^2 - 2 x_n + x_{n-1} =
@@ -22,8 +23,6 @@ h^2 r_n with c^2 = 1 / (1 + h^2 omega^2). If r_n is independent in every frame, 
 with h^2 c^2 sqrt((1 + c^2) / (1 + 3 c^2)) / (1 - c^2) times the root mean square of r_n, 0.7 to 1
 of the static response 1 / omega^2. For a mode without stiffness, the response over a run of the
 scene's length is used.
-
-The factors are found by sparse non-negative least squares, stopped early (`nnls_path`).
 """
 
 import logging
@@ -52,9 +51,9 @@ class TrainingFrame:
 
     start : (K, 3) subspace coordinates at the frame's start, for data computed once per frame
     pairs : (n, 2, K, 3) coordinates before and after each iteration
-    measure : (K', K) matrix; |measure r| is the size of a residual r in the chosen norm, "energy":
-        |measure r|^2 = r^T A^-1 r, J; "response": |M^1/2 x|^2 for the response x, kg m^2. The K'
-        free coordinates have equations, fixed ones have none
+    measure : (K', K) matrix; |measure r|^2, J, is r^T A^-1 r in the norm "energy", |M^1/2 x / h|^2
+        in the norm "response": x is the root mean square motion that residuals r cause in a run
+        (see the module). The K' free coordinates have equations, fixed ones have none
     """
 
     start: np.ndarray
@@ -72,7 +71,7 @@ def training_run(
     start: State | None = None,
     norm: Norm = "energy",
 ) -> list[TrainingFrame]:
-    """Run ``scene`` in a subspace with all projections; return the iterates of some ``frames``.
+    """Run ``scene`` in a subspace with all projections; return the iterates of ``frames``.
 
     ``frames`` are ascending. The run begins at ``start``, a state in coordinates (K, 3), or at the
     scene's initial state if that is None. ``norm`` measures residuals of the training equations.
@@ -92,7 +91,7 @@ def training_run(
         first = state.positions
         state, _ = loop.step(state, frame)
         if frame in wanted:
-            # with one iteration, the end of the frame, after contacts, is the pair's second iterate
+            # of a single iteration only the start is recorded; the frame's end serves as its result
             if len(iterates) == 1:
                 iterates.append(state.positions)
             pairs = np.stack([iterates[:-1], iterates[1:]], axis=1)
@@ -104,7 +103,7 @@ def training_run(
 
 
 class _Watched(SubspaceLocalStep):
-    """Local step that records the coordinates of each evaluation in ``iterates``."""
+    """Local step that records in ``iterates`` the coordinates y at which it is evaluated."""
 
     def __init__(self, group: ConstraintGroup, columns: Columns) -> None:
         super().__init__(group, columns)
@@ -116,15 +115,19 @@ class _Watched(SubspaceLocalStep):
 
 
 def _measure(space: ReducedSpace, fixed: np.ndarray, norm: Norm, frames: int) -> np.ndarray:
-    """Matrix (K', K) as `TrainingFrame.measure` in ``norm``, for K' coordinates not ``fixed``."""
+    """Matrix `TrainingFrame.measure` (K', K) of ``norm``, for the K' coordinates not ``fixed``.
+
+    ``frames`` is the number of frames of the run, on which the response of modes
+    without stiffness depends.
+    """
     size = len(space.matrix)
     free = np.setdiff1d(np.arange(size), fixed)
     block, inertia = (m[np.ix_(free, free)] for m in (space.matrix, space.inertia_matrix))
     measure = np.zeros((len(free), size))
-    if norm == "energy":  # the measure is a triangular R with R^T R = A^-1
+    if norm == "energy":  # the measure is a triangular R, R^T R = A^-1 (A: system matrix)
         root = linalg.cholesky(block, lower=True)
         measure[:, free] = linalg.solve_triangular(root, np.eye(len(block)), lower=True)
-    else:  # the measure is the root mean square response of each mode
+    else:  # measure r is the response of each eigenmode to a residual r (see the module)
         values, modes = linalg.eigh(block, inertia)
         c2 = 1.0 / np.maximum(values, 1.0)
         beside = np.maximum(1.0 - c2, 1.0 / frames)
@@ -134,10 +137,10 @@ def _measure(space: ReducedSpace, fixed: np.ndarray, norm: Norm, frames: int) ->
 
 
 # Training equations are added up at random (hashed) to SKETCH rows per coordinate of the subspace.
-# There must be several times more rows than selected elements, or factors would fit the hashing.
+# There must be several times more rows than selected elements, or their factors xi would overfit.
 SKETCH = 60
-# First and largest number of elements among which samples are chosen: the equations of all elements
-# of a large mesh would not fit into memory, and neighbouring elements are similar.
+# Number of elements among which samples are first chosen, and limit of its doubling: the equations
+# of all elements of a large mesh would not fit into memory, and neighbouring elements are similar.
 CANDIDATES, MOST = 10_000, 20_000
 SEED = 0
 
@@ -147,9 +150,9 @@ def ecsw_elements(
 ) -> list[tuple[np.ndarray, np.ndarray]]:
     """Select elements (m,) and their factors xi > 0 (m,) for each tolerance.
 
-    In a large group they are chosen from a random (seeded) subset, which is doubled, up to `MOST`,
-    until all tolerances are met. They always approximate the sum over all elements of the group.
-    A tolerance is the relative residual tau of the training equations at which the fit stops.
+    A tolerance is the relative residual tau of the training equations at which the fit of the
+    factors stops. In a large group, elements are chosen from a random (seeded) subset, which is
+    doubled, up to `MOST`, until all tolerances are met; the target is always the whole group's sum.
     """
     count = CANDIDATES
     while True:
@@ -170,15 +173,15 @@ def ecsw_elements(
 def training_equations(
     group: ConstraintGroup, columns: Columns, training: Training, elements: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return m equations (m, len(elements)) for ``elements``; and sums (m,) over the whole group.
+    """Return equations (m, len(elements)) for ``elements``, and their sums (m,) over all elements.
 
-    For each pair (z, z') of iterates and each coordinate there is one equation with the entries
+    For each iterate z, the next one z' and each coordinate there is one equation with the entries
     g_e = B^T S_e^T w_e (S_e B z' - p_e(B z)), multiplied by `TrainingFrame.measure`. All are scaled
     so that the sums have norm 1. One more equation has the elements' fractions of the total weight,
     so that a group without any force keeps its stiffness. The array is in Fortran order.
 
-    Many equations are hashed to `SKETCH` K rows with random signs (seeded), which keeps norms of
-    combinations to a few per cent (count sketch, Charikar et al. 2002).
+    With K columns, equations are hashed to at most `SKETCH` K rows with seeded random signs, which
+    changes norms of residuals by a few per cent (count sketch, Charikar et al. 2002).
     """
     strain = np.ascontiguousarray(group.S @ columns.B)
     weighted = strain * group.row_weights[:, None]
@@ -235,11 +238,11 @@ def _hash_equations(lifted, differences, buckets, signs, out):
 
 log = logging.getLogger(__name__)
 
-# A unit column depends on the active columns if its part orthogonal to them is below this.
+# A unit column counts as dependent on the active columns of `nnls_path` if its part orthogonal to
+# them is below this.
 DEPENDENT = 1e-7
-
-# Columns are added at the same time if their correlation with the residual is at least CLOSE times
-# the largest one; at most one more than BLOCK times the number of active columns.
+# Columns are made active together if their correlation with the residual is at least CLOSE times
+# the largest one, but at most 1 + BLOCK n at a time if n columns are active already.
 CLOSE = 0.7
 BLOCK = 0.2
 
@@ -285,7 +288,7 @@ def nnls_path(
 
 
 class _ActiveSet:
-    """State of `nnls_path`: active columns, values, and Cholesky factor of their Gram matrix."""
+    """State of `nnls_path`: active columns, their factors, Cholesky factor of their Gram matrix."""
 
     def __init__(self, g: np.ndarray, b: np.ndarray) -> None:
         self._g, self._b, self._size = g, b, float(np.linalg.norm(b))
@@ -306,11 +309,11 @@ class _ActiveSet:
 
     @property
     def relative_residual(self) -> float:
-        """Relative residual || G x - b || / || b ||."""
+        """Relative residual || G x - b || / || b || of the problem of `nnls_path`; 0 if b = 0."""
         return float(np.linalg.norm(self._residual)) / self._size if self._size else 0.0
 
     def solution(self) -> tuple[np.ndarray, np.ndarray]:
-        """Indices of the active columns, ascending, and their values in x."""
+        """Indices of the active columns of G, ascending, and their factors in x (G x near b)."""
         order = np.argsort(self._active)
         active = np.array(self._active, dtype=np.int64)[order]
         return active, self._values[order] / self._norms[active]
@@ -325,13 +328,13 @@ class _ActiveSet:
             if joined:
                 self._solve()
             staying = set(self._active).intersection(joined)
-            # ban a single column that is dependent or at once removed: it would be chosen again
+            # ban a single column that was not added or at once removed: it would be chosen again
             if len(block) == 1 and not staying:
                 self._banned[block] = True
             self._alone = not staying and len(block) > 1
 
     def _choose(self) -> np.ndarray:
-        """Indices of the columns most correlated with the residual, the best first."""
+        """Indices of columns most correlated with the residual, the best first; may be empty."""
         gradient = (self._residual @ self._g) / self._norms
         gradient[self._active] = -np.inf
         gradient[self._banned] = -np.inf
@@ -347,7 +350,7 @@ class _ActiveSet:
         return first[np.argsort(-gradient[first], kind="stable")]
 
     def _add(self, column: int) -> bool:
-        """Append a column and return True; return False if it depends on the active columns."""
+        """Make a column active if linearly independent of the active ones; return whether it is."""
         n, new = len(self._active), self._g[:, column] / self._norms[column]
         cross = self._forward(self._columns[:, :n].T @ new)
         rest = float(new @ new - cross @ cross)
@@ -387,7 +390,7 @@ class _ActiveSet:
         return linalg.solve_triangular(self._factor[:n, :n], rhs, lower=True, check_finite=False)
 
     def _keep(self, keep: np.ndarray, x: np.ndarray) -> None:
-        """Remove the active columns not marked in ``keep``; ``x`` has the values of all of them."""
+        """Keep the active columns of G where ``keep`` is True; ``x``: values of all active ones."""
         kept = np.flatnonzero(keep)
         size, n = len(self._active), len(kept)
         first = int(np.flatnonzero(~keep)[0])

@@ -22,7 +22,7 @@ from pdrom.reduction.subspace.interpolation import Interpolation
 from pdrom.reduction.subspace.model import Samples, SubspaceModel
 from pdrom.reduction.subspace.space import PROBES, ReducedSpace, probe_vertices, reduced_state
 
-# In a basis with more entries than this, only the rows that iterations use are stored as doubles.
+# A basis with more entries than this is in single precision, except rows that iterations use.
 DOUBLES = 60_000
 MANIFOLDS = ("clamped", "length")
 
@@ -66,7 +66,7 @@ def export_scene(scene: Scene) -> dict[str, Any]:
 
 
 def require_known(config: SceneConfig) -> None:
-    """Raise SceneError if the browser's simulation code cannot run a scene."""
+    """Raise SceneError if the browser's simulation code cannot run the scene of ``config``."""
     for name in (each.effect for each in config.effects):
         effect = EFFECTS.load(name)
         projected = issubclass(effect, StencilGroup) and effect.manifold in MANIFOLDS
@@ -84,9 +84,10 @@ def require_known(config: SceneConfig) -> None:
 
 
 def export_basis(scene: Scene, columns: Columns, needed: np.ndarray) -> dict[str, Any]:
-    """Export ``columns`` of a subspace of ``scene`` and further data that samples do not affect.
+    """Export the data that models of ``scene`` with the same ``columns`` share.
 
-    Rows of the ``needed`` vertices (n,), which iterations use, are always exported as doubles.
+    They are the columns, the inertia matrix, the initial state and the forces in the subspace. Rows
+    of the ``needed`` vertices (n,), which iterations use, are always exported as doubles.
     """
     space = ReducedSpace(scene, columns, [])
     start = reduced_state(scene, columns)
@@ -110,7 +111,7 @@ def export_basis(scene: Scene, columns: Columns, needed: np.ndarray) -> dict[str
 
 
 def export_model(scene: Scene, model: SubspaceModel) -> dict[str, Any]:
-    """Export the sampled elements of ``model`` for each constraint group of ``scene``."""
+    """Export each group's elements sampled by ``model``, with weights or interpolation matrices."""
     groups = {}
     for group in scene.groups:
         chosen = model.chosen(group)

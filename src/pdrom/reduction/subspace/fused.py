@@ -1,20 +1,21 @@
 """Iterations and frames of a subspace model in one compiled loop over the sampled elements.
 
-In the K' free coordinates z of a position subspace one iteration is
+In the K' coordinates z of a position subspace that are not fixed, one iteration is
 
     d = D z + d_0        S q of the m sampled elements, d_0 from the fixed coordinates
     p = p(d)             projections
     z = c + L^T p        global step, with c = A^-1 (M/h^2 s - load) and L = W D A^-1
 
-D and L are (m p, K') for p rows per element. An iteration has two small dense products and the
-projections; it allocates nothing, and no array grows with the mesh. If no group has data that are
-computed once per frame, c is the product of a matrix with s, whose fixed coordinates are set to
-their targets, and one compiled call computes many frames, up to the first that meets a floor.
+D and L are (m p, K') for p rows per element, load is due to the fixed coordinates. An iteration has
+two small dense products and the projections; it allocates nothing, and no array grows with the
+mesh. If no group has data that are computed once per frame, c is the product of a matrix with s,
+whose fixed coordinates are set to their targets, and one compiled call computes many frames, up to
+the first in which a vertex is below a floor.
 
-The matrix of a product is stored in blocks of `TALL` rows, each column by column, so that the
-products of a column with a vector do not wait for each other. Vectors are stored as three numbers
-each, but read and written four numbers at a time; their arrays have space for the additional
-numbers (`vectors`). Every sum is in the order of the columns on all processors.
+The matrix of a product is stored in blocks of `TALL` rows, each block column by column, so that the
+sums of all rows of a block are computed side by side. Vectors are stored as three numbers each, but
+read and written four numbers at a time; their arrays have space for the additional numbers
+(`vectors`). Every sum is in the order of the columns on all processors.
 """
 
 from collections.abc import Sequence
@@ -40,7 +41,7 @@ class FusedStepper(Stepper):
     """Step loop with compiled, fused iterations; results equal those of `Stepper` up to round-off.
 
     The whole time of iterations counts as that of the local step. If a local step is no
-    `SubspaceLocalStep` or a group has no gradient kernel, this class iterates like `Stepper`.
+    `SubspaceLocalStep` or a group has no `gradient_kernel`, this class iterates like `Stepper`.
     """
 
     def __init__(self, scene: Scene, space: ReducedSpace, local_steps: Sequence[LocalStep]) -> None:
@@ -67,7 +68,7 @@ class FusedStepper(Stepper):
 
 
 class _Fused:
-    """Fused iterations and frames, with operators for each set of fixed coordinates."""
+    """Compiled iterations and frames, with matrices for each set of fixed subspace coordinates."""
 
     def __init__(
         self, space: ReducedSpace, sampled: "_Sampled", acceleration: Anderson | None
@@ -78,7 +79,7 @@ class _Fused:
         self._waiting = 0
 
     def _of(self, elimination: DenseElimination) -> "_Operators":
-        # the id is a unique key, since the space never deletes its eliminations
+        # the id is a unique key, since the space keeps all its reduced systems (eliminations)
         key = id(elimination)
         if key not in self._operators:
             inertia = self._space.inertia_matrix
@@ -88,7 +89,7 @@ class _Fused:
     def iterate(
         self, elimination: DenseElimination, s: np.ndarray, base: np.ndarray, iterations: int
     ) -> np.ndarray:
-        """Coordinates (K, 3) after all iterations of a frame, which begin at the prediction s."""
+        """Coordinates (K, 3) after a frame's iterations from prediction s; ``base``: (M/h^2) s."""
         own, sampled, free = self._of(elimination), self._sampled, elimination.free
         sampled.refresh()
         targets = vectors(len(elimination.fixed))
@@ -105,7 +106,7 @@ class _Fused:
         return y
 
     def _history(self, free: np.ndarray) -> History | None:
-        """Empty history of Anderson acceleration for a frame with these ``free`` coordinates."""
+        """Empty history of Anderson acceleration for ``free`` coordinates; None if unused."""
         if self._acceleration is None:
             return NO_HISTORY
         self._acceleration.begin_frame(np.empty((len(free), 3)))
@@ -114,9 +115,10 @@ class _Fused:
     def run(
         self, q: np.ndarray, v: np.ndarray, frames: range, h: float, iterations: int, track: bool
     ) -> Blocks | None:
-        """Run as many of the first ``frames`` as one compiled call can, without the objective.
+        """Compute as many of ``frames`` in turn as one compiled call can; ``track`` is ignored.
 
-        Return None for a frame that meets a floor and, since a contact lasts, for some after it.
+        Return None if the body touches a floor in the first frame, and also in the next `BLOCK` - 1
+        calls, as contacts last. In both cases, the caller computes one frame by `iterate`.
         """
         if self._waiting and frames.start:
             self._waiting -= 1
@@ -162,21 +164,21 @@ class _Sampled:
             vectors(len(self.strain)),
             vectors(len(self.strain)),
         )
-        """Addresses, elements, first rows, parameters and their starts, S q, projections."""
+        """Groups: kernel addresses, elements, first rows, parameters and their starts; S q; p."""
 
     def refresh(self) -> None:
-        """Copy the parameters that groups have computed at the beginning of the frame."""
+        """Copy to `arrays` the parameters that groups have computed at the frame's beginning."""
         for i in self._lagged:
             start, stop = self._starts[i : i + 2]
             self._parameters[start:stop] = self._groups[i].kernel_parameters().ravel()
 
 
 class _Operators:
-    """Matrices and vectors of an iteration for one set of fixed coordinates.
+    """Matrices and vectors of an iteration, while the same subspace coordinates are fixed.
 
     iterated : D, L^T, d_0, c and z of the module's docstring; for the objective: weights of the
         rows, M/h^2 of the free coordinates, and working memory
-    begun : matrix that maps s to c, coupling to the fixed coordinates, working vectors
+    begun : matrices from prediction s to c and from fixed coordinates to d_0, zeros, working space
     """
 
     def __init__(
@@ -213,13 +215,13 @@ def blocks(matrix: np.ndarray) -> np.ndarray:
 
 
 def vectors(count: int) -> np.ndarray:
-    """Flat array of zeros for ``count`` vectors, which `product` reads and writes."""
+    """Flat zeros for ``count`` vectors of three numbers, with the extra space for `product`."""
     return zeros(3 * (-(-count // TALL) * TALL) + WIDTH)
 
 
 @compiled(nogil=True)
 def product(matrix, m, n, start, x, out):
-    """Set ``out`` = ``start`` + M ``x``, vectors from `vectors`; `blocks` has arranged M (m, n)."""
+    """Set ``out`` = ``start`` + M ``x``; M (m, n) is stored by `blocks`, vectors by `vectors`."""
     entry = 0
     for row in range(0, 3 * m, 3 * TALL):
         a, b = load(start, row), load(start, row + 3)
@@ -248,12 +250,10 @@ def product(matrix, m, n, start, x, out):
 def run_iterations(count, size, rows, operators, sampled, history):
     """Do ``count`` iterations of the ``size`` free coordinates z, in place.
 
-    Parameters
-    ----------
-    rows : number of rows of D
+    rows : number of rows of all sampled elements
     operators : matrices and vectors, see ``iterated`` of `_Operators`
     sampled : arrays of `_Sampled`
-    history : arrays of the acceleration, see `Anderson`; `NO_HISTORY` without acceleration
+    history : arrays of Anderson acceleration, see `Anderson`; `NO_HISTORY` without it
     """
     strain, lift, offset, constant, z, weights, inertia, start = operators
     addresses, elements, starts, parameters, parameter_starts, d, p = sampled
@@ -282,7 +282,7 @@ def run_iterations(count, size, rows, operators, sampled, history):
 
 @inner
 def _objective(weights, d, p, inertia, y, s):
-    """Objective, J: 1/2 sum_i w_i |d_i - p_i|^2 + 1/2 (y - s)^T (M/h^2) (y - s)."""
+    """Objective, J, of y: 1/2 sum_i w_i |d_i - p_i|^2 + 1/2 (y - s)^T (M/h^2) (y - s), d = S q."""
     total = 0.0
     for i in range(len(weights)):
         for axis in range(3):
@@ -299,7 +299,7 @@ def _objective(weights, d, p, inertia, y, s):
 
 @inner
 def _predict(z, v, acceleration, rate, rates, h, s):
-    """Write s = z + h v + h^2 (a + c v + C v), a ``acceleration``, c ``rate``, C ``rates``."""
+    """Write the prediction s = z + h v + h^2 (a + c v + C v); a, c and C as in `run_frames`."""
     for i in range(len(z)):
         for axis in range(3):
             total = acceleration[i, axis] + rate * v[i, axis]
@@ -337,7 +337,7 @@ def run_frames(
             for axis in range(3):
                 s[3 * fixed[i] + axis] = held[3 * i + axis] = targets[f, i, axis]
         product(response, len(free), len(before), nothing, s, constant)
-        # unchanged targets reuse the product of the previous frame
+        # with unchanged targets, ``offset`` is that of the previous frame
         if f == 0 or (targets[f] != targets[f - 1]).any():
             product(coupling, rows, len(fixed), nothing, held, offset)
         for i in range(len(free)):

@@ -6,7 +6,7 @@ The space needs no training: its functions are skinning weights on the elements 
 vectors S q_rest, so that it contains all linear maps of the rest shape that vary slowly over the
 mesh. The source adds the weights themselves as further columns (the translations of a skinning
 space). They are left out here, since S annihilates translations and such columns would depend on
-the arbitrary frame of each element.
+the arbitrary local axes of each element.
 """
 
 from typing import Annotated
@@ -25,7 +25,7 @@ from pdrom.reduction.snapshots import touched_vertices
 from pdrom.reduction.subspace.columns import DEPENDENT, Columns, orthonormal, skinning_weights
 from pdrom.reduction.subspace.interpolation import Interpolation, reduced_strain
 
-# If the condition number of the sampled equations is larger, their solution counts as noise.
+# Largest allowed condition number of a basis at its sampled rows; a larger one is an error.
 SINGULAR = 1e8
 
 
@@ -41,7 +41,7 @@ class HrpdSpec(ConfigModel):
 
 
 def hrpd(group: ConstraintGroup, columns: Columns, sampled: "SampledSpace | None") -> Interpolation:
-    """Interpolation of ``group`` in ``columns``; projections are zero if ``sampled`` is None."""
+    """Interpolate projections of ``group`` in the subspace; they are 0 if ``sampled`` is None."""
     strain, stiffness = reduced_strain(group, columns)
     offset = np.zeros((len(stiffness), 3))
     if sampled is None:
@@ -77,16 +77,10 @@ class SampledSpace:
 def sampled_space(
     group: ConstraintGroup, points: np.ndarray, spec: HrpdSpec
 ) -> SampledSpace | None:
-    """Space and sampled elements of ``group`` by ``spec``; None if its rest vectors are round-off.
+    """Space of projections of ``group`` and its samples; None if S ``points`` is only round-off.
 
-    Parameters
-    ----------
-    points : (N, 3) m, rest shape
-
-    Raises
-    ------
-    SamplingError
-        The sampled elements do not determine the coefficients.
+    S has the operators of all elements, ``points`` (N, 3) m is the rest shape. SamplingError if the
+    sampled elements do not determine the coefficients of the projections in the space.
     """
     rest = group.S @ points
     if np.linalg.norm(rest) <= group.roundoff(points):
@@ -111,7 +105,7 @@ def projection_space(
     rest : (e p, 3) rest vectors S q_rest
     centres : (e, 3) m, centres of the elements
     weights : (e p,) diagonal of W
-    dimension : number d of columns, at most
+    dimension : largest number d of columns
     """
     root = np.sqrt(weights)[:, None]
     active = rest[:, np.linalg.norm(rest, axis=0) > DEPENDENT * np.linalg.norm(rest)]

@@ -1,8 +1,8 @@
 """Local steps in the coordinates of a position subspace, by sampling or by interpolation.
 
 Interpolation evaluates a few elements, computes coefficients c from their projections, and from c
-the right-hand side B^T S^T W (mean + V c). Products of arrays as long as the mesh are computed
-before the run; the system matrix is the same as with all projections.
+the right-hand side B^T S^T W (mean + V c). Products that involve all vertices or elements are
+computed before the run; the system matrix is the same as with all projections.
 """
 
 from dataclasses import dataclass
@@ -36,7 +36,7 @@ class Interpolation:
 
 
 class InterpolatedLocalStep:
-    """Local step of a group whose projections are interpolated."""
+    """Local step of a group whose projections are interpolated from those of a few elements."""
 
     def __init__(
         self, group: ConstraintGroup, columns: Columns, interpolation: Interpolation
@@ -77,7 +77,7 @@ def reduced_strain(group: ConstraintGroup, columns: Columns) -> tuple[np.ndarray
 def interpolation_of(
     group: ConstraintGroup, columns: Columns, reduction: Reduction
 ) -> Interpolation:
-    """Interpolation in the subspace ``columns`` by a ``reduction`` made for vertex positions.
+    """Convert a ``reduction`` of full-order projections to the subspace with the given ``columns``.
 
     If each axis has its own coefficients, those of all axes are stacked.
     """
@@ -123,7 +123,7 @@ class SubspaceLocalStep:
 
     @property
     def strain(self) -> np.ndarray:
-        """Reduced strain S B of the sampled elements, (m p, K)."""
+        """Matrix S B (m p, K): p rows of S for each of m sampled elements times the K columns B."""
         return self.group.S @ self._rows
 
     @property
@@ -137,7 +137,7 @@ class SubspaceLocalStep:
         self.group.begin_frame(self._rows @ q)
 
     def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
-        """Add B^T S^T W p at ``y`` (K, 3) to ``rhs`` (K, 3); return the energy of the samples."""
+        """Add B^T S^T W p at ``y`` (K, 3) to ``rhs`` (K, 3); return the elements' energy, J."""
         self._rhs[...] = 0.0
         energy = self.group.accumulate(self._rows @ y, self._rhs)
         rhs += self._transposed @ self._rhs

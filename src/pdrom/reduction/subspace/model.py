@@ -22,7 +22,7 @@ from pdrom.reduction.subspace.fused import FusedStepper
 from pdrom.reduction.subspace.interpolation import Interpolation
 from pdrom.reduction.subspace.space import ReducedSpace, reduced_state
 
-# Number of frames, divided among the training motions, whose iterates are used to sample elements.
+# Elements are sampled on the iterates of this many frames, in equal shares of all training motions.
 FRAMES = 70
 ECSW = "ecsw"
 
@@ -34,7 +34,7 @@ def ecsw_name(tolerance: float) -> str:
 
 @dataclass(frozen=True)
 class Samples:
-    """Indices (m,) of sampled elements and the factors (m,) >= 0 of their weights."""
+    """Indices (m,) of sampled elements and the factors (m,) >= 0 that multiply their weights."""
 
     elements: np.ndarray
     factors: np.ndarray
@@ -42,7 +42,7 @@ class Samples:
 
 @dataclass(frozen=True)
 class SubspaceModel:
-    """Reduced model: kind of its columns ("pod", "skinning"), columns, samples of each group.
+    """Reduced model: kind of its columns (as in `make_columns`), columns, samples of each group.
 
     A constraint group without samples evaluates all elements with factor one.
     """
@@ -109,7 +109,7 @@ class Output:
 
 @compiled(nogil=True)
 def _multiply(panels, z, sums, result):
-    """Write the product of ``panels`` and ``z`` to ``result`` (N, 3); ``sums`` is a work array."""
+    """Write B z to ``result`` (N, 3). B is stored in ``panels``, and ``sums`` is a work array."""
     a, b, c = sums[0], sums[1], sums[2]
     for p in range(len(panels)):
         panel, first = panels[p], p * PANEL
@@ -157,12 +157,13 @@ def sample_elements(
     norm: Norm = "energy",
     others: Sequence[Scene] = (),
 ) -> list[dict[str, Samples]]:
-    """Select energy-conserving samples of every constraint group for each of ``tolerances``.
+    """Select energy-conserving samples of every constraint group for each of ``tolerances`` tau.
 
-    They are trained on iterates of runs in the subspace with all projections: of ``scene`` and of
-    ``others``, further training motions, with an equal share of `FRAMES` from ``frames`` for each.
-    The run of ``scene`` begins at ``start``, a state in subspace coordinates, or at its initial
-    state if None. Residuals of the training equations are measured in ``norm`` (module `ecsw`).
+    Training data are iterates of runs in the subspace, with all elements projected: of ``scene``
+    and ``others`` (scenes with other training motions). Of each run, equally many of ``frames`` are
+    used, about `FRAMES` in total. The run of ``scene`` begins at ``start``, in subspace
+    coordinates, or (if None) at its initial state. Residuals of the training equations are measured
+    in ``norm`` (module `ecsw`).
     """
     count = -(-FRAMES // (1 + len(others)))
     chosen = frames[np.unique(np.linspace(0, len(frames) - 1, count).round().astype(int))]
@@ -205,7 +206,7 @@ def store_columns(store: h5py.Group, columns: spaces.Columns) -> None:
 def store_model(
     store: h5py.Group, labels: dict[str, Any], samples: Mapping[str, Samples | Interpolation]
 ) -> None:
-    """Write ``samples`` of each group and attributes ``labels`` to the HDF5 group ``store``."""
+    """Write ``samples`` of each constraint group and, as attributes, ``labels`` to ``store``."""
     store.attrs.update(labels)
     for name, chosen in samples.items():
         kept = store.create_group(f"samples/{name}")
@@ -214,7 +215,7 @@ def store_model(
 
 
 def load_models(path: str | os.PathLike[str]) -> list[tuple[dict[str, object], SubspaceModel]]:
-    """Read pairs (attributes method, position_basis and k; model) from the file ``path``."""
+    """Read pairs (labels, model) from the file ``path``; labels: method, position_basis and k."""
     with open_hdf5(path) as file:
         columns = {base: _columns(store) for base, store in file["columns"].items()}
         models = []

@@ -2,7 +2,7 @@
 
 Arrays with an entry per vertex are used only before the run. During a run, arrays have an entry per
 subspace coordinate, per vertex fixed by a boundary condition, or (in scenes with contacts) per
-"probe": one of some vertices at which contacts are detected.
+"probe": one of at most `PROBES` vertices at which contacts are detected.
 """
 
 from collections.abc import Sequence
@@ -24,15 +24,13 @@ from pdrom.reduction.subspace.columns import Columns
 class DenseElimination:
     """Reduced system without the fixed coordinates, solved by its explicit (small) inverse.
 
+    Raises SolverError if the block of the free coordinates is not positive definite or is solved
+    inaccurately.
+
     Parameters
     ----------
     matrix : (K, K) matrix of the reduced system, kg/s^2
     fixed : (m,) indices of the coordinates with prescribed values, ascending
-
-    Raises
-    ------
-    SolverError
-        The block of the free coordinates is not positive definite, or its solution is inaccurate.
     """
 
     def __init__(self, matrix: np.ndarray, fixed: np.ndarray) -> None:
@@ -49,7 +47,7 @@ class DenseElimination:
         self._load = np.zeros((len(self.free), 3))
 
     def set_targets(self, targets: np.ndarray) -> None:
-        """Set the values ``targets`` (m, 3) of the fixed coordinates."""
+        """Set the values ``targets`` (m, 3) of the subspace coordinates with indices `fixed`."""
         self.targets = targets
         self._load = self._coupling @ targets
 
@@ -62,16 +60,17 @@ class DenseElimination:
         return self._inverse @ (rhs[self.free] - self._load)
 
     def response(self, inertia: np.ndarray) -> np.ndarray:
-        """Matrix (K', K) that maps a prediction s (K, 3), with targets set, to K' free coordinates.
+        """Matrix (K', K) that maps a prediction s (K, 3) to the K' coordinates not fixed.
 
-        They solve the system for the right-hand side ``inertia`` s; ``inertia`` is M/h^2 (K, K).
+        These solve the reduced system for the right-hand side ``inertia`` s; ``inertia`` (K, K) is
+        B^T M B / h^2. Entries of s for fixed coordinates must be the values fixed by `set_targets`.
         """
         result = self._inverse @ inertia[self.free]
         result[:, self.fixed] -= self._inverse @ self._coupling
         return result
 
     def lift(self, rows: np.ndarray) -> np.ndarray:
-        """Product (m, K') of the free columns of ``rows`` (m, K) and the system's inverse."""
+        """Product (m, K') of the columns `free` of ``rows`` (m, K) and matrix[free, free]^-1."""
         return rows[:, self.free] @ self._inverse
 
 
@@ -84,13 +83,14 @@ class ReducedSpace(Space):
 
     Parameters
     ----------
-    matrices : stiffness B^T S^T W S B (K, K) of each group, of all or of sampled elements
+    matrices : stiffness B^T S^T W S B (K, K) of each group, summed over all or sampled elements
 
     Attributes
     ----------
     matrix : (K, K) system matrix A: inertia and stiffness
     inertia_matrix : (K, K) B^T M B / h^2
-    forces : (constant (K, 3), rate) of each force with acceleration constant + rate v
+    forces : c (K, 3) and a, a number or (K, K), of each force: it accelerates by c + a v at the
+        velocity v
     """
 
     def __init__(self, scene: Scene, columns: Columns, matrices: Sequence[np.ndarray]) -> None:
@@ -117,7 +117,7 @@ class ReducedSpace(Space):
 
     @cached_property
     def affine(self) -> tuple[np.ndarray, float, np.ndarray]:
-        """Acceleration by all forces: constant (K, 3) + rate v + rates v; rates (K, K) or empty."""
+        """All forces' acceleration c + a v + R v at velocity v: c (K, 3), a, R (K, K) or empty."""
         constant, rate, rates = np.zeros((len(self.matrix), 3)), 0.0, np.zeros((0, 0))
         for own, factor in self.forces:
             constant += own
@@ -143,11 +143,11 @@ class ReducedSpace(Space):
         return base.held_targets(self._boundaries, frame, positions)
 
     def held_path(self, frames: range, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Coordinates (m,) fixed in the first n ``frames`` with known targets; values (n, m, 3)."""
+        """Indices (m,) of fixed coordinates, values (n, m, 3) in n frames; see `base.held_path`."""
         return base.held_path(self._boundaries, frames, positions)
 
     def elimination(self, fixed: np.ndarray) -> DenseElimination:
-        """System without the ``fixed`` coordinates (m,), from a cache if possible."""
+        """Reduced system without coordinates of indices ``fixed`` (m,); cached if made before."""
         key = fixed.tobytes()
         if key not in self._cache:
             self._cache[key] = DenseElimination(self.matrix, fixed)
@@ -185,8 +185,8 @@ def projector(columns: Columns, masses: np.ndarray) -> np.ndarray:
 def _mass_solve(columns: Columns, masses: np.ndarray, rhs: np.ndarray) -> np.ndarray:
     """Return (B^T M B)^-1 ``rhs`` with the matrix B of ``columns``.
 
-    The matrix is scaled to a unit diagonal, since columns of atoms are not mass-orthonormal and
-    masses far from 1 kg would make it ill-conditioned.
+    B^T M B is scaled to a unit diagonal: masses far from 1 kg would make it ill-conditioned, since
+    columns of vertices with boundary conditions are orthonormal, but not mass-orthonormal.
     """
     mass = columns.B.T @ (masses[:, None] * columns.B)
     scale = 1.0 / np.sqrt(np.diag(mass))[:, None]
@@ -194,7 +194,7 @@ def _mass_solve(columns: Columns, masses: np.ndarray, rhs: np.ndarray) -> np.nda
 
 
 def reduced_state(scene: Scene, columns: Columns) -> State:
-    """Initial state of ``scene`` in the coordinates of ``columns``; the rest shape is exact."""
+    """Initial state of ``scene``, projected on ``columns``, in whose span the rest shape lies."""
     state = scene.initial_state()
     return State(
         coordinates(columns, scene.masses, state.positions),
@@ -205,8 +205,8 @@ def reduced_state(scene: Scene, columns: Columns) -> State:
 def _reduce_force(force: base.Force, columns: Columns, scene: Scene) -> tuple[np.ndarray, Any]:
     """Project ``force`` on the subspace: return constant (K, 3) and rate of its acceleration.
 
-    The acceleration must be constant + rate v with velocity v; the rate is a number, or (K, K) if
-    vertices have different rates (also exact). Other forces are refused, not approximated.
+    The acceleration must be constant + rate v with velocity v. The rate is a number, or a matrix
+    (K, K) if vertices have different rates. NotReducibleError is raised for all other forces.
     """
     shape = scene.mesh.points.shape
     rng = np.random.default_rng(0)
@@ -224,7 +224,7 @@ def _reduce_force(force: base.Force, columns: Columns, scene: Scene) -> tuple[np
 
 
 class _ReducedBoundary:
-    """Boundary condition in the subspace, exact: vertices fixed together have own coordinates."""
+    """Boundary condition that prescribes the subspace coordinates that move only its vertices."""
 
     def __init__(self, boundary: base.Boundary, columns: Columns) -> None:
         self.boundary = boundary
@@ -233,16 +233,16 @@ class _ReducedBoundary:
         self._columns = columns
 
     def held(self, frame: int) -> np.ndarray:
-        """Indices, ascending, of the coordinates of all vertices that are fixed in ``frame``."""
+        """Ascending indices of subspace coordinates that move the vertices held in ``frame``."""
         return self._of(frame)[0]
 
     def path(self, frames: range, current: np.ndarray) -> np.ndarray:
-        """Values (n, m, 3) of fixed coordinates in n ``frames``; those before are ``current``."""
+        """Values (n, m, 3) of `held` coordinates in n ``frames``; ``current`` (m, 3): before."""
         _, rows, inverse = self._of(frames.start)
         return inverse @ self.boundary.path(frames, rows @ current)
 
     def _of(self, frame: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Coordinates fixed in ``frame``, rows of B at fixed vertices, pseudo-inverse of these."""
+        """Indices i of coordinates fixed in ``frame``; B[held vertices, i]; its pseudo-inverse."""
         vertices = self.boundary.held(frame)
         key = vertices.tobytes()
         if key not in self._parts:
@@ -284,7 +284,7 @@ class _ReducedContact:
         self._contact.apply(corrected, self._probes @ before, held_probes)
         if np.array_equal(probed, corrected):
             return
-        # columns of fixed vertices are zero at other vertices: fixed coordinates do not change
+        # held vertices do not move, and their columns of B are 0 at others: fixed entries of y stay
         full = self._columns.B @ y
         self._contact.apply(full, self._columns.B @ before, held)
         y[...] = self._project @ full

@@ -44,7 +44,7 @@ TRAINED: Final = (TWO_LEVEL, *REDUCTIONS)
 CONVERGED: Final = "converged"  # name of the reference: the implicit step solved to convergence
 TRAINING: Final = "training"  # key in `Comparison.work` for runs on which reductions are trained
 
-# Columns that together identify a candidate (method with its settings) in a scene.
+# Columns of tables that together identify a candidate (a method with its settings) in a scene.
 SETTING: Final = ["method", "substeps", "iterations", "training_motions", "k"]
 
 Factors = Annotated[tuple[Annotated[float, Field(gt=0.0, le=1e8)], ...], Field(min_length=1)]
@@ -104,9 +104,9 @@ class ContinuousReference(ConfigModel):
 class ImplicitReference(ConfigModel):
     """Settings of the converged implicit step.
 
-    It is solved until one more local/global iteration of a frame moves no vertex by more than
-    ``tolerance`` times the mesh size, in at most ``limit`` evaluations. Runs that train a reduction
-    stop at the larger ``training_tolerance``.
+    A frame has converged when one more local/global iteration moves no vertex by more than
+    ``tolerance`` times the longest side of the mesh, or ``training_tolerance`` times it in runs on
+    which reductions are trained. Projections are evaluated at most ``limit`` times in a frame.
     """
 
     tolerance: kit.Tolerance = 1e-7
@@ -119,7 +119,7 @@ class Comparison(Processes):
 
     Each of ``processes`` new processes times ``frames`` frames of the first of ``motions``.
 
-    stiffness : scene -> factors on the weights of its groups; only 1 for all other scenes
+    stiffness : scene -> factors by which its groups' weights are multiplied; 1 without an entry
     steps : method -> pairs (substeps of a frame, iterations of each substep)
     work : method -> largest product vertices x substeps x iterations (for ``training``: vertices x
         motions); runs with more work are left out
@@ -148,7 +148,7 @@ class Comparison(Processes):
     repeats: kit.Repeats = 1
 
     def factors(self, scene: str, size: float) -> tuple[float, ...]:
-        """Factors on all weights of ``scene``; only 1 if ``size`` refines or coarsens its mesh."""
+        """Factors that multiply weights of ``scene``; only 1 with another mesh (``size`` not 1)."""
         return self.stiffness.get(scene, (1.0,)) if size == 1.0 else (1.0,)
 
     def pairs(self, method: str, vertices: int) -> list[tuple[int, int]]:
@@ -162,10 +162,10 @@ class Comparison(Processes):
 
 
 class Alternatives(Comparison):
-    """Section ``alternatives``.
+    """Section ``alternatives`` of the configuration.
 
-    scenes : scene -> factors on the vertices along a side of its mesh; the mass does not change
-    errors : allowed errors, for each of which the table winners has a row
+    scenes : scene -> factors by which its mesh gets more vertices along a side, with equal mass
+    errors : largest allowed errors; the table ``winners`` has a row for each of them
     """
 
     scenes: kit.Sizes = Field(default_factory=dict)
@@ -204,7 +204,7 @@ class Trained:
 class Candidate:
     """A method with its settings, ready to run on one scene.
 
-    steps : number of steps in a frame
+    steps : number of frames of ``loop`` in a frame of the scene
     positions : function that maps coordinates in a position subspace to positions of all vertices
     output : the same function in single precision, which is timed; None without a subspace
     columns : columns of the position subspace; None without a subspace
@@ -219,7 +219,7 @@ class Candidate:
     columns: Columns | None = None
 
     def state(self, state: State, scene: Scene) -> State:
-        """Return ``state`` of all vertices of ``scene`` in the method's subspace, if it has one."""
+        """Return ``state`` (of all vertices) in the method's subspace; unchanged without one."""
         if self.columns is None:
             return state
         own = (self.columns, scene.masses)
@@ -280,10 +280,10 @@ def candidates(
 def trained(training: Scene, settings: Comparison) -> Iterator[Trained]:
     """Yield models in position subspaces with sampled elements, trained on one or more motions.
 
-    Training motions are that of ``training`` and further ones drawn by seeds. The columns are modes
-    of nearly converged frames: with n motions, of every n-th frame of each. Elements are sampled on
-    iterates of these motions in the subspace, for every number of substeps that a reduction needs.
-    With the smallest number of motions, a coarse level for the two-level method is trained, too.
+    The training motions are that of ``training`` and variants of it drawn by seeds. Their frames
+    are nearly converged; the columns are modes of every n-th frame of each of n motions. Elements
+    are sampled on iterates of these motions in the subspace, once for each number of substeps in
+    ``settings``. The coarse level of the two-level method is trained on the fewest motions only.
     """
     vertices, own = training.mesh.vertices, settings.implicit
     taken, coarse = (
@@ -343,7 +343,7 @@ def substepped(scene: Scene, substeps: int, iterations: int, window: int = 0) ->
 
 @dataclass(frozen=True)
 class Timed:
-    """A scene in the motion that is timed, its reduced models, and first columns of its rows."""
+    """Scene in the motion that is timed, its reduced models, and ``labels`` for rows of times."""
 
     labels: dict[str, object]
     scene: Scene
@@ -354,12 +354,12 @@ class Timed:
         """Yield the step loops of all methods with all settings, to be timed."""
         scene, wanted = self.scene, min(self.settings.frames, self.scene.config.frames)
         places = np.linspace(0, scene.config.frames - 1, wanted).round().astype(int)
-        # The first frames are one for each set of held vertices. An unmeasured run of these frames
-        # factorises all matrices, so that no measured frame has to.
+        # One frame for each set of active boundary conditions comes first: an unmeasured run of
+        # these factorises all matrices, so that no measured frame has to.
         held = [tuple(b.active(frame) for b in scene.boundaries) for frame in places]
         first = [held.index(kind) for kind in dict.fromkeys(held)]
         places = np.concatenate([places[first], np.delete(places, first)])
-        # the run needs all frames: in the first one, boundaries store positions that they use later
+        # run all frames, not only timed ones: a hold stores positions in its first frame for later
         states = [
             scene.initial_state(),
             *(end for end, _ in simulate(scene, track_objective=False)),
@@ -374,7 +374,7 @@ class Timed:
 
 
 class Options(ConfigModel):
-    """Settings of the comparison of methods on one scene and mesh size."""
+    """Settings that `alternatives` reads: scene, comparison of methods, and blow-up extent."""
 
     scene: SceneConfig
     alternatives: Comparison
@@ -388,11 +388,11 @@ class Options(ConfigModel):
     alone=True,
 )
 def alternatives(sources: list[Path], settings: Options, out: File, times: File) -> None:
-    """Compare all methods on a mesh with a factor times the scene's vertices along each side.
+    """Compare all methods on one mesh of a scene.
 
     sources : files of the mesh, on which the job depends
-    settings : scene, methods and limits
-    out, times : tables of errors and of times; their paths contain the factor
+    out, times : tables of errors and of times; their paths contain the ``factor`` by which the mesh
+        has more vertices along each side than the scene's mesh
     """
     factor, section = float(out["factor"]), settings.alternatives
     rows, cases = [], []
@@ -430,11 +430,12 @@ def sized(config: SceneConfig, factor: float, stiffness: float) -> SceneConfig:
 def _rows(
     scene: Scene, recorded: np.ndarray, models: tuple[Trained, ...], settings: Options
 ) -> Iterator[dict[str, Any]]:
-    """Yield rows with errors in the motion of ``scene``: two references, then every candidate.
+    """Yield rows with errors of runs in the motion of ``scene``, one row for each run.
 
-    The first row is the converged implicit step. In the second the ``recorded`` training motion is
-    taken for the run. Errors against the implicit step are None if one of its frames did not
-    converge or if it would be too expensive. All errors of a run that blew up are None.
+    The first is the converged implicit step. In the second the ``recorded`` training motion stands
+    for a run of ``scene``. All candidates follow. Errors against the implicit step are None if a
+    frame of this step did not converge or its work exceeds the limit in ``settings``. Runs that
+    blew up have no errors (None) at all.
     """
     section, name, vertices = settings.alternatives, scene.config.name, scene.mesh.vertices
     frames, wanted, implicit = scene.config.frames, section.continuous, None

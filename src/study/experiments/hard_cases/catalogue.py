@@ -26,7 +26,8 @@ ROTATION = {"effect": "deformation_gradient", "weight": 1e8}
 VOLUME = {"effect": "volume", "weight": 1e6}
 AREA = {"effect": "area", "weight": 1e6}
 
-# Names of checks: FREE for free bodies, CALM if these start at rest without forces, FORCED else.
+# Names of the checks for hard cases: FREE for a body that nothing holds or touches, CALM if it also
+# starts at rest without forces, FORCED for all others.
 FREE = ("finite", "bounded", "objective", "momentum", "determinism")
 CALM = (*FREE, "energy")
 FORCED = ("finite", "bounded", "objective", "determinism")
@@ -60,14 +61,14 @@ def scaled(mesh: Mesh, *factors: float) -> Mesh:
 
 
 def shifted(mesh: Mesh, *offset: float) -> Mesh:
-    """Return ``mesh`` moved by ``offset``."""
+    """Return ``mesh`` moved by ``offset`` (x, y, z), m."""
     return Mesh(mesh.points + np.array(offset), mesh.triangles, mesh.tetrahedra)
 
 
 def _case(
     name: str, why: str, holds: tuple[str, ...], mesh: record.Shape, *effects: dict, **rest: Any
 ) -> record.HardCase:
-    """Return a hard case; ``rest`` has its ``start``, ``bound``, ``slow``, and scene settings."""
+    """Return a hard case; ``rest``: its start, bound, slow, and keyword arguments of `build`."""
     own = {key: rest.pop(key) for key in ("start", "bound", "slow") if key in rest}
     return record.HardCase(name, why, holds, mesh, effects, rest, **own)
 
@@ -85,14 +86,14 @@ def _all_but(*free: int) -> dict:
 
 
 def _two_sheets(*offset: float) -> Mesh:
-    """Two sheets that are not connected, the second one moved by ``offset``."""
+    """Two sheets that are not connected, the second one moved by ``offset`` (x, y, z), m."""
     first, second = sheet(), shifted(sheet(), *offset)
     cells = np.concatenate([first.triangles, second.triangles + first.vertices]).astype(np.int32)
     return Mesh(np.concatenate([first.points, second.points]), cells)
 
 
 def _one_bad_element() -> Mesh:
-    """A bar with one vertex moved almost into the opposite face of its tetrahedron."""
+    """A bar with one vertex moved almost into the opposite face of one tetrahedron."""
     mesh = small_bar()
     points = mesh.points.copy()
     corners = points[mesh.tetrahedra[1]]
@@ -118,12 +119,12 @@ def _squashed() -> list[record.HardCase]:
         )
         for target, sides in to.items()
         for name, mesh, group, why in kinds
-        if mesh is not sheet or target != "plane"  # a sheet is flat without being flattened
+        if mesh is not sheet or target != "plane"  # a sheet is a plane at rest
     ]
 
 
 def _states() -> list[record.HardCase]:
-    """Regular scenes whose initial positions are irregular, such as inverted elements."""
+    """Scenes that are extreme only in their initial positions, such as inverted elements."""
     three = (BENDING, SPRING, STRAIN)
     turn = record.mapped((-1, 0, 0), (0, -1, 0), (0, 0, 1))
     cases = [
@@ -173,7 +174,7 @@ def _states() -> list[record.HardCase]:
 
 
 def _sizes() -> list[record.HardCase]:
-    """Scenes with volume or area constraints, for which the nearest shape is not unique."""
+    """Scenes with volume or area constraints; the projection of an element may not be unique."""
     lying = record.mapped((1, 0, 5), (0, 1, 0), (0, 0, 1))
     # a large bound on the bounding box: a body of constant volume or area may stretch without limit
     loose, cases = 40.0, []
@@ -321,7 +322,7 @@ def _air() -> list[record.HardCase]:
 
 
 def _obstacles() -> list[record.HardCase]:
-    """Scenes with obstacles: edges, tunnelling, starts inside one, zero and infinite friction."""
+    """Scenes with obstacles: hits on edges, tunnelling, starts inside, no or infinite friction."""
     ball = {"effect": "sphere", "centre": [0, 1, 0], "radius": 0.4}
     edge = {"effect": "box", "lower": [-0.02, 1.0, -2], "upper": [0.03, 1.9, 2], "friction": 0.5}
     plate = {"effect": "box", "lower": [-9, 1, -9], "upper": [9, 1, 9]}
@@ -421,5 +422,5 @@ CASES: dict[str, record.HardCase] = {case.name: case for part in PARTS for case 
 
 
 def reducible_cases(slow: bool = False) -> list[str]:
-    """Names of the hard cases that are not refused: the slow ones if ``slow``, else all others."""
+    """Names of the hard cases that can be run: the slow ones if ``slow``, else all others."""
     return [name for name, c in CASES.items() if c.slow == slow and c.holds != ("refused",)]

@@ -37,7 +37,8 @@ FAILURES = ("refused", "singular", "blow-up", "distorted", "objective rises", "m
 R, K, TOLERANCE = 10, 6, 1e-2
 HRPD = HrpdSpec(dimension=20, samples=60)
 BASES = {"pod": ("full", "ecsw", "hrpd"), "skinning": ("full", "hrpd")}
-# A run whose bounding box exceeds these multiples of `Training.extent` blew up, or is distorted.
+# Longest sides of a run's bounding box, as multiples of `Training.extent`: above the first, the run
+# blew up; above the second, it is distorted.
 BLOWUP, DISTORTED = 100.0, 3.0
 # Kinds of constraint manifolds on which the norm of projections is bounded, whatever the state.
 BOUNDED = ("clamped", "length", "half sphere")
@@ -98,7 +99,7 @@ class Training:
         self._roundoff: list[float] = []
         self.run = record.full_order(case, self.scene, self._observe)
         self._bases: dict[str, Basis] = {}
-        # largest side of the bounding box (m) of run, rest shape, start, and fixed vertices
+        # longest side (m) of any bounding box: of a frame, the rest shape or the fixed vertices
         self.extent = max(self.run.extent, record.reach(self.scene, self.run))
 
     def _observe(self, frame: int, y: np.ndarray) -> None:
@@ -135,7 +136,7 @@ class ReducedRun:
     gain: float | None = None
 
     def outcome(self, training: Training) -> str:
-        """Return `NOTHING`, or the first of the `FAILURES` of the run, or else `HOLDS`."""
+        """Return the first failure, `HOLDS` if there is none, `NOTHING` if there is no run."""
         run = self.run
         if run is None:
             return NOTHING
@@ -183,9 +184,10 @@ def reduced_run(training: Training, name: str, methods: Methods, limit: float) -
 
 
 def _subspace(training: Training, kind: str, sampling: str, limit: float) -> ReducedRun:
-    """Run in a position subspace with a basis of this ``kind`` and projections by ``sampling``.
+    """Run in a subspace of positions, "pod" or "skinning" (``kind``); ``limit``: see `reduced_run`.
 
-    ECSW is trained on a run in the subspace from the start of the hard case.
+    ``sampling``: "full" evaluates all projections, "ecsw" those of some elements, "hrpd"
+    interpolates. ECSW is trained on a "full" run from the initial state of the hard case.
     """
     scene = training.scene
     columns = make_columns(scene, training.run.positions[1::2], kind, k=K)
@@ -232,7 +234,7 @@ def row(
 
 
 class HardCases(ConfigModel):
-    """Section ``hard_cases``.
+    """Section ``hard_cases`` of the configuration.
 
     cases : names of the hard cases that are run; without names, all that are not slow
     expected : reduction -> its expected failures; a reduction without an entry must never fail
@@ -243,7 +245,7 @@ class HardCases(ConfigModel):
 
     @property
     def modules(self) -> list[str]:
-        """Classes ("module:attribute") of effects in the hard cases, to detect changes of code."""
+        """Classes ("module:attribute") of effects in the hard cases; the job reads their code."""
         chosen = self.cases or reducible_cases()
         effects = {effect["effect"] for name in chosen for effect in CASES[name].effects}
         return sorted(EFFECTS[effect] for effect in effects)

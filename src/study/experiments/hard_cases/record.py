@@ -10,12 +10,12 @@ values may rise for two reasons, with the unit round-off u (`EPS`) and a constan
 - solution: the global step minimises a quadratic with matrix A. An error d of y misses the minimum
   by d^T A d / 2. A Cholesky solve leaves a residual |r| <= c u |A| |y| (Higham 2002, theorem 10.4),
   so that the minimum is missed by at most |r|^2 / (2 lambda_min(A)). In a subspace with columns B
-  and coordinates z, the right-hand side has the same error in the vertices, so that
+  and coordinates z, B^T maps this error to the reduced right-hand side, so that
   r <= c u |B|^T |A| |y|, and the explicit inverse adds d <= c u cond(A) |z|, where A has columns
   scaled to length one.
 
-Without pins, the smallest mass over h^2 is a lower bound of lambda_min. It is very loose if masses
-are round-off compared with the weights of the groups, so that only pins make A regular.
+Without pins, the smallest mass divided by h^2 is a lower bound of lambda_min, a very loose one if
+masses are round-off compared with the weights of the groups, so that only pins make A regular.
 """
 
 from collections.abc import Callable, Sequence
@@ -107,7 +107,7 @@ def scales(x: float, y: float, z: float) -> Start:
 
 
 def scrambled(size: float = 1.0) -> Start:
-    """Start at rest, vertices at random in a cube of ``size`` times the longest side at rest."""
+    """Start at rest, vertices at random in a cube of ``size`` times the mesh's longest side."""
 
     def start(scene: Scene) -> State:
         points = scene.mesh.points
@@ -131,7 +131,7 @@ def noisy(start: Start, size: float) -> Start:
 
 
 def pairs_merged(scene: Scene) -> State:
-    """Start with every odd vertex on the vertex before it, so that edges have no length."""
+    """Start with every odd vertex on the vertex before it: edges between the two have no length."""
     points = scene.mesh.points.copy()
     points[1::2] = points[: len(points) - len(points) % 2 : 2]
     return at_rest(points)
@@ -151,7 +151,7 @@ def falling(speed: float) -> Start:
 
 
 def meeting(speed: float) -> Start:
-    """Start with upper vertices moving down and lower ones moving up, at ``speed`` (m/s)."""
+    """Start with vertices above the mean height moving down, the rest up, at ``speed`` (m/s)."""
 
     def start(scene: Scene) -> State:
         y = scene.mesh.points[:, 1]
@@ -173,15 +173,15 @@ def lowered(offset: float) -> Start:
 
 
 EPS = np.finfo(float).eps
-# Constant c of the bounds: a row of S or A has about 10 entries, with a few operations for each.
+# Factor of EPS in bounds: some 10 entries in a row of S or system matrix, few operations each.
 OPERATIONS = 32.0
-# A run has recovered its rest shape if it ends within this distance, over the mesh's longest side.
+# A run recovers if it ends nearer to its rest shape than this times the mesh's longest side.
 RECOVERED = 1e-2
 
 
 @dataclass(frozen=True)
 class Roundoff:
-    """Bound for rises of the objective of a step loop by rounding errors alone.
+    """Bound for the rise of a frame's objective in one iteration by rounding errors alone.
 
     basis : (N, K) columns B, if positions are B z with coordinates z; None if the step loop has
         the positions themselves as coordinates
@@ -192,10 +192,10 @@ class Roundoff:
     basis: np.ndarray | None = None
 
     def allowance(self, before: State, after: State, first: float) -> float:
-        """Bound (J) for the rise of the objective by rounding errors in one frame.
+        """Bound (J) for the rise of the objective by rounding errors in any iteration of a frame.
 
-        ``first`` is the objective (J) at the beginning of the frame. The size of the iterates is
-        estimated from the states ``before`` and ``after`` the frame.
+        ``first`` is the objective (J) at the beginning of the frame. The largest coordinate of the
+        iterates is estimated from the states ``before`` and ``after`` the frame.
         """
         h = self.loop.time_step
         acceleration = self.loop.space.acceleration(before.positions, before.velocities)
@@ -212,7 +212,7 @@ class Roundoff:
         return evaluation + self._dense(self.basis, size, largest)
 
     def _noise(self, size: float) -> float:
-        """Objective R of rounding errors alone, J, if all coordinates are of this ``size`` (m)."""
+        """Objective R (J) of errors in y - s and S y - p alone, coordinates up to ``size`` (m)."""
         h = self.loop.time_step
         unit = OPERATIONS * EPS * size
         total = 1.5 * float(self.scene.masses.sum()) / h**2 * (2.0 * unit) ** 2
@@ -222,15 +222,15 @@ class Roundoff:
         return total
 
     def _residual(self, size: float) -> np.ndarray:
-        """Bound c u |A| |y| (N,) of the linear solver's residual, if all |y| are up to ``size``."""
+        """Bound c u |A| |y| (N,), see module, of the solver's residual, if all |y| are ``size``."""
         rows = np.asarray(abs(self.scene.system.matrix).sum(axis=1)).ravel()
         return OPERATIONS * EPS * size * rows
 
     def _dense(self, b: np.ndarray, size: float, largest: np.ndarray) -> float:
         matrix = b.T @ (self.scene.masses[:, None] * b) / self.loop.time_step**2
-        steps: Sequence[Any] = self.loop.local_steps  # in a subspace, each has a stiffness matrix
+        steps: Sequence[Any] = self.loop.local_steps  # each has ``matrix``, its reduced stiffness
         matrix = matrix + sum(step.matrix for step in steps)
-        # columns are scaled to length one: the result does not depend on units of coordinates
+        # scaling the columns of A makes the result independent of the units of coordinates
         scale = np.sqrt(np.diag(matrix))
         eigenvalues = np.linalg.eigvalsh(matrix / np.outer(scale, scale))
         smallest, greatest = max(eigenvalues[0], EPS * eigenvalues[-1]), eigenvalues[-1]
@@ -242,14 +242,14 @@ class Roundoff:
 
 @dataclass(frozen=True)
 class Record:
-    """A run, frame by frame; it ends before the first frame that is not finite.
+    """A run; it ends with a frame whose bounding box is too large, or before a non-finite frame.
 
     positions, velocities : (F + 1, N, 3) m and m/s, beginning with the start
-    rise : (F,) largest rise of the objective from one iteration to the next, over the objective at
-        the beginning of the frame; zero if the objective never rises
-    excess : (F,) this rise in J, minus the bound for rounding errors
+    rise : (F,) largest rise of the objective from one iteration to the next, divided by the
+        objective at the beginning of the frame; zero if the objective never rises
+    excess : (F,) this rise in J (not divided), minus the bound for rounding errors
     energy : (F + 1,) kinetic energy plus potential energy of the groups, J
-    blowup_frame : first frame that is not finite or too large, None if there is none
+    blowup_frame : number of this too large or non-finite frame, None if there is none
     """
 
     positions: np.ndarray
@@ -273,7 +273,7 @@ class Watched:
         self._step, self._group = step, group
 
     def begin_frame(self, q: np.ndarray) -> None:
-        """Let the reduced and the full step compute a frame's data at positions ``q`` (N, 3) m."""
+        """Let the reduced and the full step prepare a frame that begins at ``q`` (N, 3) m."""
         self._step.begin_frame(q)
         self._group.begin_frame(q)
 
@@ -358,7 +358,7 @@ def bounded(case: HardCase, scene: Scene, run: Record) -> str:
 
 
 def reach(scene: Scene, run: Record) -> float:
-    """Largest extent (side of the bounding box) of rest shape, start, and fixed vertices, m."""
+    """Longest side (m) of the bounding boxes of rest shape, start, and fixed vertices in a run."""
     sizes = [scene.mesh.extent, float(np.ptp(run.positions[0], axis=0).max())]
     held = np.unique(np.concatenate([[], *(b.vertices for b in scene.boundaries)]).astype(int))
     if len(held):
@@ -395,7 +395,7 @@ def momentum(case: HardCase, scene: Scene, run: Record) -> str:
     found = np.einsum("n,fna->fa", masses, run.velocities)
     expected = found[0] + frames * h * masses.sum() * np.broadcast_to(pull, 3)
     error = np.abs(found - expected).max()
-    # the columns of S^T W p, and of the linear solver's residual, sum to zero up to rounding
+    # allowed: rounding errors of the sums over vertices of S^T W p and the linear solver's residual
     size = float(np.abs(run.positions).max()) + float(np.abs(run.velocities).max()) * h
     noise = EPS * OPERATIONS * size * (masses.sum() / h + h * abs(scene.system.matrix).sum())
     allowed = noise * max(1.0, np.sqrt(len(found)))

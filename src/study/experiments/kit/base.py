@@ -64,20 +64,20 @@ Count = Annotated[int, Field(ge=1, le=100_000)]
 Repeats = Annotated[int, Field(ge=1, le=1000)]
 Modes = Annotated[int, Field(ge=1, le=1000)]
 Tolerance = Annotated[float, Field(gt=0.0, lt=1.0)]
-# Name of a scene -> factors on the number of vertices along each side of its mesh.
+# Name of a scene -> factors by which the vertex count along each side of its mesh is multiplied.
 Sizes = dict[str, tuple[Annotated[float, Field(gt=0.0, le=100.0)], ...]]
 PositionBasis = Literal["pod", "skinning"]
 Rank = Annotated[int, Field(ge=1, le=100_000)] | Literal["full"]
 
 
 class OfScene(ConfigModel):
-    """Base class of settings that identify a file of a scene."""
+    """Base class of settings whose texts (scene, group ...) identify a file."""
 
     scene: SceneName
 
     @property
     def labels(self) -> dict[str, str]:
-        """Map names (scene, group ...) to their values in the file's path: all text settings."""
+        """All text settings (scene, group ...) by name; the file's path contains their values."""
         return {name: text for name, text in self if isinstance(text, str)}
 
 
@@ -122,14 +122,14 @@ Solver = Annotated[str, AfterValidator(_known)]
 class Horizon(ConfigModel):
     """Settings of the horizon of a scene, the frame before which runs are compared.
 
-    It is the first frame in which runs with this ``perturbation`` differ by over ``threshold``.
+    It is the first frame that a ``perturbation`` of the start changes by more than ``threshold``.
     """
 
     perturbation: Tolerance
     threshold: Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 
     def frames(self, perturbed: File) -> int:
-        """Number of frames that are compared, from the file ``perturbed`` of perturbed runs."""
+        """Number of frames before the horizon, from the file ``perturbed`` of perturbed runs."""
         spread = floor_of(read_table(perturbed.path), perturbed["scene"], self.perturbation)
         return horizon(spread, self.threshold)
 
@@ -178,9 +178,9 @@ def varied(
 ) -> SceneConfig:
     """Return ``config`` with another ``time_step`` (s) and other weights of reduced groups.
 
-    The weights of reduced groups are multiplied by ``stiffness_ratio``. Schedules keep their times
-    in seconds, so that their frame numbers change. The run lasts ``duration`` seconds, but has at
-    least ``frames[0]`` and at most ``frames[1]`` frames.
+    The weights of reduced groups are multiplied by ``stiffness_ratio``. Effects begin and end at
+    the same times in s, so that the numbers of these frames change. The run lasts ``duration``
+    seconds, but has at least ``frames[0]`` and at most ``frames[1]`` frames.
     """
     count = min(max(round(duration / time_step), frames[0]), frames[1])
     effects = []

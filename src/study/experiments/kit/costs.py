@@ -37,15 +37,15 @@ _QUESTIONS = (
     ("begin_frame", "accumulate"), ("acceleration",), ("active", "held", "takes_hold", "path"),
     ("apply",),
 )  # fmt: skip
-# Indices into the record (array of integers) of a timed kernel: addresses of the kernel without
-# timers, of its record, of its seconds and clocks (two parts and preparation); the record's length.
+# Indices into the data array ("record") of a kernel with timers, of four addresses: of the kernel
+# without timers, of its record, of the summed times, of the clocks. SIZE: length of the array.
 KERNEL, RECORD, SECONDS, CLOCKS, SIZE = range(OWN, OWN + 5)
 
 
 def variant(
     scene: Scene, system: GlobalSystem, steps: Sequence[LocalStep], frames: int, labels: dict
 ) -> Variant:
-    """Step loop of ``scene`` to time, with local ``steps``; it does not evaluate the objective."""
+    """Return a variant to be timed: ``scene`` with local ``steps``, without objective values."""
     loop = scene.stepper(system, steps, track_objective=False)
     return Variant(labels, loop, scene.initial_state(), frames)
 
@@ -55,13 +55,13 @@ def local_costs(
 ) -> pd.DataFrame:
     """Milliseconds of one evaluation of each reduced local step, and of the full one of its group.
 
-    Times are means over some states. A row also has times of two parts of the reduced local step,
+    Times are means over ``states``. A row also has times of two phases of the reduced local step,
     each measured separately: the dense product that solves for the coefficients, and the
     reconstruction. All steps are measured in turn.
 
     often : ``warmup``, ``repeats``: numbers of unmeasured and of measured evaluations
     reduced : (group, method, r) -> reduced local step of a group of ``scene``
-    states : (n, N, 3) m, positions; data that steps compute once a frame are those of the first
+    states : (n, N, 3) m, positions; the first are also used for what is computed once per frame
     """
     groups = {name: scene.group(name) for name, _, _ in reduced}
     rhs, iterates = vertices(len(states[0])), [as_vertices(y) for y in states]
@@ -141,8 +141,8 @@ def effect_costs(
     """Times per frame of the full-order run: effects, right-hand side, global solve, the rest.
 
     The table has the columns `COSTS`; several effects of one name have one row. ``elements`` counts
-    the elements of a group, the vertices that pins or handles may fix, or else all vertices. The
-    time of the right-hand side is that of the compiled local pass without the groups.
+    the elements of a group, the vertices that pins or handles may fix, or else all vertices. Time
+    of the compiled local steps outside the groups' kernels counts as that of the right-hand side.
 
     warmup, repeats : numbers of unmeasured and of measured runs
     """
@@ -178,7 +178,7 @@ def _profile(
         own = [sum(stand.seconds for stand in stands if stand.name == name) for name in names]
         inside = sum(stand.kernel_seconds for stand in stands)
         total, (_, local, solve, _) = float(report.seconds.sum()), report.seconds.tolist()
-        # without a compiled local pass, the times of groups include their right-hand side
+        # if local steps are not compiled, the times of groups include those of the right-hand side
         right = local - inside if inside > 0.0 else 0.0
         parts = [*own, right, solve, total - sum(own) - right - solve]
         rows.append([1e3 * part for part in (total, *parts)])
@@ -248,7 +248,7 @@ def _timed(y, rhs, record, part):
 
 
 def timed(kernel: LocalKernel) -> tuple[LocalKernel, np.ndarray]:
-    """Return ``kernel`` with timers, and the seconds (3,) of its two parts and its preparation."""
+    """Return ``kernel`` with timers, and an array (3,): seconds in both `PARTS` and `PREPARE`."""
     seconds, clocks = np.zeros(PREPARE + 1), np.stack([clock() for _ in range(PREPARE + 1)])
     arrays = (seconds, clocks)
     places = [kernel.address, kernel.record.ctypes.data, *(array.ctypes.data for array in arrays)]

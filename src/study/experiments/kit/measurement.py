@@ -43,7 +43,7 @@ _INNER = ("assembly_seconds", "lift_seconds")
 
 
 class Protocol(ConfigModel):
-    """Settings of a timing: ``repeats`` timed runs of ``frames`` frames, after ``warmup`` runs."""
+    """Settings of a timing: ``warmup`` untimed and ``repeats`` timed runs of ``frames`` frames."""
 
     frames: Count = 10
     warmup: Annotated[int, Field(ge=0, le=1000)] = 1
@@ -51,7 +51,7 @@ class Protocol(ConfigModel):
 
 
 class Processes(Protocol):
-    """Settings of a timing that several new ``processes`` repeat, one after the other."""
+    """Settings of a timing done in each of ``processes`` new processes, one after the other."""
 
     frames: Count = 4
     repeats: Repeats = 3
@@ -130,7 +130,7 @@ def clocked(made: Iterable[T]) -> Iterator[tuple[float, T]]:
 
 
 def _time_once(variant: Variant, frames: int) -> np.ndarray:
-    """Run a variant; return milliseconds (frames, `PHASES`) up to a frame that is not finite."""
+    """Run a variant, up to the first frame that is not finite; return ms (frames, `PHASES`)."""
     loop, state, rows = variant.loop, variant.start, []
     frame = -1
     with np.errstate(over="ignore", invalid="ignore"):
@@ -159,10 +159,10 @@ def _time_once(variant: Variant, frames: int) -> np.ndarray:
 
 
 def median_frames(samples: np.ndarray) -> np.ndarray:
-    """Mean (phases,) over frames of ``samples`` (repeats, frames, phases), from one repeat each.
+    """Mean time (phases,) over frames of ``samples`` (repeats, frames, phases).
 
-    For each frame this is the repeat with the median total (first phase). All its phases are from
-    this repeat, since medians of single phases would not add up to the total.
+    Each frame's times are those of the repeat with the median total (the first phase),
+    since medians of single phases would not add up to the total.
     """
     order = np.argsort(samples[:, :, 0], axis=0, kind="stable")[len(samples) // 2]
     return samples[order, np.arange(samples.shape[1])].mean(axis=0)
@@ -171,10 +171,10 @@ def median_frames(samples: np.ndarray) -> np.ndarray:
 def in_processes(
     cases: Sequence[Callable[[], Iterable[Variant]]], asked: Processes
 ) -> list[dict[str, Any]]:
-    """Time all variants in several new processes; return their rows (labels, times), in order.
+    """Time all variants in several new processes; return a row per variant and process.
 
-    The processes run one after the other, each with another random order of the variants. A process
-    gets the pickled functions ``cases``, which make the variants. Raises PdromError if a process
+    The processes run one after the other, each with the variants in a random order of its own. They
+    get the pickled functions ``cases``, which make the variants. Raises PdromError if a process
     fails; the message ends with the last line of its output.
     """
     rows: list[dict[str, Any]] = []
@@ -197,8 +197,8 @@ def in_processes(
 
 
 def _in_this_process(given: str, answer: str, process: str) -> None:
-    """Time the variants of the pickled functions in file ``given``; write rows to ``answer``."""
-    with damaged_set_aside():  # rename damaged files, as the job does that started this process
+    """Time variants made by the pickled functions in file ``given``; write rows to ``answer``."""
+    with damaged_set_aside():  # a damaged file is renamed when read, as in the parent process
         cases, asked = pickle.loads(Path(given).read_bytes())
         variants = [variant for case in cases for variant in case()]
         order = np.random.default_rng(int(process)).permutation(len(variants))

@@ -39,7 +39,7 @@ def basis_of(sampling: File, method: MethodSpec, bases: Sequence[File]) -> File:
 
 
 def run_error(run: np.ndarray, reference: np.ndarray) -> float | None:
-    """Relative error of a ``run`` against a ``reference``, both positions (F + 1, N, 3) m."""
+    """Relative error of ``run`` (F + 1, N, 3) m against ``reference``; None if this never moves."""
     difference = np.linalg.norm((run - reference)[1:].reshape(len(run) - 1, -1), axis=1)
     return trajectory_error(difference, displacement_norms(reference))
 

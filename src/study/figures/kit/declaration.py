@@ -39,7 +39,7 @@ Ranks = tuple[Annotated[int, Field(ge=0)] | Literal["full"], ...]
 Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
 Instants = Annotated[tuple[Fraction, ...], Field(min_length=1)]  # fractions of a run's duration
 Columns = Annotated[int, Field(ge=1, le=6)]  # number of panels in a row
-Count = Annotated[int, Field(ge=1, le=12)]  # number of modes or iterations
+Count = Annotated[int, Field(ge=1, le=12)]  # number of drawn modes, or of steps of the sampling
 AZIMUTH = 30.0  # azimuth of every camera, degrees
 
 
@@ -145,13 +145,13 @@ class Experiment(_Plain):
         return name if self.only else f"{name}: {self.group.replace('_', ' ')}"
 
     def find(self, files: Sequence[File], **labels: str) -> str | None:
-        """Path of the first file that fits scene, group, mesh and ``labels``; None without one."""
+        """First path in ``files`` for this scene, group, mesh and ``labels``; None without one."""
         own = self.labels | labels
         found = (f.path for f in files if all(own.get(k, v) == v for k, v in f.labels.items()))
         return next(found, None)
 
     def path(self, files: Sequence[File], **labels: str) -> str:
-        """Path of the first file that the method `find` finds; LookupError without one."""
+        """Path that the method `find` returns; LookupError if there is no such file."""
         path = self.find(files, **labels)
         if path is None:
             raise LookupError(f"no file of {self.labels | labels}")
@@ -203,7 +203,7 @@ class Drawn(_Plain):
         return plain_words(held.title if held else method)
 
     def handles(self, looks: Mapping[str, tuple[str, str]], **common: Any) -> list[Line2D]:
-        """Return a legend entry for each method in ``looks`` (method -> colour, marker)."""
+        """Legend entries for ``looks`` (method -> colour, marker), with the options ``common``."""
         return [
             style.handle(self.title(method), color=colour, marker=marker, **common)
             for method, (colour, marker) in looks.items()
@@ -227,7 +227,7 @@ log = logging.getLogger(__name__)
 
 PACKAGE = "study.figures"
 PNG_DPI = 200
-RASTER_DPI = 300  # resolution of rasterised parts of a PDF
+RASTER_DPI = 300  # dots per inch of the rasterised parts of a PDF
 ELSEWHERE = "the full study (config/default.yaml) draws it"
 
 
@@ -241,7 +241,7 @@ class Declaration(Artifact):
 
     title, caption : text in the mark-up of `study.artifact.markup`; ``{key}`` in a caption stands
         for the value of a setting
-    number : number of the figure in the preprint that it reproduces; None for an own figure
+    number : number of the figure of the preprint that this one reproduces; None if there is none
     """
 
     caption: str = ""
@@ -255,7 +255,7 @@ class Declaration(Artifact):
         return chosen
 
     def words(self, value: Callable[[str], Any]) -> tuple[str, str]:
-        """Title and caption in mark-up; ``value`` returns the value of a setting in the caption.
+        """Title and caption in mark-up; ``value(key)`` is the number put in place of ``{key}``.
 
         Raises ConfigurationError if a setting does not exist.
         """
@@ -269,10 +269,7 @@ class Declaration(Artifact):
         write_figure(drawn, to_plain(self.title), outputs["pdf"], png=outputs["png"])
 
     def draw(self, **read: Any) -> Figure:
-        """Draw the figure from its inputs, or a note if they have no data for it.
-
-        Raises StorageError if a file is missing or damaged.
-        """
+        """Draw the figure, or a note if it has no data; StorageError: file missing or damaged."""
         with style.look():
             try:
                 return self.function(**read)
@@ -342,7 +339,7 @@ def declarations() -> dict[str, Declaration]:
 
 
 def load_choices(path: Path, known: Mapping[str, Collection[str]]) -> dict[str, Options]:
-    """Read the options of every figure from the file ``path``; other options have their defaults.
+    """Read options of every figure from the file ``path``; those not in it have their defaults.
 
     Raises ConfigurationError if a figure or key is unknown, a value is outside its range, or a name
     is not in ``known``.

@@ -17,7 +17,7 @@ SIGNED = "RdBu_r"
 
 
 def magnitudes(norm: Normalize | None = None) -> ScalarMappable:
-    """Return a colour map from near white to dark, for values from 0 to 1 or as ``norm`` says."""
+    """Return a colour map from near white to dark, for the range of ``norm`` (default 0 to 1)."""
     import matplotlib as mpl
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import LinearSegmentedColormap, Normalize
@@ -48,7 +48,7 @@ class ElementMap:
     mesh: Mesh
 
     def centres(self, points: np.ndarray) -> np.ndarray:
-        """Centre of each element (e, 3), m, with vertices at ``points`` (N, 3) m."""
+        """Centre (e, 3) m of each element if the mesh's vertices are at ``points`` (N, 3) m."""
         return points[self.cells].mean(axis=1)
 
     def face_values(self, values: np.ndarray) -> np.ndarray:
@@ -56,7 +56,7 @@ class ElementMap:
 
         If elements are triangles or tetrahedra, a surface triangle gets the value of its element.
         If they are vertices or edges, it gets the mean over its three vertices (NaN if none has a
-        value). The value of a vertex is its own, or the mean over the edges that meet there.
+        value). The value of a vertex is the given one, or the mean over edges that meet there.
         """
         triangles = self.mesh.triangles
         if self.kind == "triangle":
@@ -121,8 +121,8 @@ def element_map(group: str, mesh: Mesh, elements: int, source: str) -> ElementMa
 def signed_entry(vector: np.ndarray, rows_per_element: int) -> tuple[np.ndarray, str]:
     """Return one of the 3 p entries of each element (e,), and the name of this entry.
 
-    ``vector`` has 3 p entries for each of e elements, p = ``rows_per_element``. The entry is the
-    one that is largest in absolute value in any element; its name has axis and row ("x, row 2").
+    ``vector`` has 3 p entries for each of e elements, p = ``rows_per_element``. The entry has the
+    same index in every element: that of the largest |value| in ``vector``. Names: "x", "x, row 2".
     """
     entries = vector.reshape(-1, 3 * rows_per_element)
     slot = int(np.argmax(np.abs(vector))) % (3 * rows_per_element)

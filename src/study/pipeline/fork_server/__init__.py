@@ -22,7 +22,7 @@ from pathlib import Path
 
 from study.pipeline.fork_server.client import ADDRESS, PIPE, place_of
 
-# Path of the Python interpreter. The workflow starts scripts by the command `interpreter` instead.
+# Path of Python's interpreter. The workflow starts scripts by the command from `interpreter`.
 PYTHON = sys.executable
 
 # On macOS, forks of a process that has loaded system frameworks are unsafe.
@@ -45,7 +45,7 @@ def interpreter() -> str:
 
 
 def hold_pipe(place: Path) -> None:
-    """Open a named pipe; it closes when this process ends, and jobs without fork server end then.
+    """Hold a named pipe open until this process ends: jobs that are no forks notice it and end.
 
     Raises OSError if the file system does not support named pipes.
 
@@ -53,7 +53,7 @@ def hold_pipe(place: Path) -> None:
     """
     place.unlink(missing_ok=True)
     os.mkfifo(place)
-    reader = os.open(place, os.O_RDONLY | os.O_NONBLOCK)  # writing needs a reader at the other end
+    reader = os.open(place, os.O_RDONLY | os.O_NONBLOCK)  # without a reader, the next open waits
     os.open(place, os.O_WRONLY)
     os.close(reader)
     os.environ[PIPE] = str(place.absolute())
@@ -70,8 +70,7 @@ def start_server(libraries: Sequence[str] = LIBRARIES) -> None:
     if not SUPPORTED:
         return
     name = f"pdrom-{secrets.token_hex(16)}"
-    # The server has one end of a pipe; only this process has the other end open. When this process
-    # ends, the pipe closes, which tells the server to end.
+    # only this process has the write end of this pipe: when it ends, the server sees that and ends
     owner, _kept_open = os.pipe()
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as listener:
         listener.bind(place_of(name))

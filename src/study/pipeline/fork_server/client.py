@@ -74,7 +74,7 @@ def of_this_user(connection: socket.socket) -> bool:
 
 
 def ask(connection: socket.socket) -> bytes:
-    """Request a fork over ``connection``; return its process number, or b"" without a server.
+    """Request a fork over ``connection``; return its process number, or b"" if there is no fork.
 
     The server gets the standard streams, and a pipe with folder, script and environment of the job.
     """

@@ -30,7 +30,7 @@ class Server:
 
     A request is a message with file descriptors of the three standard streams and of a pipe. From
     the pipe, the fork reads the folder, the script and the variables of the environment. Each of
-    these texts ends with a zero byte, and another zero byte follows.
+    these texts ends with a zero byte; one more zero byte ends the request.
 
     listener : socket to which clients connect
     owner : read end of a pipe whose write end only the owner has open
@@ -69,8 +69,7 @@ class Server:
                     with self.jobs.pop(process) as client, suppress(OSError):
                         client.sendall(NUMBER % status)
             for process, client in self.jobs.items():
-                # A client sends nothing after its request. If its connection becomes readable, the
-                # client is gone, and its job is killed.
+                # a client sends nothing after its request: a readable connection means it is gone
                 if client in ready:
                     forward(process, signal.SIGKILL)
             for client in [client for client in self.silent if client in ready]:

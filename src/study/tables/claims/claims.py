@@ -1,8 +1,8 @@
 """Tables about the preprint's claims, by the rules of config/claims.yaml.
 
 The tests of a claim are evaluated, and their results are combined to verdicts. Table claims has
-the verdicts, claims_tests has the result of every test, claims_sensitivity the verdicts under
-changed rules, and replication compares with verdicts on other scenes.
+the verdicts, claims_tests the result of every test, claims_sensitivity the verdicts under changed
+rules, and replication the verdicts of table claims beside those on other scenes.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -35,10 +35,10 @@ class Outcome:
 
     verdict : one of `VERDICTS`; "cannot be decided" if there are no values to compare, "depends on
         the machine" if the verdict rests on ratios of times that are close to the threshold
-    measured : text with the range of the values
+    measured : text with the range of the metric's values
     sentence : text with the number of rows that satisfy the comparison
-    condition : text with this number for each value of the test's column ``by``, if the verdict
-        depends on rows or on the machine
+    condition : text with this number for each value of the test's column ``by``; empty unless the
+        verdict is "depends" or "depends on the machine"
     """
 
     verdict: str
@@ -48,7 +48,7 @@ class Outcome:
 
 
 def values_of(test: TestRule, tables: Tables) -> pd.DataFrame:
-    """Table of the rows that ``test`` selects: scene, group, method ..., and the metric `VALUE`."""
+    """Rows that ``test`` selects: columns scene, group, method ..., and `VALUE`, its metric."""
     return METRICS[test.metric].values(tables, dict(test.where), test.accuracy)
 
 
@@ -65,9 +65,10 @@ def close(test: TestRule, values: np.ndarray) -> np.ndarray:
 
 
 def answer(share: float, good: int, total: int) -> str:
-    """Verdict of a test: it holds, or fails, if at least a fraction ``share`` of rows says so.
+    """Verdict of a test of which ``good`` rows of ``total`` rows satisfy the comparison.
 
-    Of ``total`` rows, ``good`` rows satisfy the comparison of the test.
+    It "holds" if at least a fraction ``share`` of rows satisfies the comparison, "does not hold" if
+    at least this fraction violates it, "cannot be decided" without rows, and else "depends".
     """
     if total == 0:
         return UNDECIDED
@@ -77,7 +78,7 @@ def answer(share: float, good: int, total: int) -> str:
 
 
 def answer_of(test: TestRule, values: np.ndarray) -> str:
-    """Verdict of ``test``; `MACHINE` if values close to the threshold could change the verdict."""
+    """Verdict of ``test``; "depends on the machine" if values near the threshold may change it."""
     near = close(test, values)
     sure, total = int((satisfied(test, values) & ~near).sum()), len(values)
     answers = {answer(test.share, sure + more, total) for more in range(int(near.sum()) + 1)}
@@ -85,7 +86,7 @@ def answer_of(test: TestRule, values: np.ndarray) -> str:
 
 
 def evaluate(test: TestRule, tables: Tables) -> Outcome:
-    """Compare the values of the rows that ``test`` selects from ``tables`` with its threshold."""
+    """Compare the values that ``test`` selects from ``tables`` with the threshold of the test."""
     rows = values_of(test, tables)
     values = rows[VALUE].to_numpy(float)
     if len(values) == 0:
@@ -138,9 +139,9 @@ def _text(value: float) -> str:
 
 
 def combined(verdicts: Sequence[str]) -> str:
-    """Verdict of a claim from the ``verdicts`` of its tests; it holds if all tests hold.
+    """Verdict of a claim: the first in this list that a test has, "not tested" without tests.
 
-    Without any tests, the claim is "not tested".
+    "cannot be decided", "does not hold", "depends on the machine", "depends", "holds"
     """
     if not verdicts:
         return UNTESTED
@@ -166,7 +167,7 @@ def timed_columns(rule: ClaimRule) -> set[str]:
 def by_rules(timed: Callable[[ClaimRule, Any], set[str]]) -> TimedCells:
     """Return a function for `Table.timed_cells`, which calls ``timed`` for each row of a table.
 
-    ``timed`` gets the rule of the row's claim, and the row; it returns the names of columns.
+    ``timed`` gets the rule of the row's claim, and the row; it returns names of timed columns.
     """
 
     def timed_cells(table: pd.DataFrame, **files: Path) -> list[set[str]]:
@@ -177,7 +178,7 @@ def by_rules(timed: Callable[[ClaimRule, Any], set[str]]) -> TimedCells:
 
 
 def timed_parts(*cells: str) -> TimedCells:
-    """Return a function for `Table.timed_cells`; rows whose verdict uses times get ``cells``."""
+    """Return a `Table.timed_cells` function: columns ``cells`` if times affect a row's verdict."""
     return by_rules(
         lambda rule, row: {*cells} if f"verdict{PARTS[row.part]}" in timed_columns(rule) else set()
     )
@@ -190,17 +191,17 @@ FOUND = ("satisfied", "of", "close", "least", "median", "most", "verdict")
 ONE_OF = f"one of: {', '.join(VERDICTS)}"
 # Constructs a column that may depend on times and is not compared with the expected table.
 skipped = partial(Column, timed=True, compared="skipped")
-FACTORS = (0.5, 0.8, 1.25, 2.0)  # multiples of each threshold that are tried
+FACTORS = (0.5, 0.8, 1.25, 2.0)  # table claims_sensitivity multiplies thresholds by these
 SHARES = (0.5, 0.6, 0.75, 0.9, 1.0)
-MARGINS = (1.0, 1.25, 1.5, 2.0, 3.0, 5.0)  # margins tried for tests that compare times; 1: none
-SMALL = 10  # verdicts are tried with only sizes r up to this one, and with only larger sizes
+MARGINS = (1.0, 1.25, 1.5, 2.0, 3.0, 5.0)  # tried values of `TestRule.margin`; 1: no margin
+SMALL = 10  # claims_sensitivity keeps only sizes r up to this one, or only larger ones
 SPLITS = ("train", "test", "heldout")
 VARIED = ("threshold", "share", "margin", "sizes", "splits", "scenes")
-# Fraction of rows whose verdict may differ between machines: some verdicts rest on a few runs.
+# Share of verdicts of claims_sensitivity that may differ in `verify`: some rest on few runs only.
 FRAGILE = 0.01
 _Rows = list[pd.DataFrame]
 _Keep = Callable[[pd.Series], pd.Series]
-_Variation = tuple[str, str, Sequence[TestRule], _Rows]  # (kind, name, changed tests, their rows)
+_Variation = tuple[str, str, Sequence[TestRule], _Rows]  # (what is varied, how, tests, their rows)
 
 
 @declare(
@@ -290,7 +291,7 @@ def _timed_of_test(rule: ClaimRule, row: Any) -> set[str]:
     timed_cells=by_rules(_timed_of_test),
 )
 def claims_tests(rules: Path, added: Added, **tables: pd.DataFrame) -> pd.DataFrame:
-    """One row per claim, kind of verdict and test; for ``added``, see `load_claims`."""
+    """One row for each test of each claim's two verdicts; for ``added``, see `load_claims`."""
     rows = [
         {"claim": name, "part": part, **test.model_dump(include=SAID), **_found(test, tables)}
         for name, rule in load_claims(rules, added).items()
@@ -325,14 +326,14 @@ def _found(test: TestRule, tables: Tables) -> dict[str, Any]:
     timed_cells=timed_parts("verdict", "verdict_of_rules", "same"),
 )
 def claims_sensitivity(rules: Path, added: Added, **tables: pd.DataFrame) -> pd.DataFrame:
-    """One row for each claim, kind of verdict, and change of the tests that decide it."""
+    """One row per claim, kind of verdict (`PARTS`) and variation of the tests that decide it."""
     return sensitivity_rows(load_claims(rules, added), tables)
 
 
 def sensitivity_rows(rules: Mapping[str, ClaimRule], tables: Tables) -> pd.DataFrame:
-    """One row for each claim, kind of verdict, and variation of the tests that decide it.
+    """One row per claim, kind of verdict (`PARTS`) and variation of the tests that decide it.
 
-    A variation is left out if it changes nothing, or if a changed test selects no rows.
+    Variations of sizes, snapshots or scenes that change nothing or leave a test no row are omitted.
     """
     made = []
     for claim, rule in rules.items():
@@ -360,7 +361,7 @@ def _with(test: TestRule, **changes: Any) -> TestRule:
 
 
 def _variations(tests: Sequence[TestRule], rows: _Rows, tables: Tables) -> Iterator[_Variation]:
-    """Yield variations of ``tests``: other limits, fewer rows, other snapshots."""
+    """Yield ``tests`` with another threshold, share, margin or split, or fewer rows (r, scenes)."""
     for factor in FACTORS:
         changed = [_with(test, threshold=factor * test.threshold) for test in tests]
         yield "threshold", f"x {factor:g}", changed, rows
@@ -386,9 +387,9 @@ def _variations(tests: Sequence[TestRule], rows: _Rows, tables: Tables) -> Itera
 def _kept(
     tests: Sequence[TestRule], rows: _Rows, varied: str, column: str, keeps: Mapping[str, _Keep]
 ) -> Iterator[_Variation]:
-    """Yield one variation for each name in ``keeps`` (name -> function).
+    """Yield a variation of ``tests`` for each function in ``keeps`` that leaves out ``rows``.
 
-    The function gets the cells of ``column`` and returns True for each row to be kept.
+    A function gets the cells of the rows in ``column`` and returns True for each row to be kept.
     """
     for name, keep in keeps.items():
         kept = [values[keep(values[column])] if column in values else values for values in rows]
@@ -417,7 +418,7 @@ def _kept(
     timed_cells=timed_parts("verdict", "same", "measured"),
 )
 def replication(claims: pd.DataFrame, rules: Path, recorded: Path) -> pd.DataFrame:
-    """One row for each kind of verdict and each claim that also stands in file ``recorded``."""
+    """One row for each claim that is also in file ``recorded``, and kind of verdict (`PARTS`)."""
     loaded = load_claims(rules)
     both = claims.merge(pd.read_csv(recorded), on="claim", suffixes=("", "_replication"))
     unchanged = [

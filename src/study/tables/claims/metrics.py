@@ -33,7 +33,7 @@ def filtered(table: pd.DataFrame, where: Where) -> pd.DataFrame:
 
 
 def reruns(table: pd.DataFrame, where: Where) -> pd.DataFrame:
-    """Reduced runs of the training motion that could be started.
+    """Reduced runs of the training motion that ``where`` selects and that could be started.
 
     A run cannot be started if its size r exceeds the numerical rank of the snapshots. Runs with
     reduced positions are included only if ``where`` selects a position basis, because methods have
@@ -51,7 +51,7 @@ def reruns(table: pd.DataFrame, where: Where) -> pd.DataFrame:
 
 
 def by_axis(table: pd.DataFrame, where: Where) -> pd.DataFrame:
-    """Rows that ``where`` selects, once for each axis x, y, z with ``relative_error`` in it."""
+    """Rows that ``where`` selects, once per axis x, y, z with this axis's ``relative_error``."""
     parts = [table.assign(axis=a, relative_error=table[f"relative_error_{a}"]) for a in AXES]
     return filtered(pd.concat(parts, ignore_index=True), where)
 
@@ -68,7 +68,7 @@ def held_out(
 
 
 def decay(rows: pd.DataFrame, accuracy: float) -> pd.Series:
-    """Singular values over the largest of their group, without groups of mere rounding errors."""
+    """Singular values divided by their group's largest, for groups with any above round-off."""
     rows = rows[rows.groupby(["scene", "group"]).above_roundoff.transform("any")]
     return rows.relative
 
@@ -97,7 +97,7 @@ def elements_per_entry(rows: pd.DataFrame, accuracy: float) -> pd.Series:
 
 
 def local_ratio(name: str, rows: pd.DataFrame, accuracy: float) -> pd.Series:
-    """Time of a reduced local step, or of a part of it, over that of the full compiled local step.
+    """Time of a reduced local step, or a part of it, divided by that of the full compiled step.
 
     This is column ``name``, taken at the largest size r of each scene, group, method and mesh:
     there the dense solve for the coefficients is the most expensive.
@@ -164,7 +164,7 @@ def noise_error(rows: pd.DataFrame, accuracy: float) -> pd.Series:
 
 
 def position_basis_ratio(rows: pd.DataFrame, accuracy: float) -> pd.DataFrame:
-    """Ratio of the errors with POD and with skinning position bases, for each scene and size k.
+    """Error with POD divided by error with skinning position basis, for each scene and size k.
 
     Pairs in which both errors exceed ``accuracy`` are left out, as their ratio is meaningless.
     """
@@ -176,19 +176,19 @@ def position_basis_ratio(rows: pd.DataFrame, accuracy: float) -> pd.DataFrame:
 
 
 def over_the_rest(share: np.ndarray) -> np.ndarray:
-    """Ratio of the time of a part to the rest of the time, from the ``share`` of the part."""
+    """Time of a part of a frame divided by that of the rest, from the ``share`` of the part."""
     with np.errstate(divide="ignore"):
         return np.divide(share, np.subtract(1.0, share))
 
 
 @dataclass(frozen=True)
 class Metric:
-    """Metric of a test, computed from columns of one table.
+    """Metric that a test of a claim compares with a threshold, from columns of one table.
 
-    of : function of the selected rows and ``accuracy``; returns values of some of these rows, or a
-        table with a column `VALUE` and columns such as scene and group
+    of : function of the selected rows and ``accuracy`` (largest error of an accurate run); returns
+        values of some of these rows, or a table with columns `VALUE`, scene, group ...
     choose : function of the table and ``where`` (column -> allowed values) that selects the rows
-    labels : columns that ``where`` may name although the table lacks them
+    labels : columns that ``where`` may name although the table lacks them: ``choose`` adds them
     ratio : function that converts a value to a ratio of two times, for metrics based on times
     """
 
@@ -200,7 +200,7 @@ class Metric:
     ratio: Callable[[np.ndarray], np.ndarray] = np.asarray
 
     def values(self, tables: Tables, where: Where, accuracy: float) -> pd.DataFrame:
-        """Table with a `VALUE` and columns such as scene for each row that ``where`` allows.
+        """Table with the metric (column `VALUE`), scene, group ... of rows that ``where`` allows.
 
         A run counts as accurate if its error is at most ``accuracy``.
         """
@@ -222,7 +222,7 @@ METRICS = {
     "local_share": Metric(
         lambda rows, _: rows.local_share, "local_share", ("local_share",), ratio=over_the_rest
     ),
-    # error over the frames in which perturbed runs agree; infinite if the run blew up earlier
+    # error over the frames in which perturbed runs agree; infinite if the run blew up in them
     "rerun_error": _of_reruns(lambda rows, _: rows[_ERROR].fillna(np.inf)),
     "useful_speedup": _of_reruns(useful_speedup, "speedup"),
     "best_useful_speedup": _of_reruns(best_useful_speedup, "speedup"),

@@ -22,7 +22,7 @@ Added = Mapping[str, Sequence[Value]]
 NONE_ADDED: Added = MappingProxyType({})
 MARGIN = 1.5  # default of `TestRule.margin` for tests that compare times
 PARTS = {"published": "", "beyond": "_beyond"}  # name of a verdict -> suffix of its columns
-# Inputs of the tables about claims: the file of rules, a setting, and tables that metrics read.
+# Inputs of tables about claims: rules, scenes that the study adds to sets in them, metric tables.
 READS: dict[str, Read] = {
     "rules": ProjectFile("config/claims.yaml"),
     "added": Setting("claim_sets"),
@@ -92,7 +92,7 @@ class Change(ConfigModel):
     """Date and reason of a change in the rules of a claim.
 
     after_data : whether the results to which the rules apply were already known at this date
-    rules : fingerprint of the changed rules, see `ClaimRule.fingerprint`
+    rules : fingerprint of the rules after the change, see `ClaimRule.fingerprint`
     """
 
     date: datetime.date
@@ -109,8 +109,8 @@ class ClaimRule(ConfigModel):
     section, shown : section and figures of the preprint
     qualifiers : conditions that a fair test has to respect
     published : tests on the preprint's variants of the method and on its scenes
-    beyond : tests on sound variants and well-posed scenes; if none of them decides, the verdict
-        beyond the preprint is "not tested"
+    beyond : tests on sound variants of the method, on well-posed scenes; if none of them decides,
+        the verdict beyond the preprint is "not tested"
     changes : history of the rules, oldest first
     """
 
@@ -152,12 +152,12 @@ class ClaimRule(ConfigModel):
 
 
 def load_claims(path: Path, added: Added = NONE_ADDED) -> dict[str, ClaimRule]:
-    """Read identifier -> claim from the file ``path``; replace names of sets by their values.
+    """Read identifier -> claim from file ``path``; replace ``@name`` by the values of set ``name``.
 
-    Raises ConfigurationError if the file is invalid, or has no set of a name in ``added``.
+    Raises ConfigurationError if the file is invalid, or lacks a set that ``added`` names.
 
-    added : name of a set in the file -> values to append to it, such as scenes that only this
-        study has
+    added : name of a set (list of values) in the file -> values to append to it, such as scenes
+        that only this study has
     """
     content = read_yaml(path)
     if not isinstance(content, dict) or not {*content} - {SETS}:
@@ -177,7 +177,7 @@ def load_claims(path: Path, added: Added = NONE_ADDED) -> dict[str, ClaimRule]:
 
 
 def _resolved(entry: Any, sets: Mapping[str, list[Value]], place: str) -> Any:
-    """Return ``entry`` with each list item ``@name`` replaced by the values of the set ``name``."""
+    """Replace list items ``@name`` of ``entry`` by the set of this name; errors cite ``place``."""
     if isinstance(entry, dict):
         return {key: _resolved(value, sets, place) for key, value in entry.items()}
     if not isinstance(entry, list):

@@ -38,7 +38,7 @@ QUANTITIES: dict[Quantity, str] = {
     "timed": "what depends on timing, a compiler or a cache: not judged",
     "skipped": "rounding errors, and words about other columns: not compared",
 }
-# Allowed difference of a number between two machines, unless its column declares a tolerance.
+# Default tolerance of numbers between two machines: absolute for "share", relative for others.
 TOLERANCES: dict[Quantity, float] = {"exact": 1e-8, "value": 1e-4, "error": 0.05, "share": 0.1}
 # Allowed difference between two machines for integers of quantity "share" (numbers of runs).
 TALLY = 2.0
@@ -77,9 +77,10 @@ class Column:
 
     @property
     def within(self) -> float:
-        """Allowed difference of a cell: `tolerance`, or a default that depends on the content.
+        """Allowed difference of a cell between machines: `tolerance` or, without it, a default.
 
-        The default is 0 for text and flags, and for integers unless they are of quantity "share".
+        The default is 0 for text, flags and integers (`TALLY` for integers of quantity "share"),
+        and for numbers it is in `TOLERANCES`.
         """
         if self.tolerance is not None:
             return self.tolerance
@@ -127,7 +128,7 @@ def interval(names: str, make: Callable[..., Column] = number, unit: str = "") -
 
 
 def extremes(name: str) -> list[Column]:
-    """Return columns ``name_low`` and ``name_high``: least and largest value over repeated runs."""
+    """Return columns ``name_low``, ``name_high``: least and largest ``name`` of repeated runs."""
     words = {"low": "least", "high": "largest"}
     return [number(f"{name}_{end}", f"{word} {name}") for end, word in words.items()]
 

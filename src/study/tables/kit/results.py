@@ -1,8 +1,8 @@
 """Helpers for tables: times on a common scale, selections of reduced runs, medians over motions.
 
-Each job times the full-order run of its scene together with the variants, but machine speed differs
-between jobs. All times of a job are therefore multiplied by one factor: the time of the full-order
-run in table frame_times over its time in the job. Ratios of times within a job do not change.
+A job that times reduced runs of a scene, or runs without an effect, also times its full-order run,
+because machine speed differs between jobs. All times of a job are multiplied by one factor: time of
+the full-order run in table frame_times / its time in the job. Ratios of a job's times stay equal.
 
 Errors over held-out motions are summarised by their median, as fixed in config/claims.yaml.
 """
@@ -29,7 +29,7 @@ COLUMNS = (
     integer(COUNT, "held-out motions that were run, can be judged and are far enough"),
     number("playback_error", "median error of playback on these motions, see reduced_reruns"),
 )
-# A held-out motion counts only if the recorded training motion, shown instead, has a larger error.
+# Held-out motions count only if playback of the training recording has an error above this.
 FAR = 0.3
 _WHOLE = {"k": "Int64", "r": "Int64"}
 EXPERIMENT = ["scene", "group"]
@@ -39,7 +39,7 @@ TWIN = "_twin"
 
 
 def joined(files: Iterable[File]) -> pd.DataFrame:
-    """Rows of the tables in ``files``, in order; an empty frame without columns if none exist."""
+    """Rows of the tables in ``files``, in order; without any rows, a frame without columns."""
     parts = [part for part in (read_table(file.path) for file in files) if len(part)]
     return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame()
 
@@ -48,13 +48,13 @@ DAY = text("recorded", "day on which config/extended.yaml recorded the row; empt
 
 
 def with_recorded(rows: pd.DataFrame, record: list[Path]) -> pd.DataFrame:
-    """Add rows of ``record`` whose scene, stiffness and mesh size do not occur in ``rows``."""
+    """Append rows of file ``record``, if any, whose (scene, stiffness, vertices) ``rows`` lack."""
     if not record:
         return rows.assign(recorded=None)
     others = read_table(record[0], result=False)
     if rows.empty:
         return others
-    # table requested_tolerances has no column stiffness: its scenes keep their own weights
+    # table requested_tolerances has no column stiffness: its runs never scale weights of a scene
     keys = [key for key in ("scene", "stiffness", "vertices") if key in rows]
     own = pd.MultiIndex.from_frame(rows[keys].astype(object))
     others = others[~pd.MultiIndex.from_frame(others[keys].astype(object)).isin(own)]
@@ -64,14 +64,10 @@ def with_recorded(rows: pd.DataFrame, record: list[Path]) -> pd.DataFrame:
 def in_one_time(
     table: pd.DataFrame, own: pd.Series, times: pd.DataFrame, columns: Collection[str]
 ) -> pd.DataFrame:
-    """Return ``table`` with its time ``columns`` scaled to the times of the table frame_times.
+    """Scale ``columns`` (times) so that full-order frames of a scene take its time in ``times``.
 
-    The times of scenes that are missing in the table frame_times are not scaled.
-
-    Parameters
-    ----------
-    own : scene -> time of a full-order frame in the job, ms
-    times : table frame_times
+    own : scene -> time of its full-order frame in the job that measured ``table``, ms
+    times : table frame_times; times of scenes that are missing in it are not scaled
     """
     one = times.set_index("scene").ms_per_frame.reindex(own.index)
     factor = table.scene.map((one / own).fillna(1.0)).fillna(1.0)
@@ -79,7 +75,7 @@ def in_one_time(
 
 
 def timings_in_one_time(timings: Sequence[File], times: pd.DataFrame) -> pd.DataFrame:
-    """Rows of the files ``timings``, with times scaled to the table frame_times (``times``)."""
+    """Rows of the files ``timings``; `in_one_time` scales their times to those in ``times``."""
     rows = joined(timings)
     if rows.empty:
         return rows
@@ -130,12 +126,10 @@ def trained(reruns: pd.DataFrame) -> pd.DataFrame:
 def over_motions(reruns: pd.DataFrame, keys: Sequence[str] = KEYS) -> pd.DataFrame:
     """Median, least and largest error of each run over its held-out motions, and their number.
 
-    Errors use the frames before the horizon, in which perturbed runs agree; a run that ended there
+    Errors use frames before the horizon, in which perturbed runs agree; a run that ended in these
     has an infinite error. Left out are sizes above the numerical rank, which cannot run, motions
-    without such frames, and motions that the training motion matches with an error <= `FAR`.
+    with horizon 0, and those for which playback of the training recording has an error <= `FAR`.
 
-    Parameters
-    ----------
     reruns : table reduced_reruns
     keys : columns that identify a run
     """

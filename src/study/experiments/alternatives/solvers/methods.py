@@ -32,14 +32,14 @@ from study.experiments.kit.base import followed
 WINDOW = 5  # number of earlier iterates in Anderson acceleration, as in Peng et al. 2018
 # Parameters of Chebyshev's semi-iteration: estimated convergence rate of the plain iteration, and
 # number of plain iterations before the first extrapolation. Both are set by hand, as in Wang 2015.
-# Of five rates, this one is best on both sheets of the comparison, a choice that favours the
+# Of five rates, this one is best in both compared scenes with a sheet, a choice that favours the
 # method; a rate measured from the first iterates is worse.
 RATE = 0.98
 PLAIN = 5
 
 
 class SmallSteps(Alternative):
-    """Plain local/global iteration for all groups, with the system matrix of a substep."""
+    """Plain local/global iteration; the time step in the system matrix is that of a substep."""
 
     name = "projective"
 
@@ -133,7 +133,7 @@ def _chebyshev(
         end(y, before, step, v)
 
 
-INNER = 10  # number of iterations (with Anderson acceleration) on the coarse level
+INNER = 10  # number of coarse-level iterations (Anderson acceleration) in each iteration
 
 
 class TwoLevel(Alternative):
@@ -141,12 +141,12 @@ class TwoLevel(Alternative):
 
     The plain iteration converges slowly for deformations that are stiff in the system matrix A and
     soft in the objective. Its result G(y) is therefore corrected in the span of the columns V of
-    the subspace, scaled to V^T A V = 1. The component g = V^T A (G(y) - y) of the step is replaced
-    by the step z that minimises the objective of y + V z, in which sampled elements stand for all
-    elements. This is the full approximation scheme (Brandt 1977) with one additive smoothing step:
-    -g is the exact gradient in the span, so that z = g = 0 where y solves the frame, whatever the
-    samples are. The corrected iteration is accelerated. An iterate that raises the objective is
-    replaced by the last G(y) without correction.
+    the subspace, scaled to V^T A V = 1. The component V g, g = V^T A (G(y) - y), of the step from y
+    to G(y) is replaced by V z, where z minimises the objective of y + V z, with sampled elements
+    in place of all. This is the full approximation scheme (Brandt 1977) with one additive
+    smoothing step: -g is the exact gradient in the span, so that z = g = 0 where y minimises the
+    frame's objective, whatever elements are sampled. The corrected iteration is accelerated. An
+    iterate that raises the objective is replaced by the last G(y) without correction.
 
     Raises SceneError if the scene has several groups, or if `Alternative` refuses it.
     """
@@ -162,7 +162,7 @@ class TwoLevel(Alternative):
             raise SceneError(f"scene '{scene.config.name}': method '{self.name}' takes one group")
         columns, group = self._model.columns, scene.groups[0]
         system = self.space.system
-        # the correction is zero at vertices that are fixed in any frame
+        # vertices fixed in any frame get no correction, so their own columns are left out
         free = columns.B[:, columns.free]
         image = system.matrix @ free
         factor = linalg.cholesky(free.T @ image, lower=True)
@@ -220,7 +220,7 @@ def _two_level(
 
 @compiled(nogil=True)
 def _correct(coarse, start, image):
-    """Correct ``image`` = G(y), ``start`` = y: make the sampled objective minimal in the span."""
+    """Correct ``image`` = G(y) on the ``coarse`` level, as in `TwoLevel`; ``start`` is y."""
     span, duals, rows, steps, inverse, vertices, tables, history = coarse
     size, sampled = WIDTH * span.shape[1], WIDTH * len(vertices)
     step, x, at_start = np.zeros(size), np.empty(sampled), np.zeros(sampled)
@@ -329,7 +329,7 @@ class Continuous:
     """Motion in continuous time, as computed by `continuous`.
 
     positions : (F + 1, N, 3) m, initial positions Q_0, then positions at the ends of frames
-    error : estimate of || Q - Q_exact || / || Q - Q_0 ||, from the change by the last halving
+    error : estimate of || Q - Q_exact || / || Q - Q_0 ||, from the last halving of the step
     substeps : number of explicit steps of a frame
     """
 
@@ -365,7 +365,7 @@ def continuous(
 
 
 def _change(before: np.ndarray, after: np.ndarray) -> float:
-    """Relative change between two runs; inf if one of them is unstable."""
+    """Norm of the difference of two runs / norm of the motion in ``after``; inf if unstable."""
     if not max(np.abs(before).max(), np.abs(after).max()) < UNSTABLE:
         return float("inf")
     difference, moved = np.linalg.norm(after - before), np.linalg.norm(after - after[0])

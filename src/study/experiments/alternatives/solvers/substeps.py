@@ -1,9 +1,9 @@
 """Base class of methods that divide a frame into equal substeps.
 
-Fixed vertices and contacts are those of the ordinary step loop. The potential energy of all groups
-j with elements e, W(y) = sum_j 1/2 sum_e w_e |S_e y - p_e(y)|^2, has the gradient
-S^T W S y - S^T W p(y): the projection p is the nearest point of a manifold, so that the derivative
-of p is tangential and drops out (Bouaziz et al. 2014, sect. 3).
+Vertices are held, and contacts act at the end of a frame, as in the ordinary step loop. The
+potential energy of all groups j with elements e, W(y) = sum_j 1/2 sum_e w_e |S_e y - p_e(y)|^2, has
+the gradient S^T W S y - S^T W p(y): the projection p is the nearest point of a manifold, so that
+the derivative of p is tangential and drops out (Bouaziz et al. 2014, sect. 3).
 """
 
 from abc import abstractmethod
@@ -86,7 +86,7 @@ class Alternative(Stepper):
         self.substeps = substeps
         self.masses = scene.masses
         kernels = [group.local_kernel for group in scene.groups if group.local_kernel is not None]
-        # keep the kernels: the tables contain addresses of their memory
+        # keep the kernels: `self.tables` contains addresses of their memory
         self._kernels = local = LocalPass(kernels)
         self.tables = local.first, local.preparing, local.second
         self._prepare(scene)
@@ -168,7 +168,7 @@ def begin(y, v, acceleration, step, fixed, targets, before, s):
 
 @compiled(nogil=True)
 def end(y, before, step, v):
-    """Set velocities ``v``, from positions ``before`` and after (``y``) a substep of ``step`` s."""
+    """Set velocities ``v`` to (``y`` - ``before``) / ``step``; ``step`` is the duration in s."""
     for k in range(len(y)):
         v[k] = (y[k] - before[k]) / step
 
