@@ -117,14 +117,12 @@ def write_sheet(path: Path, wave: float = 0.0) -> None:
 
 
 def copy_repository(folder: Path) -> Checkout:
-    """Copy all that the workflow reads, but caches."""
-    ignored = shutil.ignore_patterns("__pycache__")
+    """Copy all that the workflow reads; the package with its compiled modules and their dates."""
     for part in PARTS:
         (folder / part).parent.mkdir(parents=True, exist_ok=True)
+        copy = shutil.copy2 if part == "src" else shutil.copyfile
         if (ROOT / part).is_dir():
-            shutil.copytree(
-                ROOT / part, folder / part, ignore=ignored, copy_function=shutil.copyfile
-            )
+            shutil.copytree(ROOT / part, folder / part, copy_function=copy)
         else:
-            shutil.copyfile(ROOT / part, folder / part)
+            copy(ROOT / part, folder / part)
     return Checkout(folder)

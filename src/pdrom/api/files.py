@@ -3,22 +3,41 @@
 import json
 import os
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import h5py
 import numpy as np
 
-from pdrom.api.arguments import file_path, require
 from pdrom.api.records import AnyRun, FullRun, ReducedRun, RequestedRun, full_run
 from pdrom.core import store
 from pdrom.core.errors import ConfigurationError, PdromError, StorageError
 from pdrom.core.provenance import made_by
-from pdrom.core.yamlfile import named, read_yaml, validate
+from pdrom.core.yamlfile import named, read_yaml, shown, validate
 from pdrom.model.mesh.config import GivenMesh, MeshFile, given_mesh
 from pdrom.model.mesh.types import store_mesh, stored_mesh
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.requested.run import Outcome, Request
 from pdrom.reduction.rerun import Rerun, displacement_norms
+
+T = TypeVar("T")
+
+
+def require(kind: type[T] | tuple[type[T], ...], value: Any, name: str, source: str) -> T:
+    """Return ``value`` if it is of the type ``kind``, else raise ConfigurationError.
+
+    The error names the argument (``name``) and tells what makes such a value (``source``).
+    """
+    if isinstance(value, kind):
+        return value
+    kinds = " or ".join(k.__name__ for k in (kind if isinstance(kind, tuple) else (kind,)))
+    raise ConfigurationError(f"{name} = {shown(value, 60)}: a {kinds} is required ({source})")
+
+
+def file_path(path: Any) -> Path:
+    """Return ``path`` as a `Path`; ConfigurationError if it cannot be one."""
+    if not isinstance(path, (str, os.PathLike)) or "\0" in str(path):
+        raise ConfigurationError(f"{shown(path, 60)}: the name of a file is required")
+    return Path(path)
 
 
 def load_scene(path: str | os.PathLike[str]) -> Scene:
@@ -221,7 +240,7 @@ def _reduced(scene: Scene, file: h5py.File) -> ReducedRun:
 
 
 def _scene(file: h5py.File, path: Path) -> Scene:
-    """Scene of the run in ``file`` at ``path``; its mesh is the stored one, else as configured."""
+    """Scene of the run in ``file`` at ``path``, with the stored mesh, else its configured mesh."""
     settings = json.loads(file.attrs["configuration"])
     # the pipeline stores the scene under the key "config", `save` and `run` under "scene"
     scene = validate(SceneConfig, settings.get("config") or settings["scene"], str(path))

@@ -5,7 +5,7 @@ from typing import get_args
 
 import numpy as np
 
-from pdrom.api.arguments import file_path, require
+from pdrom.api.files import file_path, require
 from pdrom.api.records import AnyRun, FullRun, ReducedRun, RequestedRun
 from pdrom.core.errors import SceneError
 from pdrom.core.store import require_own, require_place
@@ -108,7 +108,7 @@ def _alike(scene: Scene) -> SceneConfig:
 
 
 def _viewed(runs: list[AnyRun]) -> ViewedScene:
-    """Prepare ``runs`` of a scene; the first shown is full-order or, if none, a `RequestedRun`."""
+    """Prepare ``runs`` of a scene; the full-order run, or else a `RequestedRun`, is shown first."""
     full = [run.full if isinstance(run, ReducedRun) else run for run in runs]
     known: list[FullRun | RequestedRun] = [run for run in full if isinstance(run, FullRun)]
     first = [*known, *(run for run in runs if isinstance(run, RequestedRun))][0]

@@ -11,7 +11,7 @@ from typing import Any, overload
 
 import numpy as np
 
-from pdrom.api import arguments
+from pdrom.api import files
 from pdrom.api.records import FullRun, ReducedRun, RequestedRun, full_run
 from pdrom.core import config_file
 from pdrom.core.errors import ConfigurationError, SnapshotError, choices
@@ -63,9 +63,9 @@ def run(
     ConfigurationError, StorageError
         ``scene`` is no scene; ``out`` cannot be written, which is checked before the run.
     """
-    arguments.require(Scene, scene, "scene", source="build_scene and load_scene make one")
+    files.require(Scene, scene, "scene", source="build_scene and load_scene make one")
     if out is not None:
-        require_place(arguments.file_path(out))
+        require_place(files.file_path(out))
         require_own(out)
     count, plans = scene.config.frames, scene.config.reduce
     usual = min((count + 1) // 2, SNAPSHOTS)
@@ -105,8 +105,8 @@ def basis(full: FullRun, group: str, method: str | MethodSpec = "pod") -> Basis:
     ConfigurationError, SceneError, SnapshotError
         ``full`` is no run; the method or group is unknown; snapshots are too few or not finite.
     """
-    arguments.require(FullRun, full, "full", source=FULL_RUN)
-    chosen = full.scene.group(arguments.require(str, group, "group", source=GROUP))
+    files.require(FullRun, full, "full", source=FULL_RUN)
+    chosen = full.scene.group(files.require(str, group, "group", source=GROUP))
     spec = _method_spec(method)
     if group not in full.snapshots:
         raise SnapshotError(f"group '{group}': the run stored no snapshots of it")
@@ -182,14 +182,14 @@ def reduce(
     RankError
         The snapshots have fewer than r modes above round-off.
     """
-    arguments.require(FullRun, full, "full", source=FULL_RUN)
+    files.require(FullRun, full, "full", source=FULL_RUN)
     if error is not None:
         if group is not None:
             raise ConfigurationError("error: of the whole scene, without a group")
         return _within(full, error, scene or full.scene, on_frame)
     if scene is not None:
         raise ConfigurationError("scene: only together with an error")
-    group = arguments.require(str, group, "group", source=GROUP)
+    group = files.require(str, group, "group", source=GROUP)
     scene, spec = full.scene, _method_spec(method)
     size: Any = r  # the range of r is checked later, when the rank of the basis is known
     if isinstance(size, bool) or not isinstance(size, Integral):
@@ -234,7 +234,7 @@ def _method_spec(method: str | MethodSpec) -> MethodSpec:
 
 def _fitting_basis(made: Any, group: ConstraintGroup, spec: MethodSpec) -> Basis:
     """Return ``made`` if ``spec`` can use it as a basis of ``group``, else ConfigurationError."""
-    known = arguments.require(Basis, made, "basis_of_group", source="pdrom.api.basis makes one")
+    known = files.require(Basis, made, "basis_of_group", source="pdrom.api.basis makes one")
     found, needed = ((each.elements, each.rows_per_element) for each in (known, group))
     if found != needed:
         raise ConfigurationError(
@@ -254,12 +254,12 @@ def _fitting_basis(made: Any, group: ConstraintGroup, spec: MethodSpec) -> Basis
 
 
 def _within(full: FullRun, error: Wish, scene: Scene, on_frame: OnFrame) -> RequestedRun:
-    """Calibrate solvers on the motion of ``full``; run ``scene`` by the cheapest within ``error``.
+    """Calibrate solvers on ``full``'s motion; run ``scene`` by the cheapest that meets ``error``.
 
     The calibration uses the material, masses, time step and number of frames of ``scene``.
     """
     request = requested.read_request(error)
-    arguments.require(Scene, scene, "scene", source="load_scene makes one")
+    files.require(Scene, scene, "scene", source="load_scene makes one")
     training = requested.transferred(full.scene, scene)
     started = perf_counter()
     calibration = requested.calibrate(training, requested.ToleranceSettings(), request, on_frame)

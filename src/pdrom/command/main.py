@@ -1,6 +1,6 @@
 """``pdrom COMMAND ...``: the parser, messages and exit codes; each command is a module of its own.
 
-A command's module declares its arguments as a `Command`; running it imports all else.
+A command's module declares its arguments as a `Command`; other modules are imported as it runs.
 """
 
 import argparse

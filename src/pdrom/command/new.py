@@ -154,13 +154,13 @@ def _sides(mesh: "Mesh") -> dict[str, int]:
     for side in SIDES:
         try:
             found[side] = len(select_vertices(mesh, side))
-        except SceneError:  # raised for a mesh that is flat in this direction: it has no such side
+        except SceneError:  # the mesh is flat along this side's axis: it has no such side
             continue
     return found
 
 
 def _side(mesh: "Mesh", axis: int) -> str:
-    """YAML of pinned vertices: a side with at least `ENOUGH`, else the `ENOUGH` nearest the top."""
+    """YAML of vertices to pin: those of a side if at least `ENOUGH`, else `ENOUGH` at the top."""
     for side, count in _sides(mesh).items():
         if count >= ENOUGH:
             return side

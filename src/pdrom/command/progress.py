@@ -14,7 +14,7 @@ PAUSE = 2.0  # seconds between two lines of `LevelProgress` where stderr is no t
 
 
 class _Line:
-    """Progress of the run ``name`` on ``stream``; announces first if code must be compiled."""
+    """Progress of the run ``name`` on ``stream``; begins with a notice if code must be compiled."""
 
     def __init__(self, name: str, stream: TextIO | None = None) -> None:
         self._name, self._stream = name, stream or sys.stderr
@@ -53,7 +53,7 @@ class Progress(_Line):
         early = now - self._shown < EVERY if self._terminal else done % max(1, self._frames // 10)
         if early and done < self._frames:
             return
-        # time left by the later half of the computed frames, since early ones include compilation
+        # estimate the time left from the later half of the computed frames: early ones compile code
         half = done // 2
         left = (now - self._ends[half]) / (done - half) * (self._frames - done)
         full, ms = WIDTH * done // self._frames, 1e3 * float(report.seconds.sum())
@@ -74,7 +74,7 @@ class LevelProgress(_Line):
         self._end()
 
     def __call__(self, title: str) -> None:
-        """Show the solver ``title`` at intervals of at least `EVERY` s (no terminal: `PAUSE` s)."""
+        """Show the solver's ``title``, once per `EVERY` s at most (`PAUSE` s if no terminal)."""
         now = monotonic()
         if now - self._shown >= (EVERY if self._terminal else PAUSE):
             self._show(f"{self._name}: {title}, {now - self._began:.0f} s", now)

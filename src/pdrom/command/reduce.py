@@ -24,7 +24,7 @@ def _size(text: str) -> int:
 
 
 def perform(arguments: argparse.Namespace) -> Status:
-    """Run the scene with one group reduced, or within an error limit; print its error and time.
+    """Run the scene reduced in one group or within an error limit; print the run's error and time.
 
     With a group, the full-order run is computed first, unless a file of it is given.
     """
@@ -95,7 +95,7 @@ def _told(reduced: "ReducedRun") -> str:
 
 
 def _perform_request(arguments: argparse.Namespace) -> Status:
-    """Find the cheapest solver within the error limit on a training run; run the scene by it."""
+    """Find the cheapest solver within the error limit in a training run; run the scene with it."""
     from pdrom.api import FullRun, load, load_scene, reduce, save
     from pdrom.command.progress import LevelProgress
     from pdrom.core.errors import ConfigurationError, StorageError

@@ -15,7 +15,7 @@ import platform
 from collections.abc import Mapping
 from pathlib import Path
 
-# Prefixes of inherited variables to remove, of numerical libraries, Python, Matplotlib and TeX.
+# Name prefixes of environment variables to remove: numerical libraries, Python, Matplotlib, TeX.
 CLEARED = (
     "OPENBLAS_", "GOTO_", "BLIS_", "MKL_", "VECLIB_", "OMP_", "GOMP_", "KMP_",
     "NPY_", "NUMPY_", "SCIPY_", "NUMBA_", "NUMEXPR_", "PYTHON", "MPL", "MATPLOTLIB",
@@ -67,13 +67,13 @@ def settled(
     }
     if kernels:
         fixed["OPENBLAS_CORETYPE"] = kernels
-    if TARGET not in asked:  # if the user keeps TARGET, set no FEATURES either: they depend on it
+    if TARGET not in asked:  # FEATURES in ``target`` would not fit the user's TARGET
         fixed |= target
     return kept | {name: value for name, value in fixed.items() if name not in asked}
 
 
 def settle() -> None:
-    """Give this process and its child processes the `settled` environment, before NumPy loads."""
+    """Replace `os.environ`, which child processes inherit, by `settled`, before NumPy loads."""
     system, machine, features = platform.system(), platform.machine(), features_here()
     environment = settled(
         os.environ, core_type(system, machine, features), compiled_for(machine, features)

@@ -88,7 +88,7 @@ def _energy(scene: Scene, positions: np.ndarray, frame: int) -> float:
     kinetic = 0.5 * float(scene.masses @ np.einsum("ij,ij->i", v, v))
     unused, potential = np.zeros_like(q), 0.0
     for group in scene.groups:
-        group.begin_frame(q)  # computes the data that the group needs once per frame
+        group.begin_frame(q)  # computes data that are fixed during a frame, such as normals
         potential += group.accumulate(q, unused)
     return kinetic + potential + _force_potential(scene, q)
 

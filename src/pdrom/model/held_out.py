@@ -19,7 +19,7 @@ from pdrom.model.mesh.types import Length
 HeldOutMotion = Literal["heldout", "kick", "stiffness"]
 MOTIONS: tuple[HeldOutMotion, ...] = get_args(HeldOutMotion)
 FIRST = MOTIONS[0]
-PLAYBACK = "playback"  # name, in tables, of the recorded training motion used as a prediction
+PLAYBACK = "playback"  # method in tables: the recorded training motion as a guess of a held-out one
 FASTER = 0.75  # duration of handle motions in "kick", relative to the training motion
 # Motion -> degrees by which gravity turns towards an axis, and index of the axis in ``kick_axes``.
 TILTS = {"heldout": (-20.0, 0), "kick": (30.0, 0), "stiffness": (20.0, -1)}

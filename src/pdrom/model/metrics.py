@@ -4,7 +4,7 @@ import numpy as np
 
 
 def squared_norms(p: np.ndarray) -> np.ndarray:
-    """Return squared Frobenius norms (4,) of p (n frames, rows, 3): of all entries, x, y, z."""
+    """Return squared Frobenius norms (4,) of p (n frames, rows, 3): in total, and in x, y, z."""
     axes = np.einsum("nra,nra->a", p, p)
     return np.concatenate([[axes.sum()], axes])
 

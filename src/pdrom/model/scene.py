@@ -1,7 +1,7 @@
 """Scenes: a mesh and a list of effects, their typed configuration, and their step loop.
 
-Effects that prescribe contradictory positions raise an error; implausible ones are logged as
-warnings. Masses are lumped: one mass for all vertices, or masses of selected vertices."""
+Effects that prescribe contradictory positions raise an error; implausible effects are logged
+as warnings. Masses are lumped: all vertices have equal masses, or selected ones their own."""
 
 import logging
 from collections.abc import Sequence
@@ -82,7 +82,7 @@ MAX_VERTEX_FRAMES = 160_000_000
 class SceneConfig(ConfigModel):
     """Configuration of a scene (config/scenes/*.yaml). Units: seconds, metres, kilograms.
 
-    ``requested_error``, also written ``reduce.error``, is the tolerance of ``pdrom reduce``.
+    ``requested_error``, or key ``error`` below ``reduce``, is the tolerance of ``pdrom reduce``.
     """
 
     name: SceneName
@@ -186,7 +186,7 @@ class SceneConfig(ConfigModel):
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A scene bound to its mesh, with its effects as objects in one list for each role."""
+    """A scene on its mesh; effects are objects, in one list for each kind (groups, forces ...)."""
 
     config: SceneConfig
     mesh: Mesh
@@ -298,7 +298,7 @@ class Scene:
         log_obstructed(self)
 
     def log_contacts(self) -> None:
-        """Log the warnings of all contacts (`doubt`), for example: a contact moves the rest shape.
+        """Log a warning, from `Contact.doubt`, for each contact that does not suit the rest shape.
 
         Vertices that are held (fixed) in the first frame are ignored.
         """
@@ -343,7 +343,7 @@ class Scene:
     ) -> Stepper:
         """Return the step loop, with ``local_steps`` in place of the groups if given.
 
-        ``system`` replaces the scene's own; ``track_objective`` puts the objective into reports.
+        ``system`` replaces the global system; ``track_objective`` adds objectives to frame reports.
         """
         return Stepper(
             self.space(system or self.system),
@@ -365,7 +365,7 @@ class Scene:
 
 
 def _place(boundary: base.Boundary) -> base.EffectConfig:
-    """Configuration that sets the motion of ``boundary``: all but its vertices and last frame."""
+    """Configuration of ``boundary`` without vertices and last frame; equal ones move alike."""
     return boundary.config.model_copy(update={"select": None, "until": None})
 
 

@@ -112,7 +112,7 @@ def compute_basis(
     """
     _check(snapshots, row_mass, rows_per_element, spec)
     matrix = snapshots.reshape(len(snapshots), -1).T
-    scale = np.ones(3 * len(row_mass))  # square roots of the weights of the modes' inner product
+    scale = np.ones(3 * len(row_mass))  # square roots of the masses for mass weighting, else 1
     if spec.weighting == "mass":
         scale = np.repeat(np.sqrt(row_mass), 3)
     mean, error, shown = np.zeros(len(matrix)), roundoff, matrix
@@ -123,7 +123,7 @@ def compute_basis(
         # modes of round-off. Subtracting the first snapshot makes no such error.
         rounded = 0.5 * np.finfo(float).eps * matrix.shape[1] * float(np.linalg.norm(matrix))
         mean, error = matrix.mean(axis=1), max(roundoff, rounded)
-        # only with centring "affine" is an axis with constant snapshots inactive (``active`` below)
+        # with this centring an axis (x, y, z) with constant snapshots counts as inactive, see below
         shown = matrix - mean[:, None]
     elif spec.centring == "mean-in-modes":
         mean = matrix[:, 0].copy()
@@ -263,8 +263,8 @@ def fix_signs(u: np.ndarray) -> np.ndarray:
     return u * np.where(signs == 0.0, 1.0, signs)
 
 
-# `thin_qr` accepts Q_1 as orthonormal if |Q_1^T Q_1 - I| is at most this. Round-off alone gives
-# 1e-14 to 1e-13; an LU factor L with condition number 1e2 gives about 1e-12.
+# `thin_qr` accepts its factor Q_1 as orthonormal if |Q_1^T Q_1 - I| is at most this. Round-off
+# alone gives 1e-14 to 1e-13; if its matrix L has the condition number 1e2, it is about 1e-12.
 DEPARTURE = 1e-12
 
 

@@ -21,7 +21,7 @@ BLOCK = 32
 # a subspace model does not place vertices exactly on the surface.
 TOUCH = 1e-3
 
-# Names of the per-frame series of the full-order run (REFERENCE) and of other runs (DEVIATIONS).
+# Names of series over frames: of a full-order run; of another run, or its difference from it.
 REFERENCE = ("displacement", "step", "energy", "contact")
 DEVIATIONS = ("difference", "shape_difference", "step_difference", "energy", "contact")
 ERRORS = (
@@ -48,7 +48,7 @@ class Yardstick:
 
     @cached_property
     def scale(self) -> EnergyScale:
-        """Full-order energies that count as 0 (least potential of forces) and 1 (largest total)."""
+        """Energy scale: 0 for the full order's least potential of forces, 1 for its peak total."""
         return EnergyScale.of(self.scene, self.reference)
 
     @cached_property
@@ -79,11 +79,10 @@ class Yardstick:
     def deviations(self, outcome: Rerun) -> dict[str, np.ndarray]:
         """Deviations in each of the F' frames of the run ``outcome`` from the full-order run.
 
-        Returns
-        -------
-        ``difference``, ``shape_difference``, ``step_difference`` : (F',) m, norms of differences of
-        positions, shapes (without rigid motion), moves in a frame; ``energy`` : relative to `scale`
-        in every `STRIDE`-th frame, empty if round-off; ``contact`` : (F',), 1 if obstacle touched.
+        ``difference``, ``shape_difference`` (without rigid motion), ``step_difference`` (of changes
+        of the positions in a frame): (F',) m, norms of the differences of both runs. Two series are
+        of ``outcome`` alone: ``energy``, every `STRIDE`-th frame, scaled by `scale` (empty if the
+        full order's is round-off); ``contact`` (F',), 1 if a vertex touches an obstacle, else 0.
         """
         steps, shapes, contacts = [], [], []
         with np.errstate(over="ignore", invalid="ignore"):
@@ -133,7 +132,7 @@ def errors_within(
     if len(run["difference"]) < end:
         return dict.fromkeys(ERRORS)
     displacement, shape = reference["displacement"], run["shape_difference"]
-    drift, count = None, end // STRIDE + 1  # count: number of energies, the initial one first
+    drift, count = None, end // STRIDE + 1  # number of energies: initial, every STRIDE-th frame
     if count > 1 and len(reference["energy"]):
         drift = float(np.abs(run["energy"][:count] - reference["energy"][:count]).max())
     # first frame with contact of this run and of the full-order run; inf if there is no contact
@@ -143,7 +142,7 @@ def errors_within(
     )
 
     def over_extent(difference: np.ndarray) -> float | None:
-        """Root mean square of ``difference`` / ``extent_norm`` over ``end`` frames (none: None)."""
+        """RMS of ``difference`` / ``extent_norm`` in the first ``end`` frames; None if end = 0."""
         return float(np.sqrt(np.mean(np.square(difference[:end] / extent_norm)))) if end else None
 
     found = (

@@ -16,7 +16,7 @@ from pdrom.core.yamlfile import ConfigModel, read_yaml, shown, validate
 SELECTIONS = Registry(
     "selection",
     {
-        "greedy": "pdrom.reduction.sampling.greedy:Greedy",
+        "greedy": "pdrom.reduction.sampling.deim:Greedy",
         "pivoted-qr": "pdrom.reduction.sampling.qdeim:PivotedQR",
         "s-opt": "pdrom.reduction.sampling.s_opt:SOpt",
     },
@@ -133,7 +133,7 @@ class MethodSpec(BasisSpec):
 
     @property
     def per_axis(self) -> bool:
-        """Whether each of x, y, z has its own coefficients."""
+        """Whether x, y and z of the projections have separate coefficients of the modes."""
         if self.coefficients is not None:
             return self.coefficients == "per-axis"
         return self.rows == "joint" or self.separate_axes

@@ -45,7 +45,7 @@ class Rerun:
         return float(self.extent.max(initial=0.0))
 
     def row(self, displacement: np.ndarray) -> dict[str, Any]:
-        """Map column names of tables to results of the run; ``displacement`` as in `error`."""
+        """Map table columns to results; `error` describes the argument ``displacement`` (F,) m."""
         return {
             "frames": self.frames,
             "finite": self.finite,
@@ -55,9 +55,9 @@ class Rerun:
         }
 
     def error(self, displacement: np.ndarray) -> float | None:
-        """Error || Q_red - Q_fom || / || Q_fom - Q_0 ||; None if the run ended early.
+        """Error || Q - Q_fom || / || Q_fom - Q_0 || of positions Q; None if the run ended early.
 
-        ``displacement`` (F,) m is || Q_fom - Q_0 ||_F of the full-order run in each frame.
+        ``displacement`` (F,) m is || Q_fom - Q_0 ||_F in each full-order frame; Q_0: at the start.
         """
         if not self.finite or self.frames < len(displacement):
             return None

@@ -34,7 +34,7 @@ class Window(NamedTuple):
         return self.top - self.bottom
 
     def contains(self, flat: np.ndarray) -> np.ndarray:
-        """Return for each picture point of ``flat`` (n, 2) m whether it lies inside, (n,) bool."""
+        """Return whether the window contains each picture point of ``flat`` (n, 2) m, (n,) bool."""
         x, y = flat.T
         return (x >= self.left) & (x <= self.right) & (y >= self.bottom) & (y <= self.top)
 
@@ -82,7 +82,7 @@ def bounds(flat: np.ndarray, margin: float = 0.08) -> Window:
 
 
 def window_of(camera: Camera, clouds: Iterable[np.ndarray], margin: float = 0.08) -> Window:
-    """Window, with a margin as in `bounds`, of all points of ``clouds``, (n, 3) m each."""
+    """Window of all points in ``clouds`` (n, 3) m, widened by ``margin`` times its longer side."""
     return bounds(np.concatenate([camera.project(cloud) for cloud in clouds]), margin)
 
 

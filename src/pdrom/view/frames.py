@@ -25,7 +25,7 @@ INSTANTS = (0.25, 0.5, 0.75, 1.0)  # times of the pictures, as fractions of the 
 CAMERA = Camera(30.0, 20.0)
 NO_LIMIT = 100.0  # inches, limit of the picture's height: practically none
 NAME = "frame_{:05d}.vtu"
-SHOWN = 20  # runs with up to this many modes r are preferred in the picture
+SHOWN = 20  # the picture shows the run with most modes r up to this number, if there is one
 
 
 def write_frames(scene: ViewedScene, png: Path) -> None:
@@ -43,7 +43,7 @@ def shown_runs(scene: ViewedScene) -> list[ViewedRun]:
 
 
 def _draw(scene: ViewedScene) -> Figure:
-    """Draw one row per run; the grey outline in reduced rows is the full-order run."""
+    """Draw one row of pictures per run; a grey outline shows the full order in reduced runs."""
     # the scene and its obstacles are turned so that y points up
     turn, found = rotation_to(up_of(scene.effects)), obstacles(scene.positions, scene.effects)
     bodies = [replace(body, points=body.points @ turn) for body in found]

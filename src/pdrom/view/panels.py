@@ -15,7 +15,7 @@ from pdrom.view.camera import Camera, Window, bounds, window_of
 from pdrom.view.read import RerunInfo, rerun_positions
 from pdrom.view.style import FAILED
 
-SAME_SCALE = 1.25  # a run larger than the reference by more than this factor is drawn smaller
+SAME_SCALE = 1.25  # runs that would enlarge the reference run's picture by more are drawn smaller
 SLACK = 1.05  # a run drawn smaller by at most this factor gets no remark about its scale
 SHORTEST, TALLEST = 0.35, 1.5  # least and largest ratio of height to width of a panel
 
@@ -41,7 +41,7 @@ class RunPanel:
     obstacles: Sequence[Mesh] | None = None
 
     def zoomed(self, window: Window, camera: Camera) -> Window:
-        """Return ``window`` of ``camera``, enlarged with equal aspect ratio to contain the run."""
+        """Return ``window``, enlarged in both directions if ``camera`` sees the run exceed it."""
         flat = None if self.positions is None else camera.project(self.positions)
         if flat is None or window.contains(flat).all():
             return window
@@ -54,7 +54,7 @@ class RunPanel:
 def shared_window(
     camera: Camera, reference: np.ndarray, panels: list[RunPanel], margin: float = 0.1
 ) -> Window:
-    """Window of ``reference`` (N, 3) m and unfailed runs that widen it at most by `SAME_SCALE`."""
+    """Window for ``reference`` (N, 3) m and unfailed runs up to `SAME_SCALE` times as large."""
     base = window_of(camera, [reference], margin)
     size = SAME_SCALE * max(base.width, base.height)
     clouds = [reference]
@@ -92,7 +92,7 @@ def draw_run(ax: Axes, row: "Row", i: int) -> None:
         centre_note(ax, note, FAILED if panel.failure else "#666666")
         return
     shown = panel.zoomed(window, camera)
-    zoom = shown.width / window.width  # scale of ``window`` / scale at which the run is drawn
+    zoom = shown.width / window.width  # factor by which the run is drawn smaller to fit
     for body in panel.obstacles or ():
         look = {"colour": mesh_render.FLOOR, "wire": 0.05}
         mesh_render.draw_surface(ax, body.points, body, camera, **look).set_zorder(0.1)

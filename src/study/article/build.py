@@ -35,7 +35,7 @@ from study.tables.kit.declaration import QUANTITIES, TOLERANCES
 
 # Bytes: larger pictures are compressed with losses; larger PDFs are not copied to the web pages.
 LOSSLESS, COPIED = 150_000, 200_000
-MANY = 4  # figures with the same type of options are related if it has at least so many options
+MANY = 4  # figures are related (`_kin`) if their options have one type with at least this many keys
 
 
 def shown_figure(
@@ -50,7 +50,7 @@ def shown_figure(
     """
     attribute, caption, _ = node["c"]
     picture = attributes("", "", width=str(size[0]), height=str(size[1]), loading="lazy")
-    # merged into one node: pandoc hides a caption whose nodes are those of the alternative text
+    # a single text node: pandoc would hide a caption with the same nodes as the alternative text
     alternative = words(plain(caption[1]).strip())
     image = {"t": "Image", "c": [picture, alternative, [f"figures/{name}.webp", ""]]}
     made = {"t": "RawInline", "c": ["html", _origin(name, with_pdf, pages)]}
@@ -79,7 +79,7 @@ def _origin(name: str, with_pdf: bool, pages: Mapping[str, str]) -> str:
 
 
 def _kin(name: str, pages: Mapping[str, str]) -> list[str]:
-    """Names of figures in ``pages`` related to figure ``name``: of the same form, other scenes.
+    """Names of figures in ``pages`` that show the same as figure ``name`` for other scenes.
 
     Two figures are related if their options have the same type and this type at least `MANY` keys,
     or if the name of one figure begins with the name of the other.
@@ -311,7 +311,7 @@ def write_article(
 def _write_figures(
     figures: list[File], pictures: list[File], outputs: Mapping[str, str]
 ) -> dict[str, tuple[tuple[int, int], bool]]:
-    """Write figures as WebP, small PDFs too; return name -> (size in pixels, whether with PDF)."""
+    """Write WebP pictures, and PDFs if small; return name -> (size in pixels, PDF written?)."""
     folder = Path(outputs["main"]).parent / "figures"
     png = {picture["name"]: Path(picture.path) for picture in pictures}
     made = {}

@@ -44,8 +44,8 @@ REPLACED = r"""
 def prepared(source: str, document: str, origins: Mapping[str, Any], facts: Facts) -> str:
     """Return the ``source`` of a ``document`` for pandoc, with numbers as links to tables.
 
-    ``origins`` is the content of numbers.json: for each number the table cells, for each document
-    the decisions whether its ``\\known`` sentences are shown. ``facts`` has the captions.
+    ``origins`` is the content of numbers.json: for each number its table cells, for each document
+    which of its ``\\known`` and ``\\row`` blocks are shown. ``facts`` has the figures' captions.
     """
     preamble, begin, text = source.partition(r"\begin{document}")
     left_out = rf"\emph{{[{note(facts.part, facts.full_study)}]}}"
@@ -73,7 +73,7 @@ def _title(preamble: str) -> str:
 
 
 def _decided(source: str, known: Sequence[str], left_out: str) -> str:
-    r"""Show, drop or replace by ``left_out`` ``\known`` and ``\row`` blocks; ``known`` decides."""
+    r"""Keep, drop or replace by ``left_out`` each block ``\known`` or ``\row``, by ``known``."""
     pieces, start = [], 0
     for sentence, decision in zip(sentences(source), known, strict=True):
         shown = {SHOWN: sentence.text, NOTED: left_out}.get(decision, "")
@@ -126,7 +126,7 @@ def _agreeing(table: pd.DataFrame, header: Sequence[str], cells: Sequence[str]) 
 
 
 def _linked_cell(cell: str, key: str) -> str:
-    """Return ``cell`` with its number, the whole cell or a number at its end, linked to ``key``."""
+    """Return ``cell``; its number (all of the cell or its end) links to the table rows ``key``."""
     if _NUMBER.fullmatch(cell):
         return _link(key, cell)
     return _TAIL.sub(lambda found: found[1] + _link(key, found[2]) + found[3], cell)

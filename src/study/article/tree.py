@@ -24,7 +24,7 @@ def attributes(identifier: str = "", classes: str = "", **keys: str) -> list[Any
 def boxed(
     kind: str, content: list[Node], identifier: str = "", classes: str = "", **keys: str
 ) -> Node:
-    """Return a node of the ``kind`` "Span" or "Div" around ``content``, with `attributes`."""
+    """Return a "Span" or "Div" (``kind``) around ``content``; other arguments: see `attributes`."""
     return {"t": kind, "c": [attributes(identifier, classes, **keys), content]}
 
 
@@ -110,7 +110,7 @@ class Labels:
         return self.note(label, self.prefix + ".".join(parts))
 
     def note(self, label: str, number: str) -> str:
-        """Store ``number`` and page under ``label``, unless this is empty; return ``number``."""
+        """Store ``number`` and this page under a ``label`` that is not empty; return ``number``."""
         if label:
             self.numbers[label] = (number, self.page)
         return number

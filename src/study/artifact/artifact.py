@@ -76,7 +76,7 @@ class Artifact:
 
     @cached_property
     def types(self) -> dict[str, TypeAdapter[Any]]:
-        """Mapping of each parameter for a setting to the Pydantic adapter that validates it."""
+        """Mapping: parameter of the function for a setting -> Pydantic adapter for its value."""
         hints = get_type_hints(self.function, include_extras=True)
         settings = [name for name, read in self.reads.items() if isinstance(read, SettingRead)]
         return {name: TypeAdapter(hints[name]) for name in settings}
@@ -92,7 +92,7 @@ class Artifact:
         return {name: self.types[name].validate_python(value) for name, value in values.items()}
 
     def plain(self, settings: Mapping[str, Any]) -> dict[str, Any]:
-        """Convert ``settings`` to JSON data; fields that the parameters' types lack are dropped."""
+        """Convert ``settings`` to JSON data, without fields that their parameter's type lacks."""
         return {k: self.types[k].dump_python(v, mode="json") for k, v in settings.items()}
 
     def perform(
@@ -126,7 +126,7 @@ def make(address: str, code: str, labels: Labels, **job: Mapping[str, Any]) -> N
 
 
 def declare(made: A, *parameters: str) -> A:
-    """Return artifact ``made``; TypeError if its function cannot take ``reads``, ``parameters``."""
+    """Return ``made``; TypeError unless its function takes its inputs and output ``parameters``."""
     try:
         inspect.signature(made.function).bind(**made.reads, **dict.fromkeys(parameters))
     except TypeError as error:

@@ -17,6 +17,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from io import TextIOWrapper
 from pathlib import Path
+from typing import TextIO
 
 from threadpoolctl import threadpool_limits
 
@@ -94,15 +95,15 @@ def job_log(path: str) -> Iterator[logging.Logger]:
 
 
 @contextmanager
-def planning_log(quiet: bool) -> Iterator[None]:
-    """Show warnings of pdrom and study on stderr, or suppress them if ``quiet``.
+def warnings_to(stream: TextIO | None, form: str = "pdrom: warning: %(message)s") -> Iterator[None]:
+    """Write warnings of pdrom and study in ``form`` to ``stream``; suppress them if that is None.
 
-    Each job makes the plan again in its own process, and is quiet: the main process has shown the
-    warnings already.
+    Each job makes the plan again in its own process and suppresses them: the main process has shown
+    them already.
     """
-    handler = logging.NullHandler() if quiet else logging.StreamHandler()
+    handler = logging.NullHandler() if stream is None else logging.StreamHandler(stream)
     handler.setLevel(logging.WARNING)
-    handler.setFormatter(logging.Formatter("pdrom: warning: %(message)s"))
+    handler.setFormatter(logging.Formatter(form))
     loggers = [logging.getLogger(name) for name in PACKAGES]
     for logger in loggers:
         logger.addHandler(handler)

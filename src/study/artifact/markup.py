@@ -46,7 +46,7 @@ def to_plain(text: str) -> str:
 
 
 def to_rst(text: str) -> str:
-    """Convert mark-up to one line of reStructuredText.
+    """Convert ``text`` (mark-up of titles and captions) to one line of reStructuredText.
 
     Every punctuation character gets a backslash, so that none has a special meaning.
     """

@@ -67,7 +67,7 @@ class Place:
         return str(sources.file(self, labels))
 
     def content(self, paths: Any) -> "File":
-        """Return the path ``paths`` as the `File` that the function of an artifact receives."""
+        """Return the `File` at the path ``paths``, as an artifact's function receives its input."""
         return self.file(str(paths))
 
     @cached_property

@@ -23,7 +23,7 @@ Sources = Any
 
 @dataclass(frozen=True)
 class Every:
-    """All files of the study whose paths fit ``place`` and the scene, group ... of the job."""
+    """All files of the study whose paths fit ``place`` and the job's labels (scene, group ...)."""
 
     place: Place
 
@@ -47,7 +47,7 @@ class EachOf(Every):
 
 @dataclass(frozen=True)
 class TableOf:
-    """Table ``name`` of the study, read as a data frame."""
+    """Declared input of an artifact: table ``name`` of the study, received as a data frame."""
 
     name: str
 
@@ -87,7 +87,7 @@ class ProjectFiles(EditedFiles):
 
 @dataclass(frozen=True)
 class Recorded(EditedFiles):
-    """File `RECORD` with recorded rows of table ``name``; none if setting ``recorded`` is off."""
+    """File `RECORD` with stored rows of table ``name``; no file if setting ``recorded`` is off."""
 
     name: str
 

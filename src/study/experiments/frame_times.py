@@ -26,10 +26,9 @@ from pdrom.reduction.subspace.model import load_models
 from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import EachOf, Settings
-from study.experiments.kit.base import Modes, OfScene, PositionBasis, Solver, experiment
+from study.experiments.kit import base as kit
 from study.experiments.kit.costs import variant
 from study.experiments.kit.measurement import Processes, Variant, in_processes
-from study.experiments.kit.runfiles import load_reduction
 
 FULL, CONTROL, REDUCED = "full", "control", "reduced"
 COLUMNS = [
@@ -39,33 +38,33 @@ COLUMNS = [
 SECONDS_COLUMNS = ["scene", "group", "method", "r", "reduction_s"]
 
 
-class SubspaceCase(OfScene):
+class SubspaceCase(kit.OfScene):
     """A model in a position subspace whose speed-up the manuscript cites."""
 
     method: str
-    position_basis: PositionBasis = "pod"
-    k: Modes
+    position_basis: kit.PositionBasis = "pod"
+    k: kit.Modes
 
 
-class ProjectionCase(OfScene):
+class ProjectionCase(kit.OfScene):
     """Reduction of a group's projections (not of positions) whose speed-up the manuscript cites."""
 
     group: str
     method: str
-    r: Modes
+    r: kit.Modes
 
 
 class FrameTimes(Processes):
     """Section ``frame_times`` of the configuration: reductions whose speed-up the manuscript cites.
 
-    Whatever is listed, full-order runs of all scenes and all models of large scenes are timed, too.
+    Also timed: the full-order run of each scene, all models of scenes in section ``online``.
     """
 
     subspaces: tuple[SubspaceCase, ...] = ()
     projections: tuple[ProjectionCase, ...] = ()
 
 
-class NamedScene(OfScene):
+class NamedScene(kit.OfScene):
     """A scene and its name, which the paths of its files contain."""
 
     config: SceneConfig
@@ -80,7 +79,7 @@ class Options(ConfigModel):
     subspace_cases: tuple[SubspaceCase, ...]
     projection_cases: tuple[ProjectionCase, ...]
     projection_methods: dict[str, MethodSpec]
-    solver: Solver
+    solver: kit.Solver
 
 
 @dataclass(frozen=True)
@@ -113,7 +112,7 @@ class TimedScene:
             yield variant(scene, system, scene.groups, frames, {**common, "role": role})
         reduced: dict[str, Any] = {**common, "role": REDUCED}
         for own, spec, basis, sampling in self.projections:
-            reduction = load_reduction(load_basis(basis), sampling, spec, r=own.r)
+            reduction = kit.load_reduction(load_basis(basis), sampling, spec, r=own.r)
             step = ReducedLocalStep(scene.group(own.group), reduction)
             steps = replace_group(scene, own.group, step)
             labels = {**reduced, **own.model_dump(), "position_basis": "full"}
@@ -127,7 +126,7 @@ class TimedScene:
                     yield Variant(labels, *model.loop(scene), frames, output=model.output())
 
 
-@experiment(
+@kit.experiment(
     "Times of frames in several processes",
     reads={
         "meshes": EachOf(paths.MESH, "timed_scenes"),

@@ -26,7 +26,6 @@ from pdrom.reduction.subspace.model import load_models
 from study.artifact import paths
 from study.artifact.reads import Every, Setting
 from study.experiments.kit import base as kit
-from study.experiments.kit import runfiles
 from study.experiments.kit.base import experiment
 
 log = logging.getLogger(__name__)
@@ -48,7 +47,7 @@ class IterationCounts(ConfigModel):
 
 
 class IterationSweep(IterationCounts):
-    """Section ``iterations`` of the configuration: counts, and limits of the converged run.
+    """Section ``iterations`` of the configuration: iteration counts, limits of the converged run.
 
     In the converged run, a frame ends when one more iteration would move no vertex by more than
     ``tolerance`` times the mesh's longest side, or after ``limit`` evaluations of its objective.
@@ -109,13 +108,11 @@ def iterations(
         if (count, window) != (scene.config.iterations, scene.config.anderson_window):
             loop = stepper_of(scene, system, count, window=window)
             reached = kit.followed(loop, scene.initial_state(), frames)
-        converged = runfiles.run_error(reached, limit) if best.converged else None
-        rows.append(
-            (name, count, window, frames, converged, runfiles.run_error(reached, own), None)
-        )
+        converged = kit.run_error(reached, limit) if best.converged else None
+        rows.append((name, count, window, frames, converged, kit.run_error(reached, own), None))
     residual = max(best.changes) / scene.mesh.extent
     converged = 0.0 if best.converged else None
-    rows.append((name, None, None, frames, converged, runfiles.run_error(limit, own), residual))
+    rows.append((name, None, None, frames, converged, kit.run_error(limit, own), residual))
     table = pd.DataFrame(rows, columns=COLUMNS).astype({"iterations": "Int64", "window": "Int64"})
     write_table(table, files["out"].path)
     inside = []
@@ -126,13 +123,13 @@ def iterations(
                 run = file[f"models/{basis}_k{k:03d}_{method}/train/coordinates"][: len(limit)]
                 error = None
                 if best.converged and len(run) == len(limit):
-                    error = runfiles.run_error(np.stack([model.positions(z) for z in run]), limit)
+                    error = kit.run_error(np.stack([model.positions(z) for z in run]), limit)
                 inside.append((name, basis, k, method, error))
     write_table(pd.DataFrame(inside, columns=MODELS), files["models"].path)
 
 
 def accelerated(counts: list[int], window: int) -> list[tuple[int, int]]:
-    """Pairs (K, window): all ``counts`` without acceleration (0), then K > 2 with a ``window``."""
+    """Pairs (iterations, Anderson window): all ``counts`` with 0, those over 2 with ``window``."""
     plain = [(count, 0) for count in counts]
     return plain + [(count, window) for count in counts if window and count > 2]
 
@@ -145,8 +142,8 @@ def stepper_of(scene: Scene, system: GlobalSystem, iterations: int, window: int)
 
 
 MEMORY = 8  # number of steps that L-BFGS stores
-SUFFICIENT = 1e-4  # Armijo's constant: a step must lower the objective by this x slope x length
-SHORTEST = 1e-4  # least fraction of the L-BFGS step to try; then a local/global iteration is made
+SUFFICIENT = 1e-4  # Armijo's constant: least ratio of the objective's decrease to -slope x step
+SHORTEST = 1e-4  # least fraction of a step to try; then a local/global iteration replaces the step
 
 Evaluate = Callable[[np.ndarray], tuple[float, np.ndarray]]
 
@@ -201,7 +198,7 @@ def minimise(
         after = target - trial
         moved, change = trial - y, d - after
         both = matrix @ np.hstack([moved, change])
-        a_moved, a_change = both[:, :3].copy(), both[:, 3:].copy()  # contiguous copies: faster
+        a_moved, a_change = both[:, :3].copy(), both[:, 3:].copy()  # faster than strided views
         curvature = float(np.vdot(moved, a_change))
         if curvature > 0.0:
             pairs = [*pairs, _Pair(moved, change, a_moved, a_change, curvature)][-MEMORY:]

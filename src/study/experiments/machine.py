@@ -36,9 +36,9 @@ def machine(out: File) -> None:
 
 
 def units() -> Units:
-    """Measure the units of time of this machine, each as the minimum over some repeats."""
+    """Time the three benchmark loops (`Units`) on this machine, each as the least of repeats."""
     numbers = np.ones(MEMORY_BYTES // 8)
-    # pairs: work in units of 1e9; function of n that does 1/n of this work (reading: all of it)
+    # (billions of operations or bytes, function that does 1/``share`` of them; `_read` does all)
     trials: list[tuple[float, Callable[[int], object]]] = [
         (1e-9 * SCALAR_STEPS, lambda share: _chain(SCALAR_STEPS // share)),
         (

@@ -34,7 +34,6 @@ from pdrom.reduction.sampling.local_step import rerun_reduced
 from study.artifact import paths
 from study.artifact.reads import Settings
 from study.experiments.kit import base as kit
-from study.experiments.kit import runfiles
 from study.experiments.kit.base import experiment
 
 Varied = Literal["start", "training", "motions"]
@@ -53,7 +52,7 @@ NOISE_COLUMNS = [
 ]  # fmt: skip
 ALL, PLANE, VERTEX = "all", "plane", "vertex"
 Methods = Mapping[str, MethodSpec]
-Runs = list[tuple[dict[str, Any], Rerun | None]]  # pairs (table row, run) of runs from one start
+Runs = list[tuple[dict[str, Any], Rerun | None]]  # pairs (table row, run); equal initial positions
 Rungs = Annotated[tuple[MethodSpec, ...], Field(min_length=1)]
 
 
@@ -92,7 +91,7 @@ class ReducedRuns:
         return displacement_norms(self.reference)
 
     def until_the_end(self) -> "ReducedRuns":
-        """Return a copy whose runs have only the frames that are compared, but at least two."""
+        """Return a copy with at most max(2, `end`) frames of the scene and of the reference run."""
         frames = min(self.scene.config.frames, max(2, self.end))
         scene = self.scene.changed(frames=frames)
         return replace(self, scene=scene, reference=self.reference[: frames + 1])
@@ -128,7 +127,7 @@ class ReducedRuns:
         """Return rows of all repetitions of ``method``, at each of ``sizes`` up to the rank.
 
         ``varied`` tells if initial positions ("start") or training snapshots ("training") are drawn
-        at random. Errors are over the frames before ``end``, inf for a run that stopped earlier.
+        at random. Errors cover the frames before attribute `end`; inf for a run that ended earlier.
         """
         rows, made, offset = [], {}, None
         if varied == "start":
@@ -148,10 +147,10 @@ class ReducedRuns:
     def on_motions(
         self, method: MethodSpec, sizes: Sequence[int], counts: Sequence[int]
     ) -> Iterator[dict[str, Any]]:
-        """Yield a row for each number of training motions in ``counts``, size and held-out motion.
+        """Yield a row per number of training motions (in ``counts``), size r and held-out motion.
 
-        The first training motion is the scene's own, further ones are variants of it drawn by
-        seeds. Of each of n training motions, every n-th training snapshot is used. Errors are over
+        The first training motion is the scene's own, further ones are random variants. Of
+        each of n training motions, every n-th training snapshot is used. Errors are over
         the frames before frame ``self.end``, inf for a run that stopped earlier.
         """
         config, mesh = self.scene.config, self.scene.mesh
@@ -192,7 +191,7 @@ def recorded(
 
 
 def drawn(data: sets.SnapshotSet, seed: int) -> np.ndarray:
-    """Draw n from all snapshots of ``data``, of which n are for training; result: (n, e p, 3)."""
+    """Draw as many of all snapshots of ``data`` as are for training, n; result: (n, e p, 3)."""
     frames = np.concatenate([data.frames["train"], data.frames["test"]])
     chosen = np.random.default_rng(seed).choice(len(frames), len(data.train), replace=False)
     chosen = chosen[np.argsort(frames[chosen])]
@@ -214,7 +213,7 @@ class Cell(ConfigModel):
 
 
 class Cells(Cell):
-    """Repeated runs: every method at every size, for each reduced group of each of ``scenes``."""
+    """Runs to repeat: every method at every size, for each reduced group of each of ``scenes``."""
 
     scenes: Annotated[tuple[SceneName, ...], Field(min_length=1)]
     methods: Annotated[tuple[str, ...], Field(min_length=1)]
@@ -234,12 +233,12 @@ class Repeated(Cell):
 
 
 class Ladder(Repetitions):
-    """Methods ("rungs") that differ in single choices, and four kinds of methods (``square``).
+    """Methods ("rungs") that differ in single choices; combinations of two choices (``square``).
 
     r : basis size of all rungs (the numerical rank if that is smaller)
     signs : number of repetitions of the first rung with other signs of the singular vectors
     repeated : scenes whose runs are repeated with other training frames
-    up : methods from the published to the sound one
+    up : methods, the published one first, each with one more change; the last is called sound
     down : methods that differ from the sound one in one choice each
     square : methods with separate or with shared coefficients, which sample single rows or whole
         elements, each at all ``sizes``; p single rows replace an element of p rows, so that numbers
@@ -257,7 +256,7 @@ class Ladder(Repetitions):
     def rungs(self, p: int) -> list[tuple[str, MethodSpec, int | None, int]]:
         """List all runs as (setting; method; seed for the modes' signs or None; basis size r).
 
-        The setting asks for the run: "up", "down", "signs" or "square". ``p``: rows of an element.
+        A setting is "up", "down", "signs" or "square", see `Ladder`. Elements have ``p`` rows.
         """
         rows: list[tuple[str, MethodSpec, int | None, int]] = []
         rows += [("up", method, None, self.r) for method in self.up]
@@ -273,7 +272,7 @@ class Ladder(Repetitions):
 
 
 class LadderSection(Ladder):
-    """Section ``ladder`` of the configuration; all methods are run for all groups of ``scenes``."""
+    """Section ``ladder``: all its methods are run for each reduced group of each of ``scenes``."""
 
     scenes: tuple[str, ...] = ()
 
@@ -302,7 +301,7 @@ class Noise(NoiseRuns):
 
 
 class Options(ConfigModel):
-    """Settings for one scene and group; ``own_ladder`` or ``own_noise``: None for no such runs."""
+    """Settings for a scene and group; if ``own_ladder`` or ``own_noise`` is None: no such runs."""
 
     scene: SceneConfig
     repetitions: Repetitions
@@ -331,9 +330,9 @@ class Options(ConfigModel):
     },
 )
 def repetitions(settings: Options, **files: paths.File) -> None:
-    """Run repetitions, a `Ladder` of methods, and reductions with bases made of rounding errors.
+    """Make repeated runs, runs by a list of methods, and runs with bases of rounding errors only.
 
-    All runs are of one scene and group. The table of a kind of run that is not requested is empty.
+    All reduce one group of one scene. A table is empty if ``settings`` ask for no runs of its kind.
     """
     labels = files["out"].labels
     runs = ReducedRuns(
@@ -369,7 +368,7 @@ def repetitions(settings: Options, **files: paths.File) -> None:
 
 
 def _ladder(runs: ReducedRuns, short: ReducedRuns, ladder: Ladder) -> Iterator[dict[str, Any]]:
-    """Yield a row per run of ``ladder``; its repetitions use ``short``, which has fewer frames."""
+    """Yield rows for runs of ``ladder``; ``short`` runs methods with other training frames."""
     data = runs.data
     for direction, method, seed, r in ladder.rungs(data.rows_per_element):
         rung = method.title if seed is None else f"signs {seed}"
@@ -405,13 +404,13 @@ def _ladder(runs: ReducedRuns, short: ReducedRuns, ladder: Ladder) -> Iterator[d
 def noisy_runs(
     scene: Scene, group: str, asked: NoiseRuns, methods: Methods, limit: float, file: h5py.File
 ) -> list[dict[str, Any]]:
-    """Run a scene from perturbed starts, and reduced by bases made of those runs' rounding errors.
+    """Run a scene from perturbed starts, in full order and with bases of these runs' round-off.
 
-    Returns the rows of all runs with the ``group`` reduced by each of ``methods``. For each of the
-    `kinds` of perturbed start, ``file`` gets the runs of the first start with `irregular` outcomes
-    (if there is none: of the first start). A size r above the rank is not run: its row has no
-    results, and the attribute ``marked`` of its HDF5 group is True. A run ends as a blow-up if its
-    bounding box is longer than ``limit`` times that of the rest shape.
+    Returns a row for each run with the ``group`` reduced by one of ``methods``. For each of the
+    `kinds` of perturbed start, ``file`` gets the reduced runs of one start, an HDF5 group each: of
+    the first start at which only some runs of a method blow up (`irregular`), else of the first.
+    No run has a size r above the rank: its row has no results and its HDF5 group ``marked`` = True.
+    A run ends as a blow-up if its bounding box is longer than ``limit`` times the rest shape's.
     """
     rows = []
     for axes in kinds(scene):
@@ -426,7 +425,7 @@ def noisy_runs(
             store = file.create_group(f"{axes}/{row['method']}/r{row['r']:04d}")
             store.attrs.update(r=row["r"], marked=outcome is None)
             if outcome is not None:
-                runfiles.store_end(store, outcome)
+                kit.store_end(store, outcome)
         log.info("%s: %d starts", axes, asked.repetitions)
     return rows
 
@@ -452,8 +451,8 @@ def kinds(scene: Scene) -> tuple[str, ...]:
 def roundoff_field(scene: Scene, axes: str, size: float, seed: int) -> np.ndarray:
     """Random displacement (N, 3) m; ``axes`` is the kind of perturbed start, one of `kinds`.
 
-    A vertex moves by ``size`` times the longest side of the bounding box, before displacements that
-    the kind does not allow are removed. ``seed`` draws directions and, for `VERTEX`, the vertex.
+    Every vertex moves by ``size`` times the mesh's longest side, before displacements that the kind
+    does not allow are removed. ``seed`` draws directions and, for kind `VERTEX`, the vertex.
     """
     field = kit.perturbation_field(scene, size, seed)
     if axes != ALL:
@@ -473,7 +472,7 @@ def _noisy(
     The run is None at a size above the rank. The reductions are trained on projections of the
     full-order run from this start, even if these are rounding errors: no mode is cut off. Where a
     method has a system of equations for each axis, an axis in which nothing moves has one, too, as
-    published; elsewhere in this study, such an axis has none.
+    published; in all other runs of the study, such an axis has none.
     """
     group, plan, frames = scene.group(name), scene.config.reduce[name], scene.config.frames
     reference, projections = recorded(scene, name, start)

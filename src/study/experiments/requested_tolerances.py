@@ -40,7 +40,7 @@ class RequestedRuns(run.ToleranceSettings):
 
 
 class RequestedTolerances(RequestedRuns):
-    """Section ``requested_tolerances``; no ``scenes`` means all of the study and of ``online``."""
+    """Section ``requested_tolerances``; empty ``scenes``: those of the study and of ``online``."""
 
     scenes: tuple[str, ...] = ()
 
@@ -81,10 +81,10 @@ def requested_tolerances(
 def _rows(
     scene: Scene, recorded: np.ndarray, own: run.Calibration, section: RequestedRuns
 ) -> Iterator[dict[str, Any]]:
-    """Yield a row per tolerance; ``recorded`` (F + 1, N, 3) m is the run of the training motion.
+    """Yield a table row for each requested tolerance, for ``scene`` with a held-out motion.
 
-    Errors are those against a run of ``scene`` with converged frames or, if a frame does not
-    converge, with a large, fixed number of iterations (whose own error is ``reference_error``).
+    Errors are against a run with converged frames or, if a frame does not converge, with a large,
+    fixed number of iterations. ``recorded`` (F + 1, N, 3) m is the run of the training motion.
     """
     frames = scene.config.frames
     motion = Motion(scene, min(section.errors) / section.factor, "position")
@@ -123,7 +123,7 @@ def _rows(
 
 
 def _error(true: np.ndarray, reached: np.ndarray, end: int, quantity: Quantity) -> float | None:
-    """Error of ``reached`` against ``true`` (F + 1, N, 3) m in ``end`` frames; None if end = 0."""
+    """Error of ``reached`` against ``true`` (F + 1, N, 3) m to frame ``end``; None if end = 0."""
     if not end:
         return None
     return float(levels.relative_errors(reached[1:] - true[1:], true, quantity)[end - 1])

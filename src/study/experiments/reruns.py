@@ -29,7 +29,6 @@ from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, Setting, Settings
 from study.experiments.kit import base as kit
-from study.experiments.kit import runfiles
 from study.experiments.kit.base import experiment
 
 log = logging.getLogger(__name__)
@@ -89,7 +88,7 @@ class Options(ConfigModel):
     },
 )
 def reruns(motions: list[File], settings: Options, **files: File) -> None:
-    """Sample the group, then run training and held-out motions with reductions of every size r.
+    """Sample a constraint group; run training and held-out motions with it reduced to every size r.
 
     One job does the sampling and the runs, as sampling takes less time than starting a process.
     """
@@ -130,7 +129,7 @@ def _runs(
             log.warning("r = %d exceeds the numerical rank %d: not run", r, basis.rank)
             yield {**labels, "r": r, "frames": 0}
             continue
-        reduction = runfiles.load_reduction(basis, sampling.path, settings.method, r=r)
+        reduction = kit.load_reduction(basis, sampling.path, settings.method, r=r)
         outcome = rerun_reduced(
             scene, labels["group"], reduction, yardstick.reference, settings.blowup_extent, system
         )
@@ -138,7 +137,7 @@ def _runs(
         error = outcome.difference / np.sqrt(np.mean(yardstick.displacement**2))
         for name, values in {**apart, "error": error, "extent": outcome.extent}.items():
             store[name] = values
-        runfiles.store_end(store, outcome, with_positions=file.name == "/")
+        kit.store_end(store, outcome, with_positions=file.name == "/")
         store.attrs["finite"] = outcome.finite
         measured = {"energy_ratio": largest(apart["energy"]), "gain": reduction.gain}
         yield {**labels, "r": r, **outcome.row(yardstick.displacement), **measured}
@@ -182,7 +181,7 @@ SHORT_COLUMNS = [
     "scene", "method", "r", "h", "stiffness_ratio", "finite", "blowup_frame", "max_extent",
     "energy_ratio", "gain", "group", "position_basis", "k", "frames", "relative_error",
 ]  # fmt: skip
-Local = list[tuple[dict[str, Any], Reduction | None]]  # pairs (columns that name a run, reduction)
+Local = list[tuple[dict[str, Any], Reduction | None]]  # pairs (row labels, reduction or None)
 Models = list[tuple[dict[str, Any], SubspaceModel]]
 
 
@@ -229,7 +228,7 @@ class Stability(ShortRuns):
 
     @property
     def left(self) -> float:
-        """Value of `departure`, which the configuration calls ``left``."""
+        """Attribute for the key ``left`` of the configuration, which is stored as `departure`."""
         return self.departure
 
 
@@ -258,16 +257,16 @@ def stability(
     out: File,
     **files: list[File],
 ) -> None:
-    """Run full order, reductions, subspace models of largest k; vary time step, then stiffness."""
+    """Make full-order and reduced runs with each time step, then with each stiffness of `short`."""
     scene = kit.scene_of(config, mesh)
     local: Local = []
     for file in files["samplings"]:
         spec = methods[file["method"]]
-        basis = load_basis(runfiles.basis_of(file, spec, files["bases"]).path)
+        basis = load_basis(kit.basis_of(file, spec, files["bases"]).path)
         for r in kit.resolve_ranks(short.ranks, basis.rank):
             labels = {"group": file["group"], "method": file["method"], "r": r}
             known = r <= basis.rank
-            reduction = runfiles.load_reduction(basis, file.path, spec, r=r) if known else None
+            reduction = kit.load_reduction(basis, file.path, spec, r=r) if known else None
             local.append((labels | {"position_basis": "full"}, reduction))
     models: Models = []
     for file in files["subspaces"]:

@@ -1,4 +1,4 @@
-"""Differences of full-order runs that should be equal (docs/study.md), and forces of effects.
+"""Differences of full-order runs that should be equal (docs/study.md); forces of each effect.
 
 A run whose start is moved by 1e-10 of the mesh's size differs more and more from the original run.
 No reduced model can be expected to have a smaller error than this difference. For comparison, other
@@ -56,7 +56,7 @@ class PerturbedRuns(ConfigModel):
 
 
 class Sensitivity(PerturbedRuns):
-    """Section ``sensitivity``; ``threshold``: difference of perturbed runs at the horizon."""
+    """Section ``sensitivity``; runs are compared until perturbed runs differ by ``threshold``."""
 
     threshold: Annotated[float, Field(gt=0.0, allow_inf_nan=False)] = 1e-3
 
@@ -90,7 +90,7 @@ class _Watched:
         self.moved = np.zeros(())
 
     def apply(self, positions: np.ndarray, before: np.ndarray, held: np.ndarray) -> None:
-        """Apply the contact, and store the displacements of the vertices by it."""
+        """Apply the contact to ``positions``; store its displacement of each vertex in `moved`."""
         wanted = positions.copy()
         self._contact.apply(positions, before, held)
         self.moved = positions - wanted
@@ -142,7 +142,7 @@ def _frame(
         forces[key] = forces.get(key, 0.0) + np.broadcast_to(force, after.positions.shape)
         energies[effect.name] = energies.get(effect.name, 0.0) + energy
 
-    for group in scene.groups:  # a group still has the data computed for ``frame``
+    for group in scene.groups:  # `step` has called begin_frame for ``frame``
         missing = group.project(after.positions) - group.S @ after.positions
         weighted = group.row_weights[:, None] * missing
         energy = 0.5 * float(np.sum(missing * weighted))
@@ -160,7 +160,7 @@ def _frame(
         (name, role, frame, float(np.linalg.norm(force[~held])), energies[name])
         for (name, role), force in forces.items()
     ]
-    squares: dict[str, float] = {}  # squared forces of pins and handles; zero if not active
+    squares: dict[str, float] = {}  # name of a pin or handle -> squared force, 0 if inactive
     for boundary in scene.boundaries:
         pulled = lacking[boundary.held(frame)] if boundary in active else np.zeros(3)
         squares[boundary.name] = squares.get(boundary.name, 0.0) + float(np.sum(pulled**2))
@@ -231,7 +231,7 @@ def without(effect: str) -> str:
 
 
 def removable(config: SceneConfig) -> list[str]:
-    """Names of effects that can be left out, because a constraint group remains without them."""
+    """Names of all effects but a scene's only constraint group, without which it cannot run."""
     names = dict.fromkeys(e.effect for e in config.effects)
     return [name for name in names if config.groups != [name]]
 

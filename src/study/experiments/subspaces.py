@@ -41,7 +41,6 @@ from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import EachOf, Every, Setting, Settings, SourcesOf
 from study.experiments.kit import base as kit
-from study.experiments.kit import runfiles
 from study.experiments.kit.base import experiment
 from study.experiments.kit.measurement import clocked
 
@@ -83,7 +82,7 @@ class SubspaceModels(ConfigModel):
     hrpd: Hrpd | None = None
 
     def methods(self, kind: str, k: int) -> list[str]:
-        """Names of the models on a basis of ``kind`` with k modes; empty if none is asked for."""
+        """Names of the configured models on a basis of ``kind`` with k modes; empty if none."""
         if kind not in self.bases or k not in self.sizes:
             return []
         tolerances = self.tolerances if kind == "pod" else ()
@@ -92,25 +91,25 @@ class SubspaceModels(ConfigModel):
 
 
 class Subspace(SubspaceModels):
-    """Section ``subspace``: the models, and the ``scenes`` for which they are made (empty: all)."""
+    """Section ``subspace``: models in position subspaces, and their ``scenes`` (empty: all)."""
 
     scenes: tuple[SceneName, ...] = ()
 
 
 class LargeModels(SubspaceModels):
-    """Settings of models of a large scene; none computes all projections: it takes too long."""
+    """Settings of models of a large scene; none evaluates all elements, which takes too long."""
 
     bases: tuple[kit.PositionBasis, ...] = ("pod",)
     sizes: tuple[kit.Modes, ...] = (20,)
     tolerances: tuple[kit.Tolerance, ...] = (1e-2,)
 
     def methods(self, kind: str, k: int) -> list[str]:
-        """Names of the models on a basis of ``kind`` with k modes, except with full projections."""
+        """Names of models on a basis of ``kind`` with k modes, except `FULL` (all elements)."""
         return [method for method in super().methods(kind, k) if method != FULL]
 
 
 class Online(LargeModels):
-    """Section ``online``: the models, and the large ``scenes`` for which they are made."""
+    """Section ``online``: large ``scenes``, and settings of the reduced models made of them."""
 
     scenes: tuple[str, ...] = ()
 
@@ -216,7 +215,7 @@ def _runs(
     """
     rows: list[dict[str, Any]] = []
     played = {
-        name: runfiles.run_error(motions[kit.TRAIN].reference, m.reference)
+        name: kit.run_error(motions[kit.TRAIN].reference, m.reference)
         for name, m in motions.items()
     }
     made = clocked(_subspaces(motions[kit.TRAIN], settings))
@@ -224,7 +223,7 @@ def _runs(
         subspace.store_columns(file.create_group(f"columns/{base}"), columns)
         spent: dict[str, float] = defaultdict(float)
         for of_model, (method, samples) in clocked(models):
-            # ECSW samples for all tolerances during its first model: add that time to later models
+            # all ECSW samples are selected with the first model: its time is added to later models'
             family = subspace.ECSW if method.startswith(subspace.ECSW) else method
             spent[family] += of_model
             model = subspace.SubspaceModel(kind, columns, samples)
@@ -312,7 +311,7 @@ class Live(LiveModels):
 
 
 class JointRows(kit.OfScene):
-    """A constraint group sampled by joint rows: a chosen row is sampled in x, y and z at once."""
+    """Constraint group that method `JOINT` reduces: it samples x, y and z of each selected row."""
 
     group: str
     method: str = JOINT
@@ -344,8 +343,8 @@ class Options(ConfigModel):
 def live(mesh: File, train: File, settings: Options, out: File, **files: list[File]) -> None:
     """Write reduced models of a scene and its full-order run to the file that the web page loads.
 
-    ``bases`` and ``samplings`` are files of groups in ``settings.joint_rows``; a row sampled there
-    serves x, y and z. Raises StorageError if the file would be larger than `LARGEST`.
+    ``bases`` and ``samplings`` are files of the groups that ``settings.joint_rows`` lists: each
+    sampled row is used for x, y and z. StorageError if the file would be larger than `LARGEST`.
     """
     scene = kit.scene_of(settings.scene, mesh)
     reference = kit.positions_of(train)
@@ -355,7 +354,7 @@ def live(mesh: File, train: File, settings: Options, out: File, **files: list[Fi
     for file in (*files["subspaces"], *files["online"]):
         for own, model in subspace.load_models(file.path):
             method, kind, k = own["method"], own["position_basis"], own["k"]
-            # only models with POD bases and sampled elements are chosen
+            # the page gets only models with POD bases and sampled elements
             if method in tolerances and kind == "pod" and k in asked.sizes:
                 labels = {"family": "elements", "k": k, "tau": tolerances[method]}
                 chosen.append((labels, model))
@@ -364,7 +363,7 @@ def live(mesh: File, train: File, settings: Options, out: File, **files: list[Fi
         basis = load_basis(file.path)
         # use the requested size, or the rank if it is smaller
         size = min(asked.joint_rows, basis.rank)
-        reduction = runfiles.load_reduction(basis, sampling.path, case.spec, size)
+        reduction = kit.load_reduction(basis, sampling.path, case.spec, size)
         chosen += list(_joint(scene, case.group, reduction, chosen))
     used, triangles = np.unique(scene.mesh.triangles, return_inverse=True)
     stride = max(1, ceil((len(reference) - 1) * len(used) / GHOST))
@@ -398,8 +397,8 @@ def _joint(
 ) -> Iterator[Labelled]:
     """Yield a model for each subspace in ``beside``, with ``group`` interpolated by ``reduction``.
 
-    ``beside`` are models with sampled elements, which other groups keep; ``reduction`` selects rows
-    for x, y and z together.
+    Other groups have the sampled elements of a model ``beside`` with this subspace. ``reduction``
+    selects rows for x, y and z together.
     """
     for model in {id(model.columns): model for _, model in beside}.values():
         joint = interpolation_of(scene.group(group), model.columns, reduction)

@@ -31,7 +31,6 @@ from study.artifact.paths import File
 from study.artifact.reads import Every, Settings, SourcesOf
 from study.experiments.iterations import IterationCounts, accelerated, stepper_of
 from study.experiments.kit import base as kit
-from study.experiments.kit import runfiles
 from study.experiments.kit.base import experiment
 from study.experiments.kit.costs import effect_costs, left_out, local_costs, variant
 from study.experiments.kit.measurement import Protocol, Variant, measure
@@ -165,7 +164,7 @@ def timing(mesh: File, fom: File, settings: Options, **files: Any) -> None:
     alone: dict[tuple[str, str, int], ReducedLocalStep] = {}
     for sampling in files["samplings"]:
         spec = settings.methods[sampling["method"]]
-        basis = load_basis(runfiles.basis_of(sampling, spec, files["bases"]).path)
+        basis = load_basis(kit.basis_of(sampling, spec, files["bases"]).path)
         with open_hdf5(sampling.path) as stored:  # find the sizes r in the file
             held = {int(key[1:]) for key in stored if key.startswith("r")}
         timed = held.intersection(kit.resolve_ranks(settings.ranks, basis.rank))
@@ -173,7 +172,7 @@ def timing(mesh: File, fom: File, settings: Options, **files: Any) -> None:
         sizes = set() if spec.rows == "all" else sizes
         group = scene.group(sampling["group"])
         for r in sorted(timed | sizes):
-            reduction = runfiles.load_reduction(basis, sampling.path, spec, r=r)
+            reduction = kit.load_reduction(basis, sampling.path, spec, r=r)
             step = ReducedLocalStep(group, reduction)
             if r in timed:
                 own = {"group": group.name, "method": sampling["method"], "r": r}
@@ -207,7 +206,7 @@ def timing(mesh: File, fom: File, settings: Options, **files: Any) -> None:
 def _full_order(
     scene: Scene, system: GlobalSystem, frames: int, asked: Timing, common: dict[str, Any]
 ) -> tuple[Variant, list[Variant]]:
-    """Full-order runs to time: the slowest implementation, with fewer iterations; all others."""
+    """Return the full-order runs to time: interpreted code with fewer iterations; all others."""
     quick = variant(scene, system, scene.groups, frames, {**common, "implementation": "compiled"})
     made = [quick]
     for name, step in IMPLEMENTATIONS.items():
@@ -237,9 +236,9 @@ def _other_counts(
 
 
 class SizedBreakEven(ConfigModel):
-    """Settings of the reduced local steps that are timed by themselves on every mesh size.
+    """Settings of reduced local steps that are timed outside of runs, on every mesh size.
 
-    ``sizes`` are basis sizes r. Bases are computed from the first ``training_frames`` frames.
+    ``sizes`` are basis sizes r. Bases use the first ``training_frames`` frames of the full order.
     """
 
     methods: tuple[str, ...] = ("deim-joint", "block-deim")
@@ -287,7 +286,7 @@ class SizedOptions(ConfigModel):
     alone=True,
 )
 def scaling(sources: list[Path], settings: SizedOptions, iterations: File, breakeven: File) -> None:
-    """Time a scene on its mesh remade with ``iterations["factor"]`` times the vertices per side."""
+    """Time a scene on its mesh, refined by the factor in the label "factor" of the output files."""
     config, sized = settings.scene, settings.scaling
     specs, alone = settings.scaled_methods, settings.scaling.breakeven
     factor = float(iterations["factor"])

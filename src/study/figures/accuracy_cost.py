@@ -1,4 +1,4 @@
-"""Figures of error and time: reductions, alternatives to projective dynamics, requested errors."""
+"""Error and time of reductions and of alternatives to projective dynamics; requested tolerances."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -69,12 +69,12 @@ def markers(looks: list[Look]) -> dict[Look, str]:
 class TradeOffs:
     """Points (error, time) of reduced models in all scenes, with their markers.
 
-    The own full-order run of a scene has the number of iterations that the scene configures.
+    The "own" full-order run of a scene has as many iterations as the scene's configuration sets.
 
     points : rows of table accuracy_cost; errors are against the scene's own full-order run
     blown_up : reduced runs that blew up before an error could be computed
     own_ms : scene -> time per frame of its own full-order run, ms
-    own_error : scene -> error of its own full-order run against one of converged iterations
+    own_error : scene -> error of its own full-order run against one iterated to convergence
     marker : (name in `FAMILIES`, legend entry) -> Matplotlib marker
     """
 
@@ -168,7 +168,7 @@ def _points(ax: Axes, rows: pd.DataFrame, size: float, colour: str, **look: Any)
 
 
 def label_iterations(ax: Axes, found: TradeOffs, scene: str) -> None:
-    """Write K beside full-order runs with K iterations, fewer than ``scene`` configures.
+    """Write "K = ..." beside full-order runs of ``scene`` with fewer iterations K than configured.
 
     The runs are in ``found`` and already drawn on ``ax``; neighbouring runs share a label.
     """
@@ -269,7 +269,7 @@ def _label(ax: Axes, x: float, text: str) -> None:
 LEAST, MOST = 1e-4, 1.0  # limits of the error axis; errors outside are drawn on the limits
 BESIDE = 4  # largest number of panels in a row
 TOLERANCES, TIMES, REACHED = (5e-3, 2e-1), (1e-2, 1e1), (1e-4, 1e0)
-# Kind of run -> (colour, factor of the tolerance at which its dots are drawn: avoids overlap).
+# Kind of run -> (colour, factor that shifts its dots on the tolerance axis to avoid overlap).
 KINDS = {
     "reduction": (style.BLUE, 0.85),
     "full order": (style.VERMILLION, 1.0),

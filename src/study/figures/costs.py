@@ -221,7 +221,7 @@ def effects_contribution(
 
 
 def _looks(drawn: Drawn, rows: pd.DataFrame) -> Looks:
-    """Map effects in ``rows`` to (colour, marker), always the same for constraint groups."""
+    """Map effects in ``rows`` to (colour, marker); those of a group are the same in all figures."""
     known, effects = drawn.looks, list(dict.fromkeys(rows.effect))
     others = [effect for effect in effects if effect not in known]
     groups = {effect: known[effect] for effect in effects if effect in known}
@@ -292,7 +292,7 @@ def effects_cost(options: Scenes, drawn: Drawn, table: pd.DataFrame) -> Figure:
 def _draw_scenes(
     ax: Axes, costs: pd.DataFrame, scenes: list[str], colours: dict[str, str]
 ) -> list[str]:
-    """Draw for each scene a bar of parts of frame time (effects etc.); return the parts' names."""
+    """Draw a frame's time per scene as a bar of parts (effects, phases); return names of parts."""
     costs = costs.assign(part=costs.effect.where(costs.effect.isin(list(colours)), UNLISTED))
     parts = [part for part in colours if (costs.part == part).any()]
     for y, scene in enumerate(scenes):

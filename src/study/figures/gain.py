@@ -21,7 +21,7 @@ from study.tables.kit.results import FAILED, judged_runs
 GAINS = (1.0, 1e5)  # limits of the gain axis; points outside are drawn on the limits
 ERRORS, LADDER_ERRORS = (1e-5, 1e2), (1e-4, 1e2)
 ENDS = ("low", "median", "high")
-DECADES = 4  # number of decades of the gain with a bar each; one more bar has all larger gains
+DECADES = 4  # bars, one for each decade of the gain from 1 on; one more bar: all larger gains
 _KEYS = ["scene", "group", "method", "r"]
 
 
@@ -66,7 +66,7 @@ def error_against_gain(options: kit.Methods, drawn: Drawn, **tables: pd.DataFram
 def _draw_method(
     ax: Axes, runs: pd.DataFrame, ranges: pd.DataFrame, colour: str, marker: str
 ) -> None:
-    """Draw dots (gain, error) of runs; crosses span the ``ranges`` of both in repeated runs."""
+    """Draw a dot (gain, error) per run; crosses span both over repetitions (``ranges``)."""
     x, y = runs.gain.to_numpy(float), runs.error.to_numpy(float)
     multiples.rim_arrows(ax, x, y, colour=colour, across=GAINS, along=ERRORS)
     ax.plot(
@@ -81,7 +81,7 @@ def _draw_method(
 
 
 def _draw_decades(ax: Axes, runs: pd.DataFrame) -> None:
-    """Draw the percentage of failed runs for each decade of the gain, and the numbers of runs."""
+    """Draw for each decade of the gain (error amplification): % of failed runs, number of runs."""
     # the last bar has all larger gains, including infinite ones
     upper = np.ceil(np.log10(runs.gain.clip(upper=10.0**DECADES + 1.0))).clip(lower=1)
     decades = runs.groupby(upper.astype(int)).failed.agg(["size", "mean"])
@@ -176,7 +176,7 @@ Panel = tuple[Axes, Experiment, pd.DataFrame]
 
 
 class Reconstruction(Beside, kit.Methods):
-    """Options of a figure: those of `Beside`, and reduction methods."""
+    """Options of a figure: reduction methods, and the options that `Beside` declares."""
 
 
 def _panels(
@@ -205,7 +205,7 @@ def _panels(
 
 
 def _published(path: Path, columns: list[str], options: Beside, each: Experiment) -> pd.DataFrame:
-    """Rows of file ``path`` for the group of ``each`` and a published experiment like its scene.
+    """Rows of ``path`` for the group of ``each``, of the published experiment like its scene.
 
     The file has output of the preprint authors' own code, and must have ``columns``;
     `Beside.published` names the experiment of that code which is similar to the scene.
@@ -319,7 +319,7 @@ def reconstruction_error(
 
 
 def _draw_errors(ax: Axes, rows: pd.DataFrame, method: str) -> bool:
-    """Draw errors of ``method``, arrows for those above the axis; return whether any is finite."""
+    """Draw errors of ``method``, as arrows if too large for the axis; return if any is finite."""
     colour, marker = style.method_styles([method])[method]
     drawn = False
     for split, dashes in style.SPLITS.items():

@@ -19,7 +19,7 @@ from study.artifact.reads import EachOf, Every, Read, TableOf
 from study.experiments.kit.base import Horizon
 from study.figures.kit.declaration import Drawn, Experiment, NothingToDraw, ReducedRuns, figure
 from study.figures.kit.elements import magnitudes
-from study.figures.sensitivity_floor import FLOORS, Floors
+from study.figures.stability import FLOORS, Floors
 from study.tables.kit.results import trained
 
 NOISY = {"all": "all axes", "plane": "in the plane", "vertex": "one vertex across"}
@@ -90,7 +90,7 @@ class Shown:
 
 @dataclass(frozen=True)
 class Runs:
-    """Inputs of figures of runs: one file per scene; ``reruns``: per scene, group and method."""
+    """Inputs of figures of runs: a file per scene; in ``reruns`` per scene, group and method."""
 
     options: ReducedRuns
     drawn: Drawn
@@ -106,7 +106,7 @@ class Runs:
 
     @cached_property
     def floors(self) -> Floors:
-        """Sensitivity floor (difference of perturbed full-order runs) and horizon of each scene."""
+        """Differences of perturbed from unperturbed runs, and frames where they get too large."""
         return Floors(self.sensitivity, self.horizon)
 
     def shown(self, experiment: Experiment) -> Shown:
@@ -218,8 +218,8 @@ def bending_runs(
 def noise_rows(drawn: Drawn, shown: Shown, table: pd.DataFrame, path: str) -> list[Row]:
     """Return a row of pictures for each method and kind of perturbed start (keys of `NOISY`).
 
-    Below a picture stands how many starts of the kind led to failed runs. Kinds with equal numbers
-    at every basis size share a row, whose pictures are of the first of these kinds.
+    Below a picture stands how many starts of the kind led to failed runs. Kinds for which these
+    numbers agree at every basis size share a row, with pictures of the first of these kinds.
 
     table : rows of table ``noise`` for the experiment in ``shown``
     path : file of these runs, whose bases are computed from snapshots of mere rounding errors
@@ -240,7 +240,7 @@ def noise_rows(drawn: Drawn, shown: Shown, table: pd.DataFrame, path: str) -> li
 
 
 def _alike(table: pd.DataFrame) -> dict[tuple[tuple[int, str], ...], list[str]]:
-    """Map each list of (r, text on failed runs) to the kinds of perturbed starts that have it."""
+    """Map ((r, number of failed runs as text), ...) to the kinds of noise with these numbers."""
     table = table[table.r <= table["rank"]]
     failed = ~(table.relative_error <= WRONG)
     kinds: dict[tuple[tuple[int, str], ...], list[str]] = {}
@@ -302,7 +302,7 @@ def _over_time(
 ) -> list[RunPanel] | None:
     """Panels of a reduced run at ``frames``, coloured by the distance to the full-order run.
 
-    ``full`` : (F, N, 3) positions of the latter, m. Returns None if all sizes r exceed the rank.
+    ``full`` : (F, N, 3) m, full-order positions. Returns None if all sizes r exceed the rank.
     """
     infos = choose_ranks(rerun_infos(path), options.ranks)
     info = next((i for i in infos if not i.marked), None)

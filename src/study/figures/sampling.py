@@ -36,7 +36,7 @@ ROW_HEIGHT = 1.85  # height of a row of panels, inches
 
 
 class Steps(kit.View):
-    """Options of the figure: camera, and ``count`` first steps of the selection of elements."""
+    """Options of the figure: camera, and ``count``, how many steps of the selection are drawn."""
 
     count: kit.Count = 6
     columns: kit.Columns = 3
@@ -145,7 +145,7 @@ def iterations(
         raise StorageError(f"{len(entries)} sampled entries do not fit a basis of {len(V)} rows")
     residual_of = _joint_residual if rows == "joint" else _shared_residual
     per_element = 3 * rows_per_element
-    length = {"scalar": 1, "joint": 3, "element": per_element}[rows]  # residual entries per norm
+    length = {"scalar": 1, "joint": 3, "element": per_element}[rows]  # residual entries per sample
     steps = []
     for k in range(min(count, len(entries) // per_step, V.shape[1])):
         residual = residual_of(V, entries[: k * per_step], k)
@@ -164,7 +164,7 @@ def iterations(
 
 
 def _shared_residual(V: np.ndarray, entries: np.ndarray, k: int) -> np.ndarray:
-    """Residual of fitting mode k by earlier modes at ``entries``; x, y, z share coefficients."""
+    """Residual of mode k, fitted by earlier modes at ``entries`` with one set of coefficients."""
     if k == 0:
         return V[:, 0]
     coefficients = np.linalg.lstsq(V[entries, :k], V[entries, k], rcond=None)[0]
@@ -234,7 +234,7 @@ def deim_entries(options: Entries, drawn: kit.Drawn, **files: list[File]) -> Fig
 def _draw_hits(
     ax: Axes, elements: shapes.ElementMap, entries: np.ndarray, per_element: int, camera: Camera
 ) -> None:
-    """Draw a dot on each element with sampled ``entries``, coloured by their axis or `SEVERAL`."""
+    """Draw a dot on each sampled element, in the colour of its sampled axis or of `SEVERAL`."""
     hit: dict[int, str] = {}
     for entry in entries:
         element, axis = int(entry) // per_element, "xyz"[int(entry) % 3]
@@ -286,7 +286,7 @@ def _draw_evaluations(ax: Axes, samplings: dict[str, list[SamplingView]], per_el
 # (left edge, width, height) of the four drawn matrices, inches; their upper edges are aligned.
 BLOCKS = ((0.75, 1.6, 1.9), (2.8, 1.6, 1.9), (4.8, 0.85, 0.85), (6.0, 0.85, 0.85))
 SIGNS = ((2.575, "="), (4.6, "×"), (5.825, "×"))
-ABOVE, TITLE, FOOTER = 0.36, 0.34, 0.44  # inches: two lines of text, a title, the colour scale
+ABOVE, TITLE, FOOTER = 0.36, 0.34, 0.44  # heights, inches: two text lines, title, colour scale
 LEFT, TALLEST = 0.75, 1.45  # left edge and largest height of pictures of the mesh, inches
 
 
@@ -417,7 +417,7 @@ def _row(figure: Figure, count: int, bottom: float, height: float, label: str) -
 def _draw_column(
     ax: Axes, elements: shapes.ElementMap, points: np.ndarray, column: np.ndarray, camera: Camera
 ) -> str:
-    """Colour elements by `signed_entry` of ``column`` / largest |value|; return the entry name."""
+    """Colour each element by its `signed_entry` of ``column``, scaled to 1; name the entry."""
     values, words = shapes.signed_entry(column, len(column) // (3 * len(elements.cells)))
     largest = max(float(np.abs(values).max()), np.finfo(float).tiny)
     elements.draw(ax, points, values / largest, camera, shapes.signed())

@@ -35,7 +35,7 @@ class Facts(BaseModel):
 
     captions : name of a figure -> its title and caption as TeX
     part : name of the configuration of a study that is only a part of the full study, else None
-    full_study : name of the full study's configuration; for a user's own scenes, of their study
+    full_study : name of the default configuration; if this one has none of its scenes, of this one
     pages : name of a document -> largest allowed number of pages
     tables : name of a table about the configuration ("scenes", "methods", "study") -> its rows
     """
@@ -63,7 +63,7 @@ def write_inputs(
     ``machine`` of the run, and ``facts``. ``outputs`` maps names of the written files to paths.
 
     `NUMBERS` (JSON) has the table cells from which the number of each ``\val`` key is computed, the
-    tables from which each TeX table is made, and `decisions` on the ``\known`` and ``\row`` blocks.
+    tables from which each TeX table is made, and which ``\known`` and ``\row`` blocks are shown.
     """
     texts = documents(source[0].parent)
     whole = "".join(texts.values())

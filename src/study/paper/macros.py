@@ -29,7 +29,7 @@ _FILTER = re.compile(r"(.*?)(!?=)(.*)")
 Filter = tuple[str, str, str]  # (column, "=" or "!=", value)
 MISSING = "n/a"
 _COUNTS = ("count", "distinct")
-# Columns of names: a study without a scene, method ... has no row with its name; see `is_held`.
+# The text shows a count only if a row of the table has the names in these columns that its key has.
 _LABELS = ("scene", "group", "method", "position_basis", "variant", "direction", "experiment")
 AGGREGATES: dict[str, Callable[[pd.Series], Any]] = {
     "max": pd.Series.max,
@@ -109,7 +109,7 @@ def number_of(key: str, tables: Mapping[str, pd.DataFrame]) -> Number:
 def is_held(key: str, tables: Mapping[str, pd.DataFrame]) -> bool:
     """Return whether ``tables`` have a row that ``key`` selects; the cell there may be empty.
 
-    For a count, only filters on columns `_LABELS` matter: if others match no row, the count is 0.
+    If ``key`` counts cells, only its filters on columns `_LABELS` are used, as 0 is a count, too.
     """
     table, filters, _, aggregate = _parse(key, tables)
     if aggregate in _COUNTS:
@@ -120,7 +120,7 @@ def is_held(key: str, tables: Mapping[str, pd.DataFrame]) -> bool:
 def _parse(
     key: str, tables: Mapping[str, pd.DataFrame]
 ) -> tuple[str, list[Filter], str, str | None]:
-    """Split a key into table, filters, column and aggregate; PaperError if one is unknown."""
+    """Table, filters, column, aggregate in the key of a number in TeX; PaperError if unknown."""
     name, *parts = key.split("|")
     if name not in tables:
         raise PaperError(f"\\val{{{key}}}: no table '{name}' (allowed: {', '.join(tables)})")
@@ -259,7 +259,7 @@ def provenance(decided: Mapping[str, Sequence[str]], part: str | None, full_stud
 
 
 def note(part: str | None, full_study: str) -> str:
-    """TeX note that replaces an omitted sentence; ``part`` and ``full_study`` are as in `Facts`."""
+    """TeX text in place of sentences without numbers in this study; arguments: see `Facts`."""
     if part is None:
         return "Sentences are left out here whose numbers this study does not hold."
     full = rf"\texttt{{{escape(full_study)}}}"

@@ -82,7 +82,7 @@ _SIGNS = {">=": r"$\ge$", "<=": r"$\le$"}
 
 
 def claims(claims_tests: pd.DataFrame, claims: pd.DataFrame) -> Rows:
-    """Claims: verdicts on published and on sound methods, counts of rows that satisfy the tests."""
+    """Claims: verdicts on the preprint's and on improved methods, counts of rows passing tests."""
     tests = claims_tests[claims_tests.decides.astype(bool)]
     columns = rf"l{LEFT}p{{4.7cm}}{LEFT}p{{3.2cm}}{LEFT}p{{4.1cm}}l"
     yield columns, ["claim", "the preprint says", "as published", "beyond", "shown in"]
@@ -118,7 +118,7 @@ _RUNS = (("fom", 1), ("fom", 5), ("fom", 10), ("fom", 40), ("fom-anderson", 10))
 
 
 def iterations(accuracy_cost: pd.DataFrame) -> Rows:
-    """Full-order runs with K iterations: error against converged iterations, time per frame."""
+    """Full-order runs with K iterations: error against a run with converged frames, frame time."""
 
     def text(run: pd.Series) -> str:
         error, time = map(format_number, (run.relative_error_within_horizon, run.ms_per_frame))
@@ -306,7 +306,7 @@ def ranks(singular_values: pd.DataFrame) -> Rows:
 
 
 def reruns(reduced_reruns: pd.DataFrame, methods: pd.DataFrame) -> Rows:
-    """Error of each method at its largest basis size r, over the frames that can be compared."""
+    """Relative error of each method at its largest basis size r, over frames before the horizon."""
 
     def text(run: pd.Series) -> str:
         if not pd.isna(run.relative_error_within_horizon):
@@ -324,7 +324,7 @@ def reruns(reduced_reruns: pd.DataFrame, methods: pd.DataFrame) -> Rows:
 
 
 def local_share(local_share: pd.DataFrame) -> Rows:
-    """Time of a frame and share of the local step in it: interpreted, NumPy and compiled code."""
+    """Time of a frame and the local step's share of it, by interpreted, NumPy and compiled code."""
     yield "lrrrrrr", ["scene", "interp.\\ ms", "share", "NumPy ms", "share", "compiled ms", "share"]
     for scene, part in local_share.groupby("scene", sort=False):
         by = part.set_index("implementation")

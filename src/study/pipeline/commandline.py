@@ -103,7 +103,7 @@ def _before_targets(arguments: Sequence[str]) -> list[str]:
 
 
 def check_files(paths: Iterable[str | Path]) -> None:
-    """Raise ConfigurationError if a configuration file is no mapping or has key `TEMPLATE_KEY`."""
+    """Raise ConfigurationError if a file is no mapping or has the key that enables templates."""
     for path in map(Path, paths):
         content = read_yaml(path)
         if not isinstance(content, dict):

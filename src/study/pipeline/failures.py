@@ -56,7 +56,7 @@ class Failure:
         return _content(self.log) if path.is_file() and path.stat().st_mtime >= begun else ""
 
     def line(self, begun: float) -> str:
-        """Line with job, cause and, after a crash, crashed code line; ``begun`` as in `written`."""
+        """Line with job, cause and place of a crash, if a log newer than ``begun`` (s) has it."""
         folder = next((p for p in Path(self.output).parents if p.is_dir()), Path())
         errors = _ERROR.findall(_content(self.log))
         # the log of a job that could not start is left from an older run: do not use its errors
@@ -148,7 +148,7 @@ class Failures(logging.Handler):
         They repeat each failed job's error, as Snakemake prints many lines after its own message.
         """
         lines = []
-        for name, log in self.batches:  # batches of cluster jobs; the log says why one failed
+        for name, log in self.batches:  # failed batches of cluster jobs, and the log of each
             found = _BY_SLURM.search(_content(log))
             how = (found["why"] or found["status"]).lower() if found else "a job of it failed"
             lines.append(f"pdrom: batch {name} failed: {how} (log: {log})")

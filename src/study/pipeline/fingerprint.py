@@ -8,6 +8,10 @@ files or error of the clock; a hash of the script, as a parameter of the rule, r
 
 import ast
 import hashlib
+import json
+import sys
+from collections.abc import Callable
+from contextlib import suppress
 from functools import cache
 from itertools import compress
 from pathlib import Path
@@ -15,8 +19,9 @@ from typing import Any
 
 import pdrom
 import study
-from pdrom.core.errors import ConfigurationError
+from pdrom.core.errors import ConfigurationError, StorageError
 from pdrom.core.registry import Registry
+from pdrom.core.store import write_text
 
 PACKAGES = {
     name: Path(package.__path__[0]) for name, package in (("pdrom", pdrom), ("study", study))
@@ -25,6 +30,39 @@ PACKAGES = {
 # file causes no reruns; Snakemake itself notices if the paths of a job's files change.
 LAYOUT = {"study.artifact.paths", "study.artifact.reads"}
 SCRIPTS = Path("workflow/scripts")
+
+
+class Memory:
+    """JSON data that earlier commands computed, by hash of everything on which they depend.
+
+    path : file with the data; one that is missing, damaged or read-only does no harm
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path, self._used = path, dict[str, Any]()
+        try:
+            self._held = dict(json.loads(path.read_text(encoding="utf-8")))
+        except (OSError, ValueError, TypeError):
+            self._held = {}
+
+    def get(self, compute: Callable[[], Any], *sources: str) -> Any:
+        """Return what ``compute`` returns; it depends only on ``sources`` and Python's version."""
+        key = hashlib.sha256(json.dumps([sys.version, *sources]).encode()).hexdigest()
+        if key not in self._used:
+            self._used[key] = self._held[key] if key in self._held else compute()
+        return self._used[key]
+
+    def save(self) -> None:
+        """Replace the content of the file by the data that `get` returned, if any are new."""
+        if not self._used.keys() <= self._held.keys():
+            with suppress(StorageError):
+                write_text(json.dumps(self._used), self._path, with_checksum=False)
+
+
+@cache
+def memory() -> Memory:
+    """`Memory` of the data that earlier commands computed in this working directory."""
+    return Memory(Path(".cache/plan.json"))
 
 
 @cache
@@ -76,7 +114,16 @@ def _read(module: str) -> tuple[list[str], str]:
     path = _locate(module)
     if path is None:
         raise ConfigurationError(f"fingerprint: no module '{module}' in the packages")
-    tree = ast.parse(path.read_text(encoding="utf-8"))
+    text, own = (file.read_text(encoding="utf-8") for file in (path, Path(__file__)))
+    found, code = memory().get(lambda: _parsed(text, module), own, module, text)
+    known = {name for name in found if _locate(name) is not None}
+    # leave out the __init__ files of top-level packages, which contain the version only
+    return sorted(known - {*PACKAGES, module} - LAYOUT), code
+
+
+def _parsed(text: str, module: str) -> tuple[list[str], str]:
+    """Names that the code ``text`` of ``module`` may import, sorted, and the hash of the code."""
+    tree = ast.parse(text)
     found: set[str] = set()
     for node in _statements(tree):
         if isinstance(node, ast.Import):
@@ -85,9 +132,7 @@ def _read(module: str) -> tuple[list[str], str]:
             found |= {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)}
     for parts in [name.split(".") for name in found]:
         found |= {".".join(parts[:i]) for i in range(1, len(parts))}
-    known = {name for name in found if _locate(name) is not None}
-    # leave out the __init__ files of top-level packages, which contain the version only
-    return sorted(known - {*PACKAGES, module} - LAYOUT), digest_of_code(tree, module)
+    return sorted(found), digest_of_code(tree, module)
 
 
 def _statements(tree: ast.AST) -> list[ast.AST]:
@@ -102,13 +147,13 @@ def _statements(tree: ast.AST) -> list[ast.AST]:
 def digest_of_code(tree: ast.Module, module: str = "") -> str:
     """Hash of parsed code without comments, layout, docstrings and most registry entries.
 
-    Entries "module:attribute" of registries are left out, except those of ``module``, whose code
-    this is.
+    Entries "module:attribute" of a `Registry` in the code are left out, unless their module is
+    ``module``, to which the code belongs.
     """
     for node in _statements(tree):
         if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef)):
             texts = [s for s in node.body if isinstance(getattr(s, "value", None), ast.Constant)]
-            texts = [s for s in texts if isinstance(s, ast.Expr)]  # docstrings and lone constants
+            texts = [s for s in texts if isinstance(s, ast.Expr)]  # docstrings, unused constants
             node.body = [s for s in node.body if s not in texts] or [ast.Pass()]
         elif isinstance(node, ast.Assign):
             match node.value:

@@ -5,6 +5,7 @@ The workflow turns each `Job` (files, settings, fingerprint of its code) into on
 
 import logging
 import os
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -17,7 +18,7 @@ from pdrom.reduction.subspace.exported import DOUBLES, require_known
 from pdrom.view.text import require_typeset
 from study.article.build import article
 from study.artifact.artifact import Artifact, make, modules_in
-from study.artifact.logs import planning_log
+from study.artifact.logs import warnings_to
 from study.artifact.paths import LIVE_MODEL, TABLE, Place
 from study.artifact.reads import EditedFiles, Labels, Paths
 from study.experiments.kit.base import experiments
@@ -66,8 +67,8 @@ def check_live(study: Study) -> None:
             require_known(study.scene(name))
         except SceneError as error:
             raise ConfigurationError(f"live.scenes: {error}") from error
-        # least size of the scene's web file, bytes, base 64: points, masses, k + 4 columns a basis
-        vertices = study.vertices[name]
+        # least bytes of the scene's web file, in base 64: points, masses, k + 4 columns per basis
+        vertices = study.sizes[name][0]
         section = settings.subspace if name in study.scenes else settings.online
         sizes = [k for k in settings.live.sizes if k in section.sizes and "pod" in section.bases]
         entries = [vertices * (k + 4) for k in sizes]
@@ -156,7 +157,7 @@ def load_plan(
     names = [os.path.relpath(path) for path in files] or [DEFAULT]
     source = f"configuration ({', '.join(sorted(set(names)))})"
     others = ", ".join(sorted({*names} - {DEFAULT})) or "the command line"
-    with planning_log(quiet):
+    with warnings_to(None if quiet else sys.stderr):
         plan = Plan(Study(config, Path(), source, others), folders)
         plan.check()
     return plan
@@ -227,7 +228,7 @@ class Plan:
         own = {name: labels[name] for name in artifact.labels}
         key = (artifact.rule, *own.values())
         if key not in self._jobs:
-            known = {**own, "figure": artifact.name}  # selects a figure's options
+            known = {**own, "figure": artifact.name}  # figures find their options by this label
             settings = artifact.settings(self, known)
             inputs = {k: read.paths(self, known) for k, read in artifact.files.items()}
             edited = [k for k, read in artifact.files.items() if isinstance(read, EditedFiles)]
@@ -243,7 +244,7 @@ class Plan:
             )
         return self._jobs[key]
 
-    # The following methods belong to the protocol `Sources`, by which declared inputs are found.
+    # Methods of the protocol `Sources`, with which declared inputs find their paths and values:
 
     def file(self, place: Place, labels: Labels) -> str:
         """Path that the pattern of ``place`` gives for the scene, group ... in ``labels``.

@@ -109,7 +109,7 @@ class Preview(logging.Handler):
         self._ended = False
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Count the job that a log ``record`` announces; add why it runs, and its expected time."""
+        """Count the job that ``record`` announces; collect its reasons to run and expected time."""
         self._ended = self._ended or END in record.getMessage()
         if getattr(record, "event", None) != LogEvent.JOB_INFO:
             return
@@ -138,7 +138,7 @@ class Preview(logging.Handler):
 
 
 def shortened(reason: str) -> set[str]:
-    """Set of our short texts (values of `REASONS`) for Snakemake's text ``reason``."""
+    """Short texts (values of `REASONS`) for Snakemake's text ``reason`` on why a job has to run."""
     found = [text for text in REASONS if reason.startswith(text) or f"; {text}" in reason]
     own = [text for text in found if text != FOLLOWS] or found
     return {REASONS[text] for text in own}

@@ -8,7 +8,7 @@ from typing import Any
 from study.artifact.markup import to_plain, to_rst
 from study.experiments.kit.base import Experiment
 from study.figures.kit.declaration import Declaration
-from study.paper.figure_numbers import Numbers, figure_numbers
+from study.paper.source import Numbers, figure_numbers
 from study.pipeline.plan import Job, Plan
 from study.tables.kit.declaration import Table
 
@@ -60,7 +60,7 @@ def _experiment(plan: Plan, experiment: Experiment, cores: int) -> SimpleNamespa
 
 
 def _fixed(plan: Plan, job: Job, folder: str, numbers: Mapping[str, Numbers]) -> SimpleNamespace:
-    """Rule of an artifact with only one ``job``; ``numbers`` maps figures to their numbers."""
+    """Snakemake rule of ``job``, the only one of its artifact, with its log in logs/``folder``."""
     artifact, paths = job.artifact, job.outputs
     params = {"artifact": artifact.address, **{name: getattr(job, name) for name in PARAMETERS}}
     shown: dict[str, dict[str, Any]] = {}
@@ -97,7 +97,7 @@ def _fixed(plan: Plan, job: Job, folder: str, numbers: Mapping[str, Numbers]) ->
 
 
 def _figure(figure: Declaration, numbers: Numbers) -> dict[str, Any]:
-    """Arguments of Snakemake's ``report`` for a figure; the report sorts by the first label."""
+    """Arguments of Snakemake's ``report`` for a figure; reports sort figures by first label."""
     own = {"paper": numbers.manuscript or UNNUMBERED}
     if numbers.preprint is None:
         category, labels = "Figures of this study", {"name": figure.name, **own}

@@ -17,6 +17,7 @@ from study.artifact.paths import MACHINE
 from study.pipeline import running
 from study.pipeline.commandline import CommandLine, one_line, recall, remember
 from study.pipeline.failures import Failures
+from study.pipeline.fingerprint import memory
 from study.pipeline.fork_server import hold_pipe, start_server
 from study.pipeline.manifest import write_manifest
 from study.pipeline.plan import Plan
@@ -103,6 +104,7 @@ class Run:
                 running.hold()
                 running.settle_dates(DATED)
                 remember(self.command)
+        atexit.register(memory().save)
         self.failures = Failures()
         logging.getLogger("snakemake.logging").addHandler(self.failures)
 

@@ -93,7 +93,7 @@ def settle_dates(folders: Iterable[str | Path]) -> int:
 
 
 def end_at_sigterm() -> None:
-    """Install a handler of SIGTERM that ends this process; it serves until jobs are started."""
+    """Install a handler of SIGTERM that ends this process, for use before any job is started."""
 
     def end(number: int, frame: object) -> None:
         _say(b"pdrom: ended by SIGTERM\n")
@@ -122,7 +122,7 @@ def _say(line: bytes) -> None:
 
 
 def _end_jobs() -> None:
-    """End the processes of all jobs, and of jobs that still start, until this process ends."""
+    """End the processes of all jobs, repeatedly until this process ends: jobs may still start."""
     begin, own = time.monotonic(), psutil.Process()
     while True:
         late = time.monotonic() - begin > PATIENCE

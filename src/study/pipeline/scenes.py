@@ -1,18 +1,27 @@
 """Scenes of config/scenes, with the changes that a study configures, checked by building them."""
 
+import io
+import logging
 from collections.abc import Iterable
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated
 
 from pydantic import Field
 
 from pdrom.core.errors import ConfigurationError, PdromError, choices
+from pdrom.core.store.checksum import digest_of
 from pdrom.core.yamlfile import ConfigModel, named, read_yaml, validate
 from pdrom.model.constraints.base import GroupConfig
 from pdrom.model.effects import EFFECTS
 from pdrom.model.effects.base import Seed, effect_config
 from pdrom.model.mesh.config import MeshFile
 from pdrom.model.scene import Scene, SceneConfig
+from study.artifact.artifact import modules_in
+from study.artifact.logs import warnings_to
+from study.pipeline.fingerprint import fingerprint, memory
+
+log = logging.getLogger(__name__)
 
 Fraction = Annotated[float, Field(gt=0.0, le=1.0)]
 
@@ -70,6 +79,32 @@ def require_scenes(root: Path, names: Iterable[str], key: str) -> None:
             raise ConfigurationError(f"{key}: unknown scene '{name}'{choices(name, known)}")
 
 
+def checked_scene(root: Path, name: str, *changes: Change) -> tuple[SceneConfig, tuple[int, int]]:
+    """Check scene ``name`` below ``root``, with ``changes``, by building it, and log its warnings.
+
+    It is not built if an earlier command has built it by the same code from the same files. Returns
+    its configuration and its numbers of vertices and elements. Raises ConfigurationError as
+    `load_bound_scene` does.
+    """
+    config, own = read_scene(root, name, *changes), io.StringIO()
+
+    def build() -> tuple[int, int, list[str]]:
+        with warnings_to(own, "%(message)s"):
+            scene = load_bound_scene(root, name, *changes)
+        elements = sum(group.elements for group in scene.groups)
+        return scene.mesh.vertices, elements, own.getvalue().splitlines()
+
+    mesh = ""
+    if isinstance(config.mesh, MeshFile) and (file := root / config.mesh.path).is_file():
+        with suppress(OSError):  # ignore an unreadable file here: `build` reports it
+            mesh = digest_of(file)
+    code = fingerprint(__name__, *sorted({*modules_in(config)}))
+    vertices, elements, texts = memory().get(build, code, config.model_dump_json(), mesh)
+    for text in texts if not own.getvalue() else ():  # `build` has logged them already
+        log.warning("%s", text)
+    return config, (vertices, elements)
+
+
 def load_bound_scene(root: Path, name: str, *changes: Change) -> Scene:
     """Read scene ``name`` below ``root``, apply ``changes``, and build it on its mesh.
 
@@ -80,7 +115,7 @@ def load_bound_scene(root: Path, name: str, *changes: Change) -> Scene:
     try:
         mesh = scene.mesh.build(root)
         bound = Scene.build(scene, mesh)
-        # the held-out variant has the same constraint groups: build it without them
+        # the held-out variant has the constraint groups built above: build its other effects only
         heldout = scene.heldout_variant()
         other = tuple(e for e in heldout.effects if not isinstance(e, GroupConfig))
         Scene.build(heldout.model_copy(update={"effects": other}), mesh)

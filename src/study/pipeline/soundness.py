@@ -21,7 +21,7 @@ TOLERANCE = 1e-9
 
 
 def main() -> None:
-    """Make all calculations; if one fails or crashes, the last line of output has its name."""
+    """Make all test `calculations`; if one fails or crashes, the last line of output names it."""
     faulthandler.enable()
     settle()
     for what in calculations():
@@ -30,7 +30,7 @@ def main() -> None:
 
 
 def calculations() -> Iterator[str]:
-    """Yield the name of each calculation; the calculation is made when the next name is taken."""
+    """Yield the name of each test calculation, before it is made, so that it is printed first."""
     import numpy as np
     import scipy.linalg
 

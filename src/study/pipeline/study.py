@@ -17,7 +17,7 @@ from pdrom.core.yamlfile import ConfigModel, SceneName, read_yaml, validate
 from pdrom.model.dynamics.system import DEFAULT_SOLVER
 from pdrom.model.held_out import MOTIONS
 from pdrom.model.mesh.config import MeshConfig
-from pdrom.model.scene import Scene, SceneConfig
+from pdrom.model.scene import SceneConfig
 from pdrom.reduction.method import BasisSpec, MethodSpec, load_methods
 from study.artifact import paths
 from study.experiments.alternatives.experiment import Alternatives
@@ -70,7 +70,7 @@ class StudySettings(ConfigModel):
     live: Live = Live()
     alternatives: Alternatives = Alternatives()
     requested_tolerances: RequestedTolerances = RequestedTolerances()
-    recorded: bool = True  # whether tables also get stored rows of the study config/extended.yaml
+    recorded: bool = True  # whether tables also get stored results of config/extended.yaml
     study: str | None = None
 
     @model_validator(mode="after")
@@ -99,18 +99,12 @@ class Study:
         self.root, self.configuration = root, configuration
         self.settings = settings = validate(StudySettings, config, source)
         self.titles: dict[str, str] = {}  # name of a scene -> title, for tables and figures
-        self.vertices: dict[str, int] = {}
+        self.sizes: dict[str, tuple[int, int]] = {}  # scene -> numbers of vertices and elements
         self._known: dict[str, SceneConfig] = {}
         # changes made to every scene read from config/scenes, in this order
-        self._changes = changes = (settings.replicate, settings.coarsen)
-        self.bound: dict[str, Scene] = {
-            name: scene_kit.load_bound_scene(root, name, *changes) for name in settings.scenes
-        }
-        self.scenes = {name: self._physics(s) for name, s in self.bound.items()}
-        self.online = {
-            name: self._physics(scene_kit.load_bound_scene(root, name, *changes))
-            for name in settings.online.scenes
-        }
+        self._changes = (settings.replicate, settings.coarsen)
+        self.scenes = {name: self.scene(name) for name in settings.scenes}
+        self.online = {name: self.scene(name) for name in settings.online.scenes}
         self.methods: dict[str, MethodSpec] = self.named_methods(settings.methods, "methods")
 
     @cached_property
@@ -129,20 +123,16 @@ class Study:
         return load_methods(self.root / "config" / "methods.yaml")
 
     def scene(self, name: str) -> SceneConfig:
-        """Return any scene by ``name``; ConfigurationError if its file is missing or faulty."""
-        if name not in self._known:  # build the scene only to check it: it is not in the study
-            self._physics(scene_kit.load_bound_scene(self.root, name, *self._changes))
-        return self._known[name]
+        """Return any scene by ``name``, in the study or not; its title is replaced by its name.
 
-    def _physics(self, scene: Scene) -> SceneConfig:
-        """Return a scene's configuration, with its name in place of its title.
-
-        Jobs then do not depend on titles; tables and figures read them from `titles`.
+        Jobs then do not depend on titles, which tables and figures read from `titles`. Raises
+        ConfigurationError if the file of the scene is missing or faulty.
         """
-        config = scene.config
-        self.titles[config.name], self.vertices[config.name] = config.title, scene.mesh.vertices
-        self._known[config.name] = config.model_copy(update={"title": config.name})
-        return self._known[config.name]
+        if name not in self._known:
+            config, self.sizes[name] = scene_kit.checked_scene(self.root, name, *self._changes)
+            self.titles[name] = config.title
+            self._known[name] = config.model_copy(update={"title": name})
+        return self._known[name]
 
     def only(self, scene: str) -> "Study":
         """Return a copy of the study with only ``scene``, which need not be in this study."""
@@ -263,7 +253,7 @@ def _held(study: Study, listed: Iterable[str]) -> list[str]:
 def _with_subspaces(study: Study) -> list[str]:
     """Scenes with models in position subspaces: configured ones, else all that allow such models.
 
-    The list is empty if the study has no position basis or no size of one.
+    The list is empty if section ``subspace`` has no position bases or no basis sizes.
     """
     section = study.settings.subspace
     if not (section.bases and section.sizes):
@@ -300,7 +290,7 @@ SCENES: dict[paths.Place, Callable[[Study], Iterable[str]]] = {
         if scene in {*_with_subspaces(study), *study.online}
     ],
     paths.STABILITY: lambda study: _held(study, study.settings.stability.scenes),
-    # scenes that section `requested_tolerances` lists; if none, those of the study and of `online`
+    # scenes of the study and section `online`: all, or those that `requested_tolerances` lists
     paths.REQUESTED_TOLERANCES: lambda study: [
         scene
         for scene in (*study.scenes, *study.online)

@@ -18,9 +18,8 @@ from study.artifact import paths
 from study.artifact.logs import usage_of
 from study.artifact.reads import Every, ProjectFile, Read, Recorded, Setting, TableOf
 from study.figures.kit.declaration import declarations
-from study.paper.figure_numbers import figures_page
 from study.paper.macros import keys_of
-from study.paper.source import source_files
+from study.paper.source import figures_page, source_files
 from study.pipeline.commandline import CommandLine
 from study.pipeline.folders import Folders
 from study.pipeline.plan import Plan
@@ -111,7 +110,7 @@ def configuration(command: CommandLine) -> str:
 
 
 def verdicts_in(results: str) -> dict[str, tuple[str, str]]:
-    """Claim -> verdicts on published and on sound methods; {} if table claims is not intact."""
+    """Claim -> verdicts on the preprint's and on improved methods; {} if that table is damaged."""
     path = paths.TABLE.at(results, name="claims")
     # a damaged file is only ignored here: the next job that reads it renames it
     if not Path(path).is_file() or check_file(path) is not Condition.INTACT:
@@ -170,7 +169,7 @@ class Entry(NamedTuple):
 
 
 def entries() -> Iterator[Entry]:
-    """Yield the lines of the overview: claims, figures, tables, sections and the manuscript."""
+    """Yield entries of results/contents.md: claims, figures, tables, sections, the manuscript."""
     for name in load_claims(Path("config/claims.yaml")):
         yield Entry("claim", name, (paths.TABLE.at(paths.RESULTS, name="claims"),), ("claims",))
     for name, figure in declarations().items():

@@ -11,7 +11,7 @@ from typing import Any
 from pdrom.core.errors import ConfigurationError, choices, suggestion
 from study.artifact import paths
 from study.figures.kit.declaration import declarations
-from study.paper.figure_numbers import SUPPLEMENT, figure_numbers
+from study.paper.source import SUPPLEMENT, figure_numbers
 from study.pipeline.folders import Folders
 from study.pipeline.plan import Plan
 from study.pipeline.scenes import scene_names
@@ -69,7 +69,7 @@ def files(target: str, folders: Folders) -> list[str]:
 
 
 def own_file(path: str, folders: Folders) -> str:
-    """Return ``path`` with a default folder replaced by the one in ``folders``, else unchanged."""
+    """Return ``path`` or, if it is a default path of a result, the result's path in ``folders``."""
     for document, file in Folders().documents.items():
         if path == file:
             return folders.documents[document]

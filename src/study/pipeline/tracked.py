@@ -53,14 +53,9 @@ def kind_of(log: str, results: str) -> str:
 def measured_costs(results: str, coarse: str) -> pd.DataFrame:
     """Return a row for each kind of job (see `kind_of`), with columns `COLUMNS`, from job logs.
 
-    Parameters
-    ----------
-    results, coarse : results folders of the full study and of a study with coarse meshes
+    Raises PdromError if no log reports what a job used, for example before the first run.
 
-    Raises
-    ------
-    PdromError
-        No log reports the time and memory of a job, for example before the first run.
+    results, coarse : results folders of the full study and of a study with coarse meshes
     """
     full = _used(results).groupby("kind")
     columns = [
@@ -73,17 +68,12 @@ def measured_costs(results: str, coarse: str) -> pd.DataFrame:
 
 
 def recorded_verdicts(claims: Path, rules: Path) -> pd.DataFrame:
-    """Return for each claim: verdicts, measured values, day of the run, fingerprint of its rules.
+    """Return for each claim: verdicts, measured values, date of the table, fingerprint of rules.
 
-    Parameters
-    ----------
+    Raises StorageError if the table is missing or damaged.
+
     claims : path of the table ``claims`` of the study ``config/replication.yaml``
     rules : path of the file with the rules of the claims
-
-    Raises
-    ------
-    StorageError
-        The table is missing or damaged.
     """
     loaded = load_claims(rules)
     table = dated(claims, "date")[["claim", *MEASURED, "date"]]
@@ -108,7 +98,7 @@ def _used(results: str) -> pd.DataFrame:
 
 
 def main(words: Sequence[str]) -> None:
-    """Update the files for each of ``words``, see the module; ConfigurationError if unknown."""
+    """Update the results that ``words`` name: costs, replication, rows; else ConfigurationError."""
     for word in words or [""]:
         if word == "costs":
             made = {COSTS: measured_costs(folders([], []).results, folders([COARSE], []).results)}

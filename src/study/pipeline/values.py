@@ -33,7 +33,7 @@ from study.pipeline.folders import DEFAULT
 from study.pipeline.study import Study, labels_of
 from study.tables.kit.results import FAR
 
-# Name of the basis shown by tables with one basis per group; if no method uses it, the first basis.
+# Basis that tables with one basis per group show; if no method uses it, that of the first method.
 USUAL_BASIS = "none-none-vectorised"
 
 
@@ -55,7 +55,7 @@ def _usual_bases(study: Study, labels: Labels) -> list[paths.File]:
 
 
 def _holds(study: Study, place: paths.Place, labels: Labels) -> bool:
-    """Return whether the study makes a file with path pattern ``place`` for the job's scene etc."""
+    """Return whether the study makes the file with path pattern ``place`` for these ``labels``."""
     return {name: labels[name] for name in place.labels} in labels_of(study, place)
 
 
@@ -65,7 +65,7 @@ def _of_scene(study: Study, place: paths.Place, labels: Labels) -> tuple[OfScene
 
 
 def _joint_rows(study: Study, labels: Labels) -> tuple[JointRows, ...]:
-    """One `JointRows` per reduced group of the job's scene; () if the study lacks it or `JOINT`."""
+    """`JointRows` of the scene's reduced groups; () if the study lacks this scene or `JOINT`."""
     scene = labels["scene"]
     if JOINT not in study.methods or scene not in study.scenes:
         return ()
@@ -80,7 +80,7 @@ def _named(scenes: Mapping[str, SceneConfig]) -> list[NamedScene]:
 
 
 def _subspace_cases(study: Study, labels: Labels) -> tuple[SubspaceCase, ...]:
-    """Models to be timed: entries of ``frame_times.subspaces`` that the study also makes."""
+    """Entries of ``frame_times.subspaces`` (models to time) whose models the study computes."""
     held = {labels["scene"] for labels in labels_of(study, paths.SUBSPACES)}
     models = study.settings.subspace
     return tuple(
@@ -91,7 +91,7 @@ def _subspace_cases(study: Study, labels: Labels) -> tuple[SubspaceCase, ...]:
 
 
 def _projection_cases(study: Study, labels: Labels) -> tuple[ProjectionCase, ...]:
-    """Reductions to be timed: entries of ``frame_times.projections`` that the study samples."""
+    """Entries of ``frame_times.projections`` (cases to time) whose samples the study computes."""
     held = labels_of(study, paths.SAMPLING)
     return tuple(
         case
@@ -111,7 +111,7 @@ def scaled_methods(study: Study, labels: Labels) -> dict[str, MethodSpec]:
 
 
 def _repeated(study: Study, labels: Labels) -> tuple[Repeated, ...]:
-    """Runs to repeat for the job's scene, by the ``repetitions.cells`` entries that list it."""
+    """Runs to repeat in the job's scene: one entry per method in section ``repetitions``."""
     cells = [c for c in study.settings.repetitions.cells if labels["scene"] in c.scenes]
     return tuple(
         Repeated(method=name, spec=spec, **cell.model_dump(include={*Cell.model_fields}))
@@ -167,7 +167,7 @@ def _experiments(study: Study, labels: Labels) -> tuple[Experiment, ...]:
 
 
 def _reductions(study: Study, labels: Labels) -> dict[str, Reduction]:
-    """Name -> method, for methods that the options of a figure select, in configured order."""
+    """Name -> method, for those that the figure ``labels["figure"]`` shows, in configured order."""
     named = _options(study, labels).names("methods") or tuple(study.methods)
     held = {name: study.methods[name] for name in named if name in study.methods}
     return {name: Reduction(title=spec.title, rows=spec.rows) for name, spec in held.items()}
@@ -230,13 +230,13 @@ def _numbers(study: Study) -> dict[str, Any]:
 
 
 def _scene(study: Study, name: str) -> dict[str, Any]:
-    config, scene = study.scenes[name], study.bound[name]
+    config, (vertices, elements) = study.scenes[name], study.sizes[name]
     weights = {e.effect: e.weight for e in config.effects if isinstance(e, GroupConfig)}
     return {
         "scene": name,
         "groups": ", ".join(f"{group} ({weights[group]:g})" for group in config.groups),
-        "vertices": scene.mesh.vertices,
-        "elements": sum(group.elements for group in scene.groups),
+        "vertices": vertices,
+        "elements": elements,
         "frames": config.frames,
         "iterations": config.iterations,
         "time_step": config.time_step,
@@ -286,7 +286,7 @@ DERIVED: dict[str, Callable[[Study, Labels], Any]] = {
     "reductions": _reductions,
     "runs": _runs,
     "first_run": lambda study, labels: _runs(study, labels)[:1],
-    # of the groups that a figure shows, those in scenes with models in position subspaces
+    # reduced groups that a figure shows, if the scene has models in position subspaces
     "drawn_subspaces": lambda study, labels: tuple(
         each
         for each in _experiments(study, labels)

@@ -87,7 +87,7 @@ def accuracy_cost(
 
 
 def _sweep(errors: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
-    """Full-order runs; `FOM` with fewer iterations than configured has a second row, `FEWER`."""
+    """Full-order runs; those of `FOM` with fewer iterations than the scene's also as `FEWER`."""
     full = times[times.method.isna() | times.method.isin([FOM, ANDERSON])]
     cost = full[["scene", "method", "iterations", "ms_per_frame"]]
     cost = cost.fillna({"method": FOM})
@@ -104,7 +104,7 @@ def _sweep(errors: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
 
 
 def reference_of(points: pd.DataFrame) -> pd.Series:
-    """Reference run of the error in each row: `CONVERGED`, or `OWN` (the scene's own run)."""
+    """Kind of each row's reference run: converged frames, or the scene's number of iterations."""
     return points.method.isin([FOM, ANDERSON]).map({True: CONVERGED, False: OWN})
 
 
@@ -150,7 +150,7 @@ def pareto(error: Sequence[float], cost: Sequence[float]) -> list[bool]:
     },
 )
 def requested_tolerances(runs: list[paths.File], record: list[Path]) -> pd.DataFrame:
-    """One row per run with a requested largest error: this study's, then those in ``record``."""
+    """One row per run with a requested largest error: ``runs``, then stored ones of ``record``."""
     rows = results.joined(runs)
     if len(rows):
         met = rows.frames > 0
@@ -299,7 +299,7 @@ def payoff(reruns: pd.DataFrame, points: pd.DataFrame, effects: pd.DataFrame) ->
 
 
 def _fewer(points: pd.DataFrame) -> pd.DataFrame:
-    """Rows of method `FEWER` in ``points``, with speed-ups over the scene's own full-order run."""
+    """Rows `FEWER` of ``points``, with speed-ups over the scene's run with all its iterations."""
     full = points[(points.method == "full") & (points.position_basis == "full")]
     fewer = points[points.method == FEWER]
     speedup = fewer.scene.map(full.set_index("scene").ms_per_frame) / fewer.ms_per_frame

@@ -32,7 +32,7 @@ CASE = ["scene", "vertices", "stiffness", "motion"]
 SPEEDUP = ("reduced_speedup", "reduced_speedup_low", "reduced_speedup_high")
 CURVE = ["scene", "stiffness", "reference", "limit"]
 PLAIN = "projective"
-KNOWN = 3.0  # no row for error limits below this times the error of reference "continuous"
+KNOWN = 3.0  # least limit of errors / error of the reference run "continuous"
 
 
 @table(
@@ -75,7 +75,7 @@ def alternatives(
 ) -> pd.DataFrame:
     """One row per held-out motion and solver with its settings, in the order of files ``parts``.
 
-    Times are medians over the processes in ``times``. `with_recorded` appends rows of ``record``.
+    Times are medians over all timing processes. `with_recorded` appends rows of ``record``.
     """
     rows = joined(parts)
     if len(rows):
@@ -89,7 +89,7 @@ def alternatives(
 
 
 def beside(rows: pd.DataFrame, times: pd.DataFrame) -> tuple[pd.DataFrame, list[int]]:
-    """Add one column per process with frame times (ms) to ``rows``; also return their names."""
+    """Add a column of frame times (ms) per timing process to ``rows``; also return their names."""
     wide = times.set_index([*CANDIDATE, "process"]).ms_per_frame.unstack("process")
     wide["vertices_ms"] = times.groupby(CANDIDATE, dropna=False).vertices_ms.median()
     own = rows.drop(columns="vertices_ms", errors="ignore")
@@ -143,8 +143,8 @@ def winners(
 ) -> pd.DataFrame:
     """One row per scene, mesh, stiffness, motion, reference and error limit.
 
-    The method is empty if no full-order method (some ran in the first motion only) reaches the
-    limit. For reference "continuous", limits below `KNOWN` times its own error have no row.
+    Column ``method`` is empty if no full-order method that was timed reaches the limit. Rows of the
+    reference "continuous" have only limits of at least `KNOWN` times this reference's own error.
     """
     found = []
     rows = rows[rows.recorded.isna()]
@@ -170,9 +170,9 @@ def winners(
 
 
 def _best(rows: pd.DataFrame, limit: float, processes: list[int]) -> dict[str, object]:
-    """Columns about the fastest methods with errors up to ``limit``: two full-order, one reduced.
+    """Columns about the two fastest full-order methods and the fastest reduction within ``limit``.
 
-    A speed-up is the median over ``processes`` of full-order time / time of the reduction.
+    A speed-up is a median over ``processes`` (columns of times) of full-order / reduced time.
     """
     reaching = rows[rows.error <= limit].sort_values("ms_per_frame", kind="stable")
     inside = reaching.method.isin(settings.REDUCTIONS)
@@ -205,8 +205,8 @@ def _best(rows: pd.DataFrame, limit: float, processes: list[int]) -> dict[str, o
 
 
 def _pays(curve: pd.DataFrame) -> dict[str, object]:
-    """Mesh sizes from which on reductions beat the full order; speed-ups on the largest mesh."""
-    # the least speed-up on a mesh is NaN if a method misses the error limit in one motion
+    """Columns: mesh sizes from which on reductions are faster, speed-ups on the largest mesh."""
+    # least speed-up of all motions on a mesh; NaN if a method misses the error limit in one motion
     every = curve.assign(plain=curve.plain_ms / curve.reduced_ms)
     worst = every.groupby("vertices")[["plain", "reduced_speedup"]].agg(
         lambda speedups: speedups.min(skipna=False)

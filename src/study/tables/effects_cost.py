@@ -18,7 +18,7 @@ KEYS = ["scene", "effect"]
 NOTHING = "nothing"  # value of column effect in a row of a scene from which nothing is left out
 PHASE, SEVERAL = "phase", "several"
 IMPLEMENTATIONS = ("interpreted", "numpy", "compiled")
-FEWEST = 3  # smallest number of meshes to which table scaling fits a power law
+FEWEST = 3  # least number of mesh sizes to which a power law is fitted (table `scaling`)
 
 
 @table(
@@ -62,10 +62,10 @@ def effects_cost(
     """One row per effect or phase of a scene, then one per set of effects left out together.
 
     Phases are right-hand side, global solve and the rest. Column ``moved`` (largest difference of
-    runs with and without the effect) is empty for a scene's only constraint group, which must stay.
+    runs with and without the effect) is empty for a scene's only constraint group: no run lacks it.
 
-    parts, left_out : times of effects, and of scenes without some effects; both are scaled so that
-        scenes have the full-order times of table ``frame_times``
+    parts, left_out : times of effects, and of scenes without some effects; a factor for each scene
+        makes full-order times measured with them equal to those of table ``frame_times``
     contributions : forces and energies of effects in each frame
     sensitivity, horizon : how far runs from a perturbed start, or without an effect, differ from
         the full-order run, and the limit of this difference, above which frames are not compared
@@ -103,7 +103,7 @@ def _absent(rows: pd.DataFrame, others: pd.DataFrame) -> np.ndarray:
 
 
 def _acting(frames: pd.DataFrame, sensitivity: pd.DataFrame, horizon: Horizon) -> pd.DataFrame:
-    """Per effect: RMS force, energy range in ``frames``, largest change of positions without it."""
+    """Per effect: RMS force, range of energy, largest change of positions if it is left out."""
     made = frames.groupby([*KEYS, "role"], sort=False, as_index=False).agg(
         force=("force", lambda force: float(np.sqrt(np.mean(np.square(force))))),
         energy=("energy", lambda of: float(of.max() - of.min() if len(of) > 1 else of.iloc[0])),
@@ -116,7 +116,7 @@ def _acting(frames: pd.DataFrame, sensitivity: pd.DataFrame, horizon: Horizon) -
     ends = horizons(sensitivity, horizon.perturbation, horizon.threshold)
 
     def largest(scene: str, label: float | str) -> float | None:
-        """Largest deviation of run ``label`` in the compared frames; None without such frames."""
+        """Largest drift before the horizon of run ``label`` from the original run, or None."""
         drift = floor_of(sensitivity, scene, label)[: ends[scene]]
         return float(drift.max()) if len(drift) else None
 
@@ -139,10 +139,10 @@ def _acting(frames: pd.DataFrame, sensitivity: pd.DataFrame, horizon: Horizon) -
     reads={"timings": Every(paths.TIMINGS), "frame_times": TableOf("frame_times")},
 )
 def local_share(timings: list[File], frame_times: pd.DataFrame) -> pd.DataFrame:
-    """One row per scene and implementation of the local step; `in_one_time` scales the times.
+    """One row per scene and implementation of the local step, with its share of the frame's time.
 
-    Shares of the local step include the assembly of the right-hand side, because compiled kernels
-    compute projections and right-hand side in one pass.
+    The share includes the assembly of the right-hand side, because compiled kernels compute it
+    together with the projections. Times are scaled to those in ``frame_times`` (`in_one_time`).
     """
     times = results.timings_in_one_time(timings, frame_times)
     full = times[times.method.isna()].copy()
@@ -226,10 +226,10 @@ _TIMES = ["ms_per_frame", "vertices_ms", "speedup", "speedup_low", "speedup_high
     reads={"parts": Every(paths.FRAME_TIMES)},
 )
 def frame_times(parts: list[File]) -> pd.DataFrame:
-    """One row per scene: medians over processes of the time of a full-order frame, and of ratios.
+    """One row per scene: medians over processes of the full-order run's frame time and of ratios.
 
-    The ratios divide two times by this one: that of the same run, measured once more (control), and
-    that of the scene's variant ("twin").
+    The ratios are the frame times of an equal run (control) and of the scene's variant ("twin"),
+    each divided by that of the full-order run.
     """
     rows = results.joined(parts)
     if rows.empty:
@@ -284,9 +284,9 @@ def frame_times(parts: list[File]) -> pd.DataFrame:
 def speedups(times: pd.DataFrame, reruns: pd.DataFrame, **files: list[File]) -> pd.DataFrame:
     """One row per timed reduction; speed-ups compare runs of one and the same process.
 
-    times, reruns : tables frame_times and reduced_reruns; files ``parts`` have the measured times
-    projections, subspaces : processor times of making the reductions (basis and sampling)
-    large : errors of reductions of large scenes, and processor times of making these
+    times, reruns : tables frame_times and reduced_reruns
+    parts : frame times in each process; projections, subspaces : times of making reductions
+    large : errors of the models of scenes in section ``online``, and times of making the models
     """
     rows = results.joined(files["parts"])
     if rows.empty or not (rows.role == REDUCED).any():
@@ -350,7 +350,7 @@ def _errors(reruns: pd.DataFrame, keys: list[str]) -> pd.DataFrame:
 
 
 def large_errors(large: pd.DataFrame) -> pd.DataFrame:
-    """Errors over all frames by model of ``large``: training; median, range of held-out motions."""
+    """Errors over all frames, per model: on the training motion; median, range on held-out ones."""
     whole = large.rename(columns={"relative_error": _ERROR}).assign(horizon_frame=1)
     return _errors(whole, _MODEL)
 
@@ -390,7 +390,7 @@ def _first_known(made: pd.DataFrame, sources: list[pd.DataFrame], column: str) -
     },
 )
 def online(parts: list[File], measured: list[File], times: pd.DataFrame) -> pd.DataFrame:
-    """One row per reduced model of large scenes: errors of ``parts``, times of ``measured``."""
+    """One row per model of a large scene: errors in ``parts``, times in ``measured``, ``times``."""
     rows = results.joined(parts)
     if rows.empty:
         return rows

@@ -1,11 +1,11 @@
 """Tables of errors: of reconstructions, of perturbed runs, and of runs with one changed choice.
 
 The gain is the factor by which sampling amplifies errors. Table gain_interventions shows whether
-the error of a run falls if only its gain is lowered; a correlation of both over all methods could
-have other causes. So each step of the table compares two methods with equal basis and size r that
-differ in their samples, or in whether the axes x, y and z share coefficients (table ladder has the
-four combinations). If separate coefficients raise errors only by their larger gain, a lower gain
-lowers errors also between two methods with separate, or with shared ones (tested by `KINDS`).
+the error of a run falls if only its gain is lowered; a correlation of error and gain over all
+methods could have other causes. So each step compares two methods with equal basis and size r that
+differ in their samples, or in whether the axes x, y and z share coefficients (table ladder combines
+rows or elements with both). If separate coefficients raise errors only by their larger gain, errors
+must also fall with the gain between methods that all have separate, or all shared ones (`KINDS`).
 """
 
 from collections.abc import Iterator, Mapping
@@ -36,7 +36,7 @@ _CELL = ["scene", "group", "method", "r", "varied"]
         number("relative", "over the first one"),
         flag("above_roundoff", "larger than the rounding errors of the projections"),
     ),
-    # per group, the basis without weights and centring if a method uses it, else another basis
+    # each group's `USUAL_BASIS` (no weights, not centred) if the study makes it, else its first one
     reads={"bases": EachOf(paths.BASIS, "usual_bases")},
 )
 def singular_values(bases: list[paths.File]) -> pd.DataFrame:
@@ -181,20 +181,20 @@ def ladder(parts: list[paths.File]) -> pd.DataFrame:
     return joined(parts)
 
 
-# Steps of table gain_interventions that change the samples: name -> (method before, method after).
+# Step that changes samples, in table gain_interventions -> (method before it, method after it).
 STEPS = {
     "whole elements for single entries": ("deim", "block-deim"),
     "three elements a mode for one": ("block-deim", "gappy"),
 }
-# Steps between methods of table ladder that change only whether x, y and z share coefficients, or
-# only the samples. Steps named "whole elements ..." need elements that have more than one row.
+# Change -> methods of table ladder before and after it: one set of coefficients for x, y and z, or
+# whole elements sampled instead of single rows (compared only if elements have several rows).
 SQUARE = {
     "shared coefficients, single rows": ("single rows, separate", "single rows, shared"),
     "shared coefficients, whole elements": ("whole elements, separate", "whole elements, shared"),
     "whole elements, separate coefficients": ("single rows, separate", "whole elements, separate"),
     "whole elements, shared coefficients": ("single rows, shared", "whole elements, shared"),
 }
-# Step -> methods, compared in pairs, from the larger amplification of errors (gain) to the smaller.
+# Step -> methods; of any two, that with the larger error amplification (gain) is "before" the step.
 KINDS = {
     "lower gain, shared coefficients": ("deim", "block-deim", "gappy"),
     "lower gain, separate coefficients": ("deim-joint", "published"),
@@ -255,7 +255,7 @@ def gain_interventions(
 def _steps(
     runs: pd.DataFrame, square: pd.DataFrame
 ) -> Iterator[tuple[str, str, str, pd.DataFrame]]:
-    """Yield per change of method: name, method before, method after, table of compared runs."""
+    """Yield each change of method: name, both methods, run pairs; ``square``: from `_square`."""
     for name, methods in STEPS.items():
         yield name, *methods, _pairs(runs, *methods)
     for name, (before, after) in SQUARE.items():
@@ -273,7 +273,7 @@ def _steps(
 
 
 def _square(ladder: pd.DataFrame, runs: pd.DataFrame) -> pd.DataFrame:
-    """Rows of table ladder with direction "square" whose scene, group and r occur in ``runs``."""
+    """Rows of ``ladder`` with direction "square" and with a scene, group and r of ``runs``."""
     chosen = ladder[(ladder.direction == "square") & ladder.gain.notna()]
     chosen = chosen.rename(columns={"rung": "method"})
     error = chosen.relative_error_within_horizon.astype(float).fillna(np.inf)

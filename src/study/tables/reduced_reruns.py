@@ -13,8 +13,7 @@ from pdrom.reduction.deviations import DEVIATIONS, ERRORS, REFERENCE, Series, er
 from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, Setting, TableOf
-from study.experiments.kit.base import Horizon, floor_of, horizons, positions_of
-from study.experiments.kit.runfiles import run_error
+from study.experiments.kit.base import Horizon, floor_of, horizons, positions_of, run_error
 from study.tables.kit.declaration import flag, number, shared, table, text
 from study.tables.kit.results import KEYS, TRAIN, joined, timings_in_one_time, trained
 
@@ -54,14 +53,14 @@ def reduced_reruns(
 
     There is one row per motion, scene, group, method and r. Rows of runs in position subspaces
     follow; all groups are reduced there, and r is the number of evaluated elements. The horizon of
-    a scene and motion is the first frame at which perturbed runs differ too much for a comparison.
-    Errors "within the horizon" use earlier frames only, and are empty for a run that blew up in
-    these. Rows of method `PLAYBACK`: distance of the training recording from a held-out motion.
+    a scene and motion is the first frame in which perturbed full-order runs differ from unperturbed
+    ones by more than a limit. Errors "within the horizon" use earlier frames only, and are empty if
+    a run blew up in these. Rows of method `PLAYBACK` compare the training with a held-out motion.
 
     full_order : files of the full-order runs of all motions
     runs, rows, rows_heldout : HDF5 files of the reduced runs, and their tables in the same order
-    subspaces, subspace_rows, subspace_rows_heldout : such files for runs in position subspaces
-    sensitivity, horizon : differences of perturbed runs, and their limit, which gives the horizon
+    subspaces, subspace_rows, subspace_rows_heldout : the same for runs in position subspaces
+    sensitivity, horizon : differences of perturbed from unperturbed runs; settings with the limit
     """
     judged: list[pd.DataFrame] = []
     for motion in (TRAIN, *MOTIONS):
@@ -107,7 +106,7 @@ def _played(full_order: list[File], ends: Mapping[str, int], motion: str) -> pd.
 
 
 def _judged(run: File, row: File, end: int, motion: str) -> pd.DataFrame:
-    """Table ``row`` for ``motion``, with errors of the runs in ``run`` before frame ``end``."""
+    """Rows of file ``row`` for ``motion``, with errors before frame ``end`` from file ``run``."""
     table = read_table(row.path)
     if motion != TRAIN:  # tables of training runs have no column "motion"
         table = table[table.motion == motion]
@@ -168,7 +167,7 @@ def _with_times(runs: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
 # Possible outcomes of a run.
 OUTCOMES = ("accurate", "wrong", "left the scene", "blow-up", "not run", "not judged")
 SETTING = ["experiment", "scene", "h", "stiffness_ratio"]  # columns that identify a full-order run
-# `verify` lets at most this fraction of runs on degenerate meshes end differently (round-off).
+# Fraction of runs on degenerate meshes that may end otherwise than expected, due to round-off.
 FRAGILE = 0.005
 
 
@@ -252,7 +251,7 @@ def _full_order_rows(files: list[File]) -> pd.DataFrame:
 def _rerun_rows(
     reruns: list[File], subspaces: list[File], reduced_reruns: pd.DataFrame
 ) -> pd.DataFrame:
-    """Rows of reduced training-motion runs; errors are over frames where perturbed runs agree."""
+    """Rows of reduced runs of the training motion; errors cover the frames before the `Horizon`."""
     local = joined(reruns).assign(position_basis="full", k=np.nan)
     runs = pd.concat([local, joined(subspaces)], ignore_index=True)
     runs = runs.drop(columns="relative_error")

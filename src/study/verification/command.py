@@ -137,7 +137,7 @@ def counted(lines: Sequence[Line]) -> str:
 
 
 def page(lines: Sequence[Line], about: str) -> str:
-    """Return a Markdown page with all outcomes ``lines``; ``about`` is its first sentence."""
+    """Return a Markdown page: the sentence ``about``, and ``lines`` with all comparisons."""
     meaning = "What is compared, and what the outcomes mean, is in `docs/verification.md`."
     parts = ["# Verification", "", about, meaning, "", counted(lines) + ".", ""]
     for kind in dict.fromkeys(line.kind for line in lines):

@@ -5,7 +5,7 @@ Cells that depend on rounding errors (chaotic or ill-conditioned runs) may diffe
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +18,7 @@ from study.tables.kit.results import trained
 
 # Absolute differences of two numbers up to this size are ignored as rounding errors of sums.
 FLOOR = 1e-12
-# Relative tolerances: for numbers of samples that a fit chooses, and for errors above `WRONG`.
+# Relative tolerances: for numbers of samples from a least-squares fit; for errors above `WRONG`.
 FITTED, OF_WRONG_RUNS = 0.25, 0.3
 # Part of the names of methods whose elements are chosen by a non-negative least-squares fit.
 FITTING = "ecsw"
@@ -28,24 +28,24 @@ OF_RUNS, DIRECT = 1e2, 1e5
 RUNS, SPECTRA, RECONSTRUCTION = "reduced_reruns", "singular_values", "reconstruction_error"
 # A run whose relative error exceeds this value counts as wrong, as in all tables of the study.
 WRONG = 0.1
-# Columns with the error of a run; the first one that a table has is compared with `WRONG`.
+# Columns with a run's error; the first of them that a table has is compared with `WRONG`.
 OF_RUN = ("relative_error_within_horizon", "relative_error")
-# Columns that identify a sampled reduction of projections; those of `RUN` identify a reduced run.
+# Table columns that identify samples of projections (`SAMPLES`), or a reduced run (`RUN`).
 SAMPLES = ("scene", "group", "method", "r")
 RUN = (*SAMPLES, "position_basis", "k")
 # Largest number of cells that describe a row in a message.
 NAMED = 6
-# A small shift of a whole column is reported, too: a share of its compared cells must differ by at
-# most `CLOSE` or, if the column declares a tolerance, tolerance / `OWN`. The share is `MOST` if a
-# column of errors has at least `TEN` cells and declares no tolerance, else `HALF`. Fewer than
-# `LEAST` cells must all differ by at most `LONE`; with a declared tolerance they are not checked.
+# A fault may change all cells of a column, each by less than its tolerance. So the share `HALF` of
+# them (`MOST` of at least `TEN` errors) must differ by at most `CLOSE`; fewer than `LEAST` cells
+# must all differ by at most `LONE`. If the column declares a tolerance, the share `HALF` must
+# differ by at most this tolerance / `OWN`, and fewer than `LEAST` cells are not checked.
 MOST, HALF, TEN, LEAST = 0.9, 0.5, 10, 3
 CLOSE, OWN, LONE = 1e-5, 50, 0.01
 # Limits for cells that depend on rounding errors: (share of the runs that may differ, relative
 # difference above which a run differs, columns by which the runs are grouped for counting). In each
 # group, a tenth of the runs may differ by more than a factor of 10, and half by more than 2.
 LOOSE = ((0.1, 1 - 1 / 10, ("scene", "noisy_axes", "method")), (0.5, 1 - 1 / 2, ("scene",)))
-# In a text or flag column with a tolerance, this many cells may differ in tables of any length.
+# If a column of texts or flags lets a share of its cells differ, at least this many may differ.
 FEW = 3
 Difference = tuple[float, str]  # (distance of two cells, inf if not a number; text of a message)
 
@@ -80,7 +80,7 @@ def pairs(table: Table, expected: pd.DataFrame, found: pd.DataFrame) -> list[tup
         for frame in (expected, found)
     ]
     for columns in ([*named, *counts], named):
-        # of several rows with equal cells, the first matches the first, the second the second ...
+        # of rows with equal cells, the k-th expected one matches the k-th found one
         e, f = (rows.assign(place=rows.groupby(columns).cumcount()) for rows in left)
         both = e.merge(f, on=[*columns, "place"])
         made += zip(both.row_x, both.row_y, strict=True)
@@ -89,7 +89,7 @@ def pairs(table: Table, expected: pd.DataFrame, found: pd.DataFrame) -> list[tup
 
 
 def _key(cell: object) -> str:
-    """Text of a cell with fewer digits than are stored in expected tables; empty if missing."""
+    """Text of a cell by which rows are matched, with fewer digits than stored; "" if missing."""
     if cell is None or cell is pd.NA or cell != cell:
         return ""
     return f"{cell:.6g}" if isinstance(cell, float) else str(cell)
@@ -161,21 +161,23 @@ class Comparison:
             return found
         direct = column.quantity == "value" or self.table.name == RECONSTRUCTION
         return found | {
-            "basis of round-off": self._of_round_off(),
+            "basis of round-off": self._of_round_off,
             "degenerate mesh": np.full(len(self.e), "case" in self.e),
-            "ill-conditioned": self._gains() > (DIRECT if direct else OF_RUNS),
+            "ill-conditioned": self._gains > (DIRECT if direct else OF_RUNS),
         }
 
+    @cached_property
     def _of_round_off(self) -> np.ndarray:
-        """True for rows with r + 1 >= the modes above round-off, and all rows of table noise."""
+        """True if r + 1 >= number of modes above round-off; in all rows of table noise."""
         rows, modes = self.e, self.context.modes
         if "noisy_axes" in rows or not {"scene", "group", "r"} <= set(rows.columns):
             return np.full(len(rows), "noisy_axes" in rows)
         most = [modes.get(key, np.inf) for key in zip(rows.scene, rows.group, strict=True)]
         return (rows.r >= np.array(most, dtype=float) - 1).fillna(False).to_numpy(dtype=bool)
 
+    @cached_property
     def _gains(self) -> np.ndarray:
-        """Array (rows): largest error amplification in the row or in `Context.gains`; else 0."""
+        """Largest gain (error amplification) in each row's cells and `Context.gains`; 0 if none."""
         found = [np.zeros(len(self.e))]
         for column in self.table.columns:
             if column.name.startswith("gain") and column.quantity == "value":
@@ -185,9 +187,9 @@ class Comparison:
         return np.fmax.reduce(found)
 
     def wrong(self, column: Column) -> np.ndarray:
-        """Boolean array (rows): True if cells of ``column`` get the wider tolerance of wrong runs.
+        """Boolean array (rows): True where ``column`` gets the wider tolerance `OF_WRONG_RUNS`.
 
-        In the expected table, the error of the run and that in the cell must both exceed `WRONG`.
+        There the expected table has an error of the run above `WRONG`; the cell, if an error, too.
         """
         judged = [name for name in OF_RUN if name in self.e][:1]
         judged += [column.name] if "error" in column.name else []
@@ -215,7 +217,7 @@ class Comparison:
         return limit
 
     def beyond(self, column: Column, wider: float = 0.0) -> np.ndarray:
-        """Boolean array: compared cells that differ by more than their limit and than ``wider``."""
+        """True for compared cells for which `apart` exceeds both their tolerance and ``wider``."""
         limit = np.maximum(self.limits(column), wider)
         return (self.apart(column) > limit) & self.compared(column)
 
@@ -242,8 +244,8 @@ class Comparison:
 def judge(comparison: Comparison) -> tuple[list[str], str]:
     """Return texts of all differences, largest first, and a text on the compared cells.
 
-    The second text has the number of compared cells, and for each reason the number of cells that
-    depend on rounding errors; of such cells, a limited number may differ.
+    The second text has the number of compared cells and, for each cause ("chaotic scene" ...), how
+    many cells depend on rounding errors; of such cells, a limited number may differ.
     """
     found = [*_rows(comparison)]
     compared, loose = 0, Counter[str]()
@@ -307,7 +309,7 @@ def _cells(comparison: Comparison, column: Column) -> Iterator[Difference]:
 
 
 def _shifted(comparison: Comparison, column: Column, firm: np.ndarray) -> Iterator[Difference]:
-    """Yield a difference if most cells that ``firm`` selects have changed slightly (see `MOST`)."""
+    """Yield a difference if most cells in ``firm`` rows are slightly off expected ones (`MOST`)."""
     there = (comparison.e[column.name].fillna(0) != 0).to_numpy(dtype=bool)
     cells = firm & there & comparison.compared(column)
     own, count = column.tolerance, cells.sum()

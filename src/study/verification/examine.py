@@ -22,7 +22,7 @@ from study.verification.subject import Subject
 
 RULES = Path("config/claims.yaml")
 CLAIMS = "claims"
-# Verdict columns of table claims -> (key of the deciding tests in `RULES`, words in messages).
+# Verdict column of table claims -> field of `ClaimRule` with its tests, its name in messages.
 PARTS = {"verdict": ("published", "as published"), "verdict_beyond": ("beyond", "beyond")}
 
 
@@ -73,7 +73,7 @@ class Examination:
         self.read, self.again = cache(self._read), cache(self._again)
 
     def lines(self) -> list[Line]:
-        """Outcomes of claims, figures, tables; a CSV file that is no declared table "differs"."""
+        """Outcomes of claims, figures, tables; "differs" for a CSV file that is no such table."""
         tables = {name: self.table(name) for name in declared()}
         figures = [self._figure(job, tables) for job in self.subject.plan.fixed["figures"]]
         folder = Path(TABLE.at(self.subject.results, name="any")).parent
@@ -102,12 +102,12 @@ class Examination:
 
     @cached_property
     def expected(self) -> dict[str, Reference]:
-        """Mapping of names to the expected tables that exist."""
+        """Name of a table -> expected table, for each table that has one."""
         return read_references(folder_of(self.subject.results))
 
     @cached_property
     def context(self) -> compare.Context:
-        """Properties that show which rows depend on rounding errors (see `compare.Context`)."""
+        """Properties of scenes and runs: they show which table rows depend on rounding errors."""
         tables = {name: reference.frame for name, reference in self.expected.items()}
         try:
             return compare.Context(tables, self.found(compare.RUNS))
@@ -208,7 +208,7 @@ class Examination:
 
 
 def _claim(name: str, expected: pd.DataFrame, found: pd.DataFrame, decided: pd.DataFrame) -> Line:
-    """Compare verdicts on claim ``name``: expected, found, recomputed from tables (``decided``)."""
+    """Compare the verdicts on claim ``name`` in the expected, found and recomputed table claims."""
     if name not in expected.index or name not in found.index:
         text = "the claim is new" if name in found.index else "the claim is gone"
         return Line("claim", name, Outcome.DIFFERS, text)

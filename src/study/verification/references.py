@@ -4,7 +4,6 @@ Columns that are never compared are left out, and numbers are rounded to `DIGITS
 a CSV file, whose changes git shows; a large table is compressed (``.csv.xz``) to save space.
 """
 
-import io
 import lzma
 from datetime import date
 from pathlib import Path
@@ -21,7 +20,7 @@ from study.verification.compare import kept
 
 # Stored digits of numbers; the error of rounding is at most a hundredth of any tolerance.
 DIGITS = 9
-PACKED_FROM = 50_000
+ENDS, PACKED_FROM = (".csv", ".csv.xz"), 50_000  # larger files (in bytes) are compressed
 LOG = "changes.md"
 HEAD = """# Changes of the expected tables
 
@@ -31,7 +30,7 @@ Written by `./reproduce verify --update --reason "..."`, newest last.
 
 
 class Reference(NamedTuple):
-    """Expected table: ``frame`` has all declared columns, its file has only ``columns`` of them."""
+    """Expected table: ``frame`` has all declared columns, the table's file has only ``columns``."""
 
     frame: pd.DataFrame
     columns: tuple[str, ...]
@@ -47,7 +46,7 @@ def write_reference(table: Table, frame: pd.DataFrame, folder: Path) -> None:
     """Write ``frame``, the content of ``table``, as the expected table into ``folder``."""
     stored, form = frame[list(kept(table))], f"%.{DIGITS}g"
     content = stored.to_csv(index=False, float_format=form, lineterminator="\n").encode()
-    path, other = _paths(table.name, folder)
+    path, other = (folder / f"{table.name}{end}" for end in ENDS)
     if len(content) > PACKED_FROM:
         path, other, content = other, path, lzma.compress(content, preset=9)
     write_tracked(path, content)
@@ -59,15 +58,13 @@ def read_reference(table: Table, folder: Path) -> Reference | None:
 
     Raises StorageError if the file cannot be read.
     """
-    plain, packed = _paths(table.name, folder)
+    plain, packed = (folder / f"{table.name}{end}" for end in ENDS)
     path = plain if plain.is_file() else packed
     if not path.is_file():
         return None
     try:
-        content = path.read_bytes()
-        text = content if path == plain else lzma.decompress(content)
-        frame = pd.read_csv(io.BytesIO(text))
-    except (OSError, lzma.LZMAError, ValueError) as error:
+        frame = pd.read_csv(path)
+    except (OSError, EOFError, lzma.LZMAError, ValueError) as error:
         raise StorageError(f"{path}: cannot be read ({' '.join(str(error).split())})") from error
     whole = frame.reindex(columns=list(table.column_names))
     return Reference(table.checked(whole), tuple(frame.columns))
@@ -84,7 +81,3 @@ def note(folder: Path, reason: str, day: date, code: str) -> None:
     path = folder / LOG
     text = path.read_text(encoding="utf-8") if path.is_file() else HEAD
     write_tracked(path, f"{text}- {day:%Y-%m-%d}, code {code}: {reason}\n".encode())
-
-
-def _paths(name: str, folder: Path) -> tuple[Path, Path]:
-    return folder / f"{name}.csv", folder / f"{name}.csv.xz"

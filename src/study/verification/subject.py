@@ -69,7 +69,7 @@ class Subject:
 
 
 def options_parser(command: str, about: str, epilog: str | None = None) -> argparse.ArgumentParser:
-    """Return a parser of the options after the word ``command`` that name the configuration."""
+    """Return a parser of --configfile and --config, options of ``./reproduce`` with ``command``."""
     made = argparse.ArgumentParser(prog=f"./reproduce {command}", description=about, epilog=epilog)
     made.add_argument("--configfile", nargs="+", default=[], metavar="FILE")
     made.add_argument("--config", nargs="+", default=[], metavar="KEY=VALUE")

@@ -103,10 +103,7 @@ def atomic_path(path: str | os.PathLike[str], with_checksum: bool = True) -> Ite
 def require_place(path: str | os.PathLike[str]) -> None:
     """Check, before a long computation of a result, that ``path`` can be written.
 
-    Raises
-    ------
-    StorageError
-        ``path`` is not a regular file, or its folder cannot be created or written to.
+    Raises StorageError if it is not a regular file, or its folder cannot be made or written to.
     """
     target = Path(path)
     _require_file(target)
@@ -119,10 +116,7 @@ def require_place(path: str | os.PathLike[str]) -> None:
 def require_own(path: str | os.PathLike[str]) -> None:
     """Check that writing to ``path`` would not replace a file that pdrom has not made.
 
-    Raises
-    ------
-    StorageError
-        ``path`` is a file without an intact checksum and without the text `MARK`.
+    Raises StorageError if it is a file without an intact checksum and without the text `MARK`.
     """
     target = Path(path)
     if not target.is_file():
@@ -306,14 +300,11 @@ class _Sink:
 def open_hdf5(path: str | os.PathLike[str], unchecked: bool = False) -> Iterator[h5py.File]:
     """Open the result ``path`` (HDF5) for reading, if it matches its checksum.
 
+    Raises StorageError if it is missing, damaged, or lacks a dataset or attribute that is read.
+
     Parameters
     ----------
     unchecked : whether a file without a checksum is read
-
-    Raises
-    ------
-    StorageError
-        If the file is missing or damaged, or lacks a dataset or attribute that is read from it.
     """
     require_intact(path, unchecked)
     try:
@@ -322,17 +313,14 @@ def open_hdf5(path: str | os.PathLike[str], unchecked: bool = False) -> Iterator
     except KeyError as error:
         raise StorageError(f"{path}: {error.args[0]}") from error
     except OSError as error:
-        require_intact(path, unchecked)  # refuses a file that was damaged since the first check
+        require_intact(path, unchecked)  # refuses a file damaged since the check above
         raise StorageError(f"{path}: cannot be read ({reason(error)})") from error
 
 
 def require_self_contained(file: h5py.File, path: str | os.PathLike[str]) -> None:
     """Refuse an HDF5 ``file``, at ``path``, that refers to data in other files.
 
-    Raises
-    ------
-    StorageError
-        The file has a soft or an external link, external storage or a virtual dataset.
+    Raises StorageError for a soft or an external link, external storage or a virtual dataset.
     """
     groups: list[h5py.Group] = [file]
     seen: set[int] = set()

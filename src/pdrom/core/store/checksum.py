@@ -103,7 +103,7 @@ def new_checksum(digest: str, name: str) -> Checksum:
 
 
 def is_hdf5(path: Path) -> bool:
-    """Whether ``path`` has a suffix or the signature of HDF5, or the user block of pdrom."""
+    """Whether ``path`` has a suffix or the signature of HDF5, or begins with pdrom's checksum."""
     with open(path, "rb") as handle:
         head = handle.read(BLOCK + len(_SIGNATURE))
     named = path.suffix in SUFFIXES or head.startswith((_SIGNATURE, _LINE))
@@ -146,10 +146,7 @@ def provenance_of(path: str | os.PathLike[str]) -> dict[str, str]:
 def check_file(path: str | os.PathLike[str]) -> Condition:
     """Compare the result ``path`` of any kind with its checksum, without changing any file.
 
-    Raises
-    ------
-    StorageError
-        There is no such file, or it may not be read.
+    Raises StorageError if there is no such file, or it may not be read.
     """
     path = Path(path)
     try:

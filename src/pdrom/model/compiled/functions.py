@@ -84,7 +84,7 @@ class Callback:
 
 
 def caller(result):
-    """Return f(address, integers): it passes ``integers`` to a `Callback` of type ``result``."""
+    """Return f(address, integers) for compiled code: it calls a `Callback` returning ``result``."""
 
     def typed(_context, address, arguments):
         def generate(context, builder, _signature, values):

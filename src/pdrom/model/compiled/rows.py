@@ -43,7 +43,7 @@ def empty(numbers: int, dtype: type = np.float64) -> np.ndarray:
     """Return an uninitialised array (numbers,) at an address divisible by `ROW_BYTES`."""
     kind = np.dtype(dtype)
     memory = np.empty(numbers * kind.itemsize + ROW_BYTES, np.uint8)
-    # the result is made from a memoryview, so that it, and not ``memory``, is the base of its views
+    # no slice of ``memory``: ``base`` of its views would be ``memory``, but `flat` needs the array
     start = -memory.ctypes.data % ROW_BYTES
     return np.frombuffer(memory.data, kind, numbers, start)
 
@@ -86,7 +86,7 @@ def as_vertices(values: np.ndarray) -> np.ndarray:
 
 
 def flat(values: np.ndarray) -> np.ndarray:
-    """Return ``values`` (N, 3) as (4 N,), a zero after each row: a view if so stored, or a copy."""
+    """Return ``values`` (N, 3) as (4 N,), zero after each row; a view if memory has these zeros."""
     rows = values.base
     if (
         isinstance(rows, np.ndarray)

@@ -17,7 +17,7 @@ from pdrom.model.constraints.base import ConstraintGroup, GroupConfig, direction
 from pdrom.model.constraints.local_kernel import FIRST, OWN, VERTICES, LocalKernel
 from pdrom.model.mesh.types import Mesh, barycentric_areas, boundary_edges
 
-# A unit vector's component in the plane of a half sphere's rim is round-off if shorter than this.
+# Length below which a unit vector's component orthogonal to the vertex normal is only round-off.
 RIM = 1e-15
 # A unit vector's component in the plane of a half sphere's rim, if longer than this, is orthogonal
 # to the vertex normal up to 2e-12. A shorter one has lost digits and is made orthogonal once more.
@@ -26,7 +26,7 @@ NEAR_POLE = 1e-4
 # Offsets of an element's weight, curvature at rest (magnitude and vector) and pole of its half
 # sphere (normal times side +1, -1 or 0) among the MANIFOLD numbers that `lanes.pack` packs for it
 WEIGHT, MAGNITUDE, REST, POLE, MANIFOLD = 0, 1, 2, 5, 8
-# Offsets in a working array, SIZE numbers per lane: H(q), projection p, cosine of H's angle to pole
+# Offsets in a working array, SIZE numbers per lane: H(q), projection p, cosine of H and the POLE
 H, P, HEIGHT, SIZE = 0, 3, 6, 7
 # Indices into a kernel's record: number of all elements, of those to project; addresses of the CSR
 # arrays of S, packed numbers, working arrays, elements to project, memory for their packed numbers.
@@ -35,7 +35,7 @@ ELEMENTS, COUNT, START, INDICES, DATA, SPHERES, WORK, SAMPLED, TAKEN, ARRAYS = r
 
 @lanes.kernel
 def put_poles(manifold, elements, side, normals):
-    """Write poles, ``side`` (m,) * ``normals`` (m, 3), of ``elements`` to packed ``manifold``."""
+    """Write half-sphere poles ``side`` (m,) * ``normals`` (m, 3) of elements to ``manifold``."""
     for e in elements:
         place = (e // lanes.LANES * MANIFOLD + POLE) * lanes.LANES + e % lanes.LANES
         lanes.save(
@@ -96,7 +96,7 @@ def _to_rims(work, manifold, first):
         height = work[HEIGHT * lanes.LANES + lane]
         rim, length = _without(unit, height, n)
         again, left = _without(rim, lanes.dot(rim, n), n)
-        # if ``rim`` is only round-off, take any direction on the rim (orthogonal to n) instead
+        # if ``unit`` is along n, ``rim`` is only round-off: take any direction orthogonal to n
         again = lanes.choose(length > RIM and left > 0.5, again, lanes.perpendicular(n))
         rim = lanes.choose(length > NEAR_POLE, rim, again)
         lanes.save(work, P, lane, lanes.choose(height < 0.0, rim, unit))
@@ -114,7 +114,7 @@ def _operator(y_place, record):
 
 @lanes.lane_function
 def _spheres(record, part):
-    """Return all half spheres and working array ``part`` (0 or 1), at addresses in ``record``."""
+    """Return the packed numbers and the working array ``part`` to which ``record`` points."""
     entries = rows.indices(record, ARRAYS)
     return (
         rows.doubles(entries[SPHERES], entries[FIRST + 2] * MANIFOLD * lanes.LANES),

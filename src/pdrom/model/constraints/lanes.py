@@ -36,7 +36,7 @@ def blocks(elements: int) -> int:
 
 
 def pack(numbers: np.ndarray) -> np.ndarray:
-    """Return the k numbers of e elements, (e, k), as a flat array in the layout of the module."""
+    """Return the k numbers of e elements, (e, k), as flat array [block][number][lane] (see top)."""
     e, k = numbers.shape
     padding = np.repeat(numbers[-1:], blocks(e) * LANES - e, axis=0)
     padded = np.concatenate([numbers, padding]).reshape(blocks(e), LANES, k)
@@ -44,7 +44,7 @@ def pack(numbers: np.ndarray) -> np.ndarray:
 
 
 def workspace(numbers: int) -> np.ndarray:
-    """Return a flat working array of zeros for one block with k = ``numbers`` per element."""
+    """Return a flat working array of zeros for one block: ``numbers`` values per element."""
     return rows.zeros(numbers * LANES)
 
 
@@ -102,7 +102,7 @@ def save_matrix(work, first, lane, matrix):
 
 @lane_function
 def unmarked(work, mark):
-    """Return how many elements in ``work`` have the value zero at offset ``mark``, as float."""
+    """Return for how many elements of ``work`` the number at index ``mark`` is zero, as float."""
     left = 0.0
     for lane in range(LANES):
         left += 1.0 if work[mark * LANES + lane] == 0.0 else 0.0

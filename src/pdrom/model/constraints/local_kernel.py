@@ -48,9 +48,9 @@ def call(address, y, rhs, record, part):
 
 @compiled(nogil=True)
 def add_part(table, y, rhs):
-    """Call each kernel of a `Table` with the table's ``part``; add to ``rhs``; return energy, J.
+    """Call every kernel of ``table`` (a `Table`) with the argument ``part`` that the table has.
 
-    ``y`` and ``rhs`` are addresses of arrays (N, 4) with a last column of zeros.
+    ``y`` and ``rhs`` (added to): addresses of arrays (N, 4), last column zero. Returns energy, J.
     """
     addresses, records, part = table
     energy = 0.0
@@ -119,8 +119,8 @@ class LocalPass:
 
     Attributes
     ----------
-    first, second, preparing : tables by which `add_part` calls kernels for the first part of their
-        units of work, for the second part (see the module), or to prepare data for both
+    first, second : `Table`s of all kernels, and of those whose work has a second part
+    preparing : `Table` of the kernels that prepare data for both parts before the first one
     """
 
     def __init__(self, kernels: Sequence[LocalKernel]) -> None:

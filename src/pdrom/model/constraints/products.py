@@ -24,7 +24,7 @@ VALUES, SCALE, TARGET, LARGEST, LEAST, MARK, SIZE = 0, 3, 4, 5, 6, 7, 8
 STEPS = 60
 # state of one element: still iterating; converged or diverged; its product was already in the range
 _OPEN, _CLOSED, _INSIDE = 1.0, 0.0, 2.0
-# round-off (symbols: see top): Newton steps of t up to LAST_STEP * t, |f(t)| up to ROUNDOFF * c
+# Iteration for t (see top) ends at a step up to LAST_STEP * t; |f| up to ROUNDOFF * c counts as 0.
 LAST_STEP, ROUNDOFF = 1e-15, 1e-10
 
 
@@ -38,7 +38,7 @@ def _partner(t, s, last):
 
 @lane_function
 def _product(t, values, solid):
-    """Return t t_1 t_2 for ``values`` s_i, its derivative by t, t_1, t_2 (1 if not ``solid``)."""
+    """Return t t_1 t_2 for ``values`` s_i, its derivative by t, t_1, t_2 (which is 1 for areas)."""
     first, first_slope = _partner(t, values[0], values[2])
     second, second_slope = _partner(t, values[1], values[2])
     second = second if solid else 1.0
@@ -49,7 +49,7 @@ def _product(t, values, solid):
 
 @lane_function
 def _start(work, low, high, solid):
-    """Scale singular values, set initial t; return how many elements may have several solutions."""
+    """Scale s_i, set initial t (symbols: see module); return how many may have several t."""
     low_root = low ** (1.0 / 3.0) if solid else np.sqrt(low)
     high_root = high ** (1.0 / 3.0) if solid else np.sqrt(high)
     several = 0.0
@@ -64,7 +64,7 @@ def _start(work, low, high, solid):
         # raise a tiny target to SMALLEST, negligible compared with the scaled singular values
         target = target if target > SMALLEST else SMALLEST
         first, second = s[0] * inverse, s[1] * inverse if solid else 1.0
-        # bounds on t = t_3 if the s_i must grow: t_1 >= s_1, t_2 >= s_2, t_1 >= t_2 >= t
+        # bounds on the unknown t if values must grow: t_1 >= s_1, t_2 >= s_2, t_1 >= t_2 >= t
         least = target / (first * second)
         largest = root * inverse
         other = np.sqrt(target / first) if solid else least
@@ -83,8 +83,8 @@ def _start(work, low, high, solid):
 
 @lane_function
 def _advance(work, place, side, solid):
-    """Do a Newton step for t (offset ``place``) of each element in the block, from above (``side``
-    1) or below (-1); return how many elements need another."""
+    """Do a Newton step for the unknown t (at offset ``place``) of each element of the block, from
+    above the solution (``side`` 1) or below (-1); return how many elements need another step."""
     left = 0.0
     for lane in range(LANES):
         t, target = work[place * LANES + lane], work[TARGET * LANES + lane]
@@ -104,7 +104,7 @@ def _advance(work, place, side, solid):
 
 @lane_function
 def _distance(t, values, target, solid):
-    """Squared distance of ``values`` from (t_1, t_2, t); inf unless t_1 t_2 t = ``target``."""
+    """Squared distance of ``values`` s_i from t_1(t), t_2(t), t; inf unless t solves f(t) = 0."""
     product, _, first, second = _product(t, values, solid)
     m = t * (t - values[2])
     a, b = m / (first + SMALLEST), m / (second + SMALLEST) if solid else 0.0
@@ -114,7 +114,7 @@ def _distance(t, values, target, solid):
 
 @lane_function
 def _finish(work, solid):
-    """Write each element's nearest values, by the nearer solution t, unscaled, to `VALUES`."""
+    """Write the unscaled t_1, t_2, t to `VALUES`, for the t whose values are nearer to the s_i."""
     for lane in range(LANES):
         values, target = load(work, VALUES, lane), work[TARGET * LANES + lane]
         t, other = work[LARGEST * LANES + lane], work[LEAST * LANES + lane]
@@ -149,7 +149,7 @@ def nearest_block(work, low, high, solid):
         if _advance(work, LARGEST, 1.0, solid) == 0.0:
             break
     if several > 0.0:
-        # elements that may have a second solution t: iterate again, from below it
+        # elements that may have several solutions t (see top): find the smallest, from below
         for lane in range(LANES):
             mark = work[MARK * LANES + lane]
             again = mark == _CLOSED and work[LEAST * LANES + lane] > 0.0
@@ -178,7 +178,7 @@ def reference_nearest(values: np.ndarray, low: float, high: float) -> np.ndarray
 
 
 def _values_at(t: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Return the values (n, 2 or 3) that solve Lagrange's conditions with the last value t (n,)."""
+    """Return (n, 2 or 3): t_1, t_2 (not for areas) and ``t`` (n,), see top; ``values`` are s_i."""
     others, last = values[:, :-1], values[:, -1]
     square = np.square(others) + 4.0 * (t * (t - last))[:, None]
     return np.column_stack([0.5 * (others + np.sqrt(np.maximum(square, 0.0))), t])
@@ -187,7 +187,7 @@ def _values_at(t: np.ndarray, values: np.ndarray) -> np.ndarray:
 def _bisected(
     below: np.ndarray, above: np.ndarray, values: np.ndarray, target: np.ndarray
 ) -> np.ndarray:
-    """Return `_values_at` t with product ``target``; bisect t from ``below`` to ``above`` (n,)."""
+    """Bisect t from ``below`` to ``above`` (n,); return `_values_at` t, with product ``target``."""
     for _ in range(120):
         middle = 0.5 * (below + above)
         small = _values_at(middle, values).prod(axis=1) < target
@@ -200,7 +200,7 @@ def _nearest_of_several(values: np.ndarray, target: float) -> np.ndarray:
     smallest = min(target / values[:-1].prod(), last)
     grid = np.union1d(np.geomspace(smallest, last, 500), np.linspace(smallest, last, 500))
     same = np.tile(values, (len(grid), 1))
-    # up to round-off, no solution t is smaller than grid[0]: the product there is too small
+    # the product at t = grid[0] is not above ``target``, unless by round-off, hence small[0]
     small = _values_at(grid, same).prod(axis=1) < target
     small[0] = True
     crossed = np.flatnonzero(small[:-1] & ~small[1:])

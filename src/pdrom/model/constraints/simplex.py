@@ -39,8 +39,8 @@ class SimplexGroup(StencilGroup):
 
     A subclass sets two kernels. It overrides `_extra` if they do not read the operator S_e.
 
-    accumulate_kernel : a `pdrom.model.constraints.local_kernel.local_kernel` whose units are blocks
-    project_kernel : local kernel that writes projections of the elements that its record lists
+    accumulate_kernel : `pdrom.model.constraints.local_kernel.local_kernel` that adds blocks' forces
+    project_kernel : local kernel that writes projections of the sampled elements (see `ELEMENTS`)
     """
 
     accumulate_kernel: Any
@@ -63,7 +63,7 @@ class SimplexGroup(StencilGroup):
         self._corners = pack(visited)
         numbers = self._visited(np.column_stack([self.weights, *self._extra()]))
         self._geometry = pack(numbers)
-        # copies that fill up the last block have the weight 0, hence no force and no energy
+        # copies of the last element fill up its block: with weight 0 they add no force or energy
         by_lane = self._geometry.reshape(blocks(e), numbers.shape[1], LANES)
         by_lane[-1:, WEIGHT, e - LANES * (blocks(e) - 1) :] = 0.0
         self._work = workspaces(self.work_size)
@@ -90,13 +90,13 @@ class SimplexGroup(StencilGroup):
         return LocalKernel(function, self.S.shape[1], count, arrays, numbers, touched)
 
     def _extra(self) -> list[np.ndarray]:
-        """Return arrays (e, n) to pack after the weights: S_e without the column of corner 0."""
+        """Return arrays (e, numbers) to pack after the weights: operators S_e without column 0."""
         return [self.operator[:, :, 1:].reshape(self.elements, self.rows_per_element**2)]
 
 
 @lane_function
 def arguments(y, rhs, record, part, corners, numbers):
-    """Return arrays y, rhs, corners, geometry, constants, work; ``part``'s first block and end.
+    """Return arrays y, rhs, corners, geometry, constants, work; block range [a, b) of ``part``.
 
     ``y``, ``rhs`` and ``record`` are the addresses that a `local_kernel` gets. An element has
     ``corners`` vertices and ``numbers`` packed numbers.
@@ -119,10 +119,10 @@ def arguments(y, rhs, record, part, corners, numbers):
 
 @lane_function
 def samples(record, corners, numbers):
-    """Return three arrays of a kernel's ``record``: elements to project, corners, and geometry.
+    """Return three arrays of ``record``: elements to project, and working arrays for a block.
 
-    The last two are memory for one block of elements, see `pdrom.model.constraints.lanes.take`,
-    with ``corners`` vertices and ``numbers`` packed numbers per element.
+    `pdrom.model.constraints.lanes.take` writes to these the ``corners`` vertices and the
+    ``numbers`` packed numbers (weight, operator, rest shape) of each element of the block.
     """
     entries = rows.indices(record, ARRAYS)
     return (

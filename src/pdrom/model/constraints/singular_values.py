@@ -54,11 +54,11 @@ def project(y_place, p_place, record, part, rows, gradients, nearest):
 
 @template
 def accumulate(y_place, rhs_place, record, part, rows, gradients, nearest, forces):
-    """Add S^T W p of all elements in a ``part`` to the right-hand side; return their energy in J.
+    """Add S^T W p of the elements of a ``part`` to the right-hand side; return their energy in J.
 
     Parameters
     ----------
-    y_place, rhs_place, record : addresses of positions, right-hand side and record of a kernel
+    y_place, rhs_place, record, part : arguments of a kernel, see `local_kernel`
     rows : number of rows of S_e
     gradients, nearest, forces : functions of a block of elements; they compute S q, p, the forces
     """
@@ -100,7 +100,7 @@ def project_gradients(d_pointer, range_pointer, p_pointer, m, rows, work_size, n
 
 
 class StrainConfig(GroupConfig):
-    """Allowed range [``minimum``, ``maximum``]: singular values, or area or volume / rest value."""
+    """Range [``minimum``, ``maximum``] of singular values, or of area or volume / value at rest."""
 
     minimum: Annotated[float, Field(gt=0.0, le=1.0)] = 0.99
     maximum: Annotated[float, Field(ge=1.0, le=1e3)] = 1.01

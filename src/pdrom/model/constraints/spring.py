@@ -14,10 +14,10 @@ from pdrom.model.constraints.lanes import LANES, SMALLEST, lane_function, pack, 
 from pdrom.model.constraints.local_kernel import gradient_kernel, local_kernel
 from pdrom.model.mesh.types import Mesh
 
-# numbers packed per edge: GEOMETRY (weight, rest length at LENGTH) and REST (x, y, z at rest)
+# each edge has GEOMETRY packed numbers: its weight and, at offset LENGTH, its rest length
 LENGTH, GEOMETRY = 1, 2
-REST = 3
-# indices into a kernel's record, of two addresses: all rest edges, memory for a block of them
+REST = 3  # components x, y, z of an edge in the rest shape, packed in another array
+# indices in a kernel's record: address of all rest edges, address of memory for a block of them
 REST_EDGES, TAKEN_REST = simplex.ARRAYS, simplex.ARRAYS + 1
 # squared lengths in this range neither overflow nor lose digits
 LOW, HIGH = 1e-280, 1e280
@@ -53,7 +53,7 @@ def _rest_lengths(x, y, z, length, rest, place):
 
 @lane_function
 def _project_block(work, geometry, geometry_block, rest, rest_block):
-    """Project the block of edges in ``work``; write p to ``work``; ``rest`` has edges at rest."""
+    """Write projections p of the edges in ``work`` to it; ``rest``: edges in the rest shape."""
     for lane in range(0, LANES, WIDTH):
         edge, p = simplex.EDGE * LANES + lane, simplex.P * LANES + lane
         px, py, pz = _rest_lengths(
@@ -161,7 +161,7 @@ class EdgeSpring(simplex.SimplexGroup):
         self._assemble(mesh.vertices)
 
     def _assemble(self, vertices: int) -> None:
-        # rest edges are stored apart from the geometry, since only edges of length zero need them
+        # rest edges are not in `_geometry`: only edges whose current length is zero need them
         self._own_arrays = pack(self.rest), np.empty(REST * LANES)
         super()._assemble(vertices)
 

@@ -19,7 +19,7 @@ LAST_TANGENT = 1e-8
 # a second singular value below this fraction of the first is round-off: its vector is replaced
 RANK = 1e-15
 
-# further offsets in the working array: B, V, scale, DONE (1: columns are orthogonal), the signed
+# further offsets in the working array: B = F V / scale, V, scale, DONE (1: B is orthogonal), signed
 # singular values, FOUND (1: a cheaper method has already computed this lane's projection)
 B, V, SCALE, DONE, SIGMA, FOUND, SIZE = np.add(simplex.SIZE, [0, 9, 18, 19, 20, 23, 24]).tolist()
 

@@ -60,7 +60,7 @@ def _advance(work):
 
 @lanes.lane_function
 def _rotations(work):
-    """Write the rotation nearest to F of each element to P; set FOUND to 1 if converged, or 0."""
+    """Save at offset P the rotation nearest to F, at FOUND 1 if the iteration converged, else 0."""
     _start(work)
     for _ in range(STEPS):
         _advance(work)

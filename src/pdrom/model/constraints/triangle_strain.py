@@ -69,7 +69,7 @@ def _rotated(f0, f1, low, high):
     return mix(c, a, s, b), mix(c, b, -s, a)
 
 
-# number of packed numbers of an element: the weight and 4 entries of the operator
+# number of packed numbers of an element: its weight and the 2 x 2 matrix that maps edges to F^T
 GEOMETRY = 5
 # offset of the flag "closed form is accurate" in the working array; size of this array
 FOUND, WORK = SIZE, SIZE + 1
@@ -110,7 +110,7 @@ def forces(work, geometry, block):
 
 @lanes.lane_function
 def _nearest(work, low, high):
-    """Write each F of a block, singular values clamped to [low, high], to P; nan if not finite."""
+    """Write P: each triangle's F, singular values clamped to [low, high]; nan if not finite."""
     for lane in range(LANES):
         p0, p1, suited = _closed_form(load(work, F, lane), load(work, F + 3, lane), low, high)
         save(work, P, lane, p0)

@@ -15,13 +15,13 @@ from pdrom.model.constraints.simplex import SIZE, F, P
 from pdrom.model.constraints.svd3 import FOUND, SIGMA, rotated_pair
 from pdrom.model.constraints.tetrahedron import TetrahedronGroup, forces, gradients
 
-# offset of module `products`' numbers in the working array of volume constraints; size of the array
+# working array of volume constraints: offset of the numbers that module `products` uses; its size
 VALUES, WORK = svd3.SIZE, svd3.SIZE + products.SIZE
 
 
 @lanes.lane_function
 def _nearest(work, low, high):
-    """Write to P, for each F of a block, the nearest matrix with determinant in [low, high]."""
+    """Write to ``work`` each element's projection: matrix nearest to F with det in [low, high]."""
     for lane in range(lanes.LANES):
         f0, f1, f2 = lanes.load_matrix(work, F, lane)
         volume = lanes.dot(f0, lanes.cross(f1, f2))
@@ -76,14 +76,14 @@ class TetrahedronVolume(TetrahedronGroup):
 
 
 # further offsets in the working array of area constraints: columns of U, cosine and sine of the
-# rotation V, followed by the numbers of module `products`
+# rotation V, followed by the `products.SIZE` values with which module `products` works
 U, COSINE, SINE = SIZE, SIZE + 6, SIZE + 7
 AREA_VALUES, AREA_WORK = SIZE + 8, SIZE + 8 + products.SIZE
 
 
 @lanes.lane_function
 def _nearest_area(work, low, high):
-    """Write to P, for each F of a block, the nearest matrix with sigma_1 sigma_2 in [low, high]."""
+    """Write to ``work``, as P, each triangle's F projected to sigma_1 sigma_2 in [low, high]."""
     values = work[AREA_VALUES * lanes.LANES :]
     for lane in range(lanes.LANES):
         f0, f1 = lanes.load(work, F, lane), lanes.load(work, F + 3, lane)
@@ -91,7 +91,7 @@ def _nearest_area(work, low, high):
         u0, u1, s0, s1 = pair
         lanes.save(work, U, lane, u0)
         lanes.save(work, U + 3, lane, u1)
-        # if columns were swapped, V includes the rotation by 90 degrees that swaps them
+        # if `rotated_pair` swapped the columns, V includes the 90 degree rotation that does so
         work[COSINE * lanes.LANES + lane] = s if swapped else c
         work[SINE * lanes.LANES + lane] = -c if swapped else s
         lanes.save(values, products.VALUES, lane, (scale * s0, 1.0, scale * s1))

@@ -16,14 +16,14 @@ from pdrom.model.compiled.rows import flat, write
 # Tikhonov term, relative to the diagonal, of the least-squares problem for the weights of a
 # combination. It bounds them if residual differences are nearly parallel, as near convergence.
 REGULARISATION = 1e-14
-# Index, in array 6 of `_history`, of the number of differences; this is -1 before any iterate.
+# Index of the number of differences in array 6 that `_history` returns; -1 there: no iterate yet
 DIFFERENCES = 0
 
 
 @inner
 def _weights(gram, projection, count):
-    """Return weights (count,) of differences of images G(y), by regularised least squares; zeros,
-    so that the next iterate is G(y), if the Gram matrix ``gram`` is not positive definite."""
+    """Return weights (count,) of differences of images G(y) (see top) by regularised least squares;
+    zeros if the Gram matrix ``gram`` of the residual differences is not positive definite."""
     factor, weights = np.zeros((count, count)), np.zeros(count)
     for i in range(count):
         for j in range(i + 1):
@@ -61,8 +61,8 @@ def forget(history):
 def refuse(history, y, objective, plain=1):
     """Reject iterate ``y`` (n,) if its ``objective`` has risen; compiled form of `Anderson.refuse`.
 
-    Without a test it accepts the first iterate of ``history``, an image G(y) that replaces a
-    rejected iterate, and ``plain`` iterates after each of these: G does not raise the objective.
+    The first iterate, an iterate G(y) that replaced a rejected one, and the ``plain`` iterates that
+    follow one of these are never rejected, since an iteration G does not raise the objective.
     """
     start, _, image, _, _, _, numbers, last = history
     if numbers[DIFFERENCES] >= plain and objective > last[0]:
@@ -146,8 +146,8 @@ class Anderson:
         forget(self.history)
 
     def refuse(self, y: np.ndarray, objective: float) -> bool:
-        """Return whether iterate ``y`` is rejected, as its ``objective``, J, has risen. It is then
-        overwritten by the last image G(y) and the history deleted; nan counts as not risen."""
+        """Return whether iterate ``y`` is rejected: its ``objective``, J, has risen (nan: not).
+        It is then overwritten by G (see top) of the last accepted iterate, the history deleted."""
         return refuse(self.history, _numbers(y), objective)
 
     def combine(self, image: np.ndarray) -> None:

@@ -5,7 +5,7 @@ The iterate ``y`` and the prediction ``s`` are flat arrays of rows of four numbe
 
 If local steps and solver are compiled, one compiled loop runs the iterations of a frame. One call
 runs several whole frames in scenes that need no Python code between two frames: forces are
-constant or proportional to the velocity, local steps are compiled and need no data once per frame,
+constant or proportional to the velocity, local steps are compiled and prepare no data of a frame,
 and all contacts are floors. A call ends before a later frame in which the set of held (prescribed)
 vertices changes or a hold begins, because the targets of the vertices are known only then."""
 
@@ -26,7 +26,7 @@ from pdrom.model.effects.base import Boundary, Contact, Force
 
 @compiled(nogil=True)
 def predict(positions, velocities, acceleration, time_step):
-    """Return q + h v + h^2 a as a flat array of rows of four numbers, with h = ``time_step``.
+    """Return q + h v + h^2 a (h: ``time_step``) as a flat array: x, y, z and 0 for each vertex.
 
     ``positions`` q and ``velocities`` v are (N, 3), ``acceleration`` a is (N, 3) or (1, 3).
     """
@@ -112,14 +112,14 @@ class CompiledIterations:
         elimination: Elimination,
         seconds: np.ndarray,
     ) -> None:
-        """Compute the iterations ``which`` of the K ``iterations`` of a frame, in place.
+        """Compute iterations ``which`` of the K = ``iterations`` of a frame; change ``y`` in place.
 
         Parameters
         ----------
         objective : (K,) receives the objective at the iterates, J; empty if it is not tracked
         y, base : iterate and (M/h^2) s, (N, 3) views of arrays (N, 4) with a column of zeros
         s : (N, 3) prediction
-        elimination : the factored system, accepted by `takes`
+        elimination : the factored system, one for which `takes` returns True
         seconds : (4,) s; the times of local and global steps are added to entries 1 and 2
         """
         history = NO_HISTORY if self._acceleration is None else self._acceleration.history
@@ -146,7 +146,7 @@ def all_iterations(
     which : (first, end, K): compute iterations first, ..., end - 1 of the K iterations of a frame
     y, s, base, rhs : iterate, prediction, (M/h^2) s, working array; flat rows of four numbers
     inertia : (N,) M/h^2, kg/s^2
-    tables : tables of a `LocalPass`: first parts of its kernels, their preparations, second parts
+    tables : tables of a `LocalPass`: for first parts of local steps, preparation, second parts
     second : array to which second parts add; first and end index of the vertices that they change
     factor : triangular factor of the global system (`pdrom.model.dynamics.solvers.Factor`)
     history : history of the acceleration; with `NO_HISTORY` its code is not compiled
@@ -163,7 +163,7 @@ def all_iterations(
         add_part(preparing, y.ctypes.data, rhs.ctypes.data)
         energy = add_part(local, y.ctypes.data, rhs.ctypes.data)
         if stop > start:
-            # the second part of each local step adds to a separate array, which is added to rhs
+            # part 1 of the work (module `local_kernel`) adds to ``other``, which is added to rhs
             other[WIDTH * start : WIDTH * stop] = 0.0
             energy += add_part(kernels, y.ctypes.data, other.ctypes.data)
             for i in range(WIDTH * start, WIDTH * stop):
@@ -184,7 +184,7 @@ def all_iterations(
                 objective[k] = objective[k - 1]
         else:
             sweep(panels, vertices, loads, work, rhs, y)
-            # the last iterate is G(y), not a combination, as its objective cannot exceed that of y
+            # the last iteration is not accelerated, so that it cannot raise the objective
             if history is not None and k < iterations - 1:
                 combine(history, y)
         seconds[2] += now(watch) - between
@@ -204,8 +204,8 @@ class WholeFrames:
     Parameters
     ----------
     space : space whose ``held_path`` and ``system`` are used
-    loop : the compiled iterations
-    forces, contacts : of a scene; every force has a (damping) ``rate``, every contact is a floor
+    loop : compiled iterations that are run in each frame
+    forces, contacts : of the scene; no ``rate`` of a force is None, and each contact is a floor
     """
 
     def __init__(

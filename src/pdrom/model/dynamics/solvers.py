@@ -20,8 +20,8 @@ from pdrom.model.compiled.functions import compiled
 from pdrom.model.compiled.rows import WIDTH
 from pdrom.model.dynamics.sweeps import SWEEP, WIDTHS, load, sweep
 
-# Estimated processor cycles of a panel (a mispredicted branch, dependent columns), of a row below
-# it and of an entry of that row; fitted to sheets and bars of 400 to 10,000 vertices.
+# Estimated processor cycles of the substitution: for a panel of columns of L (mispredicted branch,
+# columns wait for each other), a row below it, a row's entry; fitted to 400 to 10,000 vertices.
 PANEL, ROW, ENTRY = 20.0, 1.0, 0.5
 
 
@@ -39,7 +39,7 @@ def panels(lower: sparse.csc_array, diagonal: np.ndarray) -> tuple[Any, ...]:
     row_start, value_start : (P + 1,) first index of each panel in ``rows`` and in ``values``
     rows : indices of the rows below each panel, times `pdrom.model.compiled.rows.WIDTH`
     values : for each panel of w columns with m rows below: 1 / D (w,), the strict lower triangle of
-        its part of L row by row, then its rows below (m, w)
+        L in the panel's own w rows, row by row, then the part of L in the m rows below, (m, w)
     """
     n = lower.shape[0]
     below = np.zeros((max(WIDTHS) + 1, n), np.int64)
@@ -85,9 +85,9 @@ def _count_rows_below(indptr, indices, seen, below):
 
 @compiled
 def _choose(below, widths, cost, chosen):
-    """Write to chosen[k] the last panel's width in the cheapest partition of the first k columns.
+    """Write to chosen[k] the last panel's width in the cheapest division of the first k columns.
 
-    ``cost`` (n + 1,) is working memory, filled with inf.
+    ``below``: see `_count_rows_below`. ``cost`` (n + 1,) is working memory, filled with inf.
     """
     cost[0] = 0.0
     for end in range(1, len(cost)):
@@ -101,7 +101,7 @@ def _choose(below, widths, cost, chosen):
 
 @compiled
 def _fill(indptr, indices, data, inverse, first, row_start, value_start, rows, values, place):
-    """Fill ``rows`` and ``values`` for `panels`; ``place`` (n,) is working memory, all -1."""
+    """Fill ``rows`` and ``values``, which `panels` returns; ``place`` (n,): work memory, all -1."""
     for panel in range(len(first) - 1):
         a, b = first[panel], first[panel + 1]
         width, start = b - a, row_start[panel]

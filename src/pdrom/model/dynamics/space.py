@@ -36,15 +36,15 @@ class Space(ABC):
         return s.copy()
 
     def end(self, y: np.ndarray, before: np.ndarray, h: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return coordinates and velocities after a frame; ``before``: coordinates at its start."""
+        """Return coordinates (last iterate ``y``) and velocities; ``before``: old coordinates."""
         return y, (y - before) / h
 
     def compiled(
         self, local_steps: Sequence[Any], acceleration: Anderson | None = None
     ) -> tuple[CompiledIterations | None, WholeFrames | None]:
-        """Return compiled code for the iterations of a frame and for whole frames.
+        """Return compiled loops over a frame's iterations and over frames, with ``acceleration``.
 
-        Either is None if none exists for these coordinates or steps; both use ``acceleration``.
+        A loop that does not exist for these coordinates or for ``local_steps`` is None.
         """
         return None, None
 
@@ -104,7 +104,7 @@ class VertexSpace(Space):
     def held_path(self, frames: range, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the vertices (m,) held in the first n ``frames``, and their targets (n, m, 3) m.
 
-        ``positions`` (N, 3) m: at the start of the first frame; n: see `effects.base.held_path`.
+        Holds begin or end only in the first of these frames; ``positions`` (N, 3) m: at its start.
         """
         return base.held_path(self._boundaries, frames, positions)
 

@@ -84,7 +84,7 @@ class Stepper:
         self.local_steps = list(local_steps)
         self._acceleration = acceleration
         self._track = track_objective
-        # a subclass may set another object with a method `run` like that of `WholeFrames`
+        # `WholeFrames` or None; a subclass may set another object that has the same method `run`
         self._whole: Any
         self._compiled, self._whole = space.compiled(self.local_steps, acceleration)
 
@@ -136,7 +136,7 @@ class Stepper:
         ]
 
     def _begin(self, state: State, frame: int) -> tuple[np.ndarray, Solve, np.ndarray]:
-        """Return prediction s (fixed rows are targets), the factored system, and (M/h^2) s."""
+        """Return prediction s with targets in fixed rows, the factored system, and (M/h^2) s."""
         space, h = self.space, self.time_step
         s = space.predict(state.positions, state.velocities, h)
         fixed, targets = space.fixed(frame, state.positions)
@@ -150,10 +150,10 @@ class Stepper:
     def _iterate(
         self, s: np.ndarray, base: np.ndarray, system: Solve, seconds: np.ndarray, watch: Observer
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Compute all iterations of a frame from y = s; return the last y and the objective (K,).
+        """Compute all iterations of a frame; return the last iterate and the objective (K,), J.
 
-        The times of local and global steps are added to ``seconds``; ``watch`` is called with the y
-        with which the last iteration begins.
+        They begin with the prediction ``s``. Times of local and global steps are added to
+        ``seconds``; ``watch`` is called with the iterate with which the last iteration begins.
         """
         y = self.space.copy(s)
         objective = np.full(self.iterations if self._track else 0, np.nan)
@@ -179,7 +179,7 @@ class Stepper:
     ) -> None:
         """Compute iteration k without compiled code; update y, objective and seconds in place.
 
-        ``vectors`` are s, (M/h^2) s and y.
+        ``vectors`` are the prediction s of the frame, (M/h^2) s and the iterate y.
         """
         s, base, y = vectors
         space, acceleration = self.space, self._acceleration

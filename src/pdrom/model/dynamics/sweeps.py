@@ -44,7 +44,7 @@ class _Panel:
         return spread(self.builder, self.builder.load(self.builder.gep(pointer, [offset])))
 
     def inverse(self, column):
-        """Return 1 / (entry of D) for ``column`` of the panel, in all numbers of a register."""
+        """Return 1 / (entry of D in L D L^T) for ``column``, in all four numbers of a register."""
         return self._spread(self._own, self._index(column))
 
     def triangle(self, row, column):
@@ -52,7 +52,7 @@ class _Panel:
         return self._spread(self._own, self._index(self.width + row * (row - 1) // 2 + column))
 
     def pointer(self, offset):
-        """Return the address of number ``offset`` of the right-hand side, where a row begins."""
+        """Return the address of the right-hand side's row that begins at its entry ``offset``."""
         return self.builder.bitcast(self.builder.gep(self._x, [offset]), NUMBERS.as_pointer())
 
     def column(self, k):
@@ -83,7 +83,7 @@ class _Panel:
 
 
 def _panel_intrinsic(write):
-    """Return a Numba intrinsic for one panel, of LLVM instructions that ``write`` generates."""
+    """Return a Numba intrinsic for a panel of L; ``write(panel)`` generates its instructions."""
 
     def typed(_context, width, x, first, rows, start, stop, values, value_start):
         def generate(context, builder, signature, arguments):
@@ -170,7 +170,7 @@ def load(beside, indptr, indices, data, targets, loads):
 def _sweep(
     count, first, row_start, value_start, rows, values, size, vertices, loads, x, rhs, y
 ):  # fmt: skip
-    """Compute `sweep` for ``count`` panels, ``size`` unknowns; other arguments are addresses."""
+    """Compute `sweep` for ``size`` unknowns in ``count`` panels of L; the rest are addresses."""
     first, vertices = integers(first, count + 1), integers(vertices, size)
     row_start, value_start = indices(row_start, count + 1), indices(value_start, count + 1)
     rows, values = integers(rows, row_start[count]), doubles(values, value_start[count])

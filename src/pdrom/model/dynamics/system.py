@@ -21,8 +21,8 @@ class Elimination:
 
     Attributes
     ----------
-    factor : first arguments of `sweeps.sweep`; None if the solver is not compiled
-    coupling : first arguments of `sweeps.load`
+    factor : (panels, vertices, loads, x) for `sweeps.sweep`; None if the solver is not compiled
+    coupling : (beside, indptr, indices, data) for `sweeps.load`
     """
 
     def __init__(self, matrix: sparse.csr_array, fixed: np.ndarray, solver: str) -> None:

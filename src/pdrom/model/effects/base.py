@@ -62,13 +62,13 @@ class EffectConfig(ConfigModel):
         """Raise ValueError if the effect is unstable with a time step of ``time_step`` s."""
 
     def redirected(self, axes: Sequence[int]) -> Self:
-        """Return the effect; handles reverse their motion or turn it in the plane of ``axes``."""
+        """Return a changed copy of a handle: motion reversed or turned in the plane of ``axes``."""
         return self
 
     def tilted(self, degrees: float, axes: Sequence[int], place: int) -> Self:
         """Return the effect; gravity is turned by ``degrees``, other effects do not change.
 
-        Gravity turns towards entry ``place`` of those ``axes`` (0, 1, 2) not parallel to gravity.
+        Gravity turns towards entry ``place`` of the list of ``axes`` (0, 1, 2) not parallel to it.
         """
         return self
 
@@ -169,7 +169,7 @@ class Boundary(Effect):
 
     @abstractmethod
     def units(self) -> list[np.ndarray]:
-        """Return the sets of vertices that are always held at the same time."""
+        """Return sets of vertices; the vertices of one set are always held in the same frames."""
 
 
 class Contact(Effect):
@@ -182,11 +182,11 @@ class Contact(Effect):
     """Height y, m, for a floor: a contact that only moves lower vertices up to y; else None."""
 
     def gaps(self, points: np.ndarray) -> np.ndarray:
-        """Return distances (n,) m of ``points`` (n, 3) m to an obstacle (inf: none), < 0 inside."""
+        """Return distances (n,) m of ``points`` (n, 3) m to obstacles, < 0 inside; inf if none."""
         return np.full(len(points), np.inf)
 
     def apply(self, positions: np.ndarray, before: np.ndarray, held: np.ndarray) -> None:
-        """Correct all vertices except the ``held`` ones (n,), in place.
+        """Resolve the contact at all vertices except the ``held`` ones (n,); changes ``positions``.
 
         A contact that moves several vertices together (self-collision) overrides this method.
 
@@ -291,5 +291,5 @@ def held_path(
         known += 1
     paths = [b.path(frames[:known], q) for b, q in zip(active, current, strict=True)]
     if single:
-        return vertices, np.array(paths[0], order="C")  # a copy: for views, Numba compiles anew
+        return vertices, np.array(paths[0], order="C")  # a view would make Numba compile again
     return vertices, np.concatenate([np.empty((known, 0, 3)), *paths], axis=1)[:, first]

@@ -24,7 +24,7 @@ class Gravity(Force):
             own = np.array(self.acceleration)
             size = float(np.linalg.norm(own))
             free = [axis for axis in axes if abs(own[axis]) < size]
-            if not free:  # gravity is zero, or there is no axis to turn to
+            if not free:  # gravity is zero, or parallel to each of ``axes``
                 return self
             axis = free[place]
             side = size * np.eye(3)[axis] - own[axis] / size * own

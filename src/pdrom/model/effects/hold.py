@@ -96,7 +96,7 @@ class Translate(Hold):
         offset: Vector
 
         def redirected(self, axes: Sequence[int]) -> Self:
-            """Turn the offset by 90 degrees in the plane of two ``axes``; along one, reverse it."""
+            """Return a copy, its offset turned by 90 degrees in two ``axes`` or reversed in one."""
             offset = list(self.offset)
             first, second = axes[0], axes[min(1, len(axes) - 1)]
             offset[first], offset[second] = offset[second], -offset[first]

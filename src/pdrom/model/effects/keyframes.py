@@ -36,7 +36,7 @@ class Keyframes(Hold):
     """
 
     class Config(HoldConfig):
-        """Poses ``keys`` in the order of time; at ``start``, offset and turn are zero."""
+        """Poses ``keys`` in order of time; frame ``start`` begins with zero offset and rotation."""
 
         effect: Literal["keyframes"] = "keyframes"
         keys: Annotated[tuple[Key, ...], Field(min_length=1, max_length=10_000)]
@@ -50,7 +50,7 @@ class Keyframes(Hold):
             return self
 
         def with_frames_scaled(self, factor: float) -> Self:
-            """Return the effect, frame numbers times ``factor``; poses stay >= 1 frame apart."""
+            """Return a copy with frame numbers times ``factor``, poses at least 1 frame apart."""
             keys: list[Key] = []
             for key in self.keys:
                 first = keys[-1].at + 1 if keys else 1

@@ -19,7 +19,7 @@ Entries = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 class ObstacleConfig(EffectConfig):
-    """Coefficient mu of ``friction``: 0 for none, ``.inf`` (infinity) for sticking."""
+    """Coefficient mu of an obstacle's ``friction``: 0 for none, ``.inf`` (infinity): sticking."""
 
     friction: Annotated[float, Field(ge=0.0)] = 0.0
 
@@ -76,7 +76,7 @@ class Obstacle(Contact):
 
     @abstractmethod
     def normals(self, points: np.ndarray) -> np.ndarray:
-        """Return outward unit normals (n, 3) at the surface points nearest to ``points`` inside."""
+        """Return outward unit normals (n, 3) at surface points nearest to the inner ``points``."""
 
     @abstractmethod
     def entries(self, start: np.ndarray, end: np.ndarray) -> Entries:
@@ -142,14 +142,14 @@ class Sphere(Obstacle):
         return np.where(length > 0.0, arm / np.where(length > 0.0, length, 1.0), UP)
 
     def entries(self, start: np.ndarray, end: np.ndarray) -> Entries:
-        """`Entries` for the smaller root t of |start + t (end - start) - centre| = radius."""
+        """`Entries` of paths, at the least t with |start + t (end - start) - centre| = radius."""
         arm, path = start - self.config.centre, end - start
         square = np.einsum("ij,ij->i", path, path)
         inwards = -np.einsum("ij,ij->i", arm, path)
         outside = np.einsum("ij,ij->i", arm, arm) - self.config.radius**2
         root = inwards**2 - square * outside
         meets = (inwards > 0.0) & (root >= 0.0)
-        # the usual form, (inwards - sqrt(root)) / square, would lose digits near the surface
+        # t = outside / divisor; (inwards - sqrt(root)) / square would lose digits near the surface
         divisor = np.where(meets, inwards + np.sqrt(np.where(meets, root, 0.0)), 1.0)
         fraction = np.clip(np.where(meets, outside / divisor, 0.0), 0.0, None)
         points = start + fraction[:, None] * path

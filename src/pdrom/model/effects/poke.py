@@ -24,7 +24,7 @@ class Poke(Boundary):
     """
 
     class Config(EffectConfig):
-        """``amplitude``, m; a vertex moves for ``over`` frames, the next ``rest`` frames later."""
+        """``amplitude``, m; ``over``, ``rest``: frames in a vertex's motion, between motions."""
 
         effect: Literal["poke"] = "poke"
         amplitude: Length = 0.2

@@ -91,7 +91,7 @@ class SelfCollision(Contact):
 
 @njit(cache=True)
 def _separate(q, before, pairs, inverse_masses, thickness, enough, sweeps):
-    """Separate vertex ``pairs`` to ``thickness``; return the least distance in the first sweep."""
+    """Move vertex ``pairs`` apart to ``thickness``; return the least distance in the first pass."""
     first = thickness
     for sweep in range(sweeps):
         closest = thickness
@@ -107,7 +107,7 @@ def _separate(q, before, pairs, inverse_masses, thickness, enough, sweeps):
             length = np.sqrt(ex * ex + ey * ey + ez * ez)
             gap = thickness - distance
             if length > 0.0 and dx * ex + dy * ey + dz * ez <= 0.0:
-                # line from i to j turned by 90 degrees or more, or zero: use that before the frame
+                # line i to j is zero or turned >= 90 degrees in the frame: use the line before it
                 along = (dx * ex + dy * ey + dz * ez) / length
                 dx, dy, dz, distance, gap = ex, ey, ez, length, thickness - along
             elif distance == 0.0:

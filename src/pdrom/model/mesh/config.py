@@ -66,7 +66,7 @@ class GeneratedMesh(MeshModel):
         return self
 
     def coarsened(self, factor: float) -> Self:
-        """Return the mesh with ``factor`` times the vertices along each side, `least` or more."""
+        """Return the mesh with ``factor`` times the vertices along each side, at least `least`."""
         sizes = {name: max(self.least, round(getattr(self, name) * factor)) for name in self.sides}
         return self.model_copy(update=sizes)
 
@@ -203,7 +203,7 @@ class GivenMesh(MeshModel):
         return cls(kind="given", blake2b=digest.hexdigest())
 
     def build(self, root: Path) -> Mesh:
-        """Raise MeshError: the mesh cannot be built, as the configuration contains no arrays."""
+        """Raise MeshError: the configuration has a digest of the mesh's arrays, not the arrays."""
         raise MeshError("mesh.kind = 'given': its arrays come from Python (pdrom.api.build_scene)")
 
     @property

@@ -49,10 +49,7 @@ class MeshLimits:
 def mesh_limits() -> MeshLimits:
     """Return the limits, multiplied by the environment variable PDROM_MESH_LIMITS if it is set.
 
-    Raises
-    ------
-    ConfigurationError
-        The variable is not a number from 1 to 1000.
+    Raises ConfigurationError if the variable is not a number from 1 to 1000.
     """
     text = os.environ.get(VARIABLE, "1")
     try:

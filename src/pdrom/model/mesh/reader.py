@@ -77,15 +77,12 @@ def _limit(name: str, value: int) -> None:
 def read(path: str, formats: list[str], max_vertices: int, max_cells: int) -> tuple:
     """Return points (N, 3) float64 and cells (E, 3 or 4) int64 of the file ``path``.
 
+    Raises ValueError, whose message states why, if the file is not a readable mesh.
+
     Parameters
     ----------
     formats : meshio's names of possible formats, the most likely one first
     max_vertices, max_cells : largest allowed numbers of vertices and cells
-
-    Raises
-    ------
-    ValueError
-        The file is not a readable mesh; the message states why.
     """
     with open(path, "rb") as file:
         begins = file.read(64).lstrip()[:1]
@@ -116,7 +113,7 @@ def read(path: str, formats: list[str], max_vertices: int, max_cells: int) -> tu
 
 
 def _by_meshio(path: str, name: str) -> tuple:
-    """Read points and cells by meshio's reader ``name``; call `check_before` and `check_after`."""
+    """Read points and cells by meshio's reader ``name``; raise if it may misread the file."""
     import meshio
     from meshio.gmsh import _gmsh40
     from meshio.gmsh import main as gmsh
@@ -212,13 +209,13 @@ def reason(error: BaseException) -> str:
 
 # More than PATIENCE reads, of less than PIECE bytes, past the end of a file mean an endless loop.
 PIECE, PATIENCE = 4096, 100
-# Format -> pattern in complete files only; `check_after`, `ends_noticed` check other formats.
+# Format -> pattern that no truncated file has. `check_after`, `ends_noticed` check other formats.
 ENDS = {
     "ansys": rb"\)\s*\Z",
     "gmsh": rb"^\$End\w+\s*\Z",
     "medit": rb"\A\x01\0\0\0|^\s*End\s*\Z",  # or a binary file, which has no end mark
     "nastran": rb"^ENDDATA",
-    "netgen": rb"^\s*endmesh\s*$",  # a section with the geometry may follow
+    "netgen": rb"^\s*endmesh\s*$",  # not the end: a geometry section may follow
     "permas": rb"^\s*\$FIN",
     "stl": rb"^\s*endsolid[^\n]*\s*\Z",
     "vtu": rb"</VTKFile>\s*\Z",
@@ -284,7 +281,7 @@ def check_after(name: str, content: bytes, mesh: Any) -> None:
         counts = re.findall(rb"^[ \t]*(?:NELEM|MARKER_ELEMS)[ \t]*=[ \t]*(\d+)", content, re.M)
         announced = {sum(map(int, counts))}
     elif name == "vtk":
-        offsets = content.startswith(b"# vtk DataFile Version 5")  # in "CELLS n", n is cells + 1
+        offsets = content.startswith(b"# vtk DataFile Version 5")  # "CELLS n" means n - 1 cells
         counts = re.findall(rb"^(CELLS|CELL_TYPES)[ \t]+(\d+)", content, re.M)
         announced = {int(count) - (offsets and word == b"CELLS") for word, count in counts}
     if announced - {there}:
@@ -392,7 +389,7 @@ class _Bytes(_Noticing, io.BufferedReader):
 
     def read(self, size: int | None = -1, /) -> bytes:
         content = super().read(size)
-        # only small reads count: readers of large pieces may rightly ask for more than the file has
+        # a large read is not noted: code that reads large pieces may request more than is left
         if size and len(content) < size < PIECE:
             self.note()
         return content
@@ -418,7 +415,7 @@ def read_obj(path: Path) -> tuple[np.ndarray, np.ndarray]:
     content = re.sub(rb"#[^\n]*", b"", path.read_bytes())
     vertices: list[bytes] = []
     faces: list[bytes] = []
-    before: list[int] = []  # number of vertices before each face; index -1 is the last of them
+    before: list[int] = []  # number of vertices before each face; a corner -1 is the last of these
     whole_lines = re.sub(rb"\\[ \t]*\r?\n", b" ", content)
     for line in whole_lines.splitlines():
         words = line.split(None, 1)

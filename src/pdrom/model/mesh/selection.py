@@ -200,7 +200,7 @@ SIDES = {
     "back": (2, -1),
     "front": (2, 1),
 }
-TOLERANCE = 1e-6  # tolerance of coordinates of a side, relative to the mesh's longest side
+TOLERANCE = 1e-6  # distance to a side up to which vertices belong to it, relative to the extent
 
 
 def select_vertices(mesh: Mesh, selection: Selection) -> np.ndarray:

@@ -1,8 +1,8 @@
 """Levels of accuracy (full-order or reduced solvers with K iterations), their runs and errors.
 
-The reference run of a motion solves the implicit step by iterations with Anderson acceleration. It
-has enough of them if a run with half as many differs from it by less than the tolerance. This
-difference is used as the error of the reference run.
+The reference run of a motion solves the implicit step by iterations with Anderson acceleration.
+They are enough if the run's error, estimated from its differences to runs with half and a quarter
+as many iterations, is less than the tolerance.
 
 The cost of a frame is computed from operation counts, not timed, so that the choice of a level is
 reproducible. Constants were measured on one thread of a 2024 processor; only their ratios matter.
@@ -29,14 +29,15 @@ WINDOW = 5  # number of differences of iterates that Anderson acceleration combi
 PROJECTION, ENTRY, ACCELERATED = 5.0, 0.9, 6.5
 FRAME, IN_PYTHON = 2.3e4, 1.2e5
 # Costs of reduced models in ns. An iteration: ITERATION, SAMPLED p^2 per sampled element of p rows,
-# DENSE per entry of dense matrices. A frame: REDUCED_FRAME, REDUCED_IN_PYTHON as for full order.
+# DENSE per entry of dense matrices. A frame also: REDUCED_FRAME (+ REDUCED_IN_PYTHON if in Python).
 SAMPLED, DENSE, ITERATION = 12.5, 0.23, 1.2e3
 REDUCED_FRAME, REDUCED_IN_PYTHON = 4e4, 2.3e5
 # The Cholesky factor of a matrix with n entries in N rows has about FILL n log2 N entries.
 FILL = 0.35
 # Size of the random shift of a perturbed start, relative to the mesh's longest side, and its seed.
 MOVED, SEED = 1e-10, 0
-CONVERGED, MOST = 80, 320  # first and largest number of iterations per frame of a reference run
+SLOWEST = 10.0  # largest ratio of error to change by doubling the iterations (`remainder`)
+CONVERGED, MOST = 80, 320  # iterations per frame of a reference run: at first, and at most
 Quantity = Literal["position", "velocity"]
 QUANTITIES: tuple[Quantity, ...] = get_args(Quantity)
 
@@ -72,16 +73,16 @@ class Level:
 
     @property
     def exact(self) -> "Level":
-        """More accurate full-order level, with whose frames those of this level are compared."""
+        """More accurate full-order level, whose frames serve as reference to check this level."""
         return Level(CONVERGED if self.model is not None else 2 * self.iterations, WINDOW)
 
     def scene(self, scene: Scene) -> Scene:
-        """Return ``scene`` with the number of iterations and the Anderson window of the level."""
+        """Return ``scene`` with the number of iterations and the Anderson window of this level."""
         changes = {"iterations": self.iterations, "anderson_window": self.window}
         return replace(scene, config=scene.config.model_copy(update=changes))
 
     def work(self, scene: Scene) -> float:
-        """Estimated time, ns, of a frame; contacts add `REDUCED_IN_PYTHON` to a reduced model's."""
+        """Estimated time of a frame, ns; for a reduced model, contacts add `REDUCED_IN_PYTHON`."""
         effects = scene.groups, scene.forces, scene.boundaries, scene.contacts
         slow = not WholeFrames.suits(*effects)
         if self.model is None:
@@ -201,6 +202,18 @@ def last_within(errors: np.ndarray, tolerance: float) -> int:
     return int(within[-1]) + 1 if len(within) else 0
 
 
+def remainder(change: np.ndarray, before: np.ndarray) -> np.ndarray:
+    """Return the ratio (F,), 1 to `SLOWEST`, of a run's estimated error to its last ``change``.
+
+    Doubling the iterations changed the run by ``before`` (F,), doubling them again by ``change``.
+    If each further doubling reduces the change by the same factor x, all later changes add up to
+    x / (1 - x) times ``change``.
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        rest = change / (before - change)
+    return np.where(change < before, np.clip(rest, 1.0, SLOWEST), SLOWEST)
+
+
 class Motion:
     """Reference run of ``scene``, converged to the error ``tolerance``, and its accuracy.
 
@@ -212,7 +225,8 @@ class Motion:
     ----------
     reference : (F + 1, N, 3) m, positions
     iterations : number of iterations in each frame of the reference
-    unconverged : relative errors (F,) of a run with half the iterations
+    unconverged : estimated relative errors (F,) of the reference, from runs with half and a quarter
+        of the iterations, see `remainder`
     sensitivity : relative errors (F,) of a run with initial positions perturbed by `MOVED`
     unit : root mean square over frames of the displacement norm, m
     """
@@ -221,25 +235,25 @@ class Motion:
         self, scene: Scene, tolerance: float, quantity: Quantity, on_frame: OnFrame = silent
     ) -> None:
         self.scene, self.quantity = scene, quantity
-        count = CONVERGED
+        count = CONVERGED // 2
 
         def run(iterations: int, moved: bool = False) -> np.ndarray:
             level = Level(iterations, WINDOW)
             return Trajectory(level, scene, moved, on_frame).to(scene.config.frames).positions
 
         half, self.reference = run(count // 2), run(count)
-        apart = run(count // 2, moved=True)[1:] - half[1:]
-        self.sensitivity = relative_errors(apart, half, self.quantity)
-        known = last_within(self.sensitivity, tolerance)
-        self.unconverged = self.errors(half)
+        self.sensitivity, change = self.errors(run(count, moved=True)), self.errors(half)
+        known = max(last_within(self.sensitivity, tolerance), 1)
+        self.unconverged = np.full(len(change), np.inf)
         while last_within(self.unconverged, tolerance) < known and count < MOST:
-            count, half = 2 * count, self.reference
+            count, half, before = 2 * count, self.reference, change
             self.reference = run(count)
-            self.unconverged = self.errors(half)
+            change = self.errors(half)
+            self.unconverged = change * remainder(change, before)
         self.iterations = count
         self.unit = mean_motion(self.reference)
 
     def errors(self, positions: np.ndarray) -> np.ndarray:
-        """Relative errors (F',) over the first 1, ..., F' frames of a run (F' + 1, N, 3) m."""
+        """Errors (F',) relative to `reference` over 1, ..., F' frames of a run (F' + 1, N, 3) m."""
         differences = positions[1:] - self.reference[1 : len(positions)]
         return relative_errors(differences, self.reference, self.quantity)

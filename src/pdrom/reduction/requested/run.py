@@ -8,9 +8,10 @@ The defect of a frame is the distance to the result of a more accurate level fro
 run accumulates defects and amplifies them. The error of a run is estimated as its level's error in
 the calibration, times the larger of two ratios if that is above 1: of the defect in checked frames
 to that in the calibration, and of the distance to a run of a second level, with a perturbed start,
-to that expected from the calibration. The tolerance counts as met for the first frames over which
-the estimate is within it. If it is missed in later frames, a full-order level replaces a reduced
-one, and the most accurate level replaces that. No decision depends on timings.
+to that expected from the calibration. The estimate is at least this distance. The tolerance counts
+as met for the first frames over which the estimate is within it. If it is missed in later frames, a
+full-order level replaces a reduced one, and the most accurate level replaces that. No decision
+depends on timings.
 """
 
 import logging
@@ -36,12 +37,12 @@ Count = Annotated[int, Field(ge=1, le=10_000)]
 # Seed of the second motion for the calibration of levels of accuracy: the training motion, varied
 # at random (`HeldOut.further`). The motions that train reductions have smaller seeds.
 CALIBRATED = 100
-# A tolerance counts as missed if it is met, or can be judged, in less than this part of the frames.
+# Least part of the frames in which a run must meet its tolerance, and its error must be measurable.
 JUDGED = 0.1
-PROBED = 6  # number of frames of a calibration run that `Trajectory.check` checks
-CHECKS = 2  # smallest number of frames of a run that `Trajectory.check` checks
-# A reduction is run only if its estimated cost, with checks, is less than this fraction of the full
-# order's cost. A smaller saving could be an error of the estimates.
+PROBED = 6  # number of frames in which `Trajectory.check` measures the error of a calibration run
+CHECKS = 2  # smallest number of frames in which `Trajectory.check` measures the error of a run
+# A reduction is run only if its estimated cost, with that of checking its errors, is below this
+# fraction of the full order's cost. A smaller saving could be an error of the estimates.
 WORTH = 2.0 / 3.0
 # A run counts as blown up if its bounding box is larger than that at rest by more than this factor.
 BLOWUP_EXTENT = 100.0
@@ -68,7 +69,7 @@ class Request(ConfigModel):
 def read_request(wish: object, source: str = "error") -> Request:
     """Read a requested tolerance: a `Request`, a number, or text such as "velocity=0.05".
 
-    ConfigurationError, naming ``source``, for an unknown quantity or no number between 0 and 1.
+    ConfigurationError, naming ``source``, if the quantity is unknown or the number not in (0, 1).
     """
     if isinstance(wish, Request):
         return wish
@@ -135,13 +136,13 @@ class Calibrated:
 
 @dataclass(frozen=True)
 class Outcome:
-    """Result of a run within a requested tolerance.
+    """Result of a run within a requested tolerance, by one of several solvers ("levels").
 
     positions : (F + 1, N, 3) m; entry 0 is the initial state
-    frames : number of first frames over which the estimated error is within the tolerance; 0 if no
+    frames : n if the estimated error is within the tolerance over the first n frames; 0 if no
         level can meet it: the most accurate full-order level has run instead
     limit : reason why later frames are not within the tolerance; empty if all frames are
-    expected : error of the chosen level on the motions of the calibration, times the safety factor
+    expected : largest error of ``level`` on `Calibration.motions`, times the safety factor
     estimate : estimated error over ``frames`` frames, times the safety factor; None without frames
     level : title of the level that computed the positions
     reduced : whether that level is a reduced model
@@ -189,10 +190,10 @@ class Calibration:
         return max(full, key=lambda each: (each.level.iterations, each.level.window))
 
     def horizon(self, error: float) -> tuple[int, str]:
-        """Number of first frames in which an error of ``error`` is measurable; why no more are.
+        """Number of first frames in which ``error`` is measurable, and reason why no later one is.
 
-        In later frames the error of a reference run, or its change by a tiny shift of the start, is
-        larger than ``error`` divided by the safety factor.
+        In later frames the error of a reference run, or the change of this run if its initial
+        positions are perturbed, is larger than ``error`` divided by the safety factor.
         """
         least = error / self.settings.factor
         converged = min(levels.last_within(motion.unconverged, least) for motion in self.motions)
@@ -200,10 +201,10 @@ class Calibration:
         return min(converged, sharp), ROUNDOFF if sharp < converged else SLOW
 
     def expected(self, level: Calibrated, error: float) -> float:
-        """Largest error of ``level`` on all motions, times the safety factor, up to the `horizon`.
+        """Largest error of ``level`` on all `motions` up to the `horizon`, times the safety factor.
 
-        It is at least the error of the reference runs. It is infinite if errors can be measured in
-        too few frames (`JUDGED`).
+        It is at least the error of the reference runs, times this factor. It is infinite if the
+        `horizon` has fewer frames than the fraction `JUDGED` of the frames of the training motion.
         """
         end, _ = self.horizon(error)
         if end < max(JUDGED * self.motions[0].scene.config.frames, 1):
@@ -212,7 +213,7 @@ class Calibration:
         return self.settings.factor * float(max(errors[end - 1] for errors in known))
 
     def admissible(self, error: float) -> list[Calibrated]:
-        """Levels with an expected error up to ``error``; [] if none of them is of full order."""
+        """Levels whose `expected` error is at most ``error``; [] if no full-order level is so."""
         good = [each for each in self.levels if self.expected(each, error) <= error]
         return good if any(not each.reduced for each in good) else []
 
@@ -222,21 +223,20 @@ class Calibration:
         return next(full, self.most_accurate)
 
     def second(self, level: Calibrated, error: float) -> Calibrated:
-        """Cheapest other level of the kind (reduced or not) of ``level``, to compare its run with.
+        """Cheapest other level for comparison with ``level``, reduced if and only if ``level`` is.
 
-        Its expected error is at most ``error`` times the safety factor; without one: ``level``.
+        Its expected error is at most ``error``, too. If there is no such level, it is ``level``.
         """
-        most = error * self.settings.factor
         alike = [each for each in self.levels if each.reduced == level.reduced]
-        others = (e for e in alike if e is not level and self.expected(e, error) <= most)
+        others = (e for e in alike if e is not level and self.expected(e, error) <= error)
         return next(others, level)
 
     def attempts(self, error: float) -> list[Calibrated]:
         """Levels of accuracy to run in turn until one meets the tolerance ``error``.
 
-        First the cheapest admissible reduction that, with checks and a comparison run (`second`),
-        costs less than `WORTH` times the full order with its comparison run; then the cheapest
-        admissible full-order level, if there is one; last the most accurate full-order level.
+        First the cheapest `admissible` reduction whose run, checks and comparison run (by `second`)
+        cost less than `WORTH` times a full-order run and its comparison run; then the cheapest
+        `admissible` full-order level, if any; last the most accurate full-order level.
         """
         full = self.full_order(error)
         most = WORTH * (full.work + self.second(full, error).work)
@@ -293,11 +293,11 @@ class CheckedRun:
     def _estimated(self, level: Calibrated) -> tuple[Trajectory, np.ndarray]:
         """Run ``level`` to the end or to a failed check; return the run and estimated errors (F,).
 
-        Each error is the larger of two estimates: that of `_amplified`, and the expected error
-        times the ratio, if above 1, of the run's root mean square defect (error made in one frame)
-        to the largest defect in the calibration. A check fails if the second estimate exceeds the
-        tolerance, or the mesh blows up. All errors are inf if a check failed or the expected error
-        is inf.
+        Each error is the larger of two estimates. The first is that of `_amplified`, the second is
+        `Calibration.expected`: if the run's root mean square defect (error made in one frame) is
+        larger than the largest defect in the calibration, it is multiplied by their ratio. A check
+        fails if the second estimate exceeds the tolerance, or the mesh blows up. All errors are inf
+        if a check failed or `Calibration.expected` is inf.
         """
         own, frames, full = self._own, self._frames, self._own.full_order(self._error).level
         largest = BLOWUP_EXTENT * self._scene.mesh.extent
@@ -310,7 +310,7 @@ class CheckedRun:
         for frame in check_frames(frames, frames // own.settings.every if level.reduced else 0):
             run.to(frame).check(exact)
             size = np.sqrt(np.mean(np.square(list(run.defects.values())))) / own.motions[0].unit
-            with np.errstate(divide="ignore", invalid="ignore"):  # for 0 / 0, fmax gives 1
+            with np.errstate(divide="ignore", invalid="ignore"):  # fmax ignores 0 / 0 = nan
                 estimate = expected * float(np.fmax(1.0, np.divide(size, level.defect)))
             if not (estimate <= self._error and np.ptp(run.ends[-1], axis=0).max() <= largest):
                 return run, hopeless
@@ -319,10 +319,11 @@ class CheckedRun:
         return run, np.maximum(estimate, self._amplified(level, run))
 
     def _amplified(self, level: Calibrated, run: Trajectory) -> np.ndarray:
-        """Estimate errors (F,) over the first frames of ``run`` by comparison with a second level.
+        """Estimate errors (F,) over the first 1, ..., F frames of ``run``, a run with ``level``.
 
-        The second run has a perturbed start. The expected error is multiplied by the ratio of the
-        runs' distance to the sum of both levels' errors in the calibration, if that is above 1.
+        A second run, with `Calibration.second`, has a perturbed start. The error expected of
+        ``level`` is multiplied by max(1, difference of the runs / sum of both levels' errors). The
+        estimate is at least the difference: two runs that differ by more do not both keep it.
         """
         own, second = self._own, self._own.second(level, self._error)
         other = self._start(second.level, moved=True).to(self._frames)
@@ -331,11 +332,11 @@ class CheckedRun:
         apart = levels.relative_errors(differences, positions, own.motions[0].quantity)
         errors = own.expected(level, self._error), own.expected(second, self._error)
         usual = sum(errors) / own.settings.factor
-        return errors[0] * np.maximum(1.0, apart / usual)
+        return np.maximum(errors[0] * np.maximum(1.0, apart / usual), apart)
 
 
 def check_frames(frames: int, count: int) -> list[int]:
-    """Numbers of the checked frames: ``count``, at least `CHECKS`, spread over all ``frames``."""
+    """Indices of frames to check: max(``count``, `CHECKS`) of them, spread over ``frames``."""
     count = min(max(CHECKS, count), frames)
     return sorted({int(f) for f in (np.arange(count) + 0.5) * frames / count})
 
@@ -352,7 +353,7 @@ def calibrate(
     scenes, least = (training, training.changed(effects=far)), request.error / settings.factor
     motions = [Motion(scene, least, request.quantity, on_frame) for scene in scenes]
     most = max(motion.iterations for motion in motions)
-    # full-order levels with the iterations of the reference runs, and with half of them
+    # full-order levels: the most iterations of a reference run; half as many, or `CONVERGED`
     many = [Level(count, levels.WINDOW) for count in {most, max(most // 2, levels.CONVERGED)}]
     plain = [Level(count) for count in settings.plain]
     full = [*many, *plain, *(Level(count, levels.WINDOW) for count in settings.accelerated)]
@@ -416,8 +417,8 @@ def _calibrated(level: Level, motions: Sequence[Motion], on_frame: OnFrame) -> C
 def transferred(trained: Scene, scene: Scene) -> Scene:
     """Return ``trained`` with the material, masses, time step, frames, obstacles of ``scene``.
 
-    Errors of accuracy levels depend on these quantities: levels are calibrated with ``scene``'s.
-    Held vertices, their paths and the initial velocity remain those of ``trained``.
+    Errors of full-order and reduced solvers depend on these quantities and are calibrated with
+    them. Held vertices, their paths and the initial velocity remain those of ``trained``.
     ConfigurationError, naming ``scene``, if it has another mesh or other constraint groups.
     """
     mesh, own = trained.mesh, scene.mesh

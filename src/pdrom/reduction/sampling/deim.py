@@ -40,7 +40,7 @@ class Selection(ABC):
         return oversample(v, size, chosen, count=count)
 
 
-# Residuals whose relative difference is below this may count as equal: the lowest index is chosen.
+# Of residual entries that differ by less than this fraction, `tie_weights` may favour the first.
 TIE = 1e-6
 
 
@@ -92,7 +92,7 @@ class GrowingFit:
         self._factor = np.zeros((modes, modes), order="F")
 
     def add(self, rows: np.ndarray) -> None:
-        """Add ``rows`` (s, r) of the modes to the sampled rows, at which modes are fitted."""
+        """Add s sampled rows to the fit; ``rows`` (s, r) are the entries of the r modes in them."""
         block = min(BLOCK, len(self._factor))
         self._factor = linalg.lapack.dtpqrt(0, block, self._factor, rows, overwrite_a=True)[0]
 
@@ -101,7 +101,7 @@ class GrowingFit:
         return self._factor[:k, :k]
 
     def coefficients(self, k: int) -> np.ndarray:
-        """Coefficients c (k,) of mode k in the modes before it; of minimal norm if not unique."""
+        """Fit mode k at the sampled rows by modes 0 to k - 1; coefficients (k,) of least norm."""
         factor, target = self.triangle(k), self._factor[:k, k]
         if linalg.lapack.dtrcon(factor)[0] > k * np.finfo(float).eps:
             return linalg.solve_triangular(factor, target, check_finite=False)
@@ -109,7 +109,7 @@ class GrowingFit:
 
 
 def block_elements(v: np.ndarray, size: int) -> np.ndarray:
-    """Greedy DEIM elements of ``v`` (size e, r), a basis: min(e, r) indices, first k for k modes.
+    """Indices of min(e, r) elements of a basis ``v`` (size e, r) by DEIM; k modes use the first k.
 
     Each of the e elements has ``size`` rows. Mode k is fitted by the earlier modes on the rows of
     the elements selected so far, by least squares. The element with the largest residual norm,
@@ -157,3 +157,11 @@ def _greedy(parts: Sequence[np.ndarray], total: int, count: int, repeat: bool) -
             size = len(modes) // total
             fit.add(modes[size * block : size * (block + 1)])
     return picked
+
+
+class Greedy(Selection):
+    """DEIM by entries or elements; the samples for r modes begin with those for fewer modes."""
+
+    def one_a_mode(self, v: np.ndarray, size: int, ranks: Sequence[int]) -> dict[int, np.ndarray]:
+        path = deim_entries(v) if size == 1 else block_elements(v, size)
+        return {r: path[:r] for r in ranks}

@@ -12,7 +12,7 @@ from scipy import linalg
 
 from pdrom.core.errors import SamplingError
 
-# Bound on the rounding errors of B B^T, B the rows of an element, relative to the trace of B B^T.
+# Bound on rounding errors of B B^T, relative to its trace; B: rows of the basis for one element.
 ROUNDOFF = 1e-11
 
 
@@ -81,14 +81,14 @@ class _Growing:
         return 1.0 / np.sqrt(self._smallest) if self._smallest > roundoff else np.inf
 
     def add(self) -> None:
-        """Add the element that most raises a lower bound of G's least eigenvalue (G: see class)."""
+        """Add the element that most raises a lower bound of the Gram matrix's least eigenvalue."""
         self.picked.append(self._strongest())
         block = self._blocks[self.picked[-1]]
         self._gram += block.T @ block
         self._decompose()
 
     def _decompose(self) -> None:
-        """Compute least eigenpair of the sampled rows' Gram matrix, gap to the next (none: inf)."""
+        """Compute G's least eigenvalue, its eigenvector and gap to the next (inf for one mode)."""
         last = min(1, len(self._gram) - 1)
         values, vectors = linalg.eigh(
             self._gram, subset_by_index=(0, last), check_finite=False, driver="evr"
@@ -121,7 +121,7 @@ class _Growing:
         return int(others[np.argmax(growth)]) if growth.max(initial=0.0) > bound else first
 
     def _growth_at_most(self, elements: np.ndarray, products: np.ndarray) -> np.ndarray:
-        """Upper bounds on `eigenvalue_growth` by ``elements``, from B B^T for their rows B."""
+        """Upper bounds on `eigenvalue_growth` by ``elements``, from B B^T of the rows B of each."""
         products = products[elements]
         squared = np.einsum("es,es->e", products, products)
         stretched = np.einsum("est,et->es", self._squares[elements], products)
@@ -170,7 +170,7 @@ def eigenvalue_growth(
 
 
 def _smaller_root(squared: np.ndarray, beside: np.ndarray, gap: float) -> np.ndarray:
-    """Root t (m,) as in `eigenvalue_growth`, for |b|^2 ``squared``, c ``beside`` and g ``gap``."""
+    """Return t (m,) of `eigenvalue_growth` for |b|^2 = ``squared``, c = ``beside``, g = ``gap``."""
     if np.isinf(gap):
         return squared
     mean = squared + beside

@@ -27,7 +27,7 @@ from pdrom.reduction.sampling.reduction import Reduction
 SPLIT_FROM = 1 << 17  # vertices times modes from which the kernel's work is done in two `PARTS`
 
 # Indices into the record (int64 array) of the kernel of `Lift`: numbers of modes, coefficient sets,
-# columns and sampled values; addresses of the sampling kernel, of its record and of all arrays.
+# columns (see `Lift`), samples; addresses of the sampling kernel, of its record and of all arrays.
 MODES, SETS, COLUMNS, SAMPLED, SAMPLER, SAMPLER_RECORD = range(OWN, OWN + 6)
 STARTS, POSITIONS, PACKED, OPERATORS, SHIFTS, COEFFICIENTS = range(OWN + 6, OWN + 12)
 AXES, OWN_SETS, LIFTED, OFFSET, SECONDS, PROJECTIONS, CLOCK, SIZE = range(OWN + 12, OWN + 20)
@@ -35,7 +35,7 @@ AXES, OWN_SETS, LIFTED, OFFSET, SECONDS, PROJECTIONS, CLOCK, SIZE = range(OWN + 
 
 @dataclass(frozen=True)
 class Lift:
-    """Arrays of a reduced local step with r modes, N vertices and c columns of the reconstruction.
+    """Arrays of a reduced local step: r modes, N vertices, coefficient sets (one, or one per axis).
 
     starts : (sets + 1,) indices in ``positions`` at which the entries of each coefficient set begin
     positions : index of each sampled entry in the projections of the sampled elements
@@ -43,7 +43,7 @@ class Lift:
     operators : matrix (r, m) of each set that maps m samples to coefficients, all flattened
     shifts : (sets, r) operator times the mean at sampled entries, subtracted from coefficients
     coefficients : (sets, r) coefficients of the last evaluation
-    axes, own_sets : (c,) axis to which each column adds, and set whose coefficients it uses
+    axes, own_sets : (c,) for each reconstructed column (x, y, z): axis, set of its coefficients
     lifted : (c, N, r) S^T W V of each column
     offset : (4 N,) S^T W mean, flat, with a zero after the three numbers of each vertex
     seconds : (2,) s, accumulated time of the reconstruction in each of the two `PARTS`
@@ -62,7 +62,7 @@ class Lift:
     seconds: np.ndarray
 
     def kernel(self, sampler: LocalKernel, sampled: int) -> LocalKernel:
-        """Compiled local step; ``sampler`` computes the samples, which are ``sampled`` numbers."""
+        """Compiled local step; ``sampler`` projects the sampled elements: ``sampled`` numbers."""
         columns, vertices, modes = self.lifted.shape
         split = vertices * modes >= SPLIT_FROM
         numbers = (
@@ -94,7 +94,7 @@ def coefficients(sampled, starts, positions, packed, operators, shifts, result):
     sets, modes = shifts.shape
     for k in range(sets):
         first, last = starts[k], starts[k + 1]
-        # copy the sampled entries of set k to contiguous memory, for products with its operator
+        # contiguous copy of the sampled entries for coefficient set k, to multiply by the operator
         for j in range(last - first):
             packed[j] = at(sampled, at(positions, first + j))
         size = last - first
@@ -179,9 +179,9 @@ def _accumulate(y, rhs_place, record, part):
 class ReducedLocalStep:
     """Local step that evaluates sampled elements and adds a reconstruction of S^T W p to rhs.
 
-    Before the run, the offset S^T W mean (N, 3), the reconstruction S^T W V for each set of
-    coefficients and the matrices that map samples to c are computed. An iteration computes the
-    projections of sampled elements, c by a small dense product, and the dense reconstruction.
+    Projections p are approximated by mean + V c, with modes V. S^T W mean (N, 3), S^T W V and the
+    matrices that map samples to the coefficients c are computed before the run. An iteration gets
+    the projections of sampled elements, c by a small dense product, and the dense reconstruction.
 
     Attributes
     ----------
@@ -204,7 +204,7 @@ class ReducedLocalStep:
             self._pass = LocalPass([self.local_kernel])
 
     def begin_frame(self, q: np.ndarray) -> None:
-        """Compute the once-per-frame data of sampled elements at positions ``q`` (N, 3) m."""
+        """Compute data that sampled elements need in a frame that starts at ``q`` (N, 3) m."""
         self._group.begin_frame(q, None if self._everything else self._elements)
 
     def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
@@ -318,7 +318,7 @@ def rerun_reduced(
 ) -> Rerun:
     """Run a scene with the projections of ``group`` reduced; compare it with the full-order run.
 
-    ``reduction`` replaces the projections, ``system`` is by default the scene's; see also `rerun`.
+    ``system`` is by default the scene's; `rerun` explains the arguments from ``reference`` on.
     """
     steps = replace_group(scene, group, ReducedLocalStep(scene.group(group), reduction))
     return rerun(scene, system or scene.system, steps, reference, blowup_extent, offset)

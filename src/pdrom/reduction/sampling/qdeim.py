@@ -53,7 +53,7 @@ class _Left:
         self._error = self._rounding(self._squares)
 
     def pick_among(self, count: int, most: int) -> int:
-        """Add pivots among the ``count`` elements of largest norm bound; return how many are added.
+        """Add pivots among ``count`` elements whose norms have the largest bounds; return how many.
 
         At most ``most`` elements are selected in total, those of earlier calls included.
         """
@@ -70,7 +70,7 @@ class _Left:
                 break
             weights[best] = -1.0
             self.picked.append(int(candidates[best]))
-            # direction in R^r that dominates the element's rows; zero if nothing is left of them
+            # leading right singular vector of the element's projected rows; zero if these are zero
             group = left[self._size * best : self._size * (best + 1)]
             direction = np.linalg.svd(group, full_matrices=False)[2][0] if group.any() else group[0]
             direction = direction - self._directions.T @ (self._directions @ direction)
@@ -84,7 +84,7 @@ class _Left:
         return len(new)
 
     def _highest(self, count: int) -> tuple[np.ndarray, float]:
-        """``count`` elements with largest bounds of squared norms; others' largest (none: -1)."""
+        """``count`` elements with the largest bounds of weighted norms; others' largest, or -1."""
         bounds = self._weights * (self._squares + self._error)
         bounds[self.picked] = -1.0
         if count == self.total:

@@ -56,8 +56,8 @@ def norm_and_condition(a: np.ndarray, operator: np.ndarray) -> tuple[float, floa
 class Sampling:
     """Entries and elements of the projection that a method evaluates during a run.
 
-    entries : indices into the vectorised projection (length 3 e p), in order of selection; for
-        "joint" sampling the x entry of each row stands for the row
+    entries : indices into the vectorised projection (e elements of p rows x, y, z), in order of
+        selection; in "joint" sampling the x entry of a row stands for all three entries of the row
     elements : unique indices of the elements of these entries, in the order of their first entries
     """
 
@@ -116,7 +116,7 @@ class Block:
 
     @property
     def output(self) -> slice:
-        """Entries of the vectorised projection that the block reconstructs."""
+        """Entries of the vectorised projection that these coefficients reconstruct."""
         return slice(None) if self.axis is None else slice(self.axis, None, 3)
 
 
@@ -185,7 +185,7 @@ class Reduction:
 
     @property
     def condition(self) -> float:
-        """Condition number of the sampled rows P^T V, the largest of all sets of coefficients."""
+        """Condition number of sampled rows P^T V; the largest if axes have own coefficients."""
         return self._norms[1]
 
     @property

@@ -103,14 +103,14 @@ class _Sampled:
         """
         if not self.picked and mode is not None:
             return int(np.argmax(self._squares[:, mode]))
-        shifted = self._products + np.eye(self._products.shape[1])  # I + M, see the class
+        shifted = self._products + np.eye(self._products.shape[1])  # I + M (M: see `_Sampled`)
         modes, residual = self._modes, np.ones(self.total)
         if mode is not None:
             z, q = self._residual()
             solved = np.linalg.solve(shifted, z[:, :, None])[:, :, 0]
             modes, residual = mode + 1, q + np.maximum(np.einsum("es,es->e", z, solved), 0.0)
         possible = residual > DEPENDENT**2
-        # det(I + M) is at least 1; a smaller value is round-off
+        # M = B G^-1 B^T (see the class) is semidefinite: log det(I + M) < 0 is round-off
         determinants = np.maximum(np.linalg.slogdet(shifted)[1], 0.0)
         columns = self._squares[self.picked, :modes].sum(axis=0) + self._squares[:, :modes]
         measure = np.full(self.total, -np.inf)
@@ -141,7 +141,7 @@ class _Sampled:
             self._modes = mode + 1
 
     def _residual(self) -> tuple[np.ndarray, float]:
-        """Residual (e, s) of the next mode fitted at the sampled rows; its squared norm at them."""
+        """Return z (e, s) of all elements and q for the next mode; see the class for z and q."""
         known, new = self._blocks[:, :, : self._modes], self._blocks[:, :, self._modes]
         z = new - known @ self._fit.coefficients(self._modes)
         return z, float(np.sum(z[self.picked] ** 2))

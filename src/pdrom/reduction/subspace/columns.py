@@ -155,7 +155,7 @@ def skinning_weights(points: np.ndarray, handles: int) -> np.ndarray:
     chosen = farthest_points(points, np.arange(len(points)), handles)
     distance = np.linalg.norm(points[:, None, :] - points[chosen][None], axis=2)
     radius = 3.0 * distance.min(axis=1).max() if handles > 1 else 2.0 * distance.max()
-    # the radius is zero if every vertex is a handle; for a single vertex all distances are zero
+    # R is 0 if every vertex is a handle; for a single vertex, all entries of distance are 0, too
     radius = max(radius, np.finfo(float).eps * distance.max(), np.finfo(float).tiny)
     scaled = np.minimum(distance / radius, 1.0)
     kernel = (1.0 - scaled) ** 4 * (4.0 * scaled + 1.0)

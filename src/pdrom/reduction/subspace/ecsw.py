@@ -51,9 +51,9 @@ class TrainingFrame:
 
     start : (K, 3) subspace coordinates at the frame's start, for data computed once per frame
     pairs : (n, 2, K, 3) coordinates before and after each iteration
-    measure : (K', K) matrix; |measure r|^2, J, is r^T A^-1 r in the norm "energy", |M^1/2 x / h|^2
-        in the norm "response": x is the root mean square motion that residuals r cause in a run
-        (see the module). The K' free coordinates have equations, fixed ones have none
+    measure : (K', K) matrix for residuals r (K,), of which the entries of K - K' fixed coordinates
+        do not count. |measure r|^2, J, is r^T A^-1 r in the norm "energy" (system matrix A),
+        |M^1/2 x / h|^2 in the norm "response" (x: root mean square motion due to r, see module)
     """
 
     start: np.ndarray
@@ -74,7 +74,7 @@ def training_run(
     """Run ``scene`` in a subspace with all projections; return the iterates of ``frames``.
 
     ``frames`` are ascending. The run begins at ``start``, a state in coordinates (K, 3), or at the
-    scene's initial state if that is None. ``norm`` measures residuals of the training equations.
+    scene's initial state if that is None. ``norm`` determines `TrainingFrame.measure`.
     """
     watched = _Watched(scene.groups[0], columns)
     steps = [watched, *(SubspaceLocalStep(group, columns) for group in scene.groups[1:])]
@@ -91,7 +91,7 @@ def training_run(
         first = state.positions
         state, _ = loop.step(state, frame)
         if frame in wanted:
-            # of a single iteration only the start is recorded; the frame's end serves as its result
+            # a frame of one iteration records only the coordinates before it: add those after it
             if len(iterates) == 1:
                 iterates.append(state.positions)
             pairs = np.stack([iterates[:-1], iterates[1:]], axis=1)
@@ -117,17 +117,17 @@ class _Watched(SubspaceLocalStep):
 def _measure(space: ReducedSpace, fixed: np.ndarray, norm: Norm, frames: int) -> np.ndarray:
     """Matrix `TrainingFrame.measure` (K', K) of ``norm``, for the K' coordinates not ``fixed``.
 
-    ``frames`` is the number of frames of the run, on which the response of modes
-    without stiffness depends.
+    The response of modes without stiffness to a residual depends on the number ``frames`` of
+    frames of the run.
     """
     size = len(space.matrix)
     free = np.setdiff1d(np.arange(size), fixed)
     block, inertia = (m[np.ix_(free, free)] for m in (space.matrix, space.inertia_matrix))
     measure = np.zeros((len(free), size))
-    if norm == "energy":  # the measure is a triangular R, R^T R = A^-1 (A: system matrix)
+    if norm == "energy":  # |measure @ r|^2 = r^T A^-1 r with the system matrix A
         root = linalg.cholesky(block, lower=True)
         measure[:, free] = linalg.solve_triangular(root, np.eye(len(block)), lower=True)
-    else:  # measure r is the response of each eigenmode to a residual r (see the module)
+    else:  # measure @ r is the response of each eigenmode to a residual r (see the module)
         values, modes = linalg.eigh(block, inertia)
         c2 = 1.0 / np.maximum(values, 1.0)
         beside = np.maximum(1.0 - c2, 1.0 / frames)
@@ -139,8 +139,8 @@ def _measure(space: ReducedSpace, fixed: np.ndarray, norm: Norm, frames: int) ->
 # Training equations are added up at random (hashed) to SKETCH rows per coordinate of the subspace.
 # There must be several times more rows than selected elements, or their factors xi would overfit.
 SKETCH = 60
-# Number of elements among which samples are first chosen, and limit of its doubling: the equations
-# of all elements of a large mesh would not fit into memory, and neighbouring elements are similar.
+# Samples are chosen among CANDIDATES elements, or up to MOST if a tolerance is missed: equations of
+# all elements of a large mesh would not fit into memory, and neighbouring elements are similar.
 CANDIDATES, MOST = 10_000, 20_000
 SEED = 0
 
@@ -152,7 +152,7 @@ def ecsw_elements(
 
     A tolerance is the relative residual tau of the training equations at which the fit of the
     factors stops. In a large group, elements are chosen from a random (seeded) subset, which is
-    doubled, up to `MOST`, until all tolerances are met; the target is always the whole group's sum.
+    doubled, up to `MOST`, until all tolerances are met; factors fit sums over the whole group.
     """
     count = CANDIDATES
     while True:
@@ -173,15 +173,15 @@ def ecsw_elements(
 def training_equations(
     group: ConstraintGroup, columns: Columns, training: Training, elements: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return equations (m, len(elements)) for ``elements``, and their sums (m,) over all elements.
+    """Return the matrix (m, len(elements)) and right-hand sides (m,) that the factors xi_e fit.
 
-    For each iterate z, the next one z' and each coordinate there is one equation with the entries
-    g_e = B^T S_e^T w_e (S_e B z' - p_e(B z)), multiplied by `TrainingFrame.measure`. All are scaled
-    so that the sums have norm 1. One more equation has the elements' fractions of the total weight,
-    so that a group without any force keeps its stiffness. The array is in Fortran order.
+    For each training iterate z, the next one z' and each coordinate, a row of the matrix has entry
+    g_e = B^T S_e^T w_e (S_e B z' - p_e(B z)), times `TrainingFrame.measure`. Right-hand sides are
+    sums over all elements, scaled to norm 1 with the rows. One more row has the shares of the total
+    weight, so that a group without any force keeps its stiffness. The matrix is in Fortran order.
 
-    With K columns, equations are hashed to at most `SKETCH` K rows with seeded random signs, which
-    changes norms of residuals by a few per cent (count sketch, Charikar et al. 2002).
+    The equations are hashed to at most `SKETCH` K rows (B has K columns) with seeded random signs,
+    which changes norms of residuals by a few per cent (count sketch, Charikar et al. 2002).
     """
     strain = np.ascontiguousarray(group.S @ columns.B)
     weighted = strain * group.row_weights[:, None]
@@ -241,8 +241,8 @@ log = logging.getLogger(__name__)
 # A unit column counts as dependent on the active columns of `nnls_path` if its part orthogonal to
 # them is below this.
 DEPENDENT = 1e-7
-# Columns are made active together if their correlation with the residual is at least CLOSE times
-# the largest one, but at most 1 + BLOCK n at a time if n columns are active already.
+# `nnls_path` adds columns of G at once if their correlation with its residual is at least CLOSE
+# times the largest correlation, at most 1 + BLOCK n at a time if n columns are active already.
 CLOSE = 0.7
 BLOCK = 0.2
 
@@ -313,13 +313,13 @@ class _ActiveSet:
         return float(np.linalg.norm(self._residual)) / self._size if self._size else 0.0
 
     def solution(self) -> tuple[np.ndarray, np.ndarray]:
-        """Indices of the active columns of G, ascending, and their factors in x (G x near b)."""
+        """Indices of the active columns of G, ascending, and their entries of x (in G x near b)."""
         order = np.argsort(self._active)
         active = np.array(self._active, dtype=np.int64)[order]
         return active, self._values[order] / self._norms[active]
 
     def reach(self, tolerance: float) -> None:
-        """Add columns until the relative residual is at most ``tolerance`` or none can be added."""
+        """Make columns of G active until `relative_residual` <= ``tolerance`` or none can join."""
         while self.relative_residual > tolerance and len(self._active) < self._most:
             block = self._choose()
             if len(block) == 0:
@@ -328,7 +328,7 @@ class _ActiveSet:
             if joined:
                 self._solve()
             staying = set(self._active).intersection(joined)
-            # ban a single column that was not added or at once removed: it would be chosen again
+            # exclude a column that `_add` or `_solve` rejected on its own: it would be chosen again
             if len(block) == 1 and not staying:
                 self._banned[block] = True
             self._alone = not staying and len(block) > 1
@@ -364,7 +364,7 @@ class _ActiveSet:
         return True
 
     def _solve(self) -> None:
-        """Solve least squares on the active columns; remove columns with negative values."""
+        """Solve least squares with the active columns of G; deactivate those with values <= 0."""
         while self._active:
             n = len(self._active)
             half = self._forward(self._target[:n])
@@ -390,7 +390,7 @@ class _ActiveSet:
         return linalg.solve_triangular(self._factor[:n, :n], rhs, lower=True, check_finite=False)
 
     def _keep(self, keep: np.ndarray, x: np.ndarray) -> None:
-        """Keep the active columns of G where ``keep`` is True; ``x``: values of all active ones."""
+        """Keep active columns where ``keep`` is True; ``x``: values of all columns now active."""
         kept = np.flatnonzero(keep)
         size, n = len(self._active), len(kept)
         first = int(np.flatnonzero(~keep)[0])

@@ -22,7 +22,7 @@ from pdrom.reduction.subspace.interpolation import Interpolation
 from pdrom.reduction.subspace.model import Samples, SubspaceModel
 from pdrom.reduction.subspace.space import PROBES, ReducedSpace, probe_vertices, reduced_state
 
-# A basis with more entries than this is in single precision, except rows that iterations use.
+# Bases of more entries are exported in single precision, except rows of sampled or probe vertices.
 DOUBLES = 60_000
 MANIFOLDS = ("clamped", "length")
 

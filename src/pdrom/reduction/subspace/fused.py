@@ -68,7 +68,7 @@ class FusedStepper(Stepper):
 
 
 class _Fused:
-    """Compiled iterations and frames, with matrices for each set of fixed subspace coordinates."""
+    """Compiled code for iterations and frames, with matrices per set of prescribed coordinates."""
 
     def __init__(
         self, space: ReducedSpace, sampled: "_Sampled", acceleration: Anderson | None
@@ -174,11 +174,11 @@ class _Sampled:
 
 
 class _Operators:
-    """Matrices and vectors of an iteration, while the same subspace coordinates are fixed.
+    """Matrices and vectors of an iteration, for one set of subspace coordinates that are fixed.
 
-    iterated : D, L^T, d_0, c and z of the module's docstring; for the objective: weights of the
-        rows, M/h^2 of the free coordinates, and working memory
-    begun : matrices from prediction s to c and from fixed coordinates to d_0, zeros, working space
+    iterated : D, L^T, d_0, c, z of the module's docstring; row weights, M/h^2 of free coordinates
+        and working memory, for the objective
+    begun : matrices that map s to c and fixed coordinates to d_0, zeros, arrays for these inputs
     """
 
     def __init__(
@@ -215,13 +215,13 @@ def blocks(matrix: np.ndarray) -> np.ndarray:
 
 
 def vectors(count: int) -> np.ndarray:
-    """Flat zeros for ``count`` vectors of three numbers, with the extra space for `product`."""
+    """Flat array of zeros for ``count`` vectors of three numbers, padded as `product` requires."""
     return zeros(3 * (-(-count // TALL) * TALL) + WIDTH)
 
 
 @compiled(nogil=True)
 def product(matrix, m, n, start, x, out):
-    """Set ``out`` = ``start`` + M ``x``; M (m, n) is stored by `blocks`, vectors by `vectors`."""
+    """Set ``out`` = ``start`` + M ``x``; M (m, n) comes from `blocks`, arrays from `vectors`."""
     entry = 0
     for row in range(0, 3 * m, 3 * TALL):
         a, b = load(start, row), load(start, row + 3)
@@ -248,11 +248,11 @@ def product(matrix, m, n, start, x, out):
 
 @compiled(nogil=True)
 def run_iterations(count, size, rows, operators, sampled, history):
-    """Do ``count`` iterations of the ``size`` free coordinates z, in place.
+    """Do ``count`` iterations that change ``size`` free subspace coordinates z in place.
 
     rows : number of rows of all sampled elements
-    operators : matrices and vectors, see ``iterated`` of `_Operators`
-    sampled : arrays of `_Sampled`
+    operators : matrices and vectors `_Operators.iterated`, z among them
+    sampled : data of the sampled elements, `_Sampled.arrays`
     history : arrays of Anderson acceleration, see `Anderson`; `NO_HISTORY` without it
     """
     strain, lift, offset, constant, z, weights, inertia, start = operators

@@ -41,7 +41,7 @@ class HrpdSpec(ConfigModel):
 
 
 def hrpd(group: ConstraintGroup, columns: Columns, sampled: "SampledSpace | None") -> Interpolation:
-    """Interpolate projections of ``group`` in the subspace; they are 0 if ``sampled`` is None."""
+    """Interpolate projections of ``group`` in the space ``sampled``; if this is None, all are 0."""
     strain, stiffness = reduced_strain(group, columns)
     offset = np.zeros((len(stiffness), 3))
     if sampled is None:
@@ -77,10 +77,10 @@ class SampledSpace:
 def sampled_space(
     group: ConstraintGroup, points: np.ndarray, spec: HrpdSpec
 ) -> SampledSpace | None:
-    """Space of projections of ``group`` and its samples; None if S ``points`` is only round-off.
+    """Space of projections of ``group``, with samples; None if rest vectors are only round-off.
 
-    S has the operators of all elements, ``points`` (N, 3) m is the rest shape. SamplingError if the
-    sampled elements do not determine the coefficients of the projections in the space.
+    Rest vectors are S ``points``: operators S of all elements times rest positions (N, 3) m. Raises
+    SamplingError if sampled elements do not determine the coefficients of projections in the space.
     """
     rest = group.S @ points
     if np.linalg.norm(rest) <= group.roundoff(points):
@@ -97,8 +97,8 @@ def projection_space(
 ) -> np.ndarray:
     """W-orthonormal columns (e p, d) of the span of skinning weights times rest vectors.
 
-    The rest vectors themselves come first, so that the rest shape and its rotations are exact, then
-    the directions with the largest singular values.
+    The rest vectors come first, so that the rest shape and its rotations are exact. They are
+    followed by the leading POD modes of the products, without their part along the rest vectors.
 
     Parameters
     ----------

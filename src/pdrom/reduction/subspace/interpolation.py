@@ -52,7 +52,7 @@ class InterpolatedLocalStep:
         self._rows = np.ascontiguousarray(columns.B[vertices])
 
     def begin_frame(self, q: np.ndarray) -> None:
-        """Compute the once-per-frame data of sampled elements at the coordinates q (K, 3)."""
+        """Compute, for sampled elements at q (K, 3), data that stay fixed during the frame."""
         if len(self._elements):
             self.group.begin_frame(self._rows @ q)
 
@@ -100,10 +100,10 @@ def interpolation_of(
 
 
 class SubspaceLocalStep:
-    """Local step in coordinates z: projections of some (or all) elements, B^T S^T W p(S B z).
+    """Local step in subspace coordinates z: B^T S^T W p(S B z), summed over some or all elements.
 
-    With all elements and factors 1 it is exact in the subspace. With few elements and the factors
-    of energy-conserving sampling its cost does not depend on the size of the mesh.
+    ``factors`` multiply weights of ``elements``. With all elements and factors 1 it is exact in the
+    subspace. With energy-conserving sampling its cost does not depend on the size of the mesh.
     """
 
     def __init__(
@@ -133,11 +133,11 @@ class SubspaceLocalStep:
         return strain.T @ (self.group.row_weights[:, None] * strain)
 
     def begin_frame(self, q: np.ndarray) -> None:
-        """Compute the group's once-per-frame data at the coordinates q (K, 3)."""
+        """Compute, at the coordinates q (K, 3), data of the group that stay fixed in the frame."""
         self.group.begin_frame(self._rows @ q)
 
     def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
-        """Add B^T S^T W p at ``y`` (K, 3) to ``rhs`` (K, 3); return the elements' energy, J."""
+        """Add B^T S^T W p at ``y`` (K, 3) to ``rhs`` (K, 3); return the energy of `group`, J."""
         self._rhs[...] = 0.0
         energy = self.group.accumulate(self._rows @ y, self._rhs)
         rhs += self._transposed @ self._rhs

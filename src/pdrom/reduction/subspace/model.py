@@ -42,7 +42,7 @@ class Samples:
 
 @dataclass(frozen=True)
 class SubspaceModel:
-    """Reduced model: kind of its columns (as in `make_columns`), columns, samples of each group.
+    """Reduced model: kind of position basis (see `make_columns`), its columns, samples of groups.
 
     A constraint group without samples evaluates all elements with factor one.
     """
@@ -78,7 +78,7 @@ class SubspaceModel:
         return self.columns.B @ z
 
     def output(self) -> "Output":
-        """Faster replacement of `positions` in single precision, for output of every frame."""
+        """Return a faster form of `positions` in single precision, to write every frame."""
         return Output(self.columns.B)
 
 

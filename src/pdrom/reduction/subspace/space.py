@@ -143,7 +143,7 @@ class ReducedSpace(Space):
         return base.held_targets(self._boundaries, frame, positions)
 
     def held_path(self, frames: range, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Indices (m,) of fixed coordinates, values (n, m, 3) in n frames; see `base.held_path`."""
+        """Indices (m,), values (n, m, 3) of coordinates held in n frames, see `base.held_path`."""
         return base.held_path(self._boundaries, frames, positions)
 
     def elimination(self, fixed: np.ndarray) -> DenseElimination:
@@ -237,12 +237,12 @@ class _ReducedBoundary:
         return self._of(frame)[0]
 
     def path(self, frames: range, current: np.ndarray) -> np.ndarray:
-        """Values (n, m, 3) of `held` coordinates in n ``frames``; ``current`` (m, 3): before."""
+        """Values (n, m, 3) in ``frames`` of coordinates `held`; ``current`` (m, 3): before them."""
         _, rows, inverse = self._of(frames.start)
         return inverse @ self.boundary.path(frames, rows @ current)
 
     def _of(self, frame: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Indices i of coordinates fixed in ``frame``; B[held vertices, i]; its pseudo-inverse."""
+        """Indices i of coordinates prescribed in ``frame``, R = B[held vertices, i]; pinv(R)."""
         vertices = self.boundary.held(frame)
         key = vertices.tobytes()
         if key not in self._parts:
@@ -284,7 +284,7 @@ class _ReducedContact:
         self._contact.apply(corrected, self._probes @ before, held_probes)
         if np.array_equal(probed, corrected):
             return
-        # held vertices do not move, and their columns of B are 0 at others: fixed entries of y stay
+        # fixed y do not change: only held vertices depend on them, and contacts do not move these
         full = self._columns.B @ y
         self._contact.apply(full, self._columns.B @ before, held)
         y[...] = self._project @ full

@@ -34,7 +34,6 @@ from study.experiments.alternatives.solvers.methods import WINDOW, TwoLevel, con
 from study.experiments.alternatives.solvers.substeps import METHODS
 from study.experiments.iterations import converged_run
 from study.experiments.kit import base as kit
-from study.experiments.kit import runfiles
 from study.experiments.kit.base import experiment
 from study.experiments.kit.measurement import Processes, Variant, in_processes
 
@@ -148,16 +147,16 @@ class Comparison(Processes):
     repeats: kit.Repeats = 1
 
     def factors(self, scene: str, size: float) -> tuple[float, ...]:
-        """Factors that multiply weights of ``scene``; only 1 with another mesh (``size`` not 1)."""
+        """Factors of groups' weights in ``scene``; just (1.0,) unless ``size`` of its mesh is 1."""
         return self.stiffness.get(scene, (1.0,)) if size == 1.0 else (1.0,)
 
     def pairs(self, method: str, vertices: int) -> list[tuple[int, int]]:
-        """Pairs (substeps, iterations) of ``method`` whose work does not exceed its limit."""
+        """Pairs (substeps, iterations) of ``method`` that `affords` allows for ``vertices``."""
         steps = self.steps.get(method, ())
         return [(n, k) for n, k in steps if self.affords(method, vertices * n * k)]
 
     def affords(self, method: str, work: int) -> bool:
-        """Return whether ``work`` (vertices x substeps x iterations) is in the method's limit."""
+        """Whether ``work`` (vertices x substeps x iterations) is within the limit of ``method``."""
         return work <= self.work.get(method, work)
 
 
@@ -204,7 +203,7 @@ class Trained:
 class Candidate:
     """A method with its settings, ready to run on one scene.
 
-    steps : number of frames of ``loop`` in a frame of the scene
+    steps : number of steps (frames of ``loop``) into which a frame of the scene is divided
     positions : function that maps coordinates in a position subspace to positions of all vertices
     output : the same function in single precision, which is timed; None without a subspace
     columns : columns of the position subspace; None without a subspace
@@ -219,7 +218,7 @@ class Candidate:
     columns: Columns | None = None
 
     def state(self, state: State, scene: Scene) -> State:
-        """Return ``state`` (of all vertices) in the method's subspace; unchanged without one."""
+        """Convert ``state`` of all vertices to coordinates in the method's subspace, if any."""
         if self.columns is None:
             return state
         own = (self.columns, scene.masses)
@@ -280,10 +279,10 @@ def candidates(
 def trained(training: Scene, settings: Comparison) -> Iterator[Trained]:
     """Yield models in position subspaces with sampled elements, trained on one or more motions.
 
-    The training motions are that of ``training`` and variants of it drawn by seeds. Their frames
-    are nearly converged; the columns are modes of every n-th frame of each of n motions. Elements
-    are sampled on iterates of these motions in the subspace, once for each number of substeps in
-    ``settings``. The coarse level of the two-level method is trained on the fewest motions only.
+    The first motion is that of ``training``, others are random variants of it. Every frame is
+    iterated nearly to convergence. POD modes of every n-th frame of n motions span a subspace; its
+    elements are sampled on iterates of these motions in it, once for each number of substeps in
+    ``settings``. The coarse level of the two-level method is trained only for the smallest n.
     """
     vertices, own = training.mesh.vertices, settings.implicit
     taken, coarse = (
@@ -343,7 +342,7 @@ def substepped(scene: Scene, substeps: int, iterations: int, window: int = 0) ->
 
 @dataclass(frozen=True)
 class Timed:
-    """Scene in the motion that is timed, its reduced models, and ``labels`` for rows of times."""
+    """A scene with the motion to time, its reduced models, and ``labels`` of the measured times."""
 
     labels: dict[str, object]
     scene: Scene
@@ -374,7 +373,7 @@ class Timed:
 
 
 class Options(ConfigModel):
-    """Settings that `alternatives` reads: scene, comparison of methods, and blow-up extent."""
+    """Settings of `alternatives`: scene, compared methods, size ratio that counts as a blow-up."""
 
     scene: SceneConfig
     alternatives: Comparison
@@ -416,7 +415,7 @@ def alternatives(sources: list[Path], settings: Options, out: File, times: File)
 
 
 def sized(config: SceneConfig, factor: float, stiffness: float) -> SceneConfig:
-    """Return ``config`` with a ``factor`` times finer mesh, equal mass, weights x ``stiffness``."""
+    """Refine the mesh by ``factor`` with equal mass, and multiply all weights by ``stiffness``."""
     finer = config.coarsened(factor, 1.0)
     counts = [c.mesh.build(Path()).vertices for c in (config, finer)]
     effects = tuple(
@@ -452,7 +451,7 @@ def _rows(
 
     def errors(run: np.ndarray | None) -> dict[str, float | None]:
         return {
-            key: None if run is None or other is None else runfiles.run_error(run, other)
+            key: None if run is None or other is None else kit.run_error(run, other)
             for key, other in against.items()
         }
 
@@ -469,6 +468,6 @@ def _rows(
             if id(own) not in spans:
                 project = projector(own, scene.masses)
                 nearest = np.stack([own.B @ (project @ q) for q in implicit])
-                spans[id(own)] = runfiles.run_error(nearest, implicit)
+                spans[id(own)] = kit.run_error(nearest, implicit)
             row["span_error"] = spans[id(own)]
         yield row

@@ -68,7 +68,7 @@ def shifted(mesh: Mesh, *offset: float) -> Mesh:
 def _case(
     name: str, why: str, holds: tuple[str, ...], mesh: record.Shape, *effects: dict, **rest: Any
 ) -> record.HardCase:
-    """Return a hard case; ``rest``: its start, bound, slow, and keyword arguments of `build`."""
+    """Return a `HardCase`; ``rest``: its fields start, bound and slow, and arguments of `build`."""
     own = {key: rest.pop(key) for key in ("start", "bound", "slow") if key in rest}
     return record.HardCase(name, why, holds, mesh, effects, rest, **own)
 
@@ -119,7 +119,7 @@ def _squashed() -> list[record.HardCase]:
         )
         for target, sides in to.items()
         for name, mesh, group, why in kinds
-        if mesh is not sheet or target != "plane"  # a sheet is a plane at rest
+        if mesh is not sheet or target != "plane"  # a sheet at rest is a plane already
     ]
 
 
@@ -422,5 +422,5 @@ CASES: dict[str, record.HardCase] = {case.name: case for part in PARTS for case 
 
 
 def reducible_cases(slow: bool = False) -> list[str]:
-    """Names of the hard cases that can be run: the slow ones if ``slow``, else all others."""
+    """Names of the hard cases that are not refused: the slow ones if ``slow``, else all others."""
     return [name for name, c in CASES.items() if c.slow == slow and c.holds != ("refused",)]

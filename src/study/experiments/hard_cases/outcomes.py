@@ -99,7 +99,7 @@ class Training:
         self._roundoff: list[float] = []
         self.run = record.full_order(case, self.scene, self._observe)
         self._bases: dict[str, Basis] = {}
-        # longest side (m) of any bounding box: of a frame, the rest shape or the fixed vertices
+        # longest side (m) of the bounding boxes of all frames, rest shape and fixed vertices
         self.extent = max(self.run.extent, record.reach(self.scene, self.run))
 
     def _observe(self, frame: int, y: np.ndarray) -> None:
@@ -186,8 +186,8 @@ def reduced_run(training: Training, name: str, methods: Methods, limit: float) -
 def _subspace(training: Training, kind: str, sampling: str, limit: float) -> ReducedRun:
     """Run in a subspace of positions, "pod" or "skinning" (``kind``); ``limit``: see `reduced_run`.
 
-    ``sampling``: "full" evaluates all projections, "ecsw" those of some elements, "hrpd"
-    interpolates. ECSW is trained on a "full" run from the initial state of the hard case.
+    ``sampling``: "full" evaluates all projections, "ecsw" only those of some elements, "hrpd" fits
+    all to those of some. ECSW is trained on a "full" run from the initial state of the hard case.
     """
     scene = training.scene
     columns = make_columns(scene, training.run.positions[1::2], kind, k=K)
@@ -245,7 +245,7 @@ class HardCases(ConfigModel):
 
     @property
     def modules(self) -> list[str]:
-        """Classes ("module:attribute") of effects in the hard cases; the job reads their code."""
+        """Classes ("module:attribute") of the hard cases' effects, for the job's fingerprint."""
         chosen = self.cases or reducible_cases()
         effects = {effect["effect"] for name in chosen for effect in CASES[name].effects}
         return sorted(EFFECTS[effect] for effect in effects)

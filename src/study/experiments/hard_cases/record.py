@@ -173,7 +173,7 @@ def lowered(offset: float) -> Start:
 
 
 EPS = np.finfo(float).eps
-# Factor of EPS in bounds: some 10 entries in a row of S or system matrix, few operations each.
+# Constant c (see top): a few roundings for each of some 10 entries in a row of matrix S or A.
 OPERATIONS = 32.0
 # A run recovers if it ends nearer to its rest shape than this times the mesh's longest side.
 RECOVERED = 1e-2
@@ -212,7 +212,7 @@ class Roundoff:
         return evaluation + self._dense(self.basis, size, largest)
 
     def _noise(self, size: float) -> float:
-        """Objective R (J) of errors in y - s and S y - p alone, coordinates up to ``size`` (m)."""
+        """Objective R of rounding errors alone, J (see module), if all |y| are <= ``size`` m."""
         h = self.loop.time_step
         unit = OPERATIONS * EPS * size
         total = 1.5 * float(self.scene.masses.sum()) / h**2 * (2.0 * unit) ** 2
@@ -222,7 +222,7 @@ class Roundoff:
         return total
 
     def _residual(self, size: float) -> np.ndarray:
-        """Bound c u |A| |y| (N,), see module, of the solver's residual, if all |y| are ``size``."""
+        """Bound (N,) of a global solve's residual |r| (see the module) for all |y| = ``size`` m."""
         rows = np.asarray(abs(self.scene.system.matrix).sum(axis=1)).ravel()
         return OPERATIONS * EPS * size * rows
 
@@ -230,7 +230,7 @@ class Roundoff:
         matrix = b.T @ (self.scene.masses[:, None] * b) / self.loop.time_step**2
         steps: Sequence[Any] = self.loop.local_steps  # each has ``matrix``, its reduced stiffness
         matrix = matrix + sum(step.matrix for step in steps)
-        # scaling the columns of A makes the result independent of the units of coordinates
+        # with a unit diagonal of A the bound does not depend on the units of the coordinates z
         scale = np.sqrt(np.diag(matrix))
         eigenvalues = np.linalg.eigvalsh(matrix / np.outer(scale, scale))
         smallest, greatest = max(eigenvalues[0], EPS * eigenvalues[-1]), eigenvalues[-1]
@@ -266,19 +266,19 @@ class Record:
 
 
 class Watched:
-    """Reduced local step that returns the energy of the full projections, not the reduced one."""
+    """Reduced local step that returns the energy with full projections instead of reduced ones."""
 
     def __init__(self, step: LocalStep, group: LocalStep) -> None:
         self.name = step.name
         self._step, self._group = step, group
 
     def begin_frame(self, q: np.ndarray) -> None:
-        """Let the reduced and the full step prepare a frame that begins at ``q`` (N, 3) m."""
+        """Call `begin_frame` of the reduced and the full local step at positions ``q`` (N, 3) m."""
         self._step.begin_frame(q)
         self._group.begin_frame(q)
 
     def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
-        """Add the reduced S^T W p at ``y`` (N, 3) m to ``rhs`` (N, 3); return the full energy J."""
+        """Add reduced S^T W p at ``y`` (N, 3) m to ``rhs``; return the energy of unreduced p, J."""
         self._step.accumulate(y, rhs)
         return self._group.accumulate(y, np.zeros_like(y))
 
@@ -395,7 +395,7 @@ def momentum(case: HardCase, scene: Scene, run: Record) -> str:
     found = np.einsum("n,fna->fa", masses, run.velocities)
     expected = found[0] + frames * h * masses.sum() * np.broadcast_to(pull, 3)
     error = np.abs(found - expected).max()
-    # allowed: rounding errors of the sums over vertices of S^T W p and the linear solver's residual
+    # allowed error of momentum: round-off of S^T W p summed over vertices, residual of the solver
     size = float(np.abs(run.positions).max()) + float(np.abs(run.velocities).max()) * h
     noise = EPS * OPERATIONS * size * (masses.sum() / h + h * abs(scene.system.matrix).sum())
     allowed = noise * max(1.0, np.sqrt(len(found)))
@@ -412,7 +412,7 @@ def determinism(case: HardCase, scene: Scene, run: Record) -> str:
 
 
 def recovers(case: HardCase, scene: Scene, run: Record) -> str:
-    """Check that the run ends in the rest shape, up to a rigid motion."""
+    """Check that the run ends in the rest shape, up to a rigid motion; return the fault or ""."""
     residuals, scale = shape_residuals(scene.mesh.points[None], run.positions[-1:])
     error = scale[0] * float(np.linalg.norm(residuals, axis=2).max()) / scene.mesh.extent
     return "" if error <= RECOVERED else f"ends {error:.2g} extents from its rest shape"

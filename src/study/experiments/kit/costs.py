@@ -32,20 +32,20 @@ COLUMNS = [
 ]  # fmt: skip
 COSTS = ["scene", "effect", "elements", "ms_per_frame", "share"]
 LEFT_OUT = ["scene", "left_out", "groups", "elements", "ms_per_frame", "own_ms"]
-# Methods that the step loop calls: one tuple each for groups, forces, boundaries and contacts.
+# Python methods that the step loop calls: a tuple each for groups, forces, boundaries, contacts.
 _QUESTIONS = (
     ("begin_frame", "accumulate"), ("acceleration",), ("active", "held", "takes_hold", "path"),
     ("apply",),
 )  # fmt: skip
-# Indices into the data array ("record") of a kernel with timers, of four addresses: of the kernel
-# without timers, of its record, of the summed times, of the clocks. SIZE: length of the array.
+# Indices into the data array ("record") of a kernel with timers. Its entries are the addresses of
+# the kernel without timers, its record, the summed times, the clocks. SIZE: length of the array.
 KERNEL, RECORD, SECONDS, CLOCKS, SIZE = range(OWN, OWN + 5)
 
 
 def variant(
     scene: Scene, system: GlobalSystem, steps: Sequence[LocalStep], frames: int, labels: dict
 ) -> Variant:
-    """Return a variant to be timed: ``scene`` with local ``steps``, without objective values."""
+    """Return a variant to be timed: ``scene`` with local ``steps``; no objective is computed."""
     loop = scene.stepper(system, steps, track_objective=False)
     return Variant(labels, loop, scene.initial_state(), frames)
 
@@ -56,12 +56,12 @@ def local_costs(
     """Milliseconds of one evaluation of each reduced local step, and of the full one of its group.
 
     Times are means over ``states``. A row also has times of two phases of the reduced local step,
-    each measured separately: the dense product that solves for the coefficients, and the
-    reconstruction. All steps are measured in turn.
+    each measured separately: the dense product that yields the coefficients c of the modes, and the
+    sum of S^T W (mean + V c), which all elements enter. All steps are measured in turn.
 
     often : ``warmup``, ``repeats``: numbers of unmeasured and of measured evaluations
     reduced : (group, method, r) -> reduced local step of a group of ``scene``
-    states : (n, N, 3) m, positions; the first are also used for what is computed once per frame
+    states : (n, N, 3) m, positions; the local steps prepare a frame that begins at states[0]
     """
     groups = {name: scene.group(name) for name, _, _ in reduced}
     rhs, iterates = vertices(len(states[0])), [as_vertices(y) for y in states]
@@ -178,7 +178,7 @@ def _profile(
         own = [sum(stand.seconds for stand in stands if stand.name == name) for name in names]
         inside = sum(stand.kernel_seconds for stand in stands)
         total, (_, local, solve, _) = float(report.seconds.sum()), report.seconds.tolist()
-        # if local steps are not compiled, the times of groups include those of the right-hand side
+        # without compiled kernels, a group's time includes that of the right-hand side
         right = local - inside if inside > 0.0 else 0.0
         parts = [*own, right, solve, total - sum(own) - right - solve]
         rows.append([1e3 * part for part in (total, *parts)])
@@ -186,7 +186,7 @@ def _profile(
 
 
 def _elements(scene: Scene, name: str) -> int:
-    """Number of elements of the group ``name``; for another effect, of vertices it acts on."""
+    """Count elements of group ``name``, else vertices held by effect ``name``, or all vertices."""
     for group in scene.groups:
         if group.name == name:
             return group.elements
@@ -195,7 +195,7 @@ def _elements(scene: Scene, name: str) -> int:
 
 
 def left_out_sets(scene: Scene) -> list[tuple[str, ...]]:
-    """Sets of effects to leave out: the empty set, each single effect, all groups except one.
+    """Sets of effects to leave out: none; each single effect; for each group, all other groups.
 
     The list is empty for a scene with a single constraint group, which cannot be left out. Effects
     that only change the start, such as a kick, cost no time in a frame and are never left out.
@@ -248,7 +248,7 @@ def _timed(y, rhs, record, part):
 
 
 def timed(kernel: LocalKernel) -> tuple[LocalKernel, np.ndarray]:
-    """Return ``kernel`` with timers, and an array (3,): seconds in both `PARTS` and `PREPARE`."""
+    """Return ``kernel`` with timers, and seconds (3,) spent in each of `PARTS` and in `PREPARE`."""
     seconds, clocks = np.zeros(PREPARE + 1), np.stack([clock() for _ in range(PREPARE + 1)])
     arrays = (seconds, clocks)
     places = [kernel.address, kernel.record.ctypes.data, *(array.ctypes.data for array in arrays)]

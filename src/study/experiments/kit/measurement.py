@@ -87,9 +87,9 @@ class Variant:
 def measure(variants: Sequence[Variant], warmup: int, repeats: int) -> list[dict[str, Any]]:
     """Time all variants; return a row for each: labels, and times of the `PHASES` in ms.
 
-    Times are means over the frames, where each frame's time is from its median repeat. Of each
-    variant there are ``warmup`` unmeasured runs, the first of which also factorises and caches
-    matrices, and ``repeats`` measured runs.
+    Times are means over the frames; those of a frame are from the repeat with the median total time
+    of the frame. Of each variant there are ``warmup`` unmeasured runs, the first of which also
+    factorises and caches matrices, and ``repeats`` measured runs.
     """
     samples: list[list[np.ndarray]] = [[] for _ in variants]
     for repeat in range(-warmup, repeats):
@@ -197,7 +197,7 @@ def in_processes(
 
 
 def _in_this_process(given: str, answer: str, process: str) -> None:
-    """Time variants made by the pickled functions in file ``given``; write rows to ``answer``."""
+    """Time variants made by functions in pickle ``given``; write the rows to pickle ``answer``."""
     with damaged_set_aside():  # a damaged file is renamed when read, as in the parent process
         cases, asked = pickle.loads(Path(given).read_bytes())
         variants = [variant for case in cases for variant in case()]

@@ -39,7 +39,7 @@ Ranks = tuple[Annotated[int, Field(ge=0)] | Literal["full"], ...]
 Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
 Instants = Annotated[tuple[Fraction, ...], Field(min_length=1)]  # fractions of a run's duration
 Columns = Annotated[int, Field(ge=1, le=6)]  # number of panels in a row
-Count = Annotated[int, Field(ge=1, le=12)]  # number of drawn modes, or of steps of the sampling
+Count = Annotated[int, Field(ge=1, le=12)]  # number of modes, or of selection steps, to draw
 AZIMUTH = 30.0  # azimuth of every camera, degrees
 
 
@@ -95,7 +95,7 @@ class View(Methods):
 
 
 class Beside(Scenes):
-    """Options of a figure: scenes, panels in a row, and experiments of the published code.
+    """Options of a figure: scenes, number of panels in a row, experiments of the published code.
 
     ``published`` maps a scene to a similar experiment of the preprint authors' own program.
     """
@@ -179,7 +179,7 @@ class Drawn(_Plain):
 
     @property
     def scenes(self) -> list[str]:
-        """Scenes of the experiments, each once."""
+        """Names of the scenes in ``experiments``, each once, in the order of drawing."""
         return list(dict.fromkeys(experiment.scene for experiment in self.experiments))
 
     @property
@@ -203,7 +203,7 @@ class Drawn(_Plain):
         return plain_words(held.title if held else method)
 
     def handles(self, looks: Mapping[str, tuple[str, str]], **common: Any) -> list[Line2D]:
-        """Legend entries for ``looks`` (method -> colour, marker), with the options ``common``."""
+        """Legend entries for ``looks`` (method -> colour, marker); ``common``: options of each."""
         return [
             style.handle(self.title(method), color=colour, marker=marker, **common)
             for method, (colour, marker) in looks.items()

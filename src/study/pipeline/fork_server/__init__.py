@@ -45,7 +45,7 @@ def interpreter() -> str:
 
 
 def hold_pipe(place: Path) -> None:
-    """Hold a named pipe open until this process ends: jobs that are no forks notice it and end.
+    """Hold a named pipe open until this process ends; then jobs that no server forked end, too.
 
     Raises OSError if the file system does not support named pipes.
 
@@ -53,7 +53,7 @@ def hold_pipe(place: Path) -> None:
     """
     place.unlink(missing_ok=True)
     os.mkfifo(place)
-    reader = os.open(place, os.O_RDONLY | os.O_NONBLOCK)  # without a reader, the next open waits
+    reader = os.open(place, os.O_RDONLY | os.O_NONBLOCK)  # without a reader the next line waits
     os.open(place, os.O_WRONLY)
     os.close(reader)
     os.environ[PIPE] = str(place.absolute())

@@ -50,7 +50,7 @@ class Server:
         self._libc = ctypes.CDLL(None)
 
     def serve(self) -> str | None:
-        """Serve requests; in a fork, return its script's path; in the server, None at its end."""
+        """Fork a job per request; return None when the owner ends, in a fork its script's path."""
         signal.set_wakeup_fd(self._waker, warn_on_full_buffer=False)
         signal.signal(signal.SIGCHLD, lambda number, frame: None)
         while True:

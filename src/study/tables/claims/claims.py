@@ -48,7 +48,7 @@ class Outcome:
 
 
 def values_of(test: TestRule, tables: Tables) -> pd.DataFrame:
-    """Rows that ``test`` selects: columns scene, group, method ..., and `VALUE`, its metric."""
+    """Rows that ``test`` selects: columns scene, group ..., and `VALUE`, the metric of the test."""
     return METRICS[test.metric].values(tables, dict(test.where), test.accuracy)
 
 
@@ -165,9 +165,9 @@ def timed_columns(rule: ClaimRule) -> set[str]:
 
 
 def by_rules(timed: Callable[[ClaimRule, Any], set[str]]) -> TimedCells:
-    """Return a function for `Table.timed_cells`, which calls ``timed`` for each row of a table.
+    """Return a function for `Table.timed_cells` that calls ``timed`` for each row of the table.
 
-    ``timed`` gets the rule of the row's claim, and the row; it returns names of timed columns.
+    ``timed`` gets the rule of the row's claim, and the row; it returns columns affected by times.
     """
 
     def timed_cells(table: pd.DataFrame, **files: Path) -> list[set[str]]:
@@ -178,7 +178,7 @@ def by_rules(timed: Callable[[ClaimRule, Any], set[str]]) -> TimedCells:
 
 
 def timed_parts(*cells: str) -> TimedCells:
-    """Return a `Table.timed_cells` function: columns ``cells`` if times affect a row's verdict."""
+    """Return a function for `Table.timed_cells`: ``cells`` depend on times if the verdict does."""
     return by_rules(
         lambda rule, row: {*cells} if f"verdict{PARTS[row.part]}" in timed_columns(rule) else set()
     )
@@ -194,14 +194,14 @@ skipped = partial(Column, timed=True, compared="skipped")
 FACTORS = (0.5, 0.8, 1.25, 2.0)  # table claims_sensitivity multiplies thresholds by these
 SHARES = (0.5, 0.6, 0.75, 0.9, 1.0)
 MARGINS = (1.0, 1.25, 1.5, 2.0, 3.0, 5.0)  # tried values of `TestRule.margin`; 1: no margin
-SMALL = 10  # claims_sensitivity keeps only sizes r up to this one, or only larger ones
+SMALL = 10  # claims_sensitivity repeats tests with sizes r <= this only, and with larger r only
 SPLITS = ("train", "test", "heldout")
 VARIED = ("threshold", "share", "margin", "sizes", "splits", "scenes")
-# Share of verdicts of claims_sensitivity that may differ in `verify`: some rest on few runs only.
+# Share of claims_sensitivity's verdicts (some rest on few runs) that may differ from expected ones.
 FRAGILE = 0.01
 _Rows = list[pd.DataFrame]
 _Keep = Callable[[pd.Series], pd.Series]
-_Variation = tuple[str, str, Sequence[TestRule], _Rows]  # (what is varied, how, tests, their rows)
+_Variation = tuple[str, str, Sequence[TestRule], _Rows]  # (one of `VARIED`, change, tests, rows)
 
 
 @declare(
@@ -230,7 +230,7 @@ _Variation = tuple[str, str, Sequence[TestRule], _Rows]  # (what is varied, how,
     timed_cells=by_rules(lambda rule, row: timed_columns(rule)),
 )
 def claims(rules: Path, added: Added, **tables: pd.DataFrame) -> pd.DataFrame:
-    """One row for each claim, in the order of file ``rules``; for ``added``, see `load_claims`."""
+    """One row per claim of file ``rules``; ``added``: values for its sets (see `load_claims`)."""
     found = load_claims(rules, added)
     return pd.DataFrame([_row(name, rule, tables) for name, rule in found.items()])
 
@@ -291,7 +291,7 @@ def _timed_of_test(rule: ClaimRule, row: Any) -> set[str]:
     timed_cells=by_rules(_timed_of_test),
 )
 def claims_tests(rules: Path, added: Added, **tables: pd.DataFrame) -> pd.DataFrame:
-    """One row for each test of each claim's two verdicts; for ``added``, see `load_claims`."""
+    """One row per claim, kind of verdict (`PARTS`) and test; ``added``: see table `claims`."""
     rows = [
         {"claim": name, "part": part, **test.model_dump(include=SAID), **_found(test, tables)}
         for name, rule in load_claims(rules, added).items()
@@ -333,7 +333,7 @@ def claims_sensitivity(rules: Path, added: Added, **tables: pd.DataFrame) -> pd.
 def sensitivity_rows(rules: Mapping[str, ClaimRule], tables: Tables) -> pd.DataFrame:
     """One row per claim, kind of verdict (`PARTS`) and variation of the tests that decide it.
 
-    Variations of sizes, snapshots or scenes that change nothing or leave a test no row are omitted.
+    A variation is omitted if a test has no rows; of sizes, splits, scenes, also if no row changes.
     """
     made = []
     for claim, rule in rules.items():
@@ -361,7 +361,7 @@ def _with(test: TestRule, **changes: Any) -> TestRule:
 
 
 def _variations(tests: Sequence[TestRule], rows: _Rows, tables: Tables) -> Iterator[_Variation]:
-    """Yield ``tests`` with another threshold, share, margin or split, or fewer rows (r, scenes)."""
+    """Yield ``tests`` with each change of `VARIED`, such as another threshold or fewer scenes."""
     for factor in FACTORS:
         changed = [_with(test, threshold=factor * test.threshold) for test in tests]
         yield "threshold", f"x {factor:g}", changed, rows
@@ -387,9 +387,9 @@ def _variations(tests: Sequence[TestRule], rows: _Rows, tables: Tables) -> Itera
 def _kept(
     tests: Sequence[TestRule], rows: _Rows, varied: str, column: str, keeps: Mapping[str, _Keep]
 ) -> Iterator[_Variation]:
-    """Yield a variation of ``tests`` for each function in ``keeps`` that leaves out ``rows``.
+    """Yield ``tests`` with fewer ``rows``, for each function in ``keeps`` that leaves out any.
 
-    A function gets the cells of the rows in ``column`` and returns True for each row to be kept.
+    A function gets ``column`` of one test's rows and returns True for each row to be kept.
     """
     for name, keep in keeps.items():
         kept = [values[keep(values[column])] if column in values else values for values in rows]
@@ -418,7 +418,7 @@ def _kept(
     timed_cells=timed_parts("verdict", "same", "measured"),
 )
 def replication(claims: pd.DataFrame, rules: Path, recorded: Path) -> pd.DataFrame:
-    """One row for each claim that is also in file ``recorded``, and kind of verdict (`PARTS`)."""
+    """Verdicts of ``claims`` beside those of file ``recorded``; a row per common claim and part."""
     loaded = load_claims(rules)
     both = claims.merge(pd.read_csv(recorded), on="claim", suffixes=("", "_replication"))
     unchanged = [

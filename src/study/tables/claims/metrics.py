@@ -68,13 +68,13 @@ def held_out(
 
 
 def decay(rows: pd.DataFrame, accuracy: float) -> pd.Series:
-    """Singular values divided by their group's largest, for groups with any above round-off."""
+    """Singular values / largest of the constraint group; groups of mere round-off are left out."""
     rows = rows[rows.groupby(["scene", "group"]).above_roundoff.transform("any")]
     return rows.relative
 
 
 def reconstruction(rows: pd.DataFrame, accuracy: float) -> pd.Series:
-    """Reconstruction error of each row; infinite if the matrix of the interpolation is singular."""
+    """Reconstruction error per row; inf if the interpolation is singular (``accuracy``: unused)."""
     return rows[rows.gain.notna()].relative_error.fillna(np.inf)
 
 
@@ -91,7 +91,7 @@ def axis_reconstruction(rows: pd.DataFrame, accuracy: float) -> pd.Series:
 
 
 def elements_per_entry(rows: pd.DataFrame, accuracy: float) -> pd.Series:
-    """Number of evaluated elements divided by the number of modes r, for each row."""
+    """Number of evaluated elements divided by r, the number of modes (``accuracy`` is unused)."""
     rows = rows[rows.elements_sampled.notna()]
     return rows.elements_sampled.astype(float) / rows.r
 
@@ -112,7 +112,7 @@ def useful_speedup(rows: pd.DataFrame, accuracy: float) -> pd.Series:
 
 
 def best_useful_speedup(rows: pd.DataFrame, accuracy: float) -> pd.DataFrame:
-    """Largest value of `useful_speedup` over sizes and methods, per scene and group."""
+    """Largest speed-up with an error up to ``accuracy`` (else 0) for each scene and group."""
     useful = useful_speedup(rows, accuracy).rename(VALUE)
     return useful.groupby([rows.scene, rows.group], sort=False).max().reset_index()
 
@@ -142,7 +142,7 @@ def trend_p_value(name: str, rows: pd.DataFrame, accuracy: float) -> pd.DataFram
     number of sizes are used. The result has one row, or none if there are fewer than two blocks or
     fewer than three sizes.
     """
-    # not imported at the top: SciPy's import takes a second, which planning the workflow saves
+    # imported here, as the import takes a second and planning the workflow does not need SciPy
     from scipy.stats import page_trend_test, rankdata
 
     runs = [run for _, run in rows.sort_values("r").groupby(_RUN, sort=False)]
@@ -222,7 +222,7 @@ METRICS = {
     "local_share": Metric(
         lambda rows, _: rows.local_share, "local_share", ("local_share",), ratio=over_the_rest
     ),
-    # error over the frames in which perturbed runs agree; infinite if the run blew up in them
+    # error over frames in which perturbed full-order runs agree; inf if the run blew up in them
     "rerun_error": _of_reruns(lambda rows, _: rows[_ERROR].fillna(np.inf)),
     "useful_speedup": _of_reruns(useful_speedup, "speedup"),
     "best_useful_speedup": _of_reruns(best_useful_speedup, "speedup"),

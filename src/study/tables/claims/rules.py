@@ -21,8 +21,8 @@ _NAMED = "@"  # "@name" in ``where`` stands for all values of the set ``name``
 Added = Mapping[str, Sequence[Value]]
 NONE_ADDED: Added = MappingProxyType({})
 MARGIN = 1.5  # default of `TestRule.margin` for tests that compare times
-PARTS = {"published": "", "beyond": "_beyond"}  # name of a verdict -> suffix of its columns
-# Inputs of tables about claims: rules, scenes that the study adds to sets in them, metric tables.
+PARTS = {"published": "", "beyond": "_beyond"}  # field of `ClaimRule` -> suffix in table claims
+# Inputs of tables about claims: rules, scenes to add to sets in them, tables that metrics read.
 READS: dict[str, Read] = {
     "rules": ProjectFile("config/claims.yaml"),
     "added": Setting("claim_sets"),
@@ -109,8 +109,8 @@ class ClaimRule(ConfigModel):
     section, shown : section and figures of the preprint
     qualifiers : conditions that a fair test has to respect
     published : tests on the preprint's variants of the method and on its scenes
-    beyond : tests on sound variants of the method, on well-posed scenes; if none of them decides,
-        the verdict beyond the preprint is "not tested"
+    beyond : tests on sound methods (as in set ``sound`` of config/claims.yaml) and well-posed
+        scenes; if none of them decides, the verdict beyond the preprint is "not tested"
     changes : history of the rules, oldest first
     """
 

@@ -68,7 +68,7 @@ class Column:
 
     @property
     def quantity(self) -> Quantity:
-        """Kind of content, which determines how far results of two machines may differ."""
+        """Kind of values in the column; sets how far those of two machines may differ."""
         if self.compared or self.timed:
             return self.compared or "timed"
         if self.kind != "number":

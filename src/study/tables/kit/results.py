@@ -29,7 +29,7 @@ COLUMNS = (
     integer(COUNT, "held-out motions that were run, can be judged and are far enough"),
     number("playback_error", "median error of playback on these motions, see reduced_reruns"),
 )
-# Held-out motions count only if playback of the training recording has an error above this.
+# Held-out motions are left out if the training run differs from theirs by at most this (relative).
 FAR = 0.3
 _WHOLE = {"k": "Int64", "r": "Int64"}
 EXPERIMENT = ["scene", "group"]
@@ -64,10 +64,10 @@ def with_recorded(rows: pd.DataFrame, record: list[Path]) -> pd.DataFrame:
 def in_one_time(
     table: pd.DataFrame, own: pd.Series, times: pd.DataFrame, columns: Collection[str]
 ) -> pd.DataFrame:
-    """Scale ``columns`` (times) so that full-order frames of a scene take its time in ``times``.
+    """Scale ``columns`` (times) so that a scene's full-order frame takes as long as in ``times``.
 
     own : scene -> time of its full-order frame in the job that measured ``table``, ms
-    times : table frame_times; times of scenes that are missing in it are not scaled
+    times : table frame_times; the times of scenes that it lacks are not scaled
     """
     one = times.set_index("scene").ms_per_frame.reindex(own.index)
     factor = table.scene.map((one / own).fillna(1.0)).fillna(1.0)
@@ -75,7 +75,7 @@ def in_one_time(
 
 
 def timings_in_one_time(timings: Sequence[File], times: pd.DataFrame) -> pd.DataFrame:
-    """Rows of the files ``timings``; `in_one_time` scales their times to those in ``times``."""
+    """Rows of ``timings``, scaled by `in_one_time` to the full-order frame times of ``times``."""
     rows = joined(timings)
     if rows.empty:
         return rows
@@ -89,7 +89,7 @@ def median_interval(values: Sequence[float] | np.ndarray) -> tuple[float, float,
 
     For a single value, or equal values, both quantiles are that value.
     """
-    # not imported at the top: SciPy's import takes a second, which planning the workflow saves
+    # imported here, as the import takes a second and planning the workflow does not need SciPy
     from scipy.stats import bootstrap
 
     x = np.asarray(values, float)
@@ -159,8 +159,8 @@ def judged_runs(reruns: pd.DataFrame, reconstruction: pd.DataFrame) -> pd.DataFr
 
     gain : amplification of errors by the samples of the reduction
     error : error over frames in which perturbed runs agree; inf if the run blew up in one of them
-    orthogonal_error : error of the run with orthogonal projection at the largest size that is at
-        most r; other methods may have one mode more, if their bases are not centred
+    orthogonal_error : error of the run with orthogonal projection at the largest basis size up to
+        the row's r; its centred basis may have one mode less than an uncentred one
     failed : whether the error exceeds `FAILED`
     """
     runs = trained(reruns)

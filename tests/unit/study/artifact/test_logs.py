@@ -15,7 +15,7 @@ from threadpoolctl import threadpool_info, threadpool_limits
 
 from pdrom.core.errors import INTERRUPTED, MeshError
 from pdrom.core.store.checksum import sets_aside
-from study.artifact.logs import job_log, planning_log, usage_of, usage_since
+from study.artifact.logs import job_log, usage_of, usage_since, warnings_to
 
 LOGGER = logging.getLogger("pdrom")
 
@@ -119,8 +119,8 @@ def test_a_full_disk_prints_no_traceback_for_each_message(path, capfd, monkeypat
 
 
 def test_warnings_of_the_planning_are_shown_once(capsys):
-    for quiet in (False, True):
-        with planning_log(quiet):
+    for stream in (sys.stderr, None):
+        with warnings_to(stream):
             logging.getLogger("pdrom.anything").warning("look")
             logging.getLogger("pdrom.anything").info("not shown")
     assert capsys.readouterr().err == "pdrom: warning: look\n"

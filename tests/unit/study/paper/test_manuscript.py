@@ -11,9 +11,8 @@ from pdrom.core.yamlfile import read_yaml
 from places import ROOT
 from study.figures.kit.declaration import declarations
 from study.paper.build import PAGES, bibliography, paper
-from study.paper.figure_numbers import Numbers, figure_numbers
 from study.paper.macros import AGGREGATES, keys_of, number_of, sentences
-from study.paper.source import documents
+from study.paper.source import Numbers, documents, figure_numbers
 from study.paper.tex import build_pdfs, packages_of
 from study.pipeline.plan import Plan
 from study.pipeline.study import Study

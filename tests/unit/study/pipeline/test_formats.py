@@ -10,6 +10,7 @@ import pytest
 from pdrom.core.provenance import RECORD
 from pdrom.core.yamlfile import read_yaml
 from pdrom.model.held_out import MOTIONS
+from pdrom.model.scene import Scene
 from places import ROOT
 from study.artifact.paths import FULL_ORDER, HELDOUT
 from study.pipeline.folders import Folders
@@ -65,7 +66,8 @@ def files(tmp_path_factory):
             job.make(job.outputs)
             made |= {job.artifact.writes[key].pattern: path for key, path in job.outputs.items()}
         made[FULL_ORDER.pattern] = made[HELDOUT.pattern]
-    return made, plan.study.bound[SCENE]
+    config = plan.study.scene(SCENE)
+    return made, Scene.build(config, config.mesh.build(ROOT))
 
 
 def value(expression: str, symbols: dict[str, int], size: int) -> int:

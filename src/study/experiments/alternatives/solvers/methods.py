@@ -32,8 +32,8 @@ from study.experiments.kit.base import followed
 WINDOW = 5  # number of earlier iterates in Anderson acceleration, as in Peng et al. 2018
 # Parameters of Chebyshev's semi-iteration: estimated convergence rate of the plain iteration, and
 # number of plain iterations before the first extrapolation. Both are set by hand, as in Wang 2015.
-# Of five rates, this one is best in both compared scenes with a sheet, a choice that favours the
-# method; a rate measured from the first iterates is worse.
+# Of five rates, this one is best in both of the compared scenes with a sheet: choosing it favours
+# this method. A rate that is measured from the first iterates gives worse results.
 RATE = 0.98
 PLAIN = 5
 
@@ -162,7 +162,7 @@ class TwoLevel(Alternative):
             raise SceneError(f"scene '{scene.config.name}': method '{self.name}' takes one group")
         columns, group = self._model.columns, scene.groups[0]
         system = self.space.system
-        # vertices fixed in any frame get no correction, so their own columns are left out
+        # leave out the columns of vertices that are fixed in any frame: y is not corrected there
         free = columns.B[:, columns.free]
         image = system.matrix @ free
         factor = linalg.cholesky(free.T @ image, lower=True)
@@ -206,7 +206,7 @@ def _two_level(
         for k in range(iterations):
             rhs[:] = base
             objective = add_projections(tables, y, rhs) + inertia_energy(y, s, inertia)
-            # the first corrected iterate is checked, too, as it may raise the objective
+            # 0: test also the iterate after the first correction, which may raise the objective
             if refuse(history, y, objective, 0):
                 y[:] = plain
                 continue

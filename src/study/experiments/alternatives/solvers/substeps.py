@@ -133,7 +133,7 @@ class Alternative(Stepper):
 
     @abstractmethod
     def _advance(self, part: Substeps) -> None:
-        """Advance the positions and velocities in ``part`` over its substeps, in place."""
+        """Advance positions and velocities in place by all substeps of ``part`` (of a frame)."""
 
     def _factor(self, part: Substeps) -> Factor:
         """Cholesky factor of the system matrix without the rows and columns of fixed vertices."""
@@ -175,7 +175,7 @@ def end(y, before, step, v):
 
 @compiled(nogil=True)
 def add_projections(tables, y, rhs):
-    """Add S^T W p(y) of all groups to ``rhs`` and return the energy W(y), J.
+    """Add S^T W p(y) of all groups to ``rhs``; return their potential energy (see the module), J.
 
     ``y`` and ``rhs`` (4 N,) have x, y, z and 0 of each vertex; ``tables`` are from `LocalPass`.
     """
