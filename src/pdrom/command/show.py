@@ -15,7 +15,7 @@ LONGEST = 100  # largest number of characters shown of an HDF5 attribute's value
 def perform(arguments: argparse.Namespace) -> Status:
     """Print the contents of the file of ``arguments``; no file is changed."""
     from pdrom.core.provenance import RECORD
-    from pdrom.core.store import check_file, provenance_of
+    from pdrom.core.store.checksum import check_file, provenance_of
 
     path = Path(arguments.file)
     condition, record = check_file(path), provenance_of(path)

@@ -128,10 +128,7 @@ class SceneConfig(ConfigModel):
     def vertex_masses(self, mesh: Mesh) -> np.ndarray:
         """Return masses (N,) kg: ``vertex_mass``, then changed by each entry of ``masses`` in turn.
 
-        Raises
-        ------
-        SceneError
-            A selection contains no vertex of ``mesh``, or does not exist on it.
+        Raises SceneError if a selection contains no vertex of ``mesh``, or does not exist on it.
         """
         masses = np.full(mesh.vertices, self.vertex_mass)
         for number, entry in enumerate(self.masses):

@@ -75,16 +75,13 @@ def collect(
 ) -> SnapshotSet:
     """Read snapshots of ``group``: training and test frames of one run, frames of a held-out run.
 
+    Raises SnapshotError if a set is empty, lacks a training frame, or contains NaN or Inf.
+
     Parameters
     ----------
     training_run, heldout_run : files of the two full-order runs
     masses : (N,) kg, masses of the vertices
     train : (n,) numbers of the training frames, ascending
-
-    Raises
-    ------
-    SnapshotError
-        A set of snapshots is empty, lacks a training frame, or contains NaN or Inf.
     """
     p, frames, roundoff = _read(training_run, group.name)
     held, held_frames, _ = _read(heldout_run, group.name)

@@ -18,15 +18,12 @@ def positions_at(
 ) -> tuple[list[int], np.ndarray]:
     """Frame numbers and positions (n, N, 3) m of a run at ``fractions`` of its frames.
 
+    Raises StorageError if the file is missing or holds positions that are not finite.
+
     Parameters
     ----------
     path : file of the run
     end : frame that counts as the end of the run; None for its last frame
-
-    Raises
-    ------
-    StorageError
-        The file is missing or holds positions that are not finite.
     """
     with open_hdf5(path) as file:
         data = file["positions"]

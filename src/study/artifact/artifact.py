@@ -148,8 +148,11 @@ def declared_in(package: str, kind: type[A]) -> dict[str, A]:
     To save time, modules that import nothing from the module of ``kind`` are not imported.
     """
     root, found = Path(import_module(package).__path__[0]), {}
+    above, _, own = kind.__module__.rpartition(".")
+    needed = f"\nfrom {kind.__module__} import ", f"\nfrom {above} import {own}"
     for path in root.rglob("*.py"):
-        if f"\nfrom {kind.__module__} import " not in path.read_text(encoding="utf-8"):
+        text = path.read_text(encoding="utf-8")
+        if not any(line in text for line in needed):
             continue
         name = ".".join((package, *path.relative_to(root).with_suffix("").parts))
         module = import_module(name.removesuffix(".__init__"))

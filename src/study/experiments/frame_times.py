@@ -27,6 +27,7 @@ from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import EachOf, Settings
 from study.experiments.kit import base as kit
+from study.experiments.kit import runfiles
 from study.experiments.kit.costs import variant
 from study.experiments.kit.measurement import Processes, Variant, in_processes
 
@@ -112,7 +113,7 @@ class TimedScene:
             yield variant(scene, system, scene.groups, frames, {**common, "role": role})
         reduced: dict[str, Any] = {**common, "role": REDUCED}
         for own, spec, basis, sampling in self.projections:
-            reduction = kit.load_reduction(load_basis(basis), sampling, spec, r=own.r)
+            reduction = runfiles.load_reduction(load_basis(basis), sampling, spec, r=own.r)
             step = ReducedLocalStep(scene.group(own.group), reduction)
             steps = replace_group(scene, own.group, step)
             labels = {**reduced, **own.model_dump(), "position_basis": "full"}

@@ -26,6 +26,7 @@ from pdrom.reduction.subspace.model import load_models
 from study.artifact import paths
 from study.artifact.reads import Every, Setting
 from study.experiments.kit import base as kit
+from study.experiments.kit import runfiles
 from study.experiments.kit.base import experiment
 
 log = logging.getLogger(__name__)
@@ -108,11 +109,13 @@ def iterations(
         if (count, window) != (scene.config.iterations, scene.config.anderson_window):
             loop = stepper_of(scene, system, count, window=window)
             reached = kit.followed(loop, scene.initial_state(), frames)
-        converged = kit.run_error(reached, limit) if best.converged else None
-        rows.append((name, count, window, frames, converged, kit.run_error(reached, own), None))
+        converged = runfiles.run_error(reached, limit) if best.converged else None
+        rows.append(
+            (name, count, window, frames, converged, runfiles.run_error(reached, own), None)
+        )
     residual = max(best.changes) / scene.mesh.extent
     converged = 0.0 if best.converged else None
-    rows.append((name, None, None, frames, converged, kit.run_error(limit, own), residual))
+    rows.append((name, None, None, frames, converged, runfiles.run_error(limit, own), residual))
     table = pd.DataFrame(rows, columns=COLUMNS).astype({"iterations": "Int64", "window": "Int64"})
     write_table(table, files["out"].path)
     inside = []
@@ -123,7 +126,7 @@ def iterations(
                 run = file[f"models/{basis}_k{k:03d}_{method}/train/coordinates"][: len(limit)]
                 error = None
                 if best.converged and len(run) == len(limit):
-                    error = kit.run_error(np.stack([model.positions(z) for z in run]), limit)
+                    error = runfiles.run_error(np.stack([model.positions(z) for z in run]), limit)
                 inside.append((name, basis, k, method, error))
     write_table(pd.DataFrame(inside, columns=MODELS), files["models"].path)
 

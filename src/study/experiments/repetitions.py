@@ -34,6 +34,7 @@ from pdrom.reduction.sampling.local_step import rerun_reduced
 from study.artifact import paths
 from study.artifact.reads import Settings
 from study.experiments.kit import base as kit
+from study.experiments.kit import runfiles
 from study.experiments.kit.base import experiment
 
 Varied = Literal["start", "training", "motions"]
@@ -425,7 +426,7 @@ def noisy_runs(
             store = file.create_group(f"{axes}/{row['method']}/r{row['r']:04d}")
             store.attrs.update(r=row["r"], marked=outcome is None)
             if outcome is not None:
-                kit.store_end(store, outcome)
+                runfiles.store_end(store, outcome)
         log.info("%s: %d starts", axes, asked.repetitions)
     return rows
 

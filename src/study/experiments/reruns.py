@@ -29,6 +29,7 @@ from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, Setting, Settings
 from study.experiments.kit import base as kit
+from study.experiments.kit import runfiles
 from study.experiments.kit.base import experiment
 
 log = logging.getLogger(__name__)
@@ -129,7 +130,7 @@ def _runs(
             log.warning("r = %d exceeds the numerical rank %d: not run", r, basis.rank)
             yield {**labels, "r": r, "frames": 0}
             continue
-        reduction = kit.load_reduction(basis, sampling.path, settings.method, r=r)
+        reduction = runfiles.load_reduction(basis, sampling.path, settings.method, r=r)
         outcome = rerun_reduced(
             scene, labels["group"], reduction, yardstick.reference, settings.blowup_extent, system
         )
@@ -137,7 +138,7 @@ def _runs(
         error = outcome.difference / np.sqrt(np.mean(yardstick.displacement**2))
         for name, values in {**apart, "error": error, "extent": outcome.extent}.items():
             store[name] = values
-        kit.store_end(store, outcome, with_positions=file.name == "/")
+        runfiles.store_end(store, outcome, with_positions=file.name == "/")
         store.attrs["finite"] = outcome.finite
         measured = {"energy_ratio": largest(apart["energy"]), "gain": reduction.gain}
         yield {**labels, "r": r, **outcome.row(yardstick.displacement), **measured}
@@ -262,11 +263,11 @@ def stability(
     local: Local = []
     for file in files["samplings"]:
         spec = methods[file["method"]]
-        basis = load_basis(kit.basis_of(file, spec, files["bases"]).path)
+        basis = load_basis(runfiles.basis_of(file, spec, files["bases"]).path)
         for r in kit.resolve_ranks(short.ranks, basis.rank):
             labels = {"group": file["group"], "method": file["method"], "r": r}
             known = r <= basis.rank
-            reduction = kit.load_reduction(basis, file.path, spec, r=r) if known else None
+            reduction = runfiles.load_reduction(basis, file.path, spec, r=r) if known else None
             local.append((labels | {"position_basis": "full"}, reduction))
     models: Models = []
     for file in files["subspaces"]:

@@ -41,6 +41,7 @@ from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import EachOf, Every, Setting, Settings, SourcesOf
 from study.experiments.kit import base as kit
+from study.experiments.kit import runfiles
 from study.experiments.kit.base import experiment
 from study.experiments.kit.measurement import clocked
 
@@ -215,7 +216,7 @@ def _runs(
     """
     rows: list[dict[str, Any]] = []
     played = {
-        name: kit.run_error(motions[kit.TRAIN].reference, m.reference)
+        name: runfiles.run_error(motions[kit.TRAIN].reference, m.reference)
         for name, m in motions.items()
     }
     made = clocked(_subspaces(motions[kit.TRAIN], settings))
@@ -363,7 +364,7 @@ def live(mesh: File, train: File, settings: Options, out: File, **files: list[Fi
         basis = load_basis(file.path)
         # use the requested size, or the rank if it is smaller
         size = min(asked.joint_rows, basis.rank)
-        reduction = kit.load_reduction(basis, sampling.path, case.spec, size)
+        reduction = runfiles.load_reduction(basis, sampling.path, case.spec, size)
         chosen += list(_joint(scene, case.group, reduction, chosen))
     used, triangles = np.unique(scene.mesh.triangles, return_inverse=True)
     stride = max(1, ceil((len(reference) - 1) * len(used) / GHOST))

@@ -31,6 +31,7 @@ from study.artifact.paths import File
 from study.artifact.reads import Every, Settings, SourcesOf
 from study.experiments.iterations import IterationCounts, accelerated, stepper_of
 from study.experiments.kit import base as kit
+from study.experiments.kit import runfiles
 from study.experiments.kit.base import experiment
 from study.experiments.kit.costs import effect_costs, left_out, local_costs, variant
 from study.experiments.kit.measurement import Protocol, Variant, measure
@@ -164,7 +165,7 @@ def timing(mesh: File, fom: File, settings: Options, **files: Any) -> None:
     alone: dict[tuple[str, str, int], ReducedLocalStep] = {}
     for sampling in files["samplings"]:
         spec = settings.methods[sampling["method"]]
-        basis = load_basis(kit.basis_of(sampling, spec, files["bases"]).path)
+        basis = load_basis(runfiles.basis_of(sampling, spec, files["bases"]).path)
         with open_hdf5(sampling.path) as stored:  # find the sizes r in the file
             held = {int(key[1:]) for key in stored if key.startswith("r")}
         timed = held.intersection(kit.resolve_ranks(settings.ranks, basis.rank))
@@ -172,7 +173,7 @@ def timing(mesh: File, fom: File, settings: Options, **files: Any) -> None:
         sizes = set() if spec.rows == "all" else sizes
         group = scene.group(sampling["group"])
         for r in sorted(timed | sizes):
-            reduction = kit.load_reduction(basis, sampling.path, spec, r=r)
+            reduction = runfiles.load_reduction(basis, sampling.path, spec, r=r)
             step = ReducedLocalStep(group, reduction)
             if r in timed:
                 own = {"group": group.name, "method": sampling["method"], "r": r}

@@ -16,7 +16,8 @@ from typing import Literal
 from pydantic import ValidationError
 
 from pdrom.core.errors import StorageError
-from pdrom.core.store import Checksum, Condition, check_file, read_checksum, write_text
+from pdrom.core.store import Condition, check_file, write_text
+from pdrom.core.store.checksum import Checksum, read_checksum
 from pdrom.core.yamlfile import ConfigModel, describe
 from study.artifact import paths
 from study.pipeline.plan import Plan

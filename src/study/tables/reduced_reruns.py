@@ -13,7 +13,8 @@ from pdrom.reduction.deviations import DEVIATIONS, ERRORS, REFERENCE, Series, er
 from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, Setting, TableOf
-from study.experiments.kit.base import Horizon, floor_of, horizons, positions_of, run_error
+from study.experiments.kit.base import Horizon, floor_of, horizons, positions_of
+from study.experiments.kit.runfiles import run_error
 from study.tables.kit.declaration import flag, number, shared, table, text
 from study.tables.kit.results import KEYS, TRAIN, joined, timings_in_one_time, trained
 

@@ -24,30 +24,16 @@ import numpy as np
 
 from pdrom.core.errors import StorageError, reason
 from pdrom.core.provenance import attributes
-from pdrom.core.store.checksum import (
-    BLOCK,
-    CHECKSUM_SUFFIX,
-    Checksum,
-    Condition,
-    check_file,
-    checksum_path,
-    digest_of,
-    is_hdf5,
-    new_checksum,
-    provenance_of,
-    read_checksum,
-    require_intact,
-    write_block,
-)
+from pdrom.core.store import checksum as sums
+from pdrom.core.store.checksum import Condition, check_file, checksum_path, require_intact
 
 if TYPE_CHECKING:  # pandas is not loaded by a run that writes no table
     import pandas as pd
 
 __all__ = [
-    "MARK", "Checksum", "Condition", "atomic_path", "check_file", "checksum_path", "open_hdf5",
-    "provenance_of", "read_checksum", "read_table", "read_text", "require_finite",
-    "require_intact", "require_own", "require_place", "require_self_contained", "write_hdf5",
-    "write_table", "write_text",
+    "MARK", "Condition", "atomic_path", "check_file", "checksum_path", "open_hdf5", "read_table",
+    "read_text", "require_finite", "require_intact", "require_own", "require_place",
+    "require_self_contained", "write_hdf5", "write_table", "write_text",
 ]  # fmt: skip
 # Every page, picture and ParaView file of pdrom has this text in its first or last MARKED bytes.
 MARK, MARKED = b"made by pdrom, which may replace this file", 65_536
@@ -76,21 +62,21 @@ def atomic_path(path: str | os.PathLike[str], with_checksum: bool = True) -> Ite
     _require_file(target)
     mark = f"{_MACHINE}{os.getpid():08x}{uuid.uuid4().hex[:4]}"
     temporary = target.with_name(f".{target.stem}.{mark}{target.suffix}")
-    checksum = temporary.with_name(f"{temporary.name}{CHECKSUM_SUFFIX}")
+    checksum = temporary.with_name(f"{temporary.name}{sums.CHECKSUM_SUFFIX}")
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         _remove_leftovers(target)
         yield temporary
         _bring_to_disk(temporary)
         if with_checksum:
-            checksum.write_bytes(new_checksum(digest_of(temporary), target.name).content)
+            checksum.write_bytes(sums.new_checksum(sums.digest_of(temporary), target.name).content)
             _bring_to_disk(checksum)
             _rename(temporary, checksum, target)
         else:
             os.replace(temporary, target)
             place = checksum_path(target)
             content = place.read_bytes() if place.is_file() else b""
-            if content and Checksum.parse(content).content == content:
+            if content and sums.Checksum.parse(content).content == content:
                 place.unlink()  # checksum of the file that was just replaced
     except OSError as error:
         raise StorageError(f"{target}: cannot be written ({reason(error)})") from error
@@ -121,7 +107,8 @@ def require_own(path: str | os.PathLike[str]) -> None:
     target = Path(path)
     if not target.is_file():
         return
-    if read_checksum(target) if is_hdf5(target) else check_file(target) is Condition.INTACT:
+    hdf5 = sums.is_hdf5(target)
+    if sums.read_checksum(target) if hdf5 else check_file(target) is Condition.INTACT:
         return
     with open(target, "rb") as handle:
         begin = handle.read(MARKED)
@@ -147,7 +134,7 @@ def _require_file(target: Path) -> None:
 
 def _remove_leftovers(target: Path) -> None:
     """Remove temporary files of ``target`` from processes of this machine that have ended."""
-    stem, suffix, checksum = map(re.escape, (target.stem, target.suffix, CHECKSUM_SUFFIX))
+    stem, suffix, checksum = map(re.escape, (target.stem, target.suffix, sums.CHECKSUM_SUFFIX))
     name = re.compile(rf"\.{stem}\.{_MACHINE}([0-9a-f]{{8}})[0-9a-f]{{4}}{suffix}({checksum})?")
     for path in target.parent.iterdir():
         found = name.fullmatch(path.name)
@@ -252,12 +239,12 @@ def write_hdf5(path: str | os.PathLike[str]) -> Iterator[h5py.File]:
     with atomic_path(path, with_checksum=False) as temporary:
         with open(temporary, "w+b", buffering=0) as handle:
             sink = _Sink(handle)
-            with h5py.File(sink, "w", track_order=True, userblock_size=BLOCK) as file:
+            with h5py.File(sink, "w", track_order=True, userblock_size=sums.BLOCK) as file:
                 file.attrs.update(attributes())
                 yield file
             if sink.error is not None:
                 raise sink.error
-        write_block(temporary)
+        sums.write_block(temporary)
 
 
 class _Sink:

@@ -88,10 +88,7 @@ class ConstraintGroup(Effect):
     def element_weights(self, mesh: Mesh) -> float | np.ndarray:
         """Return weights not yet multiplied by rest area or volume: (e,), or one for all elements.
 
-        Raises
-        ------
-        SceneError
-            A selection of ``factors`` contains no element of the group.
+        Raises SceneError if a selection of ``factors`` contains no element of the group.
         """
         if not self.config.factors:
             return self.config.weight

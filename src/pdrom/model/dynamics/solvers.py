@@ -236,10 +236,7 @@ class SupernodalSolver(SuperLUSolver):
 def factored(matrix: sparse.csr_array, ordering: str) -> SuperLU:
     """Factor ``matrix`` (n, n) by SuperLU without pivoting, with the column ordering ``ordering``.
 
-    Raises
-    ------
-    SolverError
-        The matrix is singular or not positive definite.
+    Raises SolverError if the matrix is singular or not positive definite.
     """
     size = matrix.shape[0]
     try:

@@ -174,10 +174,7 @@ def turned_alike(mesh: Mesh, name: str) -> tuple[Mesh, np.ndarray]:
     nodes per triangle (as given, reversed), joined to the nodes of neighbours with consistent
     orientation. A part is orientable if its nodes form two connected components.
 
-    Raises
-    ------
-    MeshError
-        A part is not orientable, such as a Möbius strip; ``name`` begins the message.
+    Raises MeshError, beginning with ``name``, if a part is not orientable, as a Möbius strip.
     """
     triangles, t = mesh.triangles, len(mesh.triangles)
     edges = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)

@@ -406,10 +406,7 @@ IGNORED = frozenset(
 def read_obj(path: Path) -> tuple[np.ndarray, np.ndarray]:
     """Return an .obj file's points (N, 3), without weights w, and triangles (E, 3), indices from 0.
 
-    Raises
-    ------
-    UnreadableError
-        A statement is unknown, a corner of a face is no integer, or a number is invalid.
+    Raises UnreadableError for an unknown statement, a face corner that is no integer, a bad number.
     """
     # comments are removed first, as a backslash at their end does not continue the line
     content = re.sub(rb"#[^\n]*", b"", path.read_bytes())

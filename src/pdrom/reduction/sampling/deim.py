@@ -157,11 +157,3 @@ def _greedy(parts: Sequence[np.ndarray], total: int, count: int, repeat: bool) -
             size = len(modes) // total
             fit.add(modes[size * block : size * (block + 1)])
     return picked
-
-
-class Greedy(Selection):
-    """DEIM by entries or elements; the samples for r modes begin with those for fewer modes."""
-
-    def one_a_mode(self, v: np.ndarray, size: int, ranks: Sequence[int]) -> dict[int, np.ndarray]:
-        path = deim_entries(v) if size == 1 else block_elements(v, size)
-        return {r: path[:r] for r in ranks}

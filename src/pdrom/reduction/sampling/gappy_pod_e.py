@@ -19,15 +19,12 @@ ROUNDOFF = 1e-11
 def oversample(v: np.ndarray, size: int, elements: np.ndarray, count: int) -> np.ndarray:
     """Extend ``elements`` to ``count`` elements (all elements, if fewer exist).
 
+    Raises SamplingError if an element is repeated or out of range.
+
     Parameters
     ----------
     v : (size e, r) basis, ``size`` consecutive rows for each of the e elements
     elements : distinct elements that are already selected, usually one for each mode
-
-    Raises
-    ------
-    SamplingError
-        An element is repeated or out of range.
     """
     growing = _Growing(v, size, elements)
     while len(growing.picked) < min(count, growing.total):

@@ -34,6 +34,7 @@ from study.experiments.alternatives.solvers.methods import WINDOW, TwoLevel, con
 from study.experiments.alternatives.solvers.substeps import METHODS
 from study.experiments.iterations import converged_run
 from study.experiments.kit import base as kit
+from study.experiments.kit import runfiles
 from study.experiments.kit.base import experiment
 from study.experiments.kit.measurement import Processes, Variant, in_processes
 
@@ -451,7 +452,7 @@ def _rows(
 
     def errors(run: np.ndarray | None) -> dict[str, float | None]:
         return {
-            key: None if run is None or other is None else kit.run_error(run, other)
+            key: None if run is None or other is None else runfiles.run_error(run, other)
             for key, other in against.items()
         }
 
@@ -468,6 +469,6 @@ def _rows(
             if id(own) not in spans:
                 project = projector(own, scene.masses)
                 nearest = np.stack([own.B @ (project @ q) for q in implicit])
-                spans[id(own)] = kit.run_error(nearest, implicit)
+                spans[id(own)] = runfiles.run_error(nearest, implicit)
             row["span_error"] = spans[id(own)]
         yield row

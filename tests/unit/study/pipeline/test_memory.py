@@ -45,7 +45,7 @@ def test_a_scene_is_built_again_if_a_file_changes_and_its_warning_is_repeated(
         command = Memory(tmp_path / "plan.json")
         monkeypatch.setattr(scenes, "memory", lambda: command)
         caplog.clear()
-        found = scenes.checked_scene(project, "small")[1]
+        found = scenes.checked_scene(project, "small")[1][0]
         command.save()
         (warned,) = [r.getMessage() for r in caplog.records if r.levelname == "WARNING"]
         assert f"holds 2 of {found} vertices, fewer than 3" in warned
