@@ -17,7 +17,7 @@ from pdrom import __version__
 from pdrom.core import store
 from pdrom.core.errors import StorageError
 from pdrom.core.store import open_hdf5
-from pdrom.core.store.checksum import BLOCK, damaged_set_aside
+from pdrom.core.store.checksum import BLOCK, damaged_set_aside, provenance_of
 
 
 def read_one(path: Path, unchecked: bool = False) -> None:
@@ -124,14 +124,14 @@ def test_every_changed_bit_and_every_cut_of_the_checksum_is_noticed(result):
 
 def test_the_checksum_tells_the_provenance_and_counts_without_it(result):
     """Also that inside a file is what b2sum prints; one beside it: `test_commands_of_pages`."""
-    assert store.provenance_of(result)["pdrom_version"] == __version__
+    assert provenance_of(result)["pdrom_version"] == __version__
     if result.suffix == ".h5":
         behind = hashlib.blake2b(result.read_bytes()[BLOCK:]).hexdigest()
         assert f"{behind}  -\n".encode() in checksum_of(result)
         return
     checksum = store.checksum_path(result).read_bytes()
     store.checksum_path(result).write_bytes(checksum.split(b"\n", 1)[1])
-    assert (store.check_file(result), store.provenance_of(result)) == ("intact", {})
+    assert (store.check_file(result), provenance_of(result)) == ("intact", {})
     store.checksum_path(result).write_bytes(checksum)
 
 
