@@ -1,8 +1,8 @@
 """Levels of accuracy (full-order or reduced solvers with K iterations), their runs and errors.
 
-The reference run of a motion solves the implicit step by iterations with Anderson acceleration.
-They are enough if the run's error, estimated from its differences to runs with half and a quarter
-as many iterations, is less than the tolerance.
+The reference run of a motion solves the implicit step by iterations with Anderson acceleration. It
+has enough of them if a run with half as many differs from it by less than the tolerance. This
+difference is used as the error of the reference run.
 
 The cost of a frame is computed from operation counts, not timed, so that the choice of a level is
 reproducible. Constants were measured on one thread of a 2024 processor; only their ratios matter.
@@ -36,7 +36,6 @@ REDUCED_FRAME, REDUCED_IN_PYTHON = 4e4, 2.3e5
 FILL = 0.35
 # Size of the random shift of a perturbed start, relative to the mesh's longest side, and its seed.
 MOVED, SEED = 1e-10, 0
-SLOWEST = 10.0  # largest ratio of error to change by doubling the iterations (`remainder`)
 CONVERGED, MOST = 80, 320  # iterations per frame of a reference run: at first, and at most
 Quantity = Literal["position", "velocity"]
 QUANTITIES: tuple[Quantity, ...] = get_args(Quantity)
@@ -202,18 +201,6 @@ def last_within(errors: np.ndarray, tolerance: float) -> int:
     return int(within[-1]) + 1 if len(within) else 0
 
 
-def remainder(change: np.ndarray, before: np.ndarray) -> np.ndarray:
-    """Return the ratio (F,), 1 to `SLOWEST`, of a run's estimated error to its last ``change``.
-
-    Doubling the iterations changed the run by ``before`` (F,), doubling them again by ``change``.
-    If each further doubling reduces the change by the same factor x, all later changes add up to
-    x / (1 - x) times ``change``.
-    """
-    with np.errstate(divide="ignore", invalid="ignore"):
-        rest = change / (before - change)
-    return np.where(change < before, np.clip(rest, 1.0, SLOWEST), SLOWEST)
-
-
 class Motion:
     """Reference run of ``scene``, converged to the error ``tolerance``, and its accuracy.
 
@@ -225,8 +212,7 @@ class Motion:
     ----------
     reference : (F + 1, N, 3) m, positions
     iterations : number of iterations in each frame of the reference
-    unconverged : estimated relative errors (F,) of the reference, from runs with half and a quarter
-        of the iterations, see `remainder`
+    unconverged : relative errors (F,) of a run with half the iterations
     sensitivity : relative errors (F,) of a run with initial positions perturbed by `MOVED`
     unit : root mean square over frames of the displacement norm, m
     """
@@ -235,21 +221,21 @@ class Motion:
         self, scene: Scene, tolerance: float, quantity: Quantity, on_frame: OnFrame = silent
     ) -> None:
         self.scene, self.quantity = scene, quantity
-        count = CONVERGED // 2
+        count = CONVERGED
 
         def run(iterations: int, moved: bool = False) -> np.ndarray:
             level = Level(iterations, WINDOW)
             return Trajectory(level, scene, moved, on_frame).to(scene.config.frames).positions
 
         half, self.reference = run(count // 2), run(count)
-        self.sensitivity, change = self.errors(run(count, moved=True)), self.errors(half)
-        known = max(last_within(self.sensitivity, tolerance), 1)
-        self.unconverged = np.full(len(change), np.inf)
+        apart = run(count // 2, moved=True)[1:] - half[1:]
+        self.sensitivity = relative_errors(apart, half, self.quantity)
+        known = last_within(self.sensitivity, tolerance)
+        self.unconverged = self.errors(half)
         while last_within(self.unconverged, tolerance) < known and count < MOST:
-            count, half, before = 2 * count, self.reference, change
+            count, half = 2 * count, self.reference
             self.reference = run(count)
-            change = self.errors(half)
-            self.unconverged = change * remainder(change, before)
+            self.unconverged = self.errors(half)
         self.iterations = count
         self.unit = mean_motion(self.reference)
 
