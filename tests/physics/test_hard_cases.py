@@ -81,15 +81,15 @@ def taken(name: str) -> bool:
     return all(effect.in_subspace for effect in listed)
 
 
-# Two thirds of the cases that a subspace takes are slow tests, since `PAIRS` runs them as well.
-TAKEN = [name for name in reducible_cases() if taken(name)]
-SELDOM = {name for i, name in enumerate(TAKEN) if i % 3}
+# Each effect's first case that a subspace takes, and its first that it refuses.
+FIRST = {
+    (effect["effect"], taken(name)): name
+    for name in reversed(list(reducible_cases()))
+    for effect in CATALOGUE[name].effects
+}
 
 
-@pytest.mark.parametrize(
-    "name",
-    [pytest.param(n, marks=[pytest.mark.slow] if n in SELDOM else []) for n in reducible_cases()],
-)
+@pytest.mark.parametrize("name", sorted({*FIRST.values()}))
 def test_a_subspace_takes_what_the_effects_say(name):
     """A subspace that refuses an effect names it; methods in vertex positions take all effects."""
     for reduction in ("pod-full", "pod"):

@@ -1,5 +1,6 @@
-"""What git tracks: text and a few pictures, nothing large, nothing binary by accident."""
+"""What git tracks: text and a few pictures, nothing large or binary by accident; the container."""
 
+import re
 from pathlib import Path
 
 from pdrom.core.yamlfile import read_yaml
@@ -7,6 +8,7 @@ from places import ROOT, tracked
 from study.artifact.paths import FIGURE, RESULTS, TABLE
 from study.figures.kit.declaration import declarations
 from study.pipeline.folders import Folders
+from study.pipeline.platforms import NEWEST, OLDEST
 from study.tables import declared
 
 LARGEST = 300_000
@@ -52,3 +54,36 @@ def test_the_catalogue_of_snakemake_workflows_finds_what_it_asks_for():
     assert list((ROOT / "workflow" / "rules").glob("*.smk"))
     usage = read_yaml(ROOT / ".snakemake-workflow-catalog.yml")["usage"]
     assert set(usage) <= {"mandatory-flags", "software-stack-deployment", "report"}
+
+
+DOCKERFILE = (ROOT / "Dockerfile").read_text("utf-8")
+IGNORED = (ROOT / ".dockerignore").read_text("utf-8").split()
+
+
+def test_its_python_is_one_that_the_packages_have_wheels_for_and_the_script_does_the_rest() -> None:
+    found = re.findall(r"^FROM python:(\d+)\.(\d+)-slim", DOCKERFILE, re.MULTILINE)
+    assert len(found) == 1
+    assert OLDEST <= tuple(map(int, found[0])) <= NEWEST
+
+    # its environment is made by the script alone
+    assert "RUN ./reproduce run pdrom --help" in DOCKERFILE
+    assert 'ENTRYPOINT ["./reproduce"]' in DOCKERFILE
+    assert "pip" not in DOCKERFILE
+
+
+def test_what_the_script_needs_is_not_left_out_of_it() -> None:
+    needed = (
+        "reproduce", "requirements.lock", "requirements-cluster.lock", "src", "config", "paper",
+        "workflow", "tests",
+    )  # fmt: skip
+    assert not set(needed) & set(IGNORED)
+    assert all((ROOT / name).exists() for name in needed)
+    assert {".venv*", "results/*"} <= set(IGNORED)
+
+
+def test_the_image_that_the_workflow_names_is_ignored_by_git_and_made_of_this_file() -> None:
+    workflow = (ROOT / "workflow" / "Snakefile").read_text("utf-8")
+    (image,) = re.findall(r'^container: "(.+)"$', workflow, re.MULTILINE)
+    assert image in (ROOT / ".gitignore").read_text("utf-8").split()
+    assert "docker build -t pdrom ." in DOCKERFILE
+    assert f"apptainer build {image}" in workflow

@@ -1,5 +1,6 @@
 """The command line: each command does its work, says it in a line, and ends with its code."""
 
+import io
 import os
 import re
 import shutil
@@ -15,15 +16,18 @@ import yaml
 
 from builders import SMALL
 from pdrom import __version__
-from pdrom.api import load_scene
+from pdrom.api import FullRun, RequestedRun, load_scene
 from pdrom.command.base import Status
 from pdrom.command.main import COMMANDS, parser, run
 from pdrom.command.new import template
+from pdrom.command.progress import Progress
 from pdrom.core.store import MARK, check_file
 from pdrom.core.store.checksum import BLOCK
+from pdrom.model.dynamics.stepper import FrameReport
 from pdrom.model.mesh.generators import bar, cloth
 from pdrom.model.mesh.types import Mesh
 from pdrom.model.scene import Scene, SceneConfig
+from pdrom.reduction.requested.run import Outcome, Request
 from pdrom.view.camera import up_of
 
 
@@ -62,9 +66,8 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_a_requested_error_is_met_said_and_viewed(folder, capsys):
-    assert run(["run", "small.yaml"]) == Status.DONE
-    capsys.readouterr()
+def test_a_requested_error_is_met_said_and_viewed(folder, finished, capsys):
+    shutil.copy(finished / "small.h5", folder)
     with (folder / "small.yaml").open("a", encoding="utf-8") as file:
         file.write("reduce: {error: velocity=0.2}\n")
     asked = ["reduce", "small.yaml", "--run", "small.h5"]
@@ -297,7 +300,7 @@ def test_what_pdrom_has_written_it_writes_again_and_leaves_no_hidden_file(folder
     for _ in range(2):
         assert run(["run", "small.yaml"]) == Status.DONE
         assert run(["view", "small.h5"]) == Status.DONE
-        for plot in ("e.png", "e.pdf", "e.svg"):
+        for plot in ("e.png", "e.pdf"):
             assert run([*picture, "--out", "r.h5", "--plot", plot]) == Status.DONE
     assert capsys.readouterr().err.count("pdrom:") == 0
     assert [path.name for path in folder.iterdir() if path.name.startswith(".")] == []
@@ -425,3 +428,104 @@ def test_threads_and_kernels_of_numpy_are_set_before_it_is_loaded():
     code = "import sys, pdrom.command.main; sys.exit('numpy' in sys.modules)"
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
     assert subprocess.run([sys.executable, "-c", code], env=environment).returncode == 0
+
+
+COMMAND = ["reduce", "small.yaml", "--run", "small.h5", "--error", "0.05"]
+
+
+@pytest.fixture
+def full(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> FullRun:
+    """A training run that is read from small.h5, of a scene in the folder of the command."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "small.yaml").write_text(SMALL)
+    found = FullRun(load_scene("small.yaml"), np.zeros((5, 30, 3)), np.ones(4), {})
+    monkeypatch.setattr("pdrom.api.load", lambda *_: found)
+    return found
+
+
+def done(full: FullRun, error: float | None = None, **changes) -> RequestedRun:
+    """A run of four frames within its tolerance, but for the ``changes`` of its outcome."""
+    outcome = {
+        "positions": full.positions, "frames": 4, "limit": "", "expected": 0.031, "estimate": None,
+        "level": "ecsw, k = 20, tau = 0.01, K = 10", "reduced": True, "failed": [],
+        "checks": [0, 2], "seconds": 0.1, "full_ms": 8.0,
+    }  # fmt: skip
+    made = Outcome(**(outcome | changes))
+    return RequestedRun(full.scene, Request(error=0.05), made, np.full(4, 2.0), 1.5, error)
+
+
+SLOW = "the iterations converge too slowly after it"
+
+
+@pytest.mark.parametrize(
+    ("changes", "words", "status"),
+    [
+        ({}, "implicit step: met, by a reduction\n", Status.DONE),
+        ({"reduced": False}, "met, by the full order only\n", Status.DONE),
+        (
+            {"frames": 2, "limit": SLOW},
+            f"met up to frame 2 of 4, by a reduction ({SLOW})\n",
+            Status.DONE,
+        ),
+        ({"frames": 1, "limit": SLOW}, "met up to frame 1 of 4", Status.NOTHING_FITS),
+        ({"frames": 0}, ": refused (nothing meets it for sure); run in", Status.NOTHING_FITS),
+        (
+            {"frames": 0, "positions": np.full((5, 30, 3), np.nan)},
+            ": blew up, with the full order, too\n",
+            Status.NOTHING_FITS,
+        ),
+        ({"estimate": 0.02, "error": 0.011}, "estimated 0.02, reached 0.011\n", Status.DONE),
+        ({"failed": ["a"]}, "K = 10, after a; 2 frames checked\n", Status.DONE),
+    ],
+)
+def test_what_became_of_a_run(full, monkeypatch, capsys, changes, words, status):
+    monkeypatch.setattr("pdrom.api.reduce", lambda *_, **__: done(full, **changes))
+    monkeypatch.setattr("pdrom.api.save", lambda *_: None)
+    assert run(COMMAND) == status
+    said = capsys.readouterr().out
+    assert said.startswith(
+        "small_requested.h5: 5 % of the positions against the converged implicit"
+    )
+    assert words in said
+    assert "\n  error: expected at most 0.031" in said
+    assert said.endswith(
+        "2.00 ms a frame, 8.00 in the cheapest full order that meets it; choosing took 1.5 s, "
+        "as long as 750 frames\n"
+    )
+
+
+def test_a_training_run_is_a_full_order_run(full, monkeypatch, capsys):
+    monkeypatch.setattr("pdrom.api.load", lambda *_: done(full))
+    assert run(COMMAND) == Status.FAULTY
+    assert capsys.readouterr().err == "pdrom: small.h5: no full-order run (pdrom run makes one)\n"
+
+
+REPORT = FrameReport(np.zeros(0), np.array([0.0, 1e-3, 1e-3, 0.0]))
+
+
+def test_progress_is_a_line_each_tenth_where_nobody_watches():
+    stream = io.StringIO()
+    told = Progress("small", 40, stream)
+    for frame in range(40):
+        told(frame, REPORT)
+    lines = stream.getvalue().splitlines()
+    assert len(lines) == 10
+    assert lines[4].startswith(f"small [{'#' * 12}{'.' * 12}] frame 20 of 40, 2.00 ms a frame, ")
+    assert "frame 40 of 40, 2.00 ms a frame, 0 s left" in lines[-1]
+
+
+def test_progress_on_a_terminal_is_one_line_that_is_written_again(monkeypatch):
+    """A fifth of a second apart; the frame that may compile kernels is no measure of the others."""
+    stream = io.StringIO()
+    stream.isatty = lambda: True
+    times = iter([0.0, 50.0, *(50.0 + 0.125 * frame for frame in range(1, 10))])
+    monkeypatch.setattr("pdrom.command.progress.monotonic", lambda: next(times))
+    told = Progress("small", 10, stream)
+    for frame in range(10):
+        told(frame, REPORT)
+    shown = stream.getvalue()
+    assert shown.endswith("  \n")
+    assert shown.count("\n") == 1
+    frames = [text.split("frame ")[1].split(" of ")[0] for text in shown.split("\r")[1:]]
+    assert frames == ["1", "3", "5", "7", "9", "10"]
+    assert "frame 5 of 10, 2.00 ms a frame, 1 s left" in shown

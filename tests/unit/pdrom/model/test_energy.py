@@ -1,11 +1,16 @@
-"""Energy of a run against mechanics: free fall, stretched springs, the full-order run itself."""
+"""Energy of a run against mechanics: free fall, stretched springs; errors and norms of tables."""
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 from builders import GRAVITY, TOP, make_scene, with_effects
 from pdrom.model.energy import STRIDE, EnergyScale, energies
+from pdrom.model.metrics import relative_errors, shape_differences, trajectory_error
 from pdrom.model.runs import trajectory
+from strategies import SEEDS
 
 SPRING = {"effect": "spring", "weight": 1e4}
 
@@ -69,3 +74,75 @@ def test_the_zero_of_the_potential_does_not_matter():
         run = trajectory(scene)
         ratios.append(EnergyScale.of(scene, run).ratio(run[:1].repeat(3, axis=0) + 0.01))
     assert ratios[0] == pytest.approx(ratios[1], rel=1e-9)
+
+
+@given(SEEDS, st.floats(1e-6, 1e6))
+def test_relative_errors_agree_with_norms_of_matrices_and_have_no_unit(seed, unit):
+    p, p_hat = np.random.default_rng(seed).standard_normal((2, 4, 5, 3))
+    axes = [np.linalg.norm(p[..., a] - p_hat[..., a]) / np.linalg.norm(p[..., a]) for a in range(3)]
+    expected = pytest.approx([np.linalg.norm(p - p_hat) / np.linalg.norm(p), *axes])
+    assert relative_errors(p, p_hat, 0.0) == expected
+    assert relative_errors(unit * p, unit * p_hat, unit * 1e-9) == expected
+
+
+@pytest.mark.parametrize(
+    ("size", "level", "expected"),
+    [
+        ([1.0, 1.0, 0.0], 1e-10, [0.1, 0.1, 0.1, None]),
+        ([1.0, 1.0, 1e-12], 1e-10, [0.1, 0.1, 0.1, None]),
+        # without a level the largest axis tells
+        ([1.0, 1.0, 1e-17], 0.0, [0.1, 0.1, 0.1, None]),
+        (1e-14, 1e-20, [0.1] * 4),
+        (1e-14, 1e-12, [None] * 4),
+        (0.0, 0.0, [None] * 4),
+    ],
+)
+def test_round_off_has_no_error(rng, size, level, expected):
+    p = rng.standard_normal((6, 8, 3)) * size
+    assert relative_errors(p, 0.9 * p, level) == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, 1e300])
+def test_a_reconstruction_that_does_not_exist_has_no_error(rng, bad):
+    """An axis that failed leaves the others their errors; the whole has none."""
+    p = rng.standard_normal((6, 8, 3))
+    p_hat = 0.9 * p
+    p_hat[..., 1] = bad
+    total, x, y, z = relative_errors(p, p_hat, 0.0)
+    assert total is None
+    assert y is None
+    assert (x, z) == pytest.approx((0.1, 0.1))
+
+
+def test_trajectory_error_weighs_frames_by_their_motion():
+    assert trajectory_error(np.array([3.0, 4.0]), np.array([6.0, 8.0])) == 0.5
+    assert trajectory_error(np.zeros(3), np.ones(3)) == 0.0
+    # a run at rest has none
+    for frames in (0, 3):
+        assert trajectory_error(np.ones(frames), np.zeros(frames)) is None
+
+
+@given(SEEDS)
+def test_a_rigid_motion_leaves_the_shape(seed):
+    """Its error is round-off; that of SciPy's best rotation is met otherwise."""
+    rng = np.random.default_rng(seed)
+    shape, moved = rng.normal(size=(2, 9, 3)), rng.normal(size=3)
+    rotation = Rotation.random(random_state=seed)
+    rigid = np.stack([rotation.apply(frame) + moved for frame in shape])
+    assert shape_differences(rigid, shape) == pytest.approx(np.zeros(2), abs=1e-13)
+    other = rng.normal(size=(2, 9, 3))
+    centred = [x - x.mean(axis=1, keepdims=True) for x in (other, shape)]
+    expected = [Rotation.align_vectors(b, a)[1] for a, b in zip(*centred, strict=True)]
+    assert shape_differences(other, shape) == pytest.approx(expected)
+
+
+def test_shapes_of_mirrored_flat_and_far_grown_frames():
+    """A mirror image is another shape; the others have finite differences."""
+    shape = np.random.default_rng(1).normal(size=(1, 9, 3))
+    assert shape_differences(shape * [1.0, 1.0, -1.0], shape)[0] > 0.1
+    flat = shape * [1.0, 1.0, 0.0]
+    assert shape_differences(flat, flat)[0] == pytest.approx(0.0, abs=1e-13)
+    size = np.linalg.norm(flat - flat.mean(axis=1))
+    assert shape_differences(np.zeros((1, 9, 3)), flat)[0] == pytest.approx(size)
+    assert np.isfinite(shape_differences(1e200 * flat, flat)).all()
+    assert len(shape_differences(np.zeros((0, 9, 3)), np.zeros((0, 9, 3)))) == 0

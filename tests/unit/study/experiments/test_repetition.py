@@ -1,21 +1,26 @@
-"""Repetitions of reduced runs with other starts and training frames; methods of the ladder."""
+"""Repetitions of reduced runs, methods of the ladder, and runs with bases of round-off."""
 
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from builders import TOP, make_scene
+from pdrom.core.store import write_hdf5
 from pdrom.core.yamlfile import read_yaml
 from pdrom.model.held_out import MOTIONS
 from pdrom.model.runs import trajectory
 from pdrom.model.scene import Scene
 from pdrom.reduction.basis import compute_basis
-from pdrom.reduction.method import MethodSpec
+from pdrom.reduction.method import MethodSpec, load_methods
 from pdrom.reduction.sampling import Reduction, reductions, select
 from pdrom.reduction.snapshots import SnapshotSet
+from pdrom.view.read import rerun_infos
 from places import ROOT
+from study.experiments import repetitions as module
 from study.experiments.repetitions import LadderSection, ReducedRuns, Repetitions, drawn, recorded
+from study.pipeline.scenes import Coarsen, load_bound_scene
 
 BLOCK = MethodSpec(title="elements", centring="affine", rows="element", solve="qr")
 END = 9
@@ -152,3 +157,54 @@ def test_the_square_samples_as_many_entries_in_each_of_its_places(p, rng):
             reduction = Reduction(basis, select(basis, method, 5), method, 5)
             entries.add(sum(len(block.entries) for block in reduction.blocks))
     assert entries == {3 * p * 5}
+
+
+METHODS = load_methods(ROOT / "config" / "methods.yaml")
+
+
+@pytest.fixture(scope="module")
+def fall():
+    """The falling sheet, coarse and short."""
+    return load_bound_scene(ROOT, "bend_fall", Coarsen(resolution=0.4, frames=0.4))
+
+
+def test_a_flat_mesh_may_keep_its_plane(fall):
+    assert module.kinds(fall) == (module.ALL, module.PLANE, module.VERTEX)
+    curved = load_bound_scene(ROOT, "bend_curved", Coarsen(resolution=0.4))
+    assert module.kinds(curved) == (module.ALL,)
+    every, plane, vertex = (
+        module.roundoff_field(fall, axes, 1e-15, 1) for axes in module.kinds(fall)
+    )
+    np.testing.assert_array_equal(plane[:, :2], every[:, :2])
+    np.testing.assert_array_equal(vertex[:, :2], every[:, :2])
+    assert not plane[:, 2].any()
+    assert np.count_nonzero(vertex[:, 2]) == 1
+    assert every[:, 2].all()
+
+
+def test_the_joint_selection_fails_where_an_axis_carries_nothing(fall, tmp_path):
+    """Without noise in an axis the system of that axis is singular; with noise it is not."""
+    asked = module.NoiseRuns(sizes=(2, 5, 99), repetitions=2)
+    methods = {name: METHODS[name] for name in ("deim-joint", "published")}
+    runs = tmp_path / "noise.h5"
+    with write_hdf5(runs) as file:
+        rows = module.noisy_runs(fall.changed(frames=22), "bending", asked, methods, 100.0, file)
+    table = pd.DataFrame(rows)
+    assert len(table) == 3 * 2 * 2 * 3
+    beyond = table.r == 99
+    assert (table.frames[beyond] == 0).all()
+    assert (table["rank"] < 99).all()
+    singular = (table.noisy_axes == module.PLANE) & (table.method == "deim-joint") & ~beyond
+    assert np.isinf(table.gain[singular]).all()
+    assert (table.blowup_frame[singular] == 0).all()
+    runs_through = table.noisy_axes.isin((module.ALL, module.PLANE)) & ~singular & ~beyond
+    assert (table.relative_error[runs_through] < 1e-10).all()
+    drawn = [rerun_infos(runs, f"{axes}/deim-joint") for axes in module.kinds(fall)]
+    assert [[(i.r, i.marked) for i in infos] for infos in drawn] == 3 * [
+        [(2, False), (5, False), (99, True)]
+    ]
+    joint = table[(table.method == "deim-joint") & ~beyond]
+    for axes, infos in zip(module.kinds(fall), drawn, strict=True):
+        starts = joint[joint.noisy_axes == axes].groupby("seed").frames.apply(list)
+        ends = [info.entries - 1 for info in infos if not info.marked]
+        assert ends == next((s for s in starts if len(set(s)) > 1), starts.iloc[0])

@@ -18,7 +18,7 @@ from pdrom.model.mesh.generators import bar, cloth
 from pdrom.model.mesh.types import Mesh, save_mesh
 from pdrom.reduction.basis import Basis, save_basis
 from pdrom.reduction.method import load_methods
-from pdrom.reduction.sampling import reductions
+from pdrom.reduction.sampling import select_path
 from pdrom.reduction.snapshots import SPLITS, SnapshotSet, save_snapshots
 from places import CONFIG, ROOT
 from study.artifact import paths
@@ -98,12 +98,12 @@ def make_results(results: Invented) -> None:
             count = len(EFFECTS.load(group).element_vertices(mesh))
             basis = _write_bases(results, scene, group, count, rank, rng)
             for method, spec in results.study.methods.items():
-                chosen = reductions(basis, spec, range(1, rank + 1)) if rank else {}
+                chosen = select_path(basis, spec, range(1, rank + 1))
                 with write_hdf5(results.path(paths.SAMPLING, scene, group, method)) as file:
-                    for r, reduction in chosen.items():
+                    for r, sampling in chosen.items():
                         store = file.create_group(f"r{r:04d}")
-                        store["entries"] = reduction.sampling.entries
-                        store["elements"] = reduction.sampling.elements
+                        store["entries"] = sampling.entries
+                        store["elements"] = sampling.elements
                 _write_reruns(results, scene, group, method, positions, rank, rng)
         if scene in FLAT:
             _write_noise_runs(results, scene)

@@ -1,4 +1,7 @@
-"""``./reproduce verify`` on a folder of results: outcomes, exit codes, the page."""
+"""``./reproduce verify`` on a folder of results: outcomes, exit codes, the page.
+
+And edits of tables, with new checksums, that a sceptic tries: each is noticed.
+"""
 
 import json
 import re
@@ -6,37 +9,30 @@ from pathlib import Path
 from subprocess import CompletedProcess
 from types import SimpleNamespace
 
+import numpy as np
+import pandas as pd
 import pytest
 
 from pdrom.core.errors import ConfigurationError, StorageError
-from pdrom.core.store import read_table, write_table, write_text
+from pdrom.core.store import atomic_path, read_table, write_table, write_text
 from study.article.build import INDEX, VERIFIED
 from study.artifact.paths import ARTICLE, TABLE
 from study.figures.kit.declaration import declarations
 from study.tables import declared
 from study.verification.command import NOTHING, status_of, update, verify, verify_tables
-from study.verification.examine import Line, Outcome
-from study.verification.files import made
+from study.verification.examine import Examination, Line, Outcome
+from study.verification.files import differing, made
 from study.verification.references import LOG, folder_of
 from study.verification.subject import Status
 
 RESULTS = "results/studies/tiny"
 CLAIMS = ("claims", "claims_tests", "claims_sensitivity")
+PAGE = Path(ARTICLE.at(RESULTS, name=VERIFIED))
 
 
-@pytest.fixture
-def verified(results, subject, capsys):
-    """Exit code and printed lines of the comparison when it is asked."""
-
-    def asked():
-        status = verify_tables(subject)
-        return status, capsys.readouterr().out.splitlines()
-
-    return asked
-
-
-def test_expected_results_hold_and_outcomes_reach_an_article(results, verified):
-    status, printed = verified()
+def test_expected_results_hold_and_outcomes_reach_an_article(results, subject, capsys):
+    write_text("<!DOCTYPE html>", PAGE.with_name(INDEX))
+    status, printed = verify_tables(subject), capsys.readouterr().out.splitlines()
     page = (results / RESULTS / "verification.md").read_text(encoding="utf-8")
     assert not any("differs" in line or "not there" in line for line in printed)
     assert status == Status.HOLDS
@@ -45,26 +41,23 @@ def test_expected_results_hold_and_outcomes_reach_an_article(results, verified):
     assert {"claim C1", "claim C12", "figure singular_values"} <= names
     assert any(re.match("table [a-z_]+: not comparable", line) for line in printed)
     assert "| C1 | reproduced |" in page
-    place = Path(ARTICLE.at(RESULTS, name=VERIFIED))
-    assert not place.exists()
-    write_text("<!DOCTYPE html>", place.with_name(INDEX))
-    *lines, _, _ = verified()[1]
-    text = place.read_text(encoding="utf-8")
+    text = PAGE.read_text(encoding="utf-8")
     found = json.loads(text.removeprefix("window.pdromVerified=").removesuffix(";\n"))
-    assert found == dict(line.split(": ", 1) for line in lines)
+    assert found == dict(line.split(": ", 1) for line in printed[:-2])
     assert {f"figure {name}" for name in declarations()} <= found.keys()
 
 
-def decided_again(examination, table, **columns):
+def decided_again(examination, table, names=CLAIMS, **columns):
     """Claims by name, decided again of a table with other columns; and lines of their tables."""
     path = TABLE.at(RESULTS, name=table)
     write_table(read_table(path).assign(**columns), path)
-    for name in CLAIMS:
+    for name in names:
         with made(examination.subject.plan.job(declared()[name])) as files:
             [(path, new)] = files.items()
             write_table(read_table(new), path)
+    examination.again = lambda name: None  # they were made just now
     lines = {line.name: line for line in examination.claims()}
-    return lines, [examination.table(name) for name in CLAIMS]
+    return lines, [examination.table(name) for name in names]
 
 
 def test_a_verdict_that_times_have_changed_is_shown_and_not_judged(examination):
@@ -80,18 +73,28 @@ def test_a_verdict_that_times_have_changed_is_shown_and_not_judged(examination):
 def test_a_verdict_that_errors_have_changed_is_a_difference(examination):
     errors = read_table(TABLE.at(RESULTS, name="reconstruction_error")).elements_sampled
     one = errors.where(errors.isna(), 1)
-    claims, tables = decided_again(examination, "reconstruction_error", elements_sampled=one)
-    assert claims["C8"].outcome is tables[0].outcome is Outcome.DIFFERS
+    claims, [table] = decided_again(
+        examination, "reconstruction_error", CLAIMS[:1], elements_sampled=one
+    )
+    assert claims["C8"].outcome is table.outcome is Outcome.DIFFERS
 
 
-def test_what_is_missing_has_its_own_code_and_names_its_command(verified):
+@pytest.fixture
+def not_made_again(monkeypatch):
+    """Tables are not computed from others, which takes the most of an examination."""
+    monkeypatch.setattr(Examination, "_again", lambda self, name: None)
+
+
+@pytest.mark.usefixtures("not_made_again")
+def test_what_is_missing_has_its_own_code_and_names_its_command(results, subject, capsys):
     reference = folder_of(RESULTS) / "winners.csv"
     kept = reference.read_bytes()
     for path in (TABLE.at(RESULTS, name="stability"), f"{RESULTS}/figures/ladder.png", reference):
         Path(path).unlink()
-    status, printed = verified()
+    status, printed = verify_tables(subject), capsys.readouterr().out.splitlines()
     reference.write_bytes(kept)
     assert status == Status.MISSING
+    assert not PAGE.exists()
     assert "table winners: no reference, run verify --update" in printed
     [line] = [line for line in printed if line.startswith("table stability")]
     assert line.endswith("make it by ./reproduce --configfile config/tiny.yaml -- stability")
@@ -148,3 +151,98 @@ def test_tables_that_a_run_would_make_again_are_not_expected(
     with pytest.raises(StorageError, match=fault):
         update(subject, "a new method")
     assert not (folder_of(RESULTS) / LOG).exists()
+
+
+def test_a_figure_is_drawn_again_to_the_byte(results, subject):
+    """Replaced, with new checksums, by a figure that its table does not give, or another's."""
+    job = subject.plan.job(declarations()["local_share"])  # which reads one table
+    with made(job) as drawn:
+        for path, new in drawn.items():
+            with atomic_path(path) as temporary:
+                temporary.write_bytes(new.read_bytes())
+    assert differing(job) == []
+    edited, *_ = outputs = list(job.outputs.values())
+    content = Path(edited).read_bytes()
+    with atomic_path(edited) as temporary:
+        temporary.write_bytes(content + b"%")
+    assert differing(job) == [edited]
+    [table] = [path for path in job.files if path.startswith("results/")]
+    write_table(read_table(table).assign(local_share=0.5), table)
+    assert differing(job) == outputs
+
+
+# Edits ------------------------------------------------------------------------------------------
+
+
+def put(frame, rows, columns, value):
+    frame.loc[rows, columns] = value
+    return frame
+
+
+def amplified(frame):
+    """Errors of a few rows times thirty, with other gains."""
+    rows = frame.index[frame.gain.notna()][:: 5 * len(frame) // frame.gain.notna().sum()]
+    frame.loc[rows, "gain"] *= 1 + 1e-5
+    frame.loc[rows, [name for name in frame if "error" in name]] *= 30
+    return frame
+
+
+def blow_ups_become_runs(frame):
+    rows = frame.index[frame.finite == False]  # noqa: E712 : or empty
+    assert len(rows)
+    return put(frame, rows, ["finite", "relative_error"], [True, 0.01])
+
+
+# Table, its edit, and the line in which it is to be noticed, where not that of the table. Numbers
+# and outcomes of every column that move, and rows that are invented, doubled, deleted, renamed or
+# swapped: test_judge.py.
+EDITS = {
+    "errors times thirty with other gains": ("reconstruction_error", amplified),
+    "errors of failed runs become enormous": (
+        "reduced_reruns",
+        lambda f: put(f, f.relative_error_within_horizon > 0.1, "relative_error", 1e30)),
+    "blow-ups on bases of round-off become runs": ("noise", blow_ups_become_runs),
+    "all errors of held-out motions move a little": (
+        "reduced_reruns", lambda f: f.assign(
+            shape_error=f.shape_error.where(f.motion == "train", f.shape_error * (1 + 1e-3)))),
+    "a number is missing": ("singular_values", lambda f: put(f, 0, "singular_value", np.nan)),
+    "a number is infinite": ("singular_values", lambda f: put(f, 0, "singular_value", np.inf)),
+    "a number is a word": (
+        "singular_values", lambda f: put(f.astype(object), 0, "singular_value", "large")),
+    "a column is left out": ("ladder", lambda f: f.drop(columns="gain")),
+    "a column is new": ("ladder", lambda f: f.assign(better=True)),
+    "a verdict beyond is another one": (
+        "claims", lambda f: put(f, f.claim == "C11", "verdict_beyond", "another"), "claim C11"),
+    "a verdict stays where its tables give another one": (
+        "local_share",
+        lambda f: f.assign(local_share=np.where(f.local_share.median() < 0.7, 0.9, 0.1)),
+        "claim C1"),
+    "a speed-up of a derived table is larger": (
+        "payoff", lambda f: f.assign(best_speedup=2 * f.best_speedup)),
+    "times move away from what was made of them": (
+        "local_share", lambda f: f.assign(local_share=0.5 * f.local_share), "table claims_tests"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", EDITS)
+def test_an_edit_is_noticed(name, examination):
+    table, change, *place = EDITS[name]
+    path = TABLE.at(RESULTS, name=table)
+    write_table(change(read_table(path)), path)
+    kind, line = (place or [f"table {table}"])[0].split(" ")
+    lines = examination.claims() if kind == "claim" else [examination.table(line)]
+    [found] = [one for one in lines if one.name == line]
+    assert found.outcome is Outcome.DIFFERS, found
+
+
+@pytest.mark.usefixtures("not_made_again")
+def test_a_table_that_was_cut_one_that_is_lost_and_one_that_is_none_are_noticed(examination):
+    cut, lost, more = (TABLE.at(RESULTS, name=name) for name in ("ladder", "stability", "more"))
+    content = Path(cut).read_bytes()
+    with atomic_path(cut) as temporary:
+        temporary.write_bytes(content[: len(content) // 2])
+    Path(lost).unlink()
+    write_table(pd.DataFrame({"x": [1.0]}), more)
+    lines = {line.name: line.outcome for line in examination.lines() if line.kind == "table"}
+    assert lines["ladder"] is lines["more"] is Outcome.DIFFERS
+    assert lines["stability"] is Outcome.MISSING

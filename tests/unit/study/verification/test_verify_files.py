@@ -9,7 +9,7 @@ import pytest
 
 from pdrom.core.errors import StorageError
 from pdrom.core.provenance import made_by
-from pdrom.core.store import atomic_path, write_hdf5, write_table, write_text
+from pdrom.core.store import write_hdf5, write_table, write_text
 from places import ROOT
 from study.article.build import article
 from study.artifact.artifact import Artifact
@@ -199,25 +199,6 @@ def test_outputs_of_one_name_stay_apart():
     assert differing(job) == []
     write_text("another", paths["other"])
     assert differing(job) == [paths["other"]]
-
-
-def test_a_figure_is_drawn_again_to_the_byte(results, subject):
-    """Replaced, with new checksums, by a figure that its table does not give, or another's."""
-    job = subject.plan.job(declarations()["singular_values"])  # which reads one table
-    with files.made(job) as made:
-        for path, new in made.items():
-            with atomic_path(path) as temporary:
-                temporary.write_bytes(new.read_bytes())
-    assert differing(job) == []
-    for path in job.outputs.values():
-        content = Path(path).read_bytes()
-        for other, faults in ((content + b"%", [path]), (content, [])):
-            with atomic_path(path) as temporary:
-                temporary.write_bytes(other)
-            assert differing(job) == faults
-    [table] = [path for path in job.files if path.startswith("results/")]
-    write_table(pd.read_csv(table).assign(relative=0.5), table)
-    assert differing(job) == list(job.outputs.values())
 
 
 def test_every_artifact_that_takes_seconds_is_made_again(subject, monkeypatch):

@@ -1,4 +1,4 @@
-"""Timings: interleaved, after a warm-up, started afresh, and the phases of one repeat."""
+"""Timings: interleaved, after a warm-up, phases of one repeat; costs of each effect, no other."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -6,7 +6,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from builders import GRAVITY, LEFT, make_scene
+from pdrom.model.constraints.local_kernel import LocalPass
 from pdrom.model.dynamics.stepper import FrameReport, State
+from study.experiments.kit import costs as module
+from study.experiments.kit.base import GLOBAL, REST, RIGHT
 from study.experiments.kit.measurement import PHASES, Variant, measure, measure_calls
 
 
@@ -121,3 +125,79 @@ def test_a_run_that_blows_up_is_timed_up_to_there():
     (result,) = measure([variant("a", calls, [1.0, 3.0, 100.0], 3, bad_frame=1)], 0, 1)
     assert [frame for _, frame, _ in calls] == [0, 1]
     assert result["ms_per_frame"] == pytest.approx(2000.0)
+
+
+MOVING = (GRAVITY, {"effect": "floor"}, LEFT, {"effect": "pins", "select": "right", "until": 2})
+EFFECTS = (*MOVING, {"effect": "spring", "weight": 1e5}, {"effect": "strain", "weight": 1e4})
+
+
+def test_every_effect_has_a_row_and_the_shares_are_whole():
+    scene = make_scene(*EFFECTS)
+    table = module.effect_costs(scene, scene.system, 3, 1, 3)
+    assert list(table.columns) == module.COSTS
+    expected = {
+        "spring": scene.group("spring").elements, "strain": scene.group("strain").elements,
+        "gravity": 30, "pins": 2 * 5, "floor": 30, RIGHT: 30, GLOBAL: 30, REST: 30,
+    }  # fmt: skip
+    assert dict(zip(table.effect, table.elements, strict=True)) == expected
+    assert (table.ms_per_frame > 0.0).all()
+    assert table.share.sum() == pytest.approx(1.0)
+
+
+def test_a_stand_in_and_its_kernel_answer_as_the_effect_does(rng):
+    """Timed effects stay in the compiled loop, so that their times are those of a run."""
+    scene = make_scene(*EFFECTS)
+    group = scene.group("strain")
+    y = scene.mesh.points + 0.01 * rng.standard_normal(scene.mesh.points.shape)
+    own = np.zeros_like(y)
+    energy = group.accumulate(y, own)
+    stand = module.Timed(group, ("begin_frame", "accumulate"))
+    stand.begin_frame(y)
+    kernel = LocalPass([module.Timed(group, ("begin_frame",)).local_kernel])
+    for asked, times in ((stand, 1), (kernel, 1000)):
+        for _ in range(times):
+            found = np.zeros_like(y)
+            assert asked.accumulate(y, found) == energy
+        assert (own == found).all()
+    assert stand.seconds > 0.0
+    stand.reset()
+    assert stand.seconds == 0.0
+    space = scene.space(scene.system)
+    assert space.compiled([module.Timed(g, ("begin_frame",)) for g in scene.groups])[0] is not None
+
+
+def test_a_scene_without_an_effect_does_not_ask_it(monkeypatch):
+    from pdrom.model.constraints.triangle_strain import TriangleStrain
+
+    scene = make_scene(*EFFECTS)
+    costs = module.effect_costs(scene, scene.system, 2, 0, 1)
+
+    def refuse(*_):
+        raise AssertionError("strain was asked")
+
+    monkeypatch.setattr(TriangleStrain, "accumulate", refuse)
+    with pytest.raises(AssertionError, match="strain was asked"):
+        module.left_out(scene, costs, 2, 0, 1, "splu")
+    monkeypatch.setattr("study.experiments.kit.costs.left_out_sets", lambda _: [("strain",)])
+    table = module.left_out(scene, costs, 2, 0, 1, "splu")
+    assert list(table.columns) == module.LEFT_OUT
+    row = table.iloc[0]
+    assert (row.left_out, row.groups) == ("strain", 1)
+    assert row.elements == scene.group("strain").elements
+    assert row.own_ms == costs.set_index("effect").ms_per_frame["strain"]
+
+
+def test_effects_of_a_frame_are_left_out_alone_and_groups_together():
+    # a kick is over before the first frame
+    bending = {"effect": "bending", "weight": 1.0}
+    scene = make_scene({"effect": "kick", "speed": 0.1, "seed": 1}, *EFFECTS, bending)
+    costs = module.effect_costs(scene, scene.system, 2, 0, 1)
+    table = module.left_out(scene, costs, 2, 0, 3, "splu")
+    assert table.left_out.tolist() == [
+        "nothing", "gravity", "floor", "pins", "spring", "strain", "bending", "spring + strain",
+        "spring + bending", "strain + bending",
+    ]  # fmt: skip
+    assert table.groups.tolist() == [3, 3, 3, 3, 2, 2, 2, 1, 1, 1]
+    single = make_scene({"effect": "spring", "weight": 1.0})
+    costs = module.effect_costs(single, single.system, 1, 0, 1)
+    assert len(module.left_out(single, costs, 1, 0, 1, "splu")) == 0

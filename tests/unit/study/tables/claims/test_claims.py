@@ -1,4 +1,4 @@
-"""Verdicts: every branch, every metric by hand, and thresholds that decide."""
+"""Verdicts: every branch, every metric by hand, thresholds that decide, and other rules."""
 
 import numpy as np
 import pandas as pd
@@ -16,7 +16,7 @@ from study.tables import declared
 from study.tables.claims import claims as verdicts
 from study.tables.claims.claims import claims, claims_sensitivity, claims_tests
 from study.tables.claims.metrics import METRICS
-from study.tables.claims.rules import ClaimRule, TestRule, load_claims
+from study.tables.claims.rules import PARTS, ClaimRule, TestRule, load_claims
 
 HOLDS, FAILS, DEPENDS, MACHINE, UNDECIDED, UNTESTED = verdicts.VERDICTS
 RERUNS = [
@@ -494,3 +494,81 @@ def test_a_test_beside_the_verdict_makes_its_reason_timed():
 
     assert verdicts.timed_columns(rules(decides, beside)) == {"why"}
     assert verdicts.timed_columns(rules(decides)) == set()
+
+
+ERRORS = frame(
+    "scene r relative_error", ("a", 6, 0.9), ("a", 20, 0.3), ("b", 6, 0.8), ("b", 20, 0.4)
+).assign(group="spring", method="deim", split="train", gain=1.0)
+SHARES = frame("scene local_share", ("a", 0.75), ("b", 0.5)).assign(implementation="compiled")
+
+
+def made(**rule) -> pd.DataFrame:
+    """Variations of a claim with this test, published and beyond."""
+    test = {"what": "w", "metric": "reconstruction_error", "compare": ">=", "threshold": 0.5}
+    tests = (validate(TestRule, test | rule, "test"),)
+    rules = {"C1": ClaimRule.model_construct(published=tests, beyond=tests)}
+    tables = {"reconstruction_error": ERRORS, "local_share": SHARES}
+    rows = verdicts.sensitivity_rows(rules, tables)
+    assert set(rows.part) == set(PARTS)
+    return rows[rows.part == "published"]
+
+
+def by_variation(rows: pd.DataFrame, varied: str) -> dict[str, str]:
+    chosen = rows[rows.varied == varied]
+    return dict(zip(chosen.variation, chosen.verdict, strict=True))
+
+
+def test_thresholds_and_shares():
+    rows = made()
+    assert set(rows.verdict_of_rules) == {"depends"}
+    assert by_variation(rows, "threshold") == {
+        "x 0.5": "holds", "x 0.8": "holds", "x 1.25": "depends", "x 2": "does not hold",
+    }  # fmt: skip
+    assert by_variation(rows, "share") == {
+        "0.5": "holds", "0.6": "depends", "0.75": "depends", "0.9": "depends", "1": "depends",
+    }  # fmt: skip
+    assert (rows.same == (rows.verdict == "depends")).all()
+
+
+def test_margins_vary_where_times_are_compared():
+    assert by_variation(made(), "margin") == {}
+    rows = made(metric="local_share", threshold=0.35)
+    assert by_variation(rows, "margin") == {
+        "1": "holds", "1.25": "holds", "1.5": "holds",
+        **dict.fromkeys(("2", "3", "5"), verdicts.MACHINE),
+    }  # fmt: skip
+    assert set(rows.verdict_of_rules) == {"holds"}
+
+
+def test_rows_that_are_left_out():
+    rows = made()
+    assert by_variation(rows, "sizes") == {"r up to 10": "holds", "r above 10": "does not hold"}
+    assert by_variation(rows, "scenes") == {"without a": "depends", "without b": "depends"}
+    assert by_variation(made(where={"scene": ["a"]}), "scenes") == {}
+
+
+def test_splits_vary_where_a_test_names_one():
+    assert by_variation(made(), "splits") == {}
+    # no row of this table is of another split: there is nothing to vary to
+    assert by_variation(made(where={"split": ["train"]}), "splits") == {}
+    assert by_variation(made(where={"split": ["test", "train"]}), "splits") == {"train": "depends"}
+
+
+def test_every_test_says_what_it_found_and_those_that_decide_give_the_by_variation():
+    tables = {name: table.checked(pd.DataFrame()) for name, table in declared().items()}
+    assert verdicts.sensitivity_rows(load_claims(PATH), tables).empty
+    shares = frame("scene local_share", ("a", 0.2), ("b", 0.8), ("c", 0.9))
+    tables["local_share"] = shares.assign(implementation="compiled")
+    outcomes = claims_tests(PATH, {}, **tables)
+    one = outcomes[(outcomes.claim == "C1") & (outcomes.part == "beyond")].iloc[0]
+    assert (one.satisfied, one.of, one.close, one.verdict) == (2, 3, 2, verdicts.MACHINE)
+    assert (one.margin, one.least, one["median"], one.most) == (4.0, 0.2, 0.8, 0.9)
+    nothing = outcomes[outcomes.of == 0]
+    assert (nothing.verdict == verdicts.UNDECIDED).all()
+    assert nothing[["least", "median", "most"]].isna().all(axis=None)
+    # words tell the tests of a part apart
+    assert not outcomes.duplicated(["claim", "part", "what"]).any()
+    for row in claims(PATH, {}, **tables).itertuples():
+        for part, verdict in (("published", row.verdict), ("beyond", row.verdict_beyond)):
+            mine = outcomes[(outcomes.claim == row.claim) & (outcomes.part == part)]
+            assert verdicts.combined(list(mine.verdict[mine.decides])) == verdict
