@@ -12,13 +12,13 @@ import pytest
 from places import tracked
 
 LIMITS = {
-    "lines of src": 35_863,
-    "modules of src": 215,
-    "lines of tests": 22_762,
+    "lines of src": 35_835,
+    "modules of src": 212,
+    "lines of tests": 22_706,
     "words of documentation": 24_547,
     "tables": 25,
-    "figures": 23,
-    "experiments": 19,
+    "figures": 21,
+    "experiments": 18,
     "percent of src in decorators, signatures and imports": 17.96,
 }
 PAGES = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "config/README.md", "docs/**/*.md")

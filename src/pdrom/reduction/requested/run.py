@@ -8,10 +8,9 @@ The defect of a frame is the distance to the result of a more accurate level fro
 run accumulates defects and amplifies them. The error of a run is estimated as its level's error in
 the calibration, times the larger of two ratios if that is above 1: of the defect in checked frames
 to that in the calibration, and of the distance to a run of a second level, with a perturbed start,
-to that expected from the calibration. The estimate is at least this distance. The tolerance counts
-as met for the first frames over which the estimate is within it. If it is missed in later frames, a
-full-order level replaces a reduced one, and the most accurate level replaces that. No decision
-depends on timings.
+to that expected from the calibration. The tolerance counts as met for the first frames over which
+the estimate is within it. If it is missed in later frames, a full-order level replaces a reduced
+one, and the most accurate level replaces that. No decision depends on timings.
 """
 
 import logging
@@ -225,10 +224,11 @@ class Calibration:
     def second(self, level: Calibrated, error: float) -> Calibrated:
         """Cheapest other level for comparison with ``level``, reduced if and only if ``level`` is.
 
-        Its expected error is at most ``error``, too. If there is no such level, it is ``level``.
+        Its expected error is at most ``error`` times the safety factor; without one: ``level``.
         """
+        most = error * self.settings.factor
         alike = [each for each in self.levels if each.reduced == level.reduced]
-        others = (e for e in alike if e is not level and self.expected(e, error) <= error)
+        others = (e for e in alike if e is not level and self.expected(e, error) <= most)
         return next(others, level)
 
     def attempts(self, error: float) -> list[Calibrated]:
@@ -322,8 +322,7 @@ class CheckedRun:
         """Estimate errors (F,) over the first 1, ..., F frames of ``run``, a run with ``level``.
 
         A second run, with `Calibration.second`, has a perturbed start. The error expected of
-        ``level`` is multiplied by max(1, difference of the runs / sum of both levels' errors). The
-        estimate is at least the difference: two runs that differ by more do not both keep it.
+        ``level`` is multiplied by max(1, difference of the runs / sum of both levels' errors).
         """
         own, second = self._own, self._own.second(level, self._error)
         other = self._start(second.level, moved=True).to(self._frames)
@@ -332,7 +331,7 @@ class CheckedRun:
         apart = levels.relative_errors(differences, positions, own.motions[0].quantity)
         errors = own.expected(level, self._error), own.expected(second, self._error)
         usual = sum(errors) / own.settings.factor
-        return np.maximum(errors[0] * np.maximum(1.0, apart / usual), apart)
+        return errors[0] * np.maximum(1.0, apart / usual)
 
 
 def check_frames(frames: int, count: int) -> list[int]:
