@@ -26,10 +26,10 @@ from pdrom.reduction.subspace.model import load_models
 from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import EachOf, Settings
-from study.experiments.kit import base as kit
-from study.experiments.kit import runfiles
+from study.experiments.kit.base import Modes, OfScene, PositionBasis, Solver, experiment
 from study.experiments.kit.costs import variant
 from study.experiments.kit.measurement import Processes, Variant, in_processes
+from study.experiments.kit.runfiles import load_reduction
 
 FULL, CONTROL, REDUCED = "full", "control", "reduced"
 COLUMNS = [
@@ -39,20 +39,20 @@ COLUMNS = [
 SECONDS_COLUMNS = ["scene", "group", "method", "r", "reduction_s"]
 
 
-class SubspaceCase(kit.OfScene):
+class SubspaceCase(OfScene):
     """A model in a position subspace whose speed-up the manuscript cites."""
 
     method: str
-    position_basis: kit.PositionBasis = "pod"
-    k: kit.Modes
+    position_basis: PositionBasis = "pod"
+    k: Modes
 
 
-class ProjectionCase(kit.OfScene):
+class ProjectionCase(OfScene):
     """Reduction of a group's projections (not of positions) whose speed-up the manuscript cites."""
 
     group: str
     method: str
-    r: kit.Modes
+    r: Modes
 
 
 class FrameTimes(Processes):
@@ -65,7 +65,7 @@ class FrameTimes(Processes):
     projections: tuple[ProjectionCase, ...] = ()
 
 
-class NamedScene(kit.OfScene):
+class NamedScene(OfScene):
     """A scene and its name, which the paths of its files contain."""
 
     config: SceneConfig
@@ -80,7 +80,7 @@ class Options(ConfigModel):
     subspace_cases: tuple[SubspaceCase, ...]
     projection_cases: tuple[ProjectionCase, ...]
     projection_methods: dict[str, MethodSpec]
-    solver: kit.Solver
+    solver: Solver
 
 
 @dataclass(frozen=True)
@@ -113,7 +113,7 @@ class TimedScene:
             yield variant(scene, system, scene.groups, frames, {**common, "role": role})
         reduced: dict[str, Any] = {**common, "role": REDUCED}
         for own, spec, basis, sampling in self.projections:
-            reduction = runfiles.load_reduction(load_basis(basis), sampling, spec, r=own.r)
+            reduction = load_reduction(load_basis(basis), sampling, spec, r=own.r)
             step = ReducedLocalStep(scene.group(own.group), reduction)
             steps = replace_group(scene, own.group, step)
             labels = {**reduced, **own.model_dump(), "position_basis": "full"}
@@ -127,7 +127,7 @@ class TimedScene:
                     yield Variant(labels, *model.loop(scene), frames, output=model.output())
 
 
-@kit.experiment(
+@experiment(
     "Times of frames in several processes",
     reads={
         "meshes": EachOf(paths.MESH, "timed_scenes"),

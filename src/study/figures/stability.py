@@ -15,6 +15,7 @@ from study.artifact.paths import SENSITIVITY, File
 from study.artifact.reads import EachOf, Read, Setting, TableOf
 from study.experiments.kit.base import Horizon, floor_of, horizon
 from study.figures.kit import declaration as kit
+from study.figures.kit.declaration import figure
 from study.tables.kit.results import TWIN
 
 # Inputs from which figures make `Floors`: the sensitivity floor and horizon of each scene.
@@ -62,7 +63,7 @@ class Floored(kit.Scenes):
     columns: kit.Columns = 3
 
 
-@kit.figure(title="Sensitivity floor and horizon", reads=FLOORS)
+@figure(title="Sensitivity floor and horizon", reads=FLOORS)
 def sensitivity_floor(
     options: Floored, drawn: kit.Drawn, sensitivity: list[File], horizon: Horizon
 ) -> Figure:
@@ -220,7 +221,7 @@ class Sizes(kit.Methods):
     ranks: kit.Ranks = ()
 
 
-@kit.figure(title="Where each method can be trusted", reads={"table": TableOf("stability")})
+@figure(title="Where each method can be trusted", reads={"table": TableOf("stability")})
 def stability_map(options: Sizes, drawn: kit.Drawn, table: pd.DataFrame) -> Figure:
     """End of every run on the training motion, by method, size and scene. Accurate or wrong: the
     error within the horizon is at most, or above, {stability.wrong}; left the scene: the bounding
