@@ -13,7 +13,7 @@ from pdrom.model.scene import SceneConfig
 from pdrom.reduction.method import MethodSpec
 from places import CONFIG, ROOT
 from study.artifact.paths import RESULTS
-from study.figures.stability import LOOKS
+from study.figures.stability_map import LOOKS
 from study.pipeline.front import completed
 from study.pipeline.study import StudySettings
 from study.tables import declared

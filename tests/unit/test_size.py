@@ -12,8 +12,8 @@ import pytest
 from places import tracked
 
 LIMITS = {
-    "lines of src": 35_836,
-    "modules of src": 212,
+    "lines of src": 35_837,
+    "modules of src": 213,
     "lines of tests": 22_706,
     "words of documentation": 24_547,
     "tables": 25,
@@ -58,7 +58,7 @@ def formal_percent() -> float:
 
 
 MEASURES = {
-    "lines of src": 35_836,
+    "lines of src": lambda: lines(sources()),
     "modules of src": lambda: len(sources()),
     "lines of tests": lambda: lines(texts("tests/**/*.py")),
     "words of documentation": lambda: sum(len(text.split()) for text in texts(*PAGES)),

@@ -249,7 +249,7 @@ def test_an_edit_reruns_the_scene_that_it_concerns_and_what_follows(finished, ed
 
 
 CLAIMS = ("claims", "claims_sensitivity", "claims_tests", "replication")
-MAP = "src/study/figures/stability.py"
+MAP = "src/study/figures/stability_map.py"
 
 
 @pytest.mark.parametrize(

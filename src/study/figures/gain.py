@@ -180,11 +180,7 @@ class Reconstruction(Beside, kit.Methods):
 
 
 def _panels(
-    options: Beside,
-    drawn: Drawn,
-    table: pd.DataFrame,
-    limits: tuple[float, float],
-    legend: int,
+    options: Beside, drawn: Drawn, table: pd.DataFrame, limits: tuple[float, float], legend: int
 ) -> tuple[Figure, list[Panel]]:
     """Figure with a panel for each scene and group in ``table``, and space for a legend.
 

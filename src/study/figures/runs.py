@@ -19,7 +19,7 @@ from study.artifact.reads import EachOf, Every, Read, TableOf
 from study.experiments.kit.base import Horizon
 from study.figures.kit.declaration import Drawn, Experiment, NothingToDraw, ReducedRuns, figure
 from study.figures.kit.elements import magnitudes
-from study.figures.stability import FLOORS, Floors
+from study.figures.sensitivity_floor import FLOORS, Floors
 from study.tables.kit.results import trained
 
 NOISY = {"all": "all axes", "plane": "in the plane", "vertex": "one vertex across"}

@@ -65,9 +65,7 @@ def find_pdflatex(packages: list[str], scratch: Path) -> Path:
 
 
 def build_pdfs(
-    documents: Mapping[Path, Path],
-    search: list[Path],
-    most: Mapping[str, int] | None = None,
+    documents: Mapping[Path, Path], search: list[Path], most: Mapping[str, int] | None = None
 ) -> None:
     """Compile TeX sources, repeatedly until all references are stable, and write the PDFs.
 

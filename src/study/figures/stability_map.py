@@ -1,123 +1,14 @@
-"""Figures of sensitivity floors (full-order runs from displaced starts) and the stability map."""
+"""Figure of the stability map: the outcome of every reduced run of the study."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
 import pandas as pd
 
-from pdrom.core.store import read_table
-from pdrom.model.effects import EFFECTS
 from pdrom.view import style
 from pdrom.view.artists import Axes, Figure
-from pdrom.view.multiples import clipped, label_outer, log_axis, small_multiples
-from study.artifact.paths import SENSITIVITY, File
-from study.artifact.reads import EachOf, Read, Setting, TableOf
-from study.experiments.kit.base import Horizon, floor_of, horizon
-from study.figures.kit import declaration as kit
-from study.figures.kit.declaration import figure
-from study.tables.kit.results import TWIN
-
-# Inputs from which figures make `Floors`: the sensitivity floor and horizon of each scene.
-FLOORS: dict[str, Read] = {
-    "sensitivity": EachOf(SENSITIVITY, "experiments"),
-    "horizon": Setting("horizon"),
-}
-COLUMNS = ["scene", "perturbation", "frame", "relative_difference"]
-
-
-class Floors:
-    """Sensitivity floor and horizon of each scene.
-
-    The floor (F,) is the relative difference between full-order runs with perturbed and unperturbed
-    starts in each of F frames, the largest over all random seeds; it is empty without perturbed
-    runs. The horizon is the first frame in which it exceeds a threshold; from there on runs cannot
-    be compared. Attribute ``of`` maps scenes to floors. StorageError for a damaged file.
-
-    sensitivity : files with tables of the perturbed runs, one per scene
-    horizon : settings, with the perturbation whose runs are used and the threshold
-    """
-
-    def __init__(self, sensitivity: Sequence[File], horizon: Horizon) -> None:
-        self.perturbation, self.threshold = horizon.perturbation, horizon.threshold
-        tables = {file["scene"]: read_table(file.path, COLUMNS) for file in sensitivity}
-        self.of = {s: floor_of(table, s, self.perturbation) for s, table in tables.items()}
-
-    def horizon(self, scene: str) -> int | None:
-        """First frame where the sensitivity floor exceeds `threshold` in ``scene``, or None."""
-        end = horizon(self.of[scene], self.threshold)
-        return end if end < len(self.of[scene]) else None
-
-    def instant(self, scene: str, frame: int) -> str:
-        """Text "frame n" for ``frame`` n, with "past horizon" if it is later than `horizon`."""
-        end = self.horizon(scene)
-        return f"frame {frame}" if end is None or frame <= end else f"frame {frame}, past horizon"
-
-
-LOW, HIGH = 1e-12, 1e2
-
-
-class Floored(kit.Scenes):
-    """Options of the figure: scenes, and the number of panels in a row."""
-
-    columns: kit.Columns = 3
-
-
-@figure(title="Sensitivity floor and horizon", reads=FLOORS)
-def sensitivity_floor(
-    options: Floored, drawn: kit.Drawn, sensitivity: list[File], horizon: Horizon
-) -> Figure:
-    """Drift of full-order runs whose initial positions differ by {sensitivity.reference} of the
-    extent. The horizon, given in the legends, is the first frame above the threshold of
-    {sensitivity.threshold}: beyond it a reduced run cannot be judged by its error. Dashed lines are
-    twins, scenes that end before.
-    """
-    floors = Floors(sensitivity, horizon)
-    kinds: dict[str, list[str]] = {}
-    for scene in drawn.scenes:
-        if len(floors.of[scene]):
-            kinds.setdefault(_kind(drawn, scene), []).append(scene)
-    if not kinds:
-        raise kit.NothingToDraw(f"no run perturbed by {floors.perturbation:g}")
-    columns = min(options.columns, len(kinds))
-    figure, axes = small_multiples(len(kinds), columns, height=2.7)
-    for ax, (kind, scenes) in zip(axes, kinds.items(), strict=True):
-        log_axis(ax, LOW, HIGH)
-        ax.axhline(floors.threshold, color=style.GREY, linewidth=0.9)
-        families = list(dict.fromkeys(scene.removesuffix(TWIN) for scene in scenes))
-        for scene in scenes:
-            family = families.index(scene.removesuffix(TWIN))
-            colour = style.CYCLE[family % len(style.CYCLE)]
-            floor, end = floors.of[scene], floors.horizon(scene)
-            label = f"{style.words(scene)}: {f'beyond {len(floor)}' if end is None else end}"
-            line = "--" if scene.endswith(TWIN) else "-"
-            shown = clipped(floor, LOW, HIGH)
-            ax.plot(np.arange(len(shown)), shown, color=colour, label=label, linestyle=line)
-            if end is not None:
-                dot = {"marker": "o", "markersize": 4.5, "zorder": 5}
-                ax.plot([end], [floors.threshold], color=colour, **dot)
-        ax.set_title(kind)
-        ax.legend(
-            loc="upper center", bbox_to_anchor=(0.5, -0.31), fontsize=7.5, handlelength=1.6,
-            labelspacing=0.25,
-        )  # fmt: skip
-        ax.set_xlabel("frame")
-    label_outer(axes, columns, "frame", y="relative difference")
-    handles = [
-        style.handle(f"threshold {floors.threshold:g}", color=style.GREY),
-        style.handle("horizon (frame given)", color="#555555", marker="o", linestyle="none"),
-    ]
-    style.legend(figure, handles, 2)
-    return figure
-
-
-def _kind(drawn: kit.Drawn, scene: str) -> str:
-    groups = [experiment.group for experiment in drawn.of(scene)]
-    if len(groups) > 1:
-        return "several groups"
-    on_volume = EFFECTS.load(groups[0]).cells == "tetrahedron"
-    return "tetrahedra" if on_volume else style.words(groups[0])
-
+from study.artifact.reads import TableOf
+from study.figures.kit.declaration import Drawn, Methods, NothingToDraw, Ranks, figure
 
 CELLS = 48  # largest panel width, in cells; blocks of columns that do not fit go to another panel
 ROW = 0.145  # height of a row of cells, inches
@@ -215,14 +106,14 @@ def _draw_cell(ax: Axes, x: float, y: float, found: pd.Series) -> None:
         ax.text(x + 0.5, y + 0.52, mark, ha="center", va="center", fontsize=6, color=look.ink)
 
 
-class Sizes(kit.Methods):
+class Sizes(Methods):
     """Options of the figure: scenes, methods and basis sizes."""
 
-    ranks: kit.Ranks = ()
+    ranks: Ranks = ()
 
 
 @figure(title="Where each method can be trusted", reads={"table": TableOf("stability")})
-def stability_map(options: Sizes, drawn: kit.Drawn, table: pd.DataFrame) -> Figure:
+def stability_map(options: Sizes, drawn: Drawn, table: pd.DataFrame) -> Figure:
     """End of every run on the training motion, by method, size and scene. Accurate or wrong: the
     error within the horizon is at most, or above, {stability.wrong}; left the scene: the bounding
     box exceeds {stability.left} times the largest one of the full-order run; blow-up: numbers that
@@ -233,7 +124,7 @@ def stability_map(options: Sizes, drawn: kit.Drawn, table: pd.DataFrame) -> Figu
     table = table[(table.experiment == "rerun") & (table.group.notna())]
     strips = _local_strips(table, drawn, options) + _subspace_strips(table)
     if not strips:
-        raise kit.NothingToDraw("no reduced run")
+        raise NothingToDraw("no reduced run")
     rows = [len(strip.rows) for strip in strips]
     figure = style.new_figure(ROW * sum(rows) + 0.5 * len(strips) + 0.55)
     axes = figure.subplots(len(strips), 1, squeeze=False, height_ratios=rows)[:, 0]
@@ -252,7 +143,7 @@ def stability_map(options: Sizes, drawn: kit.Drawn, table: pd.DataFrame) -> Figu
     return figure
 
 
-def _local_strips(table: pd.DataFrame, drawn: kit.Drawn, options: Sizes) -> list[Strip]:
+def _local_strips(table: pd.DataFrame, drawn: Drawn, options: Sizes) -> list[Strip]:
     part = table[table.position_basis == "full"]
     ran = part[part.outcome != "not run"]
     held = set(zip(ran.scene, ran.group, strict=True))
