@@ -14,7 +14,7 @@ from places import tracked
 LIMITS = {
     "lines of src": 35_837,
     "modules of src": 213,
-    "lines of tests": 22_706,
+    "lines of tests": 22_707,
     "words of documentation": 24_547,
     "tables": 25,
     "figures": 23,

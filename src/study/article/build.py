@@ -26,7 +26,7 @@ from study.artifact.paths import ARTICLE, FIGURE_PICTURE, RESULTS, TABLE, File
 from study.artifact.reads import Every, ProjectFile, Setting, TableOf
 from study.figures.kit.declaration import declarations
 from study.paper.build import NUMBERS, Facts, fact_tables, paper, paper_inputs
-from study.paper.source import DOCUMENTS, FIGURE, documents
+from study.paper.source import DOCUMENTS, PLACED, documents
 from study.paper.textables import tex_rows
 from study.tables import declared
 from study.tables.claims.metrics import METRICS
@@ -277,7 +277,7 @@ def write_article(
     known |= {table["name"]: read_table(table.path) for table in tables}
     templates = {name: path.read_text("utf-8") for name, path in assets.items()}
     texts = documents(source[0].parent)
-    pages = {name: PAGES[stem] for stem, text in texts.items() for name in FIGURE.findall(text)}
+    pages = {name: PAGES[stem] for stem, text in texts.items() for name in PLACED.findall(text)}
     rules, plain = load_claims(claims, added), templates["plain"]
     written = {name: templates[name] for name in ("style", "script")}
     for name, content in csv.items():

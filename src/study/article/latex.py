@@ -14,7 +14,7 @@ import pandas as pd
 from pdrom.view.text import escape
 from study.paper.build import Facts
 from study.paper.macros import NOTED, SHOWN, VAL, closing, matching, note, sentences
-from study.paper.source import COMMENT, FIGURE
+from study.paper.source import COMMENT, PLACED
 from study.paper.textables import Rows, tabular
 
 ORIGIN = "origin:"
@@ -50,7 +50,7 @@ def prepared(source: str, document: str, origins: Mapping[str, Any], facts: Fact
     preamble, begin, text = source.partition(r"\begin{document}")
     left_out = rf"\emph{{[{note(facts.part, facts.full_study)}]}}"
     text = COMMENT.sub("", _decided(text, origins["known"][document], left_out))
-    text = FIGURE.sub(lambda found: _FIGURE % (found[1], facts.captions[found[1]], found[1]), text)
+    text = PLACED.sub(lambda found: _FIGURE % (found[1], facts.captions[found[1]], found[1]), text)
     text = _PART.sub(lambda found: (found[1] if facts.part else found[2]) or "", text)
     full = facts.full_study
     for name, words in {"configuration": facts.part or full, "fullstudy": full}.items():

@@ -8,7 +8,7 @@ from typing import Any
 from study.artifact.markup import to_plain, to_rst
 from study.experiments.kit.base import Experiment
 from study.figures.kit.declaration import Declaration
-from study.paper.source import Numbers, figure_numbers
+from study.paper.build import Numbers, figure_numbers
 from study.pipeline.plan import Job, Plan
 from study.tables.kit.declaration import Table
 

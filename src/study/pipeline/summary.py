@@ -18,8 +18,9 @@ from study.artifact import paths
 from study.artifact.logs import usage_of
 from study.artifact.reads import Every, ProjectFile, Read, Recorded, Setting, TableOf
 from study.figures.kit.declaration import declarations
+from study.paper.build import figures_page
 from study.paper.macros import keys_of
-from study.paper.source import figures_page, source_files
+from study.paper.source import source_files
 from study.pipeline.commandline import CommandLine
 from study.pipeline.folders import Folders
 from study.pipeline.plan import Plan

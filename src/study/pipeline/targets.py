@@ -11,7 +11,7 @@ from typing import Any
 from pdrom.core.errors import ConfigurationError, choices, suggestion
 from study.artifact import paths
 from study.figures.kit.declaration import declarations
-from study.paper.source import SUPPLEMENT, figure_numbers
+from study.paper.build import SUPPLEMENT, figure_numbers
 from study.pipeline.folders import Folders
 from study.pipeline.plan import Plan
 from study.pipeline.scenes import scene_names

@@ -29,8 +29,9 @@ from study.article.build import ASSETS, FACTS, FOLDER, PAGES, article, write_ver
 from study.article.latex import linked_table, plain_columns
 from study.artifact.paths import File
 from study.paper import build, textables
+from study.paper.build import figure_numbers
 from study.paper.macros import AGGREGATES, MISSING, format_number, matching
-from study.paper.source import documents, figure_numbers
+from study.paper.source import documents
 from study.paper.tex import find_pdflatex, packages_of
 
 SPECIAL = r"""

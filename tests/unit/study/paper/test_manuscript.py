@@ -10,9 +10,9 @@ from pdrom.core.errors import PaperError
 from pdrom.core.yamlfile import read_yaml
 from places import ROOT
 from study.figures.kit.declaration import declarations
-from study.paper.build import PAGES, bibliography, paper
+from study.paper.build import PAGES, Numbers, bibliography, figure_numbers, paper
 from study.paper.macros import AGGREGATES, keys_of, number_of, sentences
-from study.paper.source import Numbers, documents, figure_numbers
+from study.paper.source import documents
 from study.paper.tex import build_pdfs, packages_of
 from study.pipeline.plan import Plan
 from study.pipeline.study import Study

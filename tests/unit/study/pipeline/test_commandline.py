@@ -4,7 +4,7 @@ import pytest
 
 from pdrom.core.errors import ConfigurationError
 from places import ROOT
-from study.paper.source import figure_numbers
+from study.paper.build import figure_numbers
 from study.pipeline.commandline import RECORD, CommandLine, recall, remember
 from study.pipeline.folders import Folders, folders
 from study.pipeline.front import LINES, OPTIONS, completed
