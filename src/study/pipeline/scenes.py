@@ -2,6 +2,7 @@
 
 import io
 import logging
+import os
 from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
@@ -16,12 +17,11 @@ from pdrom.model.constraints.base import GroupConfig
 from pdrom.model.effects import EFFECTS
 from pdrom.model.effects.base import Seed, effect_config
 from pdrom.model.mesh.config import MeshFile
+from pdrom.model.mesh.files import VARIABLE
 from pdrom.model.scene import Scene, SceneConfig
 from study.artifact.artifact import modules_in
 from study.artifact.logs import warnings_to
 from study.pipeline.fingerprint import fingerprint, memory
-
-log = logging.getLogger(__name__)
 
 Fraction = Annotated[float, Field(gt=0.0, le=1.0)]
 
@@ -82,9 +82,9 @@ def require_scenes(root: Path, names: Iterable[str], key: str) -> None:
 def checked_scene(root: Path, name: str, *changes: Change) -> tuple[SceneConfig, tuple[int, int]]:
     """Check scene ``name`` below ``root``, with ``changes``, by building it, and log its warnings.
 
-    It is not built if an earlier command has built it by the same code from the same files. Returns
-    its configuration and its numbers of vertices and elements. Raises ConfigurationError as
-    `load_bound_scene` does.
+    It is not built if an earlier command has built it by the same code from the same files, under
+    the same limits of meshes. Returns its configuration and its numbers of vertices and elements.
+    Raises ConfigurationError as `load_bound_scene` does.
     """
     config, own = read_scene(root, name, *changes), io.StringIO()
 
@@ -97,11 +97,11 @@ def checked_scene(root: Path, name: str, *changes: Change) -> tuple[SceneConfig,
     mesh = ""
     if isinstance(config.mesh, MeshFile) and (file := root / config.mesh.path).is_file():
         with suppress(OSError):  # ignore an unreadable file here: `build` reports it
-            mesh = digest_of(file)
+            mesh = f"{digest_of(file)} {os.environ.get(VARIABLE)}"
     code = fingerprint(__name__, *sorted({*modules_in(config)}))
     vertices, elements, texts = memory().get(build, code, config.model_dump_json(), mesh)
     for text in texts if not own.getvalue() else ():  # `build` has logged them already
-        log.warning("%s", text)
+        logging.getLogger(__name__).warning("%s", text)
     return config, (vertices, elements)
 
 

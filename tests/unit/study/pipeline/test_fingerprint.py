@@ -166,9 +166,7 @@ def test_a_damaged_file_and_one_that_cannot_be_written_count_as_none(tmp_path, c
     assert command(tmp_path / "plan.json" / "below", "a") == command(tmp_path / "plan.json", "a")
 
 
-def test_a_scene_is_built_again_if_a_file_changes_and_its_warning_is_repeated(
-    tmp_path, monkeypatch, caplog
-):
+def test_a_changed_scene_is_built_again_and_its_warning_repeated(tmp_path, monkeypatch, caplog):
     project = make_project(tmp_path, {SCENE: with_mesh(f"{{kind: file, path: {MESH}}}")})
     build, built = scenes.load_bound_scene, []
     monkeypatch.setattr(scenes, "load_bound_scene", lambda *a: built.append(a) or build(*a))
@@ -187,6 +185,8 @@ def test_a_scene_is_built_again_if_a_file_changes_and_its_warning_is_repeated(
     assert [vertices(), vertices(), len(built)] == [4, 4, 1]
     (project / "config" / "scenes" / MESH).write_text(f"{SQUARE}v 2 0 1\nf 3 2 5\n", "utf-8")
     assert [vertices(), vertices(), len(built)] == [5, 5, 2]
+    monkeypatch.setenv("PDROM_MESH_LIMITS", "2")
+    assert [vertices(), vertices(), len(built)] == [5, 5, 3]
     (project / "config" / "scenes" / MESH).unlink()
     for _ in range(2):
         with pytest.raises(ConfigurationError, match=r"square\.obj"):
