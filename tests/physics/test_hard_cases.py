@@ -13,7 +13,7 @@ import pytest
 from pdrom.core.yamlfile import read_yaml
 from pdrom.model.effects import EFFECTS
 from pdrom.reduction.method import load_methods
-from pdrom.reduction.requested.run import CheckedRun, Request, ToleranceSettings, calibrate
+from pdrom.reduction.requested.run import CheckedRun, ToleranceSettings, calibrate
 from places import CONFIG
 from study.experiments.hard_cases import outcomes
 from study.experiments.hard_cases.catalogue import CASES as CATALOGUE
@@ -116,7 +116,7 @@ ASKED = [pytest.param(n, marks=() if n in QUICK else pytest.mark.slow) for n in 
 @pytest.mark.parametrize("name", ASKED)
 def test_a_tolerance_holds_within_a_factor_of_two(name):
     scene = training(name).scene
-    own = calibrate(scene, SETTINGS, Request(error=0.01))
+    own = calibrate(scene, SETTINGS)
     for error in (0.1, 0.01):
         done = CheckedRun(own, scene, error).outcome()
         assert len(done.positions) == scene.config.frames + 1

@@ -262,7 +262,9 @@ def _within(full: FullRun, error: Wish, scene: Scene, on_frame: OnFrame) -> Requ
     files.require(Scene, scene, "scene", source="load_scene makes one")
     training = requested.transferred(full.scene, scene)
     started = perf_counter()
-    calibration = requested.calibrate(training, requested.ToleranceSettings(), request, on_frame)
+    calibration = requested.calibrate(
+        training, requested.ToleranceSettings(), request.quantity, on_frame
+    )
     offline = perf_counter() - started
     outcome = requested.CheckedRun(calibration, scene, request.error, on_frame).outcome()
     frames = len(outcome.positions) - 1

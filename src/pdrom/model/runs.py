@@ -4,42 +4,95 @@ import logging
 import os
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from itertools import takewhile
 from typing import Any
 
 import h5py
 import numpy as np
 
 from pdrom.core.store import write_hdf5
-from pdrom.model.dynamics.stepper import PHASES, FrameReport, State
-from pdrom.model.dynamics.system import DEFAULT_SOLVER
+from pdrom.model.dynamics.acceleration import minimise
+from pdrom.model.dynamics.space import VertexSpace
+from pdrom.model.dynamics.stepper import PHASES, FrameReport, State, Stepper
+from pdrom.model.dynamics.system import DEFAULT_SOLVER, GlobalSystem
 from pdrom.model.mesh.types import store_mesh
 from pdrom.model.scene import Scene
 
 log = logging.getLogger(__name__)
 
 
-def simulate(
-    scene: Scene, perturbation: np.ndarray | None = None, **stepper: Any
-) -> Iterator[tuple[State, FrameReport]]:
-    """Run ``scene`` and yield the state and the step loop's report after each frame.
-
-    Parameters
-    ----------
-    stepper : options of `Scene.stepper`
-    perturbation : (N, 3) m, added to the initial positions
-    """
-    loop = scene.stepper(**stepper)
-    yield from loop.run(scene.initial_state(perturbation), range(scene.config.frames))
-
-
 def trajectory(scene: Scene, perturbation: np.ndarray | None = None, **stepper: Any) -> np.ndarray:
     """Return positions (F + 1, N, 3) m of a run of ``scene``, the initial positions first.
 
-    Parameters are those of `simulate`.
+    ``perturbation`` (N, 3) m is added to them; ``stepper`` are options of `Scene.stepper`.
     """
-    positions = [scene.initial_state(perturbation).positions]
-    positions += [state.positions for state, _ in simulate(scene, perturbation, **stepper)]
-    return np.stack(positions)
+    return followed(
+        scene.stepper(**stepper), scene.initial_state(perturbation), scene.config.frames
+    )
+
+
+def followed(loop: Stepper, state: State, frames: int) -> np.ndarray:
+    """Run ``loop`` from ``state`` over ``frames`` frames; return positions (F + 1, N, 3) m."""
+    ends = [after.positions for after, _ in loop.run(state, range(frames))]
+    return np.stack([state.positions, *ends])
+
+
+class ConvergedStepper(Stepper):
+    """Full-order step loop that minimises the objective of every frame up to a tolerance.
+
+    ``changes`` and ``evaluations`` list these fields of `Minimum` for the frames computed so far.
+    """
+
+    def __init__(self, scene: Scene, system: GlobalSystem, tolerance: float, limit: int) -> None:
+        super().__init__(scene.space(system), scene.config.time_step, limit, scene.groups)
+        self.space: VertexSpace
+        self._tolerance = tolerance * scene.mesh.extent
+        self.changes: list[float] = []
+        self.evaluations: list[int] = []
+
+    @property
+    def solved(self) -> int:
+        """Number of first frames that reached the tolerance, of those computed so far."""
+        missed = np.flatnonzero(np.greater(self.changes, self._tolerance))
+        return int(missed[0]) if len(missed) else len(self.changes)
+
+    @property
+    def converged(self) -> bool:
+        """Whether every frame computed so far reached the tolerance."""
+        return self.solved == len(self.changes)
+
+    def step(
+        self, state: State, frame: int, on_last_iterate: Callable[[np.ndarray], None] | None = None
+    ) -> tuple[State, FrameReport]:
+        """Compute ``frame`` from ``state``; ``on_last_iterate`` is ignored, the report is empty."""
+        s, elimination, base = self._begin(state, frame)
+        rhs = np.empty_like(s)
+
+        def evaluate(y: np.ndarray) -> tuple[float, np.ndarray]:
+            np.copyto(rhs, base)
+            energy = sum(local.accumulate(y, rhs) for local in self.local_steps)
+            target = y.copy()
+            elimination.solve(rhs, target)
+            return energy + self.space.inertia_energy(y - s), target
+
+        end = minimise(
+            evaluate, self.space.system.matrix, s, tolerance=self._tolerance, limit=self.iterations
+        )
+        self.changes.append(end.change)
+        self.evaluations.append(end.evaluations)
+        return self._finish(state, end.y, frame), FrameReport(np.empty(0), np.zeros(4))
+
+
+def converged_run(scene: Scene, tolerance: float, limit: int) -> np.ndarray | None:
+    """Positions (F + 1, N, 3) m of a run of ``scene`` in which every frame has converged.
+
+    Initial positions come first. None if, after ``limit`` evaluations of a frame's objective, one
+    more iteration would move a vertex by over ``tolerance`` times the mesh's longest side.
+    """
+    best, state = ConvergedStepper(scene, scene.system, tolerance, limit), scene.initial_state()
+    ends = takewhile(lambda _: best.converged, best.run(state, range(scene.config.frames)))
+    positions = np.stack([state.positions, *(after.positions for after, _ in ends)])
+    return positions if best.converged else None
 
 
 def run(

@@ -6,7 +6,7 @@ as warnings. Masses are lumped: all vertices have equal masses, or selected ones
 import logging
 from collections.abc import Sequence
 from copy import deepcopy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
 from typing import Annotated, Any, Self
@@ -259,6 +259,11 @@ class Scene:
         """
         config = self.config.model_copy(update=keys)
         return self._bound(config, self.mesh, self.masses)
+
+    def iterated(self, iterations: int, window: int = 0) -> "Scene":
+        """Return the scene with numbers of iterations and of Anderson differences (0: none)."""
+        changes = {"iterations": iterations, "anderson_window": window}
+        return replace(self, config=self.config.model_copy(update=changes))
 
     def _check_holds(self) -> None:
         """Raise SceneError if two effects prescribe different motions of a vertex in one frame."""

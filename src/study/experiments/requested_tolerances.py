@@ -11,20 +11,19 @@ from pydantic import Field
 
 from pdrom.core.store import write_table
 from pdrom.model.held_out import MOTIONS, HeldOutMotion
-from pdrom.model.runs import trajectory
+from pdrom.model.runs import converged_run, trajectory
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.requested import levels, run
 from pdrom.reduction.requested.levels import Level, Motion, Quantity, Trajectory
 from study.artifact.paths import REQUESTED_TOLERANCES, File
 from study.artifact.reads import Setting, SourcesOf
-from study.experiments.iterations import converged_run
 from study.experiments.kit.base import Tolerance, experiment
 
 log = logging.getLogger(__name__)
 
 # Arguments of `converged_run` for the run against which errors are computed: tolerance, relative to
 # the mesh's longest side, and largest number of evaluations of a frame's objective.
-CONVERGED = 1e-6, 4000
+CONVERGED = 1e-9, 8000
 COLUMNS = [
     "scene", "motion", "tolerance", "vertices", "frames", "reduced", "error", "velocity_error",
     "expected", "estimate", "level", "failed", "checks", "ms_per_frame", "full_level",
@@ -71,7 +70,7 @@ def requested_tolerances(
         variant = Scene.build(config.heldout_variant(name), training.mesh, masses=training.masses)
         own = run.transferred(training, variant)
         if not made or made[-1].motions[0].scene.config.effects != own.config.effects:
-            made.append(run.calibrate(own, section, run.Request(error=min(section.errors))))
+            made.append(run.calibrate(own, section))
         found = _rows(variant, recorded, made[-1], section)
         rows += ({"motion": name, **row} for row in found)
         log.info("%s: %s done", config.name, name)
@@ -83,12 +82,12 @@ def _rows(
 ) -> Iterator[dict[str, Any]]:
     """Yield a table row for each requested tolerance, for ``scene`` with a held-out motion.
 
-    Errors are against a run with converged frames or, if a frame does not converge, with a large,
-    fixed number of iterations. ``recorded`` (F + 1, N, 3) m is the run of the training motion.
+    Errors are against a run solved to convergence, more accurately than in a calibration; if it is
+    not, against a reference run as in a calibration. ``recorded`` (F + 1, N, 3) m is the run of the
+    training motion.
     """
     frames = scene.config.frames
-    motion = Motion(scene, min(section.errors) / section.factor, "position")
-    judged = motion.unconverged, motion.sensitivity
+    motion = Motion(scene, "position")
     true = converged_run(scene, *CONVERGED)
     if true is None:
         log.warning("%s: a held-out motion does not converge", scene.config.name)
@@ -99,7 +98,7 @@ def _rows(
         done, full = run.CheckedRun(own, scene, error).outcome(), own.full_order(error).level
         if full.title not in known:
             known[full.title] = Trajectory(full, scene).to(frames)
-        end = done.frames or min(levels.last_within(errors, error) for errors in judged)
+        end = done.frames or levels.last_within(motion.unknown, error)
         yield {
             "scene": scene.config.name,
             "tolerance": error,

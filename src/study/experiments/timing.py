@@ -29,7 +29,7 @@ from pdrom.reduction.subspace.model import SubspaceModel, load_models, make_colu
 from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, Settings, SourcesOf
-from study.experiments.iterations import IterationCounts, accelerated, stepper_of
+from study.experiments.iterations import IterationCounts, accelerated
 from study.experiments.kit import base as kit
 from study.experiments.kit import runfiles
 from study.experiments.kit.base import experiment
@@ -229,7 +229,7 @@ def _other_counts(
     own = (scene.config.iterations, scene.config.anderson_window)
     for count, size in accelerated(counts, asked.anderson_window):
         if (count, size) != own:
-            loop = stepper_of(scene, system, count, window=size)
+            loop = scene.iterated(count, size).stepper(system, track_objective=False)
             method = kit.ANDERSON if size else kit.FOM
             labels = {"method": method, "iterations": count, "implementation": "compiled"}
             variants.append(Variant({**common, **labels}, loop, scene.initial_state(), frames))

@@ -1,15 +1,15 @@
 """Levels of accuracy (full-order or reduced solvers with K iterations), their runs and errors.
 
-The reference run of a motion solves the implicit step by iterations with Anderson acceleration. It
-has enough of them if a run with half as many differs from it by less than the tolerance. This
-difference is used as the error of the reference run.
+The reference run of a motion solves the implicit step by L-BFGS until one more iteration changes
+hardly anything. A run with a ten times larger change and a perturbed start differs from it by an
+estimate of what is not known of the motion.
 
 The cost of a frame is computed from operation counts, not timed, so that the choice of a level is
 reproducible. Constants were measured on one thread of a 2024 processor; only their ratios matter.
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from time import thread_time
 from typing import Literal, get_args
 
@@ -17,6 +17,7 @@ import numpy as np
 
 from pdrom.model.dynamics.frames import WholeFrames
 from pdrom.model.dynamics.stepper import State, Stepper
+from pdrom.model.runs import ConvergedStepper
 from pdrom.model.scene import Scene
 from pdrom.reduction.rerun import mean_motion
 from pdrom.reduction.subspace.model import SubspaceModel
@@ -25,9 +26,11 @@ from pdrom.reduction.subspace.space import projector
 WINDOW = 5  # number of differences of iterates that Anderson acceleration combines
 # Full-order costs in ns. An iteration: PROJECTION p^2 per element of p rows, ENTRY per entry of the
 # Cholesky factor, ACCELERATED per vertex (Anderson acceleration). A frame, besides its iterations:
-# FRAME, and IN_PYTHON more unless one compiled call computes several frames.
+# FRAME, and IN_PYTHON more unless one compiled call computes several frames. An evaluation of
+# L-BFGS, in Python: EVALUATED iterations and EVALUATION.
 PROJECTION, ENTRY, ACCELERATED = 5.0, 0.9, 6.5
 FRAME, IN_PYTHON = 2.3e4, 1.2e5
+EVALUATED, EVALUATION = 2.5, 1.5e5
 # Costs of reduced models in ns. An iteration: ITERATION, SAMPLED p^2 per sampled element of p rows,
 # DENSE per entry of dense matrices. A frame also: REDUCED_FRAME (+ REDUCED_IN_PYTHON if in Python).
 SAMPLED, DENSE, ITERATION = 12.5, 0.23, 1.2e3
@@ -36,7 +39,7 @@ REDUCED_FRAME, REDUCED_IN_PYTHON = 4e4, 2.3e5
 FILL = 0.35
 # Size of the random shift of a perturbed start, relative to the mesh's longest side, and its seed.
 MOVED, SEED = 1e-10, 0
-CONVERGED, MOST = 80, 320  # iterations per frame of a reference run: at first, and at most
+CONVERGED = 80  # accelerated iterations of frames that check reductions
 Quantity = Literal["position", "velocity"]
 QUANTITIES: tuple[Quantity, ...] = get_args(Quantity)
 
@@ -53,18 +56,23 @@ class Level:
     """A level of accuracy: a full-order or reduced solver with a number of iterations.
 
     iterations, window : iterations per frame; window of Anderson acceleration (0: none)
+    residual : of a full order that solves frames by L-BFGS, in at most ``iterations`` evaluations:
+        largest change by one more iteration, relative to the mesh's longest side; else None
     model : position subspace with sampled elements; None for a full-order level
     tau : tolerance of the energy-conserving sampling (module `ecsw`) by which ``model`` was made
     """
 
     iterations: int
     window: int = 0
+    residual: float | None = None
     model: SubspaceModel | None = None
     tau: float | None = None
 
     @property
     def title(self) -> str:
         """Name of this level of accuracy in messages and tables."""
+        if self.residual is not None:
+            return f"full order, L-BFGS to {self.residual:g}"
         count = f"K = {self.iterations}"
         if self.model is None:
             return f"full order, {'Anderson, ' if self.window else ''}{count}"
@@ -73,15 +81,15 @@ class Level:
     @property
     def exact(self) -> "Level":
         """More accurate full-order level, whose frames serve as reference to check this level."""
+        if self.residual is not None:
+            return EXACT
         return Level(CONVERGED if self.model is not None else 2 * self.iterations, WINDOW)
 
-    def scene(self, scene: Scene) -> Scene:
-        """Return ``scene`` with the number of iterations and the Anderson window of this level."""
-        changes = {"iterations": self.iterations, "anderson_window": self.window}
-        return replace(scene, config=scene.config.model_copy(update=changes))
+    def work(self, scene: Scene, iterations: float) -> float:
+        """Estimated time of a frame with ``iterations``, ns.
 
-    def work(self, scene: Scene) -> float:
-        """Estimated time of a frame, ns; for a reduced model, contacts add `REDUCED_IN_PYTHON`."""
+        For a reduced model, contacts add `REDUCED_IN_PYTHON`.
+        """
         effects = scene.groups, scene.forces, scene.boundaries, scene.contacts
         slow = not WholeFrames.suits(*effects)
         if self.model is None:
@@ -89,13 +97,20 @@ class Level:
             iteration = ENTRY * FILL * scene.system.matrix.nnz * np.log2(vertices)
             iteration += ACCELERATED * vertices * (self.window > 0)
             iteration += sum(PROJECTION * g.rows_per_element**2 * g.elements for g in scene.groups)
-            return FRAME + IN_PYTHON * slow + self.iterations * iteration
+            if self.residual is not None:
+                iteration = EVALUATED * iteration + EVALUATION
+            return FRAME + IN_PYTHON * slow + iterations * iteration
         size, iteration = self.model.columns.B.shape[1], ITERATION
         for group in scene.groups:
             count, rows = len(self.model.chosen(group).elements), group.rows_per_element
             iteration += count * rows * (SAMPLED * rows + DENSE * size)
         in_python = REDUCED_IN_PYTHON * (slow or len(scene.contacts) > 0)
-        return REDUCED_FRAME + in_python + self.iterations * iteration
+        return REDUCED_FRAME + in_python + iterations * iteration
+
+
+LIMIT = 4000  # largest number of evaluations in a frame that L-BFGS solves
+EXACT = Level(LIMIT, residual=1e-8)  # of reference runs
+LESS_EXACT = Level(LIMIT, residual=1e-7)  # of runs that show how well a reference run is known
 
 
 class Trajectory:
@@ -121,11 +136,14 @@ class Trajectory:
         self.level, self._on_frame = level, on_frame
         hair = np.random.default_rng(SEED).standard_normal(scene.mesh.points.shape)
         state = scene.initial_state(MOVED * scene.mesh.extent * hair if moved else None)
+        own = scene.iterated(level.iterations, level.window)
         self._loop: Stepper
-        if level.model is None:
-            self._loop = level.scene(scene).stepper(scene.system, track_objective=False)
+        if level.residual is not None:
+            self._loop = ConvergedStepper(scene, scene.system, level.residual, level.iterations)
+        elif level.model is None:
+            self._loop = own.stepper(scene.system, track_objective=False)
         else:
-            self._loop = level.model.loop(level.scene(scene))[0]
+            self._loop = level.model.loop(own)[0]
             projection = projector(level.model.columns, scene.masses)
             state = State(projection @ state.positions, projection @ state.velocities)
         self._state, self.ends = state, [self._of_vertices(state.positions)]
@@ -136,6 +154,16 @@ class Trajectory:
     def frames(self) -> int:
         """Number of frames computed so far."""
         return len(self.ends) - 1
+
+    @property
+    def solved(self) -> int:
+        """Number of first frames that L-BFGS has solved; all computed ones with other solvers."""
+        return int(getattr(self._loop, "solved", self.frames))
+
+    @property
+    def iterations(self) -> float:
+        """Number of iterations of a frame; with L-BFGS mean number of evaluations."""
+        return float(np.mean(getattr(self._loop, "evaluations", self.level.iterations)))
 
     @property
     def positions(self) -> np.ndarray:
@@ -202,7 +230,7 @@ def last_within(errors: np.ndarray, tolerance: float) -> int:
 
 
 class Motion:
-    """Reference run of ``scene``, converged to the error ``tolerance``, and its accuracy.
+    """Reference run of ``scene``, solved to convergence, and its accuracy.
 
     Parameters
     ----------
@@ -210,34 +238,23 @@ class Motion:
 
     Attributes
     ----------
-    reference : (F + 1, N, 3) m, positions
-    iterations : number of iterations in each frame of the reference
-    unconverged : relative errors (F,) of a run with half the iterations
-    sensitivity : relative errors (F,) of a run with initial positions perturbed by `MOVED`
-    unit : root mean square over frames of the displacement norm, m
+    run, reference : the run, with level `EXACT`; its positions (F + 1, N, 3) m
+    unknown : relative errors (F,) of a run with `LESS_EXACT` and a perturbed start; inf from the
+        first frame on that L-BFGS has not solved
+    unit : root mean square over frames of the displacement norm, m, at least `MOVED` times the
+        mesh's longest side
     """
 
-    def __init__(
-        self, scene: Scene, tolerance: float, quantity: Quantity, on_frame: OnFrame = silent
-    ) -> None:
+    def __init__(self, scene: Scene, quantity: Quantity, on_frame: OnFrame = silent) -> None:
         self.scene, self.quantity = scene, quantity
-        count = CONVERGED
 
-        def run(iterations: int, moved: bool = False) -> np.ndarray:
-            level = Level(iterations, WINDOW)
-            return Trajectory(level, scene, moved, on_frame).to(scene.config.frames).positions
-
-        half, self.reference = run(count // 2), run(count)
-        apart = run(count // 2, moved=True)[1:] - half[1:]
-        self.sensitivity = relative_errors(apart, half, self.quantity)
-        known = last_within(self.sensitivity, tolerance)
-        self.unconverged = self.errors(half)
-        while last_within(self.unconverged, tolerance) < known and count < MOST:
-            count, half = 2 * count, self.reference
-            self.reference = run(count)
-            self.unconverged = self.errors(half)
-        self.iterations = count
-        self.unit = mean_motion(self.reference)
+        frames = scene.config.frames
+        self.run = Trajectory(EXACT, scene, on_frame=on_frame).to(frames)
+        self.reference = self.run.positions
+        other = Trajectory(LESS_EXACT, scene, moved=True, on_frame=on_frame).to(frames)
+        self.unknown = self.errors(other.positions)
+        self.unknown[self.run.solved :] = np.inf
+        self.unit = max(mean_motion(self.reference), MOVED * scene.mesh.extent)
 
     def errors(self, positions: np.ndarray) -> np.ndarray:
         """Errors (F',) relative to `reference` over 1, ..., F' frames of a run (F' + 1, N, 3) m."""

@@ -1,8 +1,9 @@
 """Runs with an error within a requested tolerance, by the cheapest solver that suffices.
 
 A level of accuracy (`Level`) is a full-order or reduced solver. Calibration runs every level on two
-motions with converged reference runs: the training motion and a variation of it. The scene is run
-by the cheapest level whose error on both, times a safety factor, is within the tolerance.
+motions with reference runs solved to convergence: the training motion and a variation of it. The
+scene is run by the cheapest level whose error on both, times a safety factor, is within the
+tolerance.
 
 The defect of a frame is the distance to the result of a more accurate level from the same state. A
 run accumulates defects and amplifies them. The error of a run is estimated as its level's error in
@@ -43,10 +44,10 @@ CHECKS = 2  # smallest number of frames in which `Trajectory.check` measures the
 # A reduction is run only if its estimated cost, with that of checking its errors, is below this
 # fraction of the full order's cost. A smaller saving could be an error of the estimates.
 WORTH = 2.0 / 3.0
+FEW = 20  # models of more modes are made only of meshes with at least as many vertices per mode
 # A run counts as blown up if its bounding box is larger than that at rest by more than this factor.
 BLOWUP_EXTENT = 100.0
-SLOW = "the iterations converge too slowly after it"
-ROUNDOFF = "round-off decides after it"
+UNKNOWN = "after it, round-off decides the motion, or it is not solved accurately enough"
 AMPLIFIED = "a second run, of another accuracy and moved by round-off, departs after it"
 
 
@@ -95,18 +96,20 @@ class ToleranceSettings(ConfigModel):
     frames : largest number of frames of each training motion from which elements are sampled
     training_motions : number of motions that train the reductions, the training motion included
     plain, accelerated : numbers of full-order iterations, without and with Anderson acceleration
+    residuals : of full orders that L-BFGS solves (see `Level.residual`)
     iterations : numbers of iterations of the reductions, all with Anderson acceleration
     factor : safety factor by which estimated errors are multiplied
     every : a reduction is checked in one of this many frames
     """
 
-    modes: tuple[Count, ...] = (20, 40)
+    modes: tuple[Count, ...] = (20, 40, 120)
     tolerances: tuple[Annotated[float, Field(gt=0.0, lt=1.0)], ...] = (5e-2, 1e-2)
     frames: Count = 25
-    training_motions: Annotated[int, Field(ge=1, le=64)] = 4
+    training_motions: Annotated[int, Field(ge=1, le=64)] = 8
     iterations: tuple[Count, ...] = (5, 10, 20)
     plain: tuple[Count, ...] = (1, 2, 3, 5)
-    accelerated: tuple[Count, ...] = (5, 10, 20, 40)
+    accelerated: tuple[Count, ...] = (5, 10, 20, 40, 80)
+    residuals: tuple[Annotated[float, Field(gt=0.0, lt=1.0)], ...] = (1e-5, 1e-7)
     factor: Annotated[float, Field(ge=1.0, le=1e3)] = 4.0
     every: Count = 20
 
@@ -175,7 +178,7 @@ class Calibration:
     """Solvers (``levels`` of accuracy), the cheapest first, and ``motions`` on which they ran.
 
     All errors are those of one quantity, positions or velocities. The argument ``error`` of a
-    method is a requested tolerance, not below the one for which the levels were calibrated.
+    method is a requested tolerance.
     """
 
     levels: list[Calibrated]
@@ -184,20 +187,16 @@ class Calibration:
 
     @property
     def most_accurate(self) -> Calibrated:
-        """Full-order level with the most iterations."""
-        full = (each for each in self.levels if not each.reduced)
-        return max(full, key=lambda each: (each.level.iterations, each.level.window))
+        """Full-order level whose frames are solved to convergence."""
+        return next(each for each in self.levels if each.level is levels.EXACT)
 
-    def horizon(self, error: float) -> tuple[int, str]:
-        """Number of first frames in which ``error`` is measurable, and reason why no later one is.
+    def horizon(self, error: float) -> int:
+        """Number of first frames in which ``error`` is measurable.
 
-        In later frames the error of a reference run, or the change of this run if its initial
-        positions are perturbed, is larger than ``error`` divided by the safety factor.
+        In later frames what is unknown of a motion is larger than ``error`` over the safety factor.
         """
-        least = error / self.settings.factor
-        converged = min(levels.last_within(motion.unconverged, least) for motion in self.motions)
-        sharp = min(levels.last_within(motion.sensitivity, least) for motion in self.motions)
-        return min(converged, sharp), ROUNDOFF if sharp < converged else SLOW
+        unknown = np.maximum(*(motion.unknown for motion in self.motions))
+        return levels.last_within(unknown, error / self.settings.factor)
 
     def expected(self, level: Calibrated, error: float) -> float:
         """Largest error of ``level`` on all `motions` up to the `horizon`, times the safety factor.
@@ -205,10 +204,10 @@ class Calibration:
         It is at least the error of the reference runs, times this factor. It is infinite if the
         `horizon` has fewer frames than the fraction `JUDGED` of the frames of the training motion.
         """
-        end, _ = self.horizon(error)
+        end = self.horizon(error)
         if end < max(JUDGED * self.motions[0].scene.config.frames, 1):
             return np.inf
-        known = [*level.errors, *(motion.unconverged for motion in self.motions)]
+        known = [*level.errors, *(motion.unknown for motion in self.motions)]
         return self.settings.factor * float(max(errors[end - 1] for errors in known))
 
     def admissible(self, error: float) -> list[Calibrated]:
@@ -261,8 +260,7 @@ class CheckedRun:
         """Run all frames and return the result; each call starts a new run."""
         self._started.clear()
         own, error, frames, failed = self._own, self._error, self._frames, list[str]()
-        known, limit = own.horizon(error)
-        known = min(known, frames)
+        known = min(own.horizon(error), frames)
         for level in own.attempts(error):
             run, estimates = self._estimated(level)
             end = levels.last_within(estimates[:known], error)
@@ -271,11 +269,10 @@ class CheckedRun:
             failed.append(level.level.title)
             log.info("%s: replaced", level.level.title)
         end *= end >= JUDGED * frames
-        limit = AMPLIFIED if end < known else limit
         return Outcome(
             positions=run.to(frames).positions,
             frames=end,
-            limit=limit if end < frames else "",
+            limit="" if end == frames else AMPLIFIED if end < known else UNKNOWN,
             expected=own.expected(level, error),
             estimate=float(estimates[end - 1]) if end else None,
             level=level.level.title,
@@ -297,7 +294,7 @@ class CheckedRun:
         `Calibration.expected`: if the run's root mean square defect (error made in one frame) is
         larger than the largest defect in the calibration, it is multiplied by their ratio. A check
         fails if the second estimate exceeds the tolerance, or the mesh blows up. All errors are inf
-        if a check failed or `Calibration.expected` is inf.
+        if a check failed or `Calibration.expected` is inf; later ones if L-BFGS did not converge.
         """
         own, frames, full = self._own, self._frames, self._own.full_order(self._error).level
         largest = BLOWUP_EXTENT * self._scene.mesh.extent
@@ -316,13 +313,16 @@ class CheckedRun:
                 return run, hopeless
         if not np.ptp(run.to(frames).ends[-1], axis=0).max() <= largest:
             return run, hopeless
-        return run, np.maximum(estimate, self._amplified(level, run))
+        estimates = np.maximum(estimate, self._amplified(level, run))
+        estimates[run.solved :] = np.inf
+        return run, estimates
 
     def _amplified(self, level: Calibrated, run: Trajectory) -> np.ndarray:
         """Estimate errors (F,) over the first 1, ..., F frames of ``run``, a run with ``level``.
 
         A second run, with `Calibration.second`, has a perturbed start. The error expected of
-        ``level`` is multiplied by max(1, difference of the runs / sum of both levels' errors).
+        ``level`` is multiplied by max(1, difference of the runs / sum of both levels' errors). The
+        estimate is at least the difference of the runs minus the error expected of the second.
         """
         own, second = self._own, self._own.second(level, self._error)
         other = self._start(second.level, moved=True).to(self._frames)
@@ -331,7 +331,7 @@ class CheckedRun:
         apart = levels.relative_errors(differences, positions, own.motions[0].quantity)
         errors = own.expected(level, self._error), own.expected(second, self._error)
         usual = sum(errors) / own.settings.factor
-        return errors[0] * np.maximum(1.0, apart / usual)
+        return np.maximum(errors[0] * np.maximum(1.0, apart / usual), apart - errors[1])
 
 
 def check_frames(frames: int, count: int) -> list[int]:
@@ -341,21 +341,21 @@ def check_frames(frames: int, count: int) -> list[int]:
 
 
 def calibrate(
-    training: Scene, settings: ToleranceSettings, request: Request, on_frame: OnFrame = silent
+    training: Scene,
+    settings: ToleranceSettings,
+    quantity: Quantity = "position",
+    on_frame: OnFrame = silent,
 ) -> Calibration:
     """Run every level of ``settings`` on the ``training`` motion and on a variation of it.
 
-    The calibration is for the quantity of ``request``, and for its error or larger ones.
-    ``on_frame`` is called after each frame.
+    ``quantity`` is the one whose errors count. ``on_frame`` is called after each frame.
     """
     far = training.config.training_variant(CALIBRATED).effects
-    scenes, least = (training, training.changed(effects=far)), request.error / settings.factor
-    motions = [Motion(scene, least, request.quantity, on_frame) for scene in scenes]
-    most = max(motion.iterations for motion in motions)
-    # full-order levels: the most iterations of a reference run; half as many, or `CONVERGED`
-    many = [Level(count, levels.WINDOW) for count in {most, max(most // 2, levels.CONVERGED)}]
-    plain = [Level(count) for count in settings.plain]
-    full = [*many, *plain, *(Level(count, levels.WINDOW) for count in settings.accelerated)]
+    scenes = training, training.changed(effects=far)
+    motions = [Motion(scene, quantity, on_frame) for scene in scenes]
+    full = [levels.EXACT, *(Level(levels.LIMIT, residual=size) for size in settings.residuals)]
+    full += [Level(count) for count in settings.plain]
+    full += [Level(count, levels.WINDOW) for count in settings.accelerated]
     found: list[Calibrated] = []
     for level in (*full, *_reduced(training, motions[0], settings)):
         try:
@@ -370,30 +370,29 @@ def calibrate(
 def _reduced(training: Scene, motion: Motion, settings: ToleranceSettings) -> Iterator[Level]:
     """Yield the reduced levels of accuracy; none if a model of the scene cannot be made.
 
-    They are trained on the converged reference run of ``motion`` and on runs of other motions with
+    They are trained on the reference run of ``motion`` and on runs of other motions with
     20 iterations per frame and Anderson acceleration.
     """
     frames = np.arange(0, training.config.frames, 2)
     few = frames[:: -(-len(frames) // settings.frames)]
     # the sampling of elements is trained on 20 iterations per frame of a run in the subspace
-    scene, config = Level(20).scene(training), training.config
+    scene, config = training.iterated(20), training.config
     try:
         seeds = range(1, settings.training_motions)
         variants = [config.training_variant(seed).effects for seed in seeds]
         others = [scene.changed(effects=effects) for effects in variants]
         runs = [motion.reference]
-        runs += [trajectory(Level(20, levels.WINDOW).scene(other)) for other in others]
+        runs += [trajectory(other.iterated(20, levels.WINDOW)) for other in others]
         seen = np.concatenate([run[1:][frames] for run in runs])
-        for k in settings.modes:
+        for k in (k for k in settings.modes if k <= max(FEW, training.mesh.vertices / FEW)):
             columns = make_columns(scene, seen, "pod", k=k)
             found = sample_elements(
                 scene, columns, few, tolerances=settings.tolerances, others=others
             )
             for tau, samples in zip(settings.tolerances, found, strict=True):
                 model = SubspaceModel("pod", columns, samples)
-                yield from (
-                    Level(count, levels.WINDOW, model, tau) for count in settings.iterations
-                )
+                for count in settings.iterations:
+                    yield Level(count, levels.WINDOW, model=model, tau=tau)
     except PdromError as error:
         log.warning("%s: no reduction (%s)", training.config.name, error)
 
@@ -402,15 +401,16 @@ def _calibrated(level: Level, motions: Sequence[Motion], on_frame: OnFrame) -> C
     errors, defects, ms = [], [0.0], []
     for motion in motions:
         frames = motion.scene.config.frames
-        run = Trajectory(level, motion.scene, on_frame=on_frame)
-        exact = Trajectory(level.exact, motion.scene)
-        for frame in np.unique(np.linspace(0, frames - 1, PROBED + 1).round().astype(int)[1:]):
-            defects.append(run.to(int(frame)).check(exact) / motion.unit)
+        run, exact = motion.run, Trajectory(level.exact, motion.scene)
+        if level is not levels.EXACT:
+            run = Trajectory(level, motion.scene, on_frame=on_frame)
+            for frame in np.unique(np.linspace(0, frames - 1, PROBED + 1).round().astype(int)[1:]):
+                defects.append(run.to(int(frame)).check(exact) / motion.unit)
         errors.append(motion.errors(run.to(frames).positions))
         ms.append(1e3 * run.seconds / frames)
     defect = float(np.nan_to_num(max(defects), nan=np.inf))
     log.info("%s: errors %s", level.title, ", ".join(f"{own[-1]:.2e}" for own in errors))
-    return Calibrated(level, level.work(motions[0].scene), errors, defect, ms[0])
+    return Calibrated(level, level.work(motion.scene, run.iterations), errors, defect, ms[0])
 
 
 def transferred(trained: Scene, scene: Scene) -> Scene:

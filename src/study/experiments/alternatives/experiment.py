@@ -7,7 +7,7 @@ implicit step deviates from it. All methods run the held-out motions; only subsp
 
 import logging
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from time import process_time
 from typing import Annotated, Any, Final
@@ -23,7 +23,7 @@ from pdrom.model.constraints.base import GroupConfig
 from pdrom.model.dynamics.stepper import State, Stepper
 from pdrom.model.dynamics.system import GlobalSystem
 from pdrom.model.held_out import FIRST, MOTIONS, PLAYBACK, HeldOutMotion
-from pdrom.model.runs import BoundedRun, simulate, trajectory
+from pdrom.model.runs import BoundedRun, converged_run, trajectory
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.subspace.columns import Columns
 from pdrom.reduction.subspace.model import SubspaceModel, make_columns, sample_elements
@@ -32,7 +32,6 @@ from study.artifact.paths import ALTERNATIVE_TIMES, ALTERNATIVES, File
 from study.artifact.reads import Settings, SourcesOf
 from study.experiments.alternatives.solvers.methods import WINDOW, TwoLevel, continuous
 from study.experiments.alternatives.solvers.substeps import METHODS
-from study.experiments.iterations import converged_run
 from study.experiments.kit import base as kit
 from study.experiments.kit import runfiles
 from study.experiments.kit.base import experiment
@@ -329,16 +328,13 @@ def substepped(scene: Scene, substeps: int, iterations: int, window: int = 0) ->
     acceleration, 0 for none.
     """
     config = scene.config
-    changes = {
-        "time_step": config.time_step / substeps,
-        "frames": substeps * config.frames,
-        "iterations": iterations,
-        "anderson_window": window,
-        "effects": tuple(e.with_frames_scaled(substeps) for e in config.effects),
-    }
-    if substeps == 1:
-        return replace(scene, config=config.model_copy(update=changes))
-    return scene.changed(**changes)
+    if substeps > 1:
+        scene = scene.changed(
+            time_step=config.time_step / substeps,
+            frames=substeps * config.frames,
+            effects=tuple(e.with_frames_scaled(substeps) for e in config.effects),
+        )
+    return scene.iterated(iterations, window)
 
 
 @dataclass(frozen=True)
@@ -360,10 +356,8 @@ class Timed:
         first = [held.index(kind) for kind in dict.fromkeys(held)]
         places = np.concatenate([places[first], np.delete(places, first)])
         # run all frames, not only timed ones: a hold stores positions in its first frame for later
-        states = [
-            scene.initial_state(),
-            *(end for end, _ in simulate(scene, track_objective=False)),
-        ]
+        loop, states = scene.stepper(track_objective=False), [scene.initial_state()]
+        states += [end for end, _ in loop.run(states[0], range(scene.config.frames))]
         for each in candidates(scene, self.models, self.settings):
             labels = {**self.labels, **each.labels, "steps": each.steps}
             starts = tuple((each.state(states[f], scene), f * each.steps) for f in places)

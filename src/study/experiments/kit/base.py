@@ -19,7 +19,6 @@ from pdrom.core.store import open_hdf5, read_table
 from pdrom.core.yamlfile import ConfigModel, SceneName
 from pdrom.model.constraints.base import GroupConfig
 from pdrom.model.dynamics.solvers import SOLVERS
-from pdrom.model.dynamics.stepper import State, Stepper
 from pdrom.model.held_out import HeldOutMotion
 from pdrom.model.mesh.types import load_mesh
 from pdrom.model.scene import Scene, SceneConfig
@@ -155,12 +154,6 @@ def positions_of(run: File, frames: int | None = None) -> np.ndarray:
     """Read positions (F + 1, N, 3) m of a full-order run, or only of its first ``frames``."""
     with open_hdf5(run.path) as file:
         return file["positions"][: None if frames is None else frames + 1]
-
-
-def followed(loop: Stepper, state: State, frames: int) -> np.ndarray:
-    """Run ``loop`` from ``state`` over ``frames`` frames; return positions (F + 1, N, 3) m."""
-    ends = [after.positions for after, _ in loop.run(state, range(frames))]
-    return np.stack([state.positions, *ends])
 
 
 def perturbation_field(scene: Scene, size: float, seed: int) -> np.ndarray:

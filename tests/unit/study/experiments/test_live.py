@@ -8,11 +8,11 @@ import pytest
 from builders import GRAVITY, GROUPS, make_scene
 from node import RUN, evaluate
 from pdrom.core.errors import SceneError, StorageError
+from pdrom.model.runs import followed
 from pdrom.model.scene import Scene
 from pdrom.reduction.subspace import exported
 from pdrom.reduction.subspace.exported import export_scene
 from study.experiments import subspaces as module
-from study.experiments.kit.base import followed
 from written_models import write_models
 
 FRAMES = 24

@@ -18,6 +18,7 @@ from pdrom.model.constraints.local_kernel import LocalPass
 from pdrom.model.dynamics.acceleration import Anderson, combine, forget, refuse
 from pdrom.model.dynamics.frames import inertia_energy, weighted
 from pdrom.model.dynamics.sweeps import sweep
+from pdrom.model.runs import followed
 from pdrom.model.scene import Scene
 from pdrom.reduction.subspace.model import Samples, SubspaceModel
 from study.experiments.alternatives.solvers.substeps import (
@@ -27,7 +28,6 @@ from study.experiments.alternatives.solvers.substeps import (
     begin,
     end,
 )
-from study.experiments.kit.base import followed
 
 WINDOW = 5  # number of earlier iterates in Anderson acceleration, as in Peng et al. 2018
 # Parameters of Chebyshev's semi-iteration: estimated convergence rate of the plain iteration, and

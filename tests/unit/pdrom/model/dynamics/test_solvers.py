@@ -14,7 +14,7 @@ from pdrom.core.errors import SolverError
 from pdrom.model.dynamics.acceleration import Anderson
 from pdrom.model.dynamics.solvers import SOLVERS
 from pdrom.model.dynamics.system import GlobalSystem
-from pdrom.model.runs import simulate, trajectory
+from pdrom.model.runs import trajectory
 
 NAMES = sorted(SOLVERS)
 
@@ -119,7 +119,7 @@ def test_same_fixed_point_and_monotone_objective(group):
     for window in (1, 3, 6):
         fast = make_scene(*effects, **settings, iterations=300, anderson_window=window)
         assert np.abs(trajectory(fast) - plain).max() < 1e-7
-        for _, report in simulate(fast):
+        for _, report in fast.stepper().run(fast.initial_state(), range(3)):
             rises = np.diff(report.objective) / np.maximum(np.abs(report.objective[:-1]), 1e-12)
             assert rises.max() < 1e-9
 

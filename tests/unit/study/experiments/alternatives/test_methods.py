@@ -10,11 +10,10 @@ import pytest
 from builders import GRAVITY, GROUPS, LEFT, make_scene
 from pdrom.core.errors import ConfigurationError, SceneError
 from pdrom.model.dynamics.stepper import State
+from pdrom.model.runs import ConvergedStepper, converged_run, followed
 from pdrom.reduction.subspace.model import Samples, SubspaceModel, make_columns
 from study.experiments.alternatives.solvers.methods import TwoLevel, continuous
 from study.experiments.alternatives.solvers.substeps import METHODS
-from study.experiments.iterations import ConvergedStepper, converged_run
-from study.experiments.kit.base import followed
 
 SHEET = {"kind": "cloth", "rows": 6, "columns": 5, "plane": "xz"}
 HELD = (GRAVITY, LEFT)

@@ -5,8 +5,9 @@ import pytest
 from scipy import optimize, sparse
 
 from builders import GRAVITY, LEFT, make_scene
+from pdrom.model.dynamics.acceleration import minimise
 from pdrom.model.dynamics.stepper import Stepper
-from study.experiments.iterations import ConvergedStepper, minimise
+from pdrom.model.runs import ConvergedStepper
 
 SHEET = {"kind": "cloth", "rows": 6, "columns": 5, "plane": "xz"}
 
