@@ -268,7 +268,7 @@ def _label(ax: Axes, x: float, text: str) -> None:
 
 LEAST, MOST = 1e-4, 1.0  # limits of the error axis; errors outside are drawn on the limits
 BESIDE = 4  # largest number of panels in a row
-TOLERANCES, TIMES, REACHED = (5e-3, 2e-1), (1e-2, 1e3), (1e-5, 1e0)
+TOLERANCES, TIMES, REACHED = (5e-3, 2e-1), (1e-2, 1e4), (1e-5, 1e0)
 # Kind of run -> (colour, factor that shifts its dots on the tolerance axis to avoid overlap).
 KINDS = {
     "reduction": (style.BLUE, 0.85),
