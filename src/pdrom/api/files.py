@@ -8,15 +8,14 @@ from typing import Any, TypeVar
 import h5py
 import numpy as np
 
-from pdrom.api.records import AnyRun, FullRun, ReducedRun, RequestedRun, full_run
+from pdrom.api.records import AnyRun, FullRun, ReducedRun, full_run
 from pdrom.core import store
 from pdrom.core.errors import ConfigurationError, PdromError, StorageError
 from pdrom.core.provenance import made_by
 from pdrom.core.yamlfile import named, read_yaml, shown, validate
 from pdrom.model.mesh.config import GivenMesh, MeshFile, given_mesh
 from pdrom.model.mesh.types import store_mesh, stored_mesh
-from pdrom.model.scene import Scene, SceneConfig
-from pdrom.reduction.requested.run import Outcome, Request
+from pdrom.model.scene import GONE, Scene, SceneConfig
 from pdrom.reduction.rerun import Rerun, displacement_norms
 
 T = TypeVar("T")
@@ -94,10 +93,8 @@ def bound(config: SceneConfig, folder: Path, source: str) -> Scene:
         raise ConfigurationError(f"{source}: {error}") from error
 
 
-def save(reduced: ReducedRun | RequestedRun, path: str | os.PathLike[str]) -> None:
+def save(reduced: ReducedRun, path: str | os.PathLike[str]) -> None:
     """Write a reduced run and its full-order run to one file, positions in single precision.
-
-    A run within a requested tolerance is written without a full-order run, in double precision.
 
     Parameters
     ----------
@@ -109,12 +106,9 @@ def save(reduced: ReducedRun | RequestedRun, path: str | os.PathLike[str]) -> No
     ConfigurationError, StorageError
         ``reduced`` is no reduced run; the file cannot be written.
     """
-    require((ReducedRun, RequestedRun), reduced, "reduced", source="pdrom.api.reduce makes one")
+    require(ReducedRun, reduced, "reduced", source="pdrom.api.reduce makes one")
     path = file_path(path)
     store.require_own(path)
-    if isinstance(reduced, RequestedRun):
-        _save_requested(reduced, path)
-        return
     config = reduced.full.scene.config.model_dump(mode="json")
     labels = {"group": reduced.group, "method": reduced.method, "r": reduced.r}
     outcome = reduced.outcome
@@ -129,20 +123,6 @@ def save(reduced: ReducedRun | RequestedRun, path: str | os.PathLike[str]) -> No
         _store(file, "error", reduced.error, "1")
         _store(file, "extent", outcome.extent, "1")
         _store(file, "displacement", displacement_norms(reduced.full.positions), "m")
-
-
-def _save_requested(run: RequestedRun, path: Path) -> None:
-    config, done = run.scene.config.model_dump(mode="json"), run.outcome
-    wish = {"quantity": run.request.quantity, "requested_error": run.request.error}
-    with made_by("pdrom.api.save", {"scene": config, **wish}), store.write_hdf5(path) as file:
-        file.attrs.update({**wish, "frames_met": done.frames, "limit": done.limit})
-        file.attrs.update({"level": done.level, "failed": done.failed, "expected": done.expected})
-        file.attrs.update({"reduced": done.reduced, "checks": done.checks, "full_ms": done.full_ms})
-        if done.estimate is not None:
-            file.attrs["estimate"] = done.estimate
-        store_mesh(run.scene.mesh, file.create_group("mesh"))
-        _store(file, "positions", done.positions, "m")
-        _store(file, "timings", run.ms[:, None], "ms")
 
 
 def load(path: str | os.PathLike[str], unchecked: bool = False) -> AnyRun:
@@ -166,8 +146,8 @@ def load(path: str | os.PathLike[str], unchecked: bool = False) -> AnyRun:
             store.require_self_contained(file, path)
             found: AnyRun | None = None
             if "requested_error" in file.attrs:
-                found = _requested(_scene(file, path), file)
-            elif "positions" in file and "timings" in file:
+                raise StorageError(f"{path}: {GONE}")
+            if "positions" in file and "timings" in file:
                 found = full_run(_scene(file, path), file)
             elif "reduced" in file and "full" in file:
                 found = _reduced(_scene(file, path), file)
@@ -185,12 +165,7 @@ def load(path: str | os.PathLike[str], unchecked: bool = False) -> AnyRun:
 
 def _require_sound(found: AnyRun) -> None:
     """Raise ValueError if an array of the run is not finite or not of the shape its scene gives."""
-    if isinstance(found, RequestedRun):
-        full = FullRun(found.scene, found.outcome.positions, found.ms, {})
-        if not 0 <= found.outcome.frames <= len(found.ms):
-            raise ValueError(f"tolerance met for {found.outcome.frames} of {len(found.ms)} frames")
-    else:
-        full = found.full if isinstance(found, ReducedRun) else found
+    full = found.full if isinstance(found, ReducedRun) else found
     frames, vertices = full.scene.config.frames, full.scene.mesh.vertices
     arrays = {"positions": (full.positions, (frames + 1, vertices, 3)), "ms": (full.ms, (frames,))}
     for name, own in full.snapshots.items():
@@ -214,21 +189,6 @@ def _store(file: h5py.File, name: str, values: np.ndarray, unit: str) -> None:
     file[name].attrs["unit"] = unit
 
 
-def _requested(scene: Scene, file: h5py.File) -> RequestedRun:
-    """Load a run within a requested tolerance; its calibration time, not stored, is NaN."""
-    kept, timings = file.attrs, file["timings"][...].sum(axis=1)
-    request = Request(error=float(kept["requested_error"]), quantity=str(kept["quantity"]))
-    estimate = kept.get("estimate")
-    outcome = Outcome(
-        positions=file["positions"][...], frames=int(kept["frames_met"]), limit=str(kept["limit"]),
-        expected=float(kept["expected"]), estimate=None if estimate is None else float(estimate),
-        level=str(kept["level"]), reduced=bool(kept["reduced"]),
-        failed=[str(each) for each in kept["failed"]], checks=[int(f) for f in kept["checks"]],
-        seconds=1e-3 * float(timings.sum()), full_ms=float(kept["full_ms"]),
-    )  # fmt: skip
-    return RequestedRun(scene, request, outcome, timings, np.nan, None)
-
-
 def _reduced(scene: Scene, file: h5py.File) -> ReducedRun:
     full = FullRun(scene, file["full"][...].astype(float), file["full_ms"][...], {})
     positions, blowup = file["reduced"][...].astype(float), int(file.attrs["blowup_frame"])
@@ -243,7 +203,9 @@ def _scene(file: h5py.File, path: Path) -> Scene:
     """Scene of the run in ``file`` at ``path``, with the stored mesh, else its configured mesh."""
     settings = json.loads(file.attrs["configuration"])
     # the pipeline stores the scene under the key "config", `save` and `run` under "scene"
-    scene = validate(SceneConfig, settings.get("config") or settings["scene"], str(path))
+    keys = settings.get("config") or settings["scene"]
+    keys.pop("requested_error", None)  # an earlier pdrom stored this key, which changed no run
+    scene = validate(SceneConfig, keys, str(path))
     if "mesh" in file:
         return Scene.build(scene, stored_mesh(file["mesh"]))
     # a relative path of a mesh starts at the nearest folder above the run's file that has the mesh

@@ -6,11 +6,10 @@ from typing import get_args
 import numpy as np
 
 from pdrom.api.files import file_path, require
-from pdrom.api.records import AnyRun, FullRun, ReducedRun, RequestedRun
+from pdrom.api.records import AnyRun, ReducedRun
 from pdrom.core.errors import SceneError
 from pdrom.core.store import require_own, require_place
-from pdrom.model.scene import Scene, SceneConfig
-from pdrom.reduction.rerun import mean_motion
+from pdrom.model.scene import Scene
 from pdrom.view import style
 from pdrom.view.artists import Figure
 from pdrom.view.multiples import clipped, log_axis
@@ -61,13 +60,12 @@ def plot(*runs: ReducedRun) -> Figure:
 def view(path: str | os.PathLike[str], *runs: AnyRun) -> None:
     """Write a page (HTML, one file) that shows runs; a browser opens it without a network.
 
-    A reduced run is shown with its full-order run. A run within a requested tolerance is shown with
-    the full-order run of its scene if ``runs`` have one. Runs with equal scenes are shown together.
+    A reduced run is shown with its full-order run. Runs with equal scenes are shown together.
 
     Parameters
     ----------
     path : file to write
-    runs : full-order and reduced runs, and runs within a requested tolerance
+    runs : full-order and reduced runs
 
     Raises
     ------
@@ -92,7 +90,7 @@ def viewed_scenes(*runs: AnyRun) -> list[ViewedScene]:
     for run in runs:
         require(get_args(AnyRun), run, "view", source="pdrom.api.run and reduce make one")
         known = scenes.setdefault(_scene(run).config.name, [])
-        if known and _alike(_scene(known[0])) != _alike(_scene(run)):
+        if known and _scene(known[0]).config != _scene(run).config:
             raise SceneError(f"view: two different scenes are called '{_scene(run).config.name}'")
         known.append(run)
     return [_viewed(of_scene) for of_scene in scenes.values()]
@@ -102,40 +100,26 @@ def _scene(run: AnyRun) -> Scene:
     return run.full.scene if isinstance(run, ReducedRun) else run.scene
 
 
-def _alike(scene: Scene) -> SceneConfig:
-    """Configuration to compare scenes by: without ``requested_error``, which changes no run."""
-    return scene.config.model_copy(update={"requested_error": None})
-
-
 def _viewed(runs: list[AnyRun]) -> ViewedScene:
-    """Prepare ``runs`` of a scene; the full-order run, or else a `RequestedRun`, is shown first."""
-    full = [run.full if isinstance(run, ReducedRun) else run for run in runs]
-    known: list[FullRun | RequestedRun] = [run for run in full if isinstance(run, FullRun)]
-    first = [*known, *(run for run in runs if isinstance(run, RequestedRun))][0]
-    others = [run for run in runs if run is not first and not isinstance(run, FullRun)]
-    others.sort(key=lambda run: run.r if isinstance(run, ReducedRun) else 0)
-    scene = _scene(first)
-    positions = first.outcome.positions if isinstance(first, RequestedRun) else first.positions
+    """Prepare ``runs`` of a scene; reduced runs are shown with the first full-order run."""
+    first = runs[0].full if isinstance(runs[0], ReducedRun) else runs[0]
+    reduced = [run for run in runs if isinstance(run, ReducedRun)]
+    config = first.scene.config
     return ViewedScene(
-        name=scene.config.name,
-        title=scene.config.title,
-        mesh=scene.mesh,
-        time_step=scene.config.time_step,
-        positions=positions,
+        name=config.name,
+        title=config.title,
+        mesh=first.scene.mesh,
+        time_step=config.time_step,
+        positions=first.positions,
         ms=float(np.median(first.ms)),
-        runs=tuple(_shown(run, positions) for run in others),
-        effects=scene.config.effects,
-        first=first.title if isinstance(first, RequestedRun) else "full order",
+        runs=tuple(_shown(run) for run in sorted(reduced, key=lambda run: run.r)),
+        effects=config.effects,
     )
 
 
-def _shown(run: AnyRun, positions: np.ndarray) -> ViewedRun:
-    """Prepare ``run`` for a page, with errors against a run with ``positions`` (F + 1, N, 3) m."""
-    if isinstance(run, ReducedRun):
-        names, blowup = (run.group, run.method, run.method), run.outcome.blowup_frame
-        moved, ms = np.asarray(run.outcome.positions), run.ms if np.isfinite(run.ms) else None
-        return ViewedRun(*names, run.r, moved, run.error, blowup, ms)
-    assert isinstance(run, RequestedRun)
-    apart = np.linalg.norm(run.outcome.positions[1:] - positions[1:], axis=(1, 2))
-    names, error = ("all groups", run.title, run.title), apart / mean_motion(positions)
-    return ViewedRun(*names, 0, run.outcome.positions, error, None, float(np.median(run.ms)))
+def _shown(run: ReducedRun) -> ViewedRun:
+    """Prepare a reduced run for a page."""
+    names, outcome = (run.group, run.method, run.method), run.outcome
+    ms = run.ms if np.isfinite(run.ms) else None
+    moved = np.asarray(outcome.positions)
+    return ViewedRun(*names, run.r, moved, run.error, outcome.blowup_frame, ms)

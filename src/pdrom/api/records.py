@@ -8,7 +8,6 @@ import numpy as np
 from pdrom.core.packed import brief
 from pdrom.model.scene import Scene
 from pdrom.reduction.deviations import Yardstick
-from pdrom.reduction.requested.run import Outcome, Request
 from pdrom.reduction.rerun import Rerun, mean_motion
 
 
@@ -84,42 +83,7 @@ class ReducedRun:
         return f"{self.group.replace('_', ' ')}, {self.method}, r = {self.r}"
 
 
-@dataclass(frozen=True, eq=False)
-class RequestedRun:
-    """A run within a requested tolerance.
-
-    scene : scene that was run
-    request : requested tolerance and the quantity that it bounds
-    outcome : positions (F + 1, N, 3) m, number of frames that meet the tolerance, solver used
-    ms : (F,), all equal: milliseconds of all frames, checks and failed attempts, divided by F
-    offline_s : seconds of the calibration before the run
-    error : true error, over the frames that meet the tolerance, against the converged implicit
-        step; None (unknown) if the scene is not the one of the calibration
-    """
-
-    scene: Scene
-    request: Request
-    outcome: Outcome
-    ms: np.ndarray
-    offline_s: float
-    error: float | None
-
-    @property
-    def title(self) -> str:
-        """Text: the requested tolerance, and for how many frames it is met."""
-        done = self.outcome
-        if not done.met:
-            return f"{self.request} requested, refused"
-        part = "" if done.frames == len(self.ms) else f" up to frame {done.frames}"
-        return f"within {self.request}{part}"
-
-    def __repr__(self) -> str:
-        done = self.outcome
-        met = f"met for {done.frames} of {len(self.ms)} frames" if done.met else "not met"
-        return f"RequestedRun('{self.scene.config.name}': {self.request} {met}; {done.level})"
-
-
-AnyRun = FullRun | ReducedRun | RequestedRun
+AnyRun = FullRun | ReducedRun
 
 
 def full_run(scene: Scene, file: h5py.File) -> FullRun:

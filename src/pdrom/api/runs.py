@@ -7,12 +7,12 @@ from numbers import Integral
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import perf_counter
-from typing import Any, overload
+from typing import Any
 
 import numpy as np
 
 from pdrom.api import files
-from pdrom.api.records import FullRun, ReducedRun, RequestedRun, full_run
+from pdrom.api.records import FullRun, ReducedRun, full_run
 from pdrom.core import config_file
 from pdrom.core.errors import ConfigurationError, SnapshotError, choices
 from pdrom.core.provenance import made_by
@@ -23,11 +23,9 @@ from pdrom.model.dynamics.stepper import FrameReport, State
 from pdrom.model.dynamics.system import DEFAULT_SOLVER
 from pdrom.model.runs import BoundedRun, frame_by_frame
 from pdrom.model.runs import run as run_full_order
-from pdrom.model.scene import Scene
+from pdrom.model.scene import GONE, Scene
 from pdrom.reduction.basis import Basis, compute_basis
 from pdrom.reduction.method import MethodSpec, load_methods
-from pdrom.reduction.requested import run as requested
-from pdrom.reduction.requested.levels import OnFrame, silent
 from pdrom.reduction.rerun import compare
 from pdrom.reduction.sampling import Reduction, select
 from pdrom.reduction.sampling.local_step import ReducedLocalStep, replace_group
@@ -122,35 +120,14 @@ def methods() -> dict[str, MethodSpec]:
     return load_methods(config_file("methods.yaml"))
 
 
-Wish = float | str | requested.Request
-
-
-@overload
-def reduce(
-    full: FullRun, *, error: Wish, scene: Scene | None = None, on_frame: OnFrame = silent
-) -> RequestedRun: ...
-
-
-@overload
-def reduce(
-    full: FullRun,
-    group: str,
-    method: str | MethodSpec = "gappy",
-    r: int = 20,
-    basis_of_group: Basis | None = None,
-) -> ReducedRun: ...
-
-
 def reduce(
     full: FullRun,
     group: str | None = None,
     method: str | MethodSpec = "gappy",
     r: int = 20,
     basis_of_group: Basis | None = None,
-    error: Wish | None = None,
-    scene: Scene | None = None,
-    on_frame: OnFrame = silent,
-) -> ReducedRun | RequestedRun:
+    **gone: Any,
+) -> ReducedRun:
     """Run the scene of ``full`` again, with the projections of one group reduced to r modes.
 
     A run that blows up ends there and is a result like any other.
@@ -162,17 +139,13 @@ def reduce(
     method : name in config/methods.yaml, or a specification
     r : number of modes, from 1 to the rank of the basis
     basis_of_group : basis of the group by `basis` for this method; None makes one from ``full``
-    error : replaces the four arguments ``group`` to ``basis_of_group``. It is the largest allowed
-        relative error, 0.01 or "velocity=0.05", against the implicit step solved to convergence.
-        The whole scene is reduced as far as this error allows, or not at all.
-    scene : with ``error``, another scene with the same mesh to run; ``full`` is the training run
-    on_frame : with ``error``, called after each frame with the title of the solver in use
+    gone : arguments that earlier versions had, such as ``error``; they are refused
 
     Returns
     -------
-    ReducedRun, or RequestedRun if ``error`` is given
-        A ReducedRun has ``outcome`` (positions, differences from ``full``, frame of a blow-up),
-        ``error`` of each frame, ``gain`` (amplification of errors by sampling), ``ms`` (per frame).
+    ReducedRun
+        Has ``outcome`` (positions, differences from ``full``, frame of a blow-up), ``error`` of
+        each frame, ``gain`` (amplification of errors by sampling), ``ms`` (per frame).
 
     Raises
     ------
@@ -182,13 +155,10 @@ def reduce(
     RankError
         The snapshots have fewer than r modes above round-off.
     """
+    if gone:
+        unknown = f"reduce: no argument '{next(iter(gone))}'"
+        raise ConfigurationError(f"error: {GONE}" if "error" in gone else unknown)
     files.require(FullRun, full, "full", source=FULL_RUN)
-    if error is not None:
-        if group is not None:
-            raise ConfigurationError("error: of the whole scene, without a group")
-        return _within(full, error, scene or full.scene, on_frame)
-    if scene is not None:
-        raise ConfigurationError("scene: only together with an error")
     group = files.require(str, group, "group", source=GROUP)
     scene, spec = full.scene, _method_spec(method)
     size: Any = r  # the range of r is checked later, when the rank of the basis is known
@@ -251,26 +221,3 @@ def _fitting_basis(made: Any, group: ConstraintGroup, spec: MethodSpec) -> Basis
             f"{'apart' if known.separate_axes else 'together'})"
         )
     return known
-
-
-def _within(full: FullRun, error: Wish, scene: Scene, on_frame: OnFrame) -> RequestedRun:
-    """Calibrate solvers on ``full``'s motion; run ``scene`` by the cheapest that meets ``error``.
-
-    The calibration uses the material, masses, time step and number of frames of ``scene``.
-    """
-    request = requested.read_request(error)
-    files.require(Scene, scene, "scene", source="load_scene makes one")
-    training = requested.transferred(full.scene, scene)
-    started = perf_counter()
-    calibration = requested.calibrate(
-        training, requested.ToleranceSettings(), request.quantity, on_frame
-    )
-    offline = perf_counter() - started
-    outcome = requested.CheckedRun(calibration, scene, request.error, on_frame).outcome()
-    frames = len(outcome.positions) - 1
-    ms = np.full(frames, 1e3 * outcome.seconds / frames)
-    reached = None
-    if scene.config.effects == training.config.effects and outcome.frames:
-        errors = calibration.motions[0].errors(outcome.positions)
-        reached = float(errors[outcome.frames - 1])
-    return RequestedRun(scene, request, outcome, ms, offline, reached)

@@ -17,7 +17,6 @@ class Status(IntEnum):
     DONE = 0
     FAULTY = 1
     BLEW_UP = 3
-    NOTHING_FITS = 4
 
 
 @dataclass(frozen=True)
@@ -28,14 +27,12 @@ class Command:
     example : example of a call
     arguments : name of each argument -> keywords of `argparse.ArgumentParser.add_argument`
     perform : function that executes the command and returns the exit code
-    one_of : names of the arguments of which a call may have only one
     """
 
     title: str
     example: str
     arguments: Mapping[str, dict[str, Any]]
     perform: Callable[[argparse.Namespace], Status]
-    one_of: Sequence[str] = ()
 
 
 # Keywords of `add_argument` for arguments that several commands have.

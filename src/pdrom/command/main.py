@@ -20,7 +20,7 @@ from pdrom.core.errors import INTERRUPTED, PdromError, choices, reason
 COMMANDS = ("new", "run", "reduce", "view", "show")
 CODES = """exit codes: 0 done; 1 faulty input, or a file that cannot be read or written;
 2 the command was not understood; 3 a reduced run blew up (its file is written all the
-same); 4 the tolerance is met for less than half of the frames (reduce --error); 130 interrupted"""
+same); 130 interrupted"""
 
 
 def parser() -> argparse.ArgumentParser:
@@ -43,10 +43,8 @@ def parser() -> argparse.ArgumentParser:
             epilog=f"example: {command.example}",
             formatter_class=plain,
         )
-        one_of = own.add_mutually_exclusive_group() if command.one_of else own
         for argument, keywords in command.arguments.items():
-            parent = one_of if argument in command.one_of else own
-            parent.add_argument(argument, **keywords)
+            own.add_argument(argument, **keywords)
         own.set_defaults(perform=command.perform, parser=own)
     return top
 

@@ -4,7 +4,7 @@ import os
 import sys
 from pathlib import Path
 from time import monotonic
-from typing import Self, TextIO
+from typing import TextIO
 
 from pdrom.model.dynamics.stepper import FrameReport
 
@@ -62,19 +62,3 @@ class Progress(_Line):
         self._show(f"{self._name} [{bar}] {text}", now)
         if done == self._frames:
             self._end()
-
-
-class LevelProgress(_Line):
-    """Line with the solver in use, such as "full order, K = 20", and the time since the start."""
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *fault: object) -> None:
-        self._end()
-
-    def __call__(self, title: str) -> None:
-        """Show the solver's ``title``, once per `EVERY` s at most (`PAUSE` s if no terminal)."""
-        now = monotonic()
-        if now - self._shown >= (EVERY if self._terminal else PAUSE):
-            self._show(f"{self._name}: {title}, {now - self._began:.0f} s", now)

@@ -1,4 +1,4 @@
-"""Error and time of reductions and of alternatives to projective dynamics; requested tolerances."""
+"""Error and time of reductions and of alternatives to projective dynamics."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -13,7 +13,7 @@ from pdrom.view.multiples import clipped, label_counts, log_axis, time_axis
 from study.artifact.reads import TableOf
 from study.experiments.alternatives.experiment import REDUCTIONS
 from study.experiments.kit.base import ANDERSON, FOM
-from study.figures.kit.declaration import Drawn, Methods, NothingToDraw, Options, Scenes, figure
+from study.figures.kit.declaration import Drawn, Methods, NothingToDraw, Scenes, figure
 from study.tables.accuracy_cost import FEWER, pareto
 
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "*")
@@ -268,13 +268,6 @@ def _label(ax: Axes, x: float, text: str) -> None:
 
 LEAST, MOST = 1e-4, 1.0  # limits of the error axis; errors outside are drawn on the limits
 BESIDE = 4  # largest number of panels in a row
-TOLERANCES, TIMES, REACHED = (5e-3, 2e-1), (1e-2, 1e4), (1e-5, 1e0)
-# Kind of run -> (colour, factor that shifts its dots on the tolerance axis to avoid overlap).
-KINDS = {
-    "reduction": (style.BLUE, 0.85),
-    "full order": (style.VERMILLION, 1.0),
-    "refused": (style.GREY, 1.15),
-}
 BEST, DOT = ("full order, the best of all methods", style.BLACK), (0.55, 0.55, 0.55)
 # Legend label -> (condition on the number of training motions of a reduction, colour).
 TRAINED = {
@@ -347,56 +340,3 @@ def best_points(rows: pd.DataFrame, error: str) -> pd.DataFrame:
     """Pareto-optimal ``rows`` with respect to time and column ``error``, the fastest first."""
     best = pareto(rows[error].to_list(), rows[TIME].to_list())
     return rows[np.array(best, dtype=bool)].sort_values(TIME)
-
-
-@figure(
-    title="Requested tolerances and errors reached",
-    reads={"table": TableOf("requested_tolerances")},
-)
-def requested_tolerances(options: Options, table: pd.DataFrame) -> Figure:
-    """A dot for each scene and held-out motion. Left: the error that a run reached against the
-    tolerance that was requested; dots of met tolerances above their line are broken. Right: its
-    time over that of a frame with the scene's own iterations, checks and failed levels included.
-    What lies outside is drawn on the rim.
-    """
-    table = table[table.error.notna()]
-    if table.empty:
-        raise NothingToDraw("no tolerance was requested")
-    chart = style.new_figure(3.2)
-    left, right = chart.subplots(1, 2)
-    met, reduced = table.met.astype(bool), table.reduced.astype(bool)
-    looks = {}
-    for (kind, (colour, shift)), chosen in zip(
-        KINDS.items(), (met & reduced, met & ~reduced, ~met), strict=True
-    ):
-        own = table[chosen]
-        if not own.empty:
-            looks[kind] = (colour, "o")
-        dots(left, shift * own.tolerance, own.error, REACHED, colour)
-        dots(right, shift * own.tolerance, own.over_own, TIMES, colour)
-    multiples.log_axes(left, TOLERANCES, REACHED)
-    multiples.log_axes(right, TOLERANCES, TIMES)
-    for tolerance in table.tolerance.unique():
-        ends = [0.78 * tolerance, 1.28 * tolerance]
-        left.plot(ends, [tolerance, tolerance], color="#333333", linewidth=1.2)
-    right.axhline(1.0, color="#333333", linewidth=0.8)
-    left.set_ylabel("reached error")
-    right.set_ylabel("time over that of own iterations")
-    for ax in (left, right):
-        ax.set_xlabel("requested tolerance")
-    style.legend(chart, style.handles(looks, linestyle="none", markersize=4), 3)
-    return chart
-
-
-def dots(
-    ax: Axes, tolerances: pd.Series, values: pd.Series, limits: tuple[float, float], colour: str
-) -> None:
-    """Draw ``values`` against ``tolerances`` as dots on ``ax``, if there are any values.
-
-    Values beyond the ``limits`` are drawn on the limit.
-    """
-    if not values.empty:
-        ax.plot(
-            tolerances, multiples.clipped(np.asarray(values, float), *limits), "o",
-            markersize=3.0, color=colour, alpha=0.7, clip_on=False,
-        )  # fmt: skip

@@ -26,7 +26,6 @@ from study.experiments.hard_cases.outcomes import HardCases
 from study.experiments.iterations import IterationSweep
 from study.experiments.kit.base import BlowupExtent, Rank, Solver
 from study.experiments.repetitions import LadderSection, Noise, RepetitionSection
-from study.experiments.requested_tolerances import RequestedTolerances
 from study.experiments.reruns import Stability, Sweep
 from study.experiments.sensitivity import Sensitivity
 from study.experiments.subspaces import Live, Online, Subspace
@@ -69,7 +68,6 @@ class StudySettings(ConfigModel):
     online: Online = Online()
     live: Live = Live()
     alternatives: Alternatives = Alternatives()
-    requested_tolerances: RequestedTolerances = RequestedTolerances()
     recorded: bool = True  # whether tables also get stored results of config/extended.yaml
     study: str | None = None
 
@@ -290,12 +288,6 @@ SCENES: dict[paths.Place, Callable[[Study], Iterable[str]]] = {
         if scene in {*_with_subspaces(study), *study.online}
     ],
     paths.STABILITY: lambda study: _held(study, study.settings.stability.scenes),
-    # scenes of the study and section `online`: all, or those that `requested_tolerances` lists
-    paths.REQUESTED_TOLERANCES: lambda study: [
-        scene
-        for scene in (*study.scenes, *study.online)
-        if scene in (study.settings.requested_tolerances.scenes or (*study.scenes, *study.online))
-    ],
 }
 # Kind of file -> function that tells whether a study makes it for a scene and a reduced group.
 GROUPS: dict[paths.Place, Callable[[Study, str, str], bool]] = {

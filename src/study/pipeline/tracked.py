@@ -36,7 +36,7 @@ COLUMNS = ["kind", "seconds", "coarse_seconds", "longest_s", "memory_mb"]
 COARSE = "config/tiny.yaml"
 SAMPLE = "config/replication.yaml"
 LONG = "config/extended.yaml"
-KEPT = ("alternatives", "winners", "requested_tolerances")
+KEPT = ("alternatives", "winners")
 
 
 def write_tracked(path: Path, content: bytes) -> None:

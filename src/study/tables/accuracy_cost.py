@@ -1,4 +1,4 @@
-"""Tables of error and time: each method and size, requested tolerances, where reductions save time.
+"""Tables of error and time: each method and size, where reductions save time.
 
 Errors are taken against one of two reference runs; only rows with the same one are comparable. For
 ``fom`` and ``fom-anderson``, the reference is a full-order run with converged frames (K -> infinity
@@ -10,16 +10,15 @@ which a reduction must beat. ``fom-anderson`` is a full-order run with Anderson 
 """
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
 from study.artifact import paths
-from study.artifact.reads import Every, Recorded, Setting, TableOf
+from study.artifact.reads import Every, Setting, TableOf
 from study.experiments.kit.base import ANDERSON, FOM
 from study.tables.kit import results
-from study.tables.kit.declaration import count, flag, integer, number, shared, table, text, timed
+from study.tables.kit.declaration import count, flag, integer, number, shared, table, timed
 from study.tables.kit.results import FAILED, joined, trained, with_held_out
 
 FEWER = "fewer-iterations"
@@ -114,53 +113,6 @@ def pareto(error: Sequence[float], cost: Sequence[float]) -> list[bool]:
         not any((e <= a) & (c <= b) & ((e < a) | (c < b)) for e, c in zip(error, cost, strict=True))
         for a, b in zip(error, cost, strict=True)
     ]
-
-
-@table(
-    title="Requested tolerances and errors reached",
-    columns=(
-        *shared("scene"),
-        text("motion", "held-out motion that was run"),
-        number("tolerance", "largest relative error of the positions requested", compared="exact"),
-        *shared("vertices"),
-        flag("met", "the run says that it is within the tolerance", compared="error"),
-        integer("frames", "first frames for which it says so", compared="error"),
-        flag("reduced", "a reduction made the run", compared="error"),
-        number("error", "error over these frames against the converged implicit step"),
-        number("velocity_error", "error of the velocities, likewise"),
-        number("playback_error", "error of playback of the training motion, likewise"),
-        number("reference_error", "of the reference of the request, likewise; 0: used instead"),
-        number("expected", "error in the calibration, times the factor", compared="error"),
-        number("estimate", "estimate by checks and a second run, likewise", compared="error"),
-        flag("broken", "met, and the error is above the tolerance", compared="error"),
-        text("level", "level of accuracy that made the run", compared="error"),
-        integer("failed", "levels that were tried before", compared="error"),
-        integer("checks", "frames that a more accurate level did as well", compared="error"),
-        *shared("ms_per_frame"),
-        text("full_level", "cheapest full order within tolerance by calibration", compared="error"),
-        timed(number("full_ms", "time of its frame, without checks", "ms")),
-        timed(number("over_full", "time of a frame over that")),
-        timed(number("own_ms", "time of a frame with the scene's own iterations", "ms")),
-        timed(number("over_own", "time of a frame over that")),
-        results.DAY,
-    ),
-    reads={
-        "runs": Every(paths.REQUESTED_TOLERANCES),
-        "record": Recorded("requested_tolerances"),
-    },
-)
-def requested_tolerances(runs: list[paths.File], record: list[Path]) -> pd.DataFrame:
-    """One row per run with a requested largest error: ``runs``, then stored ones of ``record``."""
-    rows = results.joined(runs)
-    if len(rows):
-        met = rows.frames > 0
-        rows = rows.assign(
-            met=met,
-            broken=met & ~(rows.error <= rows.tolerance),
-            over_full=rows.ms_per_frame / rows.full_ms,
-            over_own=rows.ms_per_frame / rows.own_ms,
-        )
-    return results.with_recorded(rows, record)
 
 
 # Columns that identify a curve (time of the local step over size r); its rows differ only in r.

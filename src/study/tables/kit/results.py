@@ -54,8 +54,7 @@ def with_recorded(rows: pd.DataFrame, record: list[Path]) -> pd.DataFrame:
     others = read_table(record[0], result=False)
     if rows.empty:
         return others
-    # table requested_tolerances has no column stiffness: its runs never scale weights of a scene
-    keys = [key for key in ("scene", "stiffness", "vertices") if key in rows]
+    keys = ["scene", "stiffness", "vertices"]
     own = pd.MultiIndex.from_frame(rows[keys].astype(object))
     others = others[~pd.MultiIndex.from_frame(others[keys].astype(object)).isin(own)]
     return pd.concat([rows.assign(recorded=None), others], ignore_index=True)

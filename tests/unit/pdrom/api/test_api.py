@@ -147,15 +147,17 @@ FAULTY = {
         lambda full, _: spring(full, r=1, basis_of_group=np.eye(3)),
         "basis_of_group = array.*a Basis is required",
     ),
-    "error of a group": (lambda full, _: spring(full, error=0.1), "error: of the whole scene"),
-    "motion of a group": (lambda full, _: spring(full, scene=full), "scene: only together with"),
-    "motion of another mesh": (
-        lambda full, _: api.reduce(full, error=0.1, scene=given((SQUARE, HALVES))),
-        "another mesh or other constraint groups",
+    "requested error": (lambda full, _: api.reduce(full, error=0.1), "error: runs within a req"),
+    "requested error, another scene": (
+        lambda full, _: api.reduce(full, error="velocity=0.1", scene=full.scene), "error: runs",
     ),
-    "motion that is none": (
-        lambda full, _: api.reduce(full, error=0.1, scene=full), "scene = FullRun.*a Scene is",
+    "requested error of a scene": (
+        lambda *_: given((SQUARE, HALVES), reduce={"error": 0.1}), r"reduce\.error: runs within a",
     ),
+    "requested error of a scene, by its other key": (
+        lambda *_: given((SQUARE, HALVES), requested_error=0.1), "requested_error: runs within a",
+    ),
+    "argument misspelt": (lambda full, _: spring(full, metod="pod"), "no argument 'metod'"),
     "plot of a run": (lambda full, _: api.plot(full), "plot = FullRun.*a ReducedRun"),
     "plot of nothing": (lambda *_: api.plot(), "at least one run"),
     "view of nothing": (lambda _, p: api.view(p / "v"), "view"),

@@ -16,7 +16,7 @@ import yaml
 
 from builders import SMALL
 from pdrom import __version__
-from pdrom.api import FullRun, RequestedRun, load_scene
+from pdrom.api import load_scene
 from pdrom.command.base import Status
 from pdrom.command.main import COMMANDS, parser, run
 from pdrom.command.new import template
@@ -27,7 +27,6 @@ from pdrom.model.dynamics.stepper import FrameReport
 from pdrom.model.mesh.generators import bar, cloth
 from pdrom.model.mesh.types import Mesh
 from pdrom.model.scene import Scene, SceneConfig
-from pdrom.reduction.requested.run import Outcome, Request
 from pdrom.view.camera import up_of
 
 
@@ -64,23 +63,6 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "small.yaml").write_text(SMALL, encoding="utf-8")
     assert run(["run", str(folder / "small.yaml")]) == Status.DONE
     return folder
-
-
-def test_a_requested_error_is_met_said_and_viewed(folder, finished, capsys):
-    shutil.copy(finished / "small.h5", folder)
-    with (folder / "small.yaml").open("a", encoding="utf-8") as file:
-        file.write("reduce: {error: velocity=0.2}\n")
-    asked = ["reduce", "small.yaml", "--run", "small.h5"]
-    assert run([*asked, "--error", "0.05", "--out", "one.h5"]) == Status.DONE
-    said = capsys.readouterr().out
-    assert said.startswith("one.h5: 5 % of the positions against the converged implicit step")
-    for words in ("met, by", "frames checked", "reached", "choosing took"):
-        assert words in said
-    assert run(asked) == Status.DONE
-    assert capsys.readouterr().out.startswith("small_requested.h5: 20 % of the velocities")
-    assert run(["view", "one.h5"]) == Status.DONE
-    assert run(["show", "one.h5"]) == Status.DONE
-    assert "requested_error: 0.05" in capsys.readouterr().out
 
 
 REDUCE = ["reduce", "small.yaml", "--group", "spring", "--r", "1"]
@@ -250,7 +232,6 @@ def test_what_an_obstacle_moves_at_rest_is_said_once(folder, caplog):
     assert thin.startswith(f"{start}'self_collision': with thickness 0.01 a vertex can pass")
 
 
-ASK = ["reduce", "small.yaml", "--error"]
 FAULTY = [
     (["run", "none.yaml"], "none.yaml: no such configuration file"),
     (["show", "none.h5"], "none.h5: no such file"),
@@ -259,11 +240,12 @@ FAULTY = [
     (["show", "a" * 5000], "File name too long"),
     (["show", "."], "is a folder"),
     (["run", "."], "no such configuration file"),
-    (["reduce", "small.yaml"], "--group or --error: one is required"),
-    ([*ASK, "0"], "--error = '0': a number above 0 and below 1 is required"),
-    ([*ASK, "velocty=0.1"], "unknown quantity 'velocty' (allowed: position, velocity), did"),
-    ([*ASK, "0.1"], "--error: --run is required with it: a training run"),
-    ([*ASK, "0.1", "--plot", "a.png"], "--plot: only together with --group"),
+    (["reduce", "small.yaml", "--error", "0.1"], "--error: runs within a requested error"),
+    (
+        ["reduce", "--error=velocity=0.1", "--nonsense"],
+        "--error: runs within a requested error",
+    ),
+    ([*REDUCE, "--run", "x.h5", "--error"], "--error: runs within a requested error"),
     ([*REDUCE, "--plot", "x.exe"], "--plot x.exe: no kind of picture 'exe' (allowed: pdf, png"),
     ([*REDUCE, "--plot", "x.pgn"], "did you mean 'png'?"),
     ([*REDUCE, "--plot", "folder.png"], "folder.png: cannot be written (a folder)"),
@@ -288,9 +270,8 @@ def test_files_of_others_and_the_mesh_of_the_scene_are_not_overwritten(folder, c
         ("own.yaml", "m.obj", "would be overwritten, and is read by this command"),
     ):
         before = Path(out).read_bytes()
-        reduce = ["reduce", scene, "--run", "none.h5"]
-        wishes = (["--group", "spring"], ["--error", "0.1"])
-        for command in (["run", scene], *([*reduce, *wish] for wish in wishes)):
+        reduce = ["reduce", scene, "--run", "none.h5", "--group", "spring"]
+        for command in (["run", scene], reduce):
             assert f"{out}: {words}" in refusal(capsys, [*command, "--out", out])
         assert Path(out).read_bytes() == before
 
@@ -379,14 +360,20 @@ def test_a_blow_up_has_a_code_of_its_own(folder, monkeypatch, capsys):
 
 @pytest.mark.parametrize(
     "arguments",
-    [[], ["reduec"], ["run"], ["reduce", "x", "--r", "0"], ["reduce", "x", "--eror", "1e-2"]],
+    [
+        [],
+        ["reduec"],
+        ["run"],
+        ["reduce", "x", "--r", "0"],
+        ["reduce", "x", "--group", "g", "--rnu"],
+    ],
 )
 def test_what_is_not_understood_has_code_2(arguments, capsys):
     with pytest.raises(SystemExit) as caught:
         run(arguments)
     assert caught.value.code == 2
     said = capsys.readouterr().err
-    assert "--eror" not in arguments or "did you mean '--error'?" in said
+    assert "--rnu" not in arguments or "did you mean '--run'?" in said
     assert "reduec" not in arguments or "did you mean 'reduce'?" in said
 
 
@@ -428,76 +415,6 @@ def test_threads_and_kernels_of_numpy_are_set_before_it_is_loaded():
     code = "import sys, pdrom.command.main; sys.exit('numpy' in sys.modules)"
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
     assert subprocess.run([sys.executable, "-c", code], env=environment).returncode == 0
-
-
-COMMAND = ["reduce", "small.yaml", "--run", "small.h5", "--error", "0.05"]
-
-
-@pytest.fixture
-def full(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> FullRun:
-    """A training run that is read from small.h5, of a scene in the folder of the command."""
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "small.yaml").write_text(SMALL)
-    found = FullRun(load_scene("small.yaml"), np.zeros((5, 30, 3)), np.ones(4), {})
-    monkeypatch.setattr("pdrom.api.load", lambda *_: found)
-    return found
-
-
-def done(full: FullRun, error: float | None = None, **changes) -> RequestedRun:
-    """A run of four frames within its tolerance, but for the ``changes`` of its outcome."""
-    outcome = {
-        "positions": full.positions, "frames": 4, "limit": "", "expected": 0.031, "estimate": None,
-        "level": "ecsw, k = 20, tau = 0.01, K = 10", "reduced": True, "failed": [],
-        "checks": [0, 2], "seconds": 0.1, "full_ms": 8.0,
-    }  # fmt: skip
-    made = Outcome(**(outcome | changes))
-    return RequestedRun(full.scene, Request(error=0.05), made, np.full(4, 2.0), 1.5, error)
-
-
-SLOW = "the iterations converge too slowly after it"
-
-
-@pytest.mark.parametrize(
-    ("changes", "words", "status"),
-    [
-        ({}, "implicit step: met, by a reduction\n", Status.DONE),
-        ({"reduced": False}, "met, by the full order only\n", Status.DONE),
-        (
-            {"frames": 2, "limit": SLOW},
-            f"met up to frame 2 of 4, by a reduction ({SLOW})\n",
-            Status.DONE,
-        ),
-        ({"frames": 1, "limit": SLOW}, "met up to frame 1 of 4", Status.NOTHING_FITS),
-        ({"frames": 0}, ": refused (nothing meets it for sure); run in", Status.NOTHING_FITS),
-        (
-            {"frames": 0, "positions": np.full((5, 30, 3), np.nan)},
-            ": blew up, with the full order, too\n",
-            Status.NOTHING_FITS,
-        ),
-        ({"estimate": 0.02, "error": 0.011}, "estimated 0.02, reached 0.011\n", Status.DONE),
-        ({"failed": ["a"]}, "K = 10, after a; 2 frames checked\n", Status.DONE),
-    ],
-)
-def test_what_became_of_a_run(full, monkeypatch, capsys, changes, words, status):
-    monkeypatch.setattr("pdrom.api.reduce", lambda *_, **__: done(full, **changes))
-    monkeypatch.setattr("pdrom.api.save", lambda *_: None)
-    assert run(COMMAND) == status
-    said = capsys.readouterr().out
-    assert said.startswith(
-        "small_requested.h5: 5 % of the positions against the converged implicit"
-    )
-    assert words in said
-    assert "\n  error: expected at most 0.031" in said
-    assert said.endswith(
-        "2.00 ms a frame, 8.00 in the cheapest full order that meets it; choosing took 1.5 s, "
-        "as long as 750 frames\n"
-    )
-
-
-def test_a_training_run_is_a_full_order_run(full, monkeypatch, capsys):
-    monkeypatch.setattr("pdrom.api.load", lambda *_: done(full))
-    assert run(COMMAND) == Status.FAULTY
-    assert capsys.readouterr().err == "pdrom: small.h5: no full-order run (pdrom run makes one)\n"
 
 
 REPORT = FrameReport(np.zeros(0), np.array([0.0, 1e-3, 1e-3, 0.0]))

@@ -166,7 +166,7 @@ def _write_tables(results: Invented) -> None:
     reads = [read for made in declarations().values() for read in made.reads.values()]
     for name in {read.name for read in reads if isinstance(read, TableOf)}:
         table = reference(name)
-        if "scene" in table and name != "requested_tolerances":
+        if "scene" in table:
             table = table[table.scene.isin(list(results.study.scenes))]
         if "method" in table:
             table = table[~table.method.isin(others)]

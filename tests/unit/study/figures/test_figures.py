@@ -23,12 +23,10 @@ from pdrom.model.effects.obstacle import Sphere
 from pdrom.model.mesh.generators import cloth
 from pdrom.model.mesh.types import save_mesh
 from pdrom.reduction.method import load_methods
-from pdrom.view.multiples import log_axes
-from pdrom.view.style import new_figure, note
+from pdrom.view.style import note
 from places import CONFIG
 from study.artifact.paths import MESH, RERUNS, SUBSPACES
 from study.figures import accuracy_cost as view
-from study.figures.accuracy_cost import dots
 from study.figures.kit.declaration import Drawn, Reduction, declarations, write_figure
 from study.figures.runs import obstacles_of
 from study.pipeline.study import Study
@@ -362,16 +360,6 @@ def test_every_axis_of_the_scaling_has_two_numbers_at_least(study):
         for axis in (ax.xaxis, ax.yaxis):
             low, high = axis.get_view_interval()
             assert sum(low <= place <= high for place in axis.get_majorticklocs()) >= 2
-
-
-def test_dots_that_are_none_leave_the_axes_their_room():
-    """Such dots, which are not clipped, made the axes of the figure collapse."""
-    chart, none = new_figure(3.2), pd.Series(dtype=float)
-    for ax in chart.subplots(1, 2):
-        dots(ax, none, none, (1e-4, 1.0), "black")
-        log_axes(ax, (5e-3, 2e-1), (1e-4, 1.0))
-    FigureCanvasAgg(chart).draw()
-    assert all(ax.get_position().width > 0.3 for ax in chart.axes)
 
 
 # Accuracy against time --------------------------------------------------------------------------

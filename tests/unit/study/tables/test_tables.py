@@ -14,10 +14,9 @@ from pdrom.core.store import write_hdf5, write_table
 from pdrom.model.held_out import MOTIONS, PLAYBACK
 from pdrom.reduction.basis import Basis, save_basis
 from study.artifact import paths
-from study.artifact.paths import REQUESTED_TOLERANCES, File
+from study.artifact.paths import File
 from study.experiments.kit.base import Horizon
-from study.experiments.requested_tolerances import COLUMNS
-from study.tables.accuracy_cost import accuracy_cost, pareto, reference_of, requested_tolerances
+from study.tables.accuracy_cost import accuracy_cost, pareto, reference_of
 from study.tables.effects_cost import local_share
 from study.tables.errors import sensitivity, singular_values
 from study.tables.kit.results import TRAIN, trained
@@ -360,20 +359,3 @@ def test_local_share_counts_assembly_with_the_local_step(tmp_path, files):
            "assembly_ms": 1.0, "global_ms": 1.0, "method": None, "ms_per_frame": 4.0}  # fmt: skip
     path = written(tmp_path / "c.csv", row)
     assert local_share([path], NOT_TIMED).local_share.tolist() == [0.75]
-
-
-ROW = {
-    "scene": "s", "motion": "heldout", "tolerance": 0.05, "vertices": 9, "frames": 8,
-    "reduced": True, "error": 0.04, "ms_per_frame": 0.1, "full_ms": 0.2, "own_ms": 0.4,
-}  # fmt: skip
-
-
-def test_a_request_is_broken_where_it_counts_as_met_and_the_error_is_larger(tmp_path):
-    rows = [ROW, ROW | {"error": 0.06}, ROW | {"frames": 0, "error": 0.06, "reduced": False}]
-    path = REQUESTED_TOLERANCES.at(str(tmp_path), scene="s")
-    write_table(pd.DataFrame(rows, columns=COLUMNS), path)
-    made = requested_tolerances([REQUESTED_TOLERANCES.file(path)], [])
-    assert made.met.tolist() == [True, True, False]
-    assert made.broken.tolist() == [False, True, False]
-    assert made.over_full.tolist() == [0.5] * 3
-    assert made.over_own.tolist() == [0.25] * 3
