@@ -119,7 +119,6 @@ def _viewed(runs: list[AnyRun]) -> ViewedScene:
 
 def _shown(run: ReducedRun) -> ViewedRun:
     """Prepare a reduced run for a page."""
-    names, outcome = (run.group, run.method, run.method), run.outcome
+    moved, blowup = np.asarray(run.outcome.positions), run.outcome.blowup_frame
     ms = run.ms if np.isfinite(run.ms) else None
-    moved = np.asarray(outcome.positions)
-    return ViewedRun(*names, run.r, moved, run.error, outcome.blowup_frame, ms)
+    return ViewedRun(run.group, run.method, run.r, moved, run.error, blowup, ms)

@@ -10,41 +10,24 @@ from pdrom.model.dynamics.stepper import FrameReport
 
 WIDTH = 24  # number of characters of the progress bar
 EVERY = 0.2  # seconds between two updates of the line on a terminal
-PAUSE = 2.0  # seconds between two lines of `LevelProgress` where stderr is no terminal
 
 
-class _Line:
-    """Progress of the run ``name`` on ``stream``; begins with a notice if code must be compiled."""
+class Progress:
+    """Line with the number of the frame, milliseconds per frame and the estimated time left.
 
-    def __init__(self, name: str, stream: TextIO | None = None) -> None:
-        self._name, self._stream = name, stream or sys.stderr
-        self._terminal = self._stream.isatty()
-        self._began = self._shown = monotonic()
+    It begins with a notice if code must be compiled. If ``stream`` is no terminal, a new line is
+    written after each tenth of the run ``name``, which has ``frames`` frames.
+    """
+
+    def __init__(self, name: str, frames: int, stream: TextIO | None = None) -> None:
+        self._name, self._frames, self._stream = name, frames, stream or sys.stderr
+        self._terminal, self._shown = self._stream.isatty(), monotonic()
+        self._ends = [self._shown]
         folder = os.environ.get("NUMBA_CACHE_DIR")
         # without a compiled step loop in the cache folder, compilation is announced
         if folder is not None and not any(Path(folder).glob("dynamics*/*.nbi")):
             self._stream.write(f"{name}: compiling kernels (once, up to a minute)\n")
             self._stream.flush()
-
-    def _show(self, text: str, now: float) -> None:
-        self._shown = now
-        self._stream.write(f"\r{text:<{3 * WIDTH}}  " if self._terminal else f"{text}\n")
-        self._stream.flush()
-
-    def _end(self) -> None:
-        if self._terminal:
-            self._stream.write("\n")
-
-
-class Progress(_Line):
-    """Line with the number of the frame, milliseconds per frame and the estimated time left.
-
-    If the stream is no terminal, a new line is written after each tenth of the run.
-    """
-
-    def __init__(self, name: str, frames: int, stream: TextIO | None = None) -> None:
-        super().__init__(name, stream)
-        self._frames, self._ends = frames, [self._began]
 
     def __call__(self, frame: int, report: FrameReport) -> None:
         """Show that frame ``frame`` (0-based) has been computed, and its time from ``report``."""
@@ -60,5 +43,10 @@ class Progress(_Line):
         bar = "#" * full + "." * (WIDTH - full)
         text = f"frame {done} of {self._frames}, {ms:.2f} ms a frame, {left:.0f} s left"
         self._show(f"{self._name} [{bar}] {text}", now)
-        if done == self._frames:
-            self._end()
+        if done == self._frames and self._terminal:
+            self._stream.write("\n")
+
+    def _show(self, text: str, now: float) -> None:
+        self._shown = now
+        self._stream.write(f"\r{text:<{3 * WIDTH}}  " if self._terminal else f"{text}\n")
+        self._stream.flush()

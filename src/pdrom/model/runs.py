@@ -51,15 +51,9 @@ class ConvergedStepper(Stepper):
         self.evaluations: list[int] = []
 
     @property
-    def solved(self) -> int:
-        """Number of first frames that reached the tolerance, of those computed so far."""
-        missed = np.flatnonzero(np.greater(self.changes, self._tolerance))
-        return int(missed[0]) if len(missed) else len(self.changes)
-
-    @property
     def converged(self) -> bool:
         """Whether every frame computed so far reached the tolerance."""
-        return self.solved == len(self.changes)
+        return not np.greater(self.changes, self._tolerance).any()
 
     def step(
         self, state: State, frame: int, on_last_iterate: Callable[[np.ndarray], None] | None = None

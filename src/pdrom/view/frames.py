@@ -55,10 +55,10 @@ def _draw(scene: ViewedScene) -> Figure:
         RunPanel(f"frame {frame}", style.FULL_ORDER, q, reference=True)
         for frame, q in zip(numbers, full, strict=True)
     ]
-    labels, groups = [f"{style.words(scene.name)}\n{scene.first}"], {r.group for r in scene.runs}
+    labels, groups = [f"{style.words(scene.name)}\nfull order"], {r.group for r in scene.runs}
     for run in shown_runs(scene):
         group = f"{style.words(run.group)}\n" if len(groups) > 1 else ""
-        labels.append(group + plain_words(run.title) + (f"\nr = {run.r}" if run.r else ""))
+        labels.append(f"{group}{plain_words(run.method)}\nr = {run.r}")
     every = [reference, *([_panel(run, f) for f in numbers] for run in shown_runs(scene))]
     windows = [
         shared_window(CAMERA, q, [panels[i] for panels in every]) for i, q in enumerate(full)
@@ -123,13 +123,12 @@ def vtk(scene: ViewedScene, collection: Path) -> None:
 def point_data(scene: ViewedScene, frame: int) -> dict[str, np.ndarray]:
     """Data of each vertex of ``scene`` in a ``frame``, (N, 3) float32 each.
 
-    Velocity (m/s, if stored) and displacement from the initial state (m) of the full-order run;
-    for each reduced run its positions minus those of the full order (m), by which ParaView
-    can warp the full-order mesh, and NaN after the end of the reduced run.
+    Displacement from the initial state (m) of the full-order run; for each reduced run its
+    positions minus those of the full order (m), by which ParaView can warp the full-order mesh, and
+    NaN after the end of the reduced run.
     """
     now = scene.positions[frame]
-    data = {} if scene.velocities is None else {"velocity": scene.velocities[frame]}
-    data["displacement"] = now - scene.positions[0]
+    data = {"displacement": now - scene.positions[0]}
     for run in shown_runs(scene):
         ended = frame >= len(run.positions)
         apart = np.full_like(now, np.nan) if ended else run.positions[frame] - now

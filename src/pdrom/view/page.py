@@ -5,7 +5,7 @@ The file has only the surface vertices of a run, in some of its frames, quantise
 import json
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from importlib.resources import files
 from math import ceil
 from typing import Any
@@ -24,7 +24,7 @@ from pdrom.view.camera import rotation_to, shown_region, up_of
 class ViewedRun:
     """A reduced run of F' frames.
 
-    group, method, title : names of the reduced group and of the method, title of the method
+    group, method : names of the reduced group and of the method
     positions : (F' + 1, N, 3) m, finite, the initial state first
     error : (F',) relative error of each frame
     blowup_frame : frame in which the run blew up and ended; None if all frames of the scene ran
@@ -33,7 +33,6 @@ class ViewedRun:
 
     group: str
     method: str
-    title: str
     r: int
     positions: np.ndarray
     error: np.ndarray
@@ -48,12 +47,8 @@ class ViewedScene:
     time_step : time step of a frame, s
     positions : (F + 1, N, 3) m of the full-order run
     ms : milliseconds per frame of the full-order run, None if not measured
-    floor : (F,) relative difference of runs that differ by rounding errors only; empty if unknown
-    horizon : frame from which on ``floor`` is too large to compare runs; None if unknown
     runs : reduced runs, sorted by group, method and basis size r
     effects : effects of the scene; obstacles among them are drawn
-    velocities : (F + 1, N, 3) m/s of the full-order run, None if they were not stored
-    first : label of the run with which the reduced runs are compared
     """
 
     name: str
@@ -62,12 +57,8 @@ class ViewedScene:
     time_step: float
     positions: np.ndarray
     ms: float | None
-    floor: np.ndarray = field(default_factory=lambda: np.empty(0))
-    horizon: int | None = None
     runs: tuple[ViewedRun, ...] = ()
     effects: tuple[EffectConfig, ...] = ()
-    velocities: np.ndarray | None = None
-    first: str = "full order"
 
     def sizes(self, group: str, method: str) -> list[ViewedRun]:
         """Runs of a group and a method by ascending basis size r."""
@@ -128,7 +119,6 @@ def pack_scene(scene: ViewedScene) -> dict[str, Any]:
     return {
         "name": scene.name,
         "title": scene.title,
-        "first": scene.first,
         "triangles": pack_text(triangles.reshape(-1, 3).astype("<u4")),
         "timeStep": scene.time_step,
         "stride": stride,
@@ -144,12 +134,10 @@ def pack_scene(scene: ViewedScene) -> dict[str, Any]:
             if body is not None
         ],
         "ms": scene.ms,
-        "floor": _numbers(scene.floor),
-        "horizon": scene.horizon,
         "runs": [
             {
                 "group": run.group,
-                "method": run.title,
+                "method": run.method,
                 "r": run.r,
                 "positions": pack_positions(run.positions[::stride, used]),
                 "error": _numbers(run.error),

@@ -15,7 +15,7 @@ NOTE = 100  # characters per line in a figure that contains only text
 
 # Palette of Okabe and Ito (2008), distinguishable with every common colour vision deficiency.
 BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
-YELLOW, BLUE, VERMILLION, PURPLE = "#F0E442", "#0072B2", "#D55E00", "#CC79A7"
+BLUE, VERMILLION, PURPLE = "#0072B2", "#D55E00", "#CC79A7"
 GREY = "#8C8C8C"
 FAILED = "#B3261E"
 FULL_ORDER = "#DAD6CC"
@@ -30,14 +30,6 @@ METHODS: dict[str, tuple[str, str]] = {
     "block-qdeim": (GREEN, "X"),
     "gappy": ("#7A5C00", "<"),
     "bounded": ("#1F9E89", "*"),
-    "fewer-iterations": ("#4D4D4D", "x"),
-    "pod subspace": ("#5E3C99", "p"),
-    "pod subspace, ecsw-3e-02": ("#00A19A", "."),
-    "pod subspace, ecsw-1e-02": ("#1B6E6E", ">"),
-    "pod subspace, ecsw-1e-03": ("#3F6B00", "d"),
-    "skinning subspace": ("#8B1A4A", "h"),
-    "pod subspace, hrpd": ("#B05CC6", "|"),
-    "skinning subspace, hrpd": ("#D98BA6", "+"),
 }
 _RESERVE = (("#5A5A5A", "1"), ("#9A6A00", "2"), ("#6B3F00", "3"), ("#2B2B80", "4"))
 

@@ -34,7 +34,7 @@
     const ofGroup = scene.runs.filter((run) => run.group === at("group").value);
     fill(at("method"), distinct(ofGroup.map((run) => run.method)));
     const ofMethod = ofGroup.filter((run) => run.method === at("method").value);
-    fill(at("r"), ofMethod.map((run) => run.r), (r) => r || "–");
+    fill(at("r"), ofMethod.map((run) => run.r));
     return [scene, ofMethod.find((run) => String(run.r) === at("r").value) || null];
   }
 
@@ -84,7 +84,7 @@
       body.set(q);
       drawing.add(body);
     }
-    at("left").textContent = above() ? `${shown.scene.first} (wires) and reduced` : shown.scene.first;
+    at("left").textContent = above() ? "full order (wires) and reduced" : "full order";
     at("right").textContent = beside ? "reduced" : "";
     at("legend").hidden = !(shown.reduced && at("colour").checked);
     at("largest").textContent = `${(0.1 * side() / 1.4).toPrecision(2)} and more`;
@@ -125,9 +125,9 @@
   const x = (frame) => LEFT + (WIDTH - LEFT - RIGHT) * frame / Math.max(1, (shown.full.length - 1) * shown.scene.stride);
   const y = (error, [low, high]) => TOP + (HEIGHT - TOP - BOTTOM) * (high - Math.log10(error)) / (high - low);
 
-  // Decades of the axis: those of the scene's errors and of its floor, for all its runs the same ones.
+  // Decades of the axis: those of the scene's errors, for all its runs the same ones.
   function decades(scene) {
-    const values = [scene.floor, ...scene.runs.map((run) => run.error)].flat().filter((error) => error > 0).map(clipped);
+    const values = scene.runs.flatMap((run) => run.error).filter((error) => error > 0).map(clipped);
     if (!values.length) return [-2, 0];
     const least = values.reduce((a, b) => Math.min(a, b)), most = values.reduce((a, b) => Math.max(a, b));
     const low = Math.floor(Math.log10(least)), high = Math.ceil(Math.log10(most));
@@ -172,21 +172,9 @@
     for (let i = 0; i <= 4; i++) {
       parts.push(word(x(i * last / 4), bottom + 16, time(i * last / 4).toPrecision(2), i < 4 ? "middle" : "end"));
     }
-    if (scene.floor.some((error) => error > 0)) {
-      const line = path(scene.floor, range).replaceAll("M", "L").slice(1);
-      parts.push(element("path", { class: "floor", d: `M${x(1)} ${bottom}L${line}L${x(scene.floor.length)} ${bottom}Z` }));
-    }
     if (run) parts.push(element("path", { class: "error", d: path(run.error, range) }));
-    if (scene.horizon !== null) {
-      const place = x(scene.horizon);
-      parts.push(element("line", { class: "horizon", x1: place, x2: place, y1: TOP, y2: bottom }));
-    }
     chart.now = element("line", { class: "now", x1: LEFT, x2: LEFT, y1: TOP, y2: bottom });
     parts.push(chart.now, word((LEFT + WIDTH) / 2, bottom + 34, "time, s"), word(4, 14, "relative error", "start"));
-    if (scene.floor.length) {
-      parts.push(element("rect", { class: "floor", x: LEFT, y: HEIGHT - 18, width: 18, height: 9 }));
-      parts.push(word(LEFT + 24, HEIGHT - 9, "sensitivity floor", "start"));
-    }
     at("errors").replaceChildren(...parts);
     at("errors").dataset.decades = range.join(" ");
   }
@@ -203,13 +191,10 @@
 
   function tell() {
     const { scene, run } = shown, ms = (value) => (value === null ? "not timed" : `${value.toPrecision(3)} ms a frame`);
-    const parts = [`${scene.title}.`, `${scene.first[0].toUpperCase()}${scene.first.slice(1)}: ${ms(scene.ms)}.`];
+    const parts = [`${scene.title}.`, `Full order: ${ms(scene.ms)}.`];
     if (run) parts.push(`Reduced: ${ms(run.ms)}.`);
     if (run) parts.push(`Relative error: distance of the two runs over the full order's motion (its distance from the start, root mean square over the frames); ${told(run)}.`);
     if (run && run.blowup !== null) parts.push(`The reduced run blew up at frame ${run.blowup}.`);
-    parts.push(!scene.floor.length ? "Sensitivity floor and horizon are not known here."
-      : scene.horizon === null ? "The floor stays below the threshold: the whole run can be judged."
-        : `Beyond frame ${scene.horizon} (dotted line) errors cannot be told from chaos.`);
     if (!drawing.accelerated) parts.push("This browser has no WebGL2: pictures are drawn on the processor, and slower.");
     at("about").textContent = parts.join(" ");
   }
@@ -218,7 +203,6 @@
     const parts = [`frame ${frame}, ${time(frame).toFixed(2)} s`], { run } = shown;
     if (run && shown.reduced.length <= k) parts.push("the reduced run had ended");
     else if (run && frame > 0 && run.error[frame - 1] != null) parts.push(`relative error ${run.error[frame - 1].toPrecision(2)}`);
-    if (shown.scene.horizon !== null && frame > shown.scene.horizon) parts.push("past the horizon");
     return parts.join(", ");
   }
 
