@@ -45,6 +45,8 @@ def run(
 ) -> FullRun:
     """Run a scene in full order; snapshots of every group are stored for the training of a basis.
 
+    Log a warning where held vertices or free vertices at rest lie inside an obstacle.
+
     Parameters
     ----------
     scene : scene made by `build_scene` or `load_scene`
@@ -65,6 +67,8 @@ def run(
     if out is not None:
         require_place(files.file_path(out))
         require_own(out)
+    scene.log_holds()
+    scene.log_contacts()
     count, plans = scene.config.frames, scene.config.reduce
     usual = min((count + 1) // 2, SNAPSHOTS)
     frames = {

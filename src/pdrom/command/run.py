@@ -18,7 +18,6 @@ def perform(arguments: argparse.Namespace) -> Status:
     out = arguments.out or str(file.parent / f"{file.stem}.h5")
     scene = load_scene(arguments.scene)
     require_output(out, files_of(arguments.scene, scene))
-    scene.log_contacts()
     full = run(scene, out, Progress(scene.config.name, scene.config.frames))
     sys.stdout.write(
         f"{out}: {scene.config.frames} frames of {scene.mesh.vertices} vertices, "

@@ -66,6 +66,27 @@ def test_a_run_is_that_of_the_step_loop(full):
     assert len(training_frames(12, 6)) == 6
 
 
+TOP = {"select": "top", "over": 4}
+INTO_A_BALL = {
+    "translate": {"effect": "translate", "offset": [0, 0, 0.6], **TOP},
+    "rotate": {"effect": "rotate", "axis": "y", "degrees": 90, **TOP},
+    "keyframes": {
+        "effect": "keyframes", "select": "top",
+        "keys": [{"at": 2, "offset": [0, 0, 0.6]}, {"at": 4}],
+    },
+    "poke": {"effect": "poke", "amplitude": 0.6, "over": 8, "count": 1, "avoid": ["top", "bottom"]},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", INTO_A_BALL)
+def test_a_run_warns_of_held_vertices_that_enter_an_obstacle(name, caplog):
+    """Also where they leave it again."""
+    ball = {"effect": "sphere", "centre": [0, 2.25, 0.6], "radius": 0.4}
+    effects = [INTO_A_BALL[name], ball, {"effect": "spring", "weight": 1e5}]
+    api.run(api.build_scene(effects=effects, mesh={"kind": "cloth"}, frames=9))
+    assert "held vertices have targets inside 'sphere' and stay there" in caplog.text
+
+
 def test_the_full_rank_reproduces_the_run_and_few_modes_do_not(full):
     """Snapshots train the basis at even frames; at full rank the rest is interpolation error."""
     rank = api.basis(full, "spring").rank
