@@ -236,6 +236,13 @@ PASSED_OVER = {
     "su2": (rb"^[ \t]*(NZONE[ \t]*=[ \t]*0*(?:[2-9]|1\d))", "one zone is read"),
     "tecplot": (rb"^[ \t]*ZONE\b.*?^[ \t]*(ZONE)\b", "one zone is read"),
 }
+# Format -> pattern of lines that begin a section; of two sections meshio would read the last.
+ONCE = {
+    "gmsh": rb"^(\$(?:MeshFormat|Nodes|Elements))\b",
+    "medit": rb"^\s*(Dimension|Vertices)\b",
+    "ply": rb"^(element\s+(?:vertex|face))\b",
+    "vtk": rb"^(DATASET|POINTS|CELLS|CELL_TYPES)\b",
+}
 
 
 def check_before(name: str, content: bytes) -> None:
@@ -246,12 +253,16 @@ def check_before(name: str, content: bytes) -> None:
     CutError
         The end mark of this format is missing.
     UnreadableError
-        The reader would ignore a line that changes the mesh, or vertex numbers that are
-        not in ascending order.
+        A section stands there twice, or the reader would ignore a line that changes the mesh,
+        or vertex numbers that are not in ascending order.
     """
     binary = name == "stl" and 84 + 50 * int.from_bytes(content[80:84], "little") == len(content)
     if name in ENDS and not binary and not re.search(ENDS[name], content, re.M):
         raise CutError("the file does not end as this format does")
+    begun = re.findall(ONCE[name], content, re.M | re.I) if name in ONCE else []
+    twice = next((section for section in begun if begun.count(section) > 1), None)
+    if twice:
+        raise UnreadableError(f"{twice.decode()} stands there twice")
     if name == "wkt" and content.count(b"(") != content.count(b")"):
         raise CutError("brackets that are not closed")  # the reader would run for hours
     if name in PASSED_OVER:
@@ -409,11 +420,11 @@ def read_obj(path: Path) -> tuple[np.ndarray, np.ndarray]:
     Raises UnreadableError for an unknown statement, a face corner that is no integer, a bad number.
     """
     # comments are removed first, as a backslash at their end does not continue the line
-    content = re.sub(rb"#[^\n]*", b"", path.read_bytes())
+    content = re.sub(rb"#[^\r\n]*", b"", path.read_bytes())
     vertices: list[bytes] = []
     faces: list[bytes] = []
     before: list[int] = []  # number of vertices before each face; a corner -1 is the last of these
-    whole_lines = re.sub(rb"\\[ \t]*\r?\n", b" ", content)
+    whole_lines = re.sub(rb"\\[ \t]*(?:\r\n|\r|\n)", b" ", content)
     for line in whole_lines.splitlines():
         words = line.split(None, 1)
         if not words:

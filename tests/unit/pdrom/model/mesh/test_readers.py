@@ -41,6 +41,7 @@ def square(path: Path, content: str | bytes) -> None:
         V + "# C:\\meshes\\\nf 1 2 3 # one \\\nf 1 3 4\n",
         V + "f 1 \\\n2 3\nf 1 3 \\  \r\n4\n",
         V.replace(" ", "\t").replace("\n", "\r\n") + "\r\n  f 1 2  3 # one\r\nf\t1 3 4\r\n",
+        (V + "f 1 2 3 # one\n# lower part\nf 1 3 \\\n4\n").replace("\n", "\r"),
         (V + "g H\u00fclle\nf 1 2 3\nfo 1 3 4\n").encode("latin-1"),
     ],
 )
@@ -103,6 +104,10 @@ def legacy(dataset: str, sections: str, version: str = "3.0") -> str:
 
 GRID = f"CELLS 2 8\n{FACES}CELL_TYPES 2\n5\n5\n"
 OFFSETS = "OFFSETS vtktypeint64\n0 3 6\nCONNECTIVITY vtktypeint64\n0 1 2 0 2 3\n"
+MEDIT = (
+    "MeshVersionFormatted 2\nDimension 3\nVertices\n4\n" + XYZ.replace("\n", " 0\n")
+    + "Triangles\n2\n1 2 3 0\n1 3 4 0\nEnd\n"
+)  # fmt: skip
 NODES = "1 0 0 0\n2 1 0 0.1\n3 1 .25 1\n4 0 0.5 1e-3\n"
 
 
@@ -124,6 +129,7 @@ def gmsh4(version: str) -> str:
         ("a.vtk", legacy("UNSTRUCTURED_GRID", GRID)),
         ("a.vtk", legacy("UNSTRUCTURED_GRID\nFIELD FieldData 1\nTIME 1 1 double\n0.5",
                          f"CELLS 3 6\n{OFFSETS}CELL_TYPES 2\n5 5\n", "5.1")),
+        ("a.mesh", MEDIT),
         ("a.msh", gmsh4("4")),
         ("a.msh", gmsh4("4.0")),
     ],
@@ -148,6 +154,11 @@ def test_plain_files_are_read(tmp_path, name, content):
         ("a.vtk", legacy("POLYDATA", f"POLYGONS 2 8\n{FACES}"), PLAIN),
         ("a.vtk", legacy("UNSTRUCTURED_GRID", GRID.replace("TYPES 2\n5", "TYPES 1")),
          "elements are announced"),
+        ("a.vtk", legacy("UNSTRUCTURED_GRID", f"POINTS 4 double\n{XYZ}" + GRID), "POINTS stands"),
+        ("a.mesh", MEDIT.replace("Triangles", f"Vertices 4\n{NODES}Triangles"), "Vertices stands"),
+        ("a.ply", ply().replace("element face", "element vertex 4\nelement face"), "vertex stands"),
+        ("a.msh", gmsh4("4").replace("$Elements", f"$Nodes\n{NODES}$EndNodes\n$Elements"),
+         "$Nodes stands there twice"),
         ("a.vtk", legacy("UNSTRUCTURED_GRID", f"CELLS 2 {10**12}\n{FACES}"), "not a readable mesh"),
     ],
 )  # fmt: skip
