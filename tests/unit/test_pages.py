@@ -2,6 +2,7 @@
 
 import re
 import shlex
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -11,7 +12,7 @@ from pdrom.model.effects import EFFECTS
 from pdrom.model.mesh.selection import KINDS
 from pdrom.model.scene import SceneConfig
 from pdrom.reduction.method import MethodSpec
-from places import CONFIG, ROOT
+from places import CONFIG, ROOT, tracked
 from study.artifact.paths import RESULTS
 from study.figures.stability_map import LOOKS
 from study.pipeline.front import completed
@@ -21,15 +22,15 @@ from study.tables.kit.results import trained
 from study.verification.command import parser
 from study.verification.references import folder_of, read_reference
 from study.verification.subject import options_parser
+from vocabulary import gone, known
 
 PAGES = sorted([ROOT / "README.md", ROOT / "config" / "README.md", *(ROOT / "docs").rglob("*.md")])
 ADDING = ROOT / "docs" / "adding.md"
 NAMES = [str(page.relative_to(ROOT)) for page in PAGES]
-# Examples of names that a reader chooses.
-EXAMPLES = {"config/scenes/my_sheet.yaml", "config/mine.yaml", "config/scenes/meshes/sheet.obj"}
 LINK = re.compile(r"\]\(([^)#]+)[^)]*\)")
-PATH = re.compile(r"`((?:config|docs|paper|src|tests|workflow)/[\w./-]+)`")
-BUILT = {"paper/main.pdf", "paper/supplement.pdf", "paper/numbers.json"}
+NAMED = [*PAGES, ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md"]
+CODE = re.compile(r"(?<![\w`])`+([^`\s](?:[^`\n]*[^`\s])?)`+")
+FILE = re.compile(r"(?<![\w{}./*$-])[\w{}./*-]*\w\.(?:py|js|smk|tex|yaml|sh|css)\b")
 COMMAND = re.compile(r"\./reproduce ([^`#\n]+)")
 
 
@@ -49,14 +50,60 @@ def test_links_lead_to_files_and_headings_that_exist(page: Path) -> None:
     assert [a for target, a in targets if a not in headings(target)] == []
 
 
-@pytest.mark.parametrize("page", [*PAGES, ROOT / "CONTRIBUTING.md"], ids=[*NAMES, "CONTRIBUTING"])
-def test_paths_of_the_project_exist(page: Path) -> None:
-    """A recipe's own files stand before its code, with a colon; what was given up is gone."""
+def spans(text: str) -> Iterator[str]:
+    """Texts in code font and commands; a key that begins with a dot gets the section before it."""
+    for block in re.findall(r"^```sh\n(.*?)^```", text, re.MULTILINE | re.DOTALL):
+        yield from (line.partition(" #")[0] for line in block.splitlines())
+    for line in re.sub(r"```.*?```", "", text, flags=re.DOTALL).splitlines():
+        section = ""
+        for span in CODE.findall(line):
+            if re.fullmatch(r"[a-z_]+(\.\w+)+", span):
+                section = span.rpartition(".")[0]
+            yield section + span if section and re.fullmatch(r"\.\w+", span) else span
+
+
+@pytest.mark.parametrize("page", NAMED, ids=[str(page.relative_to(ROOT)) for page in NAMED])
+def test_names_in_code_font_exist(page: Path) -> None:
+    """Modules, commands, options, keys, files; those that a recipe of the page defines, too."""
+    text = page.read_text("utf-8").split("\n## 0.")[0]  # of releases only the coming one
     if page.name == "0018-what-was-given-up.md":
-        return
-    text = page.read_text("utf-8")
-    made = set(re.findall(r"^`([^`]+)`:$", text, re.MULTILINE)) | EXAMPLES | BUILT
-    assert [p for p in PATH.findall(text) if p not in made and not (ROOT / p).exists()] == []
+        text = re.sub(r"^\| [^|]* \|", "|", text, flags=re.MULTILINE)
+    recipes = re.findall(r"```(?:python|yaml|tex)\n(.*?)```", text, re.DOTALL)
+    own = {*re.findall(r"\w+", "".join(recipes)), *re.findall(r"(?m)^`([^`]+)`:$", text)}
+    wrong = [word for span in spans(text) for word in gone(span, own)]
+    assert wrong + [name for name in FILE.findall(text) if not known(name, own)] == []
+
+
+def test_files_modules_and_commands_that_sources_name_exist() -> None:
+    wrong = []
+    for path in tracked("src", "workflow", "config/*.yaml", "paper", "reproduce", "Snakefile"):
+        text = path.read_text("utf-8")
+        text = "\n".join(re.findall(r"%.*", text)) if path.suffix == ".tex" else text
+        words = [word for span in CODE.findall(text) for word in gone(span)]
+        words = [w for w in words if re.match(r"--|(pdrom|study)[. ]", w)] + FILE.findall(text)
+        wrong += [f"{path.relative_to(ROOT)}: {w}" for w in words if not known(w)]
+    assert wrong == []
+
+
+@pytest.mark.parametrize("title", ["Study", "Scene", "Method"])
+def test_keys_of_the_configuration_exist(title: str) -> None:
+    model = {"Study": StudySettings, "Scene": SceneConfig, "Method": MethodSpec}[title]
+    page = (CONFIG / "README.md").read_text("utf-8")
+    table = re.split(r"\n## |\| effect \|", page.split(f"\n## {title} (")[1])[0]
+    cells = "\n".join(re.findall(r"^\| (`[^|]*) \|", table, re.MULTILINE))
+    assert {key.split(".")[0] for key in spans(cells)} <= set(model.model_fields)
+
+
+@pytest.mark.parametrize(
+    "span",
+    [
+        "pdrom advise", "pdrom show --plot", "./reproduce --certify", "pdrom.core.gone",
+        "core/gone.py", "src/pdrom/errors.py", "docs/gone", "gone.csv", "stability.sweeps",
+        "variants", "{kind: x5y}",
+    ],
+)  # fmt: skip
+def test_a_name_that_is_gone_is_found(span: str) -> None:
+    assert list(gone(span)) != []
 
 
 def test_a_line_of_prose_holds_one_sentence() -> None:

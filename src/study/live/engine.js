@@ -3,8 +3,8 @@
 // it runs in a page as in a test. Matrices are Float64Arrays by rows; coordinates are (K, 3).
 const pdromEngine = (() => {
   const SWEEPS = 12, ORTHOGONAL = 1e-15, LAST_TANGENT = 1e-8, RANK = 1e-15; // as in svd3.py
-  const STEPS = 16, WELL_CONDITIONED = 1e-2, LAST_STEP = 1e-18; // as in polar3.py
-  const FLAT = 1e-2, EQUAL = 1e-17, LOW = 1e-60, HIGH = 1e60; // as in clamp2.py
+  const STEPS = 16, WELL_CONDITIONED = 1e-2, LAST_STEP = 1e-18; // as in tetrahedron.py
+  const FLAT = 1e-2, EQUAL = 1e-17, LOW = 1e-60, HIGH = 1e60; // as in triangle_strain.py
   const SMALLEST = 1e-300;
 
   // ---- small linear algebra ----
