@@ -95,9 +95,9 @@ def names() -> set[str]:
 
 @cache
 def resolved(word: str) -> bool:
-    """Whether the word is a module or what one defines."""
-    with suppress(ImportError, AttributeError, ValueError):
-        return resolve_name(word) is not word
+    """Whether the word is a module of the project or what one defines."""
+    with suppress(ImportError, AttributeError):
+        return word.startswith(("pdrom.", "study.")) and resolve_name(word) is not word
     return False
 
 

@@ -30,7 +30,9 @@ NAMES = [str(page.relative_to(ROOT)) for page in PAGES]
 LINK = re.compile(r"\]\(([^)#]+)[^)]*\)")
 NAMED = [*PAGES, ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md"]
 CODE = re.compile(r"(?<![\w`])`+([^`\s](?:[^`\n]*[^`\s])?)`+")
-FILE = re.compile(r"(?<![\w{}./*$-])[\w{}./*-]*\w\.(?:py|js|smk|tex|yaml|sh|css)\b")
+FILE = re.compile(
+    r"(?<![\w{}./*$-])[\w{}./*-]*\w\.(?:py|js|smk|tex|yaml|sh|css)\b|\bpdrom(?:\.\w+){2,}"
+)
 COMMAND = re.compile(r"\./reproduce ([^`#\n]+)")
 
 
@@ -80,8 +82,9 @@ def test_files_modules_and_commands_that_sources_name_exist() -> None:
         text = path.read_text("utf-8")
         text = "\n".join(re.findall(r"%.*", text)) if path.suffix == ".tex" else text
         words = [word for span in CODE.findall(text) for word in gone(span)]
-        words = [w for w in words if re.match(r"--|(pdrom|study)[. ]", w)] + FILE.findall(text)
-        wrong += [f"{path.relative_to(ROOT)}: {w}" for w in words if not known(w)]
+        words = [w for w in words if re.match(r"--|(pdrom|study)[. ]", w)]
+        words += [w for w in FILE.findall(text) if not known(w)]
+        wrong += [f"{path.relative_to(ROOT)}: {w}" for w in words]
     assert wrong == []
 
 
