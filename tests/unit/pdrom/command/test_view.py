@@ -1,5 +1,6 @@
 """pdrom view: a page, a picture and files for ParaView, of every kind of run."""
 
+import json
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -39,6 +40,17 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def files(runs: Path) -> list[str]:
     return [str(runs / f"{name}.h5") for name in ("small", "small_spring_gappy_2")]
+
+
+def test_a_run_of_an_earlier_version_which_stored_a_requested_error_is_read(runs, tmp_path):
+    path = tmp_path / "run.h5"
+    shutil.copy(runs / "small.h5", path)
+    with h5py.File(path, "r+") as file:
+        settings = json.loads(file.attrs["configuration"])
+        settings["scene"]["requested_error"] = None
+        file.attrs["configuration"] = json.dumps(settings)
+    write_block(path)
+    assert load(path).scene.config == load(runs / "small.h5").scene.config
 
 
 def test_the_page_the_picture_and_the_files_for_paraview_have_all_runs(runs, tmp_path, capsys):
