@@ -1,6 +1,6 @@
 """Total energy of a run, from its stored positions, relative to the full-order run."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -23,6 +23,7 @@ def energies(scene: Scene, positions: np.ndarray) -> np.ndarray:
     1 / (STRIDE K) of a run's local steps. The forces' potential is defined up to a constant.
     """
     frames = sorted({*range(0, len(positions), STRIDE), len(positions) - 1})
+    scene = replace(scene, groups=[group.for_run() for group in scene.groups])
     with np.errstate(over="ignore", invalid="ignore"):
         return np.array([_energy(scene, positions, frame) for frame in frames])
 

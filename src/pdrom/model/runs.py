@@ -59,7 +59,7 @@ class ConvergedStepper(Stepper):
         self, state: State, frame: int, on_last_iterate: Callable[[np.ndarray], None] | None = None
     ) -> tuple[State, FrameReport]:
         """Compute ``frame`` from ``state``; ``on_last_iterate`` is ignored, the report is empty."""
-        s, elimination, base = self._begin(state, frame)
+        s, elimination, base, anchors = self._begin(state, frame)
         rhs = np.empty_like(s)
 
         def evaluate(y: np.ndarray) -> tuple[float, np.ndarray]:
@@ -74,7 +74,7 @@ class ConvergedStepper(Stepper):
         )
         self.changes.append(end.change)
         self.evaluations.append(end.evaluations)
-        return self._finish(state, end.y, frame), FrameReport(np.empty(0), np.zeros(4))
+        return self._finish(state, end.y, frame, anchors), FrameReport(np.empty(0), np.zeros(4))
 
 
 def converged_run(scene: Scene, tolerance: float, limit: int) -> np.ndarray | None:
@@ -127,7 +127,7 @@ def run(
             series[name] = file.create_dataset(name, shape, dtype="f8")
             series[name].attrs["unit"] = unit
         series["timings"].attrs["phases"] = PHASES
-        recorder = _SnapshotRecorder(file, scene, snapshot_frames)
+        recorder = _SnapshotRecorder(file, loop, snapshot_frames)
         series["positions"][0], series["velocities"][0] = state.positions, state.velocities
         for frame in range(frames):
             watch = recorder.observer(frame)
@@ -146,11 +146,11 @@ class _SnapshotRecorder:
     """Writes projections p of the requested groups and frames to datasets of an HDF5 file."""
 
     def __init__(
-        self, file: h5py.File, scene: Scene, snapshot_frames: Mapping[str, np.ndarray]
+        self, file: h5py.File, loop: Stepper, snapshot_frames: Mapping[str, np.ndarray]
     ) -> None:
         self._targets = []
         for name, frames in snapshot_frames.items():
-            group = scene.group(name)
+            group = loop.local_step(name)
             store = file.create_group(f"snapshots/{name}")
             store["frames"] = np.asarray(frames, dtype=np.int64)
             shape = (len(frames), group.elements * group.rows_per_element, 3)

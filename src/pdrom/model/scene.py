@@ -5,7 +5,6 @@ as warnings. Masses are lumped: all vertices have equal masses, or selected ones
 
 import logging
 from collections.abc import Sequence
-from copy import deepcopy
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
@@ -376,11 +375,12 @@ def log_obstructed(scene: Scene) -> None:
     """
     obstacles = [contact for contact in scene.contacts if contact.each_alone]
     inside, blocked = np.zeros(scene.mesh.vertices, dtype=bool), dict[str, None]()
-    # copies, since boundary conditions store positions when a hold begins
-    boundaries, positions = deepcopy(scene.boundaries), scene.mesh.points.copy()
+    anchors: base.Anchors = ()
+    positions = scene.mesh.points.copy()
     slack = SLACK * scene.mesh.extent
-    for frame in range(scene.config.frames if obstacles and boundaries else 0):
-        held, targets = base.held_targets(boundaries, frame, positions)
+    for frame in range(scene.config.frames if obstacles and scene.boundaries else 0):
+        one = range(frame, frame + 1)
+        held, (targets,), anchors = base.held_path(scene.boundaries, one, positions, anchors)
         positions[held] = targets
         for obstacle in obstacles:
             obstacle.correct(positions, positions.copy())

@@ -182,8 +182,8 @@ def recorded(
     The projections are those of the constraint ``group`` (e elements of p rows each) at the last
     iterate of every frame. ``start`` (N, 3) m is added to the initial positions.
     """
-    own, projections = scene.group(group), list[np.ndarray]()
     loop, state = scene.stepper(), scene.initial_state(start)
+    own, projections = loop.local_step(group), list[np.ndarray]()
     positions = [state.positions]
     for frame in range(scene.config.frames):
         state, _ = loop.step(state, frame, lambda y: projections.append(own.project(y)))

@@ -121,13 +121,13 @@ def contributions(scene: Scene) -> pd.DataFrame:
         rows.append((start.name, "start", 0, force, 0.5 * float(np.sum(m * v**2))))
     for frame in range(config.frames):
         after, _ = loop.step(state, frame)
-        rows += _frame(scene, watched, state, after, frame)
+        rows += _frame(scene, loop, watched, state, after, frame)
         state = after
     return pd.DataFrame([(config.name, *row) for row in rows], columns=EFFECTS)
 
 
 def _frame(
-    scene: Scene, watched: list[_Watched], before: State, after: State, frame: int
+    scene: Scene, loop: Stepper, watched: list[_Watched], before: State, after: State, frame: int
 ) -> list[Row]:
     h, m = scene.config.time_step, scene.masses[:, None]
     active = [b for b in scene.boundaries if b.active(frame)]
@@ -142,7 +142,7 @@ def _frame(
         forces[key] = forces.get(key, 0.0) + np.broadcast_to(force, after.positions.shape)
         energies[effect.name] = energies.get(effect.name, 0.0) + energy
 
-    for group in scene.groups:  # `step` has called begin_frame for ``frame``
+    for group in map(loop.local_step, scene.config.groups):  # prepared for ``frame`` by `step`
         missing = group.project(after.positions) - group.S @ after.positions
         weighted = group.row_weights[:, None] * missing
         energy = 0.5 * float(np.sum(missing * weighted))

@@ -44,6 +44,7 @@ class NumpyLocalStep:
     """
 
     def __init__(self, group: ConstraintGroup) -> None:
+        group = group.for_run()
         self.name, self.group, self.begin_frame = group.name, group, group.begin_frame
         self.assembly_seconds = 0.0
         self._shape = (group.elements, group.rows_per_element, 3)
@@ -66,6 +67,7 @@ class InterpretedLocalStep:
     """Local step by interpreted Python code that projects one element after the other."""
 
     def __init__(self, group: ConstraintGroup) -> None:
+        group = group.for_run()
         self.name, self.group, self.begin_frame = group.name, group, group.begin_frame
         self.assembly_seconds = 0.0
         rows = group.rows_per_element
@@ -342,8 +344,8 @@ def _training(scene: Scene, system: GlobalSystem, frames: int) -> tuple[np.ndarr
     Positions (n, N, 3) in m are those at the ends of frames. Projections (n, e p, 3) of the first
     group of ``scene`` and their rounding errors (n,) are those of the last local step of a frame.
     """
-    group = scene.groups[0]
     loop, state = scene.stepper(system, track_objective=False), scene.initial_state()
+    group = loop.local_step(scene.groups[0].name)
     positions, projections, roundoff = [], [], []
 
     def watch(y: np.ndarray) -> None:

@@ -74,13 +74,14 @@ class Callback:
 
     def __init__(self, function, signature):
         _mark(function)
-        self.function, self.signature = function, signature
+        self.function, self.signature, self._compiled = function, signature, []
 
     @cached_property
     def address(self):
         """Address of the compiled function, valid as long as this object exists."""
-        self._compiled = cfunc(self.signature, cache=True, error_model="numpy")(self.function)
-        return self._compiled.address
+        made = cfunc(self.signature, cache=True, error_model="numpy")(self.function)
+        self._compiled.append(made)  # two threads may compile at once: keep both results
+        return made.address
 
 
 def caller(result):

@@ -6,7 +6,7 @@ Energy of a group (Bouaziz et al. 2014, eq. 4): 1/2 sum_e w_e || S_e q - p_e(q) 
 from abc import abstractmethod
 from collections.abc import Callable
 from copy import copy
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
 from pydantic import Field
@@ -67,7 +67,7 @@ class ConstraintGroup(Effect):
     gradient_kernel: Any = None
     """Compiled function that maps S q to projections (`local_kernel.gradient_kernel`), or None."""
     local_kernel: LocalKernel | None = None
-    """Compiled form of `accumulate` for compiled loops; without it, override `accumulate`."""
+    """Compiled form of `accumulate` for compiled loops, in a group from `for_run`, else None."""
     _pass: LocalPass | None = None
     manifold: ClassVar[str | None] = None
     """Set onto which elements are projected: "clamped" (signed singular values in the range
@@ -115,7 +115,18 @@ class ConstraintGroup(Effect):
 
     def begin_frame(self, q: np.ndarray, elements: np.ndarray | None = None) -> None:
         """Compute data that are fixed during a frame, such as normals, at ``q`` (N, 3) m for
-        ``elements`` (m,); None: all."""
+        ``elements`` (m,); None: all. Only groups from `for_run` store such data."""
+
+    def for_run(self) -> Self:
+        """Return the group with memory of its own for all that a run writes, the rest shared."""
+        own = copy(self)
+        own.local_kernel = own._accumulator()
+        own._pass = None if own.local_kernel is None else LocalPass([own.local_kernel])
+        return own
+
+    def _accumulator(self) -> LocalKernel | None:
+        """Return a new `local_kernel` with its own memory; None if `accumulate` is overridden."""
+        return None
 
     def kernel_parameters(self) -> np.ndarray:
         """Return the numbers that ``gradient_kernel`` needs besides S q, in the order it expects.
@@ -142,11 +153,10 @@ class ConstraintGroup(Effect):
 
     def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
         """Add S^T W p(y) of ``y`` (N, 3) m to ``rhs`` (N, 3) in place; return the energy, J."""
-        if self.local_kernel is None:
+        own = self._pass or self.for_run()._pass
+        if own is None:
             raise NotImplementedError(f"{self.name} has neither a local kernel nor its own")
-        if self._pass is None or self._pass.kernels != (self.local_kernel,):
-            self._pass = LocalPass([self.local_kernel])
-        return self._pass.accumulate(y, rhs)
+        return own.accumulate(y, rhs)
 
     @abstractmethod
     def reference_project(self, d: np.ndarray, elements: np.ndarray) -> np.ndarray:
@@ -156,7 +166,7 @@ class ConstraintGroup(Effect):
     def restricted(
         self, elements: np.ndarray, factors: np.ndarray
     ) -> tuple["ConstraintGroup", np.ndarray]:
-        """Return a group of the given ``elements`` only, on the vertices that these elements use.
+        """Return a group `for_run` of the given ``elements`` only, on the vertices that they use.
 
         Parameters
         ----------
@@ -202,7 +212,7 @@ class StencilGroup(ConstraintGroup):
         for name in ("operator", *self.per_element):
             setattr(part, name, np.ascontiguousarray(getattr(self, name)[elements]))
         part._assemble(len(vertices))
-        return part, vertices
+        return part.for_run(), vertices
 
     def _assemble(self, vertices: int) -> None:
         e, p, m = self.operator.shape

@@ -2,7 +2,7 @@
 
 import math
 from copy import copy
-from typing import Any, Literal
+from typing import Any, Literal, Self
 
 import numpy as np
 from numba import carray
@@ -356,14 +356,29 @@ class VertexBending(ConstraintGroup):
         fan_normals(q, self.vertices, curved, *fans, self.normals)
         put_poles(self._manifold, curved, self.side, self.normals)
 
+    def for_run(self) -> Self:
+        own = copy(self)
+        own.normals, own._manifold = self.normals.copy(), rows.copied(self._manifold)
+        return super(VertexBending, own).for_run()
+
     def sampler(self, elements: np.ndarray) -> LocalKernel:
         return self._kernel(project_vertices, elements)
+
+    def _accumulator(self) -> LocalKernel:
+        def touched(block: int) -> np.ndarray:
+            return self.S.indices[self.S.indptr[block * lanes.LANES] :]
+
+        split, none = self.elements >= self.split_from, np.empty(0, np.int64)
+        return self._kernel(accumulate_vertices, none, touched if split else None)
 
     def _kernel(self, function: Any, elements: np.ndarray, touched: Any = None) -> LocalKernel:
         """Return a `LocalKernel` with a ``function`` that either writes the projections of
         ``elements`` or adds the forces of all elements; for ``touched``, see `LocalKernel`."""
+        if not self.normals.flags.writeable:
+            raise RuntimeError(f"{self.name}: a scene's group has no frame; use that of `for_run`")
         operator = self.S.indptr, self.S.indices, self.S.data
-        arrays = (*operator, self._manifold, self._work, elements, self._taken)
+        memory = lanes.workspaces(SIZE), elements, lanes.workspace(MANIFOLD)
+        arrays = (*operator, self._manifold, *memory)
         numbers, count = (self.elements, len(elements)), lanes.blocks(self.elements)
         return LocalKernel(function, self.S.shape[1], count, arrays, numbers, touched)
 
@@ -387,21 +402,14 @@ class VertexBending(ConstraintGroup):
         part.normals = self.normals[elements].copy()
         part._curved = np.flatnonzero(part.side)
         part._set_kernel()
-        return part, vertices
+        return part.for_run(), vertices
 
     def _set_kernel(self) -> None:
         self.S.indptr = self.S.indptr.astype(np.int32)
         self.S.indices = self.S.indices.astype(np.int32)
         numbers = (self.weights, self.magnitude, self.rest, self.side[:, None] * self.normals)
         self._manifold = lanes.pack(np.column_stack(numbers))
-        self._work = lanes.workspaces(SIZE)
-        self._taken = lanes.workspace(MANIFOLD)
-
-        def touched(block: int) -> np.ndarray:
-            return self.S.indices[self.S.indptr[block * lanes.LANES] :]
-
-        split, none = self.elements >= self.split_from, np.empty(0, np.int64)
-        self.local_kernel = self._kernel(accumulate_vertices, none, touched if split else None)
+        self.normals.flags.writeable = self._manifold.flags.writeable = False
 
     def kernel_parameters(self) -> np.ndarray:
         return self._manifold

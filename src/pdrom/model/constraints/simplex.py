@@ -50,27 +50,26 @@ class SimplexGroup(StencilGroup):
     """Number of values per lane in the working array."""
     allowed: Any = ()
     """Constants of the kernels, such as the allowed range of singular values."""
-    _own_arrays: tuple[np.ndarray, ...] = ()
-    """Further arrays whose addresses are appended to the record of the kernels."""
     reordered: ClassVar[bool] = True
     """Whether the kernels may visit the elements in an order different from the mesh."""
 
     def _assemble(self, vertices: int) -> None:
         super()._assemble(vertices)
-        e, m = self.stencil.shape
+        e = len(self.stencil)
         self._order = visiting_order(self.stencil, vertices) if self.reordered else None
-        visited = self._visited(np.asarray(self.stencil, dtype=np.int32))
-        self._corners = pack(visited)
+        self._corners = pack(self._visited(np.asarray(self.stencil, dtype=np.int32)))
         numbers = self._visited(np.column_stack([self.weights, *self._extra()]))
-        self._geometry = pack(numbers)
+        self._geometry, self._numbers = pack(numbers), numbers.shape[1]
         # copies of the last element fill up its block: with weight 0 they add no force or energy
-        by_lane = self._geometry.reshape(blocks(e), numbers.shape[1], LANES)
+        by_lane = self._geometry.reshape(blocks(e), self._numbers, LANES)
         by_lane[-1:, WEIGHT, e - LANES * (blocks(e) - 1) :] = 0.0
-        self._work = workspaces(self.work_size)
-        self._taken = (np.empty(m * LANES, np.int32), rows.zeros(LANES * numbers.shape[1]))
-        touched = (lambda block: visited[block * LANES :]) if e >= self.split_from else None
-        none = np.empty(0, np.int64)
-        self.local_kernel = self._kernel(self.accumulate_kernel, none, touched)
+        self._corners.flags.writeable = self._geometry.flags.writeable = False
+
+    def _accumulator(self) -> LocalKernel:
+        visited = self._visited(self.stencil)
+        split = self.elements >= self.split_from
+        touched = (lambda block: visited[block * LANES :]) if split else None
+        return self._kernel(self.accumulate_kernel, np.empty(0, np.int64), touched)
 
     def _visited(self, values: np.ndarray) -> np.ndarray:
         """Return the values (e, ...) of all elements in the order in which kernels visit them."""
@@ -83,11 +82,16 @@ class SimplexGroup(StencilGroup):
     def _kernel(self, function: Any, elements: np.ndarray, touched: Any = None) -> LocalKernel:
         """Return a `LocalKernel` with a ``function`` that either writes the projections of
         ``elements`` or adds the forces of all elements; for ``touched``, see `LocalKernel`."""
-        data = (self._corners, self._geometry, np.array(self.allowed), self._work)
-        arrays = (*data, elements, *self._taken, *self._own_arrays)
-        numbers = self._work.shape[1], len(elements)
-        count = blocks(self.elements)
+        count, work = blocks(self.elements), workspaces(self.work_size)
+        data = (self._corners, self._geometry, np.array(self.allowed), work, elements)
+        corners = np.empty(self.stencil.shape[1] * LANES, np.int32)
+        arrays = (*data, corners, rows.zeros(LANES * self._numbers), *self._further())
+        numbers = work.shape[1], len(elements)
         return LocalKernel(function, self.S.shape[1], count, arrays, numbers, touched)
+
+    def _further(self) -> tuple[np.ndarray, ...]:
+        """Return further arrays whose addresses are appended to the record of a new kernel."""
+        return ()
 
     def _extra(self) -> list[np.ndarray]:
         """Return arrays (e, numbers) to pack after the weights: operators S_e without column 0."""

@@ -162,14 +162,17 @@ class EdgeSpring(simplex.SimplexGroup):
 
     def _assemble(self, vertices: int) -> None:
         # rest edges are not in `_geometry`: only edges whose current length is zero need them
-        self._own_arrays = pack(self.rest), np.empty(REST * LANES)
+        self._rest_edges = pack(self.rest)
         super()._assemble(vertices)
+
+    def _further(self) -> tuple[np.ndarray, ...]:
+        return self._rest_edges, np.empty(REST * LANES)
 
     def _extra(self) -> list[np.ndarray]:
         return [np.linalg.norm(self.rest, axis=1)]
 
     def kernel_parameters(self) -> np.ndarray:
-        return np.concatenate([self._geometry, self._own_arrays[0]])
+        return np.concatenate([self._geometry, self._rest_edges])
 
     def reference_project(self, d: np.ndarray, elements: np.ndarray) -> np.ndarray:
         rest = self.rest[elements, None, :]

@@ -21,7 +21,7 @@ from pdrom.model.constraints.local_kernel import LocalPass, add_part
 from pdrom.model.dynamics.acceleration import NO_HISTORY, Anderson, combine, forget, refuse
 from pdrom.model.dynamics.sweeps import load, sweep
 from pdrom.model.dynamics.system import Elimination
-from pdrom.model.effects.base import Boundary, Contact, Force
+from pdrom.model.effects.base import Anchors, Boundary, Contact, Force
 
 
 @compiled(nogil=True)
@@ -194,8 +194,9 @@ def all_iterations(
 # Largest number of frames that one compiled call computes: few are wasted if a run ends early.
 BLOCK = 16
 
-Blocks = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
-"""Positions, velocities (n, N, 3) at the end of n frames; objectives (n, K), seconds (n, 4)."""
+Blocks = tuple[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray], Anchors]
+"""Positions, velocities (n, N, 3) at the end of n frames, objectives (n, K), seconds (n, 4); and
+the anchors of the states (`pdrom.model.dynamics.stepper.State`)."""
 
 
 class WholeFrames:
@@ -203,7 +204,7 @@ class WholeFrames:
 
     Parameters
     ----------
-    space : space whose ``held_path`` and ``system`` are used
+    space : space whose ``held_path`` and ``elimination`` are used
     loop : compiled iterations that are run in each frame
     forces, contacts : of the scene; no ``rate`` of a force is None, and each contact is a floor
     """
@@ -251,8 +252,9 @@ class WholeFrames:
         )
 
     def run(
-        self, q: np.ndarray, v: np.ndarray, frames: range, h: float, iterations: int, track: bool
-    ) -> Blocks | None:
+        self, q: np.ndarray, v: np.ndarray, frames: range, h: float, iterations: int, track: bool,
+        anchors: Anchors,
+    ) -> Blocks | None:  # fmt: skip
         """Run the first n ``frames``, as many as one call can, and return the results; return None,
         without a run, if the solver is not compiled.
 
@@ -262,9 +264,10 @@ class WholeFrames:
         h : time step, s
         iterations : number of iterations per frame
         track : whether the objective is computed
+        anchors : those of the state at the beginning
         """
-        fixed, targets = self._space.held_path(frames[:BLOCK], q)
-        system = self._space.system.eliminate(fixed)
+        fixed, targets, anchors = self._space.held_path(frames[:BLOCK], q, anchors)
+        system = self._space.elimination(fixed)
         if not self._loop.takes(system):
             return None
         count = len(targets)
@@ -281,7 +284,7 @@ class WholeFrames:
             targets, system.coupling, self._floors, self._work, (0, iterations, iterations),
             history, objective, seconds, *self._loop.compiled_arguments, system.factor,
         )  # fmt: skip
-        return positions[1:], velocities[1:], objective, seconds
+        return (positions[1:], velocities[1:], objective, seconds), anchors
 
 
 @inner

@@ -1,7 +1,7 @@
 """Coordinates of the step loop: vertex positions, or coordinates in a position subspace."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, Protocol
 
 import numpy as np
@@ -16,6 +16,9 @@ from pdrom.model.effects import base
 class Solve(Protocol):
     """A factored global system from which coordinates with prescribed values are eliminated."""
 
+    def set_targets(self, targets: np.ndarray) -> None:
+        """Set the values ``targets`` (m, 3) of the prescribed coordinates for the next solves."""
+
     def solve(self, rhs: np.ndarray, y: np.ndarray) -> None:
         """Overwrite the free coordinates of ``y`` (n, 3) by the solution for ``rhs`` (n, 3)."""
 
@@ -26,6 +29,10 @@ class Space(ABC):
     Arrays are (n, 3) for n coordinates: ``positions`` and their ``velocities`` at the beginning of
     a frame, the iterate ``y``, the prediction ``s``. ``h`` is the time step in seconds.
     """
+
+    _boundaries: Sequence[Any]  # each acts like a `base.Boundary`, on coordinates
+    _eliminated: Callable[[np.ndarray], Solve]
+    _made: dict[bytes, Solve]
 
     def predict(self, positions: np.ndarray, velocities: np.ndarray, h: float) -> np.ndarray:
         """Return the prediction s = q + h v + h^2 a of ``positions`` q and ``velocities`` v."""
@@ -55,16 +62,37 @@ class Space(ABC):
         ``positions`` (m) and ``velocities`` (m/s) are those at the beginning of the frame.
         """
 
-    @abstractmethod
-    def fixed(self, frame: int, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def fixed(self, frame: int, positions: np.ndarray, anchors: base.Anchors = ()) -> base.Held:
         """Return indices (m,), ascending, and values (m, 3) of coordinates prescribed in ``frame``.
 
-        ``positions`` (n, 3) are the coordinates at the beginning of the frame.
+        ``positions`` (n, 3) are the coordinates at the beginning of the frame, ``anchors`` those of
+        the state; anchors of the state after the frame are the third result.
         """
+        one = range(frame, frame + 1)
+        indices, (targets,), anchors = self.held_path(one, positions, anchors)
+        return indices, targets, anchors
 
-    @abstractmethod
+    def held_path(
+        self, frames: range, positions: np.ndarray, anchors: base.Anchors = ()
+    ) -> base.Held:
+        """Return indices (m,) and values (n, m, 3) in the first n ``frames``, else as `fixed`.
+
+        Holds begin or end only in the first of these frames.
+        """
+        return base.held_path(self._boundaries, frames, positions, anchors)
+
+    def elimination(self, fixed: np.ndarray) -> Any:
+        """Return the factored system (`Solve`) without ``fixed`` coordinates, made only once."""
+        key = fixed.tobytes()
+        if key not in self._made:
+            self._made[key] = self._eliminated(fixed)
+        return self._made[key]
+
     def eliminate(self, fixed: np.ndarray, targets: np.ndarray) -> Solve:
         """Return the factored system in which ``fixed`` coordinates have the values ``targets``."""
+        elimination: Solve = self.elimination(fixed)
+        elimination.set_targets(targets)
+        return elimination
 
     @abstractmethod
     def inertia(self, s: np.ndarray) -> np.ndarray:
@@ -89,7 +117,7 @@ class VertexSpace(Space):
         boundaries: Sequence[base.Boundary] = (),
         contacts: Sequence[base.Contact] = (),
     ) -> None:
-        self.system = system
+        self.system, self._eliminated, self._made = system, system.eliminate, {}
         self._forces, self._boundaries, self._contacts = forces, boundaries, contacts
 
     def acceleration(self, positions: np.ndarray, velocities: np.ndarray) -> np.ndarray:
@@ -97,21 +125,6 @@ class VertexSpace(Space):
         for force in self._forces:
             total = total + force.acceleration(positions, velocities)
         return total
-
-    def fixed(self, frame: int, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        return base.held_targets(self._boundaries, frame, positions)
-
-    def held_path(self, frames: range, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the vertices (m,) held in the first n ``frames``, and their targets (n, m, 3) m.
-
-        Holds begin or end only in the first of these frames; ``positions`` (N, 3) m: at its start.
-        """
-        return base.held_path(self._boundaries, frames, positions)
-
-    def eliminate(self, fixed: np.ndarray, targets: np.ndarray) -> Solve:
-        elimination = self.system.eliminate(fixed)
-        elimination.set_targets(targets)
-        return elimination
 
     def predict(self, positions: np.ndarray, velocities: np.ndarray, h: float) -> np.ndarray:
         acceleration = np.atleast_2d(self.acceleration(positions, velocities))

@@ -16,6 +16,7 @@ import numpy as np
 
 from pdrom.model.dynamics.acceleration import Anderson
 from pdrom.model.dynamics.space import Solve, Space
+from pdrom.model.effects.base import Anchors
 
 PHASES = ("inertia", "local", "global", "finish")
 Observer = Callable[[np.ndarray], None] | None
@@ -29,7 +30,8 @@ class LocalStep(Protocol):
     """Local step of a constraint group, or an approximation of it; groups have these methods, too.
 
     In a position subspace y and rhs have the shape (k, 3) of k coordinates instead of (N, 3).
-    Compiled iterations need an attribute ``local_kernel`` in every local step.
+    Compiled iterations need an attribute ``local_kernel`` in every local step. A local step that
+    several runs may share has a method ``for_run``, which returns it with memory of its own.
     """
 
     name: str
@@ -46,10 +48,14 @@ class LocalStep(Protocol):
 
 @dataclass(frozen=True)
 class State:
-    """Positions (N, 3) m and velocities (N, 3) m/s, or their coordinates (k, 3) in a subspace."""
+    """Positions (N, 3) m and velocities (N, 3) m/s, or their coordinates (k, 3) in a subspace.
+
+    With ``anchors``, where present holds began, any step loop of the scene can continue from here.
+    """
 
     positions: np.ndarray
     velocities: np.ndarray
+    anchors: Anchors = ()
 
 
 @dataclass(frozen=True)
@@ -67,7 +73,7 @@ class FrameReport:
 
 
 class Stepper:
-    """Step loop, which advances a state frame by frame in the coordinates of a `Space`."""
+    """Step loop in the coordinates of a `Space`; it owns all memory that its run writes."""
 
     def __init__(
         self,
@@ -81,12 +87,16 @@ class Stepper:
         self.space = space
         self.time_step = time_step
         self.iterations = iterations
-        self.local_steps = list(local_steps)
+        self.local_steps = [s.for_run() if hasattr(s, "for_run") else s for s in local_steps]
         self._acceleration = acceleration
         self._track = track_objective
         # `WholeFrames` or None; a subclass may set another object that has the same method `run`
         self._whole: Any
         self._compiled, self._whole = space.compiled(self.local_steps, acceleration)
+
+    def local_step(self, name: str) -> Any:
+        """Return the local step ``name`` of this loop, with the data of its present frame."""
+        return next(step for step in self.local_steps if step.name == name)
 
     def step(
         self, state: State, frame: int, on_last_iterate: Observer = None
@@ -97,11 +107,11 @@ class Stepper:
                 return done
         seconds = np.zeros(len(PHASES))
         started = perf_counter()
-        s, elimination, base = self._begin(state, frame)
+        s, elimination, base, anchors = self._begin(state, frame)
         seconds[0] = perf_counter() - started
         y, objective = self._iterate(s, base, elimination, seconds, on_last_iterate)
         before = perf_counter()
-        after = self._finish(state, y, frame)
+        after = self._finish(state, y, frame, anchors)
         seconds[3] = perf_counter() - before
         return after, FrameReport(objective, seconds)
 
@@ -124,28 +134,29 @@ class Stepper:
             return ()
         q, v, h = state.positions, state.velocities, self.time_step
         started = perf_counter()
-        done = self._whole.run(q, v, frames, h, self.iterations, self._track)
-        if done is None:
+        found = self._whole.run(q, v, frames, h, self.iterations, self._track, state.anchors)
+        if found is None:
             return ()
+        done, anchors = found
         # time outside compiled code is added to phase "inertia", divided equally among the frames
         beside = perf_counter() - started - float(done[3].sum())
         done[3][:, 0] += max(beside, 0.0) / len(done[3])
         return [
-            (State(q, v), FrameReport(objective, seconds))
+            (State(q, v, anchors), FrameReport(objective, seconds))
             for q, v, objective, seconds in zip(*done, strict=True)
         ]
 
-    def _begin(self, state: State, frame: int) -> tuple[np.ndarray, Solve, np.ndarray]:
-        """Return prediction s with targets in fixed rows, the factored system, and (M/h^2) s."""
+    def _begin(self, state: State, frame: int) -> tuple[np.ndarray, Solve, np.ndarray, Anchors]:
+        """Return prediction s with targets in fixed rows, factored system, (M/h^2) s, anchors."""
         space, h = self.space, self.time_step
         s = space.predict(state.positions, state.velocities, h)
-        fixed, targets = space.fixed(frame, state.positions)
+        fixed, targets, anchors = space.fixed(frame, state.positions, state.anchors)
         s[fixed] = targets
         elimination = space.eliminate(fixed, targets)
         base = space.inertia(s)
         for local in self.local_steps:
             local.begin_frame(state.positions)
-        return s, elimination, base
+        return s, elimination, base, anchors
 
     def _iterate(
         self, s: np.ndarray, base: np.ndarray, system: Solve, seconds: np.ndarray, watch: Observer
@@ -204,7 +215,7 @@ class Stepper:
                 acceleration.combine(y)
         seconds[2] += perf_counter() - before
 
-    def _finish(self, state: State, y: np.ndarray, frame: int) -> State:
+    def _finish(self, state: State, y: np.ndarray, frame: int, anchors: Anchors) -> State:
         """Return the state after the frame: apply contacts, then compute the velocities."""
         self.space.correct(y, state.positions, frame)
-        return State(*self.space.end(y, state.positions, self.time_step))
+        return State(*self.space.end(y, state.positions, self.time_step), anchors)

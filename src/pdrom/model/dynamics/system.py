@@ -1,12 +1,14 @@
 """The global system (M / h^2 + sum_j S_j^T W_j S_j) y = rhs, with held vertices eliminated."""
 
 from collections.abc import Callable, Sequence
+from copy import copy
 
 import numpy as np
 from scipy import sparse
 
 from pdrom.core.errors import SolverError
 from pdrom.core.store import require_finite
+from pdrom.model.compiled.rows import empty, zeros
 from pdrom.model.constraints.base import ConstraintGroup
 from pdrom.model.dynamics import solvers
 
@@ -38,6 +40,14 @@ class Elimination:
             self._solver = kind(sparse.csr_array(block), self.free, coupling)
             self.factor, self.coupling = self._solver.factor, self._solver.coupling
             require_accurate(block, self._solve_free)
+
+    def for_run(self) -> "Elimination":
+        """Return the system with memory of its own for targets and solves, the factor shared."""
+        own, own._solver = copy(self), copy(self._solver)
+        if own._solver is not None and own.factor is not None:
+            panels, order, loads, x = own.factor
+            own.factor = own._solver.factor = panels, order, zeros(len(loads)), empty(len(x))
+        return own
 
     def _solve_free(self, rhs: np.ndarray, out: np.ndarray) -> None:
         all_rhs, y = np.zeros((2, len(self.fixed) + len(self.free), 3))
@@ -101,8 +111,8 @@ class GlobalSystem:
         return len(self._cache)
 
     def eliminate(self, fixed: np.ndarray) -> Elimination:
-        """Return the factored system without the vertices ``fixed`` (ascending), cached."""
+        """Return a system without the vertices ``fixed`` (ascending) for one run; cache factors."""
         key = np.ascontiguousarray(fixed, dtype=np.int64).tobytes()
         if key not in self._cache:
             self._cache[key] = Elimination(self.matrix, fixed, self._solver)
-        return self._cache[key]
+        return self._cache[key].for_run()

@@ -149,23 +149,26 @@ class Boundary(Effect):
         """Return the vertices (n,) int64 that are held in ``frame``, in which it is `active`."""
 
     @abstractmethod
-    def targets(self, frame: int, current: np.ndarray) -> np.ndarray:
+    def targets(self, frame: int, anchor: np.ndarray) -> np.ndarray:
         """Return the positions (n, 3) m of the held vertices at the end of ``frame``.
 
-        ``current`` (n, 3) m are their positions at the frame's beginning, which the effect stores
-        in the first frame of a hold.
+        ``anchor`` (n, 3) m are their positions at the beginning of the hold, see `anchor`.
         """
+
+    def anchor(self, frame: int, positions: np.ndarray) -> np.ndarray:
+        """Return the part (n, 3) m of ``positions`` (N, 3) of the vertices held in ``frame``."""
+        return positions[self.held(frame)]
 
     def takes_hold(self, frame: int) -> bool:
         """Return whether a hold begins in ``frame``; its targets depend on the positions then."""
         return True
 
-    def path(self, frames: range, current: np.ndarray) -> np.ndarray:
+    def path(self, frames: range, anchor: np.ndarray) -> np.ndarray:
         """Return `targets` (f, n, 3) m in f ``frames``; a hold may begin only in the first."""
-        first = self.targets(frames.start, current)
         if not self.moves:
+            first = self.targets(frames.start, anchor)
             return np.broadcast_to(first, (len(frames), *first.shape))
-        return np.array([first, *(self.targets(frame, current) for frame in frames[1:])])
+        return np.array([self.targets(frame, anchor) for frame in frames])
 
     @abstractmethod
     def units(self) -> list[np.ndarray]:
@@ -254,29 +257,30 @@ def held_vertices(boundaries: Sequence[Boundary], frame: int) -> np.ndarray:
     return np.unique(np.concatenate(held)) if held else np.empty(0, dtype=np.int64)
 
 
-def held_targets(
-    boundaries: Sequence[Boundary], frame: int, positions: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the vertices (n,) that ``boundaries`` hold in ``frame`` and their targets (n, 3) m.
-
-    ``positions`` (N, 3) m are those at the beginning of the frame.
-    """
-    vertices, path = held_path(boundaries, range(frame, frame + 1), positions)
-    return vertices, path[0]
+Anchors = tuple[np.ndarray | None, ...]
+"""For each boundary condition the positions (n, 3) m at which its present hold began, or None."""
+Held = tuple[np.ndarray, np.ndarray, Anchors]
+"""Held vertices, their targets, anchors for the next frame."""
 
 
 def held_path(
-    boundaries: Sequence[Boundary], frames: range, positions: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return held vertices (m,) and their targets (n, m, 3) m in the first n >= 1 ``frames``.
+    boundaries: Sequence[Boundary], frames: range, positions: np.ndarray, anchors: Anchors = ()
+) -> Held:
+    """Return held vertices (m,), their targets (n, m, 3) m in the first n >= 1 ``frames``, anchors.
 
     These frames end before the first in which the set of held vertices changes or a hold begins,
     since targets of that hold depend on positions that are not yet known. ``positions`` (N, 3) m
-    are those at the beginning of the first frame.
+    are those at the beginning of the first frame, ``anchors`` those returned for the frame before.
+    A hold without an anchor is taken to begin in the first frame.
     """
-    active = [b for b in boundaries if b.active(frames.start)]
-    held = [b.held(frames.start) for b in active]
-    current = [positions[v] for v in held]
+    frame, old = frames.start, anchors or (None,) * len(boundaries)
+    active = [b for b in boundaries if b.active(frame)]
+    held = [b.held(frame) for b in active]
+    anchors = tuple(
+        None if b not in active else
+        b.anchor(frame, positions) if q is None or b.takes_hold(frame) else q
+        for b, q in zip(boundaries, old, strict=True)
+    )  # fmt: skip
     single = len(active) == 1 and bool((held[0][1:] > held[0][:-1]).all())
     vertices, first = np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
     if single:
@@ -289,7 +293,10 @@ def held_path(
         or any(b.takes_hold(frames[known]) for b in active)
     ):
         known += 1
-    paths = [b.path(frames[:known], q) for b, q in zip(active, current, strict=True)]
+    begun = [q for q in anchors if q is not None]
+    paths = [b.path(frames[:known], q) for b, q in zip(active, begun, strict=True)]
     if single:
-        return vertices, np.array(paths[0], order="C")  # a view would make Numba compile again
-    return vertices, np.concatenate([np.empty((known, 0, 3)), *paths], axis=1)[:, first]
+        paths[0] = np.array(paths[0], order="C")  # a view would make Numba compile again
+        return vertices, paths[0], anchors
+    path = np.concatenate([np.empty((known, 0, 3)), *paths], axis=1)[:, first]
+    return vertices, path, anchors

@@ -1,6 +1,5 @@
 """Boundary conditions on the positions of vertices in some frames: pins, and moving handles."""
 
-from abc import abstractmethod
 from collections.abc import Sequence
 from typing import Annotated, Literal, Self
 
@@ -27,13 +26,12 @@ class HoldConfig(EffectConfig):
 
 
 class Hold(Boundary):
-    """Base class of pins and handles; it stores the vertices' positions when the hold begins."""
+    """Base class of pins and handles; their targets depend on the positions when a hold begins."""
 
     def __init__(self, config: HoldConfig, mesh: Mesh, masses: np.ndarray) -> None:
         super().__init__(config, mesh, masses)
         self.vertices = select_vertices(mesh, config.select)
         self.side = config.select if isinstance(config.select, str) else None
-        self._anchor: np.ndarray | None = None
 
     def active(self, frame: int) -> bool:
         until = self.config.until
@@ -45,17 +43,8 @@ class Hold(Boundary):
     def takes_hold(self, frame: int) -> bool:
         return frame == self.config.start
 
-    def targets(self, frame: int, current: np.ndarray) -> np.ndarray:
-        if self._anchor is None or self.takes_hold(frame):
-            self._anchor = current.copy()
-        return self._moved(self._anchor, frame)
-
     def units(self) -> list[np.ndarray]:
         return [self.vertices]
-
-    @abstractmethod
-    def _moved(self, anchor: np.ndarray, frame: int) -> np.ndarray:
-        """Return targets (n, 3) m in ``frame``; the hold began at positions ``anchor`` (n, 3) m."""
 
 
 class Pins(Hold):
@@ -72,7 +61,7 @@ class Pins(Hold):
 
     moves = False
 
-    def _moved(self, anchor: np.ndarray, frame: int) -> np.ndarray:
+    def targets(self, frame: int, anchor: np.ndarray) -> np.ndarray:
         return anchor
 
 
@@ -104,13 +93,11 @@ class Translate(Hold):
 
     moves = True
 
-    def path(self, frames: range, current: np.ndarray) -> np.ndarray:
-        first = self.targets(frames.start, current)
+    def path(self, frames: range, anchor: np.ndarray) -> np.ndarray:
         done = np.array([self.config.progress(frame) for frame in frames])
-        anchor = first if self._anchor is None else self._anchor
         return anchor + done[:, None, None] * np.array(self.config.offset)
 
-    def _moved(self, anchor: np.ndarray, frame: int) -> np.ndarray:
+    def targets(self, frame: int, anchor: np.ndarray) -> np.ndarray:
         return anchor + self.config.progress(frame) * np.array(self.config.offset)
 
 
@@ -136,7 +123,7 @@ class Rotate(Hold):
         super().__init__(config, mesh, masses)
         self._centre = 0.5 * (mesh.points.min(axis=0) + mesh.points.max(axis=0))
 
-    def _moved(self, anchor: np.ndarray, frame: int) -> np.ndarray:
+    def targets(self, frame: int, anchor: np.ndarray) -> np.ndarray:
         angle = np.radians(self.config.degrees) * self.config.progress(frame)
         axis = AXES[self.config.axis]
         first, second = (axis + 1) % 3, (axis + 2) % 3

@@ -76,7 +76,7 @@ class Keyframes(Hold):
         self._poses = np.stack([np.zeros(6), *poses])
         self._smooth = config.interpolation == "smooth"
 
-    def _moved(self, anchor: np.ndarray, frame: int) -> np.ndarray:
+    def targets(self, frame: int, anchor: np.ndarray) -> np.ndarray:
         from scipy.interpolate import PchipInterpolator
         from scipy.spatial.transform import Rotation
 

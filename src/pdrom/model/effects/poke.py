@@ -49,7 +49,6 @@ class Poke(Boundary):
             )
         self._order = farthest_points(mesh.points, free, config.count)
         self.vertices = np.sort(self._order)
-        self._anchor: np.ndarray | None = None
 
     def active(self, frame: int) -> bool:
         turn, phase = divmod(frame, self.config.over + self.config.rest)
@@ -62,12 +61,10 @@ class Poke(Boundary):
     def takes_hold(self, frame: int) -> bool:
         return frame % (self.config.over + self.config.rest) == 0
 
-    def targets(self, frame: int, current: np.ndarray) -> np.ndarray:
+    def targets(self, frame: int, anchor: np.ndarray) -> np.ndarray:
         phase = frame % (self.config.over + self.config.rest)
-        if self._anchor is None or self.takes_hold(frame):
-            self._anchor = current.copy()
         progress = (phase + 1) / self.config.over
-        target = self._anchor.copy()
+        target = anchor.copy()
         times = np.linspace(0.0, 1.0, len(KNOTS))
         target[:, AXES[self.config.axis]] += self.config.amplitude * np.interp(
             progress, times, KNOTS

@@ -6,7 +6,9 @@ coefficients, or each has its own set. A column of the lift adds the reconstruct
 coefficients to one axis of the right-hand side."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from copy import copy
+from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
@@ -192,16 +194,25 @@ class ReducedLocalStep:
     def __init__(self, group: ConstraintGroup, reduction: Reduction) -> None:
         """Precompute the arrays that ``reduction`` of ``group`` needs during a run."""
         self.name, self.frame_lagged = group.name, group.frame_lagged
-        self._group = group
         self._elements = np.ascontiguousarray(reduction.elements, dtype=np.int64)
         self._everything = len(self._elements) == group.elements
-        self._lift = _lift(group, reduction)
+        self._take(group, _lift(group, reduction))
+
+    def _take(self, group: ConstraintGroup, lift: Lift) -> None:
+        self._group, self._lift = group.for_run(), lift
         self.local_kernel: LocalKernel | None = None
         self._pass: LocalPass | None = None
-        if getattr(group, "local_kernel", None) is not None:
+        if self._group.local_kernel is not None:
             sampled = 3 * group.rows_per_element * len(self._elements)
-            self.local_kernel = self._lift.kernel(group.sampler(self._elements), sampled)
+            self.local_kernel = lift.kernel(self._group.sampler(self._elements), sampled)
             self._pass = LocalPass([self.local_kernel])
+
+    def for_run(self) -> Self:
+        """Return the step with memory of its own for all that a run writes, matrices shared."""
+        own, memory = copy(self), ("packed", "coefficients", "seconds")
+        changed = {name: np.zeros_like(getattr(self._lift, name)) for name in memory}
+        own._take(self._group, replace(self._lift, **changed))
+        return own
 
     def begin_frame(self, q: np.ndarray) -> None:
         """Compute data that sampled elements need in a frame that starts at ``q`` (N, 3) m."""

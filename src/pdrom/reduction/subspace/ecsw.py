@@ -183,7 +183,7 @@ def training_equations(
     The equations are hashed to at most `SKETCH` K rows (B has K columns) with seeded random signs,
     which changes norms of residuals by a few per cent (count sketch, Charikar et al. 2002).
     """
-    strain = np.ascontiguousarray(group.S @ columns.B)
+    group, strain = group.for_run(), np.ascontiguousarray(group.S @ columns.B)
     weighted = strain * group.row_weights[:, None]
     equations = sum(3 * len(frame.measure) * len(frame.pairs) for frame in training)
     size = min(SKETCH * strain.shape[1], equations)

@@ -32,6 +32,7 @@ from pdrom.model.dynamics.acceleration import NO_HISTORY, Anderson, History, com
 from pdrom.model.dynamics.frames import BLOCK, Blocks
 from pdrom.model.dynamics.space import Solve
 from pdrom.model.dynamics.stepper import LocalStep, Observer, Stepper
+from pdrom.model.effects.base import Anchors
 from pdrom.model.scene import Scene
 from pdrom.reduction.subspace.interpolation import SubspaceLocalStep
 from pdrom.reduction.subspace.space import DenseElimination, ReducedSpace
@@ -49,7 +50,7 @@ class FusedStepper(Stepper):
         h, iterations = config.time_step, config.iterations
         super().__init__(space, h, iterations, local_steps, False, acceleration)
         self._fused: _Fused | None = None
-        steps = [step for step in local_steps if isinstance(step, SubspaceLocalStep)]
+        steps = [step for step in self.local_steps if isinstance(step, SubspaceLocalStep)]
         kernels = [step.group.gradient_kernel for step in steps]
         if len(steps) == len(local_steps) and None not in kernels:
             self._fused = _Fused(space, _Sampled(steps), acceleration)
@@ -113,8 +114,9 @@ class _Fused:
         return self._acceleration.history
 
     def run(
-        self, q: np.ndarray, v: np.ndarray, frames: range, h: float, iterations: int, track: bool
-    ) -> Blocks | None:
+        self, q: np.ndarray, v: np.ndarray, frames: range, h: float, iterations: int, track: bool,
+        anchors: Anchors,
+    ) -> Blocks | None:  # fmt: skip
         """Compute as many of ``frames`` in turn as one compiled call can; ``track`` is ignored.
 
         Return None if the body touches a floor in the first frame, and also in the next `BLOCK` - 1
@@ -123,7 +125,7 @@ class _Fused:
         if self._waiting and frames.start:
             self._waiting -= 1
             return None
-        fixed, targets = self._space.held_path(frames[:BLOCK], q)
+        fixed, targets, anchors = self._space.held_path(frames[:BLOCK], q, anchors)
         elimination = self._space.elimination(fixed)
         own, count = self._of(elimination), len(targets)
         positions, velocities = np.empty((2, count + 1, *q.shape))
@@ -139,7 +141,7 @@ class _Fused:
             self._waiting = BLOCK - 1
             return None
         done = slice(1, free + 1)
-        return positions[done], velocities[done], np.empty((free, 0)), seconds[:free]
+        return (positions[done], velocities[done], np.empty((free, 0)), seconds[:free]), anchors
 
 
 class _Sampled:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pdrom.model.constraints.base import ConstraintGroup
+from pdrom.model.constraints.local_kernel import projections
 from pdrom.reduction.sampling.reduction import Reduction, element_rows
 from pdrom.reduction.subspace.columns import Columns
 
@@ -49,6 +50,7 @@ class InterpolatedLocalStep:
         self.group, vertices = group.restricted(
             interpolation.elements, np.ones(len(self._elements))
         )
+        self._sampler = self.group.sampler(self._elements)
         self._rows = np.ascontiguousarray(columns.B[vertices])
 
     def begin_frame(self, q: np.ndarray) -> None:
@@ -62,7 +64,8 @@ class InterpolatedLocalStep:
         rhs += i.offset
         if len(self._elements) == 0:
             return float("nan")
-        values = self.group.project_elements(self._rows @ y, self._elements)
+        count = self.group.rows_per_element * len(self._elements)
+        values = projections(self._sampler, self._rows @ y, count)
         coefficients = i.operator @ values.reshape(i.operator.shape[1], -1)
         rhs += (i.modes @ coefficients).reshape(rhs.shape)
         return float("nan")

@@ -13,7 +13,7 @@ import numpy as np
 from scipy import linalg
 
 from pdrom.core.errors import NotReducibleError, SolverError
-from pdrom.model.dynamics.space import Solve, Space
+from pdrom.model.dynamics.space import Space
 from pdrom.model.dynamics.stepper import State
 from pdrom.model.dynamics.system import require_accurate
 from pdrom.model.effects import base
@@ -100,13 +100,13 @@ class ReducedSpace(Space):
         h = scene.config.time_step
         self.columns = columns
         mass = columns.B.T @ (scene.masses[:, None] * columns.B)
+        self._made, self._eliminated = {}, lambda fixed: DenseElimination(self.matrix, fixed)
         self.matrix = mass / h**2 + sum(matrices, np.zeros_like(mass))
         self.inertia_matrix = mass / h**2
         self.forces = [_reduce_force(force, columns, scene) for force in scene.forces]
         # these objects act like a `Boundary`, with coordinates instead of vertices
-        self._boundaries: Any = [_ReducedBoundary(b, columns) for b in scene.boundaries]
+        self._boundaries = [_ReducedBoundary(b, columns) for b in scene.boundaries]
         self._contacts = [_ReducedContact(c, columns, scene) for c in scene.contacts]
-        self._cache: dict[bytes, DenseElimination] = {}
 
     def acceleration(self, positions: np.ndarray, velocities: np.ndarray) -> np.ndarray:
         total = np.zeros_like(positions)
@@ -138,25 +138,6 @@ class ReducedSpace(Space):
         for contact in self._contacts:
             first = contact.free_frames(path[:first])
         return first
-
-    def fixed(self, frame: int, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        return base.held_targets(self._boundaries, frame, positions)
-
-    def held_path(self, frames: range, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Indices (m,), values (n, m, 3) of coordinates held in n frames, see `base.held_path`."""
-        return base.held_path(self._boundaries, frames, positions)
-
-    def elimination(self, fixed: np.ndarray) -> DenseElimination:
-        """Reduced system without coordinates of indices ``fixed`` (m,); cached if made before."""
-        key = fixed.tobytes()
-        if key not in self._cache:
-            self._cache[key] = DenseElimination(self.matrix, fixed)
-        return self._cache[key]
-
-    def eliminate(self, fixed: np.ndarray, targets: np.ndarray) -> Solve:
-        elimination = self.elimination(fixed)
-        elimination.set_targets(targets)
-        return elimination
 
     def inertia(self, s: np.ndarray) -> np.ndarray:
         return self.inertia_matrix @ s
@@ -236,10 +217,14 @@ class _ReducedBoundary:
         """Ascending indices of subspace coordinates that move the vertices held in ``frame``."""
         return self._of(frame)[0]
 
-    def path(self, frames: range, current: np.ndarray) -> np.ndarray:
-        """Values (n, m, 3) in ``frames`` of coordinates `held`; ``current`` (m, 3): before them."""
-        _, rows, inverse = self._of(frames.start)
-        return inverse @ self.boundary.path(frames, rows @ current)
+    def anchor(self, frame: int, positions: np.ndarray) -> np.ndarray:
+        """Vertex positions (n, 3) m, in coordinates ``positions`` (K, 3), held in ``frame``."""
+        indices, rows, _ = self._of(frame)
+        return rows @ positions[indices]
+
+    def path(self, frames: range, anchor: np.ndarray) -> np.ndarray:
+        """Values (n, m, 3) in ``frames`` of coordinates `held`; see `base.Boundary.path`."""
+        return self._of(frames.start)[2] @ self.boundary.path(frames, anchor)
 
     def _of(self, frame: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Indices i of coordinates prescribed in ``frame``, R = B[held vertices, i]; pinv(R)."""

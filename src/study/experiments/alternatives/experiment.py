@@ -222,7 +222,8 @@ class Candidate:
         if self.columns is None:
             return state
         own = (self.columns, scene.masses)
-        return State(coordinates(*own, state.positions), coordinates(*own, state.velocities))
+        q, v = (coordinates(*own, field) for field in (state.positions, state.velocities))
+        return State(q, v, state.anchors)
 
     def run(self, frames: int, limit: float, extent: float) -> np.ndarray | None:
         """Run the method; return positions (F + 1, N, 3) m at the start and at the ends of frames.
@@ -355,7 +356,6 @@ class Timed:
         held = [tuple(b.active(frame) for b in scene.boundaries) for frame in places]
         first = [held.index(kind) for kind in dict.fromkeys(held)]
         places = np.concatenate([places[first], np.delete(places, first)])
-        # run all frames, not only timed ones: a hold stores positions in its first frame for later
         loop, states = scene.stepper(track_objective=False), [scene.initial_state()]
         states += [end for end, _ in loop.run(states[0], range(scene.config.frames))]
         for each in candidates(scene, self.models, self.settings):

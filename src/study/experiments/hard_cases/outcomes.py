@@ -97,14 +97,16 @@ class Training:
         self.group: ConstraintGroup = self.scene.groups[0]
         self._snapshots: list[np.ndarray] = []
         self._roundoff: list[float] = []
-        self.run = record.full_order(case, self.scene, self._observe)
+        loop = self.scene.stepper()
+        self._own: ConstraintGroup = loop.local_step(self.group.name)
+        self.run = record.record(self.scene, loop, case.start(self.scene), observe=self._observe)
         self._bases: dict[str, Basis] = {}
         # longest side (m) of the bounding boxes of all frames, rest shape and fixed vertices
         self.extent = max(self.run.extent, record.reach(self.scene, self.run))
 
     def _observe(self, frame: int, y: np.ndarray) -> None:
         if frame % 2 == 0 or self.scene.config.frames == 1:
-            self._snapshots.append(self.group.project(y))
+            self._snapshots.append(self._own.project(y))
             self._roundoff.append(self.group.roundoff(y))
 
     def basis(self, spec: MethodSpec) -> Basis:
@@ -193,7 +195,8 @@ def _subspace(training: Training, kind: str, sampling: str, limit: float) -> Red
     columns = make_columns(scene, training.run.positions[1::2], kind, k=K)
     start = training.case.start(scene)
     fields = (start.positions, start.velocities)
-    state = State(*(coordinates(columns, scene.masses, field) for field in fields))
+    q, v = (coordinates(columns, scene.masses, field) for field in fields)
+    state = State(q, v)
     samples: Mapping[str, Samples | Interpolation] = {}
     if sampling == "ecsw":
         frames = np.arange(scene.config.frames)

@@ -26,6 +26,7 @@ import numpy as np
 
 from pdrom.core.errors import PdromError
 from pdrom.core.yamlfile import validate
+from pdrom.model.constraints.base import ConstraintGroup
 from pdrom.model.dynamics.stepper import FrameReport, LocalStep, State, Stepper
 from pdrom.model.mesh.types import Mesh
 from pdrom.model.metrics import shape_residuals
@@ -268,9 +269,9 @@ class Record:
 class Watched:
     """Reduced local step that returns the energy with full projections instead of reduced ones."""
 
-    def __init__(self, step: LocalStep, group: LocalStep) -> None:
+    def __init__(self, step: LocalStep, group: ConstraintGroup) -> None:
         self.name = step.name
-        self._step, self._group = step, group
+        self._step, self._group = step, group.for_run()
 
     def begin_frame(self, q: np.ndarray) -> None:
         """Call `begin_frame` of the reduced and the full local step at positions ``q`` (N, 3) m."""
@@ -322,24 +323,21 @@ def record(
         excesses.append(largest - roundoff.allowance(before, after, first))
         states.append((frame.positions, v))
         state = after
-    energies = []
+    energies, groups = [], [group.for_run() for group in scene.groups]
     with np.errstate(over="ignore", invalid="ignore"):
         for q, v in states:
             kinetic = 0.5 * float(scene.masses @ (v**2).sum(axis=1))
-            for group in scene.groups:
+            for group in groups:
                 group.begin_frame(q)
-            groups = sum(group.accumulate(q, np.zeros_like(q)) for group in scene.groups)
-            energies.append(kinetic + groups)
+            energies.append(kinetic + sum(g.accumulate(q, np.zeros_like(q)) for g in groups))
     q, v = (np.stack(parts) for parts in zip(*states, strict=True))
     rise, excess, total = (np.array(values) for values in (rises, excesses, energies))
     return Record(q, v, rise, excess, total, run.blowup_frame)
 
 
-def full_order(
-    case: HardCase, scene: Scene, observe: Callable[[int, np.ndarray], None] | None = None
-) -> Record:
-    """Run ``scene`` in full order from the start of ``case``; ``observe`` as in `record`."""
-    return record(scene, scene.stepper(), case.start(scene), observe=observe)
+def full_order(case: HardCase, scene: Scene) -> Record:
+    """Run ``scene`` in full order from the start of ``case``."""
+    return record(scene, scene.stepper(), case.start(scene))
 
 
 Check = Callable[[HardCase, Scene, Record], str]

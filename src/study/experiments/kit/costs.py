@@ -34,8 +34,8 @@ COSTS = ["scene", "effect", "elements", "ms_per_frame", "share"]
 LEFT_OUT = ["scene", "left_out", "groups", "elements", "ms_per_frame", "own_ms"]
 # Python methods that the step loop calls: a tuple each for groups, forces, boundaries, contacts.
 _QUESTIONS = (
-    ("begin_frame", "accumulate"), ("acceleration",), ("active", "held", "takes_hold", "path"),
-    ("apply",),
+    ("begin_frame", "accumulate"), ("acceleration",),
+    ("active", "held", "takes_hold", "anchor", "path"), ("apply",),
 )  # fmt: skip
 # Indices into the data array ("record") of a kernel with timers. Its entries are the addresses of
 # the kernel without timers, its record, the summed times, the clocks. SIZE: length of the array.
@@ -63,7 +63,7 @@ def local_costs(
     reduced : (group, method, r) -> reduced local step of a group of ``scene``
     states : (n, N, 3) m, positions; the local steps prepare a frame that begins at states[0]
     """
-    groups = {name: scene.group(name) for name, _, _ in reduced}
+    groups = {name: scene.group(name).for_run() for name, _, _ in reduced}
     rhs, iterates = vertices(len(states[0])), [as_vertices(y) for y in states]
     calls: dict[Hashable, Callable[[], None]] = {}
     steps: list[tuple[Hashable, LocalStep]] = [*groups.items(), *reduced.items()]
@@ -105,8 +105,10 @@ class Timed:
         self.name = effect.name
         self._asked, self._kernel = 0.0, np.zeros(1)
         self.local_kernel: LocalKernel | None = None
-        if isinstance(effect, ConstraintGroup) and effect.local_kernel is not None:
-            self.local_kernel, self._kernel = timed(effect.local_kernel)
+        if isinstance(effect, ConstraintGroup):
+            effect = effect.for_run()
+            if effect.local_kernel is not None:
+                self.local_kernel, self._kernel = timed(effect.local_kernel)
         for question in questions:
             setattr(self, question, self._timed(getattr(effect, question)))
 

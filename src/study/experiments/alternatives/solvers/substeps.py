@@ -9,7 +9,7 @@ the derivative of p is tangential and drops out (Bouaziz et al. 2014, sect. 3).
 from abc import abstractmethod
 from collections.abc import Callable
 from time import perf_counter
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -77,15 +77,15 @@ class Alternative(Stepper):
         for force in scene.forces:
             if not isinstance(force, Gravity):
                 raise SceneError(named % force.name + "takes no force but gravity")
-        for group in scene.groups:
-            if group.local_kernel is None:
-                raise SceneError(named % group.name + "needs a compiled local step")
         step = scene.config.time_step / substeps
         system = system or GlobalSystem(scene.masses, step, scene.groups)
         super().__init__(scene.space(system), step, iterations, scene.groups, False)
         self.substeps = substeps
         self.masses = scene.masses
-        kernels = [group.local_kernel for group in scene.groups if group.local_kernel is not None]
+        kernels: list[Any] = [getattr(step, "local_kernel", None) for step in self.local_steps]
+        for group, kernel in zip(scene.groups, kernels, strict=True):
+            if kernel is None:
+                raise SceneError(named % group.name + "needs a compiled local step")
         # keep the kernels: `self.tables` contains addresses of their memory
         self._kernels = local = LocalPass(kernels)
         self.tables = local.first, local.preparing, local.second
@@ -103,7 +103,7 @@ class Alternative(Stepper):
         """
         started = perf_counter()
         q = state.positions
-        fixed, targets = self.space.fixed(frame, q)
+        fixed, targets, anchors = self.space.fixed(frame, q, state.anchors)
         acceleration = np.ascontiguousarray(self.space.acceleration(q, state.velocities))
         for local in self.local_steps:
             local.begin_frame(q)
@@ -126,7 +126,7 @@ class Alternative(Stepper):
         if moved.any():
             whole = self.time_step * self.substeps
             velocities[moved] = (positions[moved] - q[moved]) / whole
-        after = State(np.ascontiguousarray(positions), np.ascontiguousarray(velocities))
+        after = State(np.ascontiguousarray(positions), np.ascontiguousarray(velocities), anchors)
         seconds = np.zeros(len(PHASES))
         seconds[1] = perf_counter() - started
         return after, FrameReport(np.empty(0), seconds)
