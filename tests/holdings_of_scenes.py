@@ -17,21 +17,21 @@ SHEET = {"kind": "cloth", "rows": 5, "columns": 4}
 FRAMES = 2
 
 
-def arrays(thing: object, seen: set[int] | None = None) -> dict[int, int]:
-    """Bytes by identity of every array that is reached from ``thing``."""
+def arrays(thing: object, seen: set[int] | None = None) -> dict[int, np.ndarray]:
+    """Every array that is reached from ``thing``, by identity."""
     seen = set() if seen is None else seen
     if id(thing) in seen:
         return {}
     seen.add(id(thing))
     if isinstance(thing, np.ndarray):
-        return {id(thing): thing.nbytes}
+        return {id(thing): thing}
     # code is counted by `compiled`, and what a compiler holds is not the scene's
     if isinstance(thing, (str, bytes, int, float, type, Callback)):
         return {}
     parts = list(thing.values()) if isinstance(thing, Mapping) else []
     parts += list(thing) if isinstance(thing, (list, tuple, set)) else []
     parts += list(getattr(thing, "__dict__", {}).values())
-    found: dict[int, int] = {}
+    found: dict[int, np.ndarray] = {}
     for part in parts:
         found |= arrays(part, seen)
     return found
@@ -58,7 +58,7 @@ def state_of(group: str) -> dict:
     held = arrays(scene)
     return {
         "arrays": len(held),
-        "bytes": sum(held.values()),
+        "bytes": sum(array.nbytes for array in held.values()),
         "compiled": compiled(),
         "run": run.tobytes().hex(),
     }

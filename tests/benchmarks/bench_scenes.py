@@ -85,7 +85,7 @@ def bench_frame(benchmark, family, kind):
     assert np.isfinite(state.positions).all()
 
 
-STEPS = {"compiled": lambda group: group, "numpy": NumpyLocalStep}
+STEPS = {"compiled": lambda group: group.for_run(), "numpy": NumpyLocalStep}
 
 
 @pytest.mark.parametrize("implementation", STEPS)

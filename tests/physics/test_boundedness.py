@@ -180,7 +180,7 @@ def test_growth_for_ever_is_that_of_a_resonance(tangent):
 @pytest.mark.parametrize("group", sorted(GROUPS))
 def test_no_projection_is_larger_than_its_bound(group, rng):
     scene = make_scene({"effect": group, "weight": 1.0}, mesh=GROUPS[group])
-    g, points = scene.group(group), scene.mesh.points
+    g, points = scene.group(group).for_run(), scene.mesh.points
     if g.manifold not in BOUNDED:
         # what keeps its size may become as long as it likes, as may what names no set
         assert g.manifold in ("size", None)

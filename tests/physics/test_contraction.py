@@ -100,7 +100,7 @@ def test_below_one_the_iterates_meet():
     (group,) = scene.groups
     assert _contraction(scene, reduction, positions[13]) < 1.0
     steps, space = ReducedLocalStep(group, reduction), scene.space(scene.system)
-    fixed, targets = space.fixed(12, positions[12])
+    fixed, targets, _ = space.fixed(12, positions[12])
     elimination, matrix = space.eliminate(fixed, targets), scene.system.matrix
     rng = np.random.default_rng(3)
     y, base = positions[13].copy(), space.inertia(positions[13])

@@ -58,7 +58,7 @@ def test_energy_gradient_is_the_elastic_force(group_scene, rng):
     The derivative of p does not enter (envelope theorem); for bending the manifold is fixed by the
     normals of the frame's beginning.
     """
-    group, points = group_scene.groups[0], group_scene.mesh.points
+    group, points = group_scene.groups[0].for_run(), group_scene.mesh.points
     y = points + 0.02 * rng.standard_normal(points.shape)
     group.begin_frame(points)
 

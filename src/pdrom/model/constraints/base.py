@@ -69,6 +69,7 @@ class ConstraintGroup(Effect):
     local_kernel: LocalKernel | None = None
     """Compiled form of `accumulate` for compiled loops, in a group from `for_run`, else None."""
     _pass: LocalPass | None = None
+    _of_run = False
     manifold: ClassVar[str | None] = None
     """Set onto which elements are projected: "clamped" (signed singular values in the range
     `kernel_parameters`), "length" (of an edge), "half sphere", or "size" (unbounded set with a
@@ -117,10 +118,14 @@ class ConstraintGroup(Effect):
         """Compute data that are fixed during a frame, such as normals, at ``q`` (N, 3) m for
         ``elements`` (m,); None: all. Only groups from `for_run` store such data."""
 
+    def _require_frame(self) -> None:
+        if self.frame_lagged and not self._of_run:
+            raise RuntimeError(f"{self.name}: a scene's group has no frame; use that of `for_run`")
+
     def for_run(self) -> Self:
         """Return the group with memory of its own for all that a run writes, the rest shared."""
         own = copy(self)
-        own.local_kernel = own._accumulator()
+        own.local_kernel, own._of_run = own._accumulator(), True
         own._pass = None if own.local_kernel is None else LocalPass([own.local_kernel])
         return own
 
@@ -153,6 +158,7 @@ class ConstraintGroup(Effect):
 
     def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
         """Add S^T W p(y) of ``y`` (N, 3) m to ``rhs`` (N, 3) in place; return the energy, J."""
+        self._require_frame()
         own = self._pass or self.for_run()._pass
         if own is None:
             raise NotImplementedError(f"{self.name} has neither a local kernel nor its own")

@@ -347,6 +347,7 @@ class VertexBending(ConstraintGroup):
 
     def begin_frame(self, q: np.ndarray, elements: np.ndarray | None = None) -> None:
         """Compute normals at ``q`` (N, 3) m for those ``elements`` (None: all) not flat at rest."""
+        self._require_frame()
         curved = self._curved
         if elements is not None:
             curved = elements[self.side[elements] != 0.0]
@@ -362,6 +363,7 @@ class VertexBending(ConstraintGroup):
         return super(VertexBending, own).for_run()
 
     def sampler(self, elements: np.ndarray) -> LocalKernel:
+        self._require_frame()
         return self._kernel(project_vertices, elements)
 
     def _accumulator(self) -> LocalKernel:
@@ -374,8 +376,6 @@ class VertexBending(ConstraintGroup):
     def _kernel(self, function: Any, elements: np.ndarray, touched: Any = None) -> LocalKernel:
         """Return a `LocalKernel` with a ``function`` that either writes the projections of
         ``elements`` or adds the forces of all elements; for ``touched``, see `LocalKernel`."""
-        if not self.normals.flags.writeable:
-            raise RuntimeError(f"{self.name}: a scene's group has no frame; use that of `for_run`")
         operator = self.S.indptr, self.S.indices, self.S.data
         memory = lanes.workspaces(SIZE), elements, lanes.workspace(MANIFOLD)
         arrays = (*operator, self._manifold, *memory)

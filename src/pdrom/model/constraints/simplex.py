@@ -50,6 +50,10 @@ class SimplexGroup(StencilGroup):
     """Number of values per lane in the working array."""
     allowed: Any = ()
     """Constants of the kernels, such as the allowed range of singular values."""
+    _own_arrays: tuple[np.ndarray, ...] = ()
+    """Further arrays whose addresses are appended to the record of the kernels."""
+    _own_memory = 0
+    """Size of an array of working memory whose address comes last in the record."""
     reordered: ClassVar[bool] = True
     """Whether the kernels may visit the elements in an order different from the mesh."""
 
@@ -85,13 +89,10 @@ class SimplexGroup(StencilGroup):
         count, work = blocks(self.elements), workspaces(self.work_size)
         data = (self._corners, self._geometry, np.array(self.allowed), work, elements)
         corners = np.empty(self.stencil.shape[1] * LANES, np.int32)
-        arrays = (*data, corners, rows.zeros(LANES * self._numbers), *self._further())
+        memory = corners, rows.zeros(LANES * self._numbers)
+        arrays = (*data, *memory, *self._own_arrays, np.empty(self._own_memory))
         numbers = work.shape[1], len(elements)
         return LocalKernel(function, self.S.shape[1], count, arrays, numbers, touched)
-
-    def _further(self) -> tuple[np.ndarray, ...]:
-        """Return further arrays whose addresses are appended to the record of a new kernel."""
-        return ()
 
     def _extra(self) -> list[np.ndarray]:
         """Return arrays (e, numbers) to pack after the weights: operators S_e without column 0."""

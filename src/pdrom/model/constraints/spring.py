@@ -147,6 +147,7 @@ class EdgeSpring(simplex.SimplexGroup):
     per_element = ("rest",)
     reordered = False  # the edges of a mesh are sorted by their vertices already
     split_from = 8192
+    _own_memory = REST * LANES
     project_kernel = _project
     accumulate_kernel = _accumulate
     gradient_kernel = _project_gradients
@@ -162,17 +163,14 @@ class EdgeSpring(simplex.SimplexGroup):
 
     def _assemble(self, vertices: int) -> None:
         # rest edges are not in `_geometry`: only edges whose current length is zero need them
-        self._rest_edges = pack(self.rest)
+        self._own_arrays = (pack(self.rest),)
         super()._assemble(vertices)
-
-    def _further(self) -> tuple[np.ndarray, ...]:
-        return self._rest_edges, np.empty(REST * LANES)
 
     def _extra(self) -> list[np.ndarray]:
         return [np.linalg.norm(self.rest, axis=1)]
 
     def kernel_parameters(self) -> np.ndarray:
-        return np.concatenate([self._geometry, self._rest_edges])
+        return np.concatenate([self._geometry, self._own_arrays[0]])
 
     def reference_project(self, d: np.ndarray, elements: np.ndarray) -> np.ndarray:
         rest = self.rest[elements, None, :]

@@ -127,12 +127,8 @@ class Rotate(Hold):
         angle = np.radians(self.config.degrees) * self.config.progress(frame)
         axis = AXES[self.config.axis]
         first, second = (axis + 1) % 3, (axis + 2) % 3
-        arm = anchor - self._centre
-        turned = anchor.copy()
-        turned[:, first] = (
-            self._centre[first] + np.cos(angle) * arm[:, first] - np.sin(angle) * arm[:, second]
-        )
-        turned[:, second] = (
-            self._centre[second] + np.sin(angle) * arm[:, first] + np.cos(angle) * arm[:, second]
-        )
+        c, s, centre = np.cos(angle), np.sin(angle), self._centre
+        arm, turned = anchor - centre, anchor.copy()
+        turned[:, first] = centre[first] + c * arm[:, first] - s * arm[:, second]
+        turned[:, second] = centre[second] + s * arm[:, first] + c * arm[:, second]
         return turned

@@ -194,8 +194,7 @@ def _subspace(training: Training, kind: str, sampling: str, limit: float) -> Red
     scene = training.scene
     columns = make_columns(scene, training.run.positions[1::2], kind, k=K)
     start = training.case.start(scene)
-    fields = (start.positions, start.velocities)
-    q, v = (coordinates(columns, scene.masses, field) for field in fields)
+    q, v = (coordinates(columns, scene.masses, f) for f in (start.positions, start.velocities))
     state = State(q, v)
     samples: Mapping[str, Samples | Interpolation] = {}
     if sampling == "ecsw":

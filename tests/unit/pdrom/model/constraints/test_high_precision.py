@@ -268,7 +268,7 @@ def test_bending(state, rng):
     """The condition number: the terms that cancel in H = row y over |H|, and where H is on the
     wrong side, over the distance of its direction from the opposite pole."""
     mesh, kind = cloth(6, 6, "xz", wave=0.1), EFFECTS.load("bending")
-    group = kind(kind.Config(weight=1.0), mesh, np.ones(mesh.vertices))
+    group = kind(kind.Config(weight=1.0), mesh, np.ones(mesh.vertices)).for_run()
     y = CURVED[state](mesh.points, rng)
     group.begin_frame(mesh.points)  # normals of the rest shape in every state
     for element in rng.permutation(group.elements)[:16]:

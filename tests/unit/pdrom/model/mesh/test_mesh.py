@@ -127,7 +127,7 @@ def test_wild_meshes_rest_in_themselves(shape, effect, data):
     """S at rest projects on itself: the elastic force vanishes for any mesh."""
     mesh = data.draw(wild_meshes(shape))
     scene = build(mesh, {"effect": effect, "weight": 1.0}, frames=1)
-    group, points = scene.groups[0], scene.mesh.points
+    group, points = scene.groups[0].for_run(), scene.mesh.points
     group.begin_frame(points)
     d = group.S @ points
     scale = np.abs(abs(group.S) @ np.abs(points)).max()

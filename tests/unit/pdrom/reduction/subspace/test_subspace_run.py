@@ -117,7 +117,7 @@ def test_output_in_single_precision_is_the_product(vertices, columns):
 
 def test_restricted_group_is_the_full_group_on_its_elements(group_scene, rng):
     """Projections, energy and right-hand side, also from frozen data of a frame; it stays apart."""
-    group = group_scene.groups[0]
+    group = group_scene.groups[0].for_run()
     elements = np.sort(rng.permutation(group.elements)[: group.elements // 3])
     factors = rng.uniform(0.5, 4.0, len(elements))
     part, vertices = group.restricted(elements, factors)
