@@ -1,7 +1,7 @@
 """POD bases computed from snapshots of projections: weighting, centring, signs, numerical rank."""
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import linalg
@@ -11,6 +11,10 @@ from pdrom.core.packed import brief
 from pdrom.core.store import open_hdf5, require_finite, write_hdf5
 from pdrom.reduction.method import BasisSpec
 from pdrom.reduction.snapshots import SnapshotSet
+
+# Snapshots whose largest entry is below this limit or above its inverse are scaled, since squares
+# of their entries could underflow or overflow.
+SMALL = 1e-100
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,9 +112,20 @@ def compute_basis(
     Raises
     ------
     SnapshotError
-        Fewer than two snapshots, a wrong shape, NaN or Inf, or mass weighting with a zero mass.
+        Fewer than two snapshots, a wrong shape, NaN or Inf, mass weighting with a zero mass, or
+        singular values that overflow.
     """
     _check(snapshots, row_mass, rows_per_element, spec)
+    require_finite("round-off of the snapshots", np.array([roundoff]), SnapshotError)
+    largest = float(np.abs(snapshots).max())
+    if largest > 0.0 and not SMALL <= largest <= 1.0 / SMALL:
+        unit = 2.0 ** (np.frexp(largest)[1] - 1)  # a power of two, so that scaling is exact
+        scaled = snapshots / unit, row_mass, roundoff / unit
+        made = compute_basis(*scaled, rows_per_element, spec, signs)
+        with np.errstate(over="ignore"):
+            sigma = require_finite("singular values", made.singular_values * unit, SnapshotError)
+        mean, noise = made.mean * unit, made.roundoff * unit
+        return replace(made, mean=mean, singular_values=sigma, roundoff=float(noise))
     matrix = snapshots.reshape(len(snapshots), -1).T
     scale = np.ones(3 * len(row_mass))  # square roots of the masses for mass weighting, else 1
     if spec.weighting == "mass":

@@ -56,7 +56,7 @@ class Yardstick:
         """Per-frame series of the full-order run for the argument ``reference`` of `errors_within`.
 
         ``displacement`` (F,) m; ``step`` (F,) m, norm of time step times velocities; ``energy`` in
-        every `STRIDE`-th frame, scaled by `scale`; ``contact`` (F,), 1 at contact, else 0.
+        every `STRIDE`-th frame and the last, scaled by `scale`; ``contact`` (F,), 1 at contact.
         """
         blocks = [q for q, _ in _blocks(self.reference, self.reference)]
         return {
@@ -81,8 +81,8 @@ class Yardstick:
 
         ``difference``, ``shape_difference`` (without rigid motion), ``step_difference`` (of changes
         of the positions in a frame): (F',) m, norms of the differences of both runs. Two series are
-        of ``outcome`` alone: ``energy``, every `STRIDE`-th frame, scaled by `scale` (empty if the
-        full order's is round-off); ``contact`` (F',), 1 if a vertex touches an obstacle, else 0.
+        of ``outcome`` alone: ``energy``, every `STRIDE`-th frame and its last, scaled by `scale`
+        (empty if the full order's is round-off); ``contact`` (F',), 1 where a vertex touches.
         """
         steps, shapes, contacts = [], [], []
         with np.errstate(over="ignore", invalid="ignore"):
@@ -133,6 +133,8 @@ def errors_within(
         return dict.fromkeys(ERRORS)
     displacement, shape = reference["displacement"], run["shape_difference"]
     drift, count = None, end // STRIDE + 1  # number of energies: initial, every STRIDE-th frame
+    if end == len(displacement):
+        count = len(reference["energy"])  # also that of the last frame
     if count > 1 and len(reference["energy"]):
         drift = float(np.abs(run["energy"][:count] - reference["energy"][:count]).max())
     # first frame with contact of this run and of the full-order run; inf if there is no contact

@@ -320,10 +320,10 @@ def scaling(sources: list[Path], settings: SizedOptions, iterations: File, break
         vertices=scene.mesh.vertices,
         elements=sum(group.elements for group in scene.groups),
         ms_per_iteration=lambda own: own.ms_per_frame / config.iterations,
-        local_ms=lambda own: (own.local_ms + own.assembly_ms) / config.iterations,
+        local_ms=lambda own: (own.local_ms + own.assembly_ms + own.lift_ms) / config.iterations,
         global_ms=lambda own: own.global_ms / config.iterations,
         vertices_ms=lambda own: own.vertices_ms / config.iterations,
-        local_share=lambda own: own.local_ms / (own.local_ms + own.global_ms),
+        local_share=lambda own: own.local_ms / own.ms_per_iteration,
     )
     write_table(times[ITERATIONS], iterations.path)
     few = alone.training_frames

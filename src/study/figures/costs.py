@@ -20,6 +20,7 @@ PHASES = {
     "local_ms": ("local step: projections", style.ORANGE),
     "assembly_ms": ("local step: right-hand side", "#F7D08A"),
     "global_ms": ("global solve", style.BLUE),
+    REST: (REST, "#C9C4BA"),
 }
 TITLES = {"interpreted": "interpreted loop", "numpy": "vectorised NumPy", "compiled": "compiled"}
 CLAIM = 70.0  # per cent of the time of a frame in the local step, by claim C1 of the preprint
@@ -53,9 +54,10 @@ class BreakEven(Methods):
 @figure(title="Where the time of a frame goes", reads={"table": TableOf("local_share")})
 def local_share(options: Scenes, drawn: Drawn, table: pd.DataFrame) -> Figure:
     """Share of the local step and of the global solve in the time of a full-order frame, for three
-    implementations of the same local step. The printed number is the share of the local step, that
-    is of both shades of orange: the projections and the right-hand side that is assembled from
-    them, in one pass where they are compiled. The dashed line is the 70 % of claim C1; beside the
+    implementations of the same local step; grey is the rest of the frame, such as prediction and
+    contacts. The printed number is the share of the local step, that is of both shades of orange:
+    the projections and the right-hand side that is assembled from them, in one pass where they are
+    compiled. The dashed line is the 70 % of claim C1; beside the
     bar stands the time per frame. An interpreted loop confirms the claim everywhere, compiled code
     only where projections are expensive.
     """
@@ -73,7 +75,7 @@ def local_share(options: Scenes, drawn: Drawn, table: pd.DataFrame) -> Figure:
     handles: list[Artist] = [style.patch(label, color=c) for label, c in PHASES.values()]
     line = {"color": style.BLACK, "linestyle": "--"}
     handles.append(style.handle(f"{CLAIM:.0f} % (claim C1)", **line))
-    style.legend(figure, handles, 4)
+    style.legend(figure, handles, 5)
     return figure
 
 
@@ -81,11 +83,11 @@ def _draw_bars(ax: Axes, rows: pd.DataFrame, scenes: list[str]) -> None:
     for y, scene in enumerate(scenes):
         if scene not in rows.index:
             continue
-        times = rows.loc[scene, list(PHASES)].to_numpy(float)
-        total = np.nansum(times)
-        start = 0.0
-        for time, (_, colour) in zip(times, PHASES.values(), strict=True):
-            share = 100.0 * np.nan_to_num(time) / total
+        times = np.nan_to_num(rows.loc[scene, [*PHASES][:-1]].to_numpy(float))
+        total, start = float(rows.ms_per_frame[scene]), 0.0
+        rest = total - times.sum()
+        for time, (_, colour) in zip([*times, rest], PHASES.values(), strict=True):
+            share = 100.0 * time / total
             ax.barh(y, share, left=start, color=colour, height=0.72)
             start += share
         printed = f"{100.0 * rows.local_share[scene]:.0f} %"

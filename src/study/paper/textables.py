@@ -331,8 +331,7 @@ def local_share(local_share: pd.DataFrame) -> Rows:
         cells = []
         for kind in ("interpreted", "numpy", "compiled"):
             row = by.loc[kind]
-            total = row.local_ms + row.assembly_ms + row.global_ms
-            cells += [format_number(total), format_number(row.local_share)]
+            cells += [format_number(row.ms_per_frame), format_number(row.local_share)]
         yield [_name(scene), *cells]
 
 

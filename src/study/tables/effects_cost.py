@@ -134,21 +134,20 @@ def _acting(frames: pd.DataFrame, sensitivity: pd.DataFrame, horizon: Horizon) -
         text("implementation", f"of the local step: {', '.join(IMPLEMENTATIONS)}"),
         *shared("vertices local_ms"),
         timed(number("assembly_ms", "time of the right-hand side in a frame", "ms")),
-        *shared("global_ms local_share"),
+        *shared("global_ms local_share ms_per_frame"),
     ),
     reads={"timings": Every(paths.TIMINGS), "frame_times": TableOf("frame_times")},
 )
 def local_share(timings: list[File], frame_times: pd.DataFrame) -> pd.DataFrame:
     """One row per scene and implementation of the local step, with its share of the frame's time.
 
-    The share includes the assembly of the right-hand side, because compiled kernels compute it
-    together with the projections. Times are scaled to those in ``frame_times`` (`in_one_time`).
+    The share is (local_ms + assembly_ms) / ms_per_frame: it includes the assembly of the right-hand
+    side, because compiled kernels compute it together with the projections, so that their
+    assembly_ms is 0. Times are scaled to those in ``frame_times`` (`in_one_time`).
     """
     times = results.timings_in_one_time(timings, frame_times)
     full = times[times.method.isna()].copy()
-    full["local_share"] = (full.local_ms + full.assembly_ms) / (
-        full.local_ms + full.assembly_ms + full.global_ms
-    )
+    full["local_share"] = (full.local_ms + full.assembly_ms) / full.ms_per_frame
     order = {name: place for place, name in enumerate(IMPLEMENTATIONS)}
     scenes = {scene: place for place, scene in enumerate(times.scene.unique())}
     keys = full.scene.map(scenes) * len(order) + full.implementation.map(order)

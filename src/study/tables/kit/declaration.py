@@ -178,7 +178,7 @@ _SHARED = (
     number(
         "energy_drift",
         "largest difference of the total energy before the horizon, over the largest energy of the "
-        "full-order run",
+        "full-order run; energies of the start, every fourth frame, and the last frame of a run",
         compared="error",
     ),
     integer("horizon_frame", "first frame that cannot be judged: the scene's horizon"),
@@ -191,7 +191,13 @@ _SHARED = (
     timed(number("global_ms", "time of the global solve in a frame", "ms")),
     timed(number("speedup", "time of the full-order run over that of this one")),
     *map(timed, interval("speedup_low speedup_high")),
-    timed(number("local_share", "local step over it and the global solve")),
+    timed(
+        number(
+            "local_share",
+            "share of the local step in the time of the whole frame, ms_per_frame: projections, "
+            "and the assembly of the right-hand side, which compiled code does in the same pass",
+        )
+    ),
 )
 
 

@@ -115,6 +115,8 @@ def test_tables_of_the_rows(written, table):
     assert (strict[strict.motion == "heldout"].method == "explicit").all()
     assert (found.motions == 2).all()
     assert found[found.limit == 1e-12].method.isna().all()
+    assert not found.method.isin(experiment.REDUCTIONS).any()
+    assert "full-order" in next(c.meaning for c in winners.columns if c.name == "method")
 
 
 def test_recorded_rows_of_other_meshes_are_beside_those_of_the_run(written, table, tmp_path):

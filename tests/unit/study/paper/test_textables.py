@@ -71,10 +71,10 @@ TABLES = {
         ("ecsw", "pod", "rerun", "accurate", 0.5),
     ),
     "local_share": frame(
-        "implementation local_ms assembly_ms global_ms local_share",
-        ("compiled", 1.0, 0.0, 1.0, 0.5),
-        ("interpreted", 100.0, 20.0, 30.0, 0.8),
-        ("numpy", 10.0, 2.0, 4.0, 0.75),
+        "implementation ms_per_frame local_share",
+        ("compiled", 2.0, 0.5),
+        ("interpreted", 150.0, 0.8),
+        ("numpy", 16.0, 0.75),
     ).assign(scene="bar_a"),
     "claims": frame(
         "claim paper verdict figure_or_table verdict_beyond",

@@ -350,12 +350,12 @@ def test_without_a_converged_run_there_is_no_point_against_it(files, tmp_path):
 # Local share --------------------------------------------------------------------------------------
 
 
-def test_local_share_counts_assembly_with_the_local_step(tmp_path, files):
+def test_local_share_counts_assembly_and_is_the_share_of_the_whole_frame(tmp_path, files):
     table = local_share(files["timings"], NOT_TIMED)
     assert table.scene.tolist() == ["a", "a", "a", "b"]
     assert table.implementation.tolist() == ["interpreted", "numpy", "compiled", "compiled"]
-    assert table.local_share.tolist() == pytest.approx([0.6] * 4)
+    assert table.local_share.tolist() == pytest.approx([0.375] * 4)
     row = {"scene": "c", "implementation": "numpy", "vertices": 4, "local_ms": 2.0,
-           "assembly_ms": 1.0, "global_ms": 1.0, "method": None, "ms_per_frame": 4.0}  # fmt: skip
+           "assembly_ms": 1.0, "global_ms": 1.0, "method": None, "ms_per_frame": 6.0}  # fmt: skip
     path = written(tmp_path / "c.csv", row)
-    assert local_share([path], NOT_TIMED).local_share.tolist() == [0.75]
+    assert local_share([path], NOT_TIMED).local_share.tolist() == [0.5]

@@ -140,6 +140,24 @@ def test_zero_and_round_off_have_no_basis(spec, rng):
     assert basis_of(p, spec, roundoff=1e-12).rank == 0
 
 
+@every_spec
+def test_tiny_and_huge_snapshots_have_the_basis_of_ordinary_ones(spec):
+    """Squares of their entries underflow or overflow; a power of two changes no digit."""
+    p, mass = snapshots(23)
+    basis = basis_of(p, spec, roundoff=1e-4, mass=mass)
+    for unit in (2.0**-1000, 2.0**660, 2.0**1015):
+        other = basis_of(unit * p, spec, roundoff=unit * 1e-4, mass=mass)
+        assert (other.rank, other.active_axes) == (basis.rank, basis.active_axes)
+        np.testing.assert_array_equal(other.V, basis.V)
+        for name in ("mean", "singular_values", "roundoff"):
+            np.testing.assert_array_equal(getattr(other, name), unit * getattr(basis, name))
+    assert {basis_of(unit * p, spec, mass=mass).rank for unit in (1e-300, 1e200)} == {basis.rank}
+    with pytest.raises(SnapshotError, match="singular values: entry"):
+        basis_of(p / p.max() * 1.7e308, BasisSpec())
+    with pytest.raises(SnapshotError, match="round-off"):
+        basis_of(p, spec, roundoff=np.inf)
+
+
 @given(seed=SEEDS, n=st.integers(2, 40), exponent=st.integers(-8, 8))
 @pytest.mark.parametrize("layout", LAYOUTS)
 @pytest.mark.parametrize("weighting", WEIGHTINGS)
