@@ -112,8 +112,7 @@ def compute_basis(
     Raises
     ------
     SnapshotError
-        Fewer than two snapshots, a wrong shape, NaN or Inf, mass weighting with a zero mass, or
-        singular values that overflow.
+        Fewer than two snapshots, a wrong shape, NaN or Inf, or mass weighting with a zero mass.
     """
     _check(snapshots, row_mass, rows_per_element, spec)
     require_finite("round-off of the snapshots", np.array([roundoff]), SnapshotError)
@@ -124,8 +123,8 @@ def compute_basis(
         made = compute_basis(*scaled, rows_per_element, spec, signs)
         with np.errstate(over="ignore"):
             sigma = require_finite("singular values", made.singular_values * unit, SnapshotError)
-        mean, noise = made.mean * unit, made.roundoff * unit
-        return replace(made, mean=mean, singular_values=sigma, roundoff=float(noise))
+        noise = float(made.roundoff * unit)
+        return replace(made, mean=made.mean * unit, singular_values=sigma, roundoff=noise)
     matrix = snapshots.reshape(len(snapshots), -1).T
     scale = np.ones(3 * len(row_mass))  # square roots of the masses for mass weighting, else 1
     if spec.weighting == "mass":

@@ -132,11 +132,10 @@ def errors_within(
     if len(run["difference"]) < end:
         return dict.fromkeys(ERRORS)
     displacement, shape = reference["displacement"], run["shape_difference"]
-    drift, count = None, end // STRIDE + 1  # number of energies: initial, every STRIDE-th frame
-    if end == len(displacement):
-        count = len(reference["energy"])  # also that of the last frame
-    if count > 1 and len(reference["energy"]):
-        drift = float(np.abs(run["energy"][:count] - reference["energy"][:count]).max())
+    # energies of the start, every STRIDE-th frame and, if all frames count, the last
+    drift, within = None, slice(None if end == len(displacement) else end // STRIDE + 1)
+    if len(reference["energy"][within]) > 1:
+        drift = float(np.abs(run["energy"][within] - reference["energy"][within]).max())
     # first frame with contact of this run and of the full-order run; inf if there is no contact
     first, wanted = (
         float(np.argmax(touched)) if np.any(touched) else np.inf

@@ -28,6 +28,7 @@ from study.paper.macros import captions, decisions, keys_of, macros, number_of, 
 from study.paper.source import COMMENT, DOCUMENTS, PLACED, documents
 from study.paper.tex import build_pdfs
 from study.paper.textables import TEX_TABLES, reads, tex_table
+from study.tables import declared
 
 PAGES = {"main": 16, "supplement": 30}  # largest allowed number of pages of each document
 
@@ -70,6 +71,8 @@ def write_inputs(
     texts = documents(source[0].parent)
     whole = "".join(texts.values())
     data = {table["name"]: read_table(table.path) for table in tables}
+    for name, frame in data.items():  # raises StorageError if a cell is not of its column's type
+        declared()[name].checked(frame.reindex(columns=declared()[name].column_names))
     data |= fact_tables(Path(machine.path), facts)
     decided = {document: decisions(text, data) for document, text in texts.items()}
     known = provenance(decided, facts.part, facts.full_study)

@@ -38,9 +38,11 @@ NAMED = 6
 # A fault may change all cells of a column, each by less than its tolerance. So the share `HALF` of
 # them (`MOST` of at least `TEN` errors) must differ by at most `CLOSE`; fewer than `LEAST` cells
 # must all differ by at most `LONE`. If the column declares a tolerance, the share `HALF` must
-# differ by at most this tolerance / `OWN`, and fewer than `LEAST` cells are not checked.
+# differ by at most this tolerance / `OWN`, and fewer than `LEAST` cells are not checked. The same
+# holds within each method, scene ..., where rounding errors may concentrate, with the limit `LONE`
+# (`LOOSER` for columns with a tolerance, and for half of at least `TEN` wrong runs).
 MOST, HALF, TEN, LEAST = 0.9, 0.5, 10, 3
-CLOSE, OWN, LONE = 1e-5, 50, 0.01
+CLOSE, OWN, LONE, LOOSER = 1e-5, 50, 0.01, 0.03
 # Limits for cells that depend on rounding errors: (share of the runs that may differ, relative
 # difference above which a run differs, columns by which the runs are grouped for counting). In each
 # group, a tenth of the runs may differ by more than a factor of 10, and half by more than 2.
@@ -274,13 +276,23 @@ def _rows(comparison: Comparison) -> Iterator[Difference]:
     if its run ended early and thus has no error.
     """
     table, context, words = comparison.table, comparison.context, ("a row", "none")
-    for side, frame in enumerate((comparison.expected, comparison.found)):
-        rows = frame[~np.isin(np.arange(len(frame)), [pair[side] for pair in comparison.pairs])]
+    frames = comparison.expected, comparison.found
+    named = [c.name for c in table.columns if names_row(c)]
+    left = [
+        frame.index.difference([pair[side] for pair in comparison.pairs], sort=False)
+        for side, frame in enumerate(frames)
+    ]
+    for side, frame in enumerate(frames):
+        rows = frame.loc[left[side]]
         if table.only_with_error:
             ended = context.ended[1 - side] - context.ended[side]
             rows = rows[[name not in ended for name in names(rows, RUN)]]
-        for i in range(len(rows)):
-            yield _difference(_row_in_words(table, rows, i), words[side], words[1 - side])
+        for i, row in enumerate(rows.index):
+            place = _row_in_words(table, rows, i)
+            if row in left[0] and row in left[1]:  # name the cells that identify it otherwise
+                one, other = (each.loc[row, named].map(_key) for each in frames)
+                place += f" (row {row + 1}, other {', '.join(one.index[one != other])})"
+            yield _difference(place, words[side], words[1 - side])
     moved = np.flatnonzero(np.diff([row for _, row in comparison.pairs]) < 0)
     if len(moved):
         place = _row_in_words(table, comparison.e, int(moved[0]) + 1)
@@ -304,25 +316,36 @@ def _cells(comparison: Comparison, column: Column) -> Iterator[Difference]:
         )
         yield _difference(place, expected, found, float(apart[row]), float(limits[row]))
     if not (beyond & firm).any() and column.kind in ("number", "integer"):
-        yield from _shifted(comparison, column, firm & ~comparison.wrong(column))
+        yield from _shifted(comparison, column, firm)
     yield from _loose(comparison, column, ~firm)
 
 
 def _shifted(comparison: Comparison, column: Column, firm: np.ndarray) -> Iterator[Difference]:
-    """Yield a difference if most cells in ``firm`` rows are slightly off expected ones (`MOST`)."""
-    there = (comparison.e[column.name].fillna(0) != 0).to_numpy(dtype=bool)
-    cells = firm & there & comparison.compared(column)
-    own, count = column.tolerance, cells.sum()
-    if not count or (own is not None and count < LEAST):
-        return
-    strict = column.quantity == "error" and own is None and count >= TEN
-    share, close = MOST if strict else HALF, CLOSE if own is None else own / OWN
-    if count < LEAST:
-        share, close = 1.0, LONE
-    size = float(np.quantile(comparison.apart(column)[cells], share))
-    if size > close:
-        words = f"a share of {share:g} of the cells within {close:g}", f"within {size:.2g}"
-        yield _difference(column.name, *words, size, close)
+    """Yield a difference if most cells in ``firm`` rows are slightly off expected ones (`MOST`).
+
+    Of errors, also one for each method, scene ... (value of a text column that identifies rows).
+    """
+    e, own, errors = comparison.e, column.tolerance, column.quantity == "error"
+    there = (e[column.name].fillna(0) != 0).to_numpy(dtype=bool)
+    cells, wrong = firm & there & comparison.compared(column), comparison.wrong(column)
+    groups = [("", cells & ~wrong, CLOSE if own is None else own / OWN)]
+    texts = [c.name for c in comparison.table.columns if names_row(c) and c.kind == "text"]
+    for label in texts if errors and column.kind == "number" else ():
+        for value, rows in e.groupby(label).indices.items():
+            inside, name = cells & np.isin(np.arange(len(e)), rows), f" of {label} {value}"
+            groups.append((name, inside & ~wrong, LONE if own is None else LOOSER))
+            if (inside & wrong).sum() >= TEN:
+                groups.append((f"{name}, wrong runs", inside & wrong, LOOSER))
+    for name, chosen, close in groups:
+        count = chosen.sum()
+        if not count or (own is not None and count < LEAST):
+            continue
+        strict = errors and own is None and count >= TEN and not (chosen & wrong).any()
+        share, limit = (MOST if strict else HALF, close) if count >= LEAST else (1.0, LONE)
+        size = float(np.quantile(comparison.apart(column)[chosen], share))
+        if size > limit:
+            words = f"a share of {share:g} of the cells within {limit:g}", f"within {size:.2g}"
+            yield _difference(f"{column.name}{name}", *words, size, limit)
 
 
 def _loose(comparison: Comparison, column: Column, cells: np.ndarray) -> Iterator[Difference]:
@@ -354,7 +377,7 @@ def in_words(value: object) -> str:
     """Cell ``value`` as text for a message."""
     if pd.isna(value):
         return "nothing"
-    return f"{value:.6g}" if isinstance(value, float) else str(value)[:60]
+    return f"{value:.6g}" if isinstance(value, float) else " ".join(str(value).split())[:60]
 
 
 def _row_in_words(table: Table, frame: pd.DataFrame, row: int) -> str:

@@ -172,6 +172,8 @@ class Examination:
         except (KeyError, StorageError):
             return [Line("claim", "all", line.outcome, line.text)]
         decided = found if again is None else again.set_index("claim")
+        if not found.index.is_unique:
+            return [Line("claim", "all", line.outcome, line.text)]
         names = dict.fromkeys([*expected.index, *found.index])
         return [_claim(str(name), expected, found, decided) for name in names]
 

@@ -32,7 +32,7 @@ UNLISTED = "not in the manifest"
 # Largest number of faults that are printed one by one.
 SHOWN = 20
 # Types of errors that a job may raise if somebody edited its input tables.
-FAULTS = (PdromError, ArithmeticError, LookupError, TypeError, ValueError)
+FAULTS = (PdromError, ArithmeticError, AttributeError, LookupError, TypeError, ValueError)
 
 
 def verify_files(subject: Subject) -> Status:

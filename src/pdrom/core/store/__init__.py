@@ -213,9 +213,11 @@ def read_table(
         raise StorageError(f"{path}: no such file") from error
     except OSError as error:
         raise StorageError(f"{path}: cannot be read ({reason(error)})") from error
-    except (pd.errors.ParserError, pd.errors.EmptyDataError, UnicodeDecodeError) as error:
+    except (ValueError, OverflowError) as error:
         fault = " ".join(str(error).split())
         raise StorageError(f"{path}: not a readable table ({fault})") from error
+    if not isinstance(table.index, pd.RangeIndex):  # pandas takes surplus cells for row names
+        raise StorageError(f"{path}: not a readable table (its rows have more cells than names)")
     if not content.endswith(b"\n"):
         raise StorageError(f"{path}: the end of its last line is missing")
     missing = [name for name in columns or () if name not in table.columns]

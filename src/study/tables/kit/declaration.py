@@ -13,6 +13,7 @@ The function gets its inputs by name: files as a list of `File`, tables as data 
 the configuration as plain data. The data frame it returns is then brought to the declared columns.
 """
 
+import re
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -43,6 +44,7 @@ TOLERANCES: dict[Quantity, float] = {"exact": 1e-8, "value": 1e-4, "error": 0.05
 # Allowed difference between two machines for integers of quantity "share" (numbers of runs).
 TALLY = 2.0
 Kind = Literal["text", "integer", "number", "flag"]
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?|[+-]?inf", re.ASCII | re.IGNORECASE)
 _DTYPES: dict[Kind, str] = {"integer": "Int64", "number": "float64", "flag": "boolean"}
 
 
@@ -89,17 +91,26 @@ class Column:
         return TOLERANCES.get(self.quantity, 0.0) if self.kind == "number" else 0.0
 
     def cast(self, values: pd.Series) -> pd.Series:
-        """Convert ``values`` to the type of the column; ValueError or TypeError if that fails."""
+        """Convert ``values`` to the type of the column; ValueError names the first unfit cell."""
         if self.kind == "text":
             return values
+        if values.dtype != _DTYPES[self.kind]:
+            for row, cell in enumerate(values, start=1):
+                if not self.holds(cell):
+                    raise ValueError(f"row {row}: '{' '.join(str(cell).split())[:60]}'")
         if self.kind == "flag":
             # pandas may have turned True and False into numbers while joining tables
-            others = values[values.notna() & ~values.isin([True, False])]
-            if len(others):
-                raise ValueError(f"'{others.iloc[0]}'")
             flags = [None if pd.isna(value) else bool(value) for value in values]
             values = pd.Series(flags, values.index, dtype=object)
         return values.astype(_DTYPES[self.kind])
+
+    def holds(self, cell: Any) -> bool:
+        """Return whether ``cell``, maybe read as text, is empty or has the type of the column."""
+        if self.kind == "flag" or pd.isna(cell):
+            return pd.isna(cell) or cell in (True, False, "True", "False")
+        size = float(str(cell)) if _NUMBER.fullmatch(str(cell)) else None
+        whole = size is not None and size.is_integer() and abs(size) < 2.0**63
+        return whole or (self.kind == "number" and size is not None)
 
 
 # Functions that make a column of strings, of integers, of booleans, of floating-point numbers.
@@ -191,13 +202,7 @@ _SHARED = (
     timed(number("global_ms", "time of the global solve in a frame", "ms")),
     timed(number("speedup", "time of the full-order run over that of this one")),
     *map(timed, interval("speedup_low speedup_high")),
-    timed(
-        number(
-            "local_share",
-            "share of the local step in the time of the whole frame, ms_per_frame: projections, "
-            "and the assembly of the right-hand side, which compiled code does in the same pass",
-        )
-    ),
+    timed(number("local_share", "time of projections and right-hand side over the whole frame's")),
 )
 
 

@@ -21,7 +21,7 @@ from PIL import Image
 
 from browser import page_at
 from builders import frame
-from pdrom.core.errors import PaperError
+from pdrom.core.errors import PaperError, StorageError
 from pdrom.core.machine import machine
 from pdrom.core.store import atomic_path, write_table, write_text
 from places import ROOT
@@ -152,6 +152,15 @@ def write_study(folder: Path) -> dict[str, object]:
         "added": {"own": ["compiled"]},
         **{name: ROOT / FOLDER / file for name, file in ASSETS.items()},
     }
+
+
+def test_a_cell_of_another_type_is_named_before_the_manuscript_is_made(tmp_path):
+    given = write_study(tmp_path)
+    infinite = TABLES["claims_tests"].assign(satisfied=float("inf"))
+    write_table(infinite, tmp_path / "tables" / "claims_tests.csv")
+    own = {name: given[name] for name in ("source", "references", "tables", "machine", "facts")}
+    with pytest.raises(StorageError, match=r"'satisfied' is no integer \(row 1: 'inf'\)"):
+        build.write_inputs(**own, outputs={})
 
 
 def named(folder: Path, names: Iterable[str]) -> list[File]:

@@ -6,6 +6,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from pdrom.core.errors import StorageError
+from pdrom.core.store import read_table
 from places import ROOT
 from study.tables import declared
 from study.tables.kit.declaration import QUANTITIES, TALLY, TOLERANCES
@@ -222,6 +224,64 @@ def test_any_column_that_moves_by_four_per_cent_or_has_other_outcomes_is_noticed
         tried += sum(columns[name].kind in ("number", "integer") for name in counts)
     assert tried > 60
     assert missed == []
+
+
+def test_errors_of_one_method_scene_or_group_that_move_by_four_per_cent_are_noticed(studies):
+    """By its name, also the one with the fewest rows; but for wrong runs and rows by count."""
+    missed, tried = [], set()
+    cases = [(each, name) for each in studies[1].values() for name in ("scene", "group", "method")]
+    cases += [(studies[0][name], "method") for name in ("reduced_reruns", "accuracy_cost")]
+    for alone, label in cases:
+        own = [c for c in kept(alone.table).values() if (c.quantity, c.kind) == ("error", "number")]
+        columns = [c.name for c in own]
+        sound = [(alone.e[c.name] > 0) & alone.firm(c) & ~alone.wrong(c) for c in own]
+        groups = alone.e.groupby(label).indices if label in alone.e else {}
+        counts = {v: max((s[i].sum() for s in sound), default=0) for v, i in groups.items()}
+        enough = sorted((n, value) for value, n in counts.items() if n >= compare.LEAST)
+        for value in {value for _, value in enough[:1] + [e for e in enough if "ecsw" in e[1]]}:
+            found = alone.expected.copy()
+            found.loc[groups[value], columns] *= 1.04
+            tried.add((alone.table.name, value))
+            if f"{label} {value}" not in "".join(differences(alone, found, *columns)):
+                missed.append((alone.table.name, label, value))
+    assert missed == []
+    assert len(tried) > 30
+    assert {("accuracy_cost", "ecsw-1e-02"), ("reduced_reruns", "ecsw-1e-02")} <= tried
+
+
+CELLS = (
+    "inf", "1e400", "nan", "", "abc", "-7", "9" * 30, "True", "no", "1_0", "\u0663", "1.5", "0x1",
+    '"a\nb"', 'a"b', '"', "a\0b", "1,2", "9223372036854775808",
+)  # fmt: skip
+
+
+def test_any_content_of_a_cell_is_a_difference_or_an_error_in_one_line(tiny, tmp_path, rng):
+    """Of some compared columns of every table: it names the column, or a file that is no table."""
+    path, missed = tmp_path / "table.csv", []
+    for name, alone in tiny.items():
+        columns = [*kept(alone.table).values()]
+        for column in rng.choice(columns, min(4, len(columns)), replace=False):
+            cell, row = str(rng.choice(CELLS)), int(rng.integers(min(4, len(alone.expected))))
+            rows = alone.expected.head(4).astype(object)
+            texts = [rows.to_csv(index=False, lineterminator="\n")]
+            rows.loc[row, column.name] = "@"
+            texts += [rows.to_csv(index=False, lineterminator="\n").replace("@", cell)]
+            try:
+                expected, found = (read(alone.table, path, text) for text in texts)
+                said = "".join(differences(alone, found, expected=expected))
+            except StorageError as error:
+                said = str(error)
+            there = alone.firm(column)[row] & alone.compared(column)[row]
+            there &= cell not in ("", "nan") or pd.notna(alone.expected[column.name][row])
+            told = column.name in said or "not a readable table" in said
+            if "\n" in said or (there and not told):
+                missed.append((name, column.name, row, cell, said))
+    assert missed == []
+
+
+def read(table, path, text):
+    path.write_text(text, newline="")
+    return table.checked(read_table(path, table.column_names, result=False))
 
 
 def test_rows_that_are_invented_doubled_deleted_swapped_or_renamed_are_noticed(tiny, rng):

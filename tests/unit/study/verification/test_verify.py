@@ -206,9 +206,6 @@ EDITS = {
         "reduced_reruns", lambda f: f.assign(
             shape_error=f.shape_error.where(f.motion == "train", f.shape_error * (1 + 1e-3)))),
     "a number is missing": ("singular_values", lambda f: put(f, 0, "singular_value", np.nan)),
-    "a number is infinite": ("singular_values", lambda f: put(f, 0, "singular_value", np.inf)),
-    "a number is a word": (
-        "singular_values", lambda f: put(f.astype(object), 0, "singular_value", "large")),
     "a column is left out": ("ladder", lambda f: f.drop(columns="gain")),
     "a column is new": ("ladder", lambda f: f.assign(better=True)),
     "a verdict beyond is another one": (
