@@ -117,9 +117,11 @@ def test_a_run_that_is_killed_with_all_its_jobs(undisturbed, fresh):
     heals(fresh, undisturbed)
 
 
-def _caught_writing(sandbox: Sandbox, folder: str, kind: str = "slow") -> subprocess.Popen[str]:
+def _caught_writing(
+    sandbox: Sandbox, folder: str, kind: str = "slow", targets: tuple[str, ...] = (TABLE,)
+) -> subprocess.Popen[str]:
     """A run one of whose jobs is at a file of ``folder``, kept there as ``kind`` says."""
-    process = sandbox.start("--", TABLE, fault=f"{kind}:/{MICRO_RESULTS}/{folder}/")
+    process = sandbox.start("--", *targets, fault=f"{kind}:/{MICRO_RESULTS}/{folder}/")
     place = sandbox.path(MICRO_RESULTS) / folder
     wait_for(lambda: any(place in p.parents for p in sandbox.temporaries()), process)
     return process
@@ -267,7 +269,48 @@ def test_a_clock_that_jumped(undisturbed, sandbox):
     heals(sandbox, undisturbed)
 
 
+@pytest.mark.parametrize("target", [(RUN,), pytest.param((), marks=slow)], ids=["a run", "all"])
+def test_code_that_is_edited_while_a_study_runs_has_no_effect(target, request, fresh):
+    """Every module fails after the edit, which is undone when the run is over."""
+    process = _caught_writing(fresh, "meshes", "hold", target)
+    sources = {path: path.read_text() for path in fresh.path("src").rglob("*.py")}
+    for path, text in sources.items():
+        path.write_text(f"{text}\n\nraise RuntimeError('edited')\n")
+    fresh.path("release").touch()
+    said, _ = process.communicate(timeout=600)
+    assert process.returncode == 0, said
+    for path, text in sources.items():
+        path.write_text(text)
+    expected = request.getfixturevalue("undisturbed" if target else "finished_study").results()
+    assert fresh.results().items() <= expected.items()
+    assert "Nothing to be done" in fresh.snakemake("-n", *target)[1]
+
+
 MESH = "config/scenes/sheet.obj"
+
+
+@pytest.mark.parametrize("name", [MESH, "workflow/scripts/artifact.py"])
+def test_a_file_that_is_edited_while_a_job_reads_it_is_refused(name, fresh):
+    """Though the edit is undone before the job ends; the next run makes the result again."""
+    _read_mesh(fresh)
+    process = _caught_writing(fresh, "meshes", "hold", (RUN,))
+    text = fresh.path(name).read_text()
+    fresh.path(name).write_text(f"{text}\n# edited\n")
+    fresh.path(name).write_text(text)
+    fresh.path("release").touch()
+    said, _ = process.communicate(timeout=600)
+    assert process.returncode != 0
+    assert f"{name}: edited while the run was at work; run the same" in last_lines(said)
+    assert not list(fresh.path(f"{MICRO_RESULTS}/meshes").glob("[!.]*.h5"))
+    fresh.finish(RUN)
+
+
+def _read_mesh(sandbox: Sandbox, wave: float = 0.0) -> None:
+    """Let the scene read its mesh, with waves of this height (m), from the file `MESH`."""
+    scene = sandbox.path("config/scenes/spring_oop.yaml")
+    text = re.sub("mesh: .*", "mesh: {kind: file, path: sheet.obj}", scene.read_text())
+    scene.write_text(text)
+    write_sheet(sandbox.path(MESH), wave)
 
 
 @slow
@@ -275,10 +318,7 @@ def test_a_changed_mesh_file_reruns_what_follows(tmp_path):
     """Though the new file is older than the results, as after unpacking an archive."""
     first, second = (Sandbox.make(tmp_path / name) for name in ("first", "second"))
     for sandbox, wave in ((first, 0.0), (second, 0.1)):
-        scene = sandbox.path("config/scenes/spring_oop.yaml")
-        text = re.sub("mesh: .*", "mesh: {kind: file, path: sheet.obj}", scene.read_text())
-        scene.write_text(text)
-        write_sheet(sandbox.path(MESH), wave)
+        _read_mesh(sandbox, wave)
         sandbox.finish(TABLE)
     flat = first.results()
     write_sheet(first.path(MESH), 0.1)

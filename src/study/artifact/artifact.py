@@ -19,14 +19,15 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property
 from importlib import import_module
-from pathlib import Path
 from typing import Any, ClassVar, TypeVar, get_type_hints
 
 from pydantic import BaseModel, TypeAdapter
 
+from pdrom.core.errors import PdromError
 from pdrom.core.provenance import made_by
 from study.artifact.paths import Place
-from study.artifact.reads import FileRead, Labels, Read, SettingRead, Sources
+from study.artifact.planned import SCRIPT, plan, refused
+from study.artifact.reads import EditedFiles, FileRead, Labels, Read, SettingRead, Sources, listed
 
 A = TypeVar("A", bound="Artifact")
 
@@ -74,6 +75,11 @@ class Artifact:
         reads = self.reads.items()
         return {name: read for name, read in reads if not isinstance(read, SettingRead)}
 
+    def edited(self, inputs: Mapping[str, Any]) -> list[str]:
+        """Paths of files edited by hand among ``inputs`` (parameter -> paths)."""
+        names = [name for name, read in self.files.items() if isinstance(read, EditedFiles)]
+        return [path for name in names for path in listed(inputs[name])]
+
     @cached_property
     def types(self) -> dict[str, TypeAdapter[Any]]:
         """Mapping: parameter of the function for a setting -> Pydantic adapter for its value."""
@@ -116,13 +122,19 @@ class Artifact:
 def make(address: str, code: str, labels: Labels, **job: Mapping[str, Any]) -> None:
     """Run a job of the artifact at ``address``; output files record rule, settings and code.
 
+    Raises PdromError if a file that the job reads was edited since the plan of the run.
+
     code : fingerprint (hash) of the code that the job runs
     labels : scene, group ... of the job, such as {"scene": "bar_release"}
     job : ``settings`` (JSON), ``inputs``, ``outputs`` (paths); each maps parameters to values
     """
     made = load(address)
-    with made_by(made.rule, {**job["settings"], "labels": dict(labels)}, code):
-        made.perform(**job)
+    try:
+        with made_by(made.rule, {**job["settings"], "labels": dict(labels)}, code):
+            made.perform(**job)
+    finally:
+        for message in refused([SCRIPT, *made.edited(job["inputs"])]):
+            raise PdromError(message)
 
 
 def declare(made: A, *parameters: str) -> A:
@@ -147,15 +159,13 @@ def declared_in(package: str, kind: type[A]) -> dict[str, A]:
 
     To save time, modules that import nothing from the module of ``kind`` are not imported.
     """
-    root, found = Path(import_module(package).__path__[0]), {}
+    found = {}
     above, _, own = kind.__module__.rpartition(".")
     needed = f"\nfrom {kind.__module__} import ", f"\nfrom {above} import {own}"
-    for path in root.rglob("*.py"):
-        text = path.read_text(encoding="utf-8")
-        if not any(line in text for line in needed):
+    for name, (_, text) in plan()[0].items():
+        if not name.startswith(f"{package}.") or not any(line in text for line in needed):
             continue
-        name = ".".join((package, *path.relative_to(root).with_suffix("").parts))
-        module = import_module(name.removesuffix(".__init__"))
+        module = import_module(name)
         for value in vars(module).values():
             if isinstance(value, kind) and value.function.__module__ == module.__name__:
                 found[value.name] = value

@@ -15,6 +15,13 @@ from study.artifact.paths import Place
 
 Labels = Mapping[str, str]
 Paths = str | list[str]
+
+
+def listed(paths: Paths) -> list[str]:
+    """Return a list of one or several ``paths``."""
+    return [paths] if isinstance(paths, str) else list(paths)
+
+
 # Path of a file in git with the rows of table {} that the long study config/extended.yaml computed.
 RECORD = "config/reference/recorded/{}.csv"
 # A `study.pipeline.plan.Plan`: finds paths and settings for the scene, group ... of a job.

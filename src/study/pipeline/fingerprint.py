@@ -17,15 +17,11 @@ from itertools import compress
 from pathlib import Path
 from typing import Any
 
-import pdrom
-import study
 from pdrom.core.errors import ConfigurationError, StorageError
 from pdrom.core.registry import Registry
 from pdrom.core.store import write_text
+from study.artifact.planned import PACKAGES, noted, plan
 
-PACKAGES = {
-    name: Path(package.__path__[0]) for name, package in (("pdrom", pdrom), ("study", study))
-}
 # Modules that only define paths of files. They are left out of fingerprints, so that a new kind of
 # file causes no reruns; Snakemake itself notices if the paths of a job's files change.
 LAYOUT = {"study.artifact.paths", "study.artifact.reads"}
@@ -96,27 +92,16 @@ def closure(*places: str) -> list[str]:
 
 
 @cache
-def _locate(module: str) -> Path | None:
-    package, *parts = module.split(".")
-    if package not in PACKAGES:
-        return None
-    base = PACKAGES[package].joinpath(*parts)
-    candidates = (base / "__init__.py", base.with_suffix(".py"))
-    return next((path for path in candidates if path.is_file()), None)
-
-
-@cache
 def _read(module: str) -> tuple[list[str], str]:
     """Names of the project's modules that ``module`` imports, and the hash of its code.
 
     Parent packages of these modules are included. Imports inside functions are found, too.
     """
-    path = _locate(module)
-    if path is None:
+    if module not in plan()[0]:
         raise ConfigurationError(f"fingerprint: no module '{module}' in the packages")
-    text, own = (file.read_text(encoding="utf-8") for file in (path, Path(__file__)))
+    text, own = (plan()[0][name][1] for name in (module, __name__))
     found, code = memory().get(lambda: _parsed(text, module), own, module, text)
-    known = {name for name in found if _locate(name) is not None}
+    known = {name for name in found if name in plan()[0]}
     # leave out the __init__ files of top-level packages, which contain the version only
     return sorted(known - {*PACKAGES, module} - LAYOUT), code
 
@@ -171,7 +156,7 @@ def digest(root: Path, *names: str) -> str:
     It is a parameter of rules that read these files: jobs are repeated if their content changes.
     Dates, which Snakemake compares, can be set back by a copy or a wrong clock.
     """
-    files = [root / name for name in names]
+    files = [noted(root / name) for name in names]
     content = b"".join(hashlib.sha256(f.read_bytes()).digest() for f in files if f.is_file())
     return hashlib.sha256(content).hexdigest()[:16]
 
@@ -183,7 +168,7 @@ def track_scripts(workflow: Any) -> None:
 
     for rule in workflow.rules:
         if rule.script:
-            text = (SCRIPTS / Path(rule.script).name).read_text(encoding="utf-8")
+            text = noted(SCRIPTS / Path(rule.script).name).read_text(encoding="utf-8")
             rule.set_params(script=digest_of_code(ast.parse(text))[:16])
     # Snakemake sets its triggers of reruns later; this property leaves out `CODE` (changed scripts)
     type(workflow).rerun_triggers = property(

@@ -20,7 +20,7 @@ from study.article.build import article
 from study.artifact.artifact import Artifact, make, modules_in
 from study.artifact.logs import warnings_to
 from study.artifact.paths import LIVE_MODEL, TABLE, Place
-from study.artifact.reads import EditedFiles, Labels, Paths
+from study.artifact.reads import Labels, Paths, listed
 from study.experiments.kit.base import experiments
 from study.experiments.subspaces import LARGEST
 from study.figures.kit.declaration import declarations
@@ -231,8 +231,7 @@ class Plan:
             known = {**own, "figure": artifact.name}  # figures find their options by this label
             settings = artifact.settings(self, known)
             inputs = {k: read.paths(self, known) for k, read in artifact.files.items()}
-            edited = [k for k, read in artifact.files.items() if isinstance(read, EditedFiles)]
-            content = [path for name in edited for path in listed(inputs[name])]
+            content = artifact.edited(inputs)
             self._jobs[key] = Job(
                 artifact,
                 own,
@@ -279,8 +278,3 @@ class Plan:
         if head not in DERIVED:
             return self.study.value(key)
         return part_of(DERIVED[head](self.study, labels), parts, key)
-
-
-def listed(paths: Paths) -> list[str]:
-    """Return a list of one or several ``paths``."""
-    return [paths] if isinstance(paths, str) else list(paths)

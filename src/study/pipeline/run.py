@@ -1,6 +1,7 @@
 """First and last steps of a run of the workflow, by ``./reproduce`` or by ``snakemake``."""
 
 import atexit
+import json
 import logging
 import os
 import sys
@@ -13,6 +14,7 @@ from pydantic import ValidationError
 from pdrom.core.errors import ConfigurationError, PdromError
 from pdrom.core.machine import Machine, Units
 from pdrom.core.store import read_table, write_text
+from study.artifact import planned
 from study.artifact.paths import MACHINE
 from study.pipeline import running
 from study.pipeline.commandline import CommandLine, one_line, recall, remember
@@ -122,9 +124,9 @@ class Run:
             hint = f"the last run was of another one: add {last}" if last else "run it first"
             raise ConfigurationError(f"report: this configuration has no {manuscript}; {hint}")
         if self.command.plans:
-            planned = Preview(expected_seconds(plan), cores)
-            logging.getLogger("snakemake.logging").addHandler(planned)
-            atexit.register(lambda: sys.stdout.write(planned.text()))
+            preview = Preview(expected_seconds(plan), cores)
+            logging.getLogger("snakemake.logging").addHandler(preview)
+            atexit.register(lambda: sys.stdout.write(preview.text()))
 
     def title(self, plan: Plan) -> str:
         """Name of the run's configuration, followed by its differences from the full study."""
@@ -140,6 +142,9 @@ class Run:
         running.stop_at_sigterm(self.failures.note_sigterm)
         say_compilation(os.environ.get("NUMBA_CACHE_DIR", ""))
         tell_expectation(workflow, plan)
+        with one_line():
+            write_text(json.dumps(planned.plan()), planned.PLAN, with_checksum=False)
+        os.environ[planned.KEPT] = str(planned.PLAN.absolute())
         if workflow.local_exec:
             try:
                 hold_pipe(running.FOLDER / "run.pipe")

@@ -3,6 +3,7 @@
 import time
 from functools import cache, cached_property
 from pathlib import Path
+from typing import Any
 from zlib import crc32
 
 import numpy as np
@@ -11,38 +12,40 @@ from numba import cfunc, njit, types
 from numba.extending import intrinsic
 
 _INTEGER = ir.IntType(types.intp.bitwidth)
-KERNELS = ("compiled", "constraints", "dynamics")  # folders of pdrom.model with inlined functions
+MODEL = Path(__file__).parents[1]
+_LOADER: Any = __spec__.loader
+# Folders with functions that compiled functions of any folder inline.
+KERNELS = {MODEL / name for name in ("compiled", "constraints", "dynamics")}
 
 
 @cache
-def _checksum(folders: tuple[str, ...]) -> str:
-    """Return a checksum of the source files in some ``folders`` of the package `pdrom.model`."""
-    model = Path(__file__).parents[1]
-    sources = sorted(path for folder in folders for path in model.glob(f"{folder}/*.py"))
-    return f"{crc32(b''.join(path.read_bytes() for path in sources)):08x}"
+def _checksum(folder: Path) -> str:
+    """Return a checksum of the source files in ``folder`` and `KERNELS`, as they are imported."""
+    sources = sorted(path for each in {*KERNELS, folder} for path in each.glob("*.py"))
+    return f"{crc32(b''.join(_LOADER.get_data(str(path)) for path in sources)):08x}"
 
 
 def _mark(function):
     """Append to the name of ``function`` a checksum of all files whose code it may inline.
 
-    Numba's cache checks only the file of the function itself. Without the checksum in the name, it
-    would return outdated machine code after an edit of a file whose functions are inlined.
+    Numba's cache checks only size and date of the function's own file. Without the checksum in the
+    name, it would return outdated machine code after an edit of a file whose functions are inlined,
+    or code of another text of the file, if the file was edited after its import.
     """
-    own = function.__module__.removeprefix("pdrom.model.").split(".")[0]
-    beside = own if (Path(__file__).parents[1] / own).is_dir() else KERNELS[0]
-    function.__qualname__ += f"_{_checksum(tuple(sorted({*KERNELS, beside})))}"
+    function.__qualname__ += f"_{_checksum(Path(function.__code__.co_filename).parent)}"
 
 
 def compiled(function=None, **options):
     """Compile ``function``, cached on disk, with neither checks for division by zero nor fast-math.
 
-    ``options`` are passed to Numba's ``njit`` and may enable fast-math; without a function, a
+    ``options`` are passed to Numba's ``njit``, where they may enable either; without a function, a
     decorator is returned. Numba's wrapper for callers in C is left out, as there are none.
     """
     if function is None:
         return lambda wrapped: compiled(wrapped, **options)
     _mark(function)
-    return njit(cache=True, error_model="numpy", no_cfunc_wrapper=True, **options)(function)
+    own = {"cache": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+    return njit(**own | options)(function)
 
 
 def inner(function=None, **options):

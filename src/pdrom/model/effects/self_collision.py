@@ -3,9 +3,9 @@
 from typing import Annotated, Literal
 
 import numpy as np
-from numba import njit
 from pydantic import Field
 
+from pdrom.model.compiled.functions import compiled
 from pdrom.model.effects.base import Contact, EffectConfig
 from pdrom.model.mesh.types import MAX_LENGTH, MIN_LENGTH, Mesh
 
@@ -89,7 +89,7 @@ class SelfCollision(Contact):
         return close[np.lexsort((close[:, 1], close[:, 0]))]
 
 
-@njit(cache=True)
+@compiled(error_model="python")
 def _separate(q, before, pairs, inverse_masses, thickness, enough, sweeps):
     """Move vertex ``pairs`` apart to ``thickness``; return the least distance in the first pass."""
     first = thickness

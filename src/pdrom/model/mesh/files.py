@@ -10,6 +10,7 @@ import sys
 from dataclasses import dataclass, fields
 from functools import lru_cache
 from pathlib import Path
+from pkgutil import get_data
 
 import numpy as np
 
@@ -137,7 +138,9 @@ def _arrays(path: Path, digest: str, limits: MeshLimits) -> tuple[np.ndarray, np
     """Return points and cells of a file; cached, with ``digest`` and ``limits`` in the key."""
     numbers = (limits.seconds, limits.memory, limits.vertices, limits.cells)
     # -P: modules in the folder of the script must not shadow the standard library
-    command = [PYTHON, "-P", "-X", "utf8", "-W", "ignore", reader.__file__, str(path)]
+    # the text as this process imports it, not as the file is now
+    script = (get_data("pdrom.model.mesh", "reader.py") or b"").decode()
+    command = [PYTHON, "-P", "-X", "utf8", "-W", "ignore", "-c", script, str(path)]
     command += [",".join(FORMATS[path.suffix.lower()]), *map(str, numbers)]
     # allow one thread per linear algebra library: more threads, unused here, would reserve memory
     single = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")

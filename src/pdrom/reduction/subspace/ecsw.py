@@ -32,9 +32,9 @@ from itertools import groupby
 from typing import Literal
 
 import numpy as np
-from numba import njit
 from scipy import linalg
 
+from pdrom.model.compiled.functions import compiled
 from pdrom.model.constraints.base import ConstraintGroup
 from pdrom.model.dynamics.stepper import State, Stepper
 from pdrom.model.scene import Scene
@@ -220,7 +220,7 @@ def training_equations(
     return rows.T, sums
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _hash_equations(lifted, differences, buckets, signs, out):
     """Add the equations of each element to the rows ``buckets`` of ``out``, times ``signs``.
 
@@ -403,7 +403,7 @@ class _ActiveSet:
             size -= 1
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _remove_row(factor, n, column):
     """Update the Cholesky ``factor`` (n, n) of a matrix that loses its row and column ``column``.
 

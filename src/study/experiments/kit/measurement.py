@@ -27,6 +27,7 @@ from pdrom.core.errors import PdromError
 from pdrom.core.store.checksum import damaged_set_aside
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.model.dynamics.stepper import State, Stepper
+from study.artifact import planned
 from study.experiments.kit.base import Count, Repeats
 
 T = TypeVar("T")
@@ -178,12 +179,13 @@ def in_processes(
     fails; the message ends with the last line of its output.
     """
     rows: list[dict[str, Any]] = []
+    command = [sys.executable, "-m", planned.__name__, __name__]
     with TemporaryDirectory() as folder:
         given, answer = Path(folder, "cases.pickle"), Path(folder, "rows.pickle")
         given.write_bytes(pickle.dumps((cases, asked)))
         for process in range(1, asked.processes + 1):
             ended = subprocess.run(
-                [sys.executable, "-m", __name__, str(given), str(answer), str(process)],
+                [*command, str(given), str(answer), str(process)],
                 stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False,
             )  # fmt: skip
             if ended.returncode:

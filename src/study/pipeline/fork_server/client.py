@@ -109,6 +109,9 @@ def run_alone() -> None:
     import runpy
     import threading
 
+    from study.artifact.planned import import_planned
+
+    import_planned()
     if pipe := os.environ.get(PIPE):
         threading.Thread(target=end_with, args=(pipe,), daemon=True).start()
     del sys.argv[:2]

@@ -19,6 +19,7 @@ import threading
 from contextlib import suppress
 from typing import Any
 
+from study.artifact.planned import import_planned
 from study.pipeline.fork_server.client import forward, of_this_user
 
 NUMBER = b"%20d"
@@ -144,6 +145,7 @@ def main() -> None:
     """Load the libraries and serve requests; in a fork, run the script of the job."""
     listener = socket.socket(fileno=int(sys.argv[1]))
     owner, libraries = int(sys.argv[2]), sys.argv[3:]
+    import_planned()
     for library in libraries:
         importlib.import_module(library)
     if "numba" in libraries:

@@ -10,7 +10,7 @@ import pytest
 
 from mesh_files import KINDS, write_mesh, zeros_vtu
 from pdrom.core.errors import ConfigurationError, MeshError
-from pdrom.model.mesh import files, reader
+from pdrom.model.mesh import files
 from pdrom.model.mesh.files import MeshLimits, mesh_limits, read_mesh_file
 
 SQUARE = "v 0 0 0\nv 1 0 0\nv 1 0 1\nv 0 0 1\nf 1 2 3\nf 1 3 4\n"
@@ -28,11 +28,9 @@ def limited(monkeypatch: pytest.MonkeyPatch, **limits: int) -> None:
     monkeypatch.setattr(files, "mesh_limits", lambda: MeshLimits(**limits))
 
 
-def replaced(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, script: str) -> None:
+def replaced(monkeypatch: pytest.MonkeyPatch, script: str) -> None:
     """Another script in place of the reader."""
-    path = tmp_path / "script.py"
-    path.write_text(script)
-    monkeypatch.setattr(reader, "__file__", str(path))
+    monkeypatch.setattr(files, "get_data", lambda *_: script.encode())
 
 
 @pytest.mark.parametrize("suffix", [".obj", ".vtu"])
@@ -127,22 +125,22 @@ def test_large_meshes_are_named(square, monkeypatch, limit, message):
         ("raise SystemExit(7)", "failed with status 7: without a word"),
     ],
 )
-def test_a_reader_that_ends_early_is_named(square, tmp_path, monkeypatch, script, message):
-    replaced(monkeypatch, tmp_path, script)
+def test_a_reader_that_ends_early_is_named(square, monkeypatch, script, message):
+    replaced(monkeypatch, script)
     with pytest.raises(MeshError, match=f"square.obj: the reader .*{message}"):
         read_mesh_file(square)
 
 
-def test_a_reader_that_waits_is_ended(square, tmp_path, monkeypatch):
+def test_a_reader_that_waits_is_ended(square, monkeypatch):
     limited(monkeypatch, deadline=0)
-    replaced(monkeypatch, tmp_path, "import signal\nsignal.pause()")
+    replaced(monkeypatch, "import signal\nsignal.pause()")
     with pytest.raises(MeshError, match=r"square\.obj: not read after 0 s"):
         read_mesh_file(square)
 
 
-def test_an_interrupt_ends_the_reader(square, tmp_path, monkeypatch):
+def test_an_interrupt_ends_the_reader(square, monkeypatch):
     script = "import os, signal\nos.kill(os.getppid(), signal.SIGINT)\nsignal.pause()"
-    replaced(monkeypatch, tmp_path, script)
+    replaced(monkeypatch, script)
     with pytest.raises(KeyboardInterrupt):
         read_mesh_file(square)
 
