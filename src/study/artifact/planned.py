@@ -31,8 +31,7 @@ PLAN, KEPT = Path(".snakemake/plan.json"), "PDROM_PLAN"
 def plan() -> tuple[dict[str, tuple[str, str]], dict[str, int]]:
     """Return what the plan has read: module -> path and text, and other file -> `changed`."""
     if place := os.environ.get(KEPT):
-        sources, files = json.loads(Path(place).read_bytes())
-        return sources, files
+        return tuple(json.loads(Path(place).read_bytes()))
     root, found = Path(__file__).resolve().parents[2], {}
     for path in sorted(path for name in PACKAGES for path in (root / name).rglob("*.py")):
         if path.is_file():  # an editor's lock file may be a link that leads nowhere
@@ -59,8 +58,13 @@ def refused(paths: Iterable[str]) -> list[str]:
     return [f"{p}: edited while the run was at work; run the same command again" for p in edited]
 
 
-class _Loader(SourceFileLoader):
-    """Loader of planned text; an earlier job's compiled code is found by the text, not by dates."""
+class _Planned(SourceFileLoader):
+    """Finder and loader of planned modules; compiled code is kept by their text, not by date."""
+
+    @classmethod
+    def find_spec(cls, name: str, path: Any = None, target: Any = None) -> ModuleSpec | None:
+        file, _ = plan()[0].get(name, ("", ""))
+        return spec_from_file_location(name, file, loader=cls(name, file)) if file else None
 
     def get_data(self, path: str) -> bytes:
         for file, text in plan()[0].values():
@@ -81,19 +85,10 @@ class _Loader(SourceFileLoader):
         return code
 
 
-class _Finder:
-    """Finder of the modules that the plan has read."""
-
-    @staticmethod
-    def find_spec(name: str, path: Any = None, target: Any = None) -> ModuleSpec | None:
-        file, _ = plan()[0].get(name, ("", ""))
-        return spec_from_file_location(name, file, loader=_Loader(name, file)) if file else None
-
-
 def import_planned() -> None:
     """Import modules as planned from now on, if a run has started this process."""
     if KEPT in os.environ:
-        sys.meta_path.insert(0, _Finder)
+        sys.meta_path.insert(0, _Planned)
 
 
 if __name__ == "__main__":

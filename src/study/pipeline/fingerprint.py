@@ -20,12 +20,11 @@ from typing import Any
 from pdrom.core.errors import ConfigurationError, StorageError
 from pdrom.core.registry import Registry
 from pdrom.core.store import write_text
-from study.artifact.planned import PACKAGES, noted, plan
+from study.artifact.planned import PACKAGES, SCRIPT, noted, plan
 
 # Modules that only define paths of files. They are left out of fingerprints, so that a new kind of
 # file causes no reruns; Snakemake itself notices if the paths of a job's files change.
 LAYOUT = {"study.artifact.paths", "study.artifact.reads"}
-SCRIPTS = Path("workflow/scripts")
 
 
 class Memory:
@@ -168,7 +167,7 @@ def track_scripts(workflow: Any) -> None:
 
     for rule in workflow.rules:
         if rule.script:
-            text = noted(SCRIPTS / Path(rule.script).name).read_text(encoding="utf-8")
+            text = noted(Path(SCRIPT)).read_text(encoding="utf-8")
             rule.set_params(script=digest_of_code(ast.parse(text))[:16])
     # Snakemake sets its triggers of reruns later; this property leaves out `CODE` (changed scripts)
     type(workflow).rerun_triggers = property(

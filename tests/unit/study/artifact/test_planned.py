@@ -13,43 +13,36 @@ from study.artifact.planned import KEPT, plan
 from study.pipeline.fork_server import SUPPORTED, interpreter
 
 MODULE = "pdrom.core.errors"
+SERVER = "from study.pipeline.fork_server import start_server\nstart_server(['h5py'])\n"
+OWNER = "import subprocess\nfor _ in 'ab': subprocess.run({!r}, shell=True)"
+CHILD = f"{sys.executable} -m study.artifact.planned {MODULE}"
 
 
 @pytest.mark.parametrize(
-    ("first", "command"),
-    [
-        pytest.param(
-            "from study.pipeline.fork_server import start_server; start_server(['h5py'])",
-            f"{interpreter()} job.py",
-            marks=pytest.mark.skipif(not SUPPORTED, reason="no safe forks on this platform"),
-        ),
-        ("", f"{interpreter()} job.py"),
-        ("", f"{sys.executable} -m study.artifact.planned {MODULE}"),
-    ],
-    ids=["a fork of the server", "without a server", "a process of a job"],
+    ("first", "job"),
+    [(SERVER * SUPPORTED, f"{interpreter()} job.py"), ("", f"{interpreter()} job.py"), ("", CHILD)],
+    ids=["a fork", "without a server", "a process of a job"],
 )
-def test_a_job_imports_what_the_plan_has_read(first, command, tmp_path):
+def test_a_job_imports_what_the_plan_has_read(first, job, tmp_path):
     """The file in ``src`` has another text all the time; the second job finds compiled code."""
     (tmp_path / "job.py").write_text(f"import {MODULE}")
-    planned = tmp_path / "plan.json"
+    path, kept = plan()[0][MODULE][0], tmp_path / "plan.json"
     for word in ("planned", "planned again"):
         text = f"print('{word}', __file__)"
-        path, _ = plan()[0][MODULE]
-        planned.write_text(json.dumps([{**plan()[0], MODULE: (path, text)}, {}]))
-        code = f"import subprocess; {first}\nfor _ in 'ab': subprocess.run({command!r}, shell=True)"
+        kept.write_text(json.dumps([{**plan()[0], MODULE: (path, text)}, {}]))
         done = subprocess.run(
-            [sys.executable, "-c", code], cwd=tmp_path, env={**os.environ, KEPT: str(planned)},
-            capture_output=True, text=True, check=True,
+            [sys.executable, "-c", first + OWNER.format(job)], cwd=tmp_path,
+            env={**os.environ, KEPT: str(kept)}, capture_output=True, text=True, check=True,
         )  # fmt: skip
         assert done.stdout == 2 * f"{word} {path}\n", done.stderr
 
 
-def test_a_kernel_has_another_name_if_a_file_beside_it_has_another_text(tmp_path):
+def test_a_kernel_has_another_name_if_its_file_has_another_text(tmp_path):
     """Of equal size and date: Numba's cache would not see the difference."""
     names, path = set(), tmp_path / "kernel.py"
-    kernel = "from pdrom.model.compiled.functions import compiled\n@compiled\ndef f(): return "
     for number in "12":
-        path.write_text(kernel + number)
+        kernel = f"@compiled\ndef f(): return {number}"
+        path.write_text(f"from pdrom.model.compiled.functions import compiled\n{kernel}")
         os.utime(path, (0, 0))
         functions._checksum.cache_clear()
         names.add(runpy.run_path(str(path))["f"].py_func.__qualname__)
