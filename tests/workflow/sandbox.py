@@ -81,6 +81,14 @@ class Sandbox:
             (self.folder / ".cache" / "numba").symlink_to(compiled)
         return self
 
+    def use_its_own_package(self) -> None:
+        """Run the package in this folder, which can be edited, and compile its kernels here."""
+        (self.folder / ".cache" / "numba").unlink()
+        for name in ("python", "snakemake"):
+            shim = self.folder / ".venv" / "bin" / name
+            text = shim.read_text(encoding="utf-8")
+            shim.write_text(text.replace('/hooks"', f'/hooks:{self.folder}/src"'), encoding="utf-8")
+
     def start(self, *targets, program="./reproduce", fault="", **options):
         """``./reproduce`` on the micro study, in a session of its own."""
         return subprocess.Popen(
