@@ -7,6 +7,7 @@ with job_log(snakemake.log[0]):
         settings=snakemake.params.settings,
         labels=dict(snakemake.wildcards.items()),
         code=snakemake.params.code,
+        content=snakemake.params.content,
         inputs=dict(snakemake.input.items()),
         outputs=dict(snakemake.output.items()),
     )

@@ -28,7 +28,8 @@ def perform(arguments: argparse.Namespace) -> Status:
         case ".json":
             lines += (f"  {line}" for line in path.read_text("utf-8").splitlines())
     lines.append("provenance:" if record else "provenance: unknown (no checksum says it)")
-    lines += [f"  {name}: {record[name]}" for name in RECORD if name in record]
+    ordered = [name for name in dict.fromkeys((*RECORD, *record)) if name in record]
+    lines += [f"  {name}: {record[name]}" for name in ordered]
     sys.stdout.write("\n".join(lines) + "\n")
     return Status.DONE
 

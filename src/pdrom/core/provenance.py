@@ -2,11 +2,13 @@
 
 Inside the context `made_by`, `pdrom.core.store` stores the provenance beside the checksum of every
 file it writes, in HDF5 files also as attributes. Two runs of one job have equal provenance: it
-contains no date, no folder and no commit, since a commit may change only documentation.
+contains no date and no commit, since a commit may change only documentation. For a job of the
+workflow it is the identity of a file: a copy of it under another name is not taken for the result.
 """
 
 import hashlib
 import json
+import os
 import platform
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -24,13 +26,15 @@ RECORD = (
     "made_by", "configuration_sha256", "code_sha256", "pdrom_version", "python_version",
     "library_versions",
 )  # fmt: skip
+# Keys that tell which result a file is; the first and the last are in its checksum only.
+ORIGIN = ("file", *RECORD[:3], "inputs_sha256")
 
 # Name and configuration hash of the running job, and its configuration as canonical JSON.
 _JOB: ContextVar[Mapping[str, str]] = ContextVar("job", default=MappingProxyType({}))
 
 
 @contextmanager
-def made_by(name: str, configuration: Any, code: str = "") -> Iterator[None]:
+def made_by(name: str, configuration: Any, code: str = "", inputs: str = "") -> Iterator[None]:
     """Context in which the job ``name`` is recorded in all files that are written.
 
     Parameters
@@ -38,11 +42,13 @@ def made_by(name: str, configuration: Any, code: str = "") -> Iterator[None]:
     name : name of a rule of the workflow, or of a function of the package
     configuration : all settings of the job, hashed as JSON
     code : fingerprint of the code that the job runs; empty outside of the workflow
+    inputs : hash of the files that the job reads, which files made from them record
     """
     canonical = json.dumps(configuration, sort_keys=True, default=str)
     hashed = hashlib.sha256(canonical.encode()).hexdigest()
     job = {"configuration": canonical, "made_by": name, "configuration_sha256": hashed}
-    previous = _JOB.set(job | {"code_sha256": code} if code else job)
+    hashes = {"code_sha256": code, "inputs_sha256": inputs}
+    previous = _JOB.set(job | {key: value for key, value in hashes.items() if value})
     try:
         yield
     finally:
@@ -64,7 +70,7 @@ def library_versions() -> dict[str, str]:
 def attributes() -> dict[str, str]:
     """Attributes of an HDF5 file that the job writes: provenance, configuration, units (SI)."""
     return {
-        **_JOB.get(),
+        **{key: value for key, value in _JOB.get().items() if key != "inputs_sha256"},
         "pdrom_version": __version__,
         "python_version": platform.python_version(),
         "library_versions": ", ".join(f"{k} {v}" for k, v in sorted(library_versions().items())),
@@ -72,7 +78,13 @@ def attributes() -> dict[str, str]:
     }
 
 
-def provenance() -> dict[str, str]:
-    """Provenance of a file that is written now; without a running job it names no job."""
-    everything = attributes()
-    return {name: everything[name] for name in RECORD if name in everything}
+def provenance(path: str | os.PathLike[str] = "") -> dict[str, str]:
+    """Provenance of the file ``path`` that is written now; without a running job it names no job.
+
+    The files of the workflow also record their path, and a hash of their job's inputs.
+    """
+    everything = {**_JOB.get(), **attributes()}
+    if path and "code_sha256" in everything:
+        everything["file"] = os.path.normpath(path)
+    names = dict.fromkeys((*RECORD, *ORIGIN))
+    return {name: everything[name] for name in names if name in everything}

@@ -14,8 +14,10 @@ Paths of outputs have wildcards (scene, group ...), and an artifact has one job 
 of their values. The values in one job are called ``labels`` in the code.
 """
 
+import hashlib
 import inspect
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from functools import cache, cached_property
 from importlib import import_module
@@ -25,6 +27,7 @@ from pydantic import BaseModel, TypeAdapter
 
 from pdrom.core.errors import PdromError
 from pdrom.core.provenance import made_by
+from pdrom.core.store.checksum import digest_told
 from study.artifact.paths import Place
 from study.artifact.planned import SCRIPT, plan, refused
 from study.artifact.reads import EditedFiles, FileRead, Labels, Read, SettingRead, Sources, listed
@@ -80,6 +83,12 @@ class Artifact:
         names = [name for name, read in self.files.items() if isinstance(read, EditedFiles)]
         return [path for name in names for path in listed(inputs[name])]
 
+    def results(self, inputs: Mapping[str, Any]) -> list[str]:
+        """Paths of those ``inputs`` of a job that other jobs make, in the order of `reads`."""
+        reads = self.files.items()
+        names = [name for name, read in reads if not isinstance(read, EditedFiles)]
+        return [str(path) for name in names for path in listed(inputs[name])]
+
     @cached_property
     def types(self) -> dict[str, TypeAdapter[Any]]:
         """Mapping: parameter of the function for a setting -> Pydantic adapter for its value."""
@@ -119,18 +128,34 @@ class Artifact:
         return content | {k: t.validate_python(settings[k]) for k, t in self.types.items()}
 
 
-def make(address: str, code: str, labels: Labels, **job: Mapping[str, Any]) -> None:
-    """Run a job of the artifact at ``address``; output files record rule, settings and code.
+def recorded(
+    made: Artifact, settings: Any, labels: Labels, code: str, content: str, digests: Iterable[str]
+) -> AbstractContextManager[None]:
+    """Context in which files record the job of ``made`` that has these settings and labels.
 
-    Raises PdromError if a file that the job reads was edited since the plan of the run.
+    The other arguments are those of `make`; ``digests`` are those of the results that it reads.
+    """
+    inputs = hashlib.sha256("\n".join((content, *digests)).encode()).hexdigest()
+    return made_by(made.rule, {**settings, "labels": dict(labels)}, code, inputs)
+
+
+def make(
+    address: str, code: str, labels: Labels, content: str = "", **job: Mapping[str, Any]
+) -> None:
+    """Run a job of the artifact at ``address``; its files record rule, settings, code and inputs.
+
+    Raises StorageError if an input is damaged or belongs to another result (`damaged_set_aside`),
+    and PdromError if a file that the job reads was edited since the plan of the run.
 
     code : fingerprint (hash) of the code that the job runs
     labels : scene, group ... of the job, such as {"scene": "bar_release"}
+    content : checksum of hand-edited inputs
     job : ``settings`` (JSON), ``inputs``, ``outputs`` (paths); each maps parameters to values
     """
     made = load(address)
+    digests = map(digest_told, made.results(job["inputs"]))
     try:
-        with made_by(made.rule, {**job["settings"], "labels": dict(labels)}, code):
+        with recorded(made, job["settings"], labels, code, content, digests):
             made.perform(**job)
     finally:
         for message in refused([SCRIPT, *made.edited(job["inputs"])]):

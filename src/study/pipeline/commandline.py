@@ -43,6 +43,7 @@ class CommandLine:
     looks_only : True if no job runs and no result is written
     plans : True for a dry run (``-n``) without any other option of `LOOKS_ONLY`
     own_output : True if an option of `OWN_OUTPUT` is given
+    makes : True if results are made or a dry run plans to; False with ``--touch``, too
     cores : True if a number of cores or jobs is given
     executor : Snakemake's executor, from command line or profile; None runs jobs on this machine
     """
@@ -65,6 +66,7 @@ class CommandLine:
         self.report = str(found["report"]) if found["report"] and reports else None
         self.looks_only = bool(looks) or reports
         self.plans = looks == ["dryrun"]
+        self.makes = (self.plans or not self.looks_only) and not found["touch"]
         self.own_output = any(found[name] is not None and found[name] for name in OWN_OUTPUT)
         self.cores = found["cores"] is not None or found["jobs"] is not None
         self.executor: str | None = found["executor"]

@@ -16,6 +16,7 @@ from typing import Literal
 from pydantic import ValidationError
 
 from pdrom.core.errors import StorageError
+from pdrom.core.provenance import ORIGIN
 from pdrom.core.store import Condition, check_file, write_text
 from pdrom.core.store.checksum import Checksum, read_checksum
 from pdrom.core.yamlfile import ConfigModel, describe
@@ -40,16 +41,22 @@ class Entry(ConfigModel):
     made_by: str | None = None
     configuration_sha256: str | None = None
     code_sha256: str | None = None
+    inputs_sha256: str | None = None
     environment: str | None = None
 
     def fits(self, path: Path) -> bool:
-        """Return whether the content of the file ``path`` agrees with this entry."""
+        """Return whether content and origin of the file ``path`` agree with this entry."""
+        checksum = read_checksum(path)
+        if checksum is None or checksum.digest != self.blake2b:
+            return False
         if self.sha256:
             with open(path, "rb") as handle:
-                return hashlib.file_digest(handle, "sha256").hexdigest() == self.sha256
-        checksum = read_checksum(path)
-        reported = checksum is not None and checksum.digest == self.blake2b
-        return reported and check_file(path) is Condition.INTACT
+                if hashlib.file_digest(handle, "sha256").hexdigest() != self.sha256:
+                    return False
+        told = json.loads(checksum.provenance or "{}")
+        own = {**self.model_dump(), "file": os.path.normpath(path) if checksum.file else None}
+        same = all(told.get(key) == own[key] for key in ORIGIN)
+        return same and check_file(path) is Condition.INTACT
 
 
 class Manifest(ConfigModel):
@@ -121,6 +128,7 @@ def asked_for(found: Iterable[str], plan: Plan) -> Iterator[str]:
 
 def _entry(path: Path, checksum: Checksum, environments: dict[str, dict[str, str]]) -> Entry:
     made = json.loads(checksum.provenance) if checksum.provenance else {}
+    made.pop("file", None)
     environment = {name: made.pop(name) for name in _ENVIRONMENT if name in made}
     if environment:
         key = hashlib.sha256(json.dumps(environment, sort_keys=True).encode()).hexdigest()[:8]

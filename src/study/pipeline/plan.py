@@ -6,7 +6,7 @@ The workflow turns each `Job` (files, settings, fingerprint of its code) into on
 import logging
 import os
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -14,10 +14,11 @@ from types import MappingProxyType
 from typing import Any
 
 from pdrom.core.errors import ConfigurationError, SceneError, choices
+from pdrom.core.provenance import ORIGIN, provenance
 from pdrom.reduction.subspace.exported import DOUBLES, require_known
 from pdrom.view.text import require_typeset
 from study.article.build import article
-from study.artifact.artifact import Artifact, make, modules_in
+from study.artifact.artifact import Artifact, make, modules_in, recorded
 from study.artifact.logs import warnings_to
 from study.artifact.paths import LIVE_MODEL, TABLE, Place
 from study.artifact.reads import Labels, Paths, listed
@@ -127,9 +128,22 @@ class Job:
             settings=self.settings,
             labels=self.labels,
             code=self.code,
+            content=self.content,
             inputs=self.inputs,
             outputs=outputs,
         )
+
+    def origin(self, path: str, digests: Iterable[str]) -> dict[str, str]:
+        """Entries of the checksum of the output ``path`` if `results` have these ``digests``."""
+        job = (self.artifact, self.settings, self.labels, self.code, self.content)
+        with recorded(*job, digests):
+            said = provenance(path)
+        return {key: said[key] for key in ORIGIN}
+
+    @cached_property
+    def results(self) -> list[str]:
+        """Input paths of the job that other jobs make."""
+        return self.artifact.results(self.inputs)
 
     @property
     def files(self) -> list[str]:

@@ -97,11 +97,15 @@ class Preview(logging.Handler):
     """Log handler that reads Snakemake's messages in a dry run and counts the jobs.
 
     seconds : function that maps the path of a job's log to its expected processor seconds
+    faults : path of a result -> why its job runs, if Snakemake does not know
     cores : number of cores of the run; a job that measures times needs all of them
     """
 
-    def __init__(self, seconds: Callable[[str], float], cores: int) -> None:
+    def __init__(
+        self, seconds: Callable[[str], float], cores: int, faults: Mapping[str, str]
+    ) -> None:
         super().__init__(logging.INFO)
+        self._faults = faults
         self._of_job, self._cores = seconds, cores
         self._jobs: Counter[str] = Counter()
         self._reasons: defaultdict[str, set[str]] = defaultdict(set)
@@ -114,7 +118,8 @@ class Preview(logging.Handler):
         if getattr(record, "event", None) != LogEvent.JOB_INFO:
             return
         self._jobs[record.rule_name] += 1
-        self._reasons[record.rule_name] |= shortened(record.reason)
+        known = {self._faults[path] for path in record.output if path in self._faults}
+        self._reasons[record.rule_name] |= known or shortened(record.reason)
         if record.log:  # rules without a log only collect targets and take no time
             seconds = self._of_job(str(record.log[0]))
             self._processor += seconds

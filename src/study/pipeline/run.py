@@ -5,20 +5,22 @@ import json
 import logging
 import os
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
 
-from pdrom.core.errors import ConfigurationError, PdromError
+from pdrom.core.errors import ConfigurationError, PdromError, StorageError
 from pdrom.core.machine import Machine, Units
 from pdrom.core.store import read_table, write_text
+from pdrom.core.store.checksum import move_aside
 from study.artifact import planned
 from study.artifact.paths import MACHINE
 from study.pipeline import running
 from study.pipeline.commandline import CommandLine, one_line, recall, remember
 from study.pipeline.failures import Failures
+from study.pipeline.faults import MISSING, UNUSUAL, faults, force
 from study.pipeline.fingerprint import memory
 from study.pipeline.fork_server import hold_pipe, start_server
 from study.pipeline.manifest import write_manifest
@@ -110,21 +112,28 @@ class Run:
         self.failures = Failures()
         logging.getLogger("snakemake.logging").addHandler(self.failures)
 
-    def check(self, plan: Plan, rules: Iterable[Any], cores: int) -> None:
+    def check(self, plan: Plan, workflow: Any, cores: int) -> None:
         """Check that requested targets and report can be made; let a dry run print a list of jobs.
 
-        ``rules`` are Snakemake's rules of ``plan``; ``cores`` is the number of cores of the run.
+        Snakemake is told to make results again that do not fit ``plan`` (see `faults`). A run sets
+        those aside that are damaged or another's. ``cores`` is the number of cores of the run.
         Raises ConfigurationError if a target or the report cannot be made.
         """
-        check_targets(plan, self.command.targets, list(rules))
+        check_targets(plan, self.command.targets, list(workflow.rules))
         reports = self.command.report and not self.command.targets
         manuscript = plan.folders.manuscript
         if reports and not Path(manuscript).is_file():
             last = " ".join(recall())
             hint = f"the last run was of another one: add {last}" if last else "run it first"
             raise ConfigurationError(f"report: this configuration has no {manuscript}; {hint}")
+        found = faults(plan, self.command.targets) if self.command.makes else {}
+        for path, fault in found.items():
+            if fault in UNUSUAL:
+                aside = "" if fault == MISSING or self.command.plans else f", {move_aside(path)}"
+                sys.stderr.write(f"pdrom: {path}: {fault}{aside}; it is made again\n")
+        force(workflow, found)
         if self.command.plans:
-            preview = Preview(expected_seconds(plan), cores)
+            preview = Preview(expected_seconds(plan), cores, found)
             logging.getLogger("snakemake.logging").addHandler(preview)
             atexit.register(lambda: sys.stdout.write(preview.text()))
 
@@ -159,6 +168,8 @@ class Run:
                 text = contents(self.command, workflow.dag, plan.folders)
                 write_text(text, CONTENTS.at(plan.results))
             write_manifest(plan, self.command.configuration)
+            for path, fault in faults(plan, self.command.targets).items():
+                raise StorageError(f"{path}: {fault} since this run; the next run makes it again")
         except PdromError as error:
             atexit.register(sys.stderr.write, f"pdrom: {error}\n")
         atexit.register(sys.stderr.write, summary(self.command, plan))

@@ -12,6 +12,7 @@ import pandas as pd
 from pdrom.core.errors import StorageError
 from pdrom.core.store import Condition, check_file, read_table
 from study.artifact.paths import TABLE
+from study.pipeline.faults import UNUSUAL, faults
 from study.pipeline.plan import Job
 from study.tables import declared
 from study.tables.claims.rules import load_claims
@@ -39,7 +40,7 @@ class Outcome(StrEnum):
 class Line(NamedTuple):
     """Outcome of comparing one claim, figure or table with the expected one.
 
-    kind : claim, figure or table
+    kind : claim, figure, table, or file: a result that does not fit the plan
     text : largest difference with its row and column, or the reason for the outcome
     details : all differences as text, largest first
     """
@@ -82,7 +83,12 @@ class Examination:
             for path in sorted(folder.glob("*.csv"))
             if path.stem not in declared() and path.name[0] != "."
         ]
-        return [*self.claims(), *figures, *tables.values(), *strangers]
+        unfit = [
+            Line("file", path, Outcome.MISSING, f"{fault}; {self.subject.command()} makes it again")
+            for path, fault in faults(self.subject.plan).items()
+            if fault in UNUSUAL
+        ]
+        return [*self.claims(), *figures, *tables.values(), *strangers, *unfit]
 
     def found(self, name: str) -> pd.DataFrame:
         """Return table ``name`` of the results folder with all declared columns.

@@ -19,6 +19,7 @@ from pdrom.core.errors import PdromError, StorageError
 from pdrom.core.store import Condition, check_file
 from study.artifact.paths import MANIFEST
 from study.artifact.reads import Every
+from study.pipeline.faults import Checked
 from study.pipeline.manifest import Entry, asked_for, read_manifest
 from study.pipeline.plan import Job
 from study.tables import declared
@@ -36,7 +37,10 @@ FAULTS = (PdromError, ArithmeticError, AttributeError, LookupError, TypeError, V
 
 
 def verify_files(subject: Subject) -> Status:
-    """Compare a study's files with its manifest; print faults, and commands to make files again."""
+    """Compare a study's files with its manifest; print faults, and commands to make files again.
+
+    The next run makes a file again that differs, also if size and dates are those of the last run.
+    """
     place = Path(MANIFEST.at(subject.results))
     hint = f"a run that succeeds writes it: {subject.command()}"
     if not place.is_file():
@@ -58,9 +62,13 @@ def verify_files(subject: Subject) -> Status:
         if set(faults).isdisjoint((*job.files, *job.outputs.values())):
             other += differing(job)
     faults |= dict.fromkeys(other, OTHER)
+    checked = Checked(subject.results)
+    checked.distrust(path for path, fault in faults.items() if fault in (DAMAGED, OTHER))
+    checked.save()
     for path, fault in list(faults.items())[:SHOWN]:
-        command = shlex.join(["./reproduce", *subject.options, "--force", "--", path])
-        say(f"{path}: {fault}" + ("" if fault == FOREIGN else f"; make it again by {command}"))
+        forced = ["--force", "--", path] if fault == UNLISTED else []
+        command = shlex.join(["./reproduce", *subject.options, *forced])
+        say(f"{path}: {fault}" + ("" if fault == FOREIGN else f"; {command} makes it again"))
     if len(faults) > SHOWN:
         say(f"and {len(faults) - SHOWN} more; finish the study by {subject.command()}")
     count = len({*paths, *faults})

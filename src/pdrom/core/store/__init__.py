@@ -69,7 +69,9 @@ def atomic_path(path: str | os.PathLike[str], with_checksum: bool = True) -> Ite
         yield temporary
         _bring_to_disk(temporary)
         if with_checksum:
-            checksum.write_bytes(sums.new_checksum(sums.digest_of(temporary), target.name).content)
+            checksum.write_bytes(
+                sums.new_checksum(sums.digest_of(temporary), target.name, target).content
+            )
             _bring_to_disk(checksum)
             _rename(temporary, checksum, target)
         else:
@@ -246,7 +248,7 @@ def write_hdf5(path: str | os.PathLike[str]) -> Iterator[h5py.File]:
                 yield file
             if sink.error is not None:
                 raise sink.error
-        sums.write_block(temporary)
+        sums.write_block(temporary, path)
 
 
 class _Sink:

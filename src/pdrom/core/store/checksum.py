@@ -34,6 +34,7 @@ _ASIDE: ContextVar[bool] = ContextVar("damaged results are set aside", default=F
 def damaged_set_aside() -> Iterator[None]:
     """Context in which an attempt to read a damaged result renames it to ``NAME.damaged``.
 
+    The same holds for a result whose checksum names another path, that of another scene, say.
     Only jobs of the workflow use it: the next run makes the missing result again. Other readers
     never rename a file, since it may be a user's only copy of a run.
     """
@@ -68,6 +69,11 @@ class Checksum:
     provenance: str
 
     @property
+    def file(self) -> str:
+        """Path of the result for which a job of the workflow wrote it; empty without a job."""
+        return str(json.loads(self.provenance or "{}").get("file", ""))
+
+    @property
     def content(self) -> bytes:
         """Bytes of the checksum file."""
         text = self.provenance.encode()
@@ -97,9 +103,9 @@ def digest_of(path: Path, start: int = 0) -> str:
         return hashlib.file_digest(handle, "blake2b").hexdigest()
 
 
-def new_checksum(digest: str, name: str) -> Checksum:
-    """Checksum of the file ``name`` with the ``digest`` of its bytes and the current provenance."""
-    return Checksum(digest, name, json.dumps(provenance(), sort_keys=True))
+def new_checksum(digest: str, name: str, path: str | os.PathLike[str] = "") -> Checksum:
+    """Checksum ``name`` of the file ``path``: the ``digest`` of its bytes, current provenance."""
+    return Checksum(digest, name, json.dumps(provenance(path), sort_keys=True))
 
 
 def is_hdf5(path: Path) -> bool:
@@ -110,9 +116,12 @@ def is_hdf5(path: Path) -> bool:
     return named or head[BLOCK:] == _SIGNATURE
 
 
-def write_block(path: Path) -> None:
-    """Write the checksum of the HDF5 file ``path`` into its user block of `BLOCK` bytes."""
-    content = _LINE + new_checksum(digest_of(path, start=BLOCK), BLOCK_NAME).content
+def write_block(path: Path, target: str | os.PathLike[str] = "") -> None:
+    """Write the checksum of the HDF5 file ``path`` into its user block of `BLOCK` bytes.
+
+    ``target`` is the path that the file will have.
+    """
+    content = _LINE + new_checksum(digest_of(path, BLOCK), BLOCK_NAME, target or path).content
     if len(content) > BLOCK:
         raise ValueError(f"{path}: a checksum of {len(content)} bytes, allowed: at most {BLOCK}")
     with open(path, "r+b") as handle:
@@ -128,9 +137,9 @@ class Condition(StrEnum):
 
 
 def read_checksum(path: str | os.PathLike[str]) -> Checksum | None:
-    """Read the checksum of the file ``path``; None if it is missing or itself damaged."""
+    """Read the checksum of the file ``path``; None if it is missing, damaged or not readable."""
     path = Path(path)
-    content = _checksum_bytes(path) if path.is_file() else None
+    content = _checksum_bytes(path) if path.is_file() and os.access(path, os.R_OK) else None
     if content is None:
         return None
     checksum = Checksum.parse(content)
@@ -174,12 +183,23 @@ def require_intact(path: str | os.PathLike[str], unchecked: bool = False) -> Non
     Raises
     ------
     StorageError
-        The file is missing, cannot be read, is damaged or has no checksum. In the last two cases a
-        job of the workflow renames the file to ``*.damaged``, so that the next run finds it missing
-        and makes it again; other readers leave it unchanged.
+        The file is missing, cannot be read, is damaged or has no checksum, or a job of the workflow
+        reads the file of another result. Except if the file is missing, a job renames it to
+        ``*.damaged``, so that the next run makes it again; other readers leave it unchanged.
     """
     path = Path(path)
-    condition = check_file(path)
+    try:
+        condition = check_file(path)
+    except StorageError as error:
+        unusable = not path.is_file() or not os.access(path, os.R_OK)
+        if sets_aside() and unusable and os.path.lexists(path):
+            raise _set_aside(path, "damaged, no file that can be read") from error
+        raise
+    if condition is Condition.INTACT and sets_aside():
+        told = read_checksum(path)
+        if told and told.file != os.path.normpath(path):
+            other = told.file or "its checksum names none"
+            raise _set_aside(path, f"the file of another result ({other})")
     if condition is Condition.INTACT or (unchecked and condition is Condition.NO_CHECKSUM):
         return
     if condition is Condition.DAMAGED:
@@ -189,7 +209,7 @@ def require_intact(path: str | os.PathLike[str], unchecked: bool = False) -> Non
     else:
         fault = f"its checksum {checksum_path(path).name} is missing (copied without it?)"
     if sets_aside():
-        raise _set_aside(path, fault)
+        raise _set_aside(path, fault if fault.startswith("damaged") else f"damaged, {fault}")
     way = f"; {UNCHECKED}" if condition is Condition.NO_CHECKSUM and is_hdf5(path) else ""
     raise StorageError(f"{path}: {fault}{way}")
 
@@ -206,12 +226,32 @@ def _checksum_bytes(path: Path) -> bytes | None:
     return block.removeprefix(_LINE).rstrip(b"\0") if block.startswith(_LINE) else b""
 
 
-def _set_aside(path: Path, fault: str) -> StorageError:
-    damage = fault if fault.startswith("damaged") else f"damaged, {fault}"
-    aside = path.with_name(f"{path.name}.damaged")
+def digest_told(path: str | os.PathLike[str]) -> str:
+    """Digest of the bytes of the result ``path`` as its checksum says; "" if none says one.
+
+    A job of the workflow refuses another result, as `require_intact` does.
+    """
+    told = read_checksum(path)
+    if sets_aside() and (told is None or told.file != os.path.normpath(path)):
+        require_intact(path)
+    return told.digest if told else ""
+
+
+def move_aside(path: str | os.PathLike[str]) -> str:
+    """Rename ``path``, also a folder or link, to ``NAME.damaged``; return words that say so."""
+    path = Path(path)
+    aside, checksum = path.with_name(f"{path.name}.damaged"), checksum_path(path)
+    while os.path.lexists(aside) and (aside.is_dir() or path.is_dir()):
+        aside = aside.with_name(f"{aside.name}.damaged")
     try:
         os.replace(path, aside)
-        checksum_path(path).unlink(missing_ok=True)
-    except OSError:
-        return StorageError(f"{path}: {damage}; delete it, the next run makes it again")
-    return StorageError(f"{path}: {damage}; set aside as {aside.name}, the next run makes it again")
+        if checksum.is_dir():
+            checksum.rename(aside.with_name(f".{aside.name}{CHECKSUM_SUFFIX}"))
+        checksum.unlink(missing_ok=True)
+    except OSError as error:
+        return f"delete it, it cannot be renamed ({reason(error)})"
+    return f"set aside as {aside.name}"
+
+
+def _set_aside(path: Path, fault: str) -> StorageError:
+    return StorageError(f"{path}: {fault}; {move_aside(path)}, the next run makes it again")

@@ -119,7 +119,7 @@ def job(rule, reason, *logs, threads=1):
     return logging.makeLogRecord(
         {
             "event": LogEvent.JOB_INFO, "rule_name": rule, "reason": reason, "threads": threads,
-            "log": logs,
+            "log": logs, "output": [f"{rule}.csv".replace("timing", "b")],
         }
     )  # fmt: skip
 
@@ -129,18 +129,18 @@ END = logging.makeLogRecord({"msg": "This was a dry-run (flag -n). The order of 
 
 def test_jobs_are_counted_by_rule_and_their_times_added():
     seconds = {"fom/a.log": 600.0, "fom/b.log": 1800.0, "timing.log": 1200.0}
-    preview = Preview(seconds.__getitem__, cores=2)
+    preview = Preview(seconds.__getitem__, 2, {"b.csv": "output is damaged"})
     preview.emit(logging.makeLogRecord({"msg": "Nothing to be done"}))
     assert preview.text() == ""
     preview.emit(job("fom", "Missing output files: a", "fom/a.log"))
     preview.emit(job("fom", "Params have changed since last execution: {}", "fom/b.log"))
-    preview.emit(job("timing", "Missing output files: a", "timing.log", threads=8))
+    preview.emit(job("timing", "Forced execution", "timing.log", threads=8))
     preview.emit(job("all", "Input files updated by another job: a"))
     assert preview.text() == ""
     preview.emit(END)
     assert preview.text().splitlines() == [
         "    2 fom     output is missing, settings or code have changed",
-        "    1 timing  output is missing",
+        "    1 timing  output is damaged",
         "    1 all     input is made again",
         "pdrom: 4 jobs, about 40 min on 2 cores, about 60 min of processor time",
     ]

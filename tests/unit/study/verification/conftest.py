@@ -88,6 +88,7 @@ def results(project, monkeypatch):
     """The project as the current folder; its tables are as they were when the test ends."""
     monkeypatch.chdir(project)
     monkeypatch.setattr("os.fsync", lambda descriptor: None)
+    monkeypatch.setattr("study.verification.examine.faults", lambda plan: {})
     kept = project.with_name("kept")
     shutil.copytree(project / RESULTS, kept)
     yield project

@@ -152,21 +152,21 @@ def no_manifest(content, _):
 
 
 STUDY = "./reproduce --configfile 'my study.yaml'"
-AGAIN = f"make it again by {STUDY} --force -- "
+AGAIN = f"{STUDY} makes it again\n"
 RUN = f"; a run that succeeds writes it: {STUDY}\n"
 # Change, what it changes, what is said of it.
 FAULTS = (
-    (flipped, NAMES, f"NAME: damaged (its checksum differs); {AGAIN}NAME\n3 of 4 files"),
+    (flipped, NAMES, f"NAME: damaged (its checksum differs); {AGAIN}3 of 4 files"),
     (flipped_before_a_later_run, NAMES[:1], "NAME: damaged"),
     (forged, ("x\n3.0\n2.6\n", "", "a picture"), f"{NAMES[2]}: not what its inputs give; {AGAIN}"),
-    (taken_out, NAMES, f"NAME: not in the manifest; {AGAIN}NAME\n"),
+    (taken_out, NAMES, f"NAME: not in the manifest; {STUDY} --force -- NAME makes it again\n"),
     (foreign, ("../../secret", "/etc/hostname", "../paper/main.tex", "notes.md"),
      ": no file of this study\n"),
-    (lost, NAMES, f"NAME: not there; {AGAIN}NAME\n"),
-    (lost_and_unlisted, NAMES[3:], f"NAME: not there; {AGAIN}NAME\n"),
+    (lost, NAMES, f"NAME: not there; {AGAIN}"),
+    (lost_and_unlisted, NAMES[3:], f"NAME: not there; {AGAIN}"),
     (lost, ("results/manifest.json",), f"NAME: not there{RUN}"),
     (lost, ("results/paper/.m.tex.blake2b",), f"{NAMES[3]}: damaged"),
-    (broken_maker, NAMES[2:3], f"NAME: not what its inputs give; {AGAIN}NAME\n"),
+    (broken_maker, NAMES[2:3], f"NAME: not what its inputs give; {AGAIN}"),
     (no_manifest, ("{", '{"format": 2}', '{"format": 1, "file": {}}'), RUN),
 )  # fmt: skip
 

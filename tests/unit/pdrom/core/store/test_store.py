@@ -14,6 +14,7 @@ import pytest
 from builders import write_result
 from pdrom.core import store
 from pdrom.core.errors import StorageError
+from pdrom.core.provenance import made_by
 from pdrom.core.store import open_hdf5
 from pdrom.core.store.checksum import damaged_set_aside, new_checksum
 
@@ -310,7 +311,7 @@ def test_a_new_file_takes_the_hidden_checksum_of_an_old_one_along(plain):
 def test_an_error_while_reading_leads_to_another_check(tmp_path, damaged):
     """A file damaged after the first check is renamed; any other read error is not damage."""
     path = tmp_path / "a.h5"
-    with store.write_hdf5(path) as file:
+    with made_by("job", {}, "c0de"), store.write_hdf5(path) as file:
         file["x"] = 1
     message = "set aside" if damaged else os.strerror(errno.ENOLCK)
     with damaged_set_aside(), pytest.raises(StorageError, match=message), open_hdf5(path):

@@ -1,0 +1,159 @@
+"""Results that a run makes again although Snakemake, which compares dates, would keep them.
+
+A result may be missing below others that are up to date, or damaged, or belong to another job: its
+checksum says of which path, settings, code and inputs it is. Snakemake is told to make such files
+again, and makes what follows from them.
+"""
+
+import json
+import os
+from collections.abc import Iterable, Sequence
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from pdrom.core.errors import StorageError
+from pdrom.core.provenance import ORIGIN
+from pdrom.core.store import Condition, check_file, checksum_path, write_text
+from pdrom.core.store.checksum import read_checksum
+from study.artifact.paths import Place
+from study.experiments.kit.base import Experiment
+from study.pipeline.plan import Job, Plan
+
+MISSING = "output is missing"
+DAMAGED = "output is damaged"
+FOREIGN = "output belongs to another result"
+CHANGED = "settings or code have changed"
+STALE = "output was made from other inputs"
+# Faults that no edit and no interrupted run explains: a run names every file that has one.
+UNUSUAL = (MISSING, DAMAGED, FOREIGN)
+
+
+class Checked:
+    """Content of the checksums of results, stored with size, inode and dates of every file.
+
+    The bytes of a file are compared with its checksum only if one of these has changed since then,
+    or those of its checksum file.
+    """
+
+    def __init__(self, results: str) -> None:
+        self._path, self._changed = Path(results, ".checked.json"), False
+        try:
+            self._stored = dict(json.loads(self._path.read_text(encoding="utf-8")))
+        except (OSError, ValueError, TypeError):
+            self._stored = {}
+
+    def told(self, path: str) -> dict[str, str] | None:
+        """Digest and origin that the checksum of ``path`` says: {} if damaged, None if missing."""
+        state, stored = _state(path), self._stored.get(path)
+        if state[0] is False:
+            return None
+        if not stored or stored[0] != state:
+            self._stored[path] = stored = [state, _read(path)]
+            self._changed = True
+        told: dict[str, str] = stored[1]
+        return told
+
+    def distrust(self, paths: Iterable[str]) -> None:
+        """Count ``paths`` as damaged from now on, until they are made again."""
+        for path in paths:
+            self._stored[path] = [_state(path), {}]
+            self._changed = True
+
+    def save(self) -> None:
+        """Store this for the next command; a folder that cannot be written does no harm."""
+        if self._changed:
+            with suppress(StorageError):
+                write_text(json.dumps(self._stored), self._path, with_checksum=False)
+
+
+def _state(path: str) -> list[Any]:
+    """Size, inode and dates of ``path`` and its checksum file; False for one that is missing."""
+    found: list[Any] = []
+    for each in (path, os.fspath(checksum_path(path))):
+        try:
+            stat = os.stat(each)
+            found.append([stat.st_size, stat.st_ino, stat.st_mtime_ns, stat.st_ctime_ns])
+        except OSError:  # there may be a link that leads nowhere
+            found.append(os.path.lexists(each))
+    return found
+
+
+def _read(path: str) -> dict[str, str]:
+    with suppress(StorageError):  # a folder, a link that leads nowhere, or no permission
+        if check_file(path) is Condition.INTACT and (checksum := read_checksum(path)):
+            told = json.loads(checksum.provenance or "{}")
+            return {"digest": checksum.digest, **{key: told.get(key, "") for key in ORIGIN}}
+    return {}
+
+
+def faults(plan: Plan, targets: Sequence[str] = ()) -> dict[str, str]:
+    """Map files to their faults: all that ``targets``, by default the study, need and are unfit.
+
+    A missing file counts if a file is there that was made from it; Snakemake notices all others.
+    """
+    jobs, checked = needed(plan, targets), Checked(plan.results)
+    told = {path: checked.told(path) for path in jobs}
+    checked.save()
+    there = [job for path, job in jobs.items() if told[path] is not None]
+    used = {path for job in there for path in (*job.files, *job.outputs.values())}
+    found: dict[str, str] = {}
+    for path, job in jobs.items():  # inputs stand before what is made from them
+        own, inputs = told[path], [told.get(name) or {} for name in job.results]
+        if own:
+            expected = job.origin(path, [one.get("digest", "") for one in inputs])
+            other = [key for key, value in expected.items() if own[key] != value]
+            if other == ["inputs_sha256"]:  # what inputs made again change, Snakemake makes again
+                fault = STALE if all(inputs) and found.keys().isdisjoint(job.results) else ""
+            else:
+                foreign = "file" in other and own["file"]
+                fault = FOREIGN if foreign else CHANGED if other else ""
+        else:
+            fault = DAMAGED if own is not None else MISSING if path in used else ""
+        if fault:
+            found[path] = fault
+    return found
+
+
+def needed(plan: Plan, targets: Sequence[str] = ()) -> dict[str, Job]:
+    """Map all files that ``targets`` (paths, rules; none: the study) need to jobs, inputs first."""
+    fixed = [job for jobs in plan.fixed.values() for job in jobs]
+    rules = {job.artifact.rule: [*job.outputs.values()] for job in fixed}
+    makers = {path: job for job in fixed for path in job.outputs.values()}
+    kinds: dict[str, list[tuple[Experiment, Place]]] = {}
+    for experiment in plan.experiments.values():
+        for place in experiment.writes.values():
+            kinds.setdefault(place.pattern.partition("/")[0], []).append((experiment, place))
+    found: dict[str, Job] = {}
+
+    def maker(path: str) -> Job | None:
+        kind = path.removeprefix(f"{plan.results}/").partition("/")[0]
+        for experiment, place in kinds.get(kind, ()):
+            with suppress(StorageError):
+                labels = place.file(path).labels
+                if place.at(plan.results, **labels) == path:
+                    return plan.job(experiment, labels)
+        return None
+
+    def visit(path: str) -> None:
+        if path not in found and (job := makers.get(path) or maker(path)):
+            for read in job.results:
+                visit(read)
+            found.update(dict.fromkeys(job.outputs.values(), job))
+
+    study = not targets or not {"study", "all"}.isdisjoint(targets)
+    for target in plan.made if study else targets:
+        for path in rules.get(target, [os.path.normpath(target)]):
+            visit(path)
+    return found
+
+
+def force(workflow: Any, files: Iterable[str]) -> None:
+    """Make Snakemake's ``workflow`` run the jobs of ``files`` as with its option ``--forcerun``."""
+
+    def settle(self: Any, settings: Any) -> None:
+        vars(self)["dag_settings"] = replace(settings, forcerun={*settings.forcerun, *files})
+
+    # Snakemake sets its options after it has read the rules
+    type(workflow).dag_settings = property(lambda self: vars(self)["dag_settings"], settle)
