@@ -119,7 +119,8 @@ class Sandbox:
 
     def results(self) -> dict[str, str]:
         """Digest of every result, all of them intact; what a clock measured is left out."""
-        files = [p for p in self.path("results").rglob("[!.]*") if p.is_file()]
+        found = self.path("results").rglob("[!.]*")
+        files = [p for p in found if p.is_file() and p.suffix != ".damaged"]
         with_checksum = [p for p in files if p.suffix != ".log"]
         assert {check_file(p) for p in with_checksum} == {"intact"}
         names = {str(p.relative_to(self.folder)): p for p in files}

@@ -9,13 +9,14 @@ import os
 import random
 import re
 import resource
+import shutil
 import signal
 import subprocess
 from pathlib import Path
 
 import pytest
 from checkout import write_sheet
-from sandbox import Sandbox, kill_all, wait_for
+from sandbox import MICRO_FILE, Sandbox, kill_all, wait_for
 
 from pdrom.core.store import checksum_path
 from places import MICRO_MANUSCRIPT, MICRO_RESULTS
@@ -70,9 +71,17 @@ def heals(sandbox: Sandbox, undisturbed: Sandbox, target: str = TABLE) -> None:
 
 
 def test_lost_rows_and_a_killed_job_are_named_and_made_again(undisturbed, sandbox):
-    """The first run finds rows missing, the second one loses the job that reads them."""
-    cut(sandbox.path(f"{SAMPLING}.csv"))
-    find_damage(sandbox, f"{SAMPLING}.csv", (TABLE,))
+    """A file is damaged after the plan, by the next run the last job is killed."""
+    sandbox.path(BASIS).unlink()
+    waiting = "/\\.none-affine-vectorised\\.[0-9a-f]{16}"
+    process = sandbox.start("--", TABLE, fault=f"hold:{waiting}")
+    wait_for(lambda: bool(sandbox.temporaries()), process)
+    cut(sandbox.path(SNAPSHOTS))
+    sandbox.path("release").touch()
+    output = process.communicate(timeout=600)[0]
+    assert process.returncode != 0
+    assert f"{SNAPSHOTS}: damaged, its c" in last_lines(output)
+    assert f"set aside as {Path(SNAPSHOTS).name}.damaged, the next run" in last_lines(output)
     status, output = sandbox.run(TABLE, fault="kill:reconstruction_error")
     assert status != 0
     expected = f"job reconstruction_error_table failed while making {TABLE}: killed (SIGKILL)"
@@ -218,42 +227,53 @@ def lose_the_checksum(path: Path) -> None:
     checksum_path(path).unlink()
 
 
-def find_damage(sandbox: Sandbox, damaged: str, missing: tuple[str, ...]) -> None:
-    """Run what reads the damaged file, to the last of the missing ones: it is set aside."""
-    for name in missing:
-        sandbox.path(name).unlink()
-    status, output = sandbox.run(missing[-1])
-    assert status != 0
-    assert f"{damaged}: damaged, its c" in last_lines(output)
-    assert f"set aside as {Path(damaged).name}.damaged, the next run" in last_lines(output)
-    sandbox.path(f"{damaged}.damaged").unlink()
+def copy_of_training(path: Path) -> None:
+    """The file of another motion with its dates and its checksum."""
+    shutil.copy2(path.with_name("train.h5"), path)
 
 
-# what lies between a damaged file and the table or the manuscript, or nothing would be read again
-BELOW_SAMPLES = (f"{SAMPLING}.h5", f"{SAMPLING}.csv", TABLE)
-IN_PAPER = (f"{MICRO_RESULTS}/paper/main.bbl", MICRO_MANUSCRIPT)
+def test_unfit_results_are_named_by_every_command_and_made_again(undisturbed, sandbox):
+    """Several at once, though all that is made from them is there and younger."""
+    other = f"{MICRO_RESULTS}/fom/spring_oop/heldout.h5"
+    damages = {other: copy_of_training, SNAPSHOTS: Path.unlink, BASIS: cut}
+    damages |= {f"{SAMPLING}.csv": lose_the_checksum, f"{SAMPLING}.h5": Path.unlink}
+    for name, damage in damages.items():
+        damage(sandbox.path(name))
+    planned = sandbox.start("-n", "--", TABLE).communicate(timeout=600)[0]
+    assert set(re.findall(r"^pdrom: (\S+): .*; it is made again$", planned, re.M)) == {*damages}
+    assert re.search(r"1 fom +output belongs to another result$", planned, re.M)
+    assert re.search(r"1 reruns +output is damaged, output is missing$", planned, re.M)
+    heals(sandbox, undisturbed)
+    planned = sandbox.start("-n", "--", TABLE).communicate(timeout=600)[0]
+    assert "Nothing to be done" in planned
 
 
 @slow
 @pytest.mark.parametrize(
-    ("name", "damage", "missing"),  # every kind of damage: test_checksum.py
+    ("name", "damage"),  # every kind of damage: test_checksum.py, pipeline/test_faults.py
     [
-        (RUN, cut, (SNAPSHOTS, BASIS, *BELOW_SAMPLES)),
-        (SNAPSHOTS, cut, BELOW_SAMPLES),
-        (BASIS, cut, BELOW_SAMPLES),
-        (f"{SAMPLING}.csv", cut, (TABLE,)),
-        (f"{SAMPLING}.csv", lose_the_checksum, (TABLE,)),
-        (f"{MICRO_RESULTS}/machine.json", cut, IN_PAPER),
-        (f"{MICRO_RESULTS}/tables/claims.csv", cut, IN_PAPER),
-        (f"{MICRO_RESULTS}/paper/macros.tex", cut, (MICRO_MANUSCRIPT,)),
-        (f"{MICRO_RESULTS}/figures/singular_values.pdf", cut, (MICRO_MANUSCRIPT,)),
+        (f"{MICRO_RESULTS}/reruns/spring_oop/spring/block-deim.csv", Path.unlink),
+        (f"{MICRO_RESULTS}/machine.json", cut),
+        (f"{MICRO_RESULTS}/tables/claims.csv", cut),
+        (f"{MICRO_RESULTS}/paper/macros.tex", Path.unlink),
+        (f"{MICRO_RESULTS}/figures/singular_values.pdf", cut),
     ],
 )
-def test_a_damaged_result(name, damage, missing, finished_study, tmp_path):
+def test_a_damaged_result(name, damage, finished_study, tmp_path):
+    """`verify --files` names the file alone before the next run, and none afterwards."""
     sandbox = finished_study.copy(tmp_path / "run")
     damage(sandbox.path(name))
-    find_damage(sandbox, name, missing)
-    heals(sandbox, finished_study, missing[-1])
+    assert unfit(sandbox) == [name]
+    sandbox.finish()
+    assert unfit(sandbox) == []
+    heals(sandbox, finished_study)
+
+
+def unfit(sandbox: Sandbox) -> list[str]:
+    """Files that `verify --files` names, with their faults."""
+    command = ("./reproduce", "verify", "--files", "--configfile", MICRO_FILE)
+    done = subprocess.run(command, cwd=sandbox.folder, capture_output=True, text=True, check=False)
+    return [line.split(": ")[0] for line in done.stdout.splitlines() if ": " in line]
 
 
 # Clocks and edited files ----------------------------------------------------------------------
