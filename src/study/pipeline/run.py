@@ -129,7 +129,7 @@ class Run:
         found = faults(plan, self.command.targets) if self.command.makes else {}
         for path, fault in found.items():
             if fault in UNUSUAL:
-                aside = "" if fault == MISSING or self.command.plans else f", {move_aside(path)}"
+                aside = "" if fault == MISSING or self.command.plans else move_aside(path)
                 sys.stderr.write(f"pdrom: {path}: {fault}{aside}; it is made again\n")
         force(workflow, found)
         if self.command.plans:

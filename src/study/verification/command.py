@@ -39,7 +39,7 @@ def update(subject: Subject, reason: str) -> Path:
         if not Path(path).is_file():
             raise StorageError(f"{path}: not there; make it by {subject.command(name)}")
         if check_file(path) is not Condition.INTACT:
-            raise StorageError(f"{path}: damaged; delete it and run {subject.command(name)}")
+            raise StorageError(f"{path}: damaged; run {subject.command(name)}")
     command = [sys.executable, "-m", "study.pipeline.front", "-n", *subject.options, "--"]
     done = subprocess.run([*command, *declared()], capture_output=True, text=True, check=False)
     if done.returncode != 0:

@@ -84,7 +84,7 @@ class Examination:
             if path.stem not in declared() and path.name[0] != "."
         ]
         unfit = [
-            Line("file", path, Outcome.MISSING, f"{fault}; {self.subject.command()} makes it again")
+            Line("file", path, Outcome.MISSING, f"{fault}; run {self.subject.command()}")
             for path, fault in faults(self.subject.plan).items()
             if fault in UNUSUAL
         ]

@@ -8,7 +8,6 @@ to be repeated; of their results only the checksums are compared.
 
 import filecmp
 import os
-import shlex
 from collections.abc import Iterator
 from contextlib import contextmanager
 from itertools import chain
@@ -16,7 +15,6 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from pdrom.core.errors import PdromError, StorageError
-from pdrom.core.store import Condition, check_file
 from study.artifact.paths import MANIFEST
 from study.artifact.reads import Every
 from study.pipeline.faults import Checked
@@ -66,9 +64,7 @@ def verify_files(subject: Subject) -> Status:
     checked.distrust(path for path, fault in faults.items() if fault in (DAMAGED, OTHER))
     checked.save()
     for path, fault in list(faults.items())[:SHOWN]:
-        forced = ["--force", "--", path] if fault == UNLISTED else []
-        command = shlex.join(["./reproduce", *subject.options, *forced])
-        say(f"{path}: {fault}" + ("" if fault == FOREIGN else f"; {command} makes it again"))
+        say(f"{path}: {fault}" + ("" if fault == FOREIGN else f"; run {subject.command()}"))
     if len(faults) > SHOWN:
         say(f"and {len(faults) - SHOWN} more; finish the study by {subject.command()}")
     count = len({*paths, *faults})
@@ -89,8 +85,7 @@ def _fault(path: str, entry: Entry | None, ours: bool) -> str:
         return LOST
     if entry is None:
         return UNLISTED
-    intact = entry.fits(Path(path)) and check_file(path) is Condition.INTACT
-    return "" if intact else DAMAGED
+    return "" if entry.fits(Path(path)) else DAMAGED
 
 
 @contextmanager

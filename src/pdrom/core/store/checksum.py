@@ -249,9 +249,9 @@ def move_aside(path: str | os.PathLike[str]) -> str:
             checksum.rename(aside.with_name(f".{aside.name}{CHECKSUM_SUFFIX}"))
         checksum.unlink(missing_ok=True)
     except OSError as error:
-        return f"delete it, it cannot be renamed ({reason(error)})"
-    return f"set aside as {aside.name}"
+        return f"; delete it, it cannot be renamed ({reason(error)})"
+    return f"; set aside as {aside.name}"
 
 
 def _set_aside(path: Path, fault: str) -> StorageError:
-    return StorageError(f"{path}: {fault}; {move_aside(path)}, the next run makes it again")
+    return StorageError(f"{path}: {fault}{move_aside(path)}, the next run makes it again")

@@ -58,17 +58,12 @@ def unfit(plan: Plan) -> dict[str, str]:
     return faults(plan, targets(plan.study))
 
 
-def rewrite(path: Path, content: bytes) -> None:
-    """Other bytes with the old dates."""
-    stat = path.stat()
+def flip(path: Path) -> None:
+    """Change one bit; size and date are the old ones."""
+    stat, content = path.stat(), bytearray(path.read_bytes())
+    content[-9] ^= 1
     path.write_bytes(content)
     os.utime(path, ns=(stat.st_atime_ns, stat.st_mtime_ns))
-
-
-def flip(path: Path) -> None:
-    content = bytearray(path.read_bytes())
-    content[-9] ^= 1
-    rewrite(path, bytes(content))
 
 
 def become_folder(path: Path) -> None:
@@ -94,7 +89,7 @@ def link(path: Path) -> None:
 
 def lose_checksum(path: Path) -> None:
     if path.suffix == ".h5":
-        rewrite(path, bytes(2048) + path.read_bytes()[2048:])
+        path.write_bytes(bytes(2048) + path.read_bytes()[2048:])
     else:
         checksum_path(path).unlink()
 
@@ -102,8 +97,8 @@ def lose_checksum(path: Path) -> None:
 DAMAGES = {
     "lost": (Path.unlink, MISSING),
     "flipped": (flip, DAMAGED),
-    "cut": (lambda path: rewrite(path, path.read_bytes()[:-30]), DAMAGED),
-    "emptied": (lambda path: rewrite(path, b""), DAMAGED),
+    "cut": (lambda path: path.write_bytes(path.read_bytes()[:-30]), DAMAGED),
+    "emptied": (lambda path: path.write_bytes(b""), DAMAGED),
     "without checksum": (lose_checksum, DAMAGED),
     "folder": (become_folder, DAMAGED),
     "dead link": (lambda path: (path.unlink(), path.symlink_to("nowhere")), DAMAGED),

@@ -152,14 +152,14 @@ def no_manifest(content, _):
 
 
 STUDY = "./reproduce --configfile 'my study.yaml'"
-AGAIN = f"{STUDY} makes it again\n"
+AGAIN = f"run {STUDY}\n"
 RUN = f"; a run that succeeds writes it: {STUDY}\n"
 # Change, what it changes, what is said of it.
 FAULTS = (
     (flipped, NAMES, f"NAME: damaged (its checksum differs); {AGAIN}3 of 4 files"),
     (flipped_before_a_later_run, NAMES[:1], "NAME: damaged"),
     (forged, ("x\n3.0\n2.6\n", "", "a picture"), f"{NAMES[2]}: not what its inputs give; {AGAIN}"),
-    (taken_out, NAMES, f"NAME: not in the manifest; {STUDY} --force -- NAME makes it again\n"),
+    (taken_out, NAMES, f"NAME: not in the manifest; {AGAIN}"),
     (foreign, ("../../secret", "/etc/hostname", "../paper/main.tex", "notes.md"),
      ": no file of this study\n"),
     (lost, NAMES, f"NAME: not there; {AGAIN}"),
