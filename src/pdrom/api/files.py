@@ -8,17 +8,18 @@ from typing import Any, TypeVar
 import h5py
 import numpy as np
 
-from pdrom.api.records import AnyRun, FullRun, ReducedRun, full_run
+from pdrom.api.records import AnyRun, FullRun, ReducedRun, Run, arrays_of, full_run
 from pdrom.core import store
 from pdrom.core.errors import ConfigurationError, PdromError, StorageError
 from pdrom.core.provenance import made_by
-from pdrom.core.yamlfile import named, read_yaml, shown, validate
+from pdrom.core.yamlfile import check_lengths, named, read_yaml, shown, validate
 from pdrom.model.mesh.config import GivenMesh, MeshFile, given_mesh
 from pdrom.model.mesh.types import store_mesh, stored_mesh
 from pdrom.model.scene import GONE, Scene, SceneConfig
 from pdrom.reduction.rerun import Rerun, displacement_norms
 
 T = TypeVar("T")
+R = TypeVar("R", bound=Run)
 
 
 def require(kind: type[T] | tuple[type[T], ...], value: Any, name: str, source: str) -> T:
@@ -32,11 +33,23 @@ def require(kind: type[T] | tuple[type[T], ...], value: Any, name: str, source: 
     raise ConfigurationError(f"{name} = {shown(value, 60)}: a {kinds} is required ({source})")
 
 
+def require_run(kind: type[R] | tuple[type[R], ...], value: Any, name: str, source: str) -> R:
+    """Return ``value`` as `require` does; SnapshotError if it is a run that is not finite."""
+    run = require(kind, value, name, source)
+    run.require_finite(name)
+    return run
+
+
 def file_path(path: Any) -> Path:
     """Return ``path`` as a `Path`; ConfigurationError if it cannot be one."""
-    if not isinstance(path, (str, os.PathLike)) or "\0" in str(path):
-        raise ConfigurationError(f"{shown(path, 60)}: the name of a file is required")
-    return Path(path)
+    try:
+        check_lengths(os.fspath(path))
+        if "\0" in os.fspath(path):
+            raise ValueError("it has a zero byte")
+        return Path(path)
+    except (TypeError, ValueError) as error:
+        fault = f"{shown(path, 60)}: the name of a file is required"
+        raise ConfigurationError(f"{fault} ({error})") from error
 
 
 def load_scene(path: str | os.PathLike[str]) -> Scene:
@@ -106,11 +119,11 @@ def save(reduced: ReducedRun, path: str | os.PathLike[str]) -> None:
     ConfigurationError, StorageError
         ``reduced`` is no reduced run; the file cannot be written.
     """
-    require(ReducedRun, reduced, "reduced", source="pdrom.api.reduce makes one")
+    require_run(ReducedRun, reduced, "reduced", source="pdrom.api.reduce makes one")
     path = file_path(path)
     store.require_own(path)
     config = reduced.full.scene.config.model_dump(mode="json")
-    labels = {"group": reduced.group, "method": reduced.method, "r": reduced.r}
+    labels = {"group": str(reduced.group), "method": str(reduced.method), "r": reduced.r}
     outcome = reduced.outcome
     with made_by("pdrom.api.save", {"scene": config, **labels}), store.write_hdf5(path) as file:
         file.attrs.update(labels | {"gain": reduced.gain, "ms_per_frame": reduced.ms})
@@ -151,8 +164,8 @@ def load(path: str | os.PathLike[str], unchecked: bool = False) -> AnyRun:
                 found = full_run(_scene(file, path), file)
             elif "reduced" in file and "full" in file:
                 found = _reduced(_scene(file, path), file)
-        if found is not None:
-            _require_sound(found)
+            if found is not None:
+                _require_consistent(found, file)
     except StorageError:
         raise
     except (PdromError, ValueError, TypeError, LookupError, RuntimeError, AttributeError) as error:
@@ -163,25 +176,49 @@ def load(path: str | os.PathLike[str], unchecked: bool = False) -> AnyRun:
     return found
 
 
-def _require_sound(found: AnyRun) -> None:
-    """Raise ValueError if an array of the run is not finite or not of the shape its scene gives."""
+def _require_consistent(found: AnyRun, file: h5py.File) -> None:
+    """Raise ValueError if an array in ``file`` is not finite, or contradicts the run ``found``."""
+    for name, (values, _) in arrays_of(found).items():
+        store.require_finite(name, values, ValueError)
     full = found.full if isinstance(found, ReducedRun) else found
-    frames, vertices = full.scene.config.frames, full.scene.mesh.vertices
-    arrays = {"positions": (full.positions, (frames + 1, vertices, 3)), "ms": (full.ms, (frames,))}
-    for name, own in full.snapshots.items():
-        group, count = full.scene.group(name), len(own.roundoff)
-        rows = group.elements * group.rows_per_element
-        arrays[f"snapshots of {name}"] = own.p, (count, rows, 3)
-        arrays[f"round-off of {name}"] = own.roundoff, (count,)
+    scene, moved, points = full.scene, full.positions, full.scene.mesh.points
+    frames, h = scene.config.frames, scene.config.time_step
+    # fault, stored and expected numbers, size of what was rounded to single precision
+    pairs = [
+        ("frame 0 of the positions is not the mesh", moved[0], points, 0.0),
+        ("a time is below zero", full.ms, np.abs(full.ms), 0.0),
+    ]
+    if "velocities" in file:
+        before = moved[:1] - h * scene.initial_state().velocities
+        steps = np.diff(moved, axis=0, prepend=before) / h
+        stored = file["velocities"][...]
+        pairs.append(("velocities are not those of the positions", stored, steps, 0.0))
+    if "objective" in file:
+        known, shape = np.zeros((frames, scene.config.iterations)), file["objective"].shape
+        pairs.append((f"objective of shape {shape}", np.zeros(shape), known, 0.0))
+    for name, own in file.get("snapshots", {}).items():
+        at, group = own["frames"][...], scene.group(name)
+        sizes = [int(own.attrs[key]) for key in ("elements", "rows_per_element")]
+        rising = at.dtype.kind in "iu" and (np.diff(at, prepend=-1, append=frames) > 0).all()
+        required = own["roundoff"].shape, [group.elements, group.rows_per_element]
+        if not rising or (at.shape, sizes) != required:
+            listed = f"frames {shown(at.tolist(), 60)} of {frames}"
+            raise ValueError(f"snapshots of {name}: {listed}, elements and rows {sizes}")
     if isinstance(found, ReducedRun):
-        done = found.outcome
-        arrays["reduced"] = done.positions, (done.frames + 1, vertices, 3)
-        arrays["difference"] = done.difference, (done.frames,)
-        arrays["extent"] = done.extent, (done.frames,)
-    for name, (array, shape) in arrays.items():
-        if array.shape != shape or array.dtype.kind != "f":
-            raise ValueError(f"{name} of {array.dtype} {array.shape}, required: float {shape}")
-        store.require_finite(name, array, ValueError)
+        done, end, side = found.outcome, found.outcome.blowup_frame, scene.mesh.extent
+        if done.frames != frames if end is None else done.frames - end not in (0, 1):
+            raise ValueError(f"{done.frames} of {frames} reduced frames, blow-up in frame {end}")
+        apart = np.linalg.norm(done.positions - moved[: done.frames + 1], axis=(1, 2))[1:]
+        sides, size = np.ptp(done.positions, axis=1).max(axis=1)[1:], float(np.linalg.norm(moved))
+        pairs += [
+            ("frame 0 of the reduced run is not the mesh", done.positions[0], points, 0.0),
+            ("difference is not that of the positions", done.difference, apart, size),
+            ("extent is not that of the positions", done.extent * side, sides, size),
+        ]
+    for fault, stored, expected, scale in pairs:
+        least = 1e-6 * max(np.abs(expected).max(initial=0.0), scale)
+        if stored.shape != expected.shape or not (np.abs(stored - expected) <= least).all():
+            raise ValueError(fault)
 
 
 def _store(file: h5py.File, name: str, values: np.ndarray, unit: str) -> None:

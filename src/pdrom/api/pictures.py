@@ -5,7 +5,7 @@ from typing import get_args
 
 import numpy as np
 
-from pdrom.api.files import file_path, require
+from pdrom.api.files import file_path, require_run
 from pdrom.api.records import AnyRun, ReducedRun
 from pdrom.core.errors import SceneError
 from pdrom.core.store import require_own, require_place
@@ -39,7 +39,7 @@ def plot(*runs: ReducedRun) -> Figure:
     if not runs:
         raise SceneError("plot: at least one run is required")
     for run in runs:
-        require(ReducedRun, run, "plot", source="pdrom.api.reduce makes one, load reads one")
+        require_run(ReducedRun, run, "plot", source="pdrom.api.reduce makes one, load reads one")
     with style.look():
         figure = style.new_figure(3.0)
         ax = figure.subplots()
@@ -88,7 +88,7 @@ def viewed_scenes(*runs: AnyRun) -> list[ViewedScene]:
         raise SceneError("view: at least one run is required")
     scenes: dict[str, list[AnyRun]] = {}
     for run in runs:
-        require(get_args(AnyRun), run, "view", source="pdrom.api.run and reduce make one")
+        require_run(get_args(AnyRun), run, "view", source="pdrom.api.run and reduce make one")
         known = scenes.setdefault(_scene(run).config.name, [])
         if known and _scene(known[0]).config != _scene(run).config:
             raise SceneError(f"view: two different scenes are called '{_scene(run).config.name}'")

@@ -3,6 +3,7 @@
 import os
 from collections.abc import Callable
 from contextlib import ExitStack
+from inspect import signature
 from numbers import Integral
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -11,13 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from pdrom.api import files
+from pdrom.api import files, records
 from pdrom.api.records import FullRun, ReducedRun, full_run
 from pdrom.core import config_file
 from pdrom.core.errors import ConfigurationError, SnapshotError, choices
 from pdrom.core.provenance import made_by
 from pdrom.core.store import open_hdf5, require_finite, require_own, require_place
-from pdrom.core.yamlfile import shown
+from pdrom.core.yamlfile import shown, validate
 from pdrom.model.constraints.base import ConstraintGroup
 from pdrom.model.dynamics.stepper import FrameReport, State
 from pdrom.model.dynamics.system import DEFAULT_SOLVER
@@ -64,6 +65,11 @@ def run(
         ``scene`` is no scene; ``out`` cannot be written, which is checked before the run.
     """
     files.require(Scene, scene, "scene", source="build_scene and load_scene make one")
+    try:
+        signature(on_frame).bind(0, None)
+    except (TypeError, ValueError) as error:
+        fault = "a function of a number and a report is required"
+        raise ConfigurationError(f"on_frame = {shown(on_frame, 60)}: {fault}") from error
     if out is not None:
         require_place(files.file_path(out))
         require_own(out)
@@ -107,7 +113,7 @@ def basis(full: FullRun, group: str, method: str | MethodSpec = "pod") -> Basis:
     ConfigurationError, SceneError, SnapshotError
         ``full`` is no run; the method or group is unknown; snapshots are too few or not finite.
     """
-    files.require(FullRun, full, "full", source=FULL_RUN)
+    files.require_run(FullRun, full, "full", source=FULL_RUN)
     chosen = full.scene.group(files.require(str, group, "group", source=GROUP))
     spec = _method_spec(method)
     if group not in full.snapshots:
@@ -162,17 +168,13 @@ def reduce(
     if gone:
         unknown = f"reduce: no argument '{next(iter(gone))}'"
         raise ConfigurationError(f"error: {GONE}" if "error" in gone else unknown)
-    files.require(FullRun, full, "full", source=FULL_RUN)
+    files.require_run(FullRun, full, "full", source=FULL_RUN)
     group = files.require(str, group, "group", source=GROUP)
     scene, spec = full.scene, _method_spec(method)
     size: Any = r  # the range of r is checked later, when the rank of the basis is known
-    if isinstance(size, bool) or not isinstance(size, Integral):
+    if isinstance(size, bool) or not isinstance(size, Integral) or int(size).bit_length() > 63:
         raise ConfigurationError(f"r = {shown(r, 60)}: a whole number of modes is required")
     r, chosen = int(size), scene.group(group)
-    found, required = np.shape(full.positions), (scene.config.frames + 1, scene.mesh.vertices, 3)
-    if found != required:
-        raise SnapshotError(f"full: positions of shape {found}, required: {required}")
-    require_finite("full: positions", full.positions, SnapshotError)
     if basis_of_group is None:
         made = basis(full, group, spec)
     else:
@@ -197,28 +199,31 @@ def reduce(
 
 
 def _method_spec(method: str | MethodSpec) -> MethodSpec:
-    """Return the method of this name in config/methods.yaml; return a specification as it is."""
+    """Return the method of this name in config/methods.yaml, or a specification, validated."""
     if isinstance(method, MethodSpec):
-        return method
+        return validate(MethodSpec, dict(method), "method")
     known = methods()
     if not isinstance(method, str) or method not in known:
-        raise ConfigurationError(f"unknown method {shown(method, 60)}{choices(method, known)}")
+        named = method if isinstance(method, str) else ""
+        raise ConfigurationError(f"unknown method {shown(method, 60)}{choices(named, known)}")
     return known[method]
 
 
 def _fitting_basis(made: Any, group: ConstraintGroup, spec: MethodSpec) -> Basis:
     """Return ``made`` if ``spec`` can use it as a basis of ``group``, else ConfigurationError."""
     known = files.require(Basis, made, "basis_of_group", source="pdrom.api.basis makes one")
-    found, needed = ((each.elements, each.rows_per_element) for each in (known, group))
-    if found != needed:
+    records.require_types(known)
+    rows, size = group.rows_per_element, 3 * group.elements * group.rows_per_element
+    if (known.rows_per_element, known.mean.shape) != (rows, (size,)):
         raise ConfigurationError(
-            f"basis_of_group: of {found[0]} elements with {found[1]} rows each, group "
-            f"'{group.name}' of this scene has {needed[0]} with {needed[1]}: another scene's?"
+            f"basis_of_group: mean of shape {known.mean.shape}; group '{group.name}' of this scene "
+            f"has {group.elements} elements with {rows} rows each: another scene's?"
         )
-    if known.V.shape != (len(known.mean), known.rank):
-        raise ConfigurationError(
-            f"basis_of_group: V of shape {known.V.shape}, required: {(len(known.mean), known.rank)}"
-        )
+    if known.V.shape[-1:] != (known.rank,):
+        raise ConfigurationError(f"basis_of_group: rank = {shown(known.rank, 60)} is not that of V")
+    for name, values, shape in (("V", known.V, (size, known.rank)), ("mean", known.mean, (size,))):
+        records.require_shapes({f"basis_of_group: {name}": (values, shape)})
+        require_finite(f"basis_of_group: {name}", values, SnapshotError)
     if known.separate_axes != spec.separate_axes:
         raise ConfigurationError(
             f"basis_of_group: made for another method than '{spec.title}' (axes "

@@ -128,8 +128,8 @@ def shown(value: Any, width: int) -> str:
     """Text of ``value`` for a message, on one line and cut to ``width`` characters."""
     try:
         return f"{value!r:.{width}}".replace("\n", " ")
-    except ValueError:  # Python does not print integers of more than 4300 digits
-        return f"a {type(value).__name__} of {value.bit_length()} bits"
+    except Exception:  # Python does not print integers of more than 4300 digits
+        return f"a {type(value).__name__}"
 
 
 def keys_of(model: type[BaseModel]) -> list[str]:
@@ -184,7 +184,8 @@ def named(keys: Any, stem: str) -> Any:
         return keys
     valid = re.sub(r"[^a-z0-9_]+", "_", stem.lower()).lstrip("_0123456789")[:64] or "scene"
     name = keys.get("name", valid)
-    return {"name": name, "title": str(name).replace("_", " ").capitalize(), **keys}
+    title = name if isinstance(name, str) else valid
+    return {"name": name, "title": title.replace("_", " ").capitalize(), **keys}
 
 
 SceneName = Annotated[str, AfterValidator(_scene_name)]

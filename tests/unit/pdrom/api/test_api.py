@@ -154,7 +154,7 @@ FAULTY = {
     "no snapshots": (lambda full, _: spring(replace(full, snapshots={})), "stored no snapshots"),
     "mesh not there": (lambda _, p: given({"kind": "file", "path": "x.obj"}, folder=p), r"x\.obj"),
     "positions cut": (
-        lambda full, _: spring(replace(full, positions=full.positions[:-1])), "full: positions",
+        lambda full, _: spring(replace(full, positions=full.positions[:-1])), "positions of float",
     ),
     "mesh no pair": (lambda *_: given((1, 2, 3)), "mesh of 3 parts"),
     "r a fraction": (lambda full, _: spring(full, r=1.5), "r = 1.5: a whole number"),

@@ -108,6 +108,10 @@ def shortened(*names):
 SHORT = r"positions of float64 \(12, 30, 3\), required: float \(13, 30, 3\)"
 
 
+AT = "snapshots/spring/frames"
+STARTS = ("small", "positions"), *(("small_spring_gappy_2", each) for each in ("full", "reduced"))
+
+
 @pytest.mark.parametrize(
     ("name", "change", "words"),
     [
@@ -125,6 +129,22 @@ SHORT = r"positions of float64 \(12, 30, 3\), required: float \(13, 30, 3\)"
         ("small_spring_gappy_2", first_of("mesh/triangles", 999), "triangle 0 names vertex"),
         # attribute of a file in which an earlier pdrom stored a run within a requested error
         ("small", lambda file: file.attrs.modify("requested_error", 0.05), "requested error are"),
+        *((name, first_of(array, 5.0), "frame 0 of the") for name, array in STARTS),
+        *(("small", first_of("velocities", v), "velocities are not") for v in (1.0, np.inf)),
+        ("small", shortened("velocities"), "velocities are not"),
+        ("small", shortened("objective"), r"objective of shape \(11, 10\)"),
+        ("small", first_of("timings", -1e9), "a time is below zero"),
+        *(("small", first_of(AT, n), "spring: frames") for n in (-1, 2, 99)),
+        ("small", shortened(AT), "spring: frames"),
+        (
+            "small",
+            lambda f: f["snapshots/spring"].attrs.modify("elements", 7),
+            r"rows \[7, 1\]",
+        ),
+        ("small_spring_gappy_2", first_of("difference", 1.0), "difference is not"),
+        ("small_spring_gappy_2", first_of("extent", 9.0), "extent is not"),
+        ("small_spring_gappy_2", lambda f: f.attrs.modify("blowup_frame", 3), "blow-up in frame 3"),
+        ("small_spring_gappy_2", lambda f: f.attrs.modify("group", "strain"), "no group 'strain'"),
     ],
 )
 def test_a_right_checksum_does_not_make_a_run_sound(runs, tmp_path, name, change, words):
