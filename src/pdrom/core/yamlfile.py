@@ -23,19 +23,40 @@ class ConfigModel(BaseModel):
 
     @model_validator(mode="before")
     @classmethod
-    def _no_truth_value_for_a_number(cls, data: Any) -> Any:
-        """Refuse booleans where numbers are required: YAML's yes, on and true would count as 1."""
+    def _as_written(cls, data: Any) -> Any:
+        """Refuse truth values (yes, on, true) and texts such as 1_0 where numbers are required."""
         for key, value in data.items() if isinstance(data, dict) else ():
             field = cls.model_fields.get(key)
-            entries = value if isinstance(value, (list, tuple)) else [value]
-            truth = any(isinstance(entry, bool) for entry in entries)
-            if truth and field is not None and field.annotation is not bool:
-                raise ValueError(f"{key} = {shown(value, 60)}: a truth value (yes, on, true ...)")
+            kind = bool if field is None else field.annotation
+            for entry in value if isinstance(value, (list, tuple)) else [value]:
+                if isinstance(entry, bool) and kind is not bool:
+                    raise ValueError(
+                        f"{key} = {shown(value, 60)}: a truth value (yes, on, true ...)"
+                    )
+                if isinstance(entry, str) and _misread(entry) and "str" not in str(kind):
+                    raise ValueError(f"{key} = {shown(value, 60)}: write {PLAIN}")
         return data
 
 
+PLAIN = "a decimal number without underscores, colons, leading zeros or letters of a base"
+_PLAIN = re.compile(r"[-+]?(0|[1-9]\d*|\d*\.\d+|\d+\.)(e[-+]?\d+)?", re.IGNORECASE)
+_NUMBER = re.compile(
+    r"[-+]?(0[bx][\da-f_]+|(?=\.?\d)[\d_]*(:[0-5]?\d)*(\.[\d_]*)?(e[-+]?[\d_]+)?)", re.IGNORECASE
+)
+_TRUTH = "tag:yaml.org,2002:bool", re.compile("(true|True|TRUE|false|False|FALSE)$")
+_DATE = "tag:yaml.org,2002:timestamp"
+
+
+def _misread(text: str) -> bool:
+    """Whether YAML 1.1 or Python reads ``text`` as a number other than the decimal one it shows."""
+    return bool(_NUMBER.fullmatch(text)) and not _PLAIN.fullmatch(text)
+
+
 class _PlainLoader(yaml.CSafeLoader):
-    """YAML loader that runs no code named by tags and refuses a key that is given twice."""
+    """YAML loader that runs no code named by tags and refuses a key that is given twice.
+
+    The words yes, no, on and off and dates are texts.
+    """
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
         seen = set()
@@ -49,6 +70,34 @@ class _PlainLoader(yaml.CSafeLoader):
                 )
             seen.add(key)
         return super().construct_mapping(node, deep)
+
+
+_PlainLoader.yaml_implicit_resolvers = {
+    first: [_TRUTH if each[0] == _TRUTH[0] else each for each in kinds if each[0] != _DATE]
+    for first, kinds in yaml.CSafeLoader.yaml_implicit_resolvers.items()
+}
+
+
+def require_as_written(text: str, source: str, place: str = "") -> None:
+    """Raise ConfigurationError if a number in the YAML ``text`` would be read as another one.
+
+    The message begins with ``source`` and names the key, which is below ``place`` if given.
+    """
+    for key, node in _scalars(yaml.compose(text, Loader=_PlainLoader), place):
+        if _misread(node.value) and (not node.style or not node.tag.endswith(":str")):
+            read = f"YAML reads it as {shown(yaml.safe_load(node.value), 60)}"
+            fault = f"{source}: {key} = {node.value}: {read}; write {PLAIN}, or a text in quotes"
+            raise ConfigurationError(fault)
+
+
+def _scalars(node: Any, place: str) -> Iterator[tuple[str, yaml.ScalarNode]]:
+    if isinstance(node, yaml.ScalarNode):
+        yield place, node
+    for number, entry in enumerate(node.value if isinstance(node, yaml.CollectionNode) else ()):
+        key, value = entry if isinstance(entry, tuple) else (None, entry)
+        name = number if key is None else key.value
+        yield from _scalars(key, place)
+        yield from _scalars(value, f"{place}.{name}" if place else str(name))
 
 
 def _require_plain(text: str) -> None:
@@ -78,9 +127,10 @@ def read_yaml(path: Path) -> Any:
         # utf-8-sig skips a byte order mark, which some editors write
         text = path.read_text(encoding="utf-8-sig")
         _require_plain(text)
+        require_as_written(text, str(path))
         return yaml.load(text, Loader=_PlainLoader)
     except (yaml.YAMLError, ValueError, TypeError, RecursionError) as error:
-        # ValueError: invalid UTF-8 or an impossible date; TypeError: an unhashable key
+        # ValueError: invalid UTF-8 or a number too long; TypeError: an unhashable key
         message = " ".join(str(error).replace('in "<unicode string>", ', "in ").split())
         raise ConfigurationError(f"{path}: not valid YAML: {message}") from error
     except OSError as error:

@@ -9,11 +9,13 @@ import json
 import shlex
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from yaml import YAMLError
+
 from pdrom.core.errors import ConfigurationError, PdromError
-from pdrom.core.yamlfile import read_yaml, shown
+from pdrom.core.yamlfile import read_yaml, require_as_written, shown
 
 # Options with which Snakemake only prints or draws something and runs no job.
 LOOKS_ONLY = (
@@ -70,6 +72,9 @@ class CommandLine:
         self.own_output = any(found[name] is not None and found[name] for name in OWN_OUTPUT)
         self.cores = found["cores"] is not None or found["jobs"] is not None
         self.executor: str | None = found["executor"]
+        for key, _, text in (setting.partition("=") for setting in self.settings):
+            with suppress(YAMLError):  # Snakemake takes such a value as a text
+                require_as_written(text, "--config", key)
         swallowed = {
             "--config": [s for s in self.settings if "=" not in s],
             "--configfile": [f for f in self.configfiles[1:] if Path(f).suffix not in YAML],

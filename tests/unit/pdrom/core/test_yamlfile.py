@@ -4,10 +4,19 @@ import pytest
 from pydantic import BaseModel, ConfigDict, Field
 
 from pdrom.core.errors import ConfigurationError
-from pdrom.core.yamlfile import MAX_BYTES, MAX_NAME, MAX_PATH, check_lengths, read_yaml, validate
+from pdrom.core.yamlfile import (
+    MAX_BYTES,
+    MAX_NAME,
+    MAX_PATH,
+    ConfigModel,
+    check_lengths,
+    read_yaml,
+    validate,
+)  # fmt: skip
 from pdrom.model.effects import EFFECTS
 from study.artifact import paths
 from study.artifact.paths import Place
+from study.pipeline.commandline import CommandLine
 
 
 class Inner(BaseModel):
@@ -68,7 +77,6 @@ def test_reads_plain_yaml(tmp_path):
         ("[1, 2]: 3\n", "not valid YAML"),
         (b"a: \xff\xfe\n", "not valid YAML"),
         ("a: " + "9" * 5000, "not valid YAML.*limit"),
-        ("a: 2026-13-45\n", "not valid YAML"),
         ("[" * 3000, "not valid YAML"),
         ("#" * (MAX_BYTES + 1), "larger than"),
     ],
@@ -77,6 +85,45 @@ def test_faulty_files_are_named_in_one_line(tmp_path, content, message):
     with pytest.raises(ConfigurationError, match=rf"file\.yaml: .*{message}") as caught:
         read_yaml(written(tmp_path, content))
     assert "\n" not in str(caught.value)
+
+
+ODD = "20:0 1_0 06 010 08 0x1F 0b11 -1_0.5 .5_0 1e0_5 1:30.5 !!int~'010' {b:~[7,~06]} {1_0:~1}"
+
+
+@pytest.mark.parametrize("value", [value.replace("~", " ") for value in ODD.split()])
+def test_a_number_that_yaml_reads_as_another_is_named_as_it_is_written(tmp_path, value):
+    words = r"file\.yaml: a(\.b\.1)? = [^ ]*[\d_F]+: YAML reads it as .*; write a decimal number"
+    with pytest.raises(ConfigurationError, match=words):
+        read_yaml(written(tmp_path, f"a: {value}\n"))
+    command = ["--config", f"a={value}"]
+    with pytest.raises(ConfigurationError, match=words.replace(r"file\.yaml", "--config")):
+        CommandLine(command)
+
+
+class Typed(ConfigModel):
+    number: float = 0.0
+    text: str = ""
+    truth: bool = False
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "expected"),
+    [
+        *(("number", text, float(text)) for text in ("1e5", "-1.0e5", ".5", "5.", "+0", "00.5")),
+        *(("number", text, float(text.replace(".", ""))) for text in ("+.inf", "-.INF")),
+        *(("text", text, text) for text in ("no", "On", "2020-01-01", "1.2.3", ".", "12:60")),
+        *(("text", f"'{text}'", text) for text in ("20:0", "010", "true")),
+        *(("truth", text, True) for text in ("yes", "on", "True")),
+        *(("number", text, None) for text in ("yes", "off", "2020-01-01", "0o17", "'1_0'", "true")),
+    ],
+)
+def test_words_dates_and_plain_numbers_are_read_as_written(tmp_path, key, value, expected):
+    data = read_yaml(written(tmp_path, f"{key}: {value}\n"))
+    if expected is not None:
+        assert getattr(validate(Typed, data, "source"), key) == expected
+        return
+    with pytest.raises(ConfigurationError, match=f"(?i)source: number = '?{value}"):
+        validate(Typed, data, "source")
 
 
 @pytest.mark.parametrize("tag", ["object/apply:pathlib.Path.touch", "name:os.system", "tuple"])
