@@ -1,7 +1,6 @@
 """What the pages for readers name is there: links, and paths of the project."""
 
 import re
-import shlex
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -15,13 +14,10 @@ from pdrom.reduction.method import MethodSpec
 from places import CONFIG, ROOT, tracked
 from study.artifact.paths import RESULTS
 from study.figures.stability_map import LOOKS
-from study.pipeline.front import completed
 from study.pipeline.study import StudySettings
 from study.tables import declared
 from study.tables.kit.results import trained
-from study.verification.command import parser
 from study.verification.references import folder_of, read_reference
-from study.verification.subject import options_parser
 from vocabulary import gone, known
 
 PAGES = sorted([ROOT / "README.md", ROOT / "config" / "README.md", *(ROOT / "docs").rglob("*.md")])
@@ -33,7 +29,6 @@ CODE = re.compile(r"(?<![\w`])`+([^`\s](?:[^`\n]*[^`\s])?)`+")
 FILE = re.compile(
     r"(?<![\w{}./*$-])[\w{}./*-]*\w\.(?:py|js|smk|tex|yaml|sh|css)\b|\bpdrom(?:\.\w+){2,}"
 )
-COMMAND = re.compile(r"\./reproduce ([^`#\n]+)")
 
 
 def headings(page: Path) -> set[str]:
@@ -88,15 +83,6 @@ def test_files_modules_and_commands_that_sources_name_exist() -> None:
     assert wrong == []
 
 
-@pytest.mark.parametrize("title", ["Study", "Scene", "Method"])
-def test_keys_of_the_configuration_exist(title: str) -> None:
-    model = {"Study": StudySettings, "Scene": SceneConfig, "Method": MethodSpec}[title]
-    page = (CONFIG / "README.md").read_text("utf-8")
-    table = re.split(r"\n## |\| effect \|", page.split(f"\n## {title} (")[1])[0]
-    cells = "\n".join(re.findall(r"^\| (`[^|]*) \|", table, re.MULTILINE))
-    assert {key.split(".")[0] for key in spans(cells)} <= set(model.model_fields)
-
-
 @pytest.mark.parametrize(
     "span",
     [
@@ -109,43 +95,11 @@ def test_a_name_that_is_gone_is_found(span: str) -> None:
     assert list(gone(span)) != []
 
 
-def test_a_line_of_prose_holds_one_sentence() -> None:
-    """So that a diff shows the sentence that changed; initials and ``...`` end none."""
-    other = re.compile(r"```.*?```|^(?:\||#|\d+\. ).*?$", re.DOTALL | re.MULTILINE)
-    two = re.compile(r"(?<!\b[A-Z])(?<!\.\.)[.!?][)*\"]* +[*(\"\[]*[A-Z`]")
-    pages = [*PAGES, ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md"]
-    lines = [line for page in pages for line in other.sub("", page.read_text("utf-8")).splitlines()]
-    assert [line for line in lines if two.search(line)] == []
-
-
 def test_every_page_is_listed_in_the_readme_which_is_short() -> None:
     text = (ROOT / "README.md").read_text("utf-8")
     pages = {f"docs/{page.name}" for page in (ROOT / "docs").glob("*.md")}
     assert pages <= set(LINK.findall(text))
     assert len(text.splitlines()) <= 110
-
-
-def commands() -> list[str]:
-    """Arguments of ./reproduce on pages and in comments of the configuration."""
-    files = [*PAGES, ROOT / "CONTRIBUTING.md", ROOT / "reproduce", *CONFIG.glob("*.yaml")]
-    texts = [path.read_text("utf-8").replace("\\\n", " ") for path in files]
-    found = {line.split("  ")[0].strip() for text in texts for line in COMMAND.findall(text)}
-    # names in capitals stand for others; a plugin of the executor need not be installed
-    left_out = re.compile(r"test|run |pages|docs|--help|--executor|--profile|.*[A-Z]{4}")
-    return sorted(command for command in found if command and not left_out.match(command))
-
-
-@pytest.mark.parametrize("command", commands())
-def test_commands_are_understood(command: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(ROOT)
-    # the scene and the study that a reader makes stand for any
-    words = command.replace("my_sheet", "spring_oop").replace("mine.yaml", "tiny.yaml")
-    first, *others = shlex.split(words)
-    parsers = {"verify": parser(), "bundle": options_parser("bundle", "")}
-    if first in parsers:
-        assert parsers[first].parse_args(others)
-    else:
-        assert completed([first, *others])
 
 
 def test_the_scene_the_study_and_the_method_that_are_added_are_valid() -> None:

@@ -44,18 +44,6 @@ def test_the_manifest_for_codecheckers_follows_version_2_and_names_what_the_stud
     assert {entry["file"] for entry in content["manifest"]} <= made
 
 
-def test_the_catalogue_of_snakemake_workflows_finds_what_it_asks_for():
-    """Conditions: https://snakemake.github.io/snakemake-workflow-catalog/docs/about."""
-    readme = (ROOT / "README.md").read_text("utf-8").lower()
-    assert "snakemake" in readme
-    assert "workflow" in readme
-    for name in ("workflow/Snakefile", "config/README.md"):
-        assert (ROOT / name).is_file()
-    assert list((ROOT / "workflow" / "rules").glob("*.smk"))
-    usage = read_yaml(ROOT / ".snakemake-workflow-catalog.yml")["usage"]
-    assert set(usage) <= {"mandatory-flags", "software-stack-deployment", "report"}
-
-
 DOCKERFILE = (ROOT / "Dockerfile").read_text("utf-8")
 IGNORED = (ROOT / ".dockerignore").read_text("utf-8").split()
 

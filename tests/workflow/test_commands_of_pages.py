@@ -1,4 +1,4 @@
-"""Every command that a page shows is executed: as it stands, planned by -n, or left out by name."""
+"""Commands of pages and configurations are executed: as they are, by -n, or left out by name."""
 
 import re
 import shlex
@@ -16,6 +16,8 @@ from places import ROOT
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "config" / "README.md"]
 PAGES += sorted((ROOT / "docs").rglob("*.md"))
 BLOCK = re.compile(r"^```sh\n(.*?)^```", re.MULTILINE | re.DOTALL)
+# In the comments of a configuration.
+ABOVE = re.compile(r"^#   (\./reproduce .*)", re.MULTILINE)
 INLINE = re.compile(r"`((?:\./reproduce|\.venv/bin/\w+) [^`]+)`")
 COMMENT = re.compile(r"\s+#.*|\s*&&.*")  # of what && joins, the first one
 
@@ -37,10 +39,10 @@ LEFT_OUT = {
 def commands(start: str) -> list[str]:
     """Commands of all pages that begin so, without those that are left out."""
     found: dict[str, None] = {}
-    for page in PAGES:
+    for page in [*PAGES, *sorted((ROOT / "config").glob("*.yaml"))]:
         text = page.read_text(encoding="utf-8").replace("\\\n", " ")
         lines = [line for block in BLOCK.findall(text) for line in block.splitlines()]
-        for line in [*lines, *INLINE.findall(text)]:
+        for line in [*lines, *INLINE.findall(text), *ABOVE.findall(text)]:
             command = COMMENT.sub("", line).strip()
             if command:
                 found[command] = None

@@ -71,8 +71,6 @@ STUDY = MICRO | {
     "ranks": [2],
 }
 ARGUMENTS, RESULTS = ("--configfile", "own.yaml"), "results/studies/own"
-EXPERIMENT = "src/study/experiments/rest_lengths.py"
-TABLE = "src/study/tables/mesh_sizes.py"
 MODEL = "tests/unit/pdrom/model"
 GROUP_TESTS = ("tests/physics", f"{MODEL}/constraints", f"{MODEL}/dynamics")
 
@@ -107,16 +105,6 @@ def test_what_was_added_belongs_to_the_study(checkout):
         f"{RESULTS}/reruns/cable_sheet/cable/leverage.csv",
         f"{RESULTS}/reruns/cable_sheet/cable/block-deim.csv",
     } <= checkout.planned(*ARGUMENTS)
-
-
-def test_a_figures_option_is_typed_without_another_line(checkout):
-    figures = checkout.folder / "config" / "figures.yaml"
-    before = figures.read_text(encoding="utf-8")
-    figures.write_text(before + "rest_shapes:\n  ranks: [6]\n", encoding="utf-8")
-    done = checkout.snakemake("-n", *ARGUMENTS)
-    figures.write_text(before, encoding="utf-8")
-    assert done.returncode != 0
-    assert "rest_shapes: unknown key 'ranks' (allowed: scenes)" in done.stderr
 
 
 # One file of each recipe.
@@ -156,23 +144,6 @@ def test_the_added_code_makes_its_files(checkout, said):
     # sides and diagonals of the cells of a square sheet
     short, long = sorted(set(lengths.round(9)))
     assert np.isclose(long, np.sqrt(2.0) * short)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("name", "module", "old", "new"),
-    [
-        ("rest_lengths/spring_oop.csv", EXPERIMENT, "/ allowed", "/ allowed / 1.0"),
-        ("tables/mesh_sizes.csv", TABLE, "> extents", ">= extents"),
-    ],
-)
-def test_settings_and_code_make_it_again(checkout, said, name, module, old, new):
-    target = f"{RESULTS}/{name}"
-    arguments = (target, *ARGUMENTS)
-    assert checkout.planned(*arguments) == set()
-    assert checkout.planned(*arguments, "--config", "blowup_extent=50") == {target}
-    checkout.edit(module, old, new)
-    assert checkout.planned(*arguments) == {target}
 
 
 @pytest.mark.slow

@@ -219,20 +219,6 @@ def test_a_new_scene_has_a_density_and_its_floor_below_along_what_is_up(up):
     assert scene.masses.mean() == pytest.approx(10.0, rel=0.05)
 
 
-def test_what_an_obstacle_holds_or_moves_at_rest_is_said_once(folder, caplog):
-    inside = "  - {effect: floor, height: 2.0}\n  - {effect: self_collision, thickness: 0.01}\n"
-    held = "{kind: cloth, rows: 6, columns: 5, plane: xy}"
-    text = SMALL.replace("{kind: cloth, rows: 6, columns: 5, plane: xz}", held) + inside
-    (folder / "small.yaml").write_text(text, encoding="utf-8")
-    assert run(["run", "small.yaml"]) == Status.DONE
-    held, lies, thin = caplog.messages
-    assert held.startswith("scene 'small': 2 held vertices have targets inside 'floor'")
-    start = "scene 'small', effect "
-    free = "10 of 25 free vertices lie inside it at rest and are moved by up to 0.4 m in the first"
-    assert lies.startswith(f"{start}'floor': {free}")
-    assert thin.startswith(f"{start}'self_collision': with thickness 0.01 a vertex can pass")
-
-
 FAULTY = [
     (["run", "none.yaml"], "none.yaml: no such configuration file"),
     (["show", "none.h5"], "none.h5: no such file"),

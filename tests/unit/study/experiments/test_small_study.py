@@ -373,21 +373,3 @@ def test_the_package_and_the_command_give_the_runs_of_the_study(at, array, table
     stored = api.load(at(paths.TRAIN))
     assert np.array_equal(stored.positions, full.positions)
     assert np.array_equal(stored.snapshots[GROUP].p[::2], full.snapshots[GROUP].p)
-
-
-def test_every_result_is_shown_with_all_that_it_holds(at, capsys):
-    results = Path(at(paths.MACHINE)).parent
-    files = [*results.rglob("*.csv"), *results.rglob("*.h5")]
-    assert len(files) > len(JOBS)
-    for path in files:
-        assert main.run(["show", str(path)]) == 0
-        told = capsys.readouterr().out
-        assert told.startswith(f"{path}: {path.stat().st_size:,} bytes, intact\n")
-        if path.suffix == ".csv":
-            names = path.read_text("utf-8").partition("\n")[0].split(",")
-        else:
-            with open_hdf5(path) as file:
-                names = [*file, *file.attrs["configuration"].split('"')[1:2]]
-        assert all(f"  {name}" in told for name in names), path
-        assert "provenance:\n" in told
-        assert "config: small (small)" in told or "fom" not in path.parts

@@ -11,7 +11,6 @@ import h5py
 import numpy as np
 import pandas as pd
 import pytest
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from builders import frame
@@ -23,7 +22,6 @@ from pdrom.model.effects.obstacle import Sphere
 from pdrom.model.mesh.generators import cloth
 from pdrom.model.mesh.types import save_mesh
 from pdrom.reduction.method import load_methods
-from pdrom.view.style import note
 from places import CONFIG
 from study.artifact.paths import MESH, RERUNS, SUBSPACES
 from study.figures import accuracy_cost as view
@@ -31,7 +29,7 @@ from study.figures.kit.declaration import Drawn, Reduction, declarations, write_
 from study.figures.runs import obstacles_of
 from study.pipeline.study import Study
 
-from .conftest import BLOWN_UP, BLOWUP_FRAME, FRAMES, ROOT, SCENES, mesh_of, reference
+from .conftest import BLOWN_UP, BLOWUP_FRAME, FRAMES, ROOT, mesh_of, reference
 
 PICTURES = ("snapshots_and_modes", "deim_iterations", "cloth_all_grid", "bending_runs",
             "spring_runs", "strain_runs", "bar_runs", "teaser")  # fmt: skip
@@ -195,16 +193,6 @@ def test_a_run_out_of_view_is_drawn_to_a_stated_scale(small_study):
     assert sum("scale 1 :" in text for text in texts(figure)) == 1
 
 
-def test_a_note_fits_its_figure():
-    """However many names it lists, and with the line on where the figure is drawn."""
-    figure = note(f"no data: {', '.join(SCENES)}, {', '.join(SCENES)}\nthe full study draws it")
-    (text,) = figure.texts
-    box = text.get_window_extent(FigureCanvasAgg(figure).get_renderer())
-    assert figure.bbox.x0 < box.x0 < box.x1 < figure.bbox.x1
-    assert figure.bbox.y0 < box.y0 < box.y1 < figure.bbox.y1
-    assert text.get_text().splitlines()[-1] == "the full study draws it"
-
-
 def test_round_off_is_drawn_and_missing_scenes_and_methods_leave_their_panels_out(
     round_off_only, strain_only, figure_name
 ):
@@ -215,13 +203,6 @@ def test_round_off_is_drawn_and_missing_scenes_and_methods_leave_their_panels_ou
     assert not any("spring" in ax.get_title() for ax in figure.axes)
     noted = any("no data in this configuration" in text for text in texts(figure))
     assert noted == (figure_name == "error_against_gain")
-
-
-def test_the_teaser_shows_the_largest_size_where_a_study_has_none_that_is_chosen(study):
-    titles = [ax.get_title() for ax in study.draw("teaser", ranks=(3,)).axes]
-    chosen = ["deim-joint, r = 14", "deim, r = 14", "block-deim, r = 14"]
-    assert titles[:4] == ["full order", *chosen]
-    assert max(map(len, titles)) < 20
 
 
 def test_figures_are_upright_and_have_the_obstacles_that_the_scene_lists(study):
@@ -315,13 +296,6 @@ def test_points_with_another_reference_are_no_dots(study):
     assert list(fewer.get_xdata()) == [1.0, 2.0]
 
 
-def test_rates_out_of_reach_are_named(study):
-    figure = study.draw("accuracy_cost", scenes=("strain_oop",))
-    assert "60, 30 fps \N{RIGHTWARDS ARROW}" in texts(figure)
-    (ax,) = figure.axes
-    assert ax.get_xlim()[1] < 1e3 / 60.0
-
-
 def test_what_an_effect_moves_stands_beside_the_floor(study):
     """Below the floor the marker is open; a group that cannot be left out has none."""
     scenes, table = ("strain_oop", "cloth_all"), reference("effects_cost")
@@ -352,14 +326,6 @@ def test_a_scene_without_effects_ends_at_the_tick(study):
     ]  # fmt: skip
     assert [bar.get_width() for bar in without.patches] == [4.0, 3.5, 2.0]
     assert [line.get_xdata()[0] for line in without.lines] == [3.5, 2.0]
-
-
-def test_every_axis_of_the_scaling_has_two_numbers_at_least(study):
-    figure = study.draw("scaling")
-    for ax in figure.axes:
-        for axis in (ax.xaxis, ax.yaxis):
-            low, high = axis.get_view_interval()
-            assert sum(low <= place <= high for place in axis.get_majorticklocs()) >= 2
 
 
 # Accuracy against time --------------------------------------------------------------------------
@@ -418,33 +384,8 @@ def test_points_outside_the_axis_are_arrows_on_its_rim():
     assert ax.get_xlim()[1] > 4.0
 
 
-@pytest.mark.parametrize(("basis", "fill"), [("pod", "full"), ("skinning", "none")])
-def test_points_in_a_subspace_of_skinning_weights_are_hollow(basis, fill):
-    ax = Figure().subplots()
-    view.draw_panel(ax, invented([0.1], [2.0], position_basis=basis), "a")
-    assert next(line.get_fillstyle() for line in ax.lines if len(line.get_xdata()) == 1) == fill
-
-
 def test_the_front_of_a_family_is_not_beaten():
     ax = Figure().subplots()
     view.draw_panel(ax, invented([0.5, 0.7, 0.1, 0.2], [1.0, 2.0, 3.0, 4.0]), "a")
     steps = [line.get_xydata() for line in ax.lines if line.get_drawstyle() == "steps-post"]
     assert [front.tolist() for front in steps if len(front)] == [[[1.0, 0.5], [3.0, 0.1]]]
-
-
-def test_near_numbers_of_iterations_share_a_label():
-    ax = Figure().subplots()
-    found = invented([0.3, 0.2, 0.1], [1.0, 1.01, 9.0], method="fewer-iterations")
-    view.draw_panel(ax, found, "a")
-    view.label_iterations(ax, found, "a")
-    assert [text.get_text() for text in ax.texts] == ["K = 1, 2", "K = 3"]
-
-
-def test_one_scene_is_large_and_each_other_group_has_a_panel(study):
-    titles = [ax.get_title() for ax in study.draw("accuracy_cost").axes]
-    assert titles[0] == "deformation gradient: bar release"
-    assert titles[1:] == ["strain:\nstrain oop", "bending:\nbend curved",
-                          "tetrahedron strain:\nbar twist"]  # fmt: skip
-    assert {ax.get_title() for ax in study.draw("break_even").axes} == {
-        "bending", "spring", "strain", "tetrahedron strain", "deformation gradient",
-    }  # fmt: skip

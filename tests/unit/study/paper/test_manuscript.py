@@ -11,7 +11,7 @@ from pdrom.core.yamlfile import read_yaml
 from places import ROOT
 from study.figures.kit.declaration import declarations
 from study.paper.build import PAGES, Numbers, bibliography, figure_numbers, paper
-from study.paper.macros import AGGREGATES, keys_of, number_of, sentences
+from study.paper.macros import keys_of, number_of, sentences
 from study.paper.source import documents
 from study.paper.tex import build_pdfs, packages_of
 from study.pipeline.plan import Plan
@@ -140,18 +140,6 @@ def test_numbers_that_a_configuration_may_lack_stand_in_sentences_that_can_be_le
     assert all(keys_of(block) for block in blocks)
 
 
-def numbers_in(paragraph: str) -> int:
-    """Numbers that a reader sees in a paragraph: values of tables but words, and typed digits."""
-    kinds = {(n, c.name): c.kind for n, table in declared().items() for c in table.columns}
-    shown = 0
-    for key in re.findall(r"\\val\{([^{}]*)\}", paragraph):
-        table, *parts = key.split("|")
-        column = next(part for part in reversed(parts) if part not in AGGREGATES)
-        counted = parts[-1] in ("count", "distinct")
-        shown += counted or kinds.get((table, column)) != "text"
-    return shown + len(typed_numbers(r"\begin{document}" + paragraph))
-
-
 def test_the_paper_keeps_to_its_measures():
     """Its number of pages is seen to by the build (`test_tex`)."""
     abstract = PAPER.split(r"\begin{abstract}")[1].split(r"\end{abstract}")[0]
@@ -164,15 +152,6 @@ def test_the_paper_keeps_to_its_measures():
     body = PAPER.rpartition(r"\begin{document}")[2]
     assert 0 < len(re.findall(tables, body)) <= 5
     assert PAGES == {"main": 16, "supplement": 30}
-
-
-def test_no_paragraph_of_the_paper_has_more_than_six_numbers():
-    assert numbers_in(r"\val{study|scenes} of \val{claims|claim|count}, \val{claims|claim} 3.") == 3
-    # paragraphs, items and captions, without the rows of tables
-    text = re.sub(r"\\begin\{fittedtabular\}.*?\\end\{fittedtabular\}", "", PAPER, flags=re.DOTALL)
-    ends = r"\n[ \t]*\n|\\item|\\caption|\\longtableof|\\begin\{document\}"
-    paragraphs = re.split(ends, text)[1:]
-    assert {p.strip()[:60]: n for p in paragraphs if (n := numbers_in(p)) > 6} == {}
 
 
 def test_the_same_inputs_give_the_same_bytes_in_every_folder(tmp_path):

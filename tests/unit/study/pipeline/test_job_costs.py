@@ -14,7 +14,7 @@ from pdrom.core.store import write_table
 from places import ROOT
 from study.artifact.logs import Usage
 from study.experiments.kit.base import experiments
-from study.pipeline.run import RUN_TIMES, expected_seconds, say_compilation, units_of
+from study.pipeline.run import RUN_TIMES, expected_seconds, units_of
 from study.pipeline.scenes import Coarsen
 from study.pipeline.summary import minutes
 from study.pipeline.tracked import COLUMNS, COSTS, main, measured_costs, recorded_verdicts
@@ -142,12 +142,3 @@ def test_another_verdict_is_not_the_same(tmp_path: Path) -> None:
     other.to_csv(tmp_path / "kept.csv", index=False)
     table = replication(today, ROOT / RULES, tmp_path / "kept.csv")
     assert table.rules_unchanged.tolist() == [False, True, False, True]
-
-
-def test_kernels_are_compiled_once(tmp_path, capsys):
-    say_compilation(str(tmp_path))
-    assert capsys.readouterr().err == "pdrom: the first jobs compile kernels (once, some minutes)\n"
-    (tmp_path / "dynamics_1").mkdir()
-    (tmp_path / "dynamics_1" / "loop.iterate_0-1.py312.nbi").touch()
-    say_compilation(str(tmp_path))
-    assert capsys.readouterr().err == ""

@@ -248,23 +248,6 @@ def test_runs_that_are_not_accurate_are_no_times():
     assert verdicts.answer_of(test, np.array([0.0, 0.0, 1.1, 0.9])) == MACHINE
 
 
-def test_sentence_counts_and_shows_the_spread():
-    where = {"method": ["deim"], "scene": ["a", "b"]}
-    outcome = verdicts.evaluate(rule("rerun_error", "<=", 0.3, where=where), tables())
-    assert outcome.sentence == "rows: 2 of 4 at most 0.3 (measured 0.1 to blow-up, median 0.3)"
-    one = verdicts.evaluate(rule("position_basis_ratio", "<=", 1.0), tables())
-    assert one.sentence == "rows: 1 of 1 at most 1 (measured 0.1)"
-
-
-@pytest.mark.parametrize(
-    ("value", "text"), [(1234.0, "1200"), (123456.0, "1.2e+05"), (99.4, "99"), (0.0123, "0.012")]
-)
-def test_measured_numbers_have_two_digits(value, text):
-    changed = tables()
-    changed["local_share"] = changed["local_share"].assign(local_share=value)
-    assert verdicts.evaluate(rule("local_share"), changed).measured == text
-
-
 WORDS = dict.fromkeys(
     ("text", "source", "paper", "section", "shown", "qualifiers", "figure_or_table"), "w"
 )
@@ -321,22 +304,6 @@ def test_every_verdict(tmp_path, tests, expected):
     assert row["why"].count("rows:") == len(tests)
     assert row.answer.startswith(f"as published it {expected},")
     assert row.measured.count(";") == sum(t.get("decides", True) for t in tests) - 1
-
-
-@pytest.mark.parametrize(
-    ("scene", "words"),
-    [
-        # the run is in the configuration; it is the data that hold nothing to reduce
-        ("c", "rows: no size can run, the numerical rank allows none"),
-        ("absent", "rows: nothing to compare in this configuration"),
-    ],
-)
-def test_a_group_of_rank_zero_is_no_missing_scene(scene, words):
-    where = {"scene": [scene], "method": ["qdeim"]}
-    outcome = verdicts.evaluate(rule("rerun_error", where=where), tables())
-    assert outcome.verdict == UNDECIDED == "cannot be decided"
-    assert outcome.measured == "no data"
-    assert outcome.sentence == words
 
 
 @pytest.mark.parametrize(
