@@ -64,7 +64,8 @@ def verify_files(subject: Subject) -> Status:
     checked.distrust(path for path, fault in faults.items() if fault in (DAMAGED, OTHER))
     checked.save()
     for path, fault in list(faults.items())[:SHOWN]:
-        say(f"{path}: {fault}" + ("" if fault == FOREIGN else f"; run {subject.command()}"))
+        command = subject.command(*{path} - own)  # a run makes files beside the study if asked for
+        say(f"{path}: {fault}" + ("" if fault == FOREIGN else f"; run {command}"))
     if len(faults) > SHOWN:
         say(f"and {len(faults) - SHOWN} more; finish the study by {subject.command()}")
     count = len({*paths, *faults})
