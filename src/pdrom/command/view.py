@@ -13,6 +13,7 @@ def perform(arguments: argparse.Namespace) -> Status:
     from pdrom.api import load
     from pdrom.api.pictures import viewed_scenes
     from pdrom.core.errors import ConfigurationError
+    from pdrom.view.frames import FRAMES, vtk, write_frames
     from pdrom.view.page import write_page
 
     first = Path(arguments.results[0])
@@ -21,7 +22,8 @@ def perform(arguments: argparse.Namespace) -> Status:
     if arguments.png:
         require_output(arguments.png, [*arguments.results, str(out)])
     if arguments.vtk:
-        require_output(Path(arguments.vtk, "run.pvd"), arguments.results)
+        for path in (Path(arguments.vtk, "run.pvd"), *Path(arguments.vtk).glob(FRAMES)):
+            require_output(path, [*arguments.results, str(out)])
     scenes = viewed_scenes(*(load(file, arguments.unchecked) for file in arguments.results))
     if len(scenes) > 1 and (arguments.png or arguments.vtk):
         raise ConfigurationError("--png and --vtk: of one scene at a time")
@@ -29,13 +31,9 @@ def perform(arguments: argparse.Namespace) -> Status:
     size = out.stat().st_size / 1e6
     sys.stdout.write(f"{out}: {size:.1f} MB; a browser opens it without a network\n")
     if arguments.png:
-        from pdrom.view.frames import write_frames
-
         write_frames(scenes[0], Path(arguments.png))
         sys.stdout.write(f"{arguments.png}: four frames of each run\n")
     if arguments.vtk:
-        from pdrom.view.frames import vtk
-
         vtk(scenes[0], Path(arguments.vtk, "run.pvd"))
         sys.stdout.write(f"{Path(arguments.vtk, 'run.pvd')}: opened by ParaView\n")
     if arguments.open and not webbrowser.open(out.resolve().as_uri()):

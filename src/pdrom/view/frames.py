@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from pdrom.core.store import MARK, atomic_path, require_own
+from pdrom.core.store import MARK, atomic_path
 from pdrom.model.constraints.base import ConstraintGroup
 from pdrom.model.effects import EFFECTS
 from pdrom.view import style
@@ -24,7 +24,7 @@ from pdrom.view.text import plain_words
 INSTANTS = (0.25, 0.5, 0.75, 1.0)  # times of the pictures, as fractions of the run
 CAMERA = Camera(30.0, 20.0)
 NO_LIMIT = 100.0  # inches, limit of the picture's height: practically none
-NAME = "frame_{:05d}.vtu"
+NAME, FRAMES = "frame_{:05d}.vtu", "frame_*.vtu"
 SHOWN = 20  # the picture shows the run with most modes r up to this number, if there is one
 
 
@@ -90,14 +90,11 @@ def _panel(run: ViewedRun, frame: int) -> RunPanel:
 def vtk(scene: ViewedScene, collection: Path) -> None:
     """Write ``scene`` for ParaView: the PVD file ``collection``, frames as VTU files in its folder.
 
-    StorageError if a frame cannot be written, or would replace a file from outside pdrom.
+    Replaces all files with names of frames in this folder. StorageError if one cannot be written.
     """
     import meshio
 
     names = [NAME.format(frame) for frame in range(len(scene.positions))]
-    earlier = sorted(collection.parent.glob("frame_*.vtu"))
-    for path in (collection, *earlier):
-        require_own(path)
     volume, mesh = len(scene.mesh.tetrahedra) > 0, scene.mesh
     cells = [("tetra", mesh.tetrahedra) if volume else ("triangle", mesh.triangles)]
     for frame, name in enumerate(names):
@@ -106,7 +103,9 @@ def vtk(scene: ViewedScene, collection: Path) -> None:
             written = meshio.Mesh(scene.positions[frame], cells, point_data=data)
             written.write(temporary, file_format="vtu")
             _mark(temporary)
-    for path in earlier:  # remove surplus frames of a longer run written earlier
+    for path in collection.parent.glob(
+        FRAMES
+    ):  # remove surplus frames of a longer run written earlier
         if path.name not in names:
             path.unlink()
     root = ElementTree.Element("VTKFile", type="Collection", version="0.1")

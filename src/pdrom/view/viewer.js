@@ -248,4 +248,5 @@
   at("play").addEventListener("click", play);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", changed);
   await changed();
+  at("state").remove();
 })();

@@ -85,9 +85,11 @@ async function showTable(name) {
     $("asked").textContent = column || places.length
       ? `${take ? `The ${take} of ` : ""}${column ?? "All"} ${places.length ? `where ${places.join(", ")}` : "over all rows"}.` : "";
     $("every").hidden = !location.hash;
-    const about = column === null ? null : $("columns").querySelector(`tr[data-column="${column}"]`);
+    const about = column === null ? null : $("columns").querySelector(`tr[data-column="${CSS.escape(column)}"]`);
+    const gone = [column, ...filters.map(([name]) => name)].filter((name) => name !== null && ![...head, "row"].includes(name));
     const [meaning, unit, kind, tolerance] = [...(about?.cells ?? [])].slice(1).map((cell) => cell.textContent);
-    $("column").textContent = about ? `${column}: ${meaning}${unit && `, ${unit}`}. Compared as ${kind}; tolerance: ${tolerance}.` : "";
+    $("column").textContent = about ? `${column}: ${meaning}${unit && `, ${unit}`}. Compared as ${kind}; tolerance: ${tolerance}.`
+      : gone.length ? `This table has no column ${gone.join(", ")}.` : "";
     show();
   };
   const show = () => {
@@ -160,7 +162,9 @@ function switchOfScene(figure) {
 for (const place of document.querySelectorAll("figure")) if (place.querySelector(".origin a.kin")) switchOfScene(place);
 for (const place of document.querySelectorAll("[data-verified]")) showVerified(place, place.dataset.verified);
 const page = document.getElementById("table");
-if (page) showTable(page.dataset.name);
+if (page) showTable(page.dataset.name).catch(() => {
+  document.getElementById("asked").textContent = "The rows cannot be read: this file was cut or changed. ./reproduce article writes it again.";
+});
 for (const place of document.querySelectorAll('math[display="inline"]')) {
   if (place.getBoundingClientRect().right > innerWidth) { place.classList.add("wide"); place.tabIndex = 0; }
 }

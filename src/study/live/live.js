@@ -18,7 +18,7 @@
   const waiting = new Map(); // scene -> takes its file when that has come
   let shown = null; // {data, frames, bases}: the scene
   let run = null, handles = [], times = [], dragging = false;
-  let playing = true, told = 0, due = 0, drawing = null, layers = {};
+  let playing = true, told = 0, due = 0, drawing = null, layers = {}, unknown = "";
 
   window.pdromLive = (content) => waiting.get(content.scene)?.(content);
 
@@ -246,7 +246,7 @@
   }
 
   function tell() {
-    say(run.finite ? "" : "The run is no longer finite.", !run.finite);
+    say(run.finite ? unknown : "The run is no longer finite.", !run.finite || unknown !== "");
     const { data } = shown, sorted = [...times].sort((a, b) => a - b), recorded = recordedAt(run.frame);
     at("frame").textContent = `${run.frame}, ${(run.frame * data.timeStep).toFixed(2)} s`;
     at("ms").textContent = sorted.length ? `${sorted[sorted.length >> 1].toFixed(2)} ms` : "";
@@ -357,7 +357,10 @@
   drawing = new Drawing(at("picture"), { grab, plain: location.hash === "#plain" });
   fill("scene", scenes.map((_, i) => i), (i) => scenes[i].scene.replaceAll("_", " "));
   at("choice").addEventListener("submit", (event) => event.preventDefault());
-  at("scene").addEventListener("change", scene);
+  at("scene").addEventListener("change", () => {
+    unknown = "";
+    scene();
+  });
   const whileRunning = (id, event, action) => at(id).addEventListener(event, () => run && action());
   for (const id of ["method", "k", "tau"]) whileRunning(id, "change", start);
   whileRunning("ghost", "change", show);
@@ -372,6 +375,7 @@
   if (scenes.length === 0) say("No scene of this study has models: its configuration lists none of them.", true);
   else {
     at("scene").value = Math.max(named, 0);
+    if (named < 0 && location.search.length > 1) unknown = `No models of ${location.search.slice(1)} are here; another scene is shown.`;
     scene().then(() => requestAnimationFrame(beat));
   }
 })();

@@ -93,6 +93,12 @@ def test_files_for_paraview_replace_and_remove_only_their_own(runs, tmp_path, ca
         assert f"{name}: cannot be written (a file that pdrom has" in capsys.readouterr().err
         assert (frames / name).read_text() == "mine"
         (frames / name).unlink()
+    (frames / "frame_00003.vtu").unlink()
+    (frames / "frame_00003.vtu").mkdir()
+    for folder in (frames, tmp_path / "p.html"):
+        assert run([*view[:3], str(tmp_path / "q.html"), "--vtk", str(folder)]) == Status.FAULTY
+        assert "cannot be written" in capsys.readouterr().err
+        assert not (tmp_path / "q.html").exists()  # refused before anything is written
 
 
 def first_of(name, value):

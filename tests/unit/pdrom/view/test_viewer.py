@@ -5,6 +5,7 @@ import io
 import json
 import zlib
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -208,8 +209,22 @@ def differ(first: np.ndarray, second: np.ndarray) -> bool:
 
 
 @pytest.mark.slow
+def test_a_page_that_was_cut_says_so(tmp_path: Path) -> None:
+    """Stands before the tests that share a browser: there can be one at a time."""
+    path = tmp_path / "cut.html"
+    write_page([viewed()], path)
+    whole = path.read_text("utf-8")
+    damaged = whole.replace('"changes":"', '"changes":"AAAA', 1)
+    for text in (damaged, *(whole[: len(whole) * part // 10] for part in (1, 3, 5, 9))):
+        path.write_text(text, encoding="utf-8")
+        with page_at(path.as_uri(), width=1000, height=700) as page:
+            assert "the file was cut" in page.inner_text("body")
+
+
+@pytest.mark.slow
 def test_two_methods_and_two_frames_differ_and_their_errors_are_explained(opened: Page) -> None:
     shapes = opened.locator("#shapes")
+    assert opened.locator("#state").count() == 0
     choose(opened, scene="sheet", method="near")
     # errors of both runs are from 1e-3 to 1
     assert opened.get_attribute("#errors", "data-decades") == "-3 0"

@@ -6,6 +6,7 @@ import io
 import json
 import os
 import re
+import shutil
 import subprocess
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cache
@@ -466,5 +467,14 @@ def test_the_outcome_of_a_verification_is_shown(small, tmp_path):
         page.evaluate("location.hash = '#error_train%'")
         page.wait_for_function("document.getElementById('every').hidden === false")
         assert page.locator("#rows tbody tr").count() == 2
+        for name in ('a"]', "\\", "]"):
+            page.evaluate("name => { location.hash = encodeURIComponent(name); }", name)
+            page.locator("#column", has_text=f"This table has no column {name}.").wait_for()
         assert page.said == []
+    cut, whole = tmp_path / "tables" / "cut.html", (small / "tables" / "payoff.html").read_bytes()
+    cut.parent.mkdir()
+    shutil.copy(small / "article.js", tmp_path)
+    cut.write_bytes(whole[: whole.index(b'id="data">') + 40])
+    with page_at(cut.as_uri(), 900, 700) as page:
+        page.locator("#asked", has_text="this file was cut").wait_for()
     write_verified({}, small)

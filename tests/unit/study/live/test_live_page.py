@@ -99,6 +99,21 @@ def test_of_scenes_chosen_in_haste_the_last_is_shown_and_a_lost_one_is_named(tmp
         assert [said for said in page.said if not any(e in said for e in expected)] == []
 
 
+@pytest.mark.slow
+def test_a_scene_that_is_not_here_and_a_page_that_was_cut_are_told(tmp_path):
+    path = write_page(tmp_path, [write_sheet(tmp_path)])
+    with page_at(path.as_uri() + '?nosuch"%', width=900, height=800) as page:
+        page.wait_for_selector("#verdict.bad")
+        after(page, 2)
+        assert page.inner_text("#verdict").startswith("No models of nosuch%22% are here")
+        page.evaluate("document.getElementById('scene').dispatchEvent(new Event('change'))")
+        page.wait_for_selector("#verdict:not(.bad)")
+        assert page.said == []
+    path.write_bytes(path.read_bytes()[:-2000])
+    with page_at(path.as_uri(), width=900, height=800) as page:
+        assert "the file was cut" in page.inner_text("#verdict")
+
+
 @pytest.fixture(scope="module", params=["", "#plain"], ids=["WebGL2", "canvas"])
 def opened(request, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
     """The page of a sheet in a headless browser; what it said and asked for is noted."""
