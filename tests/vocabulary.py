@@ -1,6 +1,5 @@
 """The names that the project has, and which words in code font name nothing of it."""
 
-import ast
 import re
 from collections.abc import Collection, Iterator
 from contextlib import suppress
@@ -9,8 +8,6 @@ from functools import cache
 from pkgutil import resolve_name
 from typing import Any
 
-import numpy as np
-import yaml
 from snakemake.cli import get_argument_parser
 
 from pdrom.command.main import parser
@@ -27,13 +24,12 @@ PROGRAMS = re.compile(
     r"|\./reproduce (test|run pip)|\.venv/bin/(ruff|snakefmt|mypy))\b"
 )
 OTHERS = {
-    # of SLURM, Snakemake, Python, pydantic, pandas, JavaScript, OpenBLAS
-    "--exclusive", "--qos", "--slurm-status-command", "MinJobAge", "cancelled", "slurm_account",
-    "slurm_logs", "slurm_partition", "attempt", "multiprocessing", "True", "null", "model_copy",
-    "NaN", "fetch", "Node.js", "Zen",
+    # of SLURM, Python, pandas, JavaScript, OpenBLAS
+    "--qos", "--slurm-status-command", "MinJobAge", "cancelled", "slurm_account",
+    "slurm_partition", "multiprocessing", "NaN", "fetch", "tanh", "Node.js", "Zen",
     # that readers choose, or code puts together
-    "config/scenes/my_sheet.yaml", "config/mine.yaml", "config/scenes/meshes/sheet.obj",
-    "sheet.yaml", "file.yaml", "t.csv", ".t.csv.blake2b", "train_frames", "heldout_frames",
+    "config/scenes/my_sheet.yaml", "config/mine.yaml", "config/scenes/meshes/sheet.obj", "t.csv",
+    "train_frames", "heldout_frames",
 }  # fmt: skip
 WRITTEN = re.compile(r"\.(py|js|smk|tex|ya?ml|toml|sh|css|lock|rst)$|^(config|docs|src|tests)/")
 WORD = re.compile(r"(?<![\w-])--[a-z][\w-]+|(?<![\\\w.-])[.\w{}*-]*[\w}](?:/[.\w{}*-]+)*")
@@ -51,26 +47,10 @@ def keys(content: dict[str, Any], above: str = "") -> Iterator[str]:
         yield from keys(value, f"{above}{key}.") if isinstance(value, dict) else ()
 
 
-def of_source(text: str, public: bool) -> Iterator[str]:
-    """What a module defines, fields, short texts, and arguments of the public interface."""
-    tree = ast.parse(text)
-    for node in [*tree.body, *ast.walk(tree)]:
-        match node:
-            case ast.Constant(value=str(text)) if len(text) < 60:
-                yield from (text, *text.split("/"))
-            case ast.AnnAssign(target=ast.Name(id=name)) | ast.ClassDef(name=name):
-                yield name
-            case ast.arg(arg=name) if public:
-                yield name
-            case ast.FunctionDef(name=name) | ast.Assign(targets=[ast.Name(id=name)]):
-                if node in tree.body:
-                    yield name
-
-
 @cache
 def names() -> set[str]:
-    """Options, keys, paths by each end, names in sources, YAML files, scripts and libraries."""
-    found = {*OTHERS, *dir(np), *(f"{name}.csv" for name in declared())}
+    """Options, keys, paths by each end, and words of the code without comments and docstrings."""
+    found = {*OTHERS, *(f"{name}.csv" for name in declared())}
     settings = StudySettings.model_validate(read_yaml(CONFIG / "default.yaml"))
     found |= {*keys(settings.model_dump(by_alias=True))}
     (commands,) = (a.choices for a in parser()._actions if a.choices)
@@ -82,14 +62,10 @@ def names() -> set[str]:
         inside = path.relative_to(ROOT)
         parts = [part.parts for part in (inside, *inside.parents)]
         found |= {"/".join(p[first:]) for p in parts for first in range(len(p))} | {path.stem}
-        if path.suffix in (".yaml", ".yml"):
-            events = yaml.parse(path.read_text("utf-8"), Loader=yaml.CSafeLoader)
-            found |= {event.value for event in events if isinstance(event, yaml.ScalarEvent)}
-        elif path.suffix == ".smk" or path.name in ("reproduce", "preamble.tex"):
-            text = re.sub(r"(^|\s)[#%].*", "", path.read_text("utf-8"))
-            found |= set(re.findall(r"[\w.-]*\w", text))
-        elif path.suffix == ".py" and str(inside).startswith(("src", "workflow", "tests/conf")):
-            found |= set(of_source(path.read_text("utf-8"), public="api" in inside.parts))
+        written = path.suffix in (".py", ".smk", ".yaml", ".yml") and inside.parts[0] != "tests"
+        if written or path.name in ("reproduce", "preamble.tex", "conftest.py"):
+            text = re.sub(r"(^|\s)[#%].*|\"{3}(.|\n)*?\"{3}", "", path.read_text("utf-8"))
+            found |= {*re.findall(r"\w[\w-]*", text), *re.findall(r"[\w./-]*\w", text)}
     return found
 
 

@@ -11,7 +11,6 @@ import pytest
 from builders import GRAVITY, LEFT, make_scene
 from pdrom.model.dynamics.solvers import SOLVERS
 from pdrom.model.scene import Scene
-from pdrom.reduction.subspace.model import Output
 from study.experiments.timing import NumpyLocalStep
 
 WEIGHTS = {
@@ -103,23 +102,6 @@ def bench_local_step(benchmark, family, implementation):
     benchmark.extra_info["elements"] = elements
     benchmark.extra_info["ns_per_element"] = round(1e9 * benchmark.stats.stats.min / elements, 1)
     assert np.isfinite(rhs).all()
-
-
-@pytest.mark.parametrize("call", ["output", "product", "copy"])
-def bench_vertices(benchmark, call):
-    """Positions of 10,000 vertices from 44 columns, beside the product in double and a copy."""
-    rng = np.random.default_rng(0)
-    B, z = rng.standard_normal((10_000, 44)), rng.standard_normal((44, 3))
-    output = Output(B)
-    made = output(z)
-    other = np.empty_like(made)
-    calls = {
-        "output": lambda: output(z),
-        "product": lambda: B @ z,
-        "copy": lambda: np.copyto(other, made),
-    }
-    benchmark.group = "vertices"
-    benchmark(calls[call])
 
 
 LARGE = [name for name in FAMILIES if "100x100" in name or "80x10x10" in name]

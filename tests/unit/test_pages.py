@@ -88,7 +88,7 @@ def test_files_modules_and_commands_that_sources_name_exist() -> None:
     [
         "pdrom advise", "pdrom show --plot", "./reproduce --certify", "pdrom.core.gone",
         "core/gone.py", "src/pdrom/errors.py", "docs/gone", "gone.csv", "stability.sweeps",
-        "variants", "{kind: x5y}",
+        "{kind: x5y}",
     ],
 )  # fmt: skip
 def test_a_name_that_is_gone_is_found(span: str) -> None:

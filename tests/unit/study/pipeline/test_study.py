@@ -1,8 +1,6 @@
 """Studies: settings and defaults, scenes made out of others, and those that no subspace takes."""
 
 import shutil
-from collections.abc import Iterator
-from typing import Any
 
 import pytest
 import yaml
@@ -53,25 +51,6 @@ def test_the_configurations_hold_what_they_ask_for(name):
     settings = validate(StudySettings, config, name)
     assert set(settings.stability.scenes) <= set(settings.scenes)
     assert set(settings.stability.ranks) <= set(settings.ranks)
-
-
-def given(content: dict[str, Any], known: Any) -> Iterator[tuple[str, Any, Any]]:
-    """(key, value, default) of every value that a configuration gives, inside sections too."""
-    for key, value in content.items():
-        default = known.get(key) if isinstance(known, dict) else None
-        if isinstance(value, dict) and isinstance(default, dict) and default:
-            for inner, *rest in given(value, default):
-                yield f"{key}.{inner}", *rest
-        else:
-            yield key, value, default
-
-
-def test_the_study_repeats_no_default() -> None:
-    content, study = read_yaml(CONFIG / "default.yaml"), StudySettings(scenes=["a"], methods=["b"])
-    # scenes and methods have no default
-    defaults = study.model_dump(mode="json", by_alias=True, exclude={"scenes", "methods"})
-    repeated = [key for key, value, default in given(content, defaults) if value == default]
-    assert repeated == []
 
 
 def test_a_replicated_scene_is_faster_and_starts_elsewhere() -> None:

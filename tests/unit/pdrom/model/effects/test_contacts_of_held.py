@@ -108,16 +108,6 @@ def logged(caplog, mesh: Mesh, *effects: dict) -> list[tuple[str, str]]:
     return [(record.levelname, record.getMessage()) for record in caplog.records]
 
 
-def test_every_hold_is_counted(caplog):
-    poke = {"effect": "poke", "count": 2, "avoid": ["left", [19]]}
-    listed = {"effect": "translate", "select": [19], "offset": [0, 0, 1], "over": 2}
-    assert logged(caplog, cloth(5, 4), LEFT, poke, listed) == [
-        ("INFO", "scene 'sheet', effect 'pins': holds 4 of 20 vertices (select: left)"),
-        ("INFO", "scene 'sheet', effect 'poke': holds 2 of 20 vertices"),
-        ("INFO", "scene 'sheet', effect 'translate': holds 1 of 20 vertices"),
-    ]
-
-
 def test_a_side_of_one_vertex_is_a_warning(caplog):
     """An unstructured sheet: no two vertices lie on one line along y."""
     mesh = cloth(5, 4)

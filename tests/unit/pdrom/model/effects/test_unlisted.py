@@ -77,18 +77,6 @@ def test_a_scene_without_it_neither_imports_it_nor_holds_more_once_it_is_loaded(
     assert own == alone["compiled"] != {}
 
 
-def test_a_scene_with_an_effect_holds_more():
-    """The count sees what an effect keeps: two constants of a group, the areas of drag."""
-    from holdings_of_scenes import arrays
-
-    spring = {"effect": "spring", "weight": 1.0}
-    plain, with_drag = (
-        sum(array.nbytes for array in arrays(make_scene(spring, *others)).values())
-        for others in ((), ({"effect": "drag", "coefficient": 1.0},))
-    )
-    assert with_drag == plain + 30 * 8
-
-
 @pytest.mark.parametrize("effect", [name for name in EFFECTS if IDLE.get(name, {}) is not None])
 def test_what_cannot_act_changes_no_bit(effect):
     """Of a sheet that falls, held on one side, with a start off its rest shape."""
