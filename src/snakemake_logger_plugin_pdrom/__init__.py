@@ -7,7 +7,7 @@ import time
 from snakemake_interface_logger_plugins.base import LogHandlerBase
 from snakemake_interface_logger_plugins.common import LogEvent
 
-from study.pipeline.progress import Estimate, rounded
+from study.pipeline.progress import Estimate
 
 NOTHING = "Nothing to be done"
 # Parts of Snakemake's messages about failed jobs. Such messages are not printed, because the last
@@ -32,7 +32,7 @@ class LogHandler(LogHandlerBase):
     def __post_init__(self) -> None:
         self._started = self._total = 0
         self._messages: dict[int, str] = {}
-        self._estimate = Estimate()
+        self._estimate = Estimate({}, 0.0)
 
     def emit(self, record: logging.LogRecord) -> None:
         """Print a ``record`` about a job or problem; update the estimate of remaining time."""
@@ -41,15 +41,13 @@ class LogHandler(LogHandlerBase):
         if event == LogEvent.RUN_INFO:
             self._total = record.stats["total"]
         elif hasattr(record, "expected"):
-            self._estimate = Estimate(record.expected)
+            self._estimate = Estimate(record.expected, record.created)
         elif event == LogEvent.JOB_INFO and not self.common_settings.dryrun:
             self._started += 1
             what = self._messages[record.jobid] = record.rule_msg or record.rule_name
-            left = self._estimate.left(record.created)
-            self._estimate.begun[record.jobid] = record.created
-            self._write(record, what + (f"   {rounded(left)} left" if left is not None else ""))
+            self._write(record, what + self._estimate.words(record.created))
         elif event == LogEvent.JOB_FINISHED:
-            self._estimate.ended[record.job_id] = record.created
+            self._estimate.finish(record.job_id)
         elif event == LogEvent.GROUP_ERROR:
             self._write(record, f"FAILED: batch {record.groupid}")
         elif event == LogEvent.JOB_ERROR and not getattr(record, "indent", False):

@@ -1,14 +1,16 @@
 """What git tracks: text and a few pictures, nothing large or binary by accident; the container."""
 
 import re
+import tomllib
 from pathlib import Path
+
+from packaging.specifiers import SpecifierSet
 
 from pdrom.core.yamlfile import read_yaml
 from places import ROOT, tracked
 from study.artifact.paths import FIGURE, RESULTS, TABLE
 from study.figures.kit.declaration import declarations
 from study.pipeline.folders import Folders
-from study.pipeline.platforms import NEWEST, OLDEST
 from study.tables import declared
 
 LARGEST = 300_000
@@ -51,7 +53,8 @@ IGNORED = (ROOT / ".dockerignore").read_text("utf-8").split()
 def test_its_python_is_one_that_the_packages_have_wheels_for_and_the_script_does_the_rest() -> None:
     found = re.findall(r"^FROM python:(\d+)\.(\d+)-slim", DOCKERFILE, re.MULTILINE)
     assert len(found) == 1
-    assert OLDEST <= tuple(map(int, found[0])) <= NEWEST
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+    assert SpecifierSet(project["requires-python"]).contains(".".join(found[0]))
 
     # its environment is made by the script alone
     assert "RUN ./reproduce run pdrom --help" in DOCKERFILE

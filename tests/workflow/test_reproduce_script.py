@@ -17,9 +17,8 @@ import pytest
 from places import ROOT
 
 SCRIPT = ROOT / "reproduce"
-TOOLS = ["cat", "chmod", "cksum", "cp", "dirname", "grep", "mkdir", "rm", "sed", "sh"]
-TOOLS += ["sleep", "tail", "touch", "tr"]
-PLATFORMS = "src/study/pipeline/platforms.py"
+TOOLS = ["cat", "chmod", "cksum", "cp", "dirname", "getconf", "grep", "mkdir", "rm", "sed", "sh"]
+TOOLS += ["sleep", "tail", "touch", "tr", "uname"]
 PACKAGES = "lib/python3.12/site-packages"
 FRONT = "python -m study.pipeline.front"
 LOCK_FILE = f"nowhere==1.0 --hash=sha256:{64 * '0'}\n"
@@ -35,9 +34,6 @@ case "$*" in
     exit {no_venv}
     ;;
 *fcntl*) exec "{real}" "$@" ;;
-*platforms.py*)
-    [ ! -e unsupported ] || {{ echo "no wheel for it" >&2; exit 1; }}
-    ;;
 *"-m venv"*)
     mkdir -p "$3/bin" "$3/{packages}/numpy-2.1.0.dist-info"
     cp "$0" "$3/bin/python"
@@ -71,8 +67,6 @@ class Folder:
         for tool in TOOLS:
             self.programs.joinpath(tool).symlink_to(shutil.which(tool))
         shutil.copy(SCRIPT, self.path)
-        (self.path / PLATFORMS).parent.mkdir(parents=True)
-        shutil.copy(ROOT / PLATFORMS, self.path / PLATFORMS)
         self.path.joinpath("requirements.lock").write_text(LOCK_FILE, encoding="utf-8")
 
     def add_python(self, version: str = "3.12", too_old: int = 0, no_venv: int = 0) -> None:
@@ -164,7 +158,6 @@ BROKEN = (
 FAILING = {
     "pip": ("pip-fails", "ERROR: no\n", "reproduce: the packages cannot be installed.*ERROR: no"),
     "a full disk, not the network": ("pip-fails", FULL, ".*no space left on the disk.*"),
-    "the platform": ("unsupported", "", "no wheel for it"),
     "linear algebra": ("broken", "", f"reproduce: {BROKEN}see .*/.cache/setup.log"),
 }
 
@@ -176,11 +169,33 @@ def test_a_failed_set_up_does_not_count_and_is_made_anew(what, folder):
     for _ in range(2):
         assert re.fullmatch(words, folder.refused()[-1])
         assert folder.calls == []
-    if what == "the platform":  # it ends before anything is made
-        assert not folder.has("installing")
-        assert not folder.has(".venv")
     folder.path.joinpath(name).unlink()
     folder.works()
+
+
+@pytest.mark.parametrize(
+    ("machine", "glibc", "works"),
+    [
+        ("Linux x86_64", True, True),
+        ("Linux aarch64", True, True),
+        ("Darwin arm64", False, True),
+        ("Linux x86_64", False, False),
+        ("Linux riscv64", True, False),
+        ("Darwin x86_64", False, False),
+    ],
+)
+def test_a_platform_without_wheels_is_refused_before_anything_is_made(
+    machine, glibc, works, folder
+):
+    for program, command in {"uname": f"echo {machine}", "getconf": str(glibc).lower()}.items():
+        folder.programs.joinpath(program).unlink()
+        folder.programs.joinpath(program).write_text(f"#!/bin/sh\n{command}\n")
+        folder.programs.joinpath(program).chmod(0o755)
+    if works:
+        folder.works()
+        return
+    assert re.fullmatch(f"reproduce: {machine}.* has no wheel .*container.*", folder.refused()[-1])
+    assert not folder.has(".venv")
 
 
 @pytest.fixture

@@ -3,15 +3,11 @@
 import logging
 from collections import Counter, defaultdict
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from itertools import accumulate
 
 from snakemake_interface_logger_plugins.common import LogEvent
 
-# An estimate needs this number of finished jobs, and this share of the total expected time in them.
-ENOUGH_JOBS, ENOUGH = 2, 0.05
-# Smallest remaining time of an unfinished job, as a fraction of its expected duration.
-REST = 0.1
+# An estimate needs this share of the work in finished jobs.
+ENOUGH = 0.05
 # A reason of Snakemake for running a job; left out if a job has another reason as well. `REASONS`
 # maps the beginnings of all reasons to our shorter texts.
 FOLLOWS = "Input files updated by another job"
@@ -26,61 +22,30 @@ REASONS = {
     "Software environment definition has changed": "environment has changed",
     FOLLOWS: "input is made again",
 }
-END = "This was a dry-run"
 
 
-@dataclass(frozen=True)
-class Expected:
-    """Expected time of a job.
-
-    seconds : expected duration of the job
-    share : fraction of this machine's cores that the job uses; 1 on a cluster
-    after : expected seconds of the longest chain of jobs that can start only after this job
-    """
-
-    seconds: float
-    share: float
-    after: float
-
-
-@dataclass
 class Estimate:
-    """Estimate of the remaining seconds of a run.
+    """Estimate of a run's remaining time: the rest of the work goes on as fast as until now.
 
-    It is the remaining core time divided by the mean number of cores in use until now, but at least
-    the time of the longest chain of jobs. Expected times are multiplied by the slowdown of this
-    machine: the median ratio of measured to expected time of finished jobs, weighted by expected
-    time, on which a few jobs that compile kernels first have little effect.
-
-    jobs : number of a job -> its expected time
-    begun, ended : number of a job -> time in s at which it started or ended
+    work : number of a job -> its expected processor seconds on all cores that the job uses
+    begun : time in s at which the run has begun
     """
 
-    jobs: Mapping[int, Expected] = field(default_factory=dict)
-    begun: dict[int, float] = field(default_factory=dict)
-    ended: dict[int, float] = field(default_factory=dict)
+    def __init__(self, work: Mapping[int, float], begun: float) -> None:
+        self._rest = dict(work)
+        self._total, self._begun = sum(work.values()), begun
 
-    def left(self, now: float) -> float | None:
-        """Return the remaining seconds at time ``now`` (in s); None until enough jobs are done."""
-        begun = {number: start for number, start in self.begun.items() if number in self.jobs}
-        ran = {number: self.ended.get(number, now) - start for number, start in begun.items()}
-        done = [(ran[n], self.jobs[n].seconds) for n in ran if n in self.ended]
-        finished = sum(seconds for _, seconds in done)
-        total = sum(job.seconds for job in self.jobs.values())
-        if len(done) < ENOUGH_JOBS or finished < ENOUGH * total:
-            return None
-        ordered = sorted((took / seconds, seconds) for took, seconds in done)
-        below = accumulate(seconds for _, seconds in ordered)
-        pairs = zip(ordered, below, strict=True)
-        slower = next(quotient for (quotient, _), sum_ in pairs if sum_ >= finished / 2)
-        work = chain = 0.0
-        for number in self.jobs.keys() - self.ended.keys():
-            job, expected = self.jobs[number], self.jobs[number].seconds * slower
-            rest = max(expected - ran.get(number, 0.0), REST * expected)
-            work += rest * job.share
-            chain = max(chain, rest + job.after * slower)
-        busy = sum(seconds * self.jobs[number].share for number, seconds in ran.items())
-        return max(work * (now - min(begun.values())) / busy, chain)
+    def finish(self, job: int) -> None:
+        """Count the work of the ``job`` of this number as done."""
+        self._rest.pop(job, None)
+
+    def words(self, now: float) -> str:
+        """Share of the work that is done at time ``now`` (in s), and remaining time; or ""."""
+        done = self._total - sum(self._rest.values())
+        if done <= 0.0 or done < ENOUGH * self._total:
+            return ""
+        left = (now - self._begun) * (self._total / done - 1.0)
+        return f"   {done / self._total:.0%} done, {rounded(left)} left"
 
 
 def rounded(seconds: float) -> str:
@@ -110,11 +75,9 @@ class Preview(logging.Handler):
         self._jobs: Counter[str] = Counter()
         self._reasons: defaultdict[str, set[str]] = defaultdict(set)
         self._processor = self._wall = 0.0
-        self._ended = False
 
     def emit(self, record: logging.LogRecord) -> None:
         """Count the job that ``record`` announces; collect its reasons to run and expected time."""
-        self._ended = self._ended or END in record.getMessage()
         if getattr(record, "event", None) != LogEvent.JOB_INFO:
             return
         self._jobs[record.rule_name] += 1
@@ -126,8 +89,8 @@ class Preview(logging.Handler):
             self._wall += seconds * min(record.threads, self._cores) / self._cores
 
     def text(self) -> str:
-        """Text with one line per rule, then the totals; empty if the dry run did not finish."""
-        if not self._ended:
+        """Text with one line per rule, then the totals; empty if no job would run."""
+        if not self._jobs:
             return ""
         width = max(map(len, self._jobs))
         lines = [

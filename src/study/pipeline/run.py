@@ -18,14 +18,14 @@ from pdrom.core.store.checksum import move_aside
 from study.artifact import planned
 from study.artifact.paths import MACHINE
 from study.pipeline import running
-from study.pipeline.commandline import CommandLine, one_line, recall, remember
+from study.pipeline.commandline import CommandLine, one_line, remember
 from study.pipeline.failures import Failures
 from study.pipeline.faults import MISSING, UNUSUAL, faults, force
 from study.pipeline.fingerprint import memory
 from study.pipeline.fork_server import hold_pipe, start_server
 from study.pipeline.manifest import write_manifest
 from study.pipeline.plan import Plan
-from study.pipeline.progress import Expected, Preview
+from study.pipeline.progress import Preview
 from study.pipeline.scenes import Coarsen
 from study.pipeline.summary import CONTENTS, configuration, contents, summary
 from study.pipeline.targets import check_targets
@@ -62,31 +62,19 @@ def expected_seconds(plan: Plan) -> Callable[[str], float]:
 
 
 def tell_expectation(workflow: Any, plan: Plan) -> None:
-    """Log the expected seconds of every job of ``workflow``, for the progress lines of a run.
-
-    Jobs that measure times are taken to use all cores; on a cluster, this holds for all jobs.
-    """
+    """Log the expected work of every job of ``workflow`` for the progress lines of a run."""
     dag, seconds_of = workflow.dag, expected_seconds(plan)
-    expected: dict[int, Expected] = {}
-    after: dict[Any, float] = {}
-    # in reverse order, as the times of the jobs that depend on a job are needed for this job
-    for job in reversed([job for level in dag.toposorted() for job in level]):
-        if not dag.needrun(job) or not job.log:
-            continue
-        seconds = seconds_of(str(job.log[0]))
-        share = min(job.threads / workflow.cores, 1.0) if workflow.local_exec else 1.0
-        follows = max((after[other] for other in dag.depending[job] if other in after), default=0.0)
-        after[job] = seconds + follows
-        expected[dag.jobid(job)] = Expected(seconds, share, follows)
-    total = sum(job.seconds for job in expected.values())
+    expected = {
+        dag.jobid(job): seconds_of(str(job.log[0])) * job.threads
+        for job in dag.jobs
+        if dag.needrun(job) and job.log
+    }
     logging.getLogger("snakemake.logging").info(
-        f"Jobs take {total:.0f} s one by one where they were measured.",
+        f"Jobs take {sum(expected.values()):.0f} s on one core where they were measured.",
         extra={"expected": expected},
     )
 
 
-# Folders with files whose dates Snakemake compares; files dated in the future get new dates.
-DATED = ("results", "paper", "config", "workflow")
 # Name of the Snakemake executor that runs a batch of jobs on a node of a cluster.
 JOBSTEP = "slurm-jobstep"
 
@@ -106,7 +94,6 @@ class Run:
                 running.remove_stale_locks()
             else:
                 running.hold()
-                running.settle_dates(DATED)
                 remember(self.command)
         atexit.register(memory().save)
         self.failures = Failures()
@@ -121,11 +108,9 @@ class Run:
         """
         check_targets(plan, self.command.targets, list(workflow.rules))
         reports = self.command.report and not self.command.targets
-        manuscript = plan.folders.manuscript
-        if reports and not Path(manuscript).is_file():
-            last = " ".join(recall())
-            hint = f"the last run was of another one: add {last}" if last else "run it first"
-            raise ConfigurationError(f"report: this configuration has no {manuscript}; {hint}")
+        file = plan.folders.manuscript
+        if reports and not Path(file).is_file():
+            raise ConfigurationError(f"report: this configuration has no {file}; run it first")
         found = faults(plan, self.command.targets) if self.command.makes else {}
         for path, fault in found.items():
             if fault in UNUSUAL:

@@ -1,12 +1,10 @@
-"""The process of a run: it locks its folder, corrects dates of files, and ends at SIGTERM.
+"""The process of a run: it locks its folder, and ends at SIGTERM.
 
 The operating system releases the lock when the process ends, for whatever reason. Snakemake's own
 lock consists of files, which a killed run leaves behind: a process that has the operating system's
 lock deletes them.
 
-Snakemake refuses a result that is older than its inputs. After the clock was set back, existing
-files have dates in the future, and no new result would be accepted: such dates are replaced. At
-SIGTERM, running jobs are ended, too, since Snakemake would wait for them for minutes.
+At SIGTERM, running jobs are ended, too, since Snakemake would wait for them for minutes.
 """
 
 import errno
@@ -18,7 +16,7 @@ import socket
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
@@ -29,8 +27,6 @@ from pdrom.core.errors import INTERRUPTED, PdromError
 FOLDER = Path(".snakemake")
 LOCK = FOLDER / "run.lock"
 SNAKEMAKE_LOCKS = FOLDER / "locks"
-# Nanoseconds between successive dates that replace dates in the future.
-STEP_NS = 10_000
 # Jobs that still run this number of seconds after SIGTERM are killed.
 PATIENCE = 5.0
 
@@ -72,24 +68,6 @@ def remove_stale_locks() -> None:
         os.close(hold())
     except AtWorkError:
         return
-
-
-def settle_dates(folders: Iterable[str | Path]) -> int:
-    """Replace file dates in the future by dates just before now; return the number of files.
-
-    The order of the dates remains, so that newer inputs still cause reruns. For a symbolic link the
-    date of the link changes, not the date of its target, which may lie outside ``folders``.
-    """
-    now = time.time_ns()
-    files = [path for folder in folders for path in Path(folder).rglob("*") if path.is_file()]
-    future = {path: date for path in files if (date := path.lstat().st_mtime_ns) > now}
-    ranks = {date: rank for rank, date in enumerate(sorted(set(future.values()), reverse=True))}
-    for path, date in future.items():
-        settled = now - ranks[date] * STEP_NS
-        os.utime(path, ns=(settled, settled), follow_symlinks=False)
-    if future:
-        sys.stderr.write(f"pdrom: {len(future)} files were dated in the future (clock set back?)\n")
-    return len(future)
 
 
 def end_at_sigterm() -> None:

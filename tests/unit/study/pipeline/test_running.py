@@ -1,10 +1,9 @@
-"""A run is alone in its folder, with dates that Snakemake takes; it ends at once, and wholly."""
+"""A run is alone in its folder; it ends at once, and wholly."""
 
 import os
 import signal
 import subprocess
 import sys
-import time
 
 import pytest
 
@@ -73,28 +72,6 @@ def test_a_folder_that_cannot_be_written_is_named(folder):
     (folder / ".snakemake").write_text("a file where the folder should be")
     with pytest.raises(running.AtWorkError, match=r"run\.lock: cannot be written"):
         running.hold()
-
-
-DAY = 86_400 * 10**9
-
-
-def test_future_dates_come_before_now_in_their_order_but_not_behind_a_link(tmp_path):
-    start = time.time_ns()
-    offsets = {"old": -DAY, "late": 3 * DAY, "early": DAY, "twin": DAY, "deep/later": 4 * DAY}
-    offsets |= {"link": 5 * DAY, "../elsewhere": 6 * DAY}  # a link to a file of no folder
-    (folder := tmp_path / "results").mkdir()
-    for name, offset in offsets.items():
-        path = folder / name
-        path.parent.mkdir(exist_ok=True)
-        path.symlink_to(folder / "../elsewhere") if name == "link" else path.write_text(name)
-        os.utime(path, ns=(start, start + offset), follow_symlinks=False)
-    assert running.settle_dates([folder, tmp_path / "none"]) == 5
-    dates = {name: (folder / name).lstat().st_mtime_ns for name in offsets}
-    assert dates["old"] == start - DAY
-    assert dates["old"] < dates["early"] == dates["twin"] < dates["late"] < dates["deep/later"]
-    assert dates["deep/later"] < dates["link"] <= time.time_ns()
-    assert dates["../elsewhere"] == start + 6 * DAY
-    assert running.settle_dates([folder]) == 0
 
 
 PLANS = """

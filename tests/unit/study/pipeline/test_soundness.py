@@ -1,4 +1,4 @@
-"""Set-up: linear algebra is tried as jobs do it; machines without wheels get a remedy."""
+"""Set-up: linear algebra is tried as jobs do it."""
 
 import subprocess
 import sys
@@ -6,8 +6,6 @@ import sys
 import numpy as np
 import pytest
 
-from study.pipeline import platforms
-from study.pipeline.platforms import obstacle
 from study.pipeline.soundness import compare
 
 # A NumPy that ends the process in the product of one shape, as the kernels of OpenBLAS 0.3.34 do.
@@ -51,33 +49,3 @@ def test_a_wrong_result_is_refused(wrong):
     compare(np.ones(3) + 1e-14, np.ones(3))
     with pytest.raises(SystemExit, match="wrong"):
         compare(np.array([1.0, wrong, 1.0]), np.ones(3))
-
-
-@pytest.mark.parametrize(
-    ("machine", "words"),
-    [
-        (("Linux", "x86_64", (3, 14), "glibc"), ("Python 3.14", "immutables", "PYTHON")),
-        (("Linux", "x86_64", (3, 10), "glibc"), ("Python 3.10", "too old", "PYTHON")),
-        (("Darwin", "x86_64", (3, 12), ""), ("macOS on Intel", "llvmlite", "container")),
-        (("Linux", "x86_64", (3, 12), ""), ("without glibc", "llvmlite", "container")),
-        (("Linux", "riscv64", (3, 12), "glibc"), ("Linux on riscv64", "use one of these")),
-        (("FreeBSD", "amd64", (3, 12), ""), ("FreeBSD on amd64", "use one of these")),
-    ],
-)
-def test_a_platform_without_wheels_is_named_with_the_remedy(machine, words):
-    assert all(word in obstacle(*machine) for word in words)
-
-
-@pytest.mark.parametrize("version", [(3, 11), (3, 12), (3, 13)])
-@pytest.mark.parametrize(
-    ("system", "processor", "libc"),
-    [("Linux", "x86_64", "glibc"), ("Linux", "aarch64", "glibc"), ("Darwin", "arm64", "")],
-)
-def test_platforms_that_work(version, system, processor, libc):
-    assert obstacle(system, processor, version, libc) is None
-
-
-def test_it_runs_by_its_path_without_any_package():
-    """As ``./reproduce`` runs it, before anything is installed."""
-    command = [sys.executable, "-I", "-S", platforms.__file__]
-    assert subprocess.run(command, check=True, capture_output=True).stdout == b""
