@@ -6,7 +6,6 @@ traceback for a file that is not text.
 """
 
 import json
-import shlex
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
@@ -81,11 +80,9 @@ class CommandLine:
         }
         for option, names in swallowed.items():
             if names:
-                targets = [*names, *self.targets]
-                options = [a for a in self.arguments if a not in (*targets, "--")]
                 raise ConfigurationError(
                     f"{option} takes every value that follows it, '{names[0]}' too; write two "
-                    f"hyphens before the targets: {shlex.join([*options, '--', *targets])}"
+                    "hyphens before the targets: ./reproduce OPTIONS -- TARGETS"
                 )
 
     @property

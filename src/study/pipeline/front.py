@@ -13,8 +13,8 @@ from collections.abc import Sequence
 from typing import NoReturn
 
 from pdrom.core.environment import settle
-from pdrom.core.errors import INTERRUPTED, PdromError
-from study.pipeline.commandline import CommandLine, check_files, recall
+from pdrom.core.errors import INTERRUPTED
+from study.pipeline.commandline import CommandLine, check_files, one_line, recall
 from study.pipeline.folders import folders
 from study.pipeline.running import end_at_sigterm
 
@@ -43,7 +43,7 @@ def completed(arguments: Sequence[str]) -> list[str]:
 
         arguments = figure_arguments(arguments[1:])
     command = CommandLine(arguments)
-    if command.report and not command.configfiles and not command.settings and recall():
+    if command.report and not command.configuration and recall():
         sys.stderr.write(f"reproduce: a report of the last run, {' '.join(recall())}\n")
         command = CommandLine(command.rewritten(recall(), {t: [t] for t in command.targets}))
     check_files(command.configfiles)
@@ -52,22 +52,20 @@ def completed(arguments: Sequence[str]) -> list[str]:
     lines = LINES if replaced and not command.own_output else ()
     own, made = folders(command.configfiles, command.settings), {}
     if command.targets:
-        from study.pipeline.targets import described, files  # slow, so not imported at the top
+        from study.pipeline.targets import files  # slow, so not imported at the top
 
         made = {target: files(target, own) for target in command.targets}
         # print the files if a target is a name and not a path
         for target, found in made.items():
             if found != [target]:
-                sys.stderr.write(f"reproduce: {described(target)}: {', '.join(found)}\n")
+                sys.stderr.write(f"reproduce: {target}: {', '.join(found)}\n")
     return command.rewritten([*cores, *lines, *OPTIONS], made)
 
 
 def _start(command: Sequence[str]) -> NoReturn:
     """Replace this process by program ``command[0]``, found on PATH, with the other arguments."""
     if not command:
-        sys.exit(
-            "pdrom: run: the name of a program is missing, as in: ./reproduce run pdrom --help"
-        )
+        sys.exit("pdrom: run: no program is named, as in: ./reproduce run pdrom --help")
     try:
         os.execvp(command[0], list(command))
     except OSError as error:
@@ -84,13 +82,12 @@ def main() -> None:
         _start(sys.argv[2:])
     end_at_sigterm()
     try:
-        arguments = completed(sys.argv[1:])
-        sys.argv = ["snakemake", *arguments]
-        from snakemake.cli import main as snakemake
+        with one_line():
+            arguments = completed(sys.argv[1:])
+            sys.argv = ["snakemake", *arguments]
+            from snakemake.cli import main as snakemake
 
-        snakemake(arguments)
-    except PdromError as error:
-        sys.exit(f"pdrom: {error}")
+            snakemake(arguments)
     except KeyboardInterrupt:
         sys.stderr.write("pdrom: interrupted\n")
         sys.exit(INTERRUPTED)

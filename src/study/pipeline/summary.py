@@ -8,6 +8,7 @@ import os
 import shlex
 import time
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -29,9 +30,10 @@ from study.tables import declared
 from study.tables.claims.rules import load_claims
 from study.tables.kit.declaration import Table
 
+# Processor times of a process and of its ended child processes; not every platform has the latter.
+PROCESSOR = ("user", "system", "children_user", "children_system")
 # A run calls its times worthless if the load average (five minutes, per core) exceeds this value.
 BUSY = 1.7
-LISTED = 8  # largest number of targets that the last lines of a run name
 TABLES_HEAD = """# Tables
 
 Tables are CSV with one row per observation, SI units unless a unit says otherwise, and an empty
@@ -59,12 +61,9 @@ def processor_seconds() -> float:
     own = psutil.Process()
     total = 0.0
     for process in (own, *own.children(recursive=True)):
-        try:
-            times = process.cpu_times()
-        except psutil.Error:  # the child has ended since the list was made
-            continue
-        total += times.user + times.system
-        total += getattr(times, "children_user", 0.0) + getattr(times, "children_system", 0.0)
+        with suppress(psutil.Error):  # the child may have ended since the list was made
+            times = process.cpu_times()._asdict()
+            total += sum(times.get(kind, 0.0) for kind in PROCESSOR)
     return total
 
 
@@ -74,9 +73,7 @@ def summary(command: CommandLine, plan: Plan) -> str:
     wall = time.time() - psutil.Process().create_time()
     lines = [f"configuration: {configuration(command)}"]
     if command.targets:
-        more = len(command.targets) - LISTED
-        others = [f"and {more} more"] if more > 0 else []
-        lines.append(f"made: {', '.join([*command.targets[:LISTED], *others])}")
+        lines.append(f"made: {', '.join(command.targets)}")
     else:
         if verdicts := verdicts_in(folders.results):
             words = f"as published / beyond; {apart}" if apart else "as published / beyond"

@@ -3,6 +3,7 @@
 A target is the number or name of a figure, the name of a table or of a rule, or a path.
 """
 
+import sys
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from itertools import takewhile
 from pathlib import Path
@@ -18,7 +19,6 @@ from study.pipeline.scenes import scene_names
 from study.pipeline.study import Study
 from study.tables import declared
 
-WORD = "figure"
 PREPRINT = "preprint:"
 
 
@@ -26,9 +26,8 @@ def figure_arguments(arguments: Sequence[str]) -> list[str]:
     """Return options and targets for Snakemake, from the ``arguments`` after the word ``figure``.
 
     A figure is given by its name, its number in the paper (``3``), in the supplement (``S3``) or in
-    the preprint (``preprint:3``). A returned target is a single string ``figure NAME``, which the
-    function `files` turns into a path. Raises ConfigurationError if no figure is given, or a given
-    figure does not exist.
+    the preprint (``preprint:3``). Targets are default paths, which are printed, too. Raises
+    ConfigurationError if no figure is given, or a given figure does not exist.
     """
     named = list(takewhile(lambda word: not word.startswith("-"), arguments))
     options = [word for word in arguments[len(named) :] if word != "--"]
@@ -40,31 +39,25 @@ def figure_arguments(arguments: Sequence[str]) -> list[str]:
     known |= {f"{PREPRINT}{n.preprint}": name for name, n in numbers.items() if n.preprint}
     known |= {name: name for name in numbers}
     if not named:
-        raise ConfigurationError(f"{WORD}: its number or name is missing{choices('', known)}")
+        raise ConfigurationError(f"figure: its number or name is missing{choices('', known)}")
+    targets = []
     for word in named:
         if word not in known:
-            raise ConfigurationError(f"{WORD} {word}: there is none{choices(word, known)}")
-    return [*options, "--", *(f"{WORD} {known[word]}" for word in named)]
-
-
-def described(target: str) -> str:
-    """Text for the user about a ``target``; the name of a figure is followed by its numbers."""
-    word, _, name = target.partition(" ")
-    return f"{WORD} {figure_numbers(Path())[name].label(name)}" if word == WORD else target
+            raise ConfigurationError(f"figure {word}: there is none{choices(word, known)}")
+        targets.append(paths.FIGURE.at(paths.RESULTS, name=known[word]))
+        words = numbers[known[word]].label(known[word])
+        sys.stderr.write(f"reproduce: figure {words}: {targets[-1]}\n")
+    return [*options, "--", *targets]
 
 
 def files(target: str, folders: Folders) -> list[str]:
     """Return the paths in ``folders`` for a ``target``: the name of a figure or table, or a path.
 
     A path below ``results`` becomes a path in the results folder of this study. A name stands for
-    figure and table if both have it; the target ``figure NAME`` is the figure only.
+    figure and table if both have it.
     """
-    word, _, name = target.partition(" ")
-    alone = word == WORD and name in declarations()
-    name = name if alone else target
-    found = [paths.FIGURE.at(folders.results, name=name)] if name in declarations() else []
-    if name in declared() and not alone:
-        found.append(paths.TABLE.at(folders.results, name=name))
+    kinds = ((paths.FIGURE, declarations()), (paths.TABLE, declared()))
+    found = [place.at(folders.results, name=target) for place, names in kinds if target in names]
     return found or [own_file(target, folders)]
 
 
@@ -88,8 +81,7 @@ def check_targets(plan: Plan, targets: Iterable[str], rules: Sequence[Any]) -> N
     for target in targets:
         if target in own:
             continue
-        named = any(rule.name == target for rule in rules)
-        if named or not any(rule.is_producer(target) for rule in rules):
+        if not any(rule.is_producer(target) for rule in rules):
             raise ConfigurationError(f"target '{target}': {_unknown(plan, target, own)}")
         for labels in paths.labels_in(target, plan.results):
             for label, value in labels.items():

@@ -58,19 +58,10 @@ def test_what_runs_no_job(arguments):
     assert parse(arguments).looks_only == (arguments in LOOKS_ONLY)
 
 
-@pytest.mark.parametrize(
-    ("arguments", "expected"),
-    [
-        ("-n --config a=b results/x y", "-n --config a=b -- results/x y"),
-        ("--config a=b x -- y", "--config a=b -- x y"),
-        ("--configfile a.yaml x", "--configfile a.yaml -- x"),
-        ("--configfile a.yaml x --cores 2", "--configfile a.yaml --cores 2 -- x"),
-    ],
-)
-def test_a_forgotten_separator_is_explained(arguments, expected):
-    with pytest.raises(ConfigurationError, match="two hyphens before the targets") as caught:
+@pytest.mark.parametrize("arguments", ["-n --config a=b x y", "--configfile a.yaml x --cores 2"])
+def test_a_forgotten_separator_is_explained(arguments):
+    with pytest.raises(ConfigurationError, match="'x' too; write two hyphens before the targets"):
         parse(arguments)
-    assert str(caught.value).endswith(f": {expected}")
 
 
 @pytest.mark.parametrize(
@@ -81,7 +72,6 @@ def test_a_forgotten_separator_is_explained(arguments, expected):
             "--configfile a.yaml -n -q -- y z x",
         ),
         ("-n", "", {}, "-n"),
-        ("-n --forcerun x -- x", "", {"x": ["a.pdf"]}, "-n --forcerun x -- a.pdf"),
         ("x --forcerun x", "", {"x": ["a"]}, "--forcerun x -- a"),
         ("x -n", "--cores 2", {"x": ["x"]}, "-n --cores 2 -- x"),
     ],

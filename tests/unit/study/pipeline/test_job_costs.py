@@ -17,7 +17,7 @@ from study.experiments.kit.base import experiments
 from study.pipeline.run import RUN_TIMES, expected_seconds, units_of
 from study.pipeline.scenes import Coarsen
 from study.pipeline.summary import minutes
-from study.pipeline.tracked import COLUMNS, COSTS, main, measured_costs, recorded_verdicts
+from study.pipeline.tracked import COLUMNS, COSTS, measured_costs, recorded_verdicts, updated
 from study.tables.claims.claims import MEASURED, RECORDED, RULES, claims, replication
 from study.tables.claims.rules import load_claims
 
@@ -105,7 +105,7 @@ def test_costs_are_read_from_the_logs_of_two_runs(tmp_path):
 
 def test_what_git_does_not_keep_or_no_run_has_measured_is_not_written(tmp_path):
     with pytest.raises(PdromError, match=r"'cost': unknown .*did you mean 'costs'"):
-        main(["cost"])
+        updated("cost")
     with pytest.raises(PdromError, match="run the study first"):
         measured_costs(str(tmp_path), str(tmp_path))
 

@@ -21,7 +21,6 @@ TINY = Folders("results/studies/tiny", "results/studies/tiny/paper/main.pdf")
         ("teaser", ["figures/teaser.pdf"]),
         ("claims", ["tables/claims.csv"]),
         ("scaling", ["figures/scaling.pdf", "tables/scaling.csv"]),
-        ("figure scaling", ["figures/scaling.pdf"]),
         ("results/fom/a.h5", ["fom/a.h5"]),
     ],
 )
@@ -31,7 +30,7 @@ def test_files_of_a_target(target, names):
 
 
 def test_files_that_have_a_place_of_their_own():
-    for name in ("results/studies/tiny/x", "figure_teaser", "figure none"):
+    for name in ("results/studies/tiny/x", "figure_teaser"):
         assert files(name, Folders()) == files(name, TINY) == [name]
     for name in ("paper/main.pdf", "paper/supplement.pdf"):
         assert files(name, Folders()) == [name]
