@@ -16,7 +16,6 @@ from pdrom.core.environment import settle
 from pdrom.core.errors import INTERRUPTED
 from study.pipeline.commandline import CommandLine, check_files, one_line, recall
 from study.pipeline.folders import folders
-from study.pipeline.running import end_at_sigterm
 
 # Options of every run. The greedy scheduler chooses jobs fast. Snakemake's default scheduler solves
 # an integer program at each choice, which takes more time than it saves, since jobs are short.
@@ -48,8 +47,7 @@ def completed(arguments: Sequence[str]) -> list[str]:
         command = CommandLine(command.rewritten(recall(), {t: [t] for t in command.targets}))
     check_files(command.configfiles)
     cores = () if command.cores else ("--cores", "all")
-    replaced = command.plans or not command.looks_only
-    lines = LINES if replaced and not command.own_output else ()
+    lines = LINES if command.makes and not command.own_output else ()
     own, made = folders(command.configfiles, command.settings), {}
     if command.targets:
         from study.pipeline.targets import files  # slow, so not imported at the top
@@ -80,7 +78,6 @@ def main() -> None:
         _start([sys.executable, "-m", HANDED_ON[word], *sys.argv[2:]])
     if word == "run":
         _start(sys.argv[2:])
-    end_at_sigterm()
     try:
         with one_line():
             arguments = completed(sys.argv[1:])

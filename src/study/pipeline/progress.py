@@ -8,9 +8,7 @@ from snakemake_interface_logger_plugins.common import LogEvent
 
 # An estimate needs this share of the work in finished jobs.
 ENOUGH = 0.05
-# A reason of Snakemake for running a job; left out if a job has another reason as well. `REASONS`
-# maps the beginnings of all reasons to our shorter texts.
-FOLLOWS = "Input files updated by another job"
+# Beginnings of Snakemake's reasons for running a job -> our shorter texts.
 REASONS = {
     "Forced execution": "forced",
     "Missing output files": "output is missing",
@@ -20,7 +18,7 @@ REASONS = {
     "Code has changed": "script has changed",
     "Params have changed": "settings or code have changed",
     "Software environment definition has changed": "environment has changed",
-    FOLLOWS: "input is made again",
+    "Input files updated by another job": "input is made again",
 }
 
 
@@ -107,6 +105,4 @@ class Preview(logging.Handler):
 
 def shortened(reason: str) -> set[str]:
     """Short texts (values of `REASONS`) for Snakemake's text ``reason`` on why a job has to run."""
-    found = [text for text in REASONS if reason.startswith(text) or f"; {text}" in reason]
-    own = [text for text in found if text != FOLLOWS] or found
-    return {REASONS[text] for text in own}
+    return {words for text, words in REASONS.items() if text in reason}

@@ -9,14 +9,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
-
 from pdrom.core.errors import ConfigurationError, PdromError, StorageError
-from pdrom.core.machine import Machine, Units
 from pdrom.core.store import read_table, write_text
 from pdrom.core.store.checksum import move_aside
 from study.artifact import planned
-from study.artifact.paths import MACHINE
 from study.pipeline import running
 from study.pipeline.commandline import CommandLine, one_line, remember
 from study.pipeline.failures import Failures
@@ -31,31 +27,16 @@ from study.pipeline.summary import CONTENTS, configuration, contents, summary
 from study.pipeline.targets import check_targets
 from study.pipeline.tracked import COLUMNS, COSTS, kind_of
 
-RUN_TIMES = Path("config/reference/run_times.csv")
-
-
-def units_of(study: str, root: Path) -> Units:
-    """Benchmark times, from `RUN_TIMES`, of the machine that ran ``study`` ("full", "tiny")."""
-    row = read_table(root / RUN_TIMES, result=False).set_index("study").loc[study]
-    return Units(**row[list(Units.model_fields)])
-
 
 def expected_seconds(plan: Plan) -> Callable[[str], float]:
     """Return a function that maps the path of a job's log to its expected processor seconds.
 
-    Kinds of jobs that were never measured get the median of all kinds. Times are multiplied by the
-    benchmark time of this machine, if known, divided by that of the machine that measured them.
+    It is the mean of measured jobs of the same kind, in a study with or without coarse meshes; for
+    kinds that were never measured, the median of all kinds.
     """
-    root, full = plan.study.root, plan.study.settings.coarsen == Coarsen()
-    study, column = ("full", "seconds") if full else ("tiny", "coarse_seconds")
-    table = read_table(root / COSTS, COLUMNS, result=False)
-    try:
-        record = (root / MACHINE.at(plan.results)).read_bytes()
-        here = Machine.model_validate_json(record).units
-    except (OSError, ValidationError):
-        here = None  # no run has recorded this machine's speed, or the record has an old format
-    slower = 1.0 if here is None else here.unit_s / units_of(study, root).unit_s
-    seconds = slower * table[column]
+    full = plan.study.settings.coarsen == Coarsen()
+    table = read_table(plan.study.root / COSTS, COLUMNS, result=False)
+    seconds = table.seconds if full else table.coarse_seconds
     known = dict(zip(table.kind, seconds, strict=True))
     usual = float(seconds.median())
     return lambda log: float(known.get(kind_of(log, plan.results), usual))
@@ -87,7 +68,6 @@ class Run:
 
         A command that runs no job, such as a dry run, needs no lock and works during another run.
         """
-        running.end_at_sigterm()
         with one_line():
             self.command = CommandLine(sys.argv[1:])
             if self.command.looks_only:
@@ -134,7 +114,8 @@ class Run:
         # these timers use a third of a core, and the process waits for the last one.
         workflow.scheduler.job_rate_limiter = None
         running.stop_at_sigterm(self.failures.note_sigterm)
-        say_compilation(os.environ.get("NUMBA_CACHE_DIR", ""))
+        if not any(Path(os.environ.get("NUMBA_CACHE_DIR", "")).glob("dynamics*/*.nbi")):
+            sys.stderr.write("pdrom: the first jobs compile kernels (once, some minutes)\n")
         tell_expectation(workflow, plan)
         with one_line():
             write_text(json.dumps(planned.plan()), planned.PLAN, with_checksum=False)
@@ -174,9 +155,3 @@ def start_batch(workflow: Any) -> None:
     """
     if workflow.remote_exec and JOBSTEP not in sys.argv:
         start_server()
-
-
-def say_compilation(cache: str) -> None:
-    """Print that kernels are compiled first if the folder ``cache`` has no compiled kernels."""
-    if not any(Path(cache).glob("dynamics*/*.nbi")):
-        sys.stderr.write("pdrom: the first jobs compile kernels (once, some minutes)\n")

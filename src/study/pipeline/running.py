@@ -22,7 +22,7 @@ from pathlib import Path
 
 import psutil
 
-from pdrom.core.errors import INTERRUPTED, PdromError
+from pdrom.core.errors import PdromError
 
 FOLDER = Path(".snakemake")
 LOCK = FOLDER / "run.lock"
@@ -70,33 +70,18 @@ def remove_stale_locks() -> None:
         return
 
 
-def end_at_sigterm() -> None:
-    """Install a handler of SIGTERM that ends this process, for use before any job is started."""
-
-    def end(number: int, frame: object) -> None:
-        _say(b"pdrom: ended by SIGTERM\n")
-        os._exit(INTERRUPTED)
-
-    signal.signal(signal.SIGTERM, end)
-
-
 def stop_at_sigterm(note: Callable[[], None]) -> None:
     """Install a handler of SIGTERM: call ``note``, end all jobs, end the run as Ctrl-C does."""
 
     def stop(number: int, frame: object) -> None:
-        _say(b"pdrom: SIGTERM: ending the jobs that run\n")
+        with suppress(OSError):  # nobody may read the stream any more
+            os.write(sys.stderr.fileno(), b"pdrom: SIGTERM: ending the jobs that run\n")
         signal.signal(signal.SIGTERM, signal.SIG_IGN)
         note()
         threading.Thread(target=_end_jobs, daemon=True).start()
         raise KeyboardInterrupt
 
     signal.signal(signal.SIGTERM, stop)
-
-
-def _say(line: bytes) -> None:
-    """Write ``line`` to standard error; ignore a closed stream."""
-    with suppress(OSError):
-        os.write(sys.stderr.fileno(), line)
 
 
 def _end_jobs() -> None:

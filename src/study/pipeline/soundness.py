@@ -8,7 +8,7 @@ name of each calculation is therefore printed before it is made.
 import faulthandler
 import sys
 from collections.abc import Iterator
-from importlib.metadata import version
+from itertools import product
 from typing import Any
 
 from pdrom.core.environment import settle
@@ -35,24 +35,23 @@ def calculations() -> Iterator[str]:
     import scipy.linalg
 
     random = np.random.default_rng(1)
-    names = [f"{library} {version(library)}" for library in ("numpy", "scipy")]
-    for rows, columns in [(rows, columns) for rows in ROWS for columns in COLUMNS]:
+    for rows, columns in product(ROWS, COLUMNS):
         x = random.standard_normal((rows, columns))
         # reference product for comparison; einsum calls no linear algebra library here
         gram = np.einsum("ij,ik->jk", x, x)
         where = f"with X of {rows} x {columns}"
-        yield f"{names[0]}: X.T @ (2 * X) {where}"
+        yield f"numpy: X.T @ (2 * X) {where}"
         compare(x.T @ (2 * x), 2 * gram)
-        yield f"{names[0]}: X.T @ X {where}"
+        yield f"numpy: X.T @ X {where}"
         compare(x.T @ x, gram)
-        yield f"{names[0]}: X @ y {where}"
+        yield f"numpy: X @ y {where}"
         compare(x @ x[0], np.einsum("ij,j->i", x, x[0]))
-        yield f"{names[1]}: X.T @ X {where}"
+        yield f"scipy: X.T @ X {where}"
         compare(scipy.linalg.blas.dgemm(1.0, x, x, trans_a=True), gram)
-        yield f"{names[1]}: pivoted QR factors {where}"
+        yield f"scipy: pivoted QR factors {where}"
         q, r, order = scipy.linalg.qr(x, mode="economic", pivoting=True)
         compare(q @ r, x[:, order])
-        for name, linalg in zip(names, (np.linalg, scipy.linalg), strict=True):
+        for name, linalg in (("numpy", np.linalg), ("scipy", scipy.linalg)):
             yield f"{name}: singular values {where}"
             left, values, right = linalg.svd(x, full_matrices=False)
             compare((left * values) @ right, x)

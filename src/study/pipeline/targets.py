@@ -12,7 +12,7 @@ from typing import Any
 from pdrom.core.errors import ConfigurationError, choices, suggestion
 from study.artifact import paths
 from study.figures.kit.declaration import declarations
-from study.paper.build import SUPPLEMENT, figure_numbers
+from study.paper.build import figure_numbers
 from study.pipeline.folders import Folders
 from study.pipeline.plan import Plan
 from study.pipeline.scenes import scene_names
@@ -33,9 +33,8 @@ def figure_arguments(arguments: Sequence[str]) -> list[str]:
     options = [word for word in arguments[len(named) :] if word != "--"]
     numbers = figure_numbers(Path())
     by_place = {n.manuscript: name for name, n in numbers.items() if n.manuscript}
-    # suggestions in error messages list numbers of the paper before those of the supplement
-    ordered = sorted(by_place, key=lambda n: (SUPPLEMENT in n, int(n.removeprefix(SUPPLEMENT))))
-    known = {number: by_place[number] for number in ordered}
+    # error messages list 1, 2, ... 10, ... S1, S2, ...
+    known = {n: by_place[n] for n in sorted(by_place, key=lambda n: (len(n), n))}
     known |= {f"{PREPRINT}{n.preprint}": name for name, n in numbers.items() if n.preprint}
     known |= {name: name for name in numbers}
     if not named:

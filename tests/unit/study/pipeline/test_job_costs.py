@@ -9,12 +9,12 @@ import pytest
 import yaml
 
 from pdrom.core.errors import PdromError
-from pdrom.core.machine import Units, machine
+from pdrom.core.machine import Units
 from pdrom.core.store import write_table
 from places import ROOT
 from study.artifact.logs import Usage
 from study.experiments.kit.base import experiments
-from study.pipeline.run import RUN_TIMES, expected_seconds, units_of
+from study.pipeline.run import expected_seconds
 from study.pipeline.scenes import Coarsen
 from study.pipeline.summary import minutes
 from study.pipeline.tracked import COLUMNS, COSTS, measured_costs, recorded_verdicts, updated
@@ -58,23 +58,13 @@ def test_a_job_takes_what_jobs_of_its_kind_took_on_meshes_like_its_own(log, kind
     assert expected_seconds(plan())(unknown) == TABLE.seconds.median()
 
 
-def test_times_are_scaled_by_the_units_of_the_last_run(tmp_path):
-    """A machine with twice the units takes twice as long; an older record has none."""
-    asked = SimpleNamespace(**vars(plan()) | {"results": str(tmp_path)})
-    log, usual = f"{tmp_path}/logs/frame_times.log", TABLE.seconds["frame_times"]
-    there = units_of("full", ROOT).model_dump()
-    twice = Units(**{name: 2.0 * seconds for name, seconds in there.items()})
-    for units, factor in ((twice, 2.0), (None, 1.0)):
-        (tmp_path / "machine.json").write_text(machine(units).model_dump_json(), "utf-8")
-        assert expected_seconds(asked)(log) == pytest.approx(factor * usual)
-
-
 def test_pages_say_the_times_of_the_record_and_the_unit():
     pages = ("README.md", "docs/running.md")
     readme, running = ((ROOT / page).read_text("utf-8") for page in pages)
-    times = pd.read_csv(ROOT / RUN_TIMES).set_index("study")
+    times = pd.read_csv(ROOT / "config/reference/run_times.csv").set_index("study")
+    units = Units(**times.loc["full", list(Units.model_fields)])
     for text in (readme, running):
-        assert f"{times.cpu['full']} (unit {units_of('full', ROOT).unit_s:.3f} s" in text
+        assert f"{times.cpu['full']} (unit {units.unit_s:.3f} s" in text
     assert f"{times.wall_s['full'] / 60:.0f} minutes" in readme
     for study in times.itertuples():
         assert minutes(study.wall_s) in running

@@ -7,7 +7,6 @@ import sys
 
 import pytest
 
-from pdrom.core.errors import INTERRUPTED
 from study.pipeline import running
 
 HOLDER = """
@@ -74,14 +73,6 @@ def test_a_folder_that_cannot_be_written_is_named(folder):
         running.hold()
 
 
-PLANS = """
-import signal
-from study.pipeline.running import end_at_sigterm
-end_at_sigterm()
-print("ready", flush=True)
-signal.pause()
-"""
-
 # A run with a job in a shell, as Snakemake waits for it; it prints how the job ended.
 RUNS = """
 import os, subprocess, sys
@@ -111,10 +102,6 @@ def sigterm(*command: str, reads: bool = True) -> tuple[int, str, str]:
     process.send_signal(signal.SIGTERM)
     out, errors = process.communicate()
     return process.returncode, out, errors
-
-
-def test_a_plan_ends_with_one_line():
-    assert sigterm(PLANS) == (INTERRUPTED, "", "pdrom: ended by SIGTERM\n")
 
 
 @pytest.mark.parametrize(
