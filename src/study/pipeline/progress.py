@@ -8,6 +8,7 @@ from snakemake_interface_logger_plugins.common import LogEvent
 
 # An estimate needs this share of the work in finished jobs.
 ENOUGH = 0.05
+FOLLOWS = "input is made again"
 # Beginnings of Snakemake's reasons for running a job -> our shorter texts.
 REASONS = {
     "Forced execution": "forced",
@@ -18,7 +19,7 @@ REASONS = {
     "Code has changed": "script has changed",
     "Params have changed": "settings or code have changed",
     "Software environment definition has changed": "environment has changed",
-    "Input files updated by another job": "input is made again",
+    "Input files updated by another job": FOLLOWS,
 }
 
 
@@ -105,4 +106,5 @@ class Preview(logging.Handler):
 
 def shortened(reason: str) -> set[str]:
     """Short texts (values of `REASONS`) for Snakemake's text ``reason`` on why a job has to run."""
-    return {words for text, words in REASONS.items() if text in reason}
+    found = {words for text, words in REASONS.items() if text in reason}
+    return found - {FOLLOWS} or found  # most jobs follow others: say so only without another reason
