@@ -74,16 +74,13 @@ class CommandLine:
         for key, _, text in (setting.partition("=") for setting in self.settings):
             with suppress(YAMLError):  # Snakemake takes such a value as a text
                 require_as_written(text, "--config", key)
-        swallowed = {
-            "--config": [s for s in self.settings if "=" not in s],
-            "--configfile": [f for f in self.configfiles[1:] if Path(f).suffix not in YAML],
-        }
-        for option, names in swallowed.items():
-            if names:
-                raise ConfigurationError(
-                    f"{option} takes every value that follows it, '{names[0]}' too; write two "
-                    "hyphens before the targets: ./reproduce OPTIONS -- TARGETS"
-                )
+        swallowed = [name for name in self.settings if "=" not in name]
+        swallowed += [name for name in self.configfiles[1:] if Path(name).suffix not in YAML]
+        if swallowed:
+            raise ConfigurationError(
+                f"the option before '{swallowed[0]}' takes every value that follows it; write two "
+                "hyphens before the targets: ./reproduce OPTIONS -- TARGETS"
+            )
 
     @property
     def configuration(self) -> list[str]:

@@ -227,12 +227,7 @@ class Plan:
     def own_files(self) -> set[str]:
         """Paths of all files that a complete run of the study makes."""
         places = [place for made in self.experiments.values() for place in made.writes.values()]
-        measured = [
-            place.at(self.results, **labels)
-            for place in places
-            for labels in labels_of(self.study, place)
-        ]
-        return {*self.made, *measured}
+        return {*self.made, *(path for place in places for path in self.files(place, {}))}
 
     def job(self, artifact: Artifact, labels: Labels = MappingProxyType({})) -> Job:
         """Return the job of ``artifact`` for the scene, group ... in ``labels``.

@@ -62,12 +62,9 @@ def hold() -> int:
 
 def remove_stale_locks() -> None:
     """Delete the lock files that a killed run of Snakemake left, unless a run is at work."""
-    if not SNAKEMAKE_LOCKS.is_dir():
-        return
-    try:
-        os.close(hold())
-    except AtWorkError:
-        return
+    if SNAKEMAKE_LOCKS.is_dir():
+        with suppress(AtWorkError):
+            os.close(hold())
 
 
 def stop_at_sigterm(note: Callable[[], None]) -> None:
