@@ -64,7 +64,7 @@ def local_share(options: Scenes, drawn: Drawn, table: pd.DataFrame) -> Figure:
     scenes = drawn.scenes_of(table, "no timings")
     present = set(table[table.scene.isin(scenes)].implementation)
     implementations = [i for i in TITLES if i in present]
-    figure = style.new_figure(0.27 * len(scenes) + 1.15)
+    figure = style.new_figure(0.27 * len(scenes) + 1.35)
     axes = figure.subplots(1, len(implementations), sharey=True, squeeze=False)[0]
     for ax, implementation in zip(axes, implementations, strict=True):
         rows = table[table.implementation == implementation].drop_duplicates("scene")
@@ -75,7 +75,7 @@ def local_share(options: Scenes, drawn: Drawn, table: pd.DataFrame) -> Figure:
     handles: list[Artist] = [style.patch(label, color=c) for label, c in PHASES.values()]
     line = {"color": style.BLACK, "linestyle": "--"}
     handles.append(style.handle(f"{CLAIM:.0f} % (claim C1)", **line))
-    style.legend(figure, handles, 5)
+    style.legend(figure, handles, 3)
     return figure
 
 
