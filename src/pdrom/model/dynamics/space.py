@@ -69,8 +69,8 @@ class Space(ABC):
         the state; anchors of the state after the frame are the third result.
         """
         one = range(frame, frame + 1)
-        indices, (targets,), anchors = self.held_path(one, positions, anchors)
-        return indices, targets, anchors
+        indices, path, anchors = base.held_path(self._boundaries, one, positions, anchors)
+        return indices, path[0], anchors
 
     def held_path(
         self, frames: range, positions: np.ndarray, anchors: base.Anchors = ()

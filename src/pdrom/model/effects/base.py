@@ -273,14 +273,15 @@ def held_path(
     are those at the beginning of the first frame, ``anchors`` those returned for the frame before.
     A hold without an anchor is taken to begin in the first frame.
     """
-    frame, old = frames.start, anchors or (None,) * len(boundaries)
-    active = [b for b in boundaries if b.active(frame)]
+    frame, now = frames.start, list(anchors) or [None] * len(boundaries)
+    for i, b in enumerate(boundaries):
+        if not b.active(frame):
+            now[i] = None
+        elif now[i] is None or b.takes_hold(frame):
+            now[i] = b.anchor(frame, positions)
+    pairs = [(b, q) for b, q in zip(boundaries, now, strict=True) if q is not None]
+    active = [b for b, _ in pairs]
     held = [b.held(frame) for b in active]
-    anchors = tuple(
-        None if b not in active else
-        b.anchor(frame, positions) if q is None or b.takes_hold(frame) else q
-        for b, q in zip(boundaries, old, strict=True)
-    )  # fmt: skip
     single = len(active) == 1 and bool((held[0][1:] > held[0][:-1]).all())
     vertices, first = np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
     if single:
@@ -293,10 +294,9 @@ def held_path(
         or any(b.takes_hold(frames[known]) for b in active)
     ):
         known += 1
-    begun = [q for q in anchors if q is not None]
-    paths = [b.path(frames[:known], q) for b, q in zip(active, begun, strict=True)]
+    paths = [b.path(frames[:known], q) for b, q in pairs]
     if single:
-        paths[0] = np.array(paths[0], order="C")  # a view would make Numba compile again
-        return vertices, paths[0], anchors
-    path = np.concatenate([np.empty((known, 0, 3)), *paths], axis=1)[:, first]
-    return vertices, path, anchors
+        path = np.array(paths[0], order="C")  # a view would make Numba compile again
+    else:
+        path = np.concatenate([np.empty((known, 0, 3)), *paths], axis=1)[:, first]
+    return vertices, path, tuple(now)
