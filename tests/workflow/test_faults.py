@@ -250,7 +250,7 @@ def test_unfit_results_are_named_by_the_plan_and_made_again(undisturbed, sandbox
 
 @slow
 @pytest.mark.parametrize(
-    ("name", "damage"),  # every kind of damage: test_checksum.py, pipeline/test_faults.py
+    ("name", "damage"),  # every kind of damage: test_checksum.py, test_unfit.py
     [
         (f"{MICRO_RESULTS}/reruns/spring_oop/spring/block-deim.csv", Path.unlink),
         (f"{MICRO_RESULTS}/tables/claims.csv", cut),

@@ -16,7 +16,6 @@ from study.artifact import planned
 from study.pipeline import running
 from study.pipeline.commandline import CommandLine, one_line, remember
 from study.pipeline.failures import Failures
-from study.pipeline.faults import MISSING, UNUSUAL, faults, force
 from study.pipeline.fingerprint import memory
 from study.pipeline.fork_server import hold_pipe, start_server
 from study.pipeline.manifest import write_manifest
@@ -26,6 +25,7 @@ from study.pipeline.scenes import Coarsen
 from study.pipeline.summary import CONTENTS, configuration, contents, summary
 from study.pipeline.targets import check_targets
 from study.pipeline.tracked import COLUMNS, COSTS, kind_of
+from study.pipeline.unfit import MISSING, UNUSUAL, faults, force
 
 
 def expected_seconds(plan: Plan) -> Callable[[str], float]:

@@ -12,8 +12,8 @@ import pandas as pd
 from pdrom.core.errors import StorageError
 from pdrom.core.store import Condition, check_file, read_table
 from study.artifact.paths import TABLE
-from study.pipeline.faults import UNUSUAL, faults
 from study.pipeline.plan import Job
+from study.pipeline.unfit import UNUSUAL, faults
 from study.tables import declared
 from study.tables.claims.rules import load_claims
 from study.verification import compare

@@ -17,9 +17,9 @@ from tempfile import TemporaryDirectory
 from pdrom.core.errors import PdromError, StorageError
 from study.artifact.paths import MANIFEST
 from study.artifact.reads import Every
-from study.pipeline.faults import Checked
 from study.pipeline.manifest import Entry, asked_for, read_manifest
 from study.pipeline.plan import Job
+from study.pipeline.unfit import Checked
 from study.tables import declared
 from study.verification.subject import Status, Subject, say
 

@@ -13,10 +13,10 @@ from pdrom.core.store.checksum import damaged_set_aside
 from small_scene import SCENE, run_jobs, small_study
 from study.artifact.artifact import recorded
 from study.artifact.paths import BASIS, HELDOUT, SENSITIVITY, SNAPSHOTS, TRAIN
-from study.pipeline.faults import CHANGED, DAMAGED, FOREIGN, MISSING, STALE, Checked, faults, needed
 from study.pipeline.folders import Folders
 from study.pipeline.plan import Plan
 from study.pipeline.study import Study, labels_of
+from study.pipeline.unfit import CHANGED, DAMAGED, FOREIGN, MISSING, STALE, Checked, faults, needed
 
 RESULTS, JOBS = "results/studies/s", ("mesh", "fom", "sensitivity", "snapshots", "pod")
 SCENES, GROUP = (SCENE, "small"), "spring"
@@ -162,7 +162,7 @@ def test_bytes_are_compared_again_only_after_a_change_or_if_a_check_has_found_da
     plan, monkeypatch
 ):
     assert unfit(plan) == {}
-    monkeypatch.setattr("study.pipeline.faults.check_file", None)
+    monkeypatch.setattr("study.pipeline.unfit.check_file", None)
     assert unfit(plan) == {}
     checked = Checked(RESULTS)
     checked.distrust([RUN])
