@@ -6,6 +6,7 @@ import pytest
 
 from builders import TOP, make_scene
 from pdrom.core.errors import ConfigurationError, PdromError
+from pdrom.core.provenance import made_by
 from pdrom.core.store import read_table, write_table
 from pdrom.core.yamlfile import validate
 from pdrom.model.dynamics.system import DEFAULT_SOLVER
@@ -27,6 +28,7 @@ CHANGES = {"reduce": {"spring": {"train": 5}}, "held_out": {"kick": 0.5}}
 
 
 @pytest.fixture(scope="module")
+@made_by("online", {}, "c0de")
 def written(tmp_path_factory):
     gravity = {"effect": "gravity", "acceleration": [0.0, 0.0, -9.81]}
     effects = ({"effect": "spring", "weight": 1e5}, gravity, TOP)
