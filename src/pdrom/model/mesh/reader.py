@@ -240,8 +240,14 @@ PASSED_OVER = {
 ONCE = {
     "gmsh": rb"^(\$(?:MeshFormat|Nodes|Elements))\b",
     "medit": rb"^\s*(Dimension|Vertices)\b",
+    "netgen": rb"^\s*(points|dimension)\s*$",
     "ply": rb"^(element\s+(?:vertex|face))\b",
-    "vtk": rb"^(DATASET|POINTS|CELLS|CELL_TYPES)\b",
+    "su2": rb"^\s*(NDIME|NPOIN|NELEM)\s*=",
+    "tecplot": rb"^\s*(VARIABLES)\b",
+    # sections, not a title or an array of the same name
+    "vtk": rb"^[ \t]*(DATASET(?=\s+\w+\s*$)|POINTS(?=\s+\d+\s+[a-z])"
+    rb"|CELLS(?=\s+\d+\s+\d+\s*$)|CELL_TYPES(?=\s+\d+\s*$))",
+    "vtu": rb"<(Piece|Points|Cells)\b|\bName\s*=\s*[\"'](connectivity|offsets|types)[\"']",
 }
 
 
@@ -259,10 +265,11 @@ def check_before(name: str, content: bytes) -> None:
     binary = name == "stl" and 84 + 50 * int.from_bytes(content[80:84], "little") == len(content)
     if name in ENDS and not binary and not re.search(ENDS[name], content, re.M):
         raise CutError("the file does not end as this format does")
-    begun = re.findall(ONCE[name], content, re.M | re.I) if name in ONCE else []
-    twice = next((section for section in begun if begun.count(section) > 1), None)
-    if twice:
-        raise UnreadableError(f"{twice.decode()} stands there twice")
+    sections = re.finditer(ONCE[name], content, re.M | re.I) if name in ONCE else ()
+    begun = [b" ".join(section[section.lastindex or 0].split()) for section in sections]
+    names = [section.upper() for section in begun]
+    if twice := [n for n, section in enumerate(names) if section in names[:n]]:
+        raise UnreadableError(f"the section {begun[twice[0]].decode()} appears twice")
     if name == "wkt" and content.count(b"(") != content.count(b")"):
         raise CutError("brackets that are not closed")  # the reader would run for hours
     if name in PASSED_OVER:
@@ -293,8 +300,15 @@ def check_after(name: str, content: bytes, mesh: Any) -> None:
         announced = {sum(map(int, counts))}
     elif name == "vtk":
         offsets = content.startswith(b"# vtk DataFile Version 5")  # "CELLS n" means n - 1 cells
-        counts = re.findall(rb"^(CELLS|CELL_TYPES)[ \t]+(\d+)", content, re.M)
-        announced = {int(count) - (offsets and word == b"CELLS") for word, count in counts}
+        counts = re.findall(
+            rb"^[ \t]*(CELLS|CELL_TYPES)[ \t]+(\d+)(?:[ \t]+\d+)?\s*$", content, re.M | re.I
+        )
+        announced = {int(count) - (offsets and word.upper() == b"CELLS") for word, count in counts}
+    elif name in ("off", "ply") and b"\0" not in content:
+        rows = [row for row in content.splitlines() if row.partition(b"#")[0].strip()]
+        head = next((n for n, row in enumerate(rows, 1) if row.strip() == b"end_header"), 2)
+        if len(rows) > head + len(mesh.points) + there:
+            raise UnreadableError("more rows than announced")
     if announced - {there}:
         raise CutError(f"{min(announced - {there})} elements are announced, {there} are there")
     if name not in ENDS and b"\0" not in content:
@@ -455,6 +469,8 @@ def _numbers(rows: list[bytes], columns: int, what: str) -> np.ndarray:
     """Return the first ``columns`` numbers of each row; error messages begin with ``what``."""
     if not rows:
         return np.empty((0, columns))
+    if not all(map(bytes.strip, rows)):
+        raise UnreadableError(f"{what}: one without numbers")
     try:
         return np.loadtxt(rows, usecols=range(columns), ndmin=2, encoding="latin-1")
     except (ValueError, IndexError) as error:

@@ -189,7 +189,7 @@ _SHARED = (
     number(
         "energy_drift",
         "largest difference of the total energy before the horizon, over the largest energy of the "
-        "full-order run; energies of the start, every fourth frame, and the last frame of a run",
+        "full-order run, at the start, every fourth frame and, without a horizon, the last frame",
         compared="error",
     ),
     integer("horizon_frame", "first frame that cannot be judged: the scene's horizon"),
