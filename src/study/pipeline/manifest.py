@@ -115,15 +115,16 @@ def study_files(plan: Plan) -> Iterator[str]:
 def asked_for(found: Iterable[str], plan: Plan) -> Iterator[str]:
     """Yield those of the paths ``found`` that a target on the command line may have requested.
 
-    They fit a path pattern of results, are not in the plan, and their scene and method exist.
+    They fit a path pattern of results, are not in the plan, their scene and method exist, and no
+    checksum says that they are files of another path.
     """
     scenes, methods = set(scene_names(plan.study.root)), {*plan.study.methods, ""}
-    for path in found:
-        if path not in plan.own_files and any(
-            labels.get("scene") in scenes and labels.get("method", "") in methods
-            for labels in paths.labels_in(path, plan.results)
-        ):
-            yield path
+    for path in sorted({*found} - plan.own_files):
+        told = read_checksum(path)
+        if told is None or told.file in ("", path):
+            known = paths.labels_in(path, plan.results)
+            if any(w.get("scene") in scenes and w.get("method", "") in methods for w in known):
+                yield path
 
 
 def _entry(path: Path, checksum: Checksum, environments: dict[str, dict[str, str]]) -> Entry:

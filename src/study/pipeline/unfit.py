@@ -40,8 +40,12 @@ class Checked:
     def __init__(self, results: str) -> None:
         self._path, self._changed = Path(results, ".checked.json"), False
         try:
-            self._stored = dict(json.loads(self._path.read_text(encoding="utf-8")))
-        except (OSError, ValueError, TypeError):
+            stored = dict(json.loads(self._path.read_text(encoding="utf-8")))
+            self._stored = {
+                path: [state, {key: told[key] for key in ("digest", *ORIGIN) if told}]
+                for path, (state, told) in stored.items()
+            }
+        except (OSError, ValueError, TypeError, KeyError):  # missing or damaged: files are read
             self._stored = {}
 
     def told(self, path: str) -> dict[str, str] | None:
@@ -92,8 +96,12 @@ def faults(plan: Plan, targets: Sequence[str] = ()) -> dict[str, str]:
     """Map files to their faults: all that ``targets``, by default the study, need and are unfit.
 
     A missing file counts if a file is there that was made from it; Snakemake notices all others.
+    Raises StorageError if a file takes the place of a folder.
     """
     jobs, checked = needed(plan, targets), Checked(plan.results)
+    for folder in sorted({folder for path in jobs for folder in Path(path).parents}):
+        if os.path.lexists(folder) and not folder.is_dir():
+            raise StorageError(f"{folder}: a file where a folder of results belongs; remove it")
     told = {path: checked.told(path) for path in jobs}
     checked.save()
     there = [job for path, job in jobs.items() if told[path] is not None]

@@ -80,7 +80,6 @@ INTO_A_BALL = {
 
 @pytest.mark.parametrize("name", INTO_A_BALL)
 def test_a_run_warns_of_held_vertices_that_enter_an_obstacle(name, caplog):
-    """Also where they leave it again."""
     ball = {"effect": "sphere", "centre": [0, 2.25, 0.6], "radius": 0.4}
     effects = [INTO_A_BALL[name], ball, {"effect": "spring", "weight": 1e5}]
     api.run(api.build_scene(effects=effects, mesh={"kind": "cloth"}, frames=9))

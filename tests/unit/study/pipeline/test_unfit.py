@@ -1,5 +1,6 @@
 """Results that are missing, damaged or those of another job: a plan names exactly these."""
 
+import json
 import os
 import shutil
 from dataclasses import replace
@@ -108,9 +109,7 @@ DAMAGES = {
 
 
 @pytest.mark.parametrize("damage", DAMAGES)
-def test_the_plan_names_the_damaged_file_alone_and_the_job_that_reads_it_sets_it_aside(
-    damage, plan
-):
+def test_the_plan_names_the_damaged_file_and_its_reader_sets_it_aside(damage, plan):
     """Then it is made again; a run holds times, so that what follows is made again, too."""
     assert unfit(plan) == {}
     do, fault = DAMAGES[damage]
@@ -158,13 +157,17 @@ def test_another_run_of_one_job_older_code_and_other_inputs_are_noticed(plan):
     assert unfit(plan) == {SNAPSHOT: STALE}
 
 
-def test_bytes_are_compared_again_only_after_a_change_or_if_a_check_has_found_damage(
-    plan, monkeypatch
-):
-    assert unfit(plan) == {}
+def test_bytes_are_compared_again_only_after_a_change_or_found_damage(plan, monkeypatch):
+    for damaged in (5, [], [[], 5], [[], {"digest": ""}]):
+        Path(RESULTS, ".checked.json").write_text(json.dumps({RUN: damaged}))
+        assert unfit(plan) == {}
     monkeypatch.setattr("study.pipeline.unfit.check_file", None)
     assert unfit(plan) == {}
     checked = Checked(RESULTS)
     checked.distrust([RUN])
     checked.save()
     assert unfit(plan) == {RUN: DAMAGED}
+    shutil.move(Path(RUN).parent, "elsewhere")
+    Path(RUN).parent.write_bytes(b"")
+    with pytest.raises(StorageError, match=f"^{Path(RUN).parent}: a file where"):
+        unfit(plan)
