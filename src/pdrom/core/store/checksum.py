@@ -34,7 +34,7 @@ _ASIDE: ContextVar[bool] = ContextVar("damaged results are set aside", default=F
 def damaged_set_aside() -> Iterator[None]:
     """Context in which an attempt to read a damaged result renames it to ``NAME.damaged``.
 
-    The same holds for a result whose checksum names another path, that of another scene, say.
+    It also renames a result whose checksum names another path, such as that of another scene.
     Only jobs of the workflow use it: the next run makes the missing result again. Other readers
     never rename a file, since it may be a user's only copy of a run.
     """

@@ -236,10 +236,12 @@ PASSED_OVER = {
     "su2": (rb"^[ \t]*(NZONE[ \t]*=[ \t]*0*(?:[2-9]|1\d))", "one zone is read"),
     "tecplot": (rb"^[ \t]*ZONE\b.*?^[ \t]*(ZONE)\b", "one zone is read"),
 }
-# Format -> pattern of lines that begin a section; of two sections meshio would read the last.
+# Format -> pattern of what begins a section or a numbered vertex; of two meshio reads the last.
 ONCE = {
+    "flac3d": rb"^[ \t]*(G[ \t]+\d+)\b",
     "gmsh": rb"^(\$(?:MeshFormat|Nodes|Elements))\b",
     "medit": rb"^\s*(Dimension|Vertices)\b",
+    "nastran": rb"^[ \t]*(GRID\*?[ \t,]+\d+)\b",
     "netgen": rb"^\s*(points|dimension)\s*$",
     "ply": rb"^(element\s+(?:vertex|face))\b",
     "su2": rb"^\s*(NDIME|NPOIN|NELEM)\s*=",
@@ -266,10 +268,12 @@ def check_before(name: str, content: bytes) -> None:
     if name in ENDS and not binary and not re.search(ENDS[name], content, re.M):
         raise CutError("the file does not end as this format does")
     sections = re.finditer(ONCE[name], content, re.M | re.I) if name in ONCE else ()
-    begun = [b" ".join(section[section.lastindex or 0].split()) for section in sections]
+    words = (section[section.lastindex or 0].replace(b",", b" ") for section in sections)
+    begun = [b" ".join(word.split()) for word in words]
     names = [section.upper() for section in begun]
-    if twice := [n for n, section in enumerate(names) if section in names[:n]]:
-        raise UnreadableError(f"the section {begun[twice[0]].decode()} appears twice")
+    first = {section: n for n, section in reversed([*enumerate(names)])}
+    if twice := [n for n, section in enumerate(names) if first[section] < n]:
+        raise UnreadableError(f"{begun[twice[0]].decode()} appears twice")
     if name == "wkt" and content.count(b"(") != content.count(b")"):
         raise CutError("brackets that are not closed")  # the reader would run for hours
     if name in PASSED_OVER:
@@ -308,7 +312,7 @@ def check_after(name: str, content: bytes, mesh: Any) -> None:
         rows = [row for row in content.splitlines() if row.partition(b"#")[0].strip()]
         head = next((n for n, row in enumerate(rows, 1) if row.strip() == b"end_header"), 2)
         if len(rows) > head + len(mesh.points) + there:
-            raise UnreadableError("more rows than announced")
+            raise UnreadableError("more rows than the file announces")
     if announced - {there}:
         raise CutError(f"{min(announced - {there})} elements are announced, {there} are there")
     if name not in ENDS and b"\0" not in content:
@@ -470,7 +474,7 @@ def _numbers(rows: list[bytes], columns: int, what: str) -> np.ndarray:
     if not rows:
         return np.empty((0, columns))
     if not all(map(bytes.strip, rows)):
-        raise UnreadableError(f"{what}: one without numbers")
+        raise UnreadableError(f"{what}: a row without numbers")
     try:
         return np.loadtxt(rows, usecols=range(columns), ndmin=2, encoding="latin-1")
     except (ValueError, IndexError) as error:
