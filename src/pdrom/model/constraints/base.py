@@ -234,7 +234,8 @@ def require_cells(mesh: Mesh, kind: str, effect: str) -> np.ndarray:
     if kind == "triangles" and len(mesh.tetrahedra):
         raise SceneError(f"effect '{effect}' needs a surface mesh, this mesh is a volume")
     if len(cells) == 0:
-        raise SceneError(f"effect '{effect}' needs {kind}, this mesh has none")
+        way = "" if kind == "triangles" else "; fTetWild or gmsh make them from a closed surface"
+        raise SceneError(f"effect '{effect}' needs {kind}, this mesh has none{way}")
     return np.ascontiguousarray(cells, dtype=np.int32)
 
 

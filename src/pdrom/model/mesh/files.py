@@ -1,7 +1,9 @@
-"""Mesh files, which meshio reads in a separate process with limits on time and memory."""
+"""Mesh files, which a separate process reads with limits on time and memory."""
 
 import hashlib
 import io
+import json
+import logging
 import math
 import os
 import signal
@@ -19,6 +21,8 @@ from pdrom.core.yamlfile import shown
 from pdrom.model.mesh import reader
 from pdrom.model.mesh.checks import mesh_of
 from pdrom.model.mesh.types import Mesh
+
+log = logging.getLogger(__name__)
 
 # Limit: the operators of a cloth with this many vertices need about 1 GB of memory.
 MAX_VERTICES = 1_000_000
@@ -66,42 +70,27 @@ def mesh_limits() -> MeshLimits:
     return MeshLimits(**{f.name: int(factor * getattr(plain, f.name)) for f in fields(plain)})
 
 
-# File extension -> possible readers; the first byte of the file selects one. No reader opens other
-# files, so that the hash of the mesh file covers all inputs. Formats are excluded if they store
-# data in further files (.xdmf, .pvd, .ele and .node, dolfin's .xml), include files (.inp), or can
-# link to files (HDF5 and netCDF: .med, .h5m, .hmf, .cgns, .e). Kratos's .mdpa is excluded because
-# meshio reads its quadrilaterals as tetrahedra.
-FORMATS = {
-    ".avs": ("avsucd",),
-    ".bdf": ("nastran",),
-    ".dat": ("tecplot",),
-    ".dato": ("permas",),
-    ".f3grid": ("flac3d",),
-    ".fem": ("nastran",),
-    ".mesh": ("medit",),
-    ".meshb": ("medit",),
-    ".msh": ("gmsh", "ansys"),
-    ".nas": ("nastran",),
-    ".obj": ("obj",),
-    ".off": ("off",),
-    ".ply": ("ply",),
-    ".post": ("permas",),
-    ".stl": ("stl",),
-    ".su2": ("su2",),
-    ".tec": ("tecplot",),
-    ".ugrid": ("ugrid",),
-    ".vol": ("netgen",),
-    ".vtk": ("vtk",),
-    ".vtu": ("vtu",),
-    ".wkt": ("wkt",),
-}
 # Path of Python, stored at import, since the workflow changes `sys.executable` to a shell command.
 PYTHON = sys.executable
+# Modules of the process that reads a file, and the script that imports them from their texts.
+MODULES = ("raw", "surfaces", "grids", "reader")
+START = """
+import json, sys, types
+above = ("pdrom", "pdrom.model", "pdrom.model.mesh")
+sys.modules |= {name: types.ModuleType(name) for name in above}
+for name, text in json.loads(sys.argv.pop(1)).items():
+    module = types.ModuleType(name)
+    setattr(sys.modules[above[-1]], name, module)
+    exec(compile(text, f"{name}.py", "exec"), module.__dict__)
+sys.exit(module.main(*sys.argv[1:]))
+"""
 ADVICE = f"{VARIABLE}=2 in the environment doubles the limits"
 
 
 def read_mesh_file(path: Path) -> Mesh:
-    """Return the mesh of triangles or tetrahedra in the file ``path``, in a format of `FORMATS`.
+    """Return the mesh of triangles or tetrahedra in the file ``path``, in a format of `READERS`.
+
+    Log a warning with the number of polygons if the file has some, which are split into triangles.
 
     Raises
     ------
@@ -115,11 +104,10 @@ def read_mesh_file(path: Path) -> Mesh:
         raise MeshError(f"{shown(str(path), 60)}: no mesh file ({error.strerror})") from error
     if not there:
         raise MeshError(f"{path}: no such mesh file (looked in {path.parent.resolve()})")
-    if path.suffix.lower() not in FORMATS:
+    if path.suffix.lower() not in reader.READERS:
         raise MeshError(
-            f"{path}: no format that keeps the whole mesh in one file and that is read right "
-            f"(allowed: {', '.join(FORMATS)}); save it as .vtu, .msh or .obj, or try "
-            f"`meshio convert {path.name} {path.stem}.vtu`"
+            f"{path}: of another format than {', '.join(reader.READERS)}; "
+            f"try `meshio convert {path.name} {path.stem}.vtu`"
         )
     limits = mesh_limits()
     if path.stat().st_size > limits.file_bytes:
@@ -129,19 +117,21 @@ def read_mesh_file(path: Path) -> Mesh:
             digest = hashlib.file_digest(file, "sha256").hexdigest()
     except OSError as error:
         raise MeshError(f"{path}: cannot be read ({error.strerror})") from error
-    points, cells = _arrays(path, digest, limits)
+    points, cells, remark = _arrays(path, digest, limits)
+    if remark:
+        log.warning("%s: %s", path, remark)
     return mesh_of(points.copy(), cells, str(path))
 
 
 @lru_cache(maxsize=8)
-def _arrays(path: Path, digest: str, limits: MeshLimits) -> tuple[np.ndarray, np.ndarray]:
-    """Return points and cells of a file; cached, with ``digest`` and ``limits`` in the key."""
+def _arrays(path: Path, digest: str, limits: MeshLimits) -> tuple[np.ndarray, np.ndarray, str]:
+    """Return points, cells, remark of a file; cached, with ``digest`` and ``limits`` in the key."""
     numbers = (limits.seconds, limits.memory, limits.vertices, limits.cells)
     # -P: modules in the folder of the script must not shadow the standard library
-    # the text as this process imports it, not as the file is now
-    script = (get_data("pdrom.model.mesh", "reader.py") or b"").decode()
-    command = [PYTHON, "-P", "-X", "utf8", "-W", "ignore", "-c", script, str(path)]
-    command += [",".join(FORMATS[path.suffix.lower()]), *map(str, numbers)]
+    # the texts as this process imports them, not as the files are now
+    texts = {name: (get_data(__package__, f"{name}.py") or b"").decode() for name in MODULES}
+    command = [PYTHON, "-P", "-X", "utf8", "-W", "ignore", "-c", START, json.dumps(texts)]
+    command += [str(path), *map(str, numbers)]
     # allow one thread per linear algebra library: more threads, unused here, would reserve memory
     single = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
     try:
@@ -161,7 +151,7 @@ def _arrays(path: Path, digest: str, limits: MeshLimits) -> tuple[np.ndarray, np
     pipe = io.BytesIO(ended.stdout)
     points, cells = np.load(pipe, allow_pickle=False), np.load(pipe, allow_pickle=False)
     points.flags.writeable = cells.flags.writeable = False
-    return points, cells
+    return points, cells, pipe.read().decode()
 
 
 def _fault(ended: subprocess.CompletedProcess[bytes], limits: MeshLimits) -> str:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from mesh_files import read_here, refusal
+from pdrom.model.mesh import reader
 
 # as in the reader's process
 pytestmark = pytest.mark.filterwarnings("ignore")
@@ -14,7 +15,6 @@ TRIANGLES = [[0, 1, 2], [0, 2, 3]]
 V = "v 0 0 0\nv 1 0 0.1\nv 1 .25 1\nv 0 0.5 1e-3\n"
 XYZ = "0 0 0\n1 0 0.1\n1 .25 1\n0 0.5 1e-3\n"
 FACES = "3 0 1 2\n3 0 2 3\n"
-PLAIN = "plain form is read: save it as .vtu, .msh or .obj"
 
 
 def square(path: Path, content: str | bytes) -> None:
@@ -55,11 +55,14 @@ def test_obj(tmp_path, content):
         (V + "f 1 2 3\nf 1 3 4\ncall b.obj\n", "statement 'call' is not read"),
         (V + "f 1 2 3\nsurf 0 1 0 1 1 2 3\n", "statement 'surf'"),
         (V + "f 1 2 3\nf 1 3 4.5\n", "corners that are no whole numbers"),
-        (V + "f 1 2 3\nf 1 3\n", "['polygon', 'triangle']|['triangle', 'polygon']"),
+        (V + "f 1 2 3\nf 1 3\n", "fewer than 3 corners"),
         (V.replace("v 1 .25 1", "v 1 .25") + "f 1 2 3\nf 1 3 4\n", "not a readable mesh (vertices"),
-        (V * 5 + "f 1 2 3\nf 1 3 2", "cut off: .* go on after 2"),
+        (V * 5 + "f 1 2 3\nf 1 3 2", "cut off: .* go on"),
         (V + "f 1 2 3\nf 1 3", "cut off"),
-        ("f -3 -2 -1\nv 0 0 0\nv 1 0 0\nv 1 0 1.5", "cut off: .* go on after 1.5"),
+        (V + "v 2 0 0\nv 2 0 1\nf 1 2 3 4\nf 2 5 6", "cut off"),  # of a quadrilateral
+        (V + "f 1 2 3\nf 1/1 3/3 4", "cut off"),
+        (V + "l 1 2 3 4\n", "only lines or points, which are not simulated"),
+        ("f -3 -2 -1\nv 0 0 0\nv 1 0 0\nv 1 0 1.5", "cut off: .* go on"),
     ],
 )
 def test_faulty_obj(tmp_path, content, why):
@@ -68,31 +71,27 @@ def test_faulty_obj(tmp_path, content, why):
     assert any(all(word in found for word in part.split(" .* ")) for part in why.split("|")), found
 
 
-def ply(face: str = "", rows: str = FACES, order: str = "ascii", of: str = "double") -> str:
-    """A file with these properties of its faces behind their corners, and with their rows."""
-    axes = "".join(f"property {of} {axis}\n" for axis in "xyz")
-    return (
-        f"ply\nformat {order} 1.0\ncomment made here\nelement vertex 4\n{axes}property uchar red\n"
-        f"element face 2\nproperty list uchar int vertex_indices\n{face}end_header\n"
-        + (XYZ.replace("\n", " 255\n") + rows if order == "ascii" else "")
-    )
+VERTEX = "element vertex 4\n" + "".join(f"property double {axis}\n" for axis in "xyz")
+FACE = "element face 2\nproperty list uchar int vertex_indices\n"
 
 
-def binary_ply(face: str = "", after: int = 0) -> bytes:
-    """The same in binary, with some bytes behind the corners of each face."""
-    vertices = np.zeros(4, [("at", "<f8", 3), ("red", "u1")])
-    vertices["at"] = POINTS
-    faces = np.zeros(2, [("n", "u1"), ("corners", "<i4", 3), ("more", f"V{after}")])
-    faces["n"], faces["corners"] = 3, TRIANGLES
-    head = ply(face, order="binary_little_endian")
-    return head.encode() + vertices.tobytes() + faces.tobytes()
+def ply(head: str, rows: str | bytes, order: str = "ascii") -> bytes:
+    start = f"ply\nformat {order} 1.0\ncomment made here\n{head}end_header\n"
+    return start.encode() + (rows if isinstance(rows, bytes) else rows.encode())
 
 
-def faces_first() -> str:
-    """A file of whose lines meshio would take the first for vertices."""
-    head, _, rows = ply().partition("end_header\n")
-    vertex = head[head.index("element vertex") : head.index("element face")]
-    return head.replace(vertex, "") + vertex + "end_header\n" + rows
+def binary_ply(
+    counts: str, order: str = "<", after: int = 0, index: str = "vertex_indices"
+) -> bytes:
+    """With this type of the counts of corners, and some bytes and an edge behind the faces."""
+    kinds = {"uchar": "u1", "ushort": "u2", "int16": "i2"}
+    faces = np.zeros(2, [("n", order + kinds[counts]), ("at", f"{order}u4", 3), ("", f"V{after}")])
+    faces["n"], faces["at"] = 3, TRIANGLES
+    head = VERTEX + f"element face 2\nproperty list {counts} uint {index}\n"
+    head += "".join(f"property uint8 colour{i}\n" for i in range(after))
+    head += "element edge 1\nproperty int vertex1\n"
+    rows = POINTS.astype(f"{order}f8").tobytes() + faces.tobytes() + bytes(4)
+    return ply(head, rows, f"binary_{'little' if order == '<' else 'big'}_endian")
 
 
 def legacy(dataset: str, sections: str, version: str = "3.0") -> str:
@@ -123,9 +122,20 @@ def gmsh4(version: str) -> str:
     ("name", "content"),
     [
         ("a.off", f"OFF\n4 2 0\n{XYZ}{FACES}"),
-        ("a.off", f"OFF\n\n# head\n4 2 0\n{XYZ}{FACES}".replace("\n", "\r\n")),
-        ("a.ply", ply()),
-        ("a.ply", binary_ply()),
+        ("a.off", f"OFF 4 2 0\n{XYZ}3 0 1 2\n3 0 2 3"),
+        ("a.off", f"OFF\n\n# head\n4 2\n{XYZ}{FACES}".replace("\n", "\r\n")),
+        ("a.off", "CNOFF\n4 2 0\n" + XYZ.replace("\n", " 0 1 0 255 0 0 # red\n")
+         + FACES.replace("\n", " 0.5 0.25 1\n")),
+        ("a.ply", ply(VERTEX + FACE, XYZ + FACES)),
+        ("a.ply", ply(VERTEX + FACE, XYZ + FACES[:-1])),
+        ("a.ply", ply(FACE + VERTEX, FACES + XYZ).replace(b"\n", b"\r\n")),
+        ("a.ply", ply(VERTEX.replace("property double x", "property uchar red\nproperty double x")
+                      + FACE.replace("indices", "index") + "property list uchar float texcoord\n",
+                      "9 " + XYZ.replace("\n", "\n9 ")[:-2] + "3 0 1 2 2 .5 1\n3 0 2 3 0\n")),
+        ("a.ply", binary_ply("uchar", after=3)),
+        ("a.ply", binary_ply("ushort", ">")),
+        ("a.ply", binary_ply("int16", index="vertex_index")),
+        ("a.vtk", legacy("POLYDATA", f"LINES 1 5\n4 0 1 2 3\nPOLYGONS 2 8\n{FACES}")),
         ("a.vtk", legacy("UNSTRUCTURED_GRID", GRID)),
         ("a.vtk", legacy("UNSTRUCTURED_GRID\nFIELD FieldData 1\nTIME 1 1 double\n0.5",
                          f"CELLS 3 6\n{OFFSETS}CELL_TYPES 2\n5 5\n", "5.1")),
@@ -141,27 +151,20 @@ def test_plain_files_are_read(tmp_path, name, content):
 @pytest.mark.parametrize(
     ("name", "content", "why"),
     [
-        ("a.off", f"COFF\n4 2 0\n{XYZ}{FACES}", PLAIN),
-        ("a.off", f"OFF\n4 2 0\n{XYZ}3 0 1 2 0.5 0.25 1\n3 0 2 3 7\n", PLAIN),
-        ("a.off", f"OFF\n4 2 0\n{XYZ}3 0 1 2\n3 0 2", "cut off: 8 numbers that follow each other"),
-        ("a.ply", ply("property uchar red\n", "3 0 1 2 9\n3 0 2 3 9\n").replace("indices", "index"),
-         PLAIN),
-        ("a.ply", ply(rows="3 0 1 2\n"), "cut off"),
-        ("a.ply", binary_ply("property uchar red\n", 1), "property: vertices, then faces that are"),
-        ("a.ply", binary_ply()[:-1], "not a readable mesh"),
-        ("a.ply", ply().replace("vertex 4", "edge 1\nproperty int a\nelement vertex 4"), PLAIN),
-        ("a.ply", faces_first(), "element face: vertices, then faces"),
-        ("a.vtk", legacy("POLYDATA", f"POLYGONS 2 8\n{FACES}"), PLAIN),
-        ("a.vtk", legacy("UNSTRUCTURED_GRID", GRID.replace("TYPES 2\n5", "TYPES 1")), "announced"),
-        ("a.vtk", legacy("UNSTRUCTURED_GRID", f" points 4 double\n{XYZ}" + GRID), "points appears"),
-        ("a.vtk", legacy("UNSTRUCTURED_GRID", GRID.replace("YPES 2\n5", "ypes 1")), "announced"),
         ("a.off", f"OFF\n4 1 0\n{XYZ}{FACES}", "more rows than the file"),
+        ("a.ply", ply(VERTEX + FACE, XYZ + FACES + FACES), "more numbers than announced"),
         ("a.obj", V.replace("v 1", "v\nv 1", 1) + "f 1 2 3\nf 1 3 4\n", "vertices: a row"),
-        ("a.su2", "NDIME= 2\nNPOIN= 1\n0 0 0\nNPOIN= 1\n1 1 0\n", "NPOIN appears twice"),
-        ("a.nas", "BEGIN BULK\nGRID,1,,0.,0.,0.\nGRID,1,,1.,0.,0.\nENDDATA\n", "GRID 1 appears"),
-        ("a.f3grid", "G 1 0 0 0\nG 1 1 0 0\n", "G 1 appears twice"),
-        ("a.mesh", MEDIT.replace("Triangles", f"Vertices 4\n{NODES}Triangles"), "Vertices appears"),
-        ("a.ply", ply().replace("element face", "element vertex 4\nelement face"), "vertex app"),
+        ("a.off", f"OFF\n4 2 0\n{XYZ}3 0 1 2\n3 0 2", "cut off: a face of 3 corners"),
+        ("a.off", f"4OFF\n4 2 0\n{XYZ}{FACES}", "no head"),
+        ("a.ply", ply(VERTEX + FACE, XYZ + "3 0 1 2\n"), "cut off"),
+        ("a.ply", binary_ply("uchar")[:-5], "cut off"),
+        ("a.ply", ply(VERTEX + "element face 2\nproperty int a\n", XYZ + "1\n2\n"), "no cells"),
+        ("a.vtk", legacy("UNSTRUCTURED_GRID", GRID.replace("TYPES 2\n5", "TYPES 1")),
+             "cut off"),
+        ("a.vtk", legacy("UNSTRUCTURED_GRID", f" points 4 double\n{XYZ}" + GRID), "POINTS appears"),
+        ("a.vtk", legacy("UNSTRUCTURED_GRID", GRID.replace("YPES 2\n5", "ypes 1")), "cut off"),
+        ("a.mesh", MEDIT.replace("Triangles", f" vertices 4\n{NODES}Triangles"), "Vertices appears"),
+        ("a.ply", ply(VERTEX + VERTEX + FACE, XYZ + XYZ + FACES), "vertex appears twice"),
         ("a.msh", gmsh4("4").replace("$Elements", f"$Nodes\n{NODES}$EndNodes\n$Elements"),
          "$Nodes appears twice"),
         ("a.vtk", legacy("UNSTRUCTURED_GRID", f"CELLS 2 {10**12}\n{FACES}"), "not a readable mesh"),
@@ -172,64 +175,171 @@ def test_what_else_there_is_is_refused(tmp_path, name, content, why):
     assert why in refusal(tmp_path / name)
 
 
-NETGEN = """# Generated by NETGEN
-
-mesh3d
-dimension
-3
-geomtype
-0
-
-# surfnr    bcnr   domin  domout      np      p1      p2      p3
-surfaceelements
-{count}
-{faces}
-#  matnr      np      p1      p2      p3      p4
-volumeelements
-1
- 1 4 1 2 3 4
-
-points
-4
- 0 0 0
- 1 0 0
- 0 1 0
- 0 0 1
-
-endmesh
-
-csgsurfaces 6
-plane 0 0 0
-"""
-SU2 = "NDIME= 3\nNELEM= 1\n10 0 1 2 3 0\nNPOIN= 4\n0 0 0 0\n1 0 0 1\n0 1 0 2\n0 0 1 3\nNMARK= 1\n"
-SU2 += "MARKER_TAG= wall\nMARKER_ELEMS= 2\n5 0 1 2\n5 {face}\n"
+def medit(axes: int, vertices: list, **sections: list) -> str:
+    """A .mesh of these sections, with a reference behind each row."""
+    text = f"MeshVersionFormatted 2\nDimension\n{axes}\n"
+    for name, rows in {"Vertices": vertices, **sections}.items():
+        lines = "".join(" ".join(map(str, row)) + " 7\n" for row in rows)
+        text += f"{name}\n{len(rows)}\n{lines}"
+    return text + "End\n"
 
 
-@pytest.mark.parametrize(
-    ("name", "content"),
-    [
-        ("a.vol", NETGEN.format(count=2, faces=" 1 1 1 0 3 1 3 2\n 2 1 1 0 3 1 2 4\n")),
-        ("a.su2", SU2.format(face="1 3 2")),
-    ],
-)
-def test_the_boundary_beside_tetrahedra_is_left_out(tmp_path, name, content):
-    (tmp_path / name).write_text(content)
-    points, cells = read_here(tmp_path / name)
-    assert points.tolist() == [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
-    assert np.sort(cells).tolist() == [[0, 1, 2, 3]]
+CORNERS = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
 
 
-def test_triangles_that_are_no_faces_are_refused(tmp_path):
-    more = SU2.replace("NPOIN= 4\n", "NPOIN= 5\n").replace("0 0 1 3\n", "0 0 1 3\n2 2 2 4\n")
-    (tmp_path / "a.su2").write_text(more.format(face="1 3 4"))
-    assert "['tetra', 'triangle'], allowed: only one of" in refusal(tmp_path / "a.su2")
+def test_surfaces_beside_tetrahedra_are_left_out_if_they_are_faces(tmp_path):
+    path = tmp_path / "a.mesh"
+    solid = {"Tetrahedra": [[1, 2, 3, 4]], "Quadrilaterals": [[1, 2, 3, 4]]}
+    path.write_text(medit(3, CORNERS, Triangles=[[1, 3, 2], [1, 2, 4]], **solid))
+    points, cells = read_here(path)
+    assert points.tolist() == CORNERS
+    assert cells.tolist() == [[0, 1, 2, 3]]
+    path.write_text(medit(3, [*CORNERS, [2, 2, 2]], Triangles=[[1, 3, 5]], **solid))
+    assert "tetrahedra and triangles that are not their faces" in refusal(path)
 
 
 def test_a_mesh_of_the_plane_lies_at_z_0(tmp_path):
-    (tmp_path / "a.su2").write_text(
-        "NDIME= 2\nNELEM= 2\n5 0 1 2 0\n5 0 2 3 1\nNPOIN= 4\n0 0 0\n1 0 1\n1 1 2\n0 1 3\n"
-        "NMARK= 1\nMARKER_TAG= lower\nMARKER_ELEMS= 1\n3 0 1\n"
-    )
-    points, cells = read_here(tmp_path / "a.su2")
+    sections = {"Edges": [[1, 2]], "Triangles": [[1, 2, 3], [1, 3, 4]]}
+    (tmp_path / "a.mesh").write_text(medit(2, [[0, 0], [1, 0], [1, 1], [0, 1]], **sections))
+    points, cells = read_here(tmp_path / "a.mesh")
     assert points.tolist() == [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
     assert cells.tolist() == TRIANGLES
+
+
+def areas(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
+    """Twice the areas of triangles in the plane z = 0, with signs."""
+    a, b, c = points[cells.T]
+    return np.cross(b - a, c - a)[:, 2]
+
+
+@pytest.mark.parametrize(
+    ("outline", "triangles"),
+    [
+        ([[0, 0], [3, 0], [4, 1], [1, 1]], [[1, 2, 3], [1, 3, 0]]),  # at the shorter diagonal
+        ([[0, 0], [2, 0], [2, 1], [0, 1]], [[0, 1, 2], [0, 2, 3]]),
+        ([[-1, 0], [0, 1], [1, 0], [0, 9]], None),  # an arrow, whose shorter diagonal lies outside
+        ([[0, 0], [2, 0], [2, 1], [1, 1], [1, 2], [0, 2]], None),  # an L
+        ([[0, 0], [1, 0], [2, 0], [2, 2], [0, 2]], None),  # three corners on a line
+    ],
+)
+def test_polygons_are_split_into_triangles_inside(tmp_path, outline, triangles):
+    path, count = tmp_path / "a.obj", len(outline)
+    corners = " ".join(str(i + 1) for i in range(count))
+    vertices = "".join(f"v {x} {y} 0\n" for x, y in outline)
+    path.write_text(f"{vertices}f 1 2 3\nf {corners}\nf 1 2 3\n")
+    points, cells, remark = reader.read(str(path), 100, 100)
+    assert remark == f"1 of 3 faces are polygons, split into triangles: {count}"
+    assert cells[[0, -1]].tolist() == 2 * [[0, 1, 2]]
+    if triangles:
+        assert cells[1:-1].tolist() == triangles
+    signed = areas(points, cells[1:-1])
+    x, y = np.array(outline).T
+    whole = (x * np.roll(y, -1) - y * np.roll(x, -1)).sum()
+    assert (signed * whole > 0).all()
+    assert signed.sum() == pytest.approx(whole)
+
+
+def solid(names: tuple[str, str] = ("solid a facet", "endsolid"), upper: bool = False) -> str:
+    corners = "".join("vertex {} {} {}\n".format(*point) for point in POINTS[[0, 1, 2]].tolist())
+    facet = f"facet normal nan nan nan\nouter loop\n{corners}endloop\nendfacet\n"
+    text = f"{names[0]}\n{facet}{names[1]}\n"
+    return text.upper() if upper else text
+
+
+def binary_stl(head: bytes, tail: bytes = b"") -> bytes:
+    facet = np.zeros(1, [("normal", "<f4", 3), ("at", "<f4", (3, 3)), ("attribute", "<u2")])
+    facet["at"], facet["attribute"] = POINTS[[0, 1, 2]], 9
+    return head.ljust(80) + b"\1\0\0\0" + facet.tobytes() + tail
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        solid(), solid(upper=True), solid().replace("\n", "\r\n  "), solid() + "\nmade by x 1 2\n",
+        binary_stl(b"solid by x"), binary_stl(b"x", tail=b"\0\0\0"),
+    ],
+)  # fmt: skip
+def test_stl(tmp_path, content):
+    path = tmp_path / "a.stl"
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    points, cells = read_here(path)
+    assert points[cells].astype(np.float32).tolist() == [POINTS[:3].astype(np.float32).tolist()]
+    path.write_bytes(path.read_bytes()[:100])
+    assert "cut off" in refusal(path)
+
+
+BINARY = (
+    b"$MeshFormat\n2.2 1 8\n\1\0\0\0$EndMeshFormat\n$Nodes\n4\n"
+    + b"".join(np.int32(i + 1).tobytes() + POINTS[i].tobytes() for i in range(4))
+    + b"$EndNodes\n$Elements\n2\n"
+    + np.array([2, 2, 0, 1, 1, 2, 3, 2, 1, 3, 4], "<i4").tobytes()
+)
+PARTS = (
+    "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Entities\n0 0 1 0\n1 0 0 0 1 1 1 0 0\n$EndEntities\n"
+    "$PartitionedEntities\n2\n1 9 1\n0 0 2 0\n2 2 1 1 1 0 0 0 1 0 1 0 0\n"
+    "3 2 1 1 2 1 0 0 2 0 1 0 0\n"
+    "$EndPartitionedEntities\n$Nodes\n2 4 10 40\n2 2 0 3\n40\n10\n30\n{}2 3 1 1\n20\n{}"
+    "$EndNodes\n$Elements\n2 2 1 2\n2 2 2 1\n1 40 10 30\n2 3 2 1\n2 40 30 20\n$EndElements\n"
+    "$GhostElements\n1\n1 1 1 2\n$EndGhostElements\n"
+).format("0 0 0\n1 0 0.1\n1 .25 1\n", "0 0.5 1e-3 0.5 0.5\n")  # the last node has parameters
+
+
+@pytest.mark.parametrize(
+    "content", [BINARY + b"$EndElements\n", BINARY + b"\n$EndElements\n$Data", PARTS.encode()]
+)
+def test_msh_of_other_programs_and_of_partitions(tmp_path, content):
+    square(tmp_path / "a.msh", content)
+    (tmp_path / "a.msh").write_bytes(content[: content.index(b"$EndElements")])
+    assert "cut off" in refusal(tmp_path / "a.msh")
+
+
+def piece(count: int) -> str:
+    """A piece of a .vtu that holds the first triangles of the square, with their vertices."""
+    points = " ".join(f"{x!r}" for x in POINTS[: count + 2 if count else 0].ravel().tolist())
+    corners = " ".join(str(i) for row in TRIANGLES[:count] for i in row)
+    arrays = {
+        "connectivity": corners, "offsets": " ".join(str(3 * i + 3) for i in range(count)),
+        "types": "5 " * count,
+    }  # fmt: skip
+    cells = "".join(
+        f'<DataArray type="Int64" Name="{name}" format="ascii">{text}</DataArray>'
+        for name, text in arrays.items()
+    )
+    return (
+        f'<Piece NumberOfPoints="{count + 2 if count else 0}" NumberOfCells="{count}"><Points>'
+        '<DataArray type="Float64" NumberOfComponents="3" format="ascii">'
+        f"{points}</DataArray></Points><Cells>{cells}</Cells></Piece>"
+    )
+
+
+VTU = '<VTKFile type="UnstructuredGrid"><UnstructuredGrid>{}</UnstructuredGrid></VTKFile>'
+
+
+def test_pieces_of_a_vtu_are_joined_and_what_follows_its_end_is_left_out(tmp_path):
+    square(tmp_path / "a.vtu", VTU.format(piece(2) + piece(0)) + "\n<!-- x -->\0\0")
+    (tmp_path / "a.vtu").write_text(VTU.format(piece(1) + piece(2)))
+    points, cells = read_here(tmp_path / "a.vtu")
+    assert np.array_equal(points, np.concatenate([POINTS[:3], POINTS]))
+    assert cells.tolist() == [[0, 1, 2], [3, 4, 5], [3, 5, 6]]
+
+
+@pytest.mark.parametrize("code", ["utf-8-sig", "utf-16"])
+def test_a_byte_order_mark_is_skipped(tmp_path, code):
+    square(tmp_path / "a.obj", (V + "f 1 2 3\nf 1 3 4\n").encode(code))
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "why"),
+    [
+        ("a.mesh", "MFEM mesh v1.0\n\ndimension\n2\n", "'MFEM mesh v1.0': not Medit's .mesh"),
+        ("a.msh", "(0 grid by ANSYS)\n", "'(0 grid by ANSYS)'; Gmsh's formats"),
+        ("a.mesh", MEDIT.replace("End", "TrianglesP2\n0\nEnd"), "elements of higher order"),
+        ("a.mesh", MEDIT.replace("End", "En"), "the end mark `End` is missing"),
+        ("a.vtu", VTU.replace("UnstructuredGrid", "PolyData"), "holds a PolyData"),
+        ("a.vtu", VTU.format(piece(2).replace("5 5 ", "12 5 ")), "holds hexahedra"),
+        ("a.vtk", legacy("STRUCTURED_GRID", ""), "holds DATASET STRUCTURED_GRID"),
+    ],
+)
+def test_other_programs_and_cells_are_named_with_a_way_out(tmp_path, name, content, why):
+    (tmp_path / name).write_text(content)
+    assert why in refusal(tmp_path / name)
