@@ -68,8 +68,9 @@ def perform(arguments: argparse.Namespace) -> Status:
 
     path = Path(arguments.scene)
     path = path if path.suffix in (".yaml", ".yml") else path.with_name(f"{path.name}.yaml")
-    file, mesh = _read(arguments.mesh, path) if arguments.mesh else (None, None)
-    text = template(path.stem, file, mesh, arguments.up)
+    merge = arguments.merge
+    file, mesh = _read(arguments.mesh, path, merge) if arguments.mesh else (None, None)
+    text = template(path.stem, file, mesh, arguments.up, merge)
     try:
         with path.open("x", encoding="utf-8") as made:
             made.write(text)
@@ -81,10 +82,17 @@ def perform(arguments: argparse.Namespace) -> Status:
     return Status.DONE
 
 
-def template(stem: str, file: str | None = None, mesh: "Mesh | None" = None, up: str = "y") -> str:
+def template(
+    stem: str,
+    file: str | None = None,
+    mesh: "Mesh | None" = None,
+    up: str = "y",
+    merge: float = 0.0,
+) -> str:
     """Text of a scene file; the scene has a generated sheet, or the ``mesh`` read from ``file``.
 
-    The scene is named after ``stem``, the name of its file; ``up`` is the upward axis of the mesh.
+    The scene is named after ``stem``, the name of its file; ``up`` is the upward axis of the mesh,
+    in which vertices that are closer than ``merge`` times the extent are merged.
     """
     from pdrom.core.yamlfile import named
     from pdrom.model.mesh.types import vertex_measures
@@ -101,7 +109,8 @@ def template(stem: str, file: str | None = None, mesh: "Mesh | None" = None, up:
         density = float(f"{KILOGRAMS * mesh.vertices / vertex_measures(mesh).sum():.2g}")
         unit = "kg/m^3" if len(mesh.tetrahedra) else "kg/m^2"
         mass = f"masses: [{{density: {density:.12g}}}] # {unit}: about {KILOGRAMS:g} kg a vertex"
-        made = f"{{kind: file, path: {json.dumps(file, ensure_ascii=False)}}}"
+        more = f", merge: {merge:.1e}" if merge else ""
+        made = f"{{kind: file, path: {json.dumps(file, ensure_ascii=False)}{more}}}"
     group = "tetrahedron_strain" if groups == VOLUME else "spring"
     pull = (
         "" if up == "y" else f", acceleration: {[-9.81 if axis == up else 0.0 for axis in 'xyz']}"
@@ -112,7 +121,7 @@ def template(stem: str, file: str | None = None, mesh: "Mesh | None" = None, up:
     )  # fmt: skip
 
 
-def _read(file: str, scene: Path) -> "tuple[str, Mesh]":
+def _read(file: str, scene: Path, merge: float) -> "tuple[str, Mesh]":
     """Path of the mesh ``file`` relative to the folder of the ``scene`` file, and its mesh."""
     from pdrom.core.errors import ConfigurationError
     from pdrom.core.yamlfile import validate
@@ -125,12 +134,15 @@ def _read(file: str, scene: Path) -> "tuple[str, Mesh]":
         raise ConfigurationError(
             f"--mesh {file}: required is a file below {folder}, the folder of the scene"
         ) from None
-    config = validate(MeshFile, {"kind": "file", "path": inside.as_posix()}, f"--mesh {file}")
+    keys = {"kind": "file", "path": inside.as_posix(), "merge": merge}
+    config = validate(MeshFile, keys, f"--mesh {file}")
     return config.path, config.build(folder)
 
 
 def _about(mesh: "Mesh") -> str:
     """YAML comments with the size and position of the mesh, and the vertex counts of its sides."""
+    from pdrom.model.mesh.checks import seams
+
     low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
     places = (
         f"{axis} from {a:.3g} to {b:.3g}" for axis, a, b in zip("xyz", low, high, strict=True)
@@ -140,7 +152,8 @@ def _about(mesh: "Mesh") -> str:
         cells = f"{len(mesh.tetrahedra)} tetrahedra"
     sides = (f"{side} {count}" for side, count in _sides(mesh).items())
     return (
-        f"# Of this file: {mesh.vertices} vertices, {cells}; {', '.join(places)} (m).\n"
+        f"# Of this file: {mesh.vertices} vertices, {cells}, {seams(mesh)}; "
+        f"{', '.join(places)} (m).\n"
         f"# Its sides, with the number of their vertices: {', '.join(sides)}.\n"
     )
 
@@ -186,6 +199,12 @@ COMMAND = Command(
     {
         "scene": {"metavar": "SCENE", "help": "file to write; .yaml is added to a name"},
         "--mesh": {"metavar": "FILE", "help": "mesh file (.obj, .vtu, .msh ...)"},
+        "--merge": {
+            "type": float,
+            "default": 0.0,
+            "metavar": "FRACTION",
+            "help": "merge vertices of the mesh that are closer than this fraction of its extent",
+        },
         "--up": {"choices": "xyz", "default": "y", "help": "axis of the mesh that points up (y)"},
     },
     perform,

@@ -13,6 +13,7 @@ def perform(arguments: argparse.Namespace) -> Status:
 
     from pdrom.api import load_scene, run
     from pdrom.command.progress import Progress
+    from pdrom.model.mesh.checks import seams
 
     file = Path(arguments.scene)
     out = arguments.out or str(file.parent / f"{file.stem}.h5")
@@ -20,8 +21,8 @@ def perform(arguments: argparse.Namespace) -> Status:
     require_output(out, files_of(arguments.scene, scene))
     full = run(scene, out, Progress(scene.config.name, scene.config.frames))
     sys.stdout.write(
-        f"{out}: {scene.config.frames} frames of {scene.mesh.vertices} vertices, "
-        f"{np.median(full.ms):.2f} ms a frame (median)\n"
+        f"{out}: {scene.config.frames} frames of {scene.mesh.vertices} vertices "
+        f"({seams(scene.mesh)}), {np.median(full.ms):.2f} ms a frame (median)\n"
     )
     return Status.DONE
 

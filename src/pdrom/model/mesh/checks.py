@@ -1,16 +1,24 @@
 """Checks of a mesh before any computation, and a consistent orientation of its cells."""
 
+import logging
+
 import numpy as np
 from scipy import sparse
 from scipy.sparse import csgraph
+from scipy.spatial import cKDTree
 
 from pdrom.core.errors import DegenerateElementError, MeshError
 from pdrom.core.store import require_finite
 from pdrom.model.mesh.generators import boundary, orient
 from pdrom.model.mesh.types import MAX_LENGTH, MIN_LENGTH, Mesh
 
+log = logging.getLogger(__name__)
+
 # An element is degenerate if its area is below this times its longest edge^2 (volume: edge^3).
 RELATIVE_MEASURE = 1e-12
+
+# Vertices that are closer than this fraction of the mesh's extent may belong to an open seam.
+SEAM = 1e-6
 
 
 def check_mesh(mesh: Mesh, name: str) -> Mesh:
@@ -143,7 +151,8 @@ def _check_vertices(mesh: Mesh, cells: np.ndarray, name: str) -> None:
     if len(first) < mesh.vertices:
         repeated = np.flatnonzero(original != np.arange(mesh.vertices))[0]
         raise MeshError(
-            f"{name}: vertex {repeated} repeats the position of vertex {original[repeated]}"
+            f"{name}: vertex {repeated} repeats the position of vertex {original[repeated]}; "
+            f"`merge: {SEAM:.1e}` below `mesh` merges vertices of a file"
         )
 
 
@@ -165,6 +174,39 @@ def _check_measures(mesh: Mesh, cells: np.ndarray, kind: str, name: str) -> None
         raise DegenerateElementError(
             f"{name}: {kind} {flat[0]} {cells[flat[0]].tolist()} has zero {what}"
         )
+
+
+def seams(mesh: Mesh) -> str:
+    """Return how many connected parts ``mesh`` has, and how many pairs of vertices are close."""
+    edges = mesh.edges()
+    graph = sparse.coo_array((np.ones(len(edges)), edges.T), shape=2 * (mesh.vertices,))
+    parts = csgraph.connected_components(graph, directed=False)[0]
+    tree = cKDTree(mesh.points)
+    pairs = (tree.count_neighbors(tree, SEAM * mesh.extent) - mesh.vertices) // 2
+    text = f"{parts} connected part{'s' * (parts > 1)}"
+    if pairs:
+        text += f", {pairs} pairs of vertices closer than {SEAM:g} of its extent"
+    return text
+
+
+def merged(mesh: Mesh, tolerance: float, name: str) -> Mesh:
+    """Return ``mesh`` with vertices that are closer than ``tolerance`` m merged into the first.
+
+    Elements of which two vertices become one are left out. ``name`` begins messages.
+    """
+    pairs = cKDTree(mesh.points).query_pairs(tolerance, output_type="ndarray")
+    graph = sparse.coo_array((np.ones(len(pairs)), pairs.T), shape=2 * (mesh.vertices,))
+    count, part = csgraph.connected_components(graph, directed=False)
+    _, first = np.unique(part, return_index=True)
+    place = np.empty(count, dtype=np.int64)
+    place[np.argsort(first)] = np.arange(count)
+    cells = place[part][mesh.tetrahedra if len(mesh.tetrahedra) else mesh.triangles]
+    whole = (np.diff(np.sort(cells, axis=1), axis=1) > 0).all(axis=1)
+    log.warning(
+        "%s: %d vertices are merged into %d; %d elements become flat and are left out",
+        name, mesh.vertices, count, len(cells) - whole.sum(),
+    )  # fmt: skip
+    return mesh_of(mesh.points[np.sort(first)], cells[whole], name)
 
 
 def turned_alike(mesh: Mesh, name: str) -> tuple[Mesh, np.ndarray]:

@@ -9,11 +9,25 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
-from pydantic import Field, field_validator, model_validator
+from pydantic import (
+    Field,
+    SerializerFunctionWrapHandler,
+    field_validator,
+    model_serializer,
+    model_validator,
+)
 
 from pdrom.core.errors import MeshError
 from pdrom.core.yamlfile import ConfigModel, check_lengths
-from pdrom.model.mesh.checks import check_mesh, check_range, mesh_of, turned_alike
+from pdrom.model.mesh.checks import (
+    SEAM,
+    check_mesh,
+    check_range,
+    merged,
+    mesh_of,
+    seams,
+    turned_alike,
+)
 from pdrom.model.mesh.files import MAX_VERTICES, read_mesh_file
 from pdrom.model.mesh.generators import Plane, bar, cloth
 from pdrom.model.mesh.types import Length, Mesh, PositiveLength
@@ -120,11 +134,18 @@ class MeshFile(MeshModel):
     """A mesh file in the scene file's folder or below; formats with several files are excluded.
 
     path : path of the mesh file, relative to the folder of the scene file
+    merge : vertices that are closer than this fraction of the extent become one
     """
 
     kind: Literal["file"]
     path: str
     scale: Annotated[float, Field(ge=1e-9, le=1e9)] = 1.0
+    merge: Annotated[float, Field(ge=0.0, le=0.01)] = 0.0
+
+    @model_serializer(mode="wrap")
+    def _without_default(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Leave ``merge`` out if it is 0, so that identifiers stay those of earlier versions."""
+        return {key: value for key, value in write(self).items() if key != "merge" or value}
 
     @field_validator("path")
     @classmethod
@@ -152,7 +173,11 @@ class MeshFile(MeshModel):
         mesh = read_mesh_file(self.file(root))
         check_range(mesh.points, self.scale, self.path)
         scaled = Mesh(mesh.points * self.scale, mesh.triangles, mesh.tetrahedra)
+        if self.merge:
+            scaled = merged(scaled, self.merge * scaled.extent, self.path)
         check_mesh(scaled, self.path)
+        if "pairs" in (found := seams(scaled)):
+            log.warning("%s: %s; `merge: %.1e` below `mesh` merges them", self.path, found, SEAM)
         if len(scaled.tetrahedra):
             return scaled
         alike, turned = turned_alike(scaled, self.path)

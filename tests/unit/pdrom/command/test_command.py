@@ -174,6 +174,24 @@ def test_every_commented_effect_of_a_new_scene_is_valid(mesh, listed, others):
     assert (mesh is None) or {"strain", "volume"} - set(every.groups)
 
 
+SEAM = "v 0 0 0\nv 1 0 0\nv 0 0 1\nv 1 0 {0}\nv 0 0 {1}\nv 1 0 1\nf 1 2 3\nf 4 6 5\n"
+
+
+def test_an_open_seam_is_named_and_merged(folder, capsys, caplog):
+    """Vertices of a seam that nearly coincide, or are exact copies."""
+    (folder / "a.obj").write_text(SEAM.format("1e-7", "1.0000001"))
+    assert run(["new", "a", "--mesh", "a.obj"]) == Status.DONE
+    found = "2 connected parts, 2 pairs of vertices closer than 1e-06 of its extent"
+    assert f"6 vertices, 2 triangles, {found}; x" in (folder / "a.yaml").read_text()
+    assert caplog.messages == [f"a.obj: {found}; `merge: 1.0e-06` below `mesh` merges them"]
+    (folder / "b.obj").write_text(SEAM.format(0, 1))
+    assert "`merge: 1.0e-06` below `mesh`" in refusal(capsys, ["new", "b", "--mesh", "b.obj"])
+    for name in "ab":
+        assert run(["new", f"{name}2", "--mesh", f"{name}.obj", "--merge", "1e-6"]) == Status.DONE
+        assert run(["run", f"{name}2.yaml"]) == Status.DONE
+        assert "100 frames of 4 vertices (1 connected part)" in capsys.readouterr().out
+
+
 def test_a_new_scene_tells_of_its_mesh_and_runs(folder, capsys, caplog):
     """Also where a quote is in the name of the mesh, and the scene lies in another folder."""
     (folder / "in").mkdir()
@@ -181,9 +199,8 @@ def test_a_new_scene_tells_of_its_mesh_and_runs(folder, capsys, caplog):
     meshio.write("in/o'b.obj", meshio.Mesh(mesh.points, [("triangle", mesh.triangles)]))
     assert run(["new", "in/no", "--mesh", "in/o'b.obj"]) == Status.DONE
     text = (folder / "in" / "no.yaml").read_text("utf-8")
-    assert (
-        "# Of this file: 12 vertices, 12 triangles; x from -0.5 to 0.5, y from -7 to -7, z" in text
-    )
+    assert "# Of this file: 12 vertices, 12 triangles, 1 connected part; x from -0.5" in text
+    assert " to 0.5, y from -7 to -7, z" in text
     assert "number of their vertices: left 3, right 3, back 4, front 4." in text
     small = text.replace("frames: 100", "frames: 4").replace("train: 40", "train: 2")
     (folder / "in" / "no.yaml").write_text(small, encoding="utf-8")

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pdrom.core.errors import DegenerateElementError, MeshError
-from pdrom.model.mesh.checks import check_mesh, turned_alike
+from pdrom.model.mesh.checks import check_mesh, merged, seams, turned_alike
 from pdrom.model.mesh.config import MeshFile
 from pdrom.model.mesh.generators import bar, cloth
 from pdrom.model.mesh.selection import farthest_points, select_vertices
@@ -171,3 +171,17 @@ def test_parts_without_a_common_edge_are_taken(tmp_path, joined, effect):
         moved = trajectory(Scene.build(config, mesh))[-1] - mesh.points
         assert np.isfinite(moved).all()
         assert (np.abs(moved).max() < 1e-12) == still
+
+
+def test_merging_keeps_the_first_of_close_vertices_and_leaves_flat_elements_out(caplog):
+    copies = np.vstack([SHEET.points, SHEET.points[[0, 4]] + 1e-8])
+    triangles = np.vstack([SHEET.triangles, [[0, 9, 4]]]).astype(np.int32)
+    triangles[0][triangles[0] == 4] = 10
+    mesh = merged(Mesh(copies, triangles), 1e-7, "mesh")
+    assert np.array_equal(mesh.points, SHEET.points)
+    assert np.array_equal(mesh.triangles, SHEET.triangles)
+    assert "11 vertices are merged into 9; 1 elements become flat" in caplog.text
+    assert seams(SHEET) == "1 connected part"
+    assert MeshFile(kind="file", path="a.obj").model_dump() == {
+        "kind": "file", "path": "a.obj", "scale": 1.0,
+    }  # fmt: skip
