@@ -121,7 +121,8 @@ def read_yaml(path: Path) -> Any:
         if not path.is_file():
             whole = Path(f"{path}.yaml")
             meant = f", did you mean '{whole}'?" if whole.is_file() else ""
-            raise ConfigurationError(f"{path}: no such configuration file{meant}")
+            what = "a folder, name a file in it" if path.is_dir() else "no such configuration file"
+            raise ConfigurationError(f"{path}: {what}{meant}")
         if path.stat().st_size > MAX_BYTES:
             raise ConfigurationError(f"{path}: larger than {MAX_BYTES} bytes")
         # utf-8-sig skips a byte order mark, which some editors write

@@ -5,16 +5,23 @@ the last one of two equal keys, run code from a file with the key ``__use_yte__`
 traceback for a file that is not text.
 """
 
+import inspect
+import io
 import json
+import re
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, redirect_stderr, suppress
+from itertools import takewhile
 from pathlib import Path
+from typing import Any
 
 from yaml import YAMLError
 
 from pdrom.core.errors import ConfigurationError, PdromError
 from pdrom.core.yamlfile import read_yaml, require_as_written, shown
+from study.pipeline.folders import folders
+from study.pipeline.running import blocked
 
 # Options with which Snakemake only prints or draws something and runs no job.
 LOOKS_ONLY = (
@@ -25,6 +32,14 @@ LOOKS_ONLY = (
 )  # fmt: skip
 # Options about Snakemake's output; if one is given, our short log lines do not replace this output.
 OWN_OUTPUT = ("logger", "quiet", "verbose", "printshellcmds", "debug_dag")
+# Options of every run. The greedy scheduler chooses jobs fast. Snakemake's default scheduler solves
+# an integer program at each choice, which takes more time than it saves, since jobs are short.
+OPTIONS = ("--scheduler", "greedy", "--rerun-incomplete")
+LINES = ("--logger", "pdrom")
+# Options with numbers that are at least one; others are at least zero.
+COUNTS = ("cores", "jobs", "local_cores", "max_threads")
+# Keys that Snakemake accepts after --config.
+KEY = re.compile(r"[A-Za-z_][\w-]*\w")
 YAML = (".yaml", ".yml", ".json")
 TEMPLATE_KEY = "__use_yte__"
 RECORD = Path(".snakemake/last_run.json")
@@ -50,14 +65,7 @@ class CommandLine:
     """
 
     def __init__(self, arguments: Sequence[str]) -> None:
-        # not imported at the top: jobs import this module, too, and need no parser
-        from snakemake.cli import get_argument_parser
-
-        found = vars(get_argument_parser().parse_args(list(arguments)))
-        if profiles := found["profile"]:
-            # cores, jobs and executor are those of a profile unless the command line sets them
-            whole = get_argument_parser(profiles).parse_args(_before_targets(arguments))
-            found |= {name: getattr(whole, name) for name in ("cores", "jobs", "executor")}
+        found = parsed(arguments)
         looks = [name for name in LOOKS_ONLY if found[name]]
         reports = bool(found["report"] or found["reporter"]) and not found["report_after_run"]
         self.arguments = tuple(arguments)
@@ -71,7 +79,9 @@ class CommandLine:
         self.own_output = any(found[name] is not None and found[name] for name in OWN_OUTPUT)
         self.cores = found["cores"] is not None or found["jobs"] is not None
         self.executor: str | None = found["executor"]
-        for key, _, text in (setting.partition("=") for setting in self.settings):
+        for key, equals, text in (setting.partition("=") for setting in self.settings):
+            if equals and not KEY.fullmatch(key):
+                raise ConfigurationError(f"--config {key}=...: no such key (see config/README.md)")
             with suppress(YAMLError):  # Snakemake takes such a value as a text
                 require_as_written(text, "--config", key)
         swallowed = [name for name in self.settings if "=" not in name]
@@ -98,9 +108,81 @@ class CommandLine:
         return [*options, *more, *(["--", *targets] if targets else [])]
 
 
+def parsed(arguments: Sequence[str]) -> dict[str, Any]:
+    """Return the options that Snakemake finds in ``arguments`` and in the profiles that they name.
+
+    Raises ConfigurationError if Snakemake refuses an option or its value, if it would use only the
+    last of several values, or if a number of cores or jobs is below one.
+    """
+    # not imported at the top: jobs import this module, too, and need no parser
+    from snakemake.cli import parse_args
+
+    said, fault = io.StringIO(), ""
+    try:
+        with redirect_stderr(said):
+            found = vars(parse_args(list(arguments))[1])
+    except SystemExit as end:
+        if not end.code:
+            raise  # after --help or --version
+        fault = said.getvalue().strip().splitlines()[-1].rpartition("rror: ")[2]
+    except Exception as error:
+        # the parser's function for an option has its name and values
+        calls = [each.frame.f_locals for each in inspect.trace(0) if each.function == "take_action"]
+        words = [[call["option_string"], *call["argument_strings"]] for call in calls]
+        fault = f"{' '.join(words[-1]) if words else 'options'}: {error}"
+    else:
+        options = [word.partition("=")[0] for word in _before_targets(arguments)]
+        if sum(each == "--config" for each in options) > 1:
+            fault = "--config is given twice; write all settings after the first"
+        if sum(each.startswith("--configf") for each in options) > 1:
+            fault = "--configfile is given twice; write all files after the first"
+        if found["config"] == []:
+            fault = "--config: KEY=VALUE is missing"
+        for name, value in found.items():
+            least = int(name in COUNTS)
+            if isinstance(value, int | float) and value < least and value is not False:
+                fault = f"--{name.replace('_', '-')} {value}: at least {least} is required"
+    if fault:
+        raise ConfigurationError(f"{fault} (.venv/bin/snakemake --help explains the options)")
+    return found
+
+
 def _before_targets(arguments: Sequence[str]) -> list[str]:
     """Return the arguments before the separator ``--``, or all of them without one."""
     return list(arguments)[: [*arguments, "--"].index("--")]
+
+
+def completed(arguments: Sequence[str]) -> list[str]:
+    """Return the ``arguments`` of the command line with the options that Snakemake needs.
+
+    Raises ConfigurationError if a configuration file is missing or is not a mapping, a target was
+    read as the value of an option, or a figure does not exist.
+    """
+    if "figure" in arguments:
+        from study.pipeline.targets import figure_files  # slow, so not imported at the top
+
+        at = list(arguments).index("figure")
+        named = list(takewhile(lambda word: not word.startswith("-"), arguments[at + 1 :]))
+        others = [*arguments[:at], *arguments[at + 1 + len(named) :]]
+        options = _before_targets(others)
+        arguments = [*options, "--", *others[len(options) + 1 :], *figure_files(named)]
+    command = CommandLine(arguments)
+    if command.report and not command.configuration and recall():
+        sys.stderr.write(f"reproduce: a report of the last run, {' '.join(recall())}\n")
+        command = CommandLine(command.rewritten(recall(), {t: [t] for t in command.targets}))
+    check_files(command.configfiles)
+    cores = () if command.cores else ("--cores", "all")
+    lines = LINES if command.makes and not command.own_output else ()
+    own, made = folders(command.configfiles, command.settings), {}
+    if command.targets:
+        from study.pipeline.targets import files  # slow, so not imported at the top
+
+        made = {target: files(target, own) for target in command.targets}
+        # print the files if a target is a name and not a path
+        for target, found in made.items():
+            if found != [target]:
+                sys.stderr.write(f"reproduce: {target}: {', '.join(found)}\n")
+    return command.rewritten([*cores, *lines, *OPTIONS], made)
 
 
 def check_files(paths: Iterable[str | Path]) -> None:
@@ -116,11 +198,13 @@ def check_files(paths: Iterable[str | Path]) -> None:
 
 @contextmanager
 def one_line() -> Iterator[None]:
-    """Context in which a `PdromError` ends the process with an error message of one line."""
+    """Context in which an error of users or files ends the process with a message of one line."""
     try:
         yield
     except PdromError as error:
         sys.exit(f"pdrom: {error}")
+    except OSError as error:
+        sys.exit(f"pdrom: {PdromError(blocked(error))}")
 
 
 def remember(command: CommandLine) -> None:

@@ -4,14 +4,18 @@ import logging
 import re
 import shutil
 import signal
+import sys
+import threading
 import time
 from pathlib import Path
 
 from snakemake_interface_logger_plugins.common import LogEvent
 
-from pdrom.core.errors import INTERRUPTED
+from pdrom.core.errors import PdromError
+from study.pipeline.fork_server.client import GONE
+from study.pipeline.running import KEPT, blocked, ending
 
-ADVICE = "pdrom: what is finished is kept; the same command goes on from there"
+ADVICE = f"pdrom: {KEPT}"
 
 _ERROR = re.compile(r"^[-0-9]+ [0-9:,]+ ERROR +pdrom: (.*)$", re.MULTILINE)
 _ENDING = re.compile(r"died with <Signals\.(?P<signal>\w+)|exit status (?P<status>\d+)")
@@ -19,8 +23,6 @@ _ENDING = re.compile(r"died with <Signals\.(?P<signal>\w+)|exit status (?P<statu
 _BY_SLURM = re.compile(r"\*\*\* JOB \S+ ON \S+ (CANCELLED) AT \S+(?: DUE TO ([A-Z ]+?))? \*\*\*")
 # Part of the error message of Snakemake's SLURM executor about a failed job.
 _SLURM_STATUS = re.compile(r"SLURM status is: '(\w+)'")
-# Part of Snakemake's log message after the user has interrupted the run.
-_INTERRUPTED = "Terminating processes on user request"
 _SIGNALS = {number.value + 128: number.name for number in signal.Signals}
 _CAUSES = {
     "SIGKILL": "killed (SIGKILL): out of memory?",
@@ -45,6 +47,8 @@ def cause(said: str, output: str, log: str) -> str:
     found = _ENDING.search(said)
     if found is None:
         return f"it ended without an error message, see {log}"
+    if found["status"] == str(GONE):
+        return "the process that jobs start from is gone: out of memory?"
     name = found["signal"] or _SIGNALS.get(int(found["status"]))
     if name is None:
         return f"exit status {found['status']}, see {log}"
@@ -58,7 +62,7 @@ class Failures(logging.Handler):
         super().__init__(logging.INFO)
         self._begun = time.time() - 1.0  # dates of files may lag behind the clock
         self._lines: list[str] = []
-        self._stopped: str | None = None
+        self._stopped: int | None = None
         # thread -> its last error message: Snakemake logs the cause before it names the failed job
         self._said: dict[int | None, str] = {}
 
@@ -81,25 +85,19 @@ class Failures(logging.Handler):
                 self._lines.append(f"{job} failed while making {output}: {why}")
         elif event == LogEvent.ERROR:
             self._said[record.thread] = text
-        elif event is None and _INTERRUPTED in text:
-            self._stopped = self._stopped or _CAUSES["SIGINT"]
 
-    def note_sigterm(self) -> None:
-        """Store that the run ends because it received the signal SIGTERM."""
-        self._stopped = _CAUSES["SIGTERM"]
+    def note(self, number: int) -> None:
+        """Store that the run ends because it received the signal ``number``."""
+        self._stopped = number
 
     def end(self) -> tuple[str, int]:
         """Return the last lines of a failed run, and its exit status.
 
         They repeat each failed job's error, as Snakemake prints many lines after its own message.
         """
-        lines = self._lines
-        if self._stopped:
-            # do not list jobs that failed only because the run was ended
-            lines = [line for line in lines if not line.endswith(tuple(_CAUSES.values()))]
-            lines.append(f"pdrom: {self._stopped}")
-        text = "\n".join([*dict.fromkeys(lines), ADVICE]) + "\n"
-        return text, INTERRUPTED if self._stopped else 1
+        if self._stopped:  # jobs that failed meanwhile were ended, too
+            return ending(self._stopped), 128 + self._stopped
+        return "\n".join([*dict.fromkeys(self._lines), ADVICE]) + "\n", 1
 
     def _written(self, log: str) -> str:
         """Text of the file ``log``; empty if this run has not written the file."""
@@ -107,3 +105,15 @@ class Failures(logging.Handler):
         if not path.is_file() or path.stat().st_mtime < self._begun:
             return ""
         return path.read_text(encoding="utf-8", errors="replace")
+
+
+def plain(record: logging.LogRecord) -> bool:
+    """Filter of Snakemake's log: an error outside of jobs becomes one line, without a traceback."""
+    error = sys.exc_info()[1]
+    outside = threading.current_thread() is threading.main_thread()
+    if getattr(record, "event", None) == LogEvent.ERROR and error and outside:
+        text = blocked(error) if isinstance(error, OSError) else str(error)
+        kind = "" if " " in text else f"{type(error).__name__}: "
+        line = " ".join(f"{kind}{text}".split())
+        record.msg, record.args = f"pdrom: {PdromError(line[:600])} (--verbose shows more)", ()
+    return True

@@ -9,6 +9,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from snakemake.scheduling.job_scheduler import JobScheduler
+
 from pdrom.core.errors import ConfigurationError, PdromError, StorageError
 from pdrom.core.store import read_table, write_text
 from pdrom.core.store.checksum import move_aside
@@ -68,6 +70,8 @@ class Run:
 
         A command that runs no job, such as a dry run, needs no lock and works during another run.
         """
+        running.handle(running.leave)
+        JobScheduler.exit_gracefully = staticmethod(running.leave)  # until jobs start
         with one_line():
             self.command = CommandLine(sys.argv[1:])
             if self.command.looks_only:
@@ -113,7 +117,6 @@ class Run:
         # selection of jobs, which triggers another selection and another timer. At the end of a run
         # these timers use a third of a core, and the process waits for the last one.
         workflow.scheduler.job_rate_limiter = None
-        running.stop_at_sigterm(self.failures.note_sigterm)
         if not any(Path(os.environ.get("NUMBA_CACHE_DIR", "")).glob("dynamics*/*.nbi")):
             sys.stderr.write("pdrom: the first jobs compile kernels (once, some minutes)\n")
         tell_expectation(workflow, plan)
@@ -126,9 +129,11 @@ class Run:
             except OSError as error:
                 sys.exit(f"pdrom: {running.FOLDER}/run.pipe: cannot be made ({error.strerror})")
             start_server()
+        running.handle(running.stop(self.failures.note))
 
     def succeed(self, workflow: Any, plan: Plan) -> None:
         """End a successful run: write overview and manifest; print the summary as last output."""
+        running.handle(running.leave)
         try:
             if not self.command.targets:
                 text = contents(self.command, workflow.dag, plan.folders)

@@ -1,15 +1,16 @@
-"""The process of a run: it locks its folder, and ends at SIGTERM.
+"""The process of a run: it locks its folder, and ends at signals with one line.
 
 The operating system releases the lock when the process ends, for whatever reason. Snakemake's own
 lock consists of files, which a killed run leaves behind: a process that has the operating system's
 lock deletes them.
 
-At SIGTERM, running jobs are ended, too, since Snakemake would wait for them for minutes.
+At a signal, running jobs are ended, too, since Snakemake would wait for them for minutes.
 """
 
 import errno
 import fcntl
 import os
+import re
 import shutil
 import signal
 import socket
@@ -19,76 +20,114 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
+from typing import NoReturn
 
 import psutil
 
-from pdrom.core.errors import PdromError
+from pdrom.core.errors import PdromError, reason
 
 FOLDER = Path(".snakemake")
 LOCK = FOLDER / "run.lock"
 SNAKEMAKE_LOCKS = FOLDER / "locks"
-# Jobs that still run this number of seconds after SIGTERM are killed.
+# Jobs that still run this number of seconds after a signal are killed.
 PATIENCE = 5.0
+KEPT = "what is finished is kept, and the same command goes on from there"
+# Signals that end a run, and the words of its last line; its exit code is 128 plus the number.
+ENDINGS = {
+    signal.SIGINT: "interrupted",
+    signal.SIGTERM: "ended by SIGTERM",
+    signal.SIGHUP: "ended by SIGHUP",
+}
 
 
-class AtWorkError(PdromError):
-    """Raised if another process runs the workflow in this folder, or the lock file is unusable."""
+def blocked(error: OSError) -> str:
+    """Return what the operating system refused, and what to do about it."""
+    full = error.errno in (errno.ENOSPC, errno.EDQUOT)
+    do = "make room" if full else "remove what stands there, or make it writable"
+    return f"{error.filename or 'a file'}: {reason(error)}; {do}"
 
 
 def hold() -> int:
     """Lock the working directory until the process ends; return the descriptor of the lock file.
 
-    Raises AtWorkError if the lock is unusable or held by another process (named in the message).
+    Raises PdromError if the lock is unusable or held by another process (named in the message).
     """
     try:
         FOLDER.mkdir(exist_ok=True)
         descriptor = os.open(LOCK, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
-    except OSError as error:
-        raise AtWorkError(f"{LOCK}: cannot be written ({error.strerror})") from error
-    try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError as error:
+        if SNAKEMAKE_LOCKS.is_dir():
+            shutil.rmtree(SNAKEMAKE_LOCKS)
+        SNAKEMAKE_LOCKS.unlink(missing_ok=True)
+    except BlockingIOError:
         holder = os.read(descriptor, 300).decode(errors="replace").strip()
         os.close(descriptor)
-        if error.errno not in (errno.EWOULDBLOCK, errno.EACCES):
-            raise AtWorkError(f"{LOCK}: cannot be locked ({error.strerror})") from error
-        at_work = f"another run ({holder or 'just started'}) is at work in this folder"
-        raise AtWorkError(f"{at_work}; wait for its end, -n works meanwhile") from None
+        raise PdromError(
+            f"another run ({holder or 'just started'}) is at work in this folder; {_advice(holder)}"
+        ) from None
+    except OSError as error:
+        raise PdromError(f"{LOCK}: cannot be written or locked; {blocked(error)}") from error
     os.ftruncate(descriptor, 0)
     os.write(descriptor, f"process {os.getpid()} on {socket.gethostname()}\n".encode())
-    shutil.rmtree(SNAKEMAKE_LOCKS, ignore_errors=True)
     return descriptor
+
+
+def _advice(holder: str) -> str:
+    """What to do about the run of ``holder``, which may be stopped, as by Ctrl-Z."""
+    number = re.fullmatch(rf"process (\d+) on {re.escape(socket.gethostname())}", holder)
+    with suppress(psutil.Error):
+        if number and psutil.Process(int(number[1])).status() == psutil.STATUS_STOPPED:
+            pid = number[1]
+            return f"it is stopped: kill -CONT {pid} continues it, kill -KILL {pid} ends it"
+    return "wait for its end, -n works meanwhile"
 
 
 def remove_stale_locks() -> None:
     """Delete the lock files that a killed run of Snakemake left, unless a run is at work."""
     if SNAKEMAKE_LOCKS.is_dir():
-        with suppress(AtWorkError):
+        with suppress(PdromError):
             os.close(hold())
 
 
-def stop_at_sigterm(note: Callable[[], None]) -> None:
-    """Install a handler of SIGTERM: call ``note``, end all jobs, end the run as Ctrl-C does."""
+def leave(number: int, _frame: object = None) -> NoReturn:
+    """Handler of the signal ``number`` while no job runs: end this process with one line."""
+    with suppress(OSError):  # nobody may read the stream any more
+        os.write(sys.stderr.fileno(), ending(number).encode())
+    os._exit(128 + number)
 
-    def stop(number: int, frame: object) -> None:
-        with suppress(OSError):  # nobody may read the stream any more
-            os.write(sys.stderr.fileno(), b"pdrom: SIGTERM: ending the jobs that run\n")
-        signal.signal(signal.SIGTERM, signal.SIG_IGN)
-        note()
+
+def stop(note: Callable[[int], None]) -> Callable[[int, object], None]:
+    """Return a handler of signals while jobs run: call ``note``, end all jobs, then the run."""
+
+    def handler(number: int, _frame: object) -> None:
+        handle(signal.SIG_IGN)
+        note(number)
         threading.Thread(target=_end_jobs, daemon=True).start()
-        raise KeyboardInterrupt
+        raise KeyboardInterrupt  # Snakemake waits for its jobs, and reports a failed run
 
-    signal.signal(signal.SIGTERM, stop)
+    return handler
+
+
+def handle(handler: Callable[[int, object], None] | signal.Handlers) -> None:
+    """Install the ``handler`` of all signals in `ENDINGS` that nohup or a shell does not ignore."""
+    for number in ENDINGS:
+        if signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, handler)
+
+
+def ending(number: int) -> str:
+    """Last line of a run that the signal ``number`` ended."""
+    return f"pdrom: {ENDINGS[signal.Signals(number)]}; {KEPT}\n"
 
 
 def _end_jobs() -> None:
     """End the processes of all jobs, repeatedly until this process ends: jobs may still start."""
     begin, own = time.monotonic(), psutil.Process()
     while True:
+        time.sleep(0.5)  # jobs that Ctrl-C has reached, too, remove their unfinished files
         late = time.monotonic() - begin > PATIENCE
         for process in own.children(recursive=True):
             with suppress(psutil.Error, ProcessLookupError):
                 # spare the fork server, whose session differs: it ends jobs whose client is dead
                 if os.getsid(process.pid) == os.getsid(0):
                     process.send_signal(signal.SIGKILL if late else signal.SIGTERM)
-        time.sleep(0.5)

@@ -5,7 +5,6 @@ A target is the number or name of a figure, the name of a table or of a rule, or
 
 import sys
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
@@ -22,31 +21,29 @@ from study.tables import declared
 PREPRINT = "preprint:"
 
 
-def figure_arguments(arguments: Sequence[str]) -> list[str]:
-    """Return options and targets for Snakemake, from the ``arguments`` after the word ``figure``.
+def figure_files(words: Sequence[str]) -> list[str]:
+    """Return the default paths of the figures that ``words`` name; they are printed, too.
 
     A figure is given by its name, its number in the paper (``3``), in the supplement (``S3``) or in
-    the preprint (``preprint:3``). Targets are default paths, which are printed, too. Raises
-    ConfigurationError if no figure is given, or a given figure does not exist.
+    the preprint (``preprint:3``). Raises ConfigurationError if no figure is given, or if a given
+    figure does not exist.
     """
-    named = list(takewhile(lambda word: not word.startswith("-"), arguments))
-    options = [word for word in arguments[len(named) :] if word != "--"]
     numbers = figure_numbers(Path())
     by_place = {n.manuscript: name for name, n in numbers.items() if n.manuscript}
     # error messages list 1, 2, ... 10, ... S1, S2, ...
     known = {n: by_place[n] for n in sorted(by_place, key=lambda n: (len(n), n))}
     known |= {f"{PREPRINT}{n.preprint}": name for name, n in numbers.items() if n.preprint}
     known |= {name: name for name in numbers}
-    if not named:
+    if not words:
         raise ConfigurationError(f"figure: its number or name is missing{choices('', known)}")
-    targets = []
-    for word in named:
+    found = []
+    for word in words:
         if word not in known:
             raise ConfigurationError(f"figure {word}: there is none{choices(word, known)}")
-        targets.append(paths.FIGURE.at(paths.RESULTS, name=known[word]))
-        words = numbers[known[word]].label(known[word])
-        sys.stderr.write(f"reproduce: figure {words}: {targets[-1]}\n")
-    return [*options, "--", *targets]
+        found.append(paths.FIGURE.at(paths.RESULTS, name=known[word]))
+        label = numbers[known[word]].label(known[word])
+        sys.stderr.write(f"reproduce: figure {label}: {found[-1]}\n")
+    return found
 
 
 def files(target: str, folders: Folders) -> list[str]:

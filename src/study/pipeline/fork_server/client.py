@@ -15,6 +15,7 @@ from contextlib import suppress
 ADDRESS = "PDROM_JOB_SERVER"
 PIPE = "PDROM_RUN_PIPE"
 ALONE = "--alone"
+GONE = 69  # exit status if the server is gone
 FORWARDED = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
@@ -38,8 +39,7 @@ def main() -> int:
     if not status:
         # the server is gone, and the job with it: end the processes that the job had started
         forward(job, signal.SIGKILL)
-        sys.stderr.write("pdrom: the process that jobs start from is gone\n")
-        return 1
+        return GONE
     code = os.waitstatus_to_exitcode(int(status))
     if code < 0:
         if -code in FORWARDED:
