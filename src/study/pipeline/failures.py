@@ -13,7 +13,8 @@ from snakemake_interface_logger_plugins.common import LogEvent
 
 from pdrom.core.errors import PdromError
 from study.pipeline.fork_server.client import GONE
-from study.pipeline.running import KEPT, blocked, ending
+from study.pipeline.running import blocked
+from study.pipeline.signals import KEPT, ending
 
 ADVICE = f"pdrom: {KEPT}"
 

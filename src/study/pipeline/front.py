@@ -6,14 +6,12 @@ compares results with the expected ones; ``bundle`` writes an archive; ``test`` 
 arguments to pytest; ``run`` starts a program found on PATH, such as pdrom.
 """
 
-import logging
 import os
 import sys
 from collections.abc import Sequence
 from typing import NoReturn
 
-from pdrom.core.environment import settle
-from study.pipeline.running import handle, leave
+from study.pipeline.signals import handle, leave
 
 # First argument of ``./reproduce`` -> module that is run with the remaining arguments.
 HANDED_ON = {
@@ -36,6 +34,9 @@ def _start(command: Sequence[str]) -> NoReturn:
 def main() -> None:
     """Run Snakemake, or the module or program that the first argument selects, and exit."""
     handle(leave)
+    # other modules are not imported at the top: until here, a signal ends this without a word
+    from pdrom.core.environment import settle
+
     settle()
     word = sys.argv[1] if sys.argv[1:] else ""
     if word in HANDED_ON:
@@ -43,14 +44,15 @@ def main() -> None:
     if word == "run":
         _start(sys.argv[2:])
     sys.stderr.write("reproduce: planning\n")
-    # not imported at the top: until the handlers are installed, a signal ends this without a word
+    from logging import getLogger
+
     from study.pipeline.commandline import completed, one_line
     from study.pipeline.failures import plain
 
     with one_line():
         sys.argv = ["snakemake", *completed(sys.argv[1:])]
     if "--verbose" not in sys.argv:
-        logging.getLogger("snakemake.logging").addFilter(plain)
+        getLogger("snakemake.logging").addFilter(plain)
     from snakemake.cli import main as snakemake
 
     snakemake(sys.argv[1:])

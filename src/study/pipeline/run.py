@@ -24,6 +24,7 @@ from study.pipeline.manifest import write_manifest
 from study.pipeline.plan import Plan
 from study.pipeline.progress import Preview
 from study.pipeline.scenes import Coarsen
+from study.pipeline.signals import handle, leave
 from study.pipeline.summary import CONTENTS, configuration, contents, summary
 from study.pipeline.targets import check_targets
 from study.pipeline.tracked import COLUMNS, COSTS, kind_of
@@ -70,8 +71,8 @@ class Run:
 
         A command that runs no job, such as a dry run, needs no lock and works during another run.
         """
-        running.handle(running.leave)
-        JobScheduler.exit_gracefully = staticmethod(running.leave)  # until jobs start
+        handle(leave)
+        JobScheduler.exit_gracefully = staticmethod(leave)  # until jobs start
         with one_line():
             self.command = CommandLine(sys.argv[1:])
             if self.command.looks_only:
@@ -129,11 +130,11 @@ class Run:
             except OSError as error:
                 sys.exit(f"pdrom: {running.FOLDER}/run.pipe: cannot be made ({error.strerror})")
             start_server()
-        running.handle(running.stop(self.failures.note))
+        handle(running.stop(self.failures.note))
 
     def succeed(self, workflow: Any, plan: Plan) -> None:
         """End a successful run: write overview and manifest; print the summary as last output."""
-        running.handle(running.leave)
+        handle(leave)
         try:
             if not self.command.targets:
                 text = contents(self.command, workflow.dag, plan.folders)

@@ -14,30 +14,22 @@ import re
 import shutil
 import signal
 import socket
-import sys
 import threading
 import time
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from typing import NoReturn
 
 import psutil
 
 from pdrom.core.errors import PdromError, reason
+from study.pipeline.signals import handle
 
 FOLDER = Path(".snakemake")
 LOCK = FOLDER / "run.lock"
 SNAKEMAKE_LOCKS = FOLDER / "locks"
 # Jobs that still run this number of seconds after a signal are killed.
 PATIENCE = 5.0
-KEPT = "what is finished is kept, and the same command goes on from there"
-# Signals that end a run, and the words of its last line; its exit code is 128 plus the number.
-ENDINGS = {
-    signal.SIGINT: "interrupted",
-    signal.SIGTERM: "ended by SIGTERM",
-    signal.SIGHUP: "ended by SIGHUP",
-}
 
 
 def blocked(error: OSError) -> str:
@@ -89,13 +81,6 @@ def remove_stale_locks() -> None:
             os.close(hold())
 
 
-def leave(number: int, _frame: object = None) -> NoReturn:
-    """Handler of the signal ``number`` while no job runs: end this process with one line."""
-    with suppress(OSError):  # nobody may read the stream any more
-        os.write(sys.stderr.fileno(), ending(number).encode())
-    os._exit(128 + number)
-
-
 def stop(note: Callable[[int], None]) -> Callable[[int, object], None]:
     """Return a handler of signals while jobs run: call ``note``, end all jobs, then the run."""
 
@@ -106,18 +91,6 @@ def stop(note: Callable[[int], None]) -> Callable[[int, object], None]:
         raise KeyboardInterrupt  # Snakemake waits for its jobs, and reports a failed run
 
     return handler
-
-
-def handle(handler: Callable[[int, object], None] | signal.Handlers) -> None:
-    """Install the ``handler`` of all signals in `ENDINGS` that nohup or a shell does not ignore."""
-    for number in ENDINGS:
-        if signal.getsignal(number) is not signal.SIG_IGN:
-            signal.signal(number, handler)
-
-
-def ending(number: int) -> str:
-    """Last line of a run that the signal ``number`` ended."""
-    return f"pdrom: {ENDINGS[signal.Signals(number)]}; {KEPT}\n"
 
 
 def _end_jobs() -> None:
