@@ -2,7 +2,6 @@
 
 import logging
 import re
-import shutil
 import signal
 import sys
 import threading
@@ -30,29 +29,25 @@ _CAUSES = {
     "SIGTERM": "ended by SIGTERM",
     "SIGINT": "interrupted",
 }
-_FULL_DISK = 1 << 18  # free bytes below which the disk counts as full
 
 
-def cause(said: str, output: str, log: str) -> str:
-    """Return the reason why a job ended that wrote no error into its log.
+def cause(said: str, log: str) -> str:
+    """Return the reason why a job ended that wrote no error into its ``log``.
 
-    said : Snakemake's message about the failure, with the exit status or the signal
-    output : file that the job was making; the reason may be that its disk is full
-    log : path of the job's log, which the text names if the reason is not known
+    ``said`` is Snakemake's message about the failure, with the exit status or the signal.
     """
-    folder = next((parent for parent in Path(output).parents if parent.is_dir()), Path())
-    if "No space left on device" in said or shutil.disk_usage(folder).free < _FULL_DISK:
+    if "No space left on device" in said:
         return "no space left on the disk"
     if slurm := _SLURM_STATUS.search(said):
         return f"SLURM says {slurm[1].lower().replace('_', ' ')}"
-    found = _ENDING.search(said)
-    if found is None:
+    if not (found := _ENDING.search(said)):
         return f"it ended without an error message, see {log}"
-    if found["status"] == str(GONE):
+    status = int(found["status"] or 0)
+    if status == GONE:
         return "the process that jobs start from is gone: out of memory?"
-    name = found["signal"] or _SIGNALS.get(int(found["status"]))
+    name = found["signal"] or _SIGNALS.get(status)
     if name is None:
-        return f"exit status {found['status']}, see {log}"
+        return f"exit status {status}, see {log}"
     return _CAUSES.get(name, f"crashed ({name}), see {log}")
 
 
@@ -82,7 +77,7 @@ class Failures(logging.Handler):
             if errors := _ERROR.findall(self._written(log)):
                 self._lines.append(f"{job} failed: {errors[-1]}")
             elif not record.indent:  # all jobs of a failed batch are indented, finished ones, too
-                why = cause(said, output, log)
+                why = cause(said, log)
                 self._lines.append(f"{job} failed while making {output}: {why}")
         elif event == LogEvent.ERROR:
             self._said[record.thread] = text

@@ -18,7 +18,6 @@ REASONS = {
     "Set of input files has changed": "other input files",
     "Code has changed": "script has changed",
     "Params have changed": "settings or code have changed",
-    "Software environment definition has changed": "environment has changed",
     "Input files updated by another job": FOLLOWS,
 }
 
@@ -89,19 +88,14 @@ class Preview(logging.Handler):
 
     def text(self) -> str:
         """Text with one line per rule, then the totals; empty if no job would run."""
-        if not self._jobs:
-            return ""
-        width = max(map(len, self._jobs))
-        lines = [
-            f"{count:>5} {rule:<{width}}  {', '.join(sorted(self._reasons[rule]))}"
+        width = max(map(len, self._jobs), default=0)
+        text = "".join(
+            f"{count:>5} {rule:<{width}}  {', '.join(sorted(self._reasons[rule]))}\n"
             for rule, count in self._jobs.items()
-        ]
-        wall = f"{rounded(self._wall)} on {self._cores} core{'s' * (self._cores > 1)}"
-        lines.append(
-            f"pdrom: {sum(self._jobs.values())} jobs, {wall}, "
-            f"{rounded(self._processor)} of processor time"
         )
-        return "\n".join(lines) + "\n"
+        wall = f"{rounded(self._wall)} on {self._cores} core{'s' * (self._cores > 1)}"
+        total = f"pdrom: {sum(self._jobs.values())} jobs, {wall}, {rounded(self._processor)}"
+        return f"{text}{total} of processor time\n" if text else ""
 
 
 def shortened(reason: str) -> set[str]:

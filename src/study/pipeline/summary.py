@@ -1,10 +1,9 @@
 """Texts about a finished run: the last lines it prints, and the overview results/contents.md.
 
-The overview lists every claim, figure, table and section of the manuscript, with the processor
-minutes of its jobs and the command line that makes it. Figure captions and table columns follow.
+The overview lists every claim, figure and table, and the manuscript, with the processor minutes of
+its jobs and the command line that makes it. Figure captions and table columns follow.
 """
 
-import os
 import shlex
 import time
 from collections.abc import Iterator, Sequence
@@ -13,6 +12,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import psutil
+from snakemake.utils import available_cpu_count
 
 from pdrom.core.store import Condition, check_file, read_table
 from study.artifact import paths
@@ -20,8 +20,6 @@ from study.artifact.logs import usage_of
 from study.artifact.reads import Every, ProjectFile, Read, Recorded, Setting, TableOf
 from study.figures.kit.declaration import declarations
 from study.paper.build import figures_page
-from study.paper.macros import keys_of
-from study.paper.source import source_files
 from study.pipeline.commandline import CommandLine
 from study.pipeline.folders import Folders
 from study.pipeline.plan import Plan
@@ -30,10 +28,6 @@ from study.tables import declared
 from study.tables.claims.rules import load_claims
 from study.tables.kit.declaration import Table
 
-# Processor times of a process and of its ended child processes; not every platform has the latter.
-PROCESSOR = ("user", "system", "children_user", "children_system")
-# A run calls its times worthless if the load average (five minutes, per core) exceeds this value.
-BUSY = 1.7
 TABLES_HEAD = """# Tables
 
 Tables are CSV with one row per observation, SI units unless a unit says otherwise, and an empty
@@ -62,8 +56,7 @@ def processor_seconds() -> float:
     total = 0.0
     for process in (own, *own.children(recursive=True)):
         with suppress(psutil.Error):  # the child may have ended since the list was made
-            times = process.cpu_times()._asdict()
-            total += sum(times.get(kind, 0.0) for kind in PROCESSOR)
+            total += sum(process.cpu_times()[:4])  # also of its ended child processes
     return total
 
 
@@ -82,16 +75,10 @@ def summary(command: CommandLine, plan: Plan) -> str:
         lines.append(f"manuscript: {', '.join(folders.documents.values())}")
         lines.append(f"as pages: {paths.ARTICLE.at(folders.results, name='index.html')}")
         for kind in ("figures", "tables"):
-            files = [next(iter(job.outputs.values())) for job in plan.fixed[kind]]
-            found = sum(Path(file).is_file() for file in files)
-            lines.append(f"{kind}: {found} in {folders.results}/{kind}")
-        lines.append(f"report: {shlex.join(['./reproduce', '--report', 'report.html'])}")
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-    lines.append(
-        f"time: {minutes(wall)} on {cores} cores, {minutes(processor_seconds())} of processor time"
-    )
-    if os.getloadavg()[1] > BUSY * (cores or 1):
-        lines.append("times: worthless, other programs have used the processor, too")
+            lines.append(f"{kind}: {len(plan.fixed[kind])} in {folders.results}/{kind}")
+        lines.append("report: ./reproduce --report report.html")
+    cores, used = available_cpu_count(), processor_seconds()
+    lines.append(f"time: {minutes(wall)} on {cores} cores, {minutes(used)} of processor time")
     return "\n".join(f"pdrom: {line}" for line in lines) + "\n"
 
 
@@ -155,7 +142,7 @@ def _source(read: Read) -> str:
 class Entry(NamedTuple):
     """Line of the overview results/contents.md: a result of the study and how to make it.
 
-    kind : claim, figure, table, section (TeX file whose text contains numbers) or manuscript
+    kind : claim, figure, table or manuscript
     files : paths of the files with the result, in the default configuration
     words : arguments of ``./reproduce`` that make these files
     """
@@ -167,7 +154,7 @@ class Entry(NamedTuple):
 
 
 def entries() -> Iterator[Entry]:
-    """Yield entries of results/contents.md: claims, figures, tables, sections, the manuscript."""
+    """Yield entries of results/contents.md: claims, figures, tables and the manuscript."""
     for name in load_claims(Path("config/claims.yaml")):
         yield Entry("claim", name, (paths.TABLE.at(paths.RESULTS, name="claims"),), ("claims",))
     for name, figure in declarations().items():
@@ -175,16 +162,10 @@ def entries() -> Iterator[Entry]:
         yield Entry(
             "figure", name, (paths.FIGURE.at(paths.RESULTS, name=name),), ("figure", number)
         )
-    tables = {name: paths.TABLE.at(paths.RESULTS, name=name) for name in declared()}
-    # a name that a table and a figure share would request both: request this table by its path
-    words = {name: path if name in declarations() else name for name, path in tables.items()}
-    for name, path in tables.items():
-        yield Entry("table", name, (path,), (words[name],))
-    for source in source_files(Path()):
-        keys = keys_of(Path(source).read_text(encoding="utf-8"))
-        if held := sorted({key.partition("|")[0] for key in keys} & tables.keys()):
-            files, targets = (tuple(names[name] for name in held) for names in (tables, words))
-            yield Entry("section", Path(source).stem, files, targets)
+    for name in declared():
+        path = paths.TABLE.at(paths.RESULTS, name=name)
+        # a name that a table and a figure share would request both: request this table by its path
+        yield Entry("table", name, (path,), (path if name in declarations() else name,))
     documents = tuple(Folders().documents.values())
     yield Entry("manuscript", documents[0], documents, ())
 

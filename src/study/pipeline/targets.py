@@ -68,10 +68,9 @@ def own_file(path: str, folders: Folders) -> str:
 
 
 def check_targets(plan: Plan, targets: Iterable[str], rules: Sequence[Any]) -> None:
-    """Raise ConfigurationError if no rule makes a target, or its scene, group ... is unknown.
+    """Raise ConfigurationError if none of Snakemake's ``rules`` makes one of ``targets``.
 
-    targets : names of rules, and paths, from the command line
-    rules : Snakemake's rules
+    A target is the name of a rule, or a path whose scene, group ... must be known.
     """
     own = {rule.name for rule in rules if not rule.has_wildcards()}
     for target in targets:
@@ -88,11 +87,7 @@ def check_targets(plan: Plan, targets: Iterable[str], rules: Sequence[Any]) -> N
 
 
 def _allowed(study: Study, label: str, before: Mapping[str, str]) -> Collection[str] | None:
-    """Allowed values of ``label`` in a path, or None if every value is allowed.
-
-    ``label`` is a wildcard of the path; only scene, group, method, basis and mesh are restricted.
-    ``before`` maps wildcards of the path to their values: allowed groups depend on its scene.
-    """
+    """Allowed values of ``label`` behind the labels ``before`` in a path; None allows every one."""
     match label:
         case "scene":
             return {*scene_names(study.root), *study.scenes}
@@ -109,14 +104,8 @@ def _allowed(study: Study, label: str, before: Mapping[str, str]) -> Collection[
 
 def _unknown(plan: Plan, target: str, rules: Collection[str]) -> str:
     """Return why ``target`` is unknown, for a message; suggestions may be names of ``rules``."""
-    scenes = {*scene_names(plan.study.root), *plan.study.scenes}
-    if target in scenes:
-        example = paths.FULL_ORDER.at(plan.results, scene=target, run="train")
-        return f"a scene; name one of its files, as {example}"
-    known = [*declarations(), *plan.tables, *rules, *scenes]
-    if "/" in target:
-        known = list(plan.own_files)
+    known = plan.own_files if "/" in target else [*declarations(), *plan.tables, *rules]
     return (
-        f"nothing makes it{suggestion(target, known)}; "
-        f"targets are names of figures and tables, and files below {plan.results}"
+        f"nothing makes it{suggestion(target, known)}; targets are names of figures and tables, "
+        f"and files, as {paths.FULL_ORDER.at(plan.results, scene='SCENE', run='train')}"
     )

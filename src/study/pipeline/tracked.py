@@ -14,6 +14,7 @@ rows : copies of some tables of the long study ``config/extended.yaml``; the sam
 import sys
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
@@ -50,25 +51,18 @@ def measured_costs(results: str, coarse: str) -> pd.DataFrame:
 
     results, coarse : results folders of the full study and of a study with coarse meshes
     """
-    full = _used(results).groupby("kind")
-    columns = [
-        full.processor.mean().round(2),
-        _used(coarse).groupby("kind").processor.mean().round(2),
-        full.wall.max().round(1),
-        full.memory.max().round().astype(int),
-    ]
-    return pd.concat(columns, axis=1, keys=COLUMNS[1:]).reset_index()
 
+    def used(folder: str) -> Any:
+        logs = {str(log): usage_of(log) for log in sorted(Path(folder, "logs").rglob("*.log"))}
+        rows = [{"kind": kind_of(log, folder), **vars(use)} for log, use in logs.items() if use]
+        if not rows:
+            raise PdromError(f"{folder}/logs: no job says what it used; run the study first")
+        return pd.DataFrame(rows).groupby("kind")
 
-def _used(results: str) -> pd.DataFrame:
-    rows = [
-        {"kind": kind_of(str(log), results), **vars(used)}
-        for log in sorted(Path(results, "logs").rglob("*.log"))
-        if (used := usage_of(log)) is not None
-    ]
-    if not rows:
-        raise PdromError(f"{results}/logs: no job says what it used; run the study first")
-    return pd.DataFrame(rows)
+    full = used(results)
+    means = [each.processor.mean().round(2) for each in (full, used(coarse))]
+    most = [full.wall.max().round(1), full.memory.max().round().astype(int)]
+    return pd.concat([*means, *most], axis=1, keys=COLUMNS[1:]).reset_index()
 
 
 def recorded_verdicts(claims: Path, rules: Path) -> pd.DataFrame:
@@ -89,18 +83,19 @@ def dated(path: Path, column: str) -> pd.DataFrame:
 
 def updated(word: str) -> dict[Path, pd.DataFrame]:
     """Map files to their new content, for "costs", "replication" or "rows"."""
-
-    def results(*configfiles: str) -> str:
-        return folders(configfiles, []).results
-
-    if word == "costs":
-        return {COSTS: measured_costs(results(), results("config/tiny.yaml"))}
-    if word == "replication":
-        claims = TABLE.at(results("config/replication.yaml"), name="claims")
-        return {Path(RECORDED): recorded_verdicts(Path(claims), Path(RULES))}
-    if word == "rows":
-        tables = {name: TABLE.at(results("config/extended.yaml"), name=name) for name in KEPT}
-        return {Path(RECORD.format(name)): dated(Path(t), "recorded") for name, t in tables.items()}
+    study, tiny, replication, extended = (
+        folders([f"config/{name}.yaml"], []).results
+        for name in ("default", "tiny", "replication", "extended")
+    )
+    match word:
+        case "costs":
+            return {COSTS: measured_costs(study, tiny)}
+        case "replication":
+            claims = Path(TABLE.at(replication, name="claims"))
+            return {Path(RECORDED): recorded_verdicts(claims, Path(RULES))}
+        case "rows":
+            tables = {name: Path(TABLE.at(extended, name=name)) for name in KEPT}
+            return {Path(RECORD.format(n)): dated(t, "recorded") for n, t in tables.items()}
     known = choices(word, ["costs", "replication", "rows"])
     raise ConfigurationError(f"tracked: '{word}': unknown{known}")
 
