@@ -10,10 +10,6 @@ from snakemake_interface_logger_plugins.common import LogEvent
 from study.pipeline.progress import Estimate
 
 NOTHING = "Nothing to be done"
-# Parts of Snakemake's messages about failed jobs. Such messages are not printed, because the last
-# lines of a run report all failed jobs.
-JOB_FAULT = "RuleException"
-CLOSING = "At least one job did not complete successfully"
 
 
 class LogHandler(LogHandlerBase):
@@ -31,7 +27,6 @@ class LogHandler(LogHandlerBase):
 
     def __post_init__(self) -> None:
         self._started = self._total = 0
-        self._messages: dict[int, str] = {}
         self._estimate = Estimate({}, 0.0)
 
     def emit(self, record: logging.LogRecord) -> None:
@@ -44,17 +39,16 @@ class LogHandler(LogHandlerBase):
             self._estimate = Estimate(record.expected, record.created)
         elif event == LogEvent.JOB_INFO and not self.common_settings.dryrun:
             self._started += 1
-            what = self._messages[record.jobid] = record.rule_msg or record.rule_name
+            what = record.rule_msg or record.rule_name
             self._write(record, what + self._estimate.words(record.created))
         elif event == LogEvent.JOB_FINISHED:
             self._estimate.finish(record.job_id)
         elif event == LogEvent.GROUP_ERROR:
             self._write(record, f"FAILED: batch {record.groupid}")
         elif event == LogEvent.JOB_ERROR and not getattr(record, "indent", False):
-            what = self._messages.get(record.jobid, record.rule_name)
-            self._write(record, f"FAILED: {what}")
-        elif event == LogEvent.ERROR:
-            news = record.exception != JOB_FAULT and CLOSING not in text
+            self._write(record, f"FAILED: {record.rule_msg or record.rule_name}")
+        elif event == LogEvent.ERROR:  # the last lines of a run report all failed jobs
+            news = record.exception != "RuleException"
         if news:
             sys.stderr.write(text + "\n")
 

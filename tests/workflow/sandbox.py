@@ -54,9 +54,7 @@ class Sandbox:
 
     def copy(self, folder: Path) -> "Sandbox":
         """The same state, times of files included, in another folder."""
-        # a pipe of the run cannot be copied; the next run makes its own
-        pipes = shutil.ignore_patterns("run.pipe")
-        shutil.copytree(self.folder, folder, symlinks=True, ignore=pipes)
+        shutil.copytree(self.folder, folder, symlinks=True)
         return Sandbox(folder)._with_environment()
 
     def _with_environment(self) -> "Sandbox":

@@ -14,12 +14,14 @@ import signal
 import subprocess
 from pathlib import Path
 
+import psutil
 import pytest
-from checkout import write_sheet
+from checkout import only_line, write_sheet
 from sandbox import MICRO_FILE, Sandbox, kill_all, wait_for
 
 from pdrom.core.store import checksum_path
 from places import MICRO_MANUSCRIPT, MICRO_RESULTS
+from study.pipeline.signals import ENDINGS, KEPT
 
 TABLE = f"{MICRO_RESULTS}/tables/reconstruction_error.csv"
 SNAPSHOTS = f"{MICRO_RESULTS}/snapshots/spring_oop/spring.h5"
@@ -149,23 +151,37 @@ def test_jobs_that_survive_their_run_do_no_harm(undisturbed, fresh):
 
 @slow
 @pytest.mark.parametrize(
-    ("end", "kind", "said"),
+    ("send", "number", "kind"),
     [
-        (lambda run: os.killpg(run.pid, signal.SIGINT), "slow", "pdrom: interrupted\n"),
-        # one of its jobs would never end by itself
-        (subprocess.Popen.terminate, "hold", "pdrom: ended by SIGTERM\n"),
+        (os.killpg, signal.SIGINT, "slow"),
+        (os.killpg, signal.SIGHUP, "hold"),
+        (os.kill, signal.SIGTERM, "hold"),  # one of its jobs would never end by itself
     ],
-    ids=["interrupted", "SIGTERM to the run alone"],
+    ids=["interrupted", "SIGHUP to all", "SIGTERM to the run alone"],
 )
-def test_a_run_that_is_ended_ends_its_jobs_and_goes_on(undisturbed, fresh, end, kind, said):
+def test_a_run_that_is_ended_ends_its_jobs_and_goes_on(undisturbed, fresh, send, number, kind):
     process = _caught_writing(fresh, "fom", kind)
-    end(process)
+    send(process.pid, number)
     output, _ = process.communicate(timeout=60)
-    assert process.returncode == 130
-    assert last_lines(output).startswith(said)
-    assert ("pdrom: SIGTERM: ending the jobs that run\n" in output) == (kind == "hold")
-    assert "Traceback" not in output
+    assert process.returncode == 128 + number
+    assert only_line(output) == f"pdrom: {ENDINGS[number]}; {KEPT}"
     assert kind == "hold" or not fresh.temporaries()
+    heals(fresh, undisturbed)
+
+
+@slow
+def test_a_run_whose_fork_server_is_killed_says_so_and_goes_on(undisturbed, fresh):
+    process = _caught_writing(fresh, "fom", "hold")
+    (server,) = (
+        child
+        for child in psutil.Process(process.pid).children()
+        if os.getsid(child.pid) == child.pid
+    )
+    server.kill()
+    output, _ = process.communicate(timeout=60)
+    assert process.returncode == 1
+    assert "pdrom: job fom failed while making" in last_lines(output)
+    assert ": the process that jobs start from is gone: out of memory?" in last_lines(output)
     heals(fresh, undisturbed)
 
 

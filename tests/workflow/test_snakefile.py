@@ -91,17 +91,6 @@ def finished(finished_once: Checkout, plan: dict[str, Made]) -> Iterator[Checkou
         os.utime(path, ns=(stat.st_atime_ns, stat.st_mtime_ns))
 
 
-def test_the_contents_count_the_jobs_of_a_run(finished, plan):
-    text = (finished.folder / MICRO_RESULTS / "contents.md").read_text("utf-8")
-    rows = [[cell.strip() for cell in line.split("|")] for line in text.splitlines()]
-    listed = [row for row in rows if len(row) == 9 and "./reproduce" in row[3]]
-    jobs = {(kind, name): int(count) for _, kind, name, _, count, *_ in listed}
-    logs = {plan[file].log for file in needed(plan, MICRO_MANUSCRIPT)}
-    assert jobs["manuscript", "paper/main.pdf"] == len(logs)
-    assert len({count for (kind, _), count in jobs.items() if kind == "figure"}) > 5
-    assert {row[5] for row in listed} == {""}  # nothing has run
-
-
 def test_a_fresh_clone_plans_the_whole_study_beside_a_run_and_starts_no_other(clean, monkeypatch):
     """Tables and figures, and the manuscript in the end. This process holds the lock."""
     monkeypatch.chdir(clean.folder)

@@ -1,4 +1,4 @@
-r"""Conversion of the mark-up of titles and captions to TeX, plain text and reStructuredText.
+r"""Conversion of the mark-up of titles and captions to TeX and plain text.
 
 In the mark-up, a name between backticks is set in typewriter, ``$r \le 20$`` is mathematics, and
 ``{key}`` stands for the value of a setting of the configuration.
@@ -43,15 +43,6 @@ def to_tex(text: str) -> str:
 def to_plain(text: str) -> str:
     """Convert the mark-up ``text`` to plain words."""
     return _converted(text, str, str, _plain_mathematics)
-
-
-def to_rst(text: str) -> str:
-    """Convert ``text`` (mark-up of titles and captions) to one line of reStructuredText.
-
-    Every punctuation character gets a backslash, so that none has a special meaning.
-    """
-    words = " ".join(to_plain(text).split())
-    return re.sub(r"([^\w\s]|_)", r"\\\1", words)
 
 
 def _converted(text: str, words: _Words, name: _Words, mathematics: _Words) -> str:

@@ -87,10 +87,7 @@ class Failures(logging.Handler):
         self._stopped = number
 
     def end(self) -> tuple[str, int]:
-        """Return the last lines of a failed run, and its exit status.
-
-        They repeat each failed job's error, as Snakemake prints many lines after its own message.
-        """
+        """Return the last lines of a failed run, with each failed job's error, and exit status."""
         if self._stopped:  # jobs that failed meanwhile were ended, too
             return ending(self._stopped), 128 + self._stopped
         return "\n".join([*dict.fromkeys(self._lines), ADVICE]) + "\n", 1

@@ -8,27 +8,16 @@ arguments to pytest; ``run`` starts a program found on PATH, such as pdrom.
 
 import os
 import sys
-from collections.abc import Sequence
-from typing import NoReturn
 
 from study.pipeline.signals import handle, leave
 
-# First argument of ``./reproduce`` -> module that is run with the remaining arguments.
+# First argument of ``./reproduce`` -> program that is run with the remaining arguments.
 HANDED_ON = {
-    "test": "pytest",
-    "verify": "study.verification.command",
-    "bundle": "study.verification.bundle",
+    "test": (sys.executable, "-m", "pytest"),
+    "verify": (sys.executable, "-m", "study.verification.command"),
+    "bundle": (sys.executable, "-m", "study.verification.bundle"),
+    "run": (),
 }
-
-
-def _start(command: Sequence[str]) -> NoReturn:
-    """Replace this process by program ``command[0]``, found on PATH, with the other arguments."""
-    if not command:
-        sys.exit("pdrom: run: no program is named, as in: ./reproduce run pdrom --help")
-    try:
-        os.execvp(command[0], list(command))
-    except OSError as error:
-        sys.exit(f"pdrom: run: {command[0]}: {error.strerror}")
 
 
 def main() -> None:
@@ -38,11 +27,14 @@ def main() -> None:
     from pdrom.core.environment import settle
 
     settle()
-    word = sys.argv[1] if sys.argv[1:] else ""
-    if word in HANDED_ON:
-        _start([sys.executable, "-m", HANDED_ON[word], *sys.argv[2:]])
-    if word == "run":
-        _start(sys.argv[2:])
+    if sys.argv[1:] and sys.argv[1] in HANDED_ON:
+        command = [*HANDED_ON[sys.argv[1]], *sys.argv[2:]]
+        if not command:
+            sys.exit("pdrom: run: no program is named, as in: ./reproduce run pdrom --help")
+        try:
+            os.execvp(command[0], command)
+        except OSError as error:
+            sys.exit(f"pdrom: run: {command[0]}: {error.strerror}")
     sys.stderr.write("reproduce: planning\n")
     from logging import getLogger
 

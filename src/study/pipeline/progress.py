@@ -93,9 +93,9 @@ class Preview(logging.Handler):
             f"{count:>5} {rule:<{width}}  {', '.join(sorted(self._reasons[rule]))}\n"
             for rule, count in self._jobs.items()
         )
-        wall = f"{rounded(self._wall)} on {self._cores} core{'s' * (self._cores > 1)}"
-        total = f"pdrom: {sum(self._jobs.values())} jobs, {wall}, {rounded(self._processor)}"
-        return f"{text}{total} of processor time\n" if text else ""
+        cores = f"{self._cores} core{'s' * (self._cores > 1)}"
+        total = f"pdrom: {self._jobs.total()} jobs, {rounded(self._wall)} on {cores}"
+        return f"{text}{total}, {rounded(self._processor)} of processor time\n" if text else ""
 
 
 def shortened(reason: str) -> set[str]:

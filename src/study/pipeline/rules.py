@@ -1,18 +1,20 @@
 """Rules of the Snakemake workflow, one for each artifact (function declared to make files)."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from operator import attrgetter
 from types import SimpleNamespace
 from typing import Any
 
-from study.artifact.markup import to_plain, to_rst
+from study.artifact.markup import to_plain
 from study.experiments.kit.base import Experiment
-from study.figures.kit.declaration import Declaration
-from study.paper.build import Numbers, figure_numbers
 from study.pipeline.plan import Job, Plan
-from study.tables.kit.declaration import Table
 
-UNNUMBERED = "–"
+# Kind of job -> name of an output -> its chapter in the report; browsers display a PNG, no PDF.
+SHOWN = {
+    "tables": {"table": "Tables"},
+    "figures": {"png": "Figures"},
+    "article": {"out": "Page", "main": "Page"},
+}
 # Attributes of a job that become parameters of its rule: Snakemake reruns the job if one changes.
 PARAMETERS = ("settings", "content", "code")
 
@@ -20,16 +22,14 @@ PARAMETERS = ("settings", "content", "code")
 def rules(plan: Plan, cores: int) -> Iterator[SimpleNamespace]:
     """Yield the rule of each artifact of ``plan``; jobs that measure times use all ``cores``.
 
-    A yielded object has the attributes of a Snakemake rule; values that differ between jobs are
-    functions of the wildcards. Its attribute ``shown``, for the HTML report, maps names of outputs
+    Values that differ between jobs are functions of the wildcards. ``shown`` maps names of outputs
     to arguments of Snakemake's function ``report``.
     """
     for experiment in plan.experiments.values():
         yield _experiment(plan, experiment, cores)
-    numbers = figure_numbers(plan.study.root)
     for folder, jobs in plan.fixed.items():
         for job in jobs:
-            yield _fixed(plan, job, folder, numbers)
+            yield _fixed(plan, job, folder)
 
 
 def _experiment(plan: Plan, experiment: Experiment, cores: int) -> SimpleNamespace:
@@ -59,50 +59,28 @@ def _experiment(plan: Plan, experiment: Experiment, cores: int) -> SimpleNamespa
     )
 
 
-def _fixed(plan: Plan, job: Job, folder: str, numbers: Mapping[str, Numbers]) -> SimpleNamespace:
+def _fixed(plan: Plan, job: Job, folder: str) -> SimpleNamespace:
     """Snakemake rule of ``job``, the only one of its artifact, with its log in logs/``folder``."""
-    artifact, paths = job.artifact, job.outputs
+    artifact, outputs = job.artifact, job.outputs
     params = {"artifact": artifact.address, **{name: getattr(job, name) for name in PARAMETERS}}
-    shown: dict[str, dict[str, Any]] = {}
-    if isinstance(artifact, Table):
-        message = f"Table {artifact.name}"
-        labels = {"table": artifact.name, "title": artifact.title}
-        shown = {"table": {"category": "Tables", "labels": labels}}
-    elif isinstance(artifact, Declaration):
-        message = f"Figure {artifact.name}"
-        # the report shows the PNG, which every browser can display
-        shown = {"png": _figure(artifact, numbers[artifact.name])}
-        title, caption = artifact.words(plan.study.value)
-        params["rst"] = f"**{to_rst(title)}.** {to_rst(caption)}"
-    elif folder == "article":
-        message = f"Page {paths['out']}" if "out" in paths else artifact.title
-        shown = {name: {"category": "Page"} for name in ("out", "main") if name in paths}
+    message, shown = artifact.title, SHOWN.get(folder, {})
+    if folder in ("tables", "figures"):
+        message = f"{folder.capitalize().removesuffix('s')} {artifact.name}"
+    elif "out" in outputs:
+        message = f"Page {outputs['out']}"
     elif artifact.name == "paper":
-        message = f"Manuscript {', '.join(paths.values())}"
-        shown = {document: {"category": "Manuscript"} for document in paths}
-    else:
-        message = artifact.title
+        message = f"Manuscript {', '.join(outputs.values())}"
+        shown = dict.fromkeys(outputs, "Manuscript")
+    labels = {"name": artifact.name, "title": to_plain(artifact.title)}
     return SimpleNamespace(
         name=artifact.rule,
         input=job.inputs,
-        output=paths,
+        output=outputs,
         log=f"{plan.results}/logs/{folder}/{artifact.name}.log",
         group="report",
         threads=1,
         resources={},
         params=params,
         message=message,
-        shown=shown,
+        shown={n: {"category": c, "labels": labels} for n, c in shown.items() if n in outputs},
     )
-
-
-def _figure(figure: Declaration, numbers: Numbers) -> dict[str, Any]:
-    """Arguments of Snakemake's ``report`` for a figure; reports sort figures by first label."""
-    own = {"paper": numbers.manuscript or UNNUMBERED}
-    if numbers.preprint is None:
-        category, labels = "Figures of this study", {"name": figure.name, **own}
-    else:
-        category = "Figures of the preprint"
-        labels = {"preprint": str(numbers.preprint), **own, "name": figure.name}
-    labels["title"] = to_plain(figure.title)
-    return {"caption": "../report/figure.rst", "category": category, "labels": labels}

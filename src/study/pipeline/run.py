@@ -19,13 +19,13 @@ from study.pipeline import running
 from study.pipeline.commandline import CommandLine, one_line, remember
 from study.pipeline.failures import Failures
 from study.pipeline.fingerprint import memory
-from study.pipeline.fork_server import hold_pipe, start_server
+from study.pipeline.fork_server import start_server
 from study.pipeline.manifest import write_manifest
 from study.pipeline.plan import Plan
 from study.pipeline.progress import Preview
 from study.pipeline.scenes import Coarsen
 from study.pipeline.signals import handle, leave
-from study.pipeline.summary import CONTENTS, configuration, contents, summary
+from study.pipeline.summary import CONTENTS, contents, summary
 from study.pipeline.targets import check_targets
 from study.pipeline.tracked import COLUMNS, COSTS, kind_of
 from study.pipeline.unfit import MISSING, UNUSUAL, faults, force
@@ -75,9 +75,7 @@ class Run:
         JobScheduler.exit_gracefully = staticmethod(leave)  # until jobs start
         with one_line():
             self.command = CommandLine(sys.argv[1:])
-            if self.command.looks_only:
-                running.remove_stale_locks()
-            else:
+            if not self.command.looks_only:
                 running.hold()
                 remember(self.command)
         atexit.register(memory().save)
@@ -87,9 +85,8 @@ class Run:
     def check(self, plan: Plan, workflow: Any, cores: int) -> None:
         """Check that requested targets and report can be made; let a dry run print a list of jobs.
 
-        Snakemake is told to make results again that do not fit ``plan`` (see `faults`). A run sets
-        those aside that are damaged or another's. ``cores`` is the number of cores of the run.
-        Raises ConfigurationError if a target or the report cannot be made.
+        Results that do not fit ``plan`` (see `faults`) are made again; a run sets those aside that
+        are damaged or another's. Raises ConfigurationError if target or report cannot be made.
         """
         check_targets(plan, self.command.targets, list(workflow.rules))
         reports = self.command.report and not self.command.targets
@@ -107,16 +104,10 @@ class Run:
             logging.getLogger("snakemake.logging").addHandler(preview)
             atexit.register(lambda: sys.stdout.write(preview.text()))
 
-    def title(self, plan: Plan) -> str:
-        """Name of the run's configuration, followed by its differences from the full study."""
-        named, words = configuration(self.command), plan.study.apart
-        return f"{named} ({words})" if words else named
-
     def start(self, workflow: Any, plan: Plan) -> None:
         """Log the expected times of jobs, and start the fork server if jobs run on this machine."""
-        # Remove the limit on the rate of job starts. With a limit, Snakemake starts a timer at each
-        # selection of jobs, which triggers another selection and another timer. At the end of a run
-        # these timers use a third of a core, and the process waits for the last one.
+        # With a limit on the rate of starts, each selection of jobs starts a timer, which selects
+        # again: at the end of a run, timers use a third of a core, and the process waits for them.
         workflow.scheduler.job_rate_limiter = None
         if not any(Path(os.environ.get("NUMBA_CACHE_DIR", "")).glob("dynamics*/*.nbi")):
             sys.stderr.write("pdrom: the first jobs compile kernels (once, some minutes)\n")
@@ -125,20 +116,15 @@ class Run:
             write_text(json.dumps(planned.plan()), planned.PLAN, with_checksum=False)
         os.environ[planned.KEPT] = str(planned.PLAN.absolute())
         if workflow.local_exec:
-            try:
-                hold_pipe(running.FOLDER / "run.pipe")
-            except OSError as error:
-                sys.exit(f"pdrom: {running.FOLDER}/run.pipe: cannot be made ({error.strerror})")
             start_server()
         handle(running.stop(self.failures.note))
 
-    def succeed(self, workflow: Any, plan: Plan) -> None:
+    def succeed(self, plan: Plan) -> None:
         """End a successful run: write overview and manifest; print the summary as last output."""
         handle(leave)
         try:
             if not self.command.targets:
-                text = contents(self.command, workflow.dag, plan.folders)
-                write_text(text, CONTENTS.at(plan.results))
+                write_text(contents(self.command, plan.results), CONTENTS.at(plan.results))
             write_manifest(plan, self.command.configuration)
             for path, fault in faults(plan, self.command.targets).items():
                 raise StorageError(f"{path}: {fault} since this run; the next run makes it again")

@@ -74,13 +74,6 @@ def _advice(holder: str) -> str:
     return "wait for its end, -n works meanwhile"
 
 
-def remove_stale_locks() -> None:
-    """Delete the lock files that a killed run of Snakemake left, unless a run is at work."""
-    if SNAKEMAKE_LOCKS.is_dir():
-        with suppress(PdromError):
-            os.close(hold())
-
-
 def stop(note: Callable[[int], None]) -> Callable[[int, object], None]:
     """Return a handler of signals while jobs run: call ``note``, end all jobs, then the run."""
 

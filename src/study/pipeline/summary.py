@@ -1,29 +1,26 @@
 """Texts about a finished run: the last lines it prints, and the overview results/contents.md.
 
-The overview lists every claim, figure and table, and the manuscript, with the processor minutes of
-its jobs and the command line that makes it. Figure captions and table columns follow.
+The overview lists every claim, figure and table, and the manuscript, with the command line that
+makes it. Figure captions and table columns follow.
 """
 
 import shlex
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, NamedTuple
 
 import psutil
 from snakemake.utils import available_cpu_count
 
 from pdrom.core.store import Condition, check_file, read_table
 from study.artifact import paths
-from study.artifact.logs import usage_of
-from study.artifact.reads import Every, ProjectFile, Read, Recorded, Setting, TableOf
 from study.figures.kit.declaration import declarations
 from study.paper.build import figures_page
 from study.pipeline.commandline import CommandLine
 from study.pipeline.folders import Folders
 from study.pipeline.plan import Plan
-from study.pipeline.targets import PREPRINT, own_file
+from study.pipeline.targets import PREPRINT
 from study.tables import declared
 from study.tables.claims.rules import load_claims
 from study.tables.kit.declaration import Table
@@ -42,18 +39,16 @@ HEAD = """\
 # Contents
 
 Written by the run of {configuration}.
-Minutes are processor time of all jobs that an entry needs, from nothing; empty where a job was not
-measured by this run.
+With `-n`, a command says how many jobs and minutes an entry needs.
 
-| kind | name | command | jobs | minutes | as published | beyond |
-|---|---|---|---|---|---|---|
+| kind | name | command | as published | beyond |
+|---|---|---|---|---|
 """
 
 
 def processor_seconds() -> float:
     """Processor seconds used until now by this process and its child processes."""
-    own = psutil.Process()
-    total = 0.0
+    own, total = psutil.Process(), 0.0
     for process in (own, *own.children(recursive=True)):
         with suppress(psutil.Error):  # the child may have ended since the list was made
             total += sum(process.cpu_times()[:4])  # also of its ended child processes
@@ -106,11 +101,10 @@ def verdicts_in(results: str) -> dict[str, tuple[str, str]]:
 
 def _section(table: Table) -> str:
     """Markdown text that describes a table and its columns."""
-    sources = dict.fromkeys(_source(read) for read in table.reads.values())
     lines = [
         f"## {table.name}",
         "",
-        f"{table.title}.\nMade by `{table.function.__module__}` from {', '.join(sources)}.",
+        f"{table.title}.\nMade by `{table.function.__module__}`.",
         "",
         "| column | type | unit | timed | compared as | meaning |",
         "|---|---|---|---|---|---|",
@@ -124,87 +118,28 @@ def _section(table: Table) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _source(read: Read) -> str:
-    match read:
-        case Every(place):
-            return f"`{place.pattern}`"
-        case TableOf(name):
-            return f"table [{name}](#{name})"
-        case Setting(key):
-            return f"setting `{key}`"
-        case ProjectFile(path):
-            return f"`{path}`"
-        case Recorded():
-            return "recorded rows"
-    raise TypeError(f"{read} has no words")
-
-
-class Entry(NamedTuple):
-    """Line of the overview results/contents.md: a result of the study and how to make it.
-
-    kind : claim, figure, table or manuscript
-    files : paths of the files with the result, in the default configuration
-    words : arguments of ``./reproduce`` that make these files
-    """
-
-    kind: str
-    name: str
-    files: tuple[str, ...]
-    words: tuple[str, ...]
-
-
-def entries() -> Iterator[Entry]:
-    """Yield entries of results/contents.md: claims, figures, tables and the manuscript."""
+def entries() -> Iterator[tuple[str, str, tuple[str, ...]]]:
+    """Yield kind, name and words for ``./reproduce`` of claims, figures, tables, the manuscript."""
     for name in load_claims(Path("config/claims.yaml")):
-        yield Entry("claim", name, (paths.TABLE.at(paths.RESULTS, name="claims"),), ("claims",))
+        yield "claim", name, ("claims",)
     for name, figure in declarations().items():
-        number = f"{PREPRINT}{figure.number}" if figure.number else name
-        yield Entry(
-            "figure", name, (paths.FIGURE.at(paths.RESULTS, name=name),), ("figure", number)
-        )
+        yield "figure", name, ("figure", f"{PREPRINT}{figure.number}" if figure.number else name)
     for name in declared():
-        path = paths.TABLE.at(paths.RESULTS, name=name)
         # a name that a table and a figure share would request both: request this table by its path
-        yield Entry("table", name, (path,), (path if name in declarations() else name,))
-    documents = tuple(Folders().documents.values())
-    yield Entry("manuscript", documents[0], documents, ())
+        path = paths.TABLE.at(paths.RESULTS, name=name)
+        yield "table", name, (path if name in declarations() else name,)
+    yield "manuscript", Folders().manuscript, ()
 
 
-def contents(command: CommandLine, dag: Any, folders: Folders) -> str:
-    """Return the text of results/contents.md after a run that has made all files.
-
-    command : command line that started the run
-    dag : Snakemake's graph of all jobs of the study
-    folders : folders of the study's results
-    """
-    listed, verdicts = list(entries()), verdicts_in(folders.results)
-    lines = []
-    for entry, (jobs, minutes) in zip(listed, costs(listed, dag, folders), strict=True):
-        words = shlex.join(["./reproduce", *entry.words, *command.configuration])
-        measured = "" if minutes is None else f"{minutes:.1f}"
-        judged = verdicts.get(entry.name, ("", "")) if entry.kind == "claim" else ("", "")
-        cells = (entry.kind, entry.name, f"`{words}`", f"{jobs}", measured, *judged)
-        lines.append(f"| {' | '.join(cells)} |\n")
+def contents(command: CommandLine, results: str) -> str:
+    """Return the text of results/contents.md after the run of ``command`` made all ``results``."""
+    verdicts, lines = verdicts_in(results), []
+    for kind, name, words in entries():
+        line = shlex.join(["./reproduce", *words, *command.configuration])
+        judged = verdicts.get(name, ("", "")) if kind == "claim" else ("", "")
+        lines.append(f"| {' | '.join((kind, name, f'`{line}`', *judged))} |\n")
     head = HEAD.format(configuration=configuration(command)) + "".join(lines)
     tables = declared().values()
     names = "\n".join(f"- [{table.name}](#{table.name}): {table.title}" for table in tables)
     described = [TABLES_HEAD, f"{names}\n", *map(_section, tables)]
     return "\n".join([head, figures_page(Path()), *described])
-
-
-def costs(
-    listed: Sequence[Entry], dag: Any, folders: Folders
-) -> Iterator[tuple[int, float | None]]:
-    """Yield for each entry the number of jobs that make its files, and their processor minutes.
-
-    Jobs that make inputs of these jobs count as well. The minutes are None if the log of one of the
-    jobs does not report its time. ``dag`` is Snakemake's graph of jobs.
-    """
-    makers = {str(file): job for job in dag.jobs for file in job.output}
-    used = {job: usage_of(job.log[0]) for job in makers.values()}
-    for entry in listed:
-        own = {makers[own_file(file, folders)] for file in entry.files}
-        needed = [used[job] for job in dag.bfs(dag.dependencies, *own)]
-        measured = [usage.processor for usage in needed if usage is not None]
-        whole = len(measured) == len(needed)
-        yield len(needed), sum(measured) / 60.0 if whole else None

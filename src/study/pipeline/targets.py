@@ -4,7 +4,7 @@ A target is the number or name of a figure, the name of a table or of a rule, or
 """
 
 import sys
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -79,27 +79,19 @@ def check_targets(plan: Plan, targets: Iterable[str], rules: Sequence[Any]) -> N
         if not any(rule.is_producer(target) for rule in rules):
             raise ConfigurationError(f"target '{target}': {_unknown(plan, target, own)}")
         for labels in paths.labels_in(target, plan.results):
-            for label, value in labels.items():
-                allowed = _allowed(plan.study, label, labels)
-                if allowed is not None and value not in allowed:
-                    hint = suggestion(value, allowed)
-                    raise ConfigurationError(f"target '{target}': unknown {label} '{value}'{hint}")
+            for label, allowed in _allowed(plan.study, labels):
+                if label in labels and labels[label] not in allowed:
+                    what = f"unknown {label} '{labels[label]}'{suggestion(labels[label], allowed)}"
+                    raise ConfigurationError(f"target '{target}': {what}")
 
 
-def _allowed(study: Study, label: str, before: Mapping[str, str]) -> Collection[str] | None:
-    """Allowed values of ``label`` behind the labels ``before`` in a path; None allows every one."""
-    match label:
-        case "scene":
-            return {*scene_names(study.root), *study.scenes}
-        case "group":
-            return study.scene(before["scene"]).reduce
-        case "method":
-            return study.methods
-        case "basis":
-            return {spec.basis_id for spec in study.methods.values()}
-        case "mesh":
-            return study.every_mesh
-    return None
+def _allowed(study: Study, labels: Mapping[str, str]) -> Iterator[tuple[str, Collection[str]]]:
+    """Yield the labels of a path that are restricted, scenes first, with their allowed values."""
+    yield "scene", {*scene_names(study.root), *study.scenes}
+    yield "method", study.methods
+    yield "basis", {spec.basis_id for spec in study.methods.values()}
+    yield "mesh", study.every_mesh if "mesh" in labels else ()
+    yield "group", study.scene(labels["scene"]).reduce if "group" in labels else ()
 
 
 def _unknown(plan: Plan, target: str, rules: Collection[str]) -> str:

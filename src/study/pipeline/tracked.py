@@ -2,13 +2,11 @@
 
 ``./reproduce run python -m study.pipeline.tracked WORD`` updates, for each WORD:
 
-costs : `config/reference/job_costs.csv` from the logs of the full and of the tiny study. For each
-    kind of job, it has the mean processor seconds in both studies, and the longest time and largest
-    memory of a job, which the requests of `workflow/profiles/slurm` must cover. The kind is the
-    first part of a log's path below ``logs``: an experiment, ``tables``, ``figures`` ...
+costs : `config/reference/job_costs.csv` from the logs of the full and of the tiny study: for each
+    kind of job, the mean processor seconds in both, and the longest time and largest memory, which
+    the requests of `workflow/profiles/slurm` must cover
 replication : the file of the table `replication` from the claims of ``config/replication.yaml``
-rows : copies of some tables of the long study ``config/extended.yaml``; the same tables of other
-    studies show these recorded rows, too
+rows : tables of the long study ``config/extended.yaml`` whose rows other studies show, too
 """
 
 import sys
@@ -45,11 +43,9 @@ def kind_of(log: str, results: str) -> str:
 
 
 def measured_costs(results: str, coarse: str) -> pd.DataFrame:
-    """Return a row for each kind of job, with columns `COLUMNS`, from job logs.
+    """Return columns `COLUMNS` of each kind of job, from logs below two folders of results.
 
-    Raises PdromError if no log reports what a job used, for example before the first run.
-
-    results, coarse : results folders of the full study and of a study with coarse meshes
+    The study in ``coarse`` has coarse meshes. Raises PdromError before the first run of a study.
     """
 
     def used(folder: str) -> Any:
@@ -66,10 +62,7 @@ def measured_costs(results: str, coarse: str) -> pd.DataFrame:
 
 
 def recorded_verdicts(claims: Path, rules: Path) -> pd.DataFrame:
-    """Return verdicts and measured values in the table ``claims``, with date and fingerprint.
-
-    The fingerprint is that of the claim's rules in the file ``rules``.
-    """
+    """Return what the table ``claims`` says, with its date and fingerprints of the ``rules``."""
     loaded = load_claims(rules)
     table = dated(claims, "date")[["claim", *MEASURED, "date"]]
     return table.assign(rules=[loaded[claim].fingerprint for claim in table.claim])

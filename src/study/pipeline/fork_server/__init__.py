@@ -6,9 +6,9 @@ scripts by `client.py`, which requests a fork from the server, passes on its str
 and folder, and exits with the status of the fork. If no server answers (on a platform without safe
 forks, or after the server was killed), the client runs the script in its own interpreter.
 
-No job outlives its run, whichever process is killed. If the client or the run is killed, the server
-ends the forks. If the server is killed, the operating system ends the forks, and the client ends
-processes that they had started. A job in its own interpreter ends itself when its run ends.
+No fork outlives its run. If the client or the run is killed, the server ends the forks. If the
+server is killed, the operating system ends the forks, and the client what they had started. A job
+in its own interpreter outlives a killed run, which does no harm.
 """
 
 import os
@@ -20,7 +20,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from study.pipeline.fork_server.client import ADDRESS, PIPE, place_of
+from study.pipeline.fork_server.client import ADDRESS, place_of
 
 # Path of Python's interpreter. The workflow starts scripts by the command from `interpreter`.
 PYTHON = sys.executable
@@ -42,21 +42,6 @@ def interpreter() -> str:
     """Shell command that runs a script in a fork of the server (by means of `client.py`)."""
     client = Path(__file__).with_name("client.py")
     return f"{shlex.quote(PYTHON)} -I -S {shlex.quote(str(client))}"
-
-
-def hold_pipe(place: Path) -> None:
-    """Hold a named pipe open until this process ends; then jobs that no server forked end, too.
-
-    Raises OSError if the file system does not support named pipes.
-
-    place : path of the pipe, which jobs get by an environment variable; an old pipe is replaced
-    """
-    place.unlink(missing_ok=True)
-    os.mkfifo(place)
-    reader = os.open(place, os.O_RDONLY | os.O_NONBLOCK)  # without a reader the next line waits
-    os.open(place, os.O_WRONLY)
-    os.close(reader)
-    os.environ[PIPE] = str(place.absolute())
 
 
 def start_server(libraries: Sequence[str] = LIBRARIES) -> None:

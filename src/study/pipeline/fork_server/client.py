@@ -1,8 +1,6 @@
 """Run a script in a fork of the server, or in this interpreter if no server answers.
 
-This file is started for every job, and imports only a few standard modules to start fast. A script
-that runs without the server ends when the run ends: the run keeps one end of a pipe open (see
-`study.pipeline.fork_server.hold_pipe`), which every platform closes when the run is killed.
+This file is started for every job, and imports only a few standard modules to start fast.
 """
 
 import os
@@ -13,7 +11,6 @@ import sys
 from contextlib import suppress
 
 ADDRESS = "PDROM_JOB_SERVER"
-PIPE = "PDROM_RUN_PIPE"
 ALONE = "--alone"
 GONE = 69  # exit status if the server is gone
 FORWARDED = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -105,29 +102,15 @@ def forward(job: int, number: int) -> None:
 
 
 def run_alone() -> None:
-    """Run the script ``sys.argv[2]`` as main module; kill this process when the run ends."""
+    """Run the script ``sys.argv[2]`` as main module, with the code that the run has planned."""
     import runpy
-    import threading
 
     from study.artifact.planned import import_planned
 
     import_planned()
-    if pipe := os.environ.get(PIPE):
-        threading.Thread(target=end_with, args=(pipe,), daemon=True).start()
     del sys.argv[:2]
     sys.path[0] = os.path.dirname(sys.argv[0])
     runpy.run_path(sys.argv[0], run_name="__main__")
-
-
-def end_with(pipe: str) -> None:
-    """Wait until the run, the only writer of ``pipe``, has ended; then kill this process."""
-    try:
-        # without O_NONBLOCK, open would wait forever if the run, the only writer, has ended
-        number = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
-        os.set_blocking(number, True)
-        os.read(number, 1)
-    finally:
-        os.kill(os.getpid(), signal.SIGKILL)
 
 
 if __name__ == "__main__":

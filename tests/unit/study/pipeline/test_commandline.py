@@ -5,9 +5,16 @@ import pytest
 from pdrom.core.errors import ConfigurationError
 from places import ROOT
 from study.paper.build import figure_numbers
-from study.pipeline.commandline import RECORD, CommandLine, recall, remember
+from study.pipeline.commandline import (
+    LINES,
+    OPTIONS,
+    RECORD,
+    CommandLine,
+    completed,
+    recall,
+    remember,
+)
 from study.pipeline.folders import Folders, folders
-from study.pipeline.front import LINES, OPTIONS, completed
 
 
 @pytest.fixture(autouse=True)
@@ -62,6 +69,36 @@ def test_what_runs_no_job(arguments):
 def test_a_forgotten_separator_is_explained(arguments):
     with pytest.raises(ConfigurationError, match=r"option before 'x' takes every value .*two hyph"):
         parse(arguments)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ("--cores x", "--cores x: .*integer or 'all'"),
+        ("--cores 0", "--cores 0: at least 1"),
+        ("--cores=-1", "--cores -1: at least 1"),
+        ("-j x", "-j x: .*must be integer"),
+        ("-j 0", "--jobs 0: at least 1"),
+        ("--retries -1", "--retries -1: at least 0"),
+        ("--latency-wait x", "--latency-wait.* invalid int value: 'x'"),
+        ("--configfile", "--configfile.* expected at least one"),
+        ("--configfile a.yaml --configfile=b.yaml", "--configfile is given twice"),
+        ("--config a1=b --configfile a.yaml --config b1=c", "--config is given twice"),
+        ("--config", "--config: KEY=VALUE is missing"),
+        ("--config x=1", "--config x=.*no such key"),
+        ("--config =1", "--config =.*no such key"),
+        ("--nonsense", "unrecognized arguments: --nonsense"),
+        ("--set-threads rubbish", "--set-threads rubbish: .*RULE=THREADS"),
+        ("--set-resources rubbish", "--set-resources rubbish: "),
+        ("--rerun-triggers rubbish", "--rerun-triggers.* invalid choice: 'rubbish'"),
+        ("--mode rubbish", "--mode rubbish: "),
+        ("--profile rubbish", r"profile directory given \(rubbish\)"),
+    ],
+)
+def test_a_wrong_option_is_named_with_its_value(arguments, words):
+    with pytest.raises(ConfigurationError, match=words) as caught:
+        parse(arguments)
+    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize(
@@ -143,6 +180,21 @@ def test_a_figure_has_two_numbers_and_a_name(name, document, preprint, asked, ca
 
 
 @pytest.mark.parametrize(
+    "asked",
+    [
+        "figure teaser -n --configfile my.yaml",
+        "-n --configfile my.yaml figure teaser",
+        "figure teaser --configfile my.yaml -n",
+        "--configfile=my.yaml -n -- figure teaser",
+    ],
+)
+def test_a_figure_may_stand_before_and_behind_options(asked):
+    command = CommandLine(completed(asked.split()))
+    assert (command.configfiles, command.plans) == (("my.yaml",), True)
+    assert command.targets == ("results/studies/my/figures/teaser.pdf",)
+
+
+@pytest.mark.parametrize(
     ("asked", "message"),
     [
         (
@@ -154,6 +206,7 @@ def test_a_figure_has_two_numbers_and_a_name(name, document, preprint, asked, ca
         (["figure", "strain_run"], "figure strain_run: .*did you mean 'strain_runs'"),
         # a faulty file is named before Snakemake reads it
         (["--configfile", "none.yaml"], r"none\.yaml: no such configuration file"),
+        (["--configfile", "config"], "config: a folder, name a file in it"),
     ],
 )
 def test_what_does_not_exist_is_said_with_what_there_is(asked, message):

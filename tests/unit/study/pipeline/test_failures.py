@@ -1,14 +1,15 @@
 """The last lines of a failed run: every cause in words of its own."""
 
+import errno
 import logging
 import os
 
 import pytest
 from snakemake_interface_logger_plugins.common import LogEvent
 
-from pdrom.core.errors import INTERRUPTED
 from study.artifact.logs import job_log
-from study.pipeline.failures import ADVICE, Failures, cause
+from study.pipeline.failures import ADVICE, Failures, cause, plain
+from study.pipeline.signals import ENDINGS, KEPT
 
 FOM = "pdrom: job fom failed while making results/x.h5"
 ENDED = "CalledProcessError in file x, line 3:\nCommand 'python x.py' "
@@ -48,14 +49,15 @@ def end(logger):
         (ENDED + "died with <Signals.SIGSEGV: 11>.", "crashed (SIGSEGV), see a.log"),
         (ENDED + "returned non-zero exit status 139.", "crashed (SIGSEGV), see a.log"),
         (ENDED + "returned non-zero exit status 3.", "exit status 3, see a.log"),
+        (ENDED + "exit status 69.", "the process that jobs start from is gone: out of memory?"),
         ("OSError: [Errno 28] No space left on device: 'x'", "no space left on the disk"),
         ("SLURM-job '3' failed, SLURM status is: 'CANCELLED'. x", "SLURM says cancelled"),
         ("SLURM-job '3' failed, SLURM status is: 'OUT_OF_MEMORY'.", "SLURM says out of memory"),
         ("", "it ended without an error message, see a.log"),
     ],
 )
-def test_causes_are_told_apart(said, expected, tmp_path):
-    assert cause(said, f"{tmp_path}/none/x.h5", "a.log") == expected
+def test_causes_are_told_apart(said, expected):
+    assert cause(said, "a.log") == expected
 
 
 @pytest.mark.parametrize(
@@ -99,10 +101,35 @@ def test_every_failed_job_is_named_with_its_error(snakemake, tmp_path):
     assert end(snakemake) == (1, [error, *(f"{FOM}: {cause}" for cause in causes)])
 
 
-@pytest.mark.parametrize("word", ["interrupted", "ended by SIGTERM"])
-def test_an_interrupted_run_says_so_and_no_more(word, snakemake, tmp_path):
-    if word == "ended by SIGTERM":
-        snakemake.failures.note_sigterm()
-    snakemake.info("Terminating processes on user request, this might take some time.")
+@pytest.mark.parametrize("number", ENDINGS)
+def test_a_run_that_a_signal_ended_says_so_and_no_more(number, snakemake):
+    """Not even of a job that failed otherwise, whose next run fails again."""
+    fail(snakemake, "fom", "none.log", ENDED + "returned non-zero exit status 1.")
+    snakemake.failures.note(number)
     fail(snakemake, "pod", "none.log", ENDED + "returned non-zero exit status 130.")
-    assert end(snakemake) == (INTERRUPTED, [f"pdrom: {word}"])
+    assert snakemake.failures.end() == (f"pdrom: {ENDINGS[number]}; {KEPT}\n", 128 + number)
+
+
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [
+        (ValueError("two\nlines"), "pdrom: two lines"),
+        (KeyError("scene"), "pdrom: KeyError: 'scene'"),
+        (
+            OSError(errno.ENOSPC, "full", "a.csv"),
+            "pdrom: a.csv: No space left on device; make room",
+        ),
+        (NotADirectoryError(errno.ENOTDIR, "", "a/b"), "pdrom: a/b: Not a directory; remove what"),
+    ],
+)
+def test_an_error_outside_of_jobs_is_one_line(error, words, snakemake, caplog):
+    snakemake.addFilter(plain)
+    snakemake.addHandler(caplog.handler)
+    try:
+        raise error
+    except type(error) as caught:
+        text = "Traceback\n" + str(caught)
+        snakemake.error(text, extra={"event": LogEvent.ERROR, "exception": "x"})
+    (line,) = caplog.messages
+    assert line.startswith(words)
+    assert "\n" not in line

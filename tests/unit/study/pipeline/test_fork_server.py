@@ -14,7 +14,7 @@ import pytest
 
 from study.pipeline import run as running
 from study.pipeline.fork_server import SUPPORTED, interpreter
-from study.pipeline.fork_server.client import ADDRESS, of_this_user, place_of
+from study.pipeline.fork_server.client import ADDRESS, GONE, of_this_user, place_of
 
 pytestmark = pytest.mark.skipif(not SUPPORTED, reason="no safe forks on this platform")
 
@@ -244,27 +244,7 @@ subprocess.run("echo $PPID; read nothing", shell=True)
     owner = start(f"exec {script(tmp_path, code)} 2>&1")
     job = int(owner.stdout.readline())
     os.kill(psutil.Process(job).ppid(), signal.SIGKILL)
-    assert owner.stdout.read() == "pdrom: the process that jobs start from is gone\nended 1\n"
-    owner.communicate()
-
-
-def test_a_plain_interpreter_ends_with_the_run(tmp_path):
-    """The pipe that it holds as its output closes."""
-    path = tmp_path / "script.py"
-    path.write_text("import os; print('ready', flush=True); os.read(0, 1)")
-    code = f"""
-import subprocess
-from pathlib import Path
-from study.pipeline.fork_server import hold_pipe
-hold_pipe(Path({str(tmp_path / "pipe")!r}))
-subprocess.run({f"{interpreter()} {path}; echo its end"!r}, shell=True)
-"""
-    owner = subprocess.Popen(
-        [sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-    )
-    assert owner.stdout.readline() == "ready\n"
-    owner.kill()
-    assert owner.stdout.read() == "its end\n"
+    assert owner.stdout.read() == f"ended {GONE}\n"
     owner.communicate()
 
 

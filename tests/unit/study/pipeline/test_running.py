@@ -4,10 +4,14 @@ import os
 import signal
 import subprocess
 import sys
+import time
 
+import psutil
 import pytest
 
+from pdrom.core.errors import PdromError
 from study.pipeline import running
+from study.pipeline.signals import ENDINGS, KEPT
 
 HOLDER = """
 import sys, time
@@ -43,16 +47,12 @@ def snakemake_lock() -> None:
 
 def test_the_second_process_names_the_first_whose_locks_go_with_it(other):
     snakemake_lock()
-    with pytest.raises(running.AtWorkError, match=rf"process {other.pid} on .* is at work"):
+    with pytest.raises(PdromError, match=rf"process {other.pid} on .* is at work"):
         running.hold()
     assert running.LOCK.read_text().startswith(f"process {other.pid} ")
-    running.remove_stale_locks()
     assert running.SNAKEMAKE_LOCKS.exists()
     other.kill()
     other.wait()
-    running.remove_stale_locks()
-    assert not running.SNAKEMAKE_LOCKS.exists()
-    snakemake_lock()
     descriptor = running.hold()
     assert running.LOCK.read_text().startswith(f"process {os.getpid()} ")
     assert not running.SNAKEMAKE_LOCKS.exists()
@@ -67,18 +67,40 @@ def test_a_lock_is_not_inherited_by_jobs():
         job.communicate(b"\n")
 
 
-def test_a_folder_that_cannot_be_written_is_named(folder):
-    (folder / ".snakemake").write_text("a file where the folder should be")
-    with pytest.raises(running.AtWorkError, match=r"run\.lock: cannot be written"):
+@pytest.mark.parametrize(
+    ("action", "advice"),
+    [("suspend", "it is stopped: kill -CONT {0} continues it, kill -KILL {0}"), ("resume", "wait")],
+)
+def test_the_second_process_says_what_to_do_about_the_first(other, action, advice):
+    process = psutil.Process(other.pid)
+    getattr(process, action)()
+    while action == "suspend" and process.status() != psutil.STATUS_STOPPED:
+        time.sleep(0.01)
+    with pytest.raises(PdromError, match=f"; {advice.format(other.pid)}"):
         running.hold()
+
+
+def test_what_stands_in_place_of_a_lock_is_named_or_goes(folder):
+    (folder / ".snakemake").write_text("a file where the folder should be")
+    with pytest.raises(PdromError, match=r"run\.lock: cannot be .*\.snakemake: .* remove what"):
+        running.hold()
+    (folder / ".snakemake").unlink()
+    running.LOCK.mkdir(parents=True)
+    with pytest.raises(PdromError, match=r"run\.lock: Is a directory; remove what stands there"):
+        running.hold()
+    running.LOCK.rmdir()
+    running.SNAKEMAKE_LOCKS.touch()
+    os.close(running.hold())
+    assert not running.SNAKEMAKE_LOCKS.exists()
 
 
 # A run with a job in a shell, as Snakemake waits for it; it prints how the job ended.
 RUNS = """
 import os, subprocess, sys
 from study.pipeline import running
+from study.pipeline.signals import handle
 running.PATIENCE = float(sys.argv[1])
-running.stop_at_sigterm(lambda: os.write(1, b"noted\\n"))
+handle(running.stop(lambda number: os.write(1, b"noted %d\\n" % number)))
 job = subprocess.Popen(["sh", "-c", sys.argv[2]], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
 ready = job.stdout.readline()
 try:
@@ -89,21 +111,7 @@ except KeyboardInterrupt:
 """
 
 
-def sigterm(*command: str, reads: bool = True) -> tuple[int, str, str]:
-    """Exit status, output and errors, if one reads them, of a program that gets SIGTERM."""
-    process = subprocess.Popen(
-        [sys.executable, "-c", *command],
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, stdin=subprocess.DEVNULL, text=True,
-    )  # fmt: skip
-    assert process.stdout.readline() == "ready\n"
-    if not reads:
-        process.stderr.close()
-        process.stderr = None
-    process.send_signal(signal.SIGTERM)
-    out, errors = process.communicate()
-    return process.returncode, out, errors
-
-
+@pytest.mark.parametrize("number", ENDINGS)
 @pytest.mark.parametrize(
     ("patience", "job", "ending"),
     [
@@ -112,11 +120,33 @@ def sigterm(*command: str, reads: bool = True) -> tuple[int, str, str]:
     ],
     ids=["ends by it", "does not listen"],
 )
-def test_a_run_ends_its_jobs(patience, job, ending):
-    said = "pdrom: SIGTERM: ending the jobs that run\n"
-    assert sigterm(RUNS, patience, job) == (0, f"noted\n{ending:d}\n", said)
+def test_a_run_that_a_signal_ends_ends_its_jobs(patience, job, ending, number):
+    assert signalled(number, RUNS, patience, job) == (0, f"noted {number}\n{ending:d}\n", "")
 
 
-def test_a_run_whose_reader_is_gone_ends_its_job_too():
-    ended = sigterm(RUNS, "1e6", "echo ready; read nothing", reads=False)
-    assert ended[1] == f"noted\n{-signal.SIGTERM:d}\n"
+LEAVES = (
+    "import os\nfrom study.pipeline.signals import *\nhandle(leave)\nos.write(1, b'ready\\n')\n"
+)
+
+
+@pytest.mark.parametrize("number", ENDINGS)
+@pytest.mark.parametrize("ignores", [False, True])
+def test_while_no_job_runs_a_signal_ends_a_run_with_one_line(number, ignores):
+    """Though sys.stderr is redirected; what nohup ignores stays ignored."""
+    code = "import sys\nsys.stderr = None\n" + LEAVES + "input()"
+    if ignores:
+        code = f"import signal\nsignal.signal({number:d}, signal.SIG_IGN)\n{LEAVES}"
+    line = "" if ignores else f"pdrom: {ENDINGS[number]}; {KEPT}\n"
+    assert signalled(number, code) == (0 if ignores else 128 + number, "", line)
+
+
+def signalled(number: int, *command: str) -> tuple[int, str, str]:
+    """Exit status, output and errors of a program that gets a signal when it is ready."""
+    process = subprocess.Popen(
+        [sys.executable, "-c", *command],
+        stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    assert process.stdout.readline() == "ready\n"
+    process.send_signal(number)
+    out, errors = process.communicate()
+    return process.returncode, out, errors

@@ -80,7 +80,7 @@ def test_what_a_rule_makes_is_a_target(plan):
         ("results/snapshots/strain_oop/strian.h5", "group 'strian', did you mean 'strain'?"),
         ("results/snapshots/strain_oop/spring.h5", "unknown group 'spring'"),
         ("results/reruns/strain_oop/strain/deem.h5", "method 'deem', did you mean 'deim'?"),
-        ("bar_twist", "a scene; name one of its files, as results/fom/bar_twist/train.h5"),
+        ("bar_twist", "files, as results/fom/SCENE/train.h5"),
         ("fom", "nothing makes it"),
         ("something/quite/different", "targets are names of figures and tables"),
     ],
