@@ -172,11 +172,8 @@ def test_a_run_that_is_ended_ends_its_jobs_and_goes_on(undisturbed, fresh, send,
 @slow
 def test_a_run_whose_fork_server_is_killed_says_so_and_goes_on(undisturbed, fresh):
     process = _caught_writing(fresh, "fom", "hold")
-    (server,) = (
-        child
-        for child in psutil.Process(process.pid).children()
-        if os.getsid(child.pid) == child.pid
-    )
+    children = psutil.Process(process.pid).children()
+    (server,) = (child for child in children if os.getsid(child.pid) == child.pid)
     server.kill()
     output, _ = process.communicate(timeout=60)
     assert process.returncode == 1

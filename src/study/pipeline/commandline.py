@@ -48,10 +48,9 @@ RECORD = Path(".snakemake/last_run.json")
 class CommandLine:
     """Options of Snakemake's command line that this project evaluates.
 
-    Raises ConfigurationError if a target directly follows ``--config`` or ``--configfile`` and is
-    read as its value.
+    Raises ConfigurationError for a wrong option, or a target that was read as an option's value.
 
-    arguments : the whole command line; Snakemake parses it, and exits for an unknown option
+    arguments : the whole command line
     configfiles : files given by the option ``--configfile``, in order
     settings : ``key=value`` pairs given by the option ``--config``
     targets : names of files and rules to make
@@ -79,9 +78,7 @@ class CommandLine:
         self.own_output = any(found[name] is not None and found[name] for name in OWN_OUTPUT)
         self.cores = found["cores"] is not None or found["jobs"] is not None
         self.executor: str | None = found["executor"]
-        for key, equals, text in (setting.partition("=") for setting in self.settings):
-            if equals and not KEY.fullmatch(key):
-                raise ConfigurationError(f"--config {key}=...: no such key (see config/README.md)")
+        for key, _, text in (setting.partition("=") for setting in self.settings):
             with suppress(YAMLError):  # Snakemake takes such a value as a text
                 require_as_written(text, "--config", key)
         swallowed = [name for name in self.settings if "=" not in name]
@@ -91,6 +88,9 @@ class CommandLine:
                 f"the option before '{swallowed[0]}' takes every value that follows it; write two "
                 "hyphens before the targets: ./reproduce OPTIONS -- TARGETS"
             )
+        for key in (setting.partition("=")[0] for setting in self.settings):
+            if not KEY.fullmatch(key):
+                raise ConfigurationError(f"--config {key}=...: no such key (see config/README.md)")
 
     @property
     def configuration(self) -> list[str]:
@@ -111,8 +111,7 @@ class CommandLine:
 def parsed(arguments: Sequence[str]) -> dict[str, Any]:
     """Return the options that Snakemake finds in ``arguments`` and in the profiles that they name.
 
-    Raises ConfigurationError if Snakemake refuses an option or its value, if it would use only the
-    last of several values, or if a number of cores or jobs is below one.
+    Raises ConfigurationError if Snakemake refuses an option or would ignore some of its values.
     """
     # not imported at the top: jobs import this module, too, and need no parser
     from snakemake.cli import parse_args
@@ -153,11 +152,7 @@ def _before_targets(arguments: Sequence[str]) -> list[str]:
 
 
 def completed(arguments: Sequence[str]) -> list[str]:
-    """Return the ``arguments`` of the command line with the options that Snakemake needs.
-
-    Raises ConfigurationError if a configuration file is missing or is not a mapping, a target was
-    read as the value of an option, or a figure does not exist.
-    """
+    """Return ``arguments`` with the options that Snakemake needs, and files in place of names."""
     if "figure" in arguments:
         from study.pipeline.targets import figure_files  # slow, so not imported at the top
 

@@ -59,10 +59,6 @@ def tell_expectation(workflow: Any, plan: Plan) -> None:
     )
 
 
-# Name of the Snakemake executor that runs a batch of jobs on a node of a cluster.
-JOBSTEP = "slurm-jobstep"
-
-
 class Run:
     """Run of the workflow in this process: its lock on the folder, fork server, last messages."""
 
@@ -142,8 +138,8 @@ class Run:
 def start_batch(workflow: Any) -> None:
     """Start the fork server for a batch of jobs, if ``workflow`` runs on a node of a cluster.
 
-    Snakemake runs twice on a node: a first process starts a second one by the executor `JOBSTEP`;
-    the second one runs the jobs and needs no fork server of its own.
+    Snakemake runs twice on a node: a first process hands the batch on by the executor
+    ``slurm-jobstep`` and needs no fork server, the second one runs the jobs.
     """
-    if workflow.remote_exec and JOBSTEP not in sys.argv:
+    if workflow.remote_exec and "slurm-jobstep" not in sys.argv:
         start_server()

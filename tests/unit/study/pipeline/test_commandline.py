@@ -216,8 +216,8 @@ def test_what_does_not_exist_is_said_with_what_there_is(asked, message):
 
 def test_the_report_is_of_the_last_run(capsys):
     assert completed(["--report"]) == ["--report", "--cores", "all", *OPTIONS]
-    remember(CommandLine(["--configfile", "my.yaml", "--config", "a=b", "c=d"]))
-    last = ["--configfile", "my.yaml", "--config", "a=b", "c=d"]
+    remember(CommandLine(["--configfile", "my.yaml", "--config", "a1=b", "c1=d"]))
+    last = ["--configfile", "my.yaml", "--config", "a1=b", "c1=d"]
     assert recall() == last
     assert completed(["--report"]) == ["--report", *last, "--cores", "all", *OPTIONS]
     assert "a report of the last run, --configfile my.yaml" in capsys.readouterr().err

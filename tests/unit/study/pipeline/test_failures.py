@@ -113,12 +113,9 @@ def test_a_run_that_a_signal_ended_says_so_and_no_more(number, snakemake):
 @pytest.mark.parametrize(
     ("error", "words"),
     [
-        (ValueError("two\nlines"), "pdrom: two lines"),
+        (ValueError("two\nlines"), "pdrom: ValueError: two lines"),
         (KeyError("scene"), "pdrom: KeyError: 'scene'"),
-        (
-            OSError(errno.ENOSPC, "full", "a.csv"),
-            "pdrom: a.csv: No space left on device; make room",
-        ),
+        (OSError(errno.ENOSPC, "", "a"), "pdrom: a: No space left on device; make room"),
         (NotADirectoryError(errno.ENOTDIR, "", "a/b"), "pdrom: a/b: Not a directory; remove what"),
     ],
 )

@@ -67,11 +67,10 @@ def test_the_lines_of_a_run(snakemake):
     snakemake.info("", extra={**job, "jobid": 5, "rule_msg": None})
     snakemake.info("", extra={"event": LogEvent.JOB_FINISHED, "job_id": 5})
     snakemake.info("", extra={**job, "jobid": 4, "rule_msg": None})
-    error = {"event": LogEvent.JOB_ERROR, "rule_name": "fom", "jobid": 3}
+    error = {"event": LogEvent.JOB_ERROR, "rule_name": "fom", "rule_msg": "Full-order run of sheet"}
     snakemake.error("Error in rule", extra=error)
     for fault, text in (
         ("RuleException", "CalledProcessError"),
-        ("WorkflowError", "At least one job did not complete successfully."),
         ("MissingInputException", "Missing input files for rule fom"),
     ):
         snakemake.error(text, extra={"event": LogEvent.ERROR, "exception": fault})

@@ -124,16 +124,19 @@ def test_a_run_that_a_signal_ends_ends_its_jobs(patience, job, ending, number):
     assert signalled(number, RUNS, patience, job) == (0, f"noted {number}\n{ending:d}\n", "")
 
 
-LEAVES = (
-    "import os\nfrom study.pipeline.signals import *\nhandle(leave)\nos.write(1, b'ready\\n')\n"
-)
+LEAVES = """
+import os
+from study.pipeline.signals import *
+handle(leave)
+os.write(1, b'ready\\n')
+"""
 
 
 @pytest.mark.parametrize("number", ENDINGS)
 @pytest.mark.parametrize("ignores", [False, True])
 def test_while_no_job_runs_a_signal_ends_a_run_with_one_line(number, ignores):
     """Though sys.stderr is redirected; what nohup ignores stays ignored."""
-    code = "import sys\nsys.stderr = None\n" + LEAVES + "input()"
+    code = "import sys\nsys.stderr = None\n" + LEAVES + "sys.stdin.read()"
     if ignores:
         code = f"import signal\nsignal.signal({number:d}, signal.SIG_IGN)\n{LEAVES}"
     line = "" if ignores else f"pdrom: {ENDINGS[number]}; {KEPT}\n"
