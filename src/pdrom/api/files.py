@@ -3,21 +3,24 @@
 import json
 import os
 from pathlib import Path
-from typing import Any, TypeVar
+from shlex import quote
+from typing import Any, Literal, TypeVar, get_args
 
 import h5py
 import numpy as np
 
 from pdrom.api.records import AnyRun, FullRun, ReducedRun, Run, arrays_of, full_run
 from pdrom.core import store
-from pdrom.core.errors import ConfigurationError, PdromError, StorageError
+from pdrom.core.errors import ConfigurationError, PdromError, StorageError, choices
 from pdrom.core.provenance import made_by
 from pdrom.core.yamlfile import check_lengths, named, read_yaml, shown, validate
 from pdrom.model.mesh.config import GivenMesh, MeshFile, given_mesh
+from pdrom.model.mesh.reader import READERS
 from pdrom.model.mesh.types import store_mesh, stored_mesh
 from pdrom.model.scene import GONE, Scene, SceneConfig
 from pdrom.reduction.rerun import Rerun, displacement_norms
 
+Precision = Literal["double", "single"]
 T = TypeVar("T")
 R = TypeVar("R", bound=Run)
 
@@ -52,6 +55,13 @@ def file_path(path: Any) -> Path:
         raise ConfigurationError(f"{fault} ({error})") from error
 
 
+def require_no_mesh(path: Path) -> None:
+    """Raise ConfigurationError if the file ``path``, which should be a scene, is a mesh."""
+    if path.suffix.lower() in READERS and path.is_file():
+        made = f"`pdrom new --mesh {quote(str(path))}` makes a scene of it"
+        raise ConfigurationError(f"{path}: this is a mesh: {made}")
+
+
 def load_scene(path: str | os.PathLike[str]) -> Scene:
     """Scene described by a YAML file, with its mesh.
 
@@ -67,6 +77,7 @@ def load_scene(path: str | os.PathLike[str]) -> Scene:
         The file has a fault; the message names the file, the key and the fault.
     """
     path = file_path(path)
+    require_no_mesh(path)
     config = validate(SceneConfig, named(read_yaml(path), path.stem), str(path))
     return bound(config, path.parent, str(path))
 
@@ -106,20 +117,27 @@ def bound(config: SceneConfig, folder: Path, source: str) -> Scene:
         raise ConfigurationError(f"{source}: {error}") from error
 
 
-def save(reduced: ReducedRun, path: str | os.PathLike[str]) -> None:
-    """Write a reduced run and its full-order run to one file, positions in single precision.
+def save(
+    reduced: ReducedRun,
+    path: str | os.PathLike[str],
+    precision: Precision = "double",
+) -> None:
+    """Write a reduced run and the positions and times of its full-order run to one file.
 
     Parameters
     ----------
     reduced : run of `pdrom.api.reduce`
     path : file (HDF5) to write
+    precision : of positions: "double" keeps all bits, "single" halves the file
 
     Raises
     ------
     ConfigurationError, StorageError
-        ``reduced`` is no reduced run; the file cannot be written.
+        ``reduced`` is no reduced run; the precision is unknown; the file cannot be written.
     """
     require_run(ReducedRun, reduced, "reduced", source="pdrom.api.reduce makes one")
+    if precision not in (known := get_args(Precision)):
+        raise ConfigurationError(f"precision = {shown(precision, 60)}{choices(precision, known)}")
     path = file_path(path)
     store.require_own(path)
     config = reduced.full.scene.config.model_dump(mode="json")
@@ -129,8 +147,8 @@ def save(reduced: ReducedRun, path: str | os.PathLike[str]) -> None:
         file.attrs.update(labels | {"gain": reduced.gain, "ms_per_frame": reduced.ms})
         file.attrs["blowup_frame"] = -1 if outcome.blowup_frame is None else outcome.blowup_frame
         store_mesh(reduced.full.scene.mesh, file.create_group("mesh"))
-        _store(file, "reduced", outcome.positions.astype(np.float32), "m")
-        _store(file, "full", reduced.full.positions.astype(np.float32), "m")
+        _store(file, "reduced", outcome.positions.astype(precision), "m")
+        _store(file, "full", reduced.full.positions.astype(precision), "m")
         _store(file, "full_ms", reduced.full.ms, "ms")
         _store(file, "difference", outcome.difference, "m")
         _store(file, "error", reduced.error, "1")

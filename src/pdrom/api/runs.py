@@ -1,5 +1,6 @@
 """Full-order and reduced runs."""
 
+import logging
 import os
 from collections.abc import Callable
 from contextlib import ExitStack
@@ -11,6 +12,7 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
+from numba.core import event
 
 from pdrom.api import files, records
 from pdrom.api.records import FullRun, ReducedRun, full_run
@@ -32,11 +34,27 @@ from pdrom.reduction.sampling import Reduction, select
 from pdrom.reduction.sampling.local_step import ReducedLocalStep, replace_group
 from pdrom.reduction.snapshots import row_masses, training_frames
 
+log = logging.getLogger(__name__)
+
 SNAPSHOTS = 100  # largest number of training snapshots of a group if the scene sets none
 # A reduced run ends when its bounding box is larger than that of the mesh at rest by this factor.
 BLOWUP_EXTENT = 100.0
 GROUP = "the name of a constraint group"
 FULL_RUN = "pdrom.api.run makes one, load reads one"
+
+
+class _Compilation(event.TimingListener):  # type: ignore[misc]
+    """Measures the compilation of kernels during a run ``name``; logs that it begins."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__()
+        self._name = name
+
+    def on_start(self, started: event.Event) -> None:
+        if self._name:
+            log.info("%s: compiling kernels (once, up to a minute)", self._name)
+        self._name = ""
+        super().on_start(started)
 
 
 def run(
@@ -46,7 +64,8 @@ def run(
 ) -> FullRun:
     """Run a scene in full order; snapshots of every group are stored for the training of a basis.
 
-    Log a warning where held vertices or free vertices at rest lie inside an obstacle.
+    Log a warning where held vertices or free vertices at rest lie inside an obstacle, and (level
+    INFO) the compilation of kernels, which the first run of a kind of scene waits for.
 
     Parameters
     ----------
@@ -87,7 +106,10 @@ def run(
         # without ``out``, the run is written to a temporary folder that is deleted afterwards
         folder = "" if out else kept.enter_context(TemporaryDirectory(prefix="pdrom-"))
         path = Path(out or Path(folder, "run.h5"))
-        run_full_order(scene, path, frames, with_mesh=True, on_frame=on_frame)
+        with event.install_listener("numba:compile", _Compilation(scene.config.name)) as compiled:
+            run_full_order(scene, path, frames, with_mesh=True, on_frame=on_frame)
+        if compiled.done:
+            log.info("%s: kernels compiled in %.1f s", scene.config.name, compiled.duration)
         with open_hdf5(path) as file:
             return full_run(scene, file)
 

@@ -4,6 +4,7 @@ A command's module declares its arguments as a `Command`; other modules are impo
 """
 
 import argparse
+import logging
 import os
 import re
 import sys
@@ -106,6 +107,8 @@ def main() -> None:
         os.environ.setdefault("NUMBA_CACHE_DIR", str(root / ".cache" / "numba"))
         os.environ.setdefault("MPLCONFIGDIR", str(root / ".cache" / "matplotlib"))
     settle()
+    logging.basicConfig(format="%(message)s")
+    logging.getLogger("pdrom.api").setLevel(logging.INFO)
     # a stream that the caller closed is None here; the next file opened would get its descriptor
     sys.stdout = sys.stdout or open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
     sys.stderr = sys.stderr or open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115

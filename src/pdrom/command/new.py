@@ -4,38 +4,43 @@ import argparse
 import json
 import math
 import sys
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pdrom.command.base import Command, Status
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from pdrom.model.mesh.types import Mesh
 
 TEMPLATE = """\
-# A scene. All keys: config/README.md. Units: metres, seconds, kilograms, newtons.
+# A scene. `pdrom show scene` explains its keys, `pdrom show WORD` any word below.
+# Units: metres, seconds, kilograms, newtons.
 name: {name} # this and the title may be left out: they follow from the file's name
 title: {title}
 
-# What moves. Also {{kind: bar, nx: 40, ny: 5, nz: 5}}, or a file with triangles or tetrahedra:
-# {{kind: file, path: sheet.obj, scale: 1.0}}
+# What moves. Others: {{kind: cloth, rows: 20, columns: 20}}, {{kind: bar, nx: 40, ny: 5, nz: 5}},
+# or a file in this folder: {{kind: file, path: sheet.obj, scale: 0.001}} if it is in millimetres
 {about}mesh: {mesh}
 
 frames: 100 # to simulate
 time_step: 0.016 # s
 iterations: 10 # local and global steps of a frame
-{mass}
+masses: [{{density: {density}}}] # {material}: {total:.3g} kg in all
 
 # Only what is listed is loaded and computed.
 effects:
-  - {{effect: gravity{pull}}} # along -{up}
+  - {{effect: gravity{pull}}} # 9.81 m/s^2 along -{up}
   - {floor}
-  - {{effect: pins, select: {side}}} # held: a side (left, right, top ...) or a list of vertices
-  # a handle: held vertices, moved by `offset` (m) over 50 frames; any `select` may be a place
-  # - {{effect: translate, select: right, offset: [0.3, 0.0, 0.0], over: 50}}
-  # - {{effect: pins, select: {{kind: sphere, centre: [0.5, 2.0, 0.0], radius: 0.1}}}}
+  - {{effect: pins, select: {held}}} # held: a side, a place, or a list of vertices
+  # a handle: held vertices, moved by `offset` (m) over 50 frames
+  # - {{effect: translate, select: {moved}, offset: {offset}, over: 50}}
+  # - {{effect: pins, select: {{kind: sphere, centre: {corner}, radius: {tenth}}}}}
   # an obstacle; also plane, box
-  # - {{effect: sphere, centre: [0.0, 1.0, 0.0], radius: 0.4, friction: 0.3}}
+  # - {{effect: sphere, centre: {below}, radius: {fifth}, friction: 0.3}}
+  # constraint groups; weights that suit these masses and 10 iterations: stiffer ones need more
 {groups}
 # Groups whose projections are reduced, and the number of snapshots (even frames of the run) that
 # train a basis.
@@ -43,30 +48,34 @@ reduce:
   {group}: {{train: 40}}
 
 # Held-out motions, on which a reduction is tested: pins move by so many m, vertices start at m/s.
-held_out: {{carry: 0.5, kick: 2.0}}
+held_out: {{carry: {half}, kick: {twice}}}
 """
-GENERATED = "{kind: cloth, rows: 20, columns: 20, plane: xz}"
 SURFACE = """\
-  # constraint groups of surfaces: edges keep their length, triangles their shape or area, bending
-  - {effect: spring, weight: 1.0e+5}
-  # - {effect: strain, weight: 1.0e+5}
-  # - {effect: area, weight: 1.0e+5}
-  # - {effect: bending, weight: 0.1}
+  - {{effect: spring, weight: {weight}}} # N/m: edges keep their length
+  # - {{effect: strain, weight: {weight}}} # N/m: triangles keep their shape
+  # - {{effect: area, weight: {weight}}} # N/m: triangles keep their area
+  # - {{effect: bending, weight: {bending}}} # N m: the surface keeps its curvature
 """
 VOLUME = """\
-  # constraint groups of volumes: tetrahedra keep their shape, or their volume
-  - {effect: tetrahedron_strain, weight: 1.0e+6}
-  # - {effect: volume, weight: 1.0e+6}
+  - {{effect: tetrahedron_strain, weight: {weight}}} # N/m^2: tetrahedra keep their shape
+  # - {{effect: volume, weight: {weight}}} # N/m^2: tetrahedra keep their volume
 """
-KILOGRAMS = 10.0  # mass of a vertex of a new scene; the constraint weights above suit it
+COTTON, WATER = (0.2, "kg/m^2, of cotton"), (1000.0, "kg/m^3, of water")
+# Weight of a new scene's constraints over density and squared distance of vertices, 1/s^2: iterated
+# ten times in a time step of 16 ms, they converge. Of bending it is smaller by this factor.
+STIFFNESS, BENDING = 1e4, 1e-3
 ENOUGH = 3  # smallest number of fixed vertices with which a body cannot turn about a line
 
 
 def perform(arguments: argparse.Namespace) -> Status:
     """Write the scene that ``arguments`` name, with comments; an existing file is left alone."""
+    from pdrom.api.files import require_no_mesh
     from pdrom.core.errors import ConfigurationError, reason
 
-    path = Path(arguments.scene)
+    if arguments.scene is None and arguments.mesh is None:
+        raise ConfigurationError("SCENE or --mesh is required: the file to write, or a mesh")
+    path = Path(arguments.scene or Path(arguments.mesh).with_suffix(".yaml"))
+    require_no_mesh(path)
     path = path if path.suffix in (".yaml", ".yml") else path.with_name(f"{path.name}.yaml")
     merge = arguments.merge
     file, mesh = _read(arguments.mesh, path, merge) if arguments.mesh else (None, None)
@@ -92,33 +101,47 @@ def template(
     """Text of a scene file; the scene has a generated sheet, or the ``mesh`` read from ``file``.
 
     The scene is named after ``stem``, the name of its file; ``up`` is the upward axis of the mesh,
-    in which vertices that are closer than ``merge`` times the extent are merged.
+    in which vertices that are closer than ``merge`` times the extent are merged. Numbers and sides
+    in examples fit the mesh.
     """
     from pdrom.core.yamlfile import named
+    from pdrom.model.mesh.generators import Plane, cloth
     from pdrom.model.mesh.types import vertex_measures
 
-    names = {key: json.dumps(value, ensure_ascii=False) for key, value in named({}, stem).items()}
     if mesh is None:
-        groups = SURFACE + VOLUME.replace("  - {", "  # - {")
-        floor, side, about, made = "{effect: floor} # at y = 0", "left", "", GENERATED
-        mass, up = "vertex_mass: 10.0 # kg of each vertex", "y"
+        plane: Plane = "xz" if up == "y" else "xy"
+        mesh, made = cloth(20, 20, plane), f"{{kind: cloth, rows: 20, columns: 20, plane: {plane}}}"
     else:
-        groups = VOLUME if len(mesh.tetrahedra) else SURFACE
-        axis = "xyz".index(up)
-        floor, side, about = _floor(mesh, axis), _side(mesh, axis), _about(mesh)
-        density = float(f"{KILOGRAMS * mesh.vertices / vertex_measures(mesh).sum():.2g}")
-        unit = "kg/m^3" if len(mesh.tetrahedra) else "kg/m^2"
-        mass = f"masses: [{{density: {density:.12g}}}] # {unit}: about {KILOGRAMS:g} kg a vertex"
         more = f", merge: {merge:.1e}" if merge else ""
         made = f"{{kind: file, path: {json.dumps(file, ensure_ascii=False)}{more}}}"
-    group = "tetrahedron_strain" if groups == VOLUME else "spring"
-    pull = (
-        "" if up == "y" else f", acceleration: {[-9.81 if axis == up else 0.0 for axis in 'xyz']}"
-    )
+    names = {key: json.dumps(value, ensure_ascii=False) for key, value in named({}, stem).items()}
+    axis, side, solid = "xyz".index(up), mesh.extent, len(mesh.tetrahedra) > 0
+    (density, material), groups = (WATER, VOLUME) if solid else (COTTON, SURFACE)
+    total = float(vertex_measures(mesh).sum())
+    square = (total / mesh.vertices) ** (2.0 / (3 if solid else 2))  # of a distance of vertices
+    weight = STIFFNESS * density * square
+    held, moved, corner = _held(mesh, axis)
+    below = 0.5 * (mesh.points.min(axis=0) + mesh.points.max(axis=0))
+    below[axis] = mesh.points[:, axis].min() - 0.25 * side
+    centre = [round(x, 2 - math.floor(math.log10(side))) + 0.0 for x in below.tolist()]
+    weights = {"weight": _short(weight), "bending": _short(BENDING * weight * square)}
+    pull = "" if up == "y" else f", acceleration: {_along(axis, -9.81)}"
     return TEMPLATE.format(
-        **names, **{"mesh": made, "about": about, "mass": mass, "pull": pull, "up": up},
-        floor=floor, side=side, groups=groups, group=group,
+        **names, mesh=made, about=_about(mesh), density=density, material=material, up=up,
+        total=density * total, pull=pull, floor=_floor(mesh, axis), held=held, moved=moved,
+        offset=_along(axis, _short(0.3 * side)), corner=corner, below=centre,
+        groups=groups.format(**weights), group="tetrahedron_strain" if solid else "spring",
+        tenth=_short(0.1 * side), fifth=_short(0.2 * side), half=_short(0.5 * side),
+        twice=_short(2.0 * side),
     )  # fmt: skip
+
+
+def _short(number: float) -> float:
+    return float(f"{number:.2g}")
+
+
+def _along(axis: int, number: float) -> list[float]:
+    return [number if i == axis else 0.0 for i in range(3)]
 
 
 def _read(file: str, scene: Path, merge: float) -> "tuple[str, Mesh]":
@@ -150,46 +173,52 @@ def _about(mesh: "Mesh") -> str:
     cells = f"{len(mesh.triangles)} triangles"
     if len(mesh.tetrahedra):
         cells = f"{len(mesh.tetrahedra)} tetrahedra"
-    sides = (f"{side} {count}" for side, count in _sides(mesh).items())
+    sides = (f"{side} {len(vertices)}" for side, vertices in _sides(mesh).items())
     return (
-        f"# Of this file: {mesh.vertices} vertices, {cells}, {seams(mesh)}; "
-        f"{', '.join(places)} (m).\n"
+        f"# It has {mesh.vertices} vertices, {cells}, {seams(mesh)}; {', '.join(places)} (m).\n"
         f"# Its sides, with the number of their vertices: {', '.join(sides)}.\n"
     )
 
 
-def _sides(mesh: "Mesh") -> dict[str, int]:
-    """Map the name of each side that the mesh has (left, top, ...) to its number of vertices."""
+def _sides(mesh: "Mesh") -> "dict[str, np.ndarray]":
+    """Map the name of each side that the mesh has (x_min ...) to its vertices."""
     from pdrom.core.errors import SceneError
     from pdrom.model.mesh.selection import SIDES, select_vertices
 
     found = {}
     for side in SIDES:
-        try:
-            found[side] = len(select_vertices(mesh, side))
-        except SceneError:  # the mesh is flat along this side's axis: it has no such side
-            continue
+        with suppress(SceneError):  # the mesh is flat along this side's axis: it has no such side
+            found[side] = select_vertices(mesh, side)
     return found
 
 
-def _side(mesh: "Mesh", axis: int) -> str:
-    """YAML of vertices to pin: those of a side if at least `ENOUGH`, else `ENOUGH` at the top."""
-    for side, count in _sides(mesh).items():
-        if count >= ENOUGH:
-            return side
-    top = mesh.points[mesh.points[:, axis].argmax()].tolist()
-    return f"{{kind: nearest, point: {top}, count: {ENOUGH}}}"
+def _held(mesh: "Mesh", up: int) -> tuple[str, str, list[float]]:
+    """Return YAML of vertices to pin and of others to move, and the position of a pinned one.
+
+    Pinned are the vertices of a side if at least `ENOUGH`, else `ENOUGH` at the top. The side is
+    one of the longest axis that has such sides; if this axis points up, the top is preferred.
+    """
+    sides, lengths = _sides(mesh), mesh.points.max(axis=0) - mesh.points.min(axis=0)
+    for axis in sorted(range(3), key=lambda i: (-lengths[i], i == up)):
+        ends = [f"{'xyz'[axis]}_{end}" for end in ("min", "max")]
+        for held, moved in (ends, ends[::-1])[:: -1 if axis == up else 1]:
+            if len(sides.get(held, ())) >= ENOUGH:
+                return held, moved, mesh.points[sides[held][0]].tolist()
+    order = mesh.points[:, up].argsort(kind="stable")
+    low, top = mesh.points[order[[0, -1]]].tolist()
+    lowest = f"{{kind: nearest, point: {low}}}"
+    return f"{{kind: nearest, point: {top}, count: {ENOUGH}}}", lowest, top
 
 
 def _floor(mesh: "Mesh", axis: int) -> str:
     """YAML of a floor below the mesh by about half its longest side, where ``axis`` points up."""
     lowest = float(mesh.points[:, axis].min())
     step = 10.0 ** math.floor(math.log10(mesh.extent))
-    height = math.floor((lowest - mesh.extent / 2.0) / step) * step
+    height = round(math.floor((lowest - mesh.extent / 2.0) / step) * step, 12)
     below = f"below the mesh, which begins at {'xyz'[axis]} = {lowest:.3g}"
     if axis == 1:
-        return f"{{effect: floor, height: {height:.12g}}} # {below}"
-    point, normal = ([x if i == axis else 0.0 for i in range(3)] for x in (height, 1.0))
+        return f"{{effect: floor, height: {height}}} # {below}"
+    point, normal = (_along(axis, x) for x in (height, 1.0))
     return f"{{effect: plane, point: {point}, normal: {normal}}} # {below}"
 
 
@@ -197,7 +226,11 @@ COMMAND = Command(
     "Write the file of a new scene, with comments",
     "pdrom new sheet.yaml --mesh sheet.obj",
     {
-        "scene": {"metavar": "SCENE", "help": "file to write; .yaml is added to a name"},
+        "scene": {
+            "metavar": "SCENE",
+            "nargs": "?",
+            "help": "file to write; .yaml is added to a name; without it, beside the mesh",
+        },
         "--mesh": {"metavar": "FILE", "help": "mesh file (.obj, .vtu, .msh ...)"},
         "--merge": {
             "type": float,

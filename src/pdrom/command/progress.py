@@ -1,8 +1,6 @@
 """Progress of runs on stderr: on a terminal one line is rewritten, elsewhere lines are added."""
 
-import os
 import sys
-from pathlib import Path
 from time import monotonic
 from typing import TextIO
 
@@ -15,7 +13,7 @@ EVERY = 0.2  # seconds between two updates of the line on a terminal
 class Progress:
     """Line with the number of the frame, milliseconds per frame and the estimated time left.
 
-    It begins with a notice if code must be compiled. If ``stream`` is no terminal, a new line is
+    If ``stream`` is no terminal, a new line is
     written after each tenth of the run ``name``, which has ``frames`` frames.
     """
 
@@ -23,11 +21,6 @@ class Progress:
         self._name, self._frames, self._stream = name, frames, stream or sys.stderr
         self._terminal, self._shown = self._stream.isatty(), monotonic()
         self._ends = [self._shown]
-        folder = os.environ.get("NUMBA_CACHE_DIR")
-        # without a compiled step loop in the cache folder, compilation is announced
-        if folder is not None and not any(Path(folder).glob("dynamics*/*.nbi")):
-            self._stream.write(f"{name}: compiling kernels (once, up to a minute)\n")
-            self._stream.flush()
 
     def __call__(self, frame: int, report: FrameReport) -> None:
         """Show that frame ``frame`` (0-based) has been computed, and its time from ``report``."""

@@ -1,7 +1,11 @@
-"""``pdrom show FILE``: print what a result file contains, how it was made, whether it is intact."""
+"""``pdrom show FILE``: print what a result file contains, how it was made, whether it is intact.
+
+``pdrom show WORD`` explains a word of a scene's file.
+"""
 
 import argparse
 import json
+import re
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,11 +17,16 @@ LONGEST = 100  # largest number of characters shown of an HDF5 attribute's value
 
 
 def perform(arguments: argparse.Namespace) -> Status:
-    """Print the contents of the file of ``arguments``; no file is changed."""
+    """Print the contents of the file of ``arguments``, or about a word; no file is changed."""
     from pdrom.core.provenance import RECORD
     from pdrom.core.store.checksum import check_file, provenance_of
 
     path = Path(arguments.file)
+    if re.fullmatch("[a-z_]{1,40}", arguments.file) and not path.exists():
+        from pdrom.command.words import explained
+
+        sys.stdout.write("\n".join(explained(arguments.file)) + "\n")
+        return Status.DONE
     condition, record = check_file(path), provenance_of(path)
     lines = [f"{path}: {path.stat().st_size:,} bytes, {condition.value}"]
     match path.suffix:
@@ -110,10 +119,10 @@ def _short(value: Any) -> str:
 
 
 COMMAND = Command(
-    "Say what a result is: content, shapes, units, configuration, provenance",
+    "Say what a result is (content, units, provenance), or what a word of a scene's file means",
     "pdrom show results/fom/spring_oop/train.h5",
     {
-        "file": {"metavar": "FILE", "help": "a result of the pipeline or of this command"},
+        "file": {"metavar": "FILE", "help": "a result, or a word such as spring or scene"},
         "--configuration": {"action": "store_true", "help": "the whole configuration, as YAML"},
     },
     perform,

@@ -193,18 +193,15 @@ for _combination in (Union, Intersection, Complement):
 
 # side name -> (axis, +1 for the maximal side, -1 for the minimal one)
 SIDES = {
-    "left": (0, -1),
-    "right": (0, 1),
-    "bottom": (1, -1),
-    "top": (1, 1),
-    "back": (2, -1),
-    "front": (2, 1),
+    f"{axis}_{end}": (i, s) for i, axis in enumerate("xyz") for end, s in (("min", -1), ("max", 1))
 }
+# words for the same sides, in this order, which fit scenes in which y points up
+WORDS = dict(zip(("left", "right", "bottom", "top", "back", "front"), SIDES.values(), strict=True))
 TOLERANCE = 1e-6  # distance to a side up to which vertices belong to it, relative to the extent
 
 
 def select_vertices(mesh: Mesh, selection: Selection) -> np.ndarray:
-    """Return vertex indices (n,) int64, ascending, of a side (`SIDES`), index list or `Shape`.
+    """Return vertex indices (n,) int64, ascending, of a side, index list or `Shape`.
 
     Raises
     ------
@@ -233,9 +230,10 @@ def _chosen(mesh: Mesh, selection: Selection) -> np.ndarray:
 
 
 def _side(mesh: Mesh, side: str) -> np.ndarray:
-    if side not in SIDES:
-        raise SceneError(f"selection '{side}': allowed are {', '.join(SIDES)} or vertex indices")
-    axis, sign = SIDES[side]
+    known = SIDES | WORDS
+    if side not in known:
+        raise SceneError(f"selection '{side}': allowed are {', '.join(known)} or vertex indices")
+    axis, sign = known[side]
     coordinate = sign * mesh.points[:, axis]
     if np.ptp(coordinate) <= TOLERANCE * mesh.extent:
         raise SceneError(f"selection '{side}': selects nothing, the mesh is flat along this axis")
