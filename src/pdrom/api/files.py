@@ -4,14 +4,14 @@ import json
 import os
 from pathlib import Path
 from shlex import quote
-from typing import Any, Literal, TypeVar, get_args
+from typing import Any, Literal, TypeVar
 
 import h5py
 import numpy as np
 
 from pdrom.api.records import AnyRun, FullRun, ReducedRun, Run, arrays_of, full_run
 from pdrom.core import store
-from pdrom.core.errors import ConfigurationError, PdromError, StorageError, choices
+from pdrom.core.errors import ConfigurationError, PdromError, StorageError
 from pdrom.core.provenance import made_by
 from pdrom.core.yamlfile import check_lengths, named, read_yaml, shown, validate
 from pdrom.model.mesh.config import GivenMesh, MeshFile, given_mesh
@@ -20,7 +20,6 @@ from pdrom.model.mesh.types import store_mesh, stored_mesh
 from pdrom.model.scene import GONE, Scene, SceneConfig
 from pdrom.reduction.rerun import Rerun, displacement_norms
 
-Precision = Literal["double", "single"]
 T = TypeVar("T")
 R = TypeVar("R", bound=Run)
 
@@ -120,7 +119,7 @@ def bound(config: SceneConfig, folder: Path, source: str) -> Scene:
 def save(
     reduced: ReducedRun,
     path: str | os.PathLike[str],
-    precision: Precision = "double",
+    precision: Literal["double", "single"] = "double",
 ) -> None:
     """Write a reduced run and the positions and times of its full-order run to one file.
 
@@ -136,8 +135,10 @@ def save(
         ``reduced`` is no reduced run; the precision is unknown; the file cannot be written.
     """
     require_run(ReducedRun, reduced, "reduced", source="pdrom.api.reduce makes one")
-    if precision not in (known := get_args(Precision)):
-        raise ConfigurationError(f"precision = {shown(precision, 60)}{choices(precision, known)}")
+    if not isinstance(precision, str) or precision not in ("double", "single"):
+        raise ConfigurationError(
+            f"precision = {shown(precision, 60)}: required is double or single"
+        )
     path = file_path(path)
     store.require_own(path)
     config = reduced.full.scene.config.model_dump(mode="json")

@@ -4,12 +4,12 @@ import hashlib
 import io
 import json
 import logging
-import math
 import os
 import signal
 import subprocess
 import sys
-from dataclasses import dataclass, fields
+from contextlib import suppress
+from dataclasses import astuple, dataclass
 from functools import lru_cache
 from pathlib import Path
 from pkgutil import get_data
@@ -34,13 +34,10 @@ MAX_FACTOR = 1000.0
 class MeshLimits:
     """Limits for reading one mesh file; `mesh_limits` returns those that apply.
 
-    file_bytes : size of the file
     seconds : processor time of the process that reads the file
     deadline : elapsed seconds after which this process is ended, if it waits or the platform has no
-        limits of processor time. Much larger than ``seconds``, so that the result does not depend
-        on the load of the machine.
+        limits of processor time; so many that the result does not depend on the machine's load
     memory : bytes of address space of this process
-    vertices, cells : largest numbers of vertices and of cells in the mesh
     """
 
     file_bytes: int = 500_000_000
@@ -56,18 +53,11 @@ def mesh_limits() -> MeshLimits:
 
     Raises ConfigurationError if the variable is not a number from 1 to 1000.
     """
-    text = os.environ.get(VARIABLE, "1")
-    try:
-        factor = float(text)
-    except ValueError:
-        factor = math.nan
-    if not 1.0 <= factor <= MAX_FACTOR:
-        raise ConfigurationError(
-            f"environment variable {VARIABLE} = '{text}': a number from 1 to {MAX_FACTOR:g} is "
-            "required"
-        )
-    plain = MeshLimits()
-    return MeshLimits(**{f.name: int(factor * getattr(plain, f.name)) for f in fields(plain)})
+    text, required = os.environ.get(VARIABLE, "1"), f"a number from 1 to {MAX_FACTOR:g} is required"
+    with suppress(ValueError):
+        if 1.0 <= (factor := float(text)) <= MAX_FACTOR:
+            return MeshLimits(*(int(factor * limit) for limit in astuple(MeshLimits())))
+    raise ConfigurationError(f"environment variable {VARIABLE} = '{text}': {required}")
 
 
 # Path of Python, stored at import, since the workflow changes `sys.executable` to a shell command.
@@ -99,24 +89,20 @@ def read_mesh_file(path: Path) -> Mesh:
         has other cells, or both triangles and tetrahedra.
     """
     try:
-        there = path.is_file()
-    except OSError as error:  # for example a file name that is too long
-        raise MeshError(f"{shown(str(path), 60)}: no mesh file ({error.strerror})") from error
-    if not there:
-        raise MeshError(f"{path}: no such mesh file (looked in {path.parent.resolve()})")
-    if path.suffix.lower() not in reader.READERS:
-        raise MeshError(
-            f"{path}: of another format than {', '.join(reader.READERS)}; "
-            f"try `meshio convert {path.name} {path.stem}.vtu`"
-        )
-    limits = mesh_limits()
-    if path.stat().st_size > limits.file_bytes:
-        raise MeshError(f"{path}: larger than {limits.file_bytes} bytes; {ADVICE}")
-    try:
+        if not path.is_file():
+            raise MeshError(f"{path}: no such mesh file (looked in {path.parent.resolve()})")
+        if path.suffix.lower() not in reader.READERS:
+            raise MeshError(
+                f"{path}: of another format than {', '.join(reader.READERS)}; "
+                f"try `meshio convert {path.name} {path.stem}.vtu`"
+            )
+        limits = mesh_limits()
+        if path.stat().st_size > limits.file_bytes:
+            raise MeshError(f"{path}: larger than {limits.file_bytes} bytes; {ADVICE}")
         with path.open("rb") as file:
             digest = hashlib.file_digest(file, "sha256").hexdigest()
-    except OSError as error:
-        raise MeshError(f"{path}: cannot be read ({error.strerror})") from error
+    except OSError as error:  # for example a file name that is too long
+        raise MeshError(f"{shown(str(path), 60)}: cannot be read ({error.strerror})") from error
     points, cells, remark = _arrays(path, digest, limits)
     if remark:
         log.warning("%s: %s", path, remark)
@@ -127,8 +113,7 @@ def read_mesh_file(path: Path) -> Mesh:
 def _arrays(path: Path, digest: str, limits: MeshLimits) -> tuple[np.ndarray, np.ndarray, str]:
     """Return points, cells, remark of a file; cached, with ``digest`` and ``limits`` in the key."""
     numbers = (limits.seconds, limits.memory, limits.vertices, limits.cells)
-    # -P: modules in the folder of the script must not shadow the standard library
-    # the texts as this process imports them, not as the files are now
+    # -P: no module in the working folder shadows one; texts as this process imports them
     texts = {name: (get_data(__package__, f"{name}.py") or b"").decode() for name in MODULES}
     command = [PYTHON, "-P", "-X", "utf8", "-W", "ignore", "-c", START, json.dumps(texts)]
     command += [str(path), *map(str, numbers)]

@@ -36,7 +36,7 @@ def gmsh(content: bytes) -> raw.Found:
             f"{raw.begin(content)}; Gmsh's formats 2 and 4 are read, `meshio convert` may read it"
         )
     order = ("<" if content[head.end()] == 1 else ">") if head[2] == b"1" else ""
-    starts = list(re.finditer(rb"\$(?:Nodes|Elements)" + raw.END, content))
+    starts = list(re.finditer(rb"^\$(?:Nodes|Elements)" + raw.END, content, re.M))
     raw.require_once([start[0].strip() for start in starts])
     if len(starts) < 2:
         raise raw.CutError("$Nodes or $Elements is missing, or nodes are parametric ones")
@@ -63,7 +63,8 @@ def _elements(source: raw.Source) -> Iterator[tuple[int, np.ndarray]]:
     """Yield kinds and corners of the elements of a section of format 2."""
     count = int(source.line())
     if not source.order:
-        for _, kind, _, _, corners in source.ragged(count, _element):
+        head, corner = 3 * (("i4", 1),), ("i4", 1, lambda kind: _linear(kind)[1])
+        for _, kind, _, _, corners in source.ragged(count, *head, ("i4", 2, int), corner):
             yield _linear(int(kind[0, 0]))[0], corners
         return
     while count > 0:
@@ -73,20 +74,10 @@ def _elements(source: raw.Source) -> Iterator[tuple[int, np.ndarray]]:
         count -= length
 
 
-def _element(source: raw.Source) -> tuple[list[raw.Field], list[int]]:
-    """Return the fields of the next element: number, kind, count of tags, tags, corners."""
-    head = [("i4", 1), ("i4", 1), ("i4", 1)]
-    width = _linear(source.peek(head[:1], "i4"))[1]
-    return [*head, ("i4", source.peek(head[:2], "i4")), ("i4", width)], [1, 2]
-
-
 def _blocks(
     nodes: raw.Source, elements: raw.Source, old: bool, size: str
 ) -> tuple[np.ndarray, np.ndarray, list[tuple[int, np.ndarray]]]:
-    """Return numbers and positions of nodes, and the elements, of format 4.1, or 4.0 (``old``).
-
-    ``size`` is the type of counts.
-    """
+    """Return numbers, positions of nodes, and elements of format 4.1 or 4.0, counts of a type."""
     tag = ("i4" if old else size, 1)
     tags, points, cells = list[np.ndarray](), list[np.ndarray](), list[tuple[int, np.ndarray]]()
     for source in (nodes, elements):
@@ -144,6 +135,7 @@ def medit(content: bytes) -> raw.Found:
 
 
 _VTK = re.compile(2 * (rb"([^\r\n]*)" + raw.END) + rb"\s*(ASCII|BINARY)" + raw.END, re.I)
+_DATASETS = ("DATASET UNSTRUCTURED_GRID", "DATASET POLYDATA")
 _LISTS = {"VERTICES": 2, "LINES": 4, "POLYGONS": raw.POLYGON, "TRIANGLE_STRIPS": 6, "CELLS": 0}
 
 
@@ -158,23 +150,19 @@ def vtk(content: bytes) -> raw.Found:
         name = words[0].upper()
         if name in ("CELL_DATA", "POINT_DATA"):
             break
+        names += [name.encode()] * (name not in ("METADATA", "FIELD") and len(words) < 4)
         if name == "METADATA":
             source.skip(b"\n\n")
-            continue
-        if name == "FIELD":
-            for _ in range(int(words[2])):
-                _, width, length, kind = source.line().decode(errors="replace").split()
-                source.values(int(width) * int(length), kind)
-            continue
-        names.append(name.encode())
-        if name == "POINTS":
+        elif len(words) == 4:  # an array of a field
+            source.values(int(words[1]) * int(words[2]), words[3])
+        elif name == "POINTS":
             points = source.values(3 * int(words[1]), words[2]).reshape(-1, 3)
         elif name == "CELL_TYPES":
             kinds = source.values(int(words[1]), "int")
         elif name in _LISTS:
             offsets = head[1].split()[-1] >= b"5"
             cells.append(_cells(source, _LISTS[name], int(words[1]), int(words[2]), offsets))
-        elif name != "DATASET" or words[1].upper() not in ("UNSTRUCTURED_GRID", "POLYDATA"):
+        elif name != "FIELD" and " ".join(words).upper() not in _DATASETS:
             raise raw.RefusedError(
                 f"holds {' '.join(words)[:60]}, read are unstructured grids and polygonal data; "
                 "ParaView saves others as .vtu"
@@ -183,7 +171,7 @@ def vtk(content: bytes) -> raw.Found:
     raw.require_once(names)
     if points is None or not cells or (kinds is None) == (b"CELLS" in names):
         raise raw.CutError("POINTS, cells or CELL_TYPES are missing")
-    read = _joined([cell._replace(points=points[:0]) for cell in cells])
+    read = _joined(cells)
     return read._replace(points=points, kinds=read.kinds if kinds is None else kinds)
 
 
@@ -204,7 +192,7 @@ def _cells(source: raw.Source, kind: int, count: int, size: int, offsets: bool) 
 
 def _joined(parts: list[raw.Found]) -> raw.Found:
     """Return the content of ``parts`` one after another."""
-    starts = np.cumsum([0, *(len(part.points) for part in parts)]).tolist()
+    starts = np.cumsum([0, *(len(part.points) for part in parts)])
     each = [part._replace(corners=part.corners + n) for part, n in zip(parts, starts, strict=False)]
     return raw.Found(*(np.concatenate(arrays) for arrays in zip(*each, strict=True)))
 
@@ -255,7 +243,7 @@ def _array(
     """
     if node is None or not count:
         values = np.empty(0)
-    elif node.get("format") == "ascii":
+    elif node.get("format", "ascii") == "ascii":
         values = raw.numbers((node.text or "").encode(), "an array")
     else:
         data = (node.text or "").encode()
@@ -265,8 +253,8 @@ def _array(
             # parts that are encoded one by one end with = or where the next begins
             data = b"".join(map(binascii.a2b_base64, re.findall(rb"[^=]+=*", data)))
         order = ">" if file.get("byte_order") == "BigEndian" else "<"
-        word = np.dtype(order + ("u8" if file.get("header_type") == "UInt64" else "u4"))
-        size = word.itemsize
+        size = 8 if file.get("header_type") == "UInt64" else 4
+        word = f"{order}u{size}"
         if compressor := file.get("compressor"):
             if compressor not in _INFLATE:
                 raise raw.RefusedError(f"compressed by {compressor}: save it uncompressed")

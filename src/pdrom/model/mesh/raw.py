@@ -18,6 +18,8 @@ TYPES |= dict(zip(_NAMES.split(), (*_NUMPY, "i8", "i4"), strict=True))
 END = rb"[ \t]*(?:\r?\n|\r)"
 Field = tuple[str, int]
 """NumPy type, without byte order, and length of one part of a row of numbers."""
+Part = tuple[str, int, Callable[[int], int]]
+"""Field of a length that is a function of a number before it: its type, the field of the number."""
 
 
 class RefusedError(ValueError):
@@ -39,10 +41,9 @@ class CutError(UnreadableError):
 
 
 class Found(NamedTuple):
-    """Content of a file: ``points`` (N, 2 or 3) and E cells.
+    """Points (N, 2 or 3) of a file, kinds (E,) and sizes (E,) of its cells, and their corners.
 
-    ``kinds`` (E,) and ``sizes`` (E,) are kinds and numbers of corners of the cells; ``corners`` are
-    the indices from 0 of their vertices, one cell after another.
+    ``sizes`` are numbers of corners; ``corners`` are indices from 0, one cell after another.
     """
 
     points: np.ndarray
@@ -56,8 +57,8 @@ def found(points: np.ndarray, cells: Sequence[tuple[int, np.ndarray]]) -> Found:
     counts = [len(rows) for _, rows in cells]
     kinds = np.repeat(np.array([kind for kind, _ in cells], np.int64), counts)
     sizes = np.repeat(np.array([rows.shape[1] for _, rows in cells], np.int64), counts)
-    flat = [whole(rows.ravel(), "corners") for _, rows in cells]
-    return Found(points, kinds, sizes, np.concatenate([np.empty(0, np.int64), *flat]))
+    flat = np.concatenate([np.empty(0), *(rows.ravel() for _, rows in cells)])
+    return Found(points, kinds, sizes, whole(flat, "corners"))
 
 
 def unified(text: bytes, comments: bool = False) -> bytes:
@@ -74,9 +75,8 @@ def begin(content: bytes) -> str:
 
 def require_once(names: Sequence[bytes]) -> None:
     """Raise UnreadableError if two of the ``names`` of sections are the same in any case."""
-    seen = [name.upper() for name in names]
     for name in names:
-        if seen.count(name.upper()) > 1:
+        if [other.upper() for other in names].count(name.upper()) > 1:
             raise UnreadableError(f"{name.decode(errors='replace')} appears twice")
 
 
@@ -99,10 +99,9 @@ def whole(values: np.ndarray, what: str) -> np.ndarray:
 
 
 def check_end(text: bytes, last: float, vertices: int) -> None:
-    """Raise `CutError` if ``text`` ends with ``last``, and this number may be truncated.
+    """Raise `CutError` if ``text`` ends with ``last``, which may be the first digits of a number.
 
-    Without an end of line, ``12`` may be the first digits of ``123``. A last index is accepted if
-    one more digit would exceed the number of ``vertices``; this is 0 for other numbers.
+    An index is not if one more digit exceeds the number of ``vertices``, which is 0 for others.
     """
     ended = vertices and last % 1 == 0 and (last == 0 or 10 * abs(last) > vertices)
     if not ended and not text[-1:].isspace():
@@ -114,10 +113,9 @@ _WORD = re.compile(rb"^[ \t]*(?!(?:nan|inf)\b)[a-z$]", re.M | re.I)
 
 
 class Source:
-    """Lines and numbers of a file, one after another.
+    """Lines and numbers of a file, one after another: binary with an order "<" or ">", or text "".
 
-    Numbers are binary with a byte order, "<" or ">", or text, "". Those of a text, up to the next
-    line that begins with a word, become float64 at once, so that one code reads both.
+    Numbers of a text, up to the next line that begins with a word, become float64 at once.
     """
 
     def __init__(self, content: bytes, order: str, start: int = 0) -> None:
@@ -155,18 +153,25 @@ class Source:
         ]
 
     def values(self, count: int, kind: str) -> np.ndarray:
-        """Return ``count`` numbers (count,) of a type of `TYPES`."""
+        """Return ``count`` numbers (count,) of a type of `TYPES`; go on behind a "string"."""
+        for _ in range(count if kind == "string" else 0):  # a line, or bytes behind their number
+            if not self.order:
+                self.skip(b"\n")
+                continue
+            size = 8 >> (self.content[self._next] >> 6)  # of the number, in its first two bits
+            length = int.from_bytes(self.content[self._next : self._next + size], "big")
+            self._next += size + length % (1 << 8 * size - 2)
+        if kind == "string":
+            return np.empty(0)
         return self.rows(count, (TYPES[kind.lower().replace("unsigned_", "u")], 1))[0].ravel()
 
-    def ragged(
-        self, count: int, describe: Callable[["Source"], tuple[list[Field], list[int]]]
-    ) -> Iterator[list[np.ndarray]]:
-        """Yield `rows` of ``count`` rows of different lengths, in blocks of equal ones.
-
-        ``describe`` returns the fields of the next row, and the numbers of those that decide.
-        """
+    def ragged(self, count: int, *parts: Field | Part) -> Iterator[list[np.ndarray]]:
+        """Yield `rows` of ``count`` rows of different lengths, in blocks of equal ones."""
+        keys = {part[1] for part in parts if len(part) == 3}
         while count:
-            fields, keys = describe(self)
+            fields = list[Field]()
+            for kind, length, *of in parts:
+                fields.append((kind, of[0](self._peek(fields[: length + 1])) if of else length))
             size, same = 1, np.ones(1, dtype=bool)
             while same.all() and size < (most := min(count, self._there(fields))):
                 size = min(8 * size, most)
@@ -179,13 +184,11 @@ class Source:
 
     def lists(self, count: int) -> list[np.ndarray]:
         """Return ``count`` lists of indices, each behind its length, as blocks (n, length)."""
-        describe: Callable[[Source], tuple[list[Field], list[int]]]
-        describe = lambda source: ([("i4", 1), ("i4", source.peek([], "i4"))], [0])  # noqa: E731
-        return [rows for _, rows in self.ragged(count, describe)]
+        return [rows for _, rows in self.ragged(count, ("i4", 1), ("i4", 0, int))]
 
-    def peek(self, before: Sequence[Field], kind: str) -> int:
-        """Return the count of type ``kind`` behind the fields ``before`` of the next row."""
-        value = self._ahead(1, [*before, (kind, 1)])[f"f{len(before)}"][0, 0]
+    def _peek(self, fields: Sequence[Field]) -> int:
+        """Return the count in the last of the ``fields`` of the next row."""
+        value = self._ahead(1, fields)[f"f{len(fields) - 1}"][0, 0]
         if not 0 <= value < 2**31:
             raise UnreadableError(f"a count of {value}")
         return int(value)

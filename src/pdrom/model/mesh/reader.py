@@ -1,15 +1,14 @@
 """Reading of one mesh file in a separate process, started by `pdrom.model.mesh.files`.
 
-A few megabytes of compressed zeros unpack to gigabytes, and a damaged file may take a reader very
-long. Limits on time and memory therefore end only this process.
-
-Arguments are the file and limits: seconds, bytes, numbers of vertices and of cells. Standard
-output is points (N, 3) float64 and cells (E, 3 or 4) int64 as two arrays in NumPy's format .npy and
-a remark, or, with the exit status `REFUSED`, a sentence that states the fault.
+A damaged file may take a reader very long, or unpack to gigabytes; limits then end only this
+process. Its arguments are the file and limits: seconds, bytes, numbers of vertices and of cells.
+Its output is points (N, 3) float64 and cells (E, 3 or 4) int64 as .npy and a remark, or, with the
+exit status `REFUSED`, a sentence that states the fault.
 """
 
 import os
 import sys
+from contextlib import suppress
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -29,10 +28,7 @@ OTHERS = {6: "triangle strips", 12: "hexahedra", 13: "wedges", 14: "pyramids"}
 
 
 def main(path: str, *numbers: str) -> int:
-    """Write points and cells of the mesh file ``path`` to standard output; return the exit status.
-
-    The parameters are the arguments that the module's text states.
-    """
+    """Write points and cells of the mesh file ``path`` to standard output; return the status."""
     seconds, memory, vertices, cells = map(int, numbers)
     _limit("RLIMIT_CPU", seconds)
     _limit("RLIMIT_AS", memory)
@@ -55,15 +51,13 @@ def main(path: str, *numbers: str) -> int:
 
 def _limit(name: str, value: int) -> None:
     """Lower the resource limit ``name`` of this process to ``value`` if the platform has it."""
-    try:
+    with suppress(ImportError, AttributeError, ValueError, OSError):
         import resource
 
         kind = getattr(resource, name)
         hard = resource.getrlimit(kind)[1]
         allowed = value if hard == resource.RLIM_INFINITY else min(value, hard)
         resource.setrlimit(kind, (allowed, hard))
-    except (ImportError, AttributeError, ValueError, OSError):
-        return
 
 
 def read(path: str, max_vertices: int, max_cells: int) -> tuple[np.ndarray, np.ndarray, str]:
@@ -77,12 +71,10 @@ def read(path: str, max_vertices: int, max_cells: int) -> tuple[np.ndarray, np.n
         content = content.decode("utf-16", errors="replace").encode()
     try:
         found = READERS[suffix](content)
-        for what, array, most in (
-            ("vertices", found.points, max_vertices),
-            ("cells", found.sizes, max_cells),
-        ):
-            if len(array) > most:
-                raise raw.RefusedError(f"holds {len(array)} {what}, allowed: at most {most}")
+        counts = ("vertices", found.points, max_vertices), ("cells", found.sizes, max_cells)
+        for what, count, most in ((what, len(each), most) for what, each, most in counts):
+            if count > most:
+                raise raw.RefusedError(f"holds {count} {what}, allowed: at most {most}")
         points = np.ascontiguousarray(found.points, np.float64)
         points = np.pad(points, ((0, 0), (0, 3 - points.shape[1])))
         return points, *cells_of(found._replace(points=points))
@@ -106,10 +98,9 @@ def cells_of(found: raw.Found) -> tuple[np.ndarray, str]:
     others = sorted({*np.unique(kinds).tolist()} - {2, 4, *FACES, *CORNERS})
     if others:
         names = ", ".join(OTHERS.get(kind, f"cells of VTK's type {kind}") for kind in others)
-        raise raw.RefusedError(
-            f"holds {names}; allowed are triangles, polygons and linear tetrahedra, which the "
-            "filter Tetrahedralize of ParaView makes"
-        )
+        allowed = "triangles, polygons and linear tetrahedra"
+        made = "which the filter Tetrahedralize of ParaView makes"
+        raise raw.RefusedError(f"holds {names}; allowed are {allowed}, {made}")
     solid, flat = kinds == raw.TETRA, np.isin(kinds, FACES)
     if solid.any():
         tetrahedra = corners[np.repeat(solid, sizes)].reshape(-1, 4)
@@ -118,10 +109,8 @@ def cells_of(found: raw.Found) -> tuple[np.ndarray, str]:
     sizes, corners = sizes[flat], corners[np.repeat(flat, sizes)]
     if not len(sizes):
         what = "only lines or points, which are not simulated" if len(kinds) else "no cells"
-        raise raw.RefusedError(
-            f"holds {what}: triangles or tetrahedra are required, as gmsh makes them from a closed "
-            "line or surface"
-        )
+        required = "triangles or tetrahedra are required, as gmsh makes them from a closed line"
+        raise raw.RefusedError(f"holds {what}: {required} or surface")
     if sizes.min() < 3:
         raise raw.UnreadableError("faces of fewer than 3 corners")
     if sizes.max() == 3:
@@ -176,11 +165,9 @@ def _check_faces(triangles: np.ndarray, tetrahedra: np.ndarray) -> None:
     faces = tetrahedra[:, [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]]].reshape(-1, 3)
     size = max(int(corners.max(initial=0)) for corners in (triangles, faces)) + 1
 
-    def number(corners: np.ndarray) -> np.ndarray:
-        a, b, c = np.sort(corners, axis=1).T
-        return (a * size + b) * size + c  # an integer per face; 64 bits suffice for 10^6 vertices
-
-    if not np.isin(number(triangles), number(faces)).all():
+    # an integer per face; 64 bits suffice for 10^6 vertices
+    weights = np.array([size**2, size, 1])
+    if not np.isin(*(np.sort(corners, axis=1) @ weights for corners in (triangles, faces))).all():
         raise raw.RefusedError(
             "holds tetrahedra and triangles that are not their faces, allowed: only one of both"
         )

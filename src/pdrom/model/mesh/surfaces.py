@@ -5,7 +5,6 @@ Specifications: .obj, Advanced Visualizer manual, appendix B1 (Alias/Wavefront);
 """
 
 import re
-from functools import partial
 
 import numpy as np
 
@@ -21,17 +20,13 @@ IGNORED = frozenset(
 
 def obj(content: bytes) -> raw.Found:
     """Read Wavefront's .obj, without weights w and colours of vertices."""
-    # comments are removed first, as a backslash at their end does not continue the line
-    text = re.sub(rb"\\[ \t]*\n", b" ", raw.unified(content, comments=True))
-    vertices: list[bytes] = []
-    faces: list[bytes] = []
+    # comments are removed first, as a backslash at their end does not continue the line; one at the
+    # end of the file stays there, and is no number
+    text = re.sub(rb"\\[ \t]*\n(?!\s*\Z)", b" ", raw.unified(content, comments=True))
+    vertices, faces, lines, last = list[bytes](), list[bytes](), 0, b""
     before: list[int] = []  # number of vertices before each face; a corner -1 is the last of these
-    lines, last = 0, b""
-    for line in text.split(b"\n"):
-        words = line.split(None, 1)
-        if not words:
-            continue
-        last, rest = words[0], words[1] if len(words) == 2 else b""
+    for line in filter(bytes.strip, text.split(b"\n")):
+        last, rest, *_ = (*line.split(None, 1), b"")
         if last == b"v":
             vertices.append(rest)
         elif last in (b"f", b"fo"):
@@ -49,14 +44,26 @@ def obj(content: bytes) -> raw.Found:
         faces = [re.sub(rb"/\S*", b"", face) for face in faces]
     sizes = np.array([len(face.split()) for face in faces], np.int64)
     corners = raw.whole(raw.numbers(b" ".join(faces), "faces"), "faces with corners")
-    if last in (b"f", b"fo") and len(forms) == 1 and sizes[-1] == sizes.max():
-        raw.check_end(content, corners[-1], len(points))
+    starts, index = np.repeat(np.array(before, np.int64), sizes), corners[-1:]
+    corners = np.where(corners < 0, corners + starts, corners - 1)
+    if last in (b"f", b"fo") and len(forms) == 1 and _closed(sizes, corners):
+        raw.check_end(content, index[-1], len(points))
     elif last in (b"v", b"f", b"fo"):  # a corner or a part of one may be missing
         raw.check_end(content.rstrip(b" \t"), 0.0, 0)
-    starts = np.repeat(np.array(before, np.int64), sizes)
-    corners = np.where(corners < 0, corners + starts, corners - 1)
     kinds, ends = np.repeat([raw.POLYGON, raw.LINE], [len(sizes), lines]), np.zeros(lines, int)
     return raw.Found(points, kinds, np.append(sizes, ends + 2), np.append(corners, [ends, ends]))
+
+
+def _closed(sizes: np.ndarray, corners: np.ndarray) -> bool:
+    """Return whether the last face has all its corners, as all faces have the same number of them.
+
+    If not, a whole face ends where it began, at an edge that it shares with another face.
+    """
+    following, ends = np.roll(corners, -1), np.cumsum(sizes)
+    following[ends - 1] = corners[ends - sizes]
+    edges = np.sort([corners, following], axis=0)
+    shared = (edges == edges[:, -1:]).all(axis=0).sum() > 1
+    return bool(sizes[-1] > 2 and ((sizes == sizes[0]).all() or shared))
 
 
 def _columns(rows: list[bytes]) -> np.ndarray:
@@ -72,7 +79,7 @@ def _columns(rows: list[bytes]) -> np.ndarray:
 def off(content: bytes) -> raw.Found:
     """Read Geomview's .off, without normals, colours and texture coordinates."""
     text = raw.unified(content, comments=True)
-    head = re.match(rb"\s*(?:(?:ST)?C?N?OFF\b)?\s*(\d+)[ \t]+(\d+)[ \t\d]*\n", text)
+    head = re.match(rb"\s*(?:(?:ST|C|N)*OFF\b)?\s*(\d+)[ \t]+(\d+)[ \t\d]*\n", text, re.I)
     if head is None:
         raise raw.UnreadableError("no head: OFF, then numbers of vertices and faces as text")
     vertices, count = int(head[1]), int(head[2])
@@ -121,8 +128,7 @@ def stl(content: bytes) -> raw.Found:
     order = np.lexsort(corners.T[::-1])
     points = corners[order]
     new = (np.diff(points, axis=0, prepend=np.nan) != 0.0).any(axis=1)
-    index = np.empty(len(order), np.int64)
-    index[order] = np.cumsum(new) - 1
+    index = np.cumsum(new)[order.argsort()] - 1
     return raw.found(points[new], [(raw.TRIANGLE, index.reshape(-1, 3))])
 
 
@@ -136,7 +142,7 @@ def ply(content: bytes) -> raw.Found:
     head = re.match(rb"ply\s[\s\S]*?[\r\n]end_header" + raw.END, content)
     if head is None:
         raise raw.UnreadableError("no head from `ply` to `end_header`")
-    elements: list[tuple[bytes, int, list[str]]] = []
+    elements: list[tuple[bytes, int, list[list[str]]]] = []
     order = b""
     for line in head[0].splitlines():
         words = line.split()
@@ -145,20 +151,24 @@ def ply(content: bytes) -> raw.Found:
         elif words[:1] == [b"element"]:
             elements.append((words[1], int(words[2]), []))
         elif words[:1] == [b"property"]:
-            elements[-1][2].append(line.decode(errors="replace"))
+            elements[-1][2].append(line.decode(errors="replace").split())
     raw.require_once([name for name, _, _ in elements])
     source = raw.Source(content, _ORDERS[order], head.end())
     read: dict[str, list[np.ndarray]] = {"x": [], "y": [], "z": [], "faces": []}
     vertices = 0
     for element, count, properties in elements:
-        # a list has two fields, its length and its numbers
-        pairs = [["length"] * ("list" in p.split()[1:2]) + p.split()[-1:] for p in properties]
-        names = [name for pair in pairs for name in pair]
-        for block in source.ragged(count, partial(_row, properties)):
+        names, parts = list[str](), list[raw.Field | raw.Part]()
+        for _, *kinds, name in properties:
+            types = [raw.TYPES[kind] for kind in kinds if kind != "list"]
+            parts.append((types[0], 1))
+            if kinds[0] == "list":  # two fields: the length of a list, and its numbers
+                parts.append((types[1], len(names), int))
+                names.append("length")
+            names.append(name)
+        for block in source.ragged(count, *parts):
             for name, values in zip(names, block, strict=True):
-                kind = (element, name)
-                if kind in _PLY:
-                    read[_PLY[kind]].append(values)
+                if place := _PLY.get((element, name)):
+                    read[place].append(values)
                     if name == names[-1]:
                         source.check_end(vertices)
         vertices = count if element == b"vertex" else vertices
@@ -167,16 +177,3 @@ def ply(content: bytes) -> raw.Found:
     faces = [(raw.POLYGON, rows) for rows in read.pop("faces")]
     columns = [np.concatenate([np.empty((0, 1)), *blocks]) for blocks in read.values()]
     return raw.found(np.hstack(columns), faces)
-
-
-def _row(properties: list[str], source: raw.Source) -> tuple[list[raw.Field], list[int]]:
-    """Return the fields of the next row of an element, and which of them are lengths of lists."""
-    fields, keys = list[raw.Field](), list[int]()
-    for line in properties:
-        _, *names, _ = line.split()
-        kinds = [raw.TYPES[name] for name in names if name != "list"]
-        fields.append((kinds[0], 1))
-        if names[0] == "list":
-            keys.append(len(fields) - 1)
-            fields.append((kinds[1], source.peek(fields[:-1], kinds[0])))
-    return fields, keys
