@@ -202,19 +202,15 @@ def _require_consistent(found: AnyRun, file: h5py.File) -> None:
     full = found.full if isinstance(found, ReducedRun) else found
     scene, moved, points = full.scene, full.positions, full.scene.mesh.points
     frames, h = scene.config.frames, scene.config.time_step
-    # fault, stored and expected numbers, size of what was rounded to single precision
-    pairs = [
-        ("frame 0 of the positions is not the mesh", moved[0], points, 0.0),
-        ("a time is below zero", full.ms, np.abs(full.ms), 0.0),
-    ]
+    _require_same("frame 0 of the positions is not the mesh", moved[0], points)
+    _require_same("a time is below zero", full.ms, np.abs(full.ms))
     if "velocities" in file:
         before = moved[:1] - h * scene.initial_state().velocities
         steps = np.diff(moved, axis=0, prepend=before) / h
-        stored = file["velocities"][...]
-        pairs.append(("velocities are not those of the positions", stored, steps, 0.0))
-    if "objective" in file:
-        known, shape = np.zeros((frames, scene.config.iterations)), file["objective"].shape
-        pairs.append((f"objective of shape {shape}", np.zeros(shape), known, 0.0))
+        _require_same("velocities are not those of the positions", file["velocities"][...], steps)
+    shape = frames, scene.config.iterations
+    if "objective" in file and file["objective"].shape != shape:
+        raise ValueError(f"objective of shape {file['objective'].shape}")
     for name, own in file.get("snapshots", {}).items():
         at, group = own["frames"][...], scene.group(name)
         sizes = [int(own.attrs[key]) for key in ("elements", "rows_per_element")]
@@ -229,15 +225,16 @@ def _require_consistent(found: AnyRun, file: h5py.File) -> None:
             raise ValueError(f"{done.frames} of {frames} reduced frames, blow-up in frame {end}")
         apart = np.linalg.norm(done.positions - moved[: done.frames + 1], axis=(1, 2))[1:]
         sides, size = np.ptp(done.positions, axis=1).max(axis=1)[1:], float(np.linalg.norm(moved))
-        pairs += [
-            ("frame 0 of the reduced run is not the mesh", done.positions[0], points, 0.0),
-            ("difference is not that of the positions", done.difference, apart, size),
-            ("extent is not that of the positions", done.extent * side, sides, size),
-        ]
-    for fault, stored, expected, scale in pairs:
-        least = 1e-6 * max(np.abs(expected).max(initial=0.0), scale)
-        if stored.shape != expected.shape or not (np.abs(stored - expected) <= least).all():
-            raise ValueError(fault)
+        _require_same("frame 0 of the reduced run is not the mesh", done.positions[0], points)
+        _require_same("difference is not that of the positions", done.difference, apart, size)
+        _require_same("extent is not that of the positions", done.extent * side, sides, size)
+
+
+def _require_same(fault: str, stored: np.ndarray, known: np.ndarray, size: float = 0.0) -> None:
+    """Raise ValueError unless ``stored`` is ``known``, whose source of a ``size`` was rounded."""
+    least = 1e-6 * max(np.abs(known).max(initial=0.0), size)
+    if stored.shape != known.shape or not (np.abs(stored - known) <= least).all():
+        raise ValueError(fault)
 
 
 def _store(file: h5py.File, name: str, values: np.ndarray, unit: str) -> None:

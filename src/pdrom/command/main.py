@@ -107,9 +107,9 @@ def main() -> None:
         os.environ.setdefault("NUMBA_CACHE_DIR", str(root / ".cache" / "numba"))
         os.environ.setdefault("MPLCONFIGDIR", str(root / ".cache" / "matplotlib"))
     settle()
-    logging.basicConfig(format="%(message)s")
-    logging.getLogger("pdrom.api").setLevel(logging.INFO)
     # a stream that the caller closed is None here; the next file opened would get its descriptor
     sys.stdout = sys.stdout or open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
     sys.stderr = sys.stderr or open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
+    logging.basicConfig(format="%(message)s")
+    logging.getLogger("pdrom.api").setLevel(logging.INFO)
     sys.exit(run(sys.argv[1:]))

@@ -3,9 +3,11 @@
 import argparse
 import json
 import math
+import re
 import sys
 from contextlib import suppress
 from pathlib import Path
+from string import Template
 from typing import TYPE_CHECKING
 
 from pdrom.command.base import Command, Status
@@ -15,52 +17,8 @@ if TYPE_CHECKING:
 
     from pdrom.model.mesh.types import Mesh
 
-TEMPLATE = """\
-# A scene. `pdrom show scene` explains its keys, `pdrom show WORD` any word below.
-# Units: metres, seconds, kilograms, newtons.
-name: {name} # this and the title may be left out: they follow from the file's name
-title: {title}
-
-# What moves. Others: {{kind: cloth, rows: 20, columns: 20}}, {{kind: bar, nx: 40, ny: 5, nz: 5}},
-# or a file in this folder: {{kind: file, path: sheet.obj, scale: 0.001}} if it is in millimetres
-{about}mesh: {mesh}
-
-frames: 100 # to simulate
-time_step: 0.016 # s
-iterations: 10 # local and global steps of a frame
-masses: [{{density: {density}}}] # {material}: {total:.3g} kg in all
-
-# Only what is listed is loaded and computed.
-effects:
-  - {{effect: gravity{pull}}} # 9.81 m/s^2 along -{up}
-  - {floor}
-  - {{effect: pins, select: {held}}} # held: a side, a place, or a list of vertices
-  # a handle: held vertices, moved by `offset` (m) over 50 frames
-  # - {{effect: translate, select: {moved}, offset: {offset}, over: 50}}
-  # - {{effect: pins, select: {{kind: sphere, centre: {corner}, radius: {tenth}}}}}
-  # an obstacle; also plane, box
-  # - {{effect: sphere, centre: {below}, radius: {fifth}, friction: 0.3}}
-  # constraint groups; weights that suit these masses and 10 iterations: stiffer ones need more
-{groups}
-# Groups whose projections are reduced, and the number of snapshots (even frames of the run) that
-# train a basis.
-reduce:
-  {group}: {{train: 40}}
-
-# Held-out motions, on which a reduction is tested: pins move by so many m, vertices start at m/s.
-held_out: {{carry: {half}, kick: {twice}}}
-"""
-SURFACE = """\
-  - {{effect: spring, weight: {weight}}} # N/m: edges keep their length
-  # - {{effect: strain, weight: {weight}}} # N/m: triangles keep their shape
-  # - {{effect: area, weight: {weight}}} # N/m: triangles keep their area
-  # - {{effect: bending, weight: {bending}}} # N m: the surface keeps its curvature
-"""
-VOLUME = """\
-  - {{effect: tetrahedron_strain, weight: {weight}}} # N/m^2: tetrahedra keep their shape
-  # - {{effect: volume, weight: {weight}}} # N/m^2: tetrahedra keep their volume
-"""
-COTTON, WATER = (0.2, "kg/m^2, of cotton"), (1000.0, "kg/m^3, of water")
+# Density of a new scene: of cotton, kg/m^2 of a surface, and of water, kg/m^3 of a volume.
+DENSITY = {2: 0.2, 3: 1000.0}
 # Weight of a new scene's constraints over density and squared distance of vertices, 1/s^2: iterated
 # ten times in a time step of 16 ms, they converge. Of bending it is smaller by this factor.
 STIFFNESS, BENDING = 1e4, 1e-3
@@ -104,6 +62,7 @@ def template(
     in which vertices that are closer than ``merge`` times the extent are merged. Numbers and sides
     in examples fit the mesh.
     """
+    from pdrom.core import config_file
     from pdrom.core.yamlfile import named
     from pdrom.model.mesh.generators import Plane, cloth
     from pdrom.model.mesh.types import vertex_measures
@@ -115,24 +74,23 @@ def template(
         more = f", merge: {merge:.1e}" if merge else ""
         made = f"{{kind: file, path: {json.dumps(file, ensure_ascii=False)}{more}}}"
     names = {key: json.dumps(value, ensure_ascii=False) for key, value in named({}, stem).items()}
-    axis, side, solid = "xyz".index(up), mesh.extent, len(mesh.tetrahedra) > 0
-    (density, material), groups = (WATER, VOLUME) if solid else (COTTON, SURFACE)
-    total = float(vertex_measures(mesh).sum())
-    square = (total / mesh.vertices) ** (2.0 / (3 if solid else 2))  # of a distance of vertices
+    axis, side, dimension = "xyz".index(up), mesh.extent, 3 if len(mesh.tetrahedra) else 2
+    text = config_file("new_scene.txt").read_text("utf-8").partition("\n")[2]
+    text = re.sub(rf"(?m)^(?!{dimension})[23]\|.*\n|^{dimension}\|", "", text)
+    density, total = DENSITY[dimension], float(vertex_measures(mesh).sum())
+    square = (total / mesh.vertices) ** (2.0 / dimension)  # of a distance of vertices
     weight = STIFFNESS * density * square
     held, moved, corner = _held(mesh, axis)
     below = 0.5 * (mesh.points.min(axis=0) + mesh.points.max(axis=0))
     below[axis] = mesh.points[:, axis].min() - 0.25 * side
     centre = [round(x, 2 - math.floor(math.log10(side))) + 0.0 for x in below.tolist()]
-    weights = {"weight": _short(weight), "bending": _short(BENDING * weight * square)}
     pull = "" if up == "y" else f", acceleration: {_along(axis, -9.81)}"
-    return TEMPLATE.format(
-        **names, mesh=made, about=_about(mesh), density=density, material=material, up=up,
-        total=density * total, pull=pull, floor=_floor(mesh, axis), held=held, moved=moved,
-        offset=_along(axis, _short(0.3 * side)), corner=corner, below=centre,
-        groups=groups.format(**weights), group="tetrahedron_strain" if solid else "spring",
-        tenth=_short(0.1 * side), fifth=_short(0.2 * side), half=_short(0.5 * side),
-        twice=_short(2.0 * side),
+    return Template(text).substitute(
+        **names, mesh=made, about=_about(mesh), density=density, total=f"{density * total:.3g}",
+        up=up, pull=pull, floor=_floor(mesh, axis), held=held, moved=moved, corner=corner,
+        offset=_along(axis, _short(0.3 * side)), below=centre, weight=_short(weight),
+        bending=_short(BENDING * weight * square), tenth=_short(0.1 * side),
+        fifth=_short(0.2 * side), half=_short(0.5 * side), twice=_short(2.0 * side),
     )  # fmt: skip
 
 

@@ -34,35 +34,32 @@ def models() -> Iterator[tuple[str, str, type[BaseModel]]]:
     yield "keys", "keys: [{...}]", Key
 
 
-def explained(word: str) -> Iterator[str]:
-    """Yield lines about a ``word``: all that has this name with its keys, and keys of this name.
+def explained(word: str) -> list[str]:
+    """Return lines about a ``word``: all that has this name with its keys, and keys of this name.
 
     Raises ConfigurationError, which lists all words, for a word that no scene can have.
     """
-    texts = read_yaml(config_file("words.yaml"))
-    entries, users = dict[str, list[str]](), dict[str, dict[str, list[str]]]()
+    texts, lines = read_yaml(config_file("words.yaml")), dict[str, list[str]]()
     for name, form, model in models():
-        heading, own = f"{form}: {texts['words'][name]}", entries.setdefault(name, [])
-        own.append(heading)
+        lines[f"{form}: {texts['words'][name]}"] = [
+            name,
+            *({"effect", "kind"} & {*model.model_fields}),
+        ]
         for key, field in model.model_fields.items():
-            if key in ("effect", "kind"):  # such a word lists all that it can be
-                users.setdefault(key, {})[f"  {heading}"] = [name]
+            if key in ("effect", "kind"):
                 continue
             unit, sentence = texts["keys"].get(f"{name}.{key}") or texts["keys"][key]
             default = "required" if field.is_required() else _plain(field.default)
             default = "" if key in named({}, "") and model is SceneConfig else default
-            options = _options(field.annotation)
-            parts = [unit, default, " or ".join(dict.fromkeys(options)), sentence]
-            line = f"  {key}: {'; '.join(filter(None, parts))}"
-            own.append(line)
-            for each in (key, *options):
-                users.setdefault(each, {}).setdefault(line, []).append(name)
-    users |= dict.fromkeys((*selection.SIDES, *selection.WORDS), users["select"])
-    if word not in entries and word not in users:
-        known = choices(word, dict.fromkeys((*entries, *users)))
+            options = list(dict.fromkeys(_options(field.annotation)))
+            parts = filter(None, [unit, default, " or ".join(options), sentence])
+            sides = (*selection.SIDES, *selection.WORDS) if key == "select" else ()
+            lines[f"  {name}.{key}: {'; '.join(parts)}"] = [name, key, *options, *sides]
+    found = [line for line, words in lines.items() if word in words]
+    if not found:
+        known = choices(word, dict.fromkeys(each for words in lines.values() for each in words))
         raise ConfigurationError(f"'{word}': no such file, and no word of a scene{known}")
-    yield from entries.get(word, [])
-    yield from (f"{line} (of {', '.join(at)})" for line, at in users.get(word, {}).items())
+    return found
 
 
 def _options(annotation: Any) -> list[str]:
