@@ -35,7 +35,6 @@ from pdrom.reduction.sampling.local_step import ReducedLocalStep, replace_group
 from pdrom.reduction.snapshots import row_masses, training_frames
 
 log = logging.getLogger(__name__)
-
 SNAPSHOTS = 100  # largest number of training snapshots of a group if the scene sets none
 # A reduced run ends when its bounding box is larger than that of the mesh at rest by this factor.
 BLOWUP_EXTENT = 100.0

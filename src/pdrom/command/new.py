@@ -109,13 +109,11 @@ def _read(file: str, scene: Path, merge: float) -> "tuple[str, Mesh]":
     from pdrom.model.mesh.config import MeshFile
 
     folder = scene.resolve().parent
-    try:
-        inside = (Path(file).parent.resolve() / Path(file).name).relative_to(folder)
-    except ValueError:
-        raise ConfigurationError(
-            f"--mesh {file}: required is a file below {folder}, the folder of the scene"
-        ) from None
-    keys = {"kind": "file", "path": inside.as_posix(), "merge": merge}
+    inside = Path(file).parent.resolve() / Path(file).name
+    if not inside.is_relative_to(folder):
+        required = f"required is a file below {folder}, the folder of the scene"
+        raise ConfigurationError(f"--mesh {file}: {required}")
+    keys = {"kind": "file", "path": inside.relative_to(folder).as_posix(), "merge": merge}
     config = validate(MeshFile, keys, f"--mesh {file}")
     return config.path, config.build(folder)
 
@@ -124,13 +122,10 @@ def _about(mesh: "Mesh") -> str:
     """YAML comments with the size and position of the mesh, and the vertex counts of its sides."""
     from pdrom.model.mesh.checks import seams
 
-    low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
-    places = (
-        f"{axis} from {a:.3g} to {b:.3g}" for axis, a, b in zip("xyz", low, high, strict=True)
-    )
-    cells = f"{len(mesh.triangles)} triangles"
-    if len(mesh.tetrahedra):
-        cells = f"{len(mesh.tetrahedra)} tetrahedra"
+    ends = zip("xyz", mesh.points.min(axis=0), mesh.points.max(axis=0), strict=True)
+    places = (f"{axis} from {low:.3g} to {high:.3g}" for axis, low, high in ends)
+    kind = "tetrahedra" if len(mesh.tetrahedra) else "triangles"
+    cells = f"{len(getattr(mesh, kind))} {kind}"
     sides = (f"{side} {len(vertices)}" for side, vertices in _sides(mesh).items())
     return (
         f"# It has {mesh.vertices} vertices, {cells}, {seams(mesh)}; {', '.join(places)} (m).\n"

@@ -3,7 +3,7 @@
 import argparse
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, NoReturn
 
 from pdrom.command.base import SCENE, UNCHECKED, Command, Status, files_of, require_output
 
@@ -16,14 +16,12 @@ WRONG = 0.1  # relative error above which the command calls a run "wrong" instea
 PICTURES = {"pdf": "Creator", "png": "Software", "svg": "Creator"}
 
 
-class _Gone(argparse.Action):
-    """Option ``--error`` of earlier versions; its use raises ConfigurationError."""
+def _gone(_: str) -> NoReturn:
+    """Refuse the option ``--error`` of earlier versions."""
+    from pdrom.core.errors import ConfigurationError
+    from pdrom.model.scene import GONE
 
-    def __call__(self, *_: Any) -> None:
-        from pdrom.core.errors import ConfigurationError
-        from pdrom.model.scene import GONE
-
-        raise ConfigurationError(f"--error: {GONE}")
+    raise ConfigurationError(f"--error: {GONE}")
 
 
 def _size(text: str) -> int:
@@ -108,7 +106,7 @@ COMMAND = Command(
     {
         "scene": SCENE,
         "--group": {"metavar": "G", "required": True, "help": "constraint group to reduce"},
-        "--error": {"action": _Gone, "nargs": "?", "help": argparse.SUPPRESS},
+        "--error": {"type": _gone, "nargs": "?", "const": "", "help": argparse.SUPPRESS},
         "--method": {
             "metavar": "M",
             "default": "gappy",

@@ -23,9 +23,7 @@ def perform(arguments: argparse.Namespace) -> Status:
 
     path = Path(arguments.file)
     if re.fullmatch("[a-z_]{1,40}", arguments.file) and not path.exists():
-        from pdrom.command.words import explained
-
-        sys.stdout.write("\n".join(explained(arguments.file)) + "\n")
+        sys.stdout.write("\n".join(_explained(arguments.file)) + "\n")
         return Status.DONE
     condition, record = check_file(path), provenance_of(path)
     lines = [f"{path}: {path.stat().st_size:,} bytes, {condition.value}"]
@@ -41,6 +39,29 @@ def perform(arguments: argparse.Namespace) -> Status:
     lines += [f"  {name}: {record[name]}" for name in ordered]
     sys.stdout.write("\n".join(lines) + "\n")
     return Status.DONE
+
+
+def _explained(word: str) -> list[str]:
+    """Return lines about a word of a scene's file; ConfigurationError, with all words, for another.
+
+    They explain all that has this name, with its keys, and the keys of this name or value.
+    """
+    from pdrom.core import config_file
+    from pdrom.core.errors import ConfigurationError, choices
+    from pdrom.core.yamlfile import read_yaml
+
+    lines = list[tuple[str, list[str]]]()  # each with the words that it explains
+    for form, keys in read_yaml(config_file("words.yaml")).items():
+        lines.append((f"{form}: {keys.pop('is')}", form.split()))
+        name = form.split()[-1]
+        for key, parts in keys.items():
+            text = f"  {name}.{key}: {'; '.join(filter(None, parts))}"
+            lines.append((text, [name, key, *filter(None, parts[2].split(" or "))]))
+    found = [line for line, words in lines if word in words]
+    if not found:
+        known = choices(word, dict.fromkeys(each for _, words in lines for each in words))
+        raise ConfigurationError(f"'{word}': no such file, and no word of a scene{known}")
+    return found
 
 
 def _hdf5(path: Path, whole: bool) -> Iterator[str]:

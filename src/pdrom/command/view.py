@@ -19,11 +19,11 @@ def perform(arguments: argparse.Namespace) -> Status:
     first = Path(arguments.results[0])
     out = Path(arguments.out or first.parent / f"{first.stem}.html")
     require_output(out, arguments.results)
-    if arguments.png:
-        require_output(arguments.png, [*arguments.results, str(out)])
+    written = [arguments.png] if arguments.png else []
     if arguments.vtk:
-        for path in (Path(arguments.vtk, "run.pvd"), *Path(arguments.vtk).glob(FRAMES)):
-            require_output(path, [*arguments.results, str(out)])
+        written += [Path(arguments.vtk, "run.pvd"), *Path(arguments.vtk).glob(FRAMES)]
+    for path in written:
+        require_output(path, [*arguments.results, str(out)])
     scenes = viewed_scenes(*(load(file, arguments.unchecked) for file in arguments.results))
     if len(scenes) > 1 and (arguments.png or arguments.vtk):
         raise ConfigurationError("--png and --vtk: of one scene at a time")

@@ -256,12 +256,11 @@ def _array(
         size = 8 if file.get("header_type") == "UInt64" else 4
         word = f"{order}u{size}"
         if compressor := file.get("compressor"):
-            if compressor not in _INFLATE:
+            if not (inflate := _INFLATE.get(compressor)):
                 raise raw.RefusedError(f"compressed by {compressor}: save it uncompressed")
             blocks = int(np.frombuffer(data, word, 1)[0])
             sizes = np.frombuffer(data, word, blocks, 3 * size).tolist()
             ends = np.cumsum([(3 + blocks) * size, *sizes]).tolist()
-            inflate = _INFLATE[compressor]
             data = b"".join(inflate(data[a:b]) for a, b in pairwise(ends))
         else:
             data = data[size : size + int(np.frombuffer(data, word, 1)[0])]
