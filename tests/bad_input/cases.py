@@ -253,7 +253,7 @@ SCENE_CASES = [
     select("nearest of too many", "{kind: nearest, point: [0, 0, 0], count: 31}",
            "count = 31 of 20 vertices"),
     select("union with no side", "{kind: union, of: [left, middle]}",
-           "selection 'middle': allowed are left"),
+           "selection 'middle': allowed are x_min"),
     select("all but all", f"{{kind: complement, of: {[*range(20)]}}}", "selects no vertex"),
     scene("tetrahedra on a sheet", "effects:\n",
           "effects:\n  - {effect: tetrahedron_strain, weight: 1.0}\n",

@@ -1,5 +1,6 @@
 """The wheel: what it carries, and that it reduces where there is no checkout."""
 
+import re
 import subprocess
 import sys
 import sysconfig
@@ -35,8 +36,8 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_it_carries_the_package_and_the_files_that_it_reads(wheel: Path) -> None:
     with ZipFile(wheel) as archive:
         names = set(archive.namelist())
-        methods = CONFIG / "methods.yaml"
-        assert archive.read("pdrom/config/methods.yaml") == methods.read_bytes()
+        for name in ("methods.yaml", "words.yaml", "new_scene.txt"):
+            assert archive.read(f"pdrom/config/{name}") == (CONFIG / name).read_bytes()
     source = ROOT / "src"
     own = {str(p.relative_to(source)) for p in (source / "pdrom").rglob("*") if p.is_file()}
     assert {name for name in own if "__pycache__" not in name and "egg-info" not in name} <= names
@@ -63,6 +64,8 @@ def test_installed_elsewhere_it_reduces(wheel: Path, tmp_path: Path) -> None:
     assert call(python, "-c", script, folder=folder).startswith(str(environment))
     call(pdrom, "new", "sheet", folder=folder, **home)
     first = (folder / "sheet.yaml").read_text(encoding="utf-8").splitlines()[0]
-    assert Path(first.partition("=file://")[2]).is_file()
+    assert "config/README" not in first
+    (word,) = re.findall("`pdrom show ([a-z]+)`", first)
+    assert call(pdrom, "show", word, folder=folder, **home).startswith("scene: ")
     said = call(pdrom, "reduce", "small.yaml", "--group", "spring", "--r", 2, folder=folder, **home)
     assert said.startswith("small_spring_gappy_2.h5: spring, gappy, r = 2: relative error")

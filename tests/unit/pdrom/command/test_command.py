@@ -6,15 +6,19 @@ import re
 import shutil
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
+from typing import get_args
 
 import h5py
 import meshio
 import numpy as np
 import pytest
 import yaml
+from pydantic import BaseModel
 
 from builders import SMALL
+from mesh_files import write_mesh
 from pdrom import __version__
 from pdrom.api import load_scene
 from pdrom.command.base import Status
@@ -23,11 +27,20 @@ from pdrom.command.new import template
 from pdrom.command.progress import Progress
 from pdrom.core.store import MARK, check_file
 from pdrom.core.store.checksum import BLOCK
+from pdrom.core.yamlfile import read_yaml
+from pdrom.model.constraints.base import WeightFactor
 from pdrom.model.dynamics.stepper import FrameReport
+from pdrom.model.effects import EFFECTS
+from pdrom.model.effects.keyframes import Key
+from pdrom.model.held_out import HeldOut
+from pdrom.model.mesh.config import BarMesh, ClothMesh, MeshFile
 from pdrom.model.mesh.generators import bar, cloth
-from pdrom.model.mesh.types import Mesh
-from pdrom.model.scene import Scene, SceneConfig
+from pdrom.model.mesh.reader import READERS
+from pdrom.model.mesh.selection import Shape
+from pdrom.model.mesh.types import Mesh, vertex_measures
+from pdrom.model.scene import MassConfig, ReductionPlan, Scene, SceneConfig
 from pdrom.view.camera import up_of
+from places import CONFIG
 
 
 @pytest.fixture
@@ -49,7 +62,7 @@ def test_a_scene_is_run_reduced_and_shown(folder, capsys):
     assert not list(folder.glob(".*"))  # no hidden file beside a user's own
     assert run(["show", "small_spring_gappy_2.h5"]) == Status.DONE
     shown = capsys.readouterr().out
-    for words in ("intact", "reduced: 13 x 30 x 3 float32, in m", "method: gappy", "scene: small"):
+    for words in ("intact", "reduced: 13 x 30 x 3 float64, in m", "method: gappy", "scene: small"):
         assert words in shown
     assert run(["show", "small.h5", "--configuration"]) == Status.DONE
     text = capsys.readouterr().out.split("configuration:\n")[1].split("attributes")[0]
@@ -158,20 +171,22 @@ def test_a_new_scene_is_valid_and_replaces_nothing(folder, capsys):
 @pytest.mark.parametrize(
     ("mesh", "listed", "others"),
     [
-        (None, {"spring"}, {"translate", "strain", "bending", "volume"}),
+        (None, {"spring"}, {"translate", "strain", "bending"}),
         (cloth(4, 3), {"spring"}, {"translate", "strain", "bending"}),
         (bar(3, 2, 2), {"tetrahedron_strain"}, {"translate", "volume"}),
     ],
 )
-def test_every_commented_effect_of_a_new_scene_is_valid(mesh, listed, others):
-    """Of a mesh that is known only groups that fit it are named."""
+def test_every_commented_effect_of_a_new_scene_is_valid(folder, mesh, listed, others):
+    """Its sides, places and groups fit the mesh, whatever axis is up."""
     text = template("it's", 'o\'b "1" ü.obj', mesh)
     scene = SceneConfig.model_validate(yaml.safe_load(text))
     assert {*scene.groups, *scene.reduce} == listed
     assert scene.mesh.sources == ([] if mesh is None else ['o\'b "1" ü.obj'])
-    every = SceneConfig.model_validate(yaml.safe_load(text.replace("  # - {", "  - {")))
-    assert others <= {effect.effect for effect in every.effects}
-    assert (mesh is None) or {"strain", "volume"} - set(every.groups)
+    for up in "xyz":
+        text = template("a", "a.obj", mesh, up).replace("  # - {", "  - {")
+        every = SceneConfig.model_validate(yaml.safe_load(text))
+        Scene.build(every, every.mesh.build(folder) if mesh is None else mesh)
+        assert others <= {effect.effect for effect in every.effects}
 
 
 SEAM = "v 0 0 0\nv 1 0 0\nv 0 0 1\nv 1 0 {0}\nv 0 0 {1}\nv 1 0 1\nf 1 2 3\nf 4 6 5\n"
@@ -199,9 +214,9 @@ def test_a_new_scene_tells_of_its_mesh_and_runs(folder, capsys, caplog):
     meshio.write("in/o'b.obj", meshio.Mesh(mesh.points, [("triangle", mesh.triangles)]))
     assert run(["new", "in/no", "--mesh", "in/o'b.obj"]) == Status.DONE
     text = (folder / "in" / "no.yaml").read_text("utf-8")
-    assert "# Of this file: 12 vertices, 12 triangles, 1 connected part; x from -0.5" in text
+    assert "# It has 12 vertices, 12 triangles, 1 connected part; x from -0.5" in text
     assert " to 0.5, y from -7 to -7, z" in text
-    assert "number of their vertices: left 3, right 3, back 4, front 4." in text
+    assert "number of their vertices: x_min 3, x_max 3, z_min 4, z_max 4." in text
     small = text.replace("frames: 100", "frames: 4").replace("train: 40", "train: 2")
     (folder / "in" / "no.yaml").write_text(small, encoding="utf-8")
     scene = load_scene("in/no.yaml")
@@ -223,16 +238,62 @@ def test_a_mesh_without_a_whole_side_is_held_at_its_top(folder):
     assert built.boundaries[0].vertices.tolist() == [2, 3, 4]
 
 
+@pytest.mark.parametrize("mesh", [cloth(4, 3, "xz", extent=200.0), bar(3, 2, 2, extent=0.01)])
 @pytest.mark.parametrize("up", [0, 1, 2])
-def test_a_new_scene_has_a_density_and_its_floor_below_along_what_is_up(up):
-    mesh = cloth(4, 3, "xz")
+def test_a_new_scene_has_a_material_and_lengths_of_its_mesh_and_its_floor_is_below(up, mesh):
+    """Water or cotton; what the pins are carried by is half the extent."""
     text = template("a", "a.obj", mesh, up="xyz"[up])
     scene = Scene.build(SceneConfig.model_validate(yaml.safe_load(text)), mesh)
+    density, unit = (1000.0, "m^3") if len(mesh.tetrahedra) else (0.2, "m^2")
+    assert f"masses: [{{density: {density}}}] # kg/{unit}, of " in text
+    assert scene.masses.sum() == pytest.approx(density * vertex_measures(mesh).sum())
+    assert scene.config.held_out.carry == 0.5 * mesh.extent
     assert up_of(scene.config.effects).tolist() == np.eye(3)[up].tolist()
     (floor,) = scene.contacts
     assert floor.gaps(mesh.points).min() >= mesh.extent / 2.0
     assert floor.gaps(mesh.points + np.eye(3)[up]) == pytest.approx(floor.gaps(mesh.points) + 1.0)
-    assert scene.masses.mean() == pytest.approx(10.0, rel=0.05)
+
+
+@pytest.mark.parametrize("suffix", READERS)
+def test_a_mesh_in_place_of_a_scene_is_named_with_the_command_that_helps(folder, suffix, capsys):
+    mesh = f"a{suffix}"
+    write_mesh(Path(mesh))
+    told = f"pdrom: {mesh}: this is a mesh: `pdrom new --mesh {mesh}` makes a scene of it"
+    for command in (["run", mesh], ["reduce", mesh, "--group", "spring"], ["new", mesh]):
+        assert refusal(capsys, command) == told
+    assert run(["new", "--mesh", mesh]) == Status.DONE
+    assert load_scene("a.yaml").mesh.vertices == 12
+
+
+def words_of_models() -> Iterator[tuple[str, type[BaseModel]]]:
+    yield from (("scene", SceneConfig), ("masses", MassConfig), ("reduce", ReductionPlan))
+    yield from (("held_out", HeldOut), ("factors", WeightFactor), ("keys", Key))
+    yield from ((f"effect {name}", EFFECTS.load(name).Config) for name in EFFECTS)
+    for model in (ClothMesh, BarMesh, MeshFile):
+        yield f"mesh kind {get_args(model.model_fields['kind'].annotation)[0]}", model
+    for model in Shape.__subclasses__():
+        yield f"select kind {model.model_fields['kind'].default}", model
+
+
+def test_words_of_a_scene_are_shown_with_their_keys_and_defaults(capsys):
+    texts, models = read_yaml(CONFIG / "words.yaml"), dict(words_of_models())
+    assert texts.keys() == models.keys()
+    for form, model in models.items():
+        fields = {k: f for k, f in model.model_fields.items() if k not in ("effect", "kind")}
+        assert texts[form].keys() == {"is", *fields}
+        for key, field in fields.items():
+            _, default, options, sentence = texts[form][key]
+            assert sentence
+            named = set(re.findall(r"Literal\[([^]]*)\]", str(field.annotation)))
+            assert not named or options == " or ".join(named).replace("', '", " or ").strip("'")
+            if not field.is_required() and isinstance(field.default, (int, float, str)):
+                assert default == f"default {field.default}"
+            assert field.is_required() == (default == "required") or key in ("name", "title")
+        assert run(["show", form.split()[-1]]) == Status.DONE
+        assert f"{form}: {texts[form]['is']}\n" in capsys.readouterr().out
+    for side in ("x_min", "front"):
+        assert run(["show", side]) == Status.DONE
+    assert "did you mean 'spring'?" in refusal(capsys, ["show", "sprng"])
 
 
 FAULTY = [

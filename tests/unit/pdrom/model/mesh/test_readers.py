@@ -63,6 +63,9 @@ def test_obj(tmp_path, content):
         (V + "f 1 2 3\nf 1/1 3/3 4", "cut off"),
         (V + "l 1 2 3 4\n", "only lines or points, which are not simulated"),
         ("f -3 -2 -1\nv 0 0 0\nv 1 0 0\nv 1 0 1.5", "cut off: .* go on"),
+        (V + "f 1 2 3 \\\n", "faces: something else"),
+        # of a polygon after a triangle and a quadrilateral: it ends at no edge of another face
+        (V + "v 2 0 0\nv 2 0 1\nf 1 2 3\nf 1 2 3 4\nf 1 2 5 6", "cut off"),
     ],
 )
 def test_faulty_obj(tmp_path, content, why):
@@ -101,6 +104,15 @@ def legacy(dataset: str, sections: str, version: str = "3.0") -> str:
     )
 
 
+def binary_vtk(strings: bytes) -> bytes:
+    """With a field of two strings, each behind its length in as few bytes as can be."""
+    head = "# vtk DataFile Version 3.0\nsheet\nBINARY\nDATASET UNSTRUCTURED_GRID\nFIELD f 1\n"
+    parts = [("names 1 2 string", strings), ("POINTS 4 double", POINTS.astype(">f8").tobytes())]
+    cells = np.array([[3, *row] for row in TRIANGLES], ">i4").tobytes()
+    parts += [("CELLS 2 8", cells), ("CELL_TYPES 2", np.array([5, 5], ">i4").tobytes())]
+    return head.encode() + b"".join(name.encode() + b"\n" + data + b"\n" for name, data in parts)
+
+
 GRID = f"CELLS 2 8\n{FACES}CELL_TYPES 2\n5\n5\n"
 OFFSETS = "OFFSETS vtktypeint64\n0 3 6\nCONNECTIVITY vtktypeint64\n0 1 2 0 2 3\n"
 MEDIT = (
@@ -122,6 +134,7 @@ def gmsh4(version: str) -> str:
     ("name", "content"),
     [
         ("a.off", f"OFF\n4 2 0\n{XYZ}{FACES}"),
+        ("a.off", f"NCOFF\n4 2 0\n{XYZ}{FACES}"),
         ("a.off", f"OFF 4 2 0\n{XYZ}3 0 1 2\n3 0 2 3"),
         ("a.off", f"OFF\n\n# head\n4 2\n{XYZ}{FACES}".replace("\n", "\r\n")),
         ("a.off", "CNOFF\n4 2 0\n" + XYZ.replace("\n", " 0 1 0 255 0 0 # red\n")
@@ -139,6 +152,9 @@ def gmsh4(version: str) -> str:
         ("a.vtk", legacy("UNSTRUCTURED_GRID", GRID)),
         ("a.vtk", legacy("UNSTRUCTURED_GRID\nFIELD FieldData 1\nTIME 1 1 double\n0.5",
                          f"CELLS 3 6\n{OFFSETS}CELL_TYPES 2\n5 5\n", "5.1")),
+        ("a.vtk", legacy("UNSTRUCTURED_GRID\nFIELD FieldData 2\nnames 1 2 string\na%20b\n\n"
+                         "TIME 1 1 double\n0.5\nMETADATA\nCOMPONENT_NAMES\nx\n", GRID)),
+        ("a.vtk", binary_vtk(b"\xc2ab" + b"\x80\x40" + 64 * b"c")),
         ("a.mesh", MEDIT),
         ("a.msh", gmsh4("4")),
         ("a.msh", gmsh4("4.0")),
@@ -204,6 +220,13 @@ def test_a_mesh_of_the_plane_lies_at_z_0(tmp_path):
     points, cells = read_here(tmp_path / "a.mesh")
     assert points.tolist() == [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
     assert cells.tolist() == TRIANGLES
+
+
+def test_a_whole_last_face_without_an_end_of_line_is_read_also_among_polygons(tmp_path):
+    sides = "f 2 1 5\nf 3 2 5\nf 4 3 5\nf 1 4 5"
+    for faces in (f"f 1 2 3 4\n{sides}", f"{sides}\nf 1 2 3 4"):
+        (tmp_path / "a.obj").write_text(f"{V}v .5 1 .5\n{faces}")
+        assert len(read_here(tmp_path / "a.obj")[1]) == 6
 
 
 def areas(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
