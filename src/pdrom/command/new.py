@@ -179,11 +179,7 @@ COMMAND = Command(
     "Write the file of a new scene, with comments",
     "pdrom new sheet.yaml --mesh sheet.obj",
     {
-        "scene": {
-            "metavar": "SCENE",
-            "nargs": "?",
-            "help": "file to write; .yaml is added to a name; without it, beside the mesh",
-        },
+        "scene": {"metavar": "SCENE", "nargs": "?", "help": "file to write; else beside the mesh"},
         "--mesh": {"metavar": "FILE", "help": "mesh file (.obj, .vtu, .msh ...)"},
         "--merge": {
             "type": float,

@@ -13,8 +13,7 @@ EVERY = 0.2  # seconds between two updates of the line on a terminal
 class Progress:
     """Line with the number of the frame, milliseconds per frame and the estimated time left.
 
-    If ``stream`` is no terminal, a new line is
-    written after each tenth of the run ``name``, which has ``frames`` frames.
+    If ``stream`` is no terminal, a line is added after each tenth of the run ``name``.
     """
 
     def __init__(self, name: str, frames: int, stream: TextIO | None = None) -> None:

@@ -72,9 +72,9 @@ def read(path: str, max_vertices: int, max_cells: int) -> tuple[np.ndarray, np.n
     try:
         found = READERS[suffix](content)
         counts = ("vertices", found.points, max_vertices), ("cells", found.sizes, max_cells)
-        for what, count, most in ((what, len(each), most) for what, each, most in counts):
-            if count > most:
-                raise raw.RefusedError(f"holds {count} {what}, allowed: at most {most}")
+        for what, each, most in counts:
+            if len(each) > most:
+                raise raw.RefusedError(f"holds {len(each)} {what}, allowed: at most {most}")
         points = np.ascontiguousarray(found.points, np.float64)
         points = np.pad(points, ((0, 0), (0, 3 - points.shape[1])))
         return points, *cells_of(found._replace(points=points))

@@ -15,16 +15,13 @@ from numba import njit
 from builders import GRAVITY, LEFT
 from pdrom import api
 from pdrom.api.pictures import viewed_scenes
-from pdrom.api.records import Snapshots
+from pdrom.api.records import Rerun, Snapshots
+from pdrom.api.runs import Basis, FrameReport, run_full_order
 from pdrom.core.errors import ConfigurationError, PdromError, RankError, StorageError
 from pdrom.core.store import write_hdf5
-from pdrom.model.dynamics.stepper import FrameReport
 from pdrom.model.mesh.types import Mesh
-from pdrom.model.runs import run as run_full_order
 from pdrom.model.runs import trajectory
 from pdrom.model.scene import Scene
-from pdrom.reduction.basis import Basis
-from pdrom.reduction.rerun import Rerun
 from pdrom.reduction.snapshots import training_frames
 from places import ROOT
 from study.pipeline.scenes import load_bound_scene
@@ -79,18 +76,15 @@ def test_a_run_is_that_of_the_step_loop(full):
 
 
 def test_a_run_logs_how_long_it_compiles_kernels(full, monkeypatch, caplog):
-    """Only if it does; the kernels of this process are compiled already."""
     caplog.set_level("INFO", "pdrom.api")
+    api.run(full.scene)  # whose kernels are compiled already
+    assert "kernels" not in caplog.text
+    twice = lambda *a, **k: (njit(lambda: 1)(), njit(lambda: 2)(), run_full_order(*a, **k))  # noqa: E731
+    monkeypatch.setattr("pdrom.api.runs.run_full_order", twice)
     api.run(full.scene)
-    assert [r for r in caplog.records if r.name == "pdrom.api.runs"] == []
-    real = run_full_order
-    compile_two = lambda *a, **k: (njit(lambda: 1)(), njit(lambda: 2)(), real(*a, **k))  # noqa: E731
-    monkeypatch.setattr("pdrom.api.runs.run_full_order", compile_two)
-    api.run(full.scene)
-    told = [r.getMessage() for r in caplog.records if r.name == "pdrom.api.runs"]
-    assert told[0] == "scene: compiling kernels (once, up to a minute)"
-    assert re.fullmatch(r"scene: kernels compiled in \d+\.\d s", told[1])
-    assert len(told) == 2
+    first, last = (text for text in caplog.messages if "kernels" in text)
+    assert first == "scene: compiling kernels (once, up to a minute)"
+    assert re.fullmatch(r"scene: kernels compiled in \d+\.\d s", last)
 
 
 TOP = {"select": "top", "over": 4}
@@ -129,12 +123,9 @@ def test_files_are_read_back(full, reduced, tmp_path):
     read = api.load(tmp_path / "reduced.h5")
     assert isinstance(read, api.ReducedRun)
     assert (read.title, read.gain, read.ms) == (reduced.title, reduced.gain, reduced.ms)
-    for field in fields(reduced.outcome):
-        assert np.array_equal(
-            getattr(read.outcome, field.name), getattr(reduced.outcome, field.name)
-        )
-    assert np.array_equal(read.full.positions, reduced.full.positions)
-    assert np.array_equal(read.full.ms, reduced.full.ms)
+    for kept, own in ((read.outcome, reduced.outcome), (read.full, replace(full, snapshots={}))):
+        for name in {*vars(own)} - {"scene"}:
+            assert np.array_equal(getattr(kept, name), getattr(own, name)), name
     whole = np.sqrt(np.mean(np.square(reduced.error)))
     errors, found = reduced.errors, read.errors
     assert errors["relative_error_within_horizon"] == pytest.approx(whole)
@@ -183,27 +174,14 @@ FAULTY = {
     "group not there": (lambda full, _: api.reduce(full, "strain"), "no group 'strain'"),
     "no snapshots": (lambda full, _: spring(replace(full, snapshots={})), "stored no snapshots"),
     "mesh not there": (lambda _, p: given({"kind": "file", "path": "x.obj"}, folder=p), r"x\.obj"),
-    "positions cut": (
-        lambda full, _: spring(replace(full, positions=full.positions[:-1])), "positions of float",
-    ),
+    "positions cut": (lambda full, _: replace(full, positions=full.positions[:-1]), "positions of"),
     "mesh no pair": (lambda *_: given((1, 2, 3)), "mesh of 3 parts"),
     "r a fraction": (lambda full, _: spring(full, r=1.5), "r = 1.5: a whole number"),
     "r zero": (lambda full, _: spring(full, r=0), "r = 0, the snapshots have"),
     "no run": (lambda full, _: api.reduce(full.scene, "spring"), "full = Scene.*a FullRun is"),
-    "basis of arrays": (
-        lambda full, _: spring(full, r=1, basis_of_group=np.eye(3)),
-        "basis_of_group = array.*a Basis is required",
-    ),
+    "basis of arrays": (lambda full, _: spring(full, r=1, basis_of_group=1), "a Basis is required"),
     "requested error": (lambda full, _: api.reduce(full, error=0.1), "error: runs within a req"),
-    "requested error, another scene": (
-        lambda full, _: api.reduce(full, error="velocity=0.1", scene=full.scene), "error: runs",
-    ),
-    "requested error of a scene": (
-        lambda *_: given((SQUARE, HALVES), reduce={"error": 0.1}), r"reduce\.error: runs within a",
-    ),
-    "requested error of a scene, by its other key": (
-        lambda *_: given((SQUARE, HALVES), requested_error=0.1), "requested_error: runs within a",
-    ),
+    "error of a scene": (lambda *_: given((SQUARE, HALVES), requested_error=1), "runs within a"),
     "argument misspelt": (lambda full, _: spring(full, metod="pod"), "no argument 'metod'"),
     "plot of a run": (lambda full, _: api.plot(full), "plot = FullRun.*a ReducedRun"),
     "plot of nothing": (lambda *_: api.plot(), "at least one run"),
@@ -216,16 +194,11 @@ FAULTY = {
     "mesh nothing": (lambda *_: given(None), "key 'mesh' is"),
     "corner beyond": (lambda *_: given((SQUARE, [[0, 1, 4]])), "names vertex"),
     "corner below": (lambda *_: given((SQUARE, [[0, 1, -1]])), "names vertex"),
-    "corner of 65 bits": (
-        lambda *_: given((SQUARE, np.array([[0, 1, 2**63]], dtype=np.uint64))), "names vertex",
-    ),
+    "corner of 65 bits": (lambda *_: given((SQUARE, np.uint64([[0, 1, 2**63]]))), "names vertex"),
     "corner of 41 bits": (lambda *_: given((SQUARE, [[0, 1, 2**40]])), "names vertex"),
     "vertex left": (lambda *_: given((SQUARE, HALVES[:1])), "in no element"),
     "cells of floats": (lambda *_: given((SQUARE, [[0.0, 1.0, 2.0]])), "cells: an array"),
-    "cells of edges": (
-        lambda *_: given((SQUARE, [[0, 1]])),
-        r"cells of shape \(1, 2\), required: \(n, 3\) or \(n, 4\)",
-    ),
+    "cells of edges": (lambda *_: given((SQUARE, [[0, 1]])), r"required: \(n, 3\) or \(n, 4\)"),
     "no cells": (lambda *_: given((SQUARE, [])), "cells of shape"),
     "empty cells": (lambda *_: given((SQUARE, np.empty((0, 3), int))), "both are required"),
     "points of a plane": (lambda *_: given((np.eye(3)[:, :2], HALVES)), "points of shape"),

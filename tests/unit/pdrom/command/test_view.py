@@ -142,11 +142,7 @@ STARTS = ("small", "positions"), *(("small_spring_gappy_2", each) for each in ("
         ("small", first_of("timings", -1e9), "a time is below zero"),
         *(("small", first_of(AT, n), "spring: frames") for n in (-1, 2, 99)),
         ("small", shortened(AT), "spring: frames"),
-        (
-            "small",
-            lambda f: f["snapshots/spring"].attrs.modify("elements", 7),
-            r"rows \[7, 1\]",
-        ),
+        ("small", lambda f: f["snapshots/spring"].attrs.modify("elements", 7), r"rows \[7, 1\]"),
         ("small_spring_gappy_2", first_of("difference", 1.0), "difference is not"),
         ("small_spring_gappy_2", first_of("extent", 9.0), "extent is not"),
         ("small_spring_gappy_2", lambda f: f.attrs.modify("blowup_frame", 3), "blow-up in frame 3"),

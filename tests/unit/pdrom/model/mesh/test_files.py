@@ -1,8 +1,6 @@
 """Mesh files: which are read, and how the process that reads them may end."""
 
-import json
 import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -47,38 +45,18 @@ def test_a_file_is_read_wherever_it_lies(tmp_path, suffix):
     assert np.array_equal(loaded.triangles, mesh.triangles)
 
 
-# Reads every file of its arguments, and says which files Python opened meanwhile.
-WATCHED = """
-import json, sys
-from pdrom.model.mesh import reader
-opened = []
-sys.addaudithook(lambda event, args: opened.append(args[0]) if event == "open" else None)
-for path in json.load(sys.stdin):
-    reader.read(path, 1000, 1000)
-here = sys.argv[1]
-print(json.dumps([str(path) for path in opened if str(path).startswith(here)]))
-"""
-
-
-def test_readers_open_no_second_file(tmp_path):
+def test_readers_open_no_second_file(tmp_path, monkeypatch):
     """Neither of files beside the mesh nor of those that the mesh names."""
-    paths = [str(tmp_path / f"mesh{suffix}") for suffix in reader.READERS]
-    for path in paths:
-        write_mesh(Path(path))
-    (tmp_path / "mesh.mtl").write_text("newmtl x\n")
-    obj = tmp_path / "mesh.obj"
-    obj.write_text("mtllib mesh.mtl\n" + obj.read_text())
-    vtu = tmp_path / "mesh.vtu"
-    outside = f'<!DOCTYPE VTKFile SYSTEM "file://{obj}"><VTKFile '
-    vtu.write_text(vtu.read_text().replace("<VTKFile ", outside, 1))
-    ended = subprocess.run(
-        [sys.executable, "-c", WATCHED, str(tmp_path)],
-        input=json.dumps(paths),
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert list(dict.fromkeys(json.loads(ended.stdout))) == paths
+    contents = {}
+    for suffix in reader.READERS:
+        write_mesh(tmp_path / f"mesh{suffix}")
+        contents[suffix] = (tmp_path / f"mesh{suffix}").read_bytes()
+    contents[".obj"] = b"mtllib mesh.mtl\n" + contents[".obj"]
+    outside = f'<!DOCTYPE VTKFile SYSTEM "file://{tmp_path}/mesh.obj"><VTKFile '.encode()
+    contents[".vtu"] = contents[".vtu"].replace(b"<VTKFile ", outside, 1)
+    for module in ("builtins", "io", "os"):
+        monkeypatch.setattr(f"{module}.open", None)
+    assert all(len(read(contents[suffix]).points) for suffix, read in reader.READERS.items())
 
 
 def test_a_file_that_takes_long(square, monkeypatch):

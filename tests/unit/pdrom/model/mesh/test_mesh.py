@@ -62,8 +62,9 @@ def test_round_trip(tmp_path):
 
 def test_sides_of_a_sheet_and_farthest_points_that_start_at_the_centre():
     mesh = cloth(4, 3)
-    assert select_vertices(mesh, "top").tolist() == [2, 5, 8, 11]
-    assert select_vertices(mesh, "left").tolist() == [0, 1, 2]
+    for top, left in (("top", "left"), ("y_max", "x_min")):
+        assert select_vertices(mesh, top).tolist() == [2, 5, 8, 11]
+        assert select_vertices(mesh, left).tolist() == [0, 1, 2]
     assert select_vertices(mesh, [5, 1, 5]).tolist() == [1, 5]
     chosen = farthest_points(cloth(5, 5).points, np.arange(25), 5)
     assert chosen[0] == 12

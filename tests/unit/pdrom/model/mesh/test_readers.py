@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mesh_files import read_here, refusal
+from mesh_files import read_here, refusal, write_mesh
 from pdrom.model.mesh import reader
 
 # as in the reader's process
@@ -104,15 +104,6 @@ def legacy(dataset: str, sections: str, version: str = "3.0") -> str:
     )
 
 
-def binary_vtk(strings: bytes) -> bytes:
-    """With a field of two strings, each behind its length in as few bytes as can be."""
-    head = "# vtk DataFile Version 3.0\nsheet\nBINARY\nDATASET UNSTRUCTURED_GRID\nFIELD f 1\n"
-    parts = [("names 1 2 string", strings), ("POINTS 4 double", POINTS.astype(">f8").tobytes())]
-    cells = np.array([[3, *row] for row in TRIANGLES], ">i4").tobytes()
-    parts += [("CELLS 2 8", cells), ("CELL_TYPES 2", np.array([5, 5], ">i4").tobytes())]
-    return head.encode() + b"".join(name.encode() + b"\n" + data + b"\n" for name, data in parts)
-
-
 GRID = f"CELLS 2 8\n{FACES}CELL_TYPES 2\n5\n5\n"
 OFFSETS = "OFFSETS vtktypeint64\n0 3 6\nCONNECTIVITY vtktypeint64\n0 1 2 0 2 3\n"
 MEDIT = (
@@ -154,7 +145,6 @@ def gmsh4(version: str) -> str:
                          f"CELLS 3 6\n{OFFSETS}CELL_TYPES 2\n5 5\n", "5.1")),
         ("a.vtk", legacy("UNSTRUCTURED_GRID\nFIELD FieldData 2\nnames 1 2 string\na%20b\n\n"
                          "TIME 1 1 double\n0.5\nMETADATA\nCOMPONENT_NAMES\nx\n", GRID)),
-        ("a.vtk", binary_vtk(b"\xc2ab" + b"\x80\x40" + 64 * b"c")),
         ("a.mesh", MEDIT),
         ("a.msh", gmsh4("4")),
         ("a.msh", gmsh4("4.0")),
@@ -227,6 +217,14 @@ def test_a_whole_last_face_without_an_end_of_line_is_read_also_among_polygons(tm
     for faces in (f"f 1 2 3 4\n{sides}", f"{sides}\nf 1 2 3 4"):
         (tmp_path / "a.obj").write_text(f"{V}v .5 1 .5\n{faces}")
         assert len(read_here(tmp_path / "a.obj")[1]) == 6
+
+
+def test_strings_of_a_binary_vtk_are_left_out(tmp_path):
+    """Each stands behind its length, in one byte or in two."""
+    mesh, path, grid = write_mesh(tmp_path / "a.vtk"), tmp_path / "a.vtk", b"UNSTRUCTURED_GRID\n"
+    field = b"FIELD f 1\nnames 1 2 string\n\xc2ab\x80\x40" + 64 * b"c" + b"\n"
+    path.write_bytes(path.read_bytes().replace(grid, grid + field))
+    assert np.array_equal(read_here(path)[0], mesh.points)
 
 
 def areas(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
@@ -318,21 +316,15 @@ def test_msh_of_other_programs_and_of_partitions(tmp_path, content):
 
 def piece(count: int) -> str:
     """A piece of a .vtu that holds the first triangles of the square, with their vertices."""
-    points = " ".join(f"{x!r}" for x in POINTS[: count + 2 if count else 0].ravel().tolist())
-    corners = " ".join(str(i) for row in TRIANGLES[:count] for i in row)
-    arrays = {
-        "connectivity": corners, "offsets": " ".join(str(3 * i + 3) for i in range(count)),
-        "types": "5 " * count,
-    }  # fmt: skip
-    cells = "".join(
-        f'<DataArray type="Int64" Name="{name}" format="ascii">{text}</DataArray>'
-        for name, text in arrays.items()
-    )
-    return (
-        f'<Piece NumberOfPoints="{count + 2 if count else 0}" NumberOfCells="{count}"><Points>'
-        '<DataArray type="Float64" NumberOfComponents="3" format="ascii">'
-        f"{points}</DataArray></Points><Cells>{cells}</Cells></Piece>"
-    )
+    points, ends = POINTS[: count + 2 if count else 0], 3 * np.arange(1, count + 1)
+    names = {"": points, "connectivity": TRIANGLES[:count], "offsets": ends, "types": [5] * count}
+    texts = [
+        f'<DataArray type="Float64" Name="{name}" format="ascii">'
+        f"{' '.join(map(repr, np.ravel(values).tolist()))}</DataArray>"
+        for name, values in names.items()
+    ]
+    head = f'<Piece NumberOfPoints="{len(points)}" NumberOfCells="{count}"><Points>'
+    return f"{head}{texts[0]}</Points><Cells>{''.join(texts[1:])}</Cells></Piece>"
 
 
 VTU = '<VTKFile type="UnstructuredGrid"><UnstructuredGrid>{}</UnstructuredGrid></VTKFile>'
@@ -359,7 +351,7 @@ def test_a_byte_order_mark_is_skipped(tmp_path, code):
         ("a.mesh", MEDIT.replace("End", "TrianglesP2\n0\nEnd"), "elements of higher order"),
         ("a.mesh", MEDIT.replace("End", "En"), "the end mark `End` is missing"),
         ("a.vtu", VTU.replace("UnstructuredGrid", "PolyData"), "holds a PolyData"),
-        ("a.vtu", VTU.format(piece(2).replace("5 5 ", "12 5 ")), "holds hexahedra"),
+        ("a.vtu", VTU.format(piece(2).replace("5 5<", "12 5<")), "holds hexahedra"),
         ("a.vtk", legacy("STRUCTURED_GRID", ""), "holds DATASET STRUCTURED_GRID"),
     ],
 )

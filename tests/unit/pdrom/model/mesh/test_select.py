@@ -31,21 +31,15 @@ def disc_with_holes():
 @pytest.mark.parametrize(
     ("selection", "holds"),
     [
-        (
-            {"kind": "box", "lower": [-0.23, 2.13, -1], "upper": [0.33, 2.41, 1]},
-            lambda p: -0.23 <= p[0] <= 0.33 and 2.13 <= p[1] <= 2.41,
-        ),
-        (
-            {"kind": "sphere", "centre": [0.1, 2.3, 0.0], "radius": 0.31},
-            lambda p: np.linalg.norm(p - [0.1, 2.3, 0.0]) <= 0.31,
-        ),
-        (
-            {"kind": "plane", "point": [0.0, 2.1, 0.0], "normal": [3.0, -4.0, 0.0]},
-            lambda p: (p - [0.0, 2.1, 0.0]) @ [3.0, -4.0, 0.0] >= -1e-9,
-        ),
+        ({"kind": "box", "lower": [-0.23, 2.13, -1], "upper": [0.33, 2.41, 1]},
+         lambda p: -0.23 <= p[0] <= 0.33 and 2.13 <= p[1] <= 2.41),
+        ({"kind": "sphere", "centre": [0.1, 2.3, 0.0], "radius": 0.31},
+         lambda p: np.linalg.norm(p - [0.1, 2.3, 0.0]) <= 0.31),
+        ({"kind": "plane", "point": [0.0, 2.1, 0.0], "normal": [3.0, -4.0, 0.0]},
+         lambda p: (p - [0.0, 2.1, 0.0]) @ [3.0, -4.0, 0.0] >= -1e-9),
     ],
     ids=["box", "sphere", "plane of any length of normal"],
-)
+)  # fmt: skip
 def test_a_shape_holds_what_is_inside(selection, holds):
     expected = [v for v, point in enumerate(SHEET.points) if holds(point)]
     assert chosen(selection) == expected != []
