@@ -12,7 +12,7 @@ from pdrom.core.yamlfile import read_yaml
 from pdrom.model.mesh.selection import KINDS
 from places import CONFIG
 
-METHODS, FIGURES, CLAIMS = (f"config/{name}.yaml" for name in ("methods", "figures", "claims"))
+METHODS, CLAIMS = (f"config/{name}.yaml" for name in ("methods", "claims"))
 LADDER = yaml.safe_dump({"ladder": read_yaml(CONFIG / "default.yaml")["ladder"]}, sort_keys=False)
 
 
@@ -350,18 +350,9 @@ OTHER_CASES = [
     other("method with a title in another script", METHODS, "title: POD projection",
           "title: \u6295\u5f71", "pod.title", "U+6295", "cannot be typeset"),
     other("method that is a number", METHODS, "pod: {", "7: {", "method 7", "letters"),
-    Case("figures as a list", {FIGURES: "- ladder\n"}, (FIGURES, "a mapping of figure names")),
-    other("unknown figure", FIGURES, "singular_values:", "singular_value:", "'singular_value'",
-          "did you mean 'singular_values'?"),
-    other("unknown key of a figure", FIGURES, "  count: 4\n", "  cuont: 4\n",
-          "snapshots_and_modes", "unknown key 'cuont'", "did you mean 'count'?"),
-    other("figure of an unknown method", FIGURES, "methods: [deim, block-deim, pod]",
-          "methods: [diem]", "snapshots_and_modes.methods = 'diem'", "did you mean 'deim'?"),
-    other("figure of an unknown scene", FIGURES, "scenes: [strain_oop,", "scenes: [strain_op,",
-          "snapshots_and_modes", "'strain_op'", "did you mean 'strain_oop'?"),
-    other("frame beyond the run", FIGURES, "frames: [0.15,", "frames: [1.5,",
-          "snapshots_and_modes", "frames.0 = 1.5"),
-    other("camera at NaN", FIGURES, "elevation: 28", "elevation: .nan", "elevation = nan"),
+    Case("choices of figures in a file", {"config/figures.yaml": "ladder: {}\n"},
+         ("src/study/figures",)),
+    override("choices of figures", "figures", {"ladder": {}}, "src/study/figures"),
     Case("empty claims", {CLAIMS: ""}, (CLAIMS, "a mapping of claims is required")),
     other("claim by an unknown metric", CLAIMS, "metric: local_share", "metric: local_shar",
           "C1", "'local_shar'"),

@@ -19,7 +19,7 @@ from bad_input import project as small
 from pdrom.core.errors import PdromError
 
 SPARE_BYTES = 2_000_000_000
-FILES = ("methods", "figures", "claims")
+FILES = ("methods", "claims")
 # One of everything that a scene may list, so that every key can be hit.
 RICH_SCENE = """\
 name: small

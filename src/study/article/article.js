@@ -132,34 +132,6 @@ function showVerified(place, name) {
   place.textContent = window.pdromVerified?.[name] ?? "not yet";
 }
 
-// A list of the figures that show the same of other scenes: their pictures in place of one, with what belongs to them.
-function switchOfScene(figure) {
-  const image = figure.querySelector("img"), origin = figure.querySelector(".origin"), caption = document.createElement("span");
-  const links = [...origin.querySelectorAll("a.kin")], own = figure.id.replace("fig:", "");
-  caption.append(...[...origin.parentNode.childNodes].filter((node) => node !== origin));
-  origin.before(caption);
-  const kept = { caption: [...caption.childNodes], alt: image.alt, height: image.getAttribute("height") };
-  const verified = origin.querySelector("[data-verified]");
-  const code = origin.querySelector("code"), pdf = origin.querySelector('a[href$=".pdf"]'), label = document.createElement("label");
-  label.className = "switch";
-  label.append("Scenes: ");
-  const list = element("select", "", label);
-  for (const name of [own, ...links.map((link) => link.textContent)]) element("option", name, list);
-  figure.prepend(label);
-  list.onchange = () => {
-    const link = links[list.selectedIndex - 1], name = list.value;
-    image.src = `figures/${name}.webp`;
-    image.alt = link ? `Figure ${name}` : kept.alt;
-    if (link) image.removeAttribute("height"); else image.setAttribute("height", kept.height);
-    code.textContent = `./reproduce figure ${name}`;
-    if (pdf) pdf.hidden = Boolean(link);
-    showVerified(verified, `figure ${name}`);
-    if (!link) caption.replaceChildren(...kept.caption);
-    else caption.replaceChildren(`The picture of ${name}, with `, Object.assign(link.cloneNode(), { textContent: "its caption" }), ".");
-  };
-}
-
-for (const place of document.querySelectorAll("figure")) if (place.querySelector(".origin a.kin")) switchOfScene(place);
 for (const place of document.querySelectorAll("[data-verified]")) showVerified(place, place.dataset.verified);
 const page = document.getElementById("table");
 if (page) showTable(page.dataset.name).catch(() => {

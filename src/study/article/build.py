@@ -8,7 +8,7 @@ import re
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from html import escape
 from importlib.util import find_spec
 from pathlib import Path
@@ -17,7 +17,7 @@ import pandas as pd
 from PIL import Image
 
 from pdrom.core.errors import PaperError
-from pdrom.core.store import atomic_path, read_table, read_text, require_intact, write_text
+from pdrom.core.store import atomic_path, read_text, require_intact, write_text
 from pdrom.view.page import filled, safe_json
 from study.article.latex import linked_table, prepared
 from study.article.tree import Labels, Node, attributes, boxed, numbered, plain, resolved, words
@@ -25,7 +25,7 @@ from study.artifact.artifact import Artifact
 from study.artifact.paths import ARTICLE, FIGURE_PICTURE, RESULTS, TABLE, File
 from study.artifact.reads import Every, ProjectFile, Setting, TableOf
 from study.figures.kit.declaration import declarations
-from study.paper.build import NUMBERS, Facts, fact_tables, paper, paper_inputs
+from study.paper.build import NUMBERS, Facts, fact_tables, paper, paper_inputs, shown_tables
 from study.paper.source import DOCUMENTS, PLACED, documents
 from study.paper.textables import tex_rows
 from study.tables import declared
@@ -35,68 +35,41 @@ from study.tables.kit.declaration import QUANTITIES, TOLERANCES
 
 # Bytes: larger pictures are compressed with losses; larger PDFs are not copied to the web pages.
 LOSSLESS, COPIED = 150_000, 200_000
-MANY = 4  # figures are related (`_kin`) if their options have one type with at least this many keys
 
 
 def shown_figure(
-    name: str, node: Node, size: tuple[int, int], with_pdf: bool, pages: Mapping[str, str]
+    name: str, node: Node, size: tuple[int, int], with_pdf: bool, known: Collection[str]
 ) -> Node:
     """Return a figure as a node of pandoc's syntax tree: picture, caption, shell command, links.
 
     node : node that pandoc made from the figure in the TeX source
     size : width and height of the picture, pixels
     with_pdf : whether the pages include a PDF of the figure
-    pages : file name of the page with each figure, by the figure's name
+    known : names of all tables that have a page
     """
     attribute, caption, _ = node["c"]
     picture = attributes("", "", width=str(size[0]), height=str(size[1]), loading="lazy")
     # a single text node: pandoc would hide a caption with the same nodes as the alternative text
     alternative = words(plain(caption[1]).strip())
     image = {"t": "Image", "c": [picture, alternative, [f"figures/{name}.webp", ""]]}
-    made = {"t": "RawInline", "c": ["html", _origin(name, with_pdf, pages)]}
+    made = {"t": "RawInline", "c": ["html", _origin(name, with_pdf, known)]}
     origin = [{"t": "Plain", "c": [*words("Command: "), made]}]
     told = [caption[0], [*caption[1], boxed("Div", origin, "", "origin")]]
     return {"t": "Figure", "c": [attribute, told, [{"t": "Plain", "c": [image]}]]}
 
 
-def _origin(name: str, with_pdf: bool, pages: Mapping[str, str]) -> str:
-    """HTML: shell command that makes a figure; links to its tables, its PDF and related figures."""
+def _origin(name: str, with_pdf: bool, known: Collection[str]) -> str:
+    """HTML: shell command that makes a figure; links to its tables and its PDF."""
     reads = declarations()[name].reads.values()
-    tables = [read.name for read in reads if isinstance(read, TableOf)]
+    tables = [r.name for r in reads if isinstance(r, TableOf) and r.name in known]
     data = ", ".join(f'<a href="tables/{table}.html">{table}</a>' for table in tables)
-    kin = ", ".join(
-        f'<a href="{pages[other]}#fig:{other}" class="kin">{other}</a>'
-        for other in _kin(name, pages)
-    )
     sentences = [
         f"<code>./reproduce figure {name}</code>.",
         f"Data: {data}." if tables else "Drawn from the runs themselves.",
         f'<a href="figures/{name}.pdf">PDF</a>.' if with_pdf else "",
-        f"Other scenes: {kin}." if kin else "",
         f'Last verification: <span data-verified="figure {name}">not yet</span>.',
     ]
     return " ".join(filter(None, sentences))
-
-
-def _kin(name: str, pages: Mapping[str, str]) -> list[str]:
-    """Names of figures in ``pages`` that show the same as figure ``name`` for other scenes.
-
-    Two figures are related if their options have the same type and this type at least `MANY` keys,
-    or if the name of one figure begins with the name of the other.
-    """
-    listed = declarations()
-    mine = listed[name].options
-    return [
-        other
-        for other, declared in listed.items()
-        if other in pages
-        and other != name
-        and (
-            (declared.options is mine and len(mine.model_fields) >= MANY)
-            or other.startswith(f"{name}_")
-            or name.startswith(f"{other}_")
-        )
-    ]
 
 
 FACTS = {
@@ -191,7 +164,8 @@ def _tests(name: str, part: str, rules: tuple[TestRule, ...], tests: pd.DataFram
     for rule, row in zip(rules, tests[tests.part == part].itertuples(), strict=True):
         aside = "" if rule.decides else " (beside the verdict)"
         place = f"tables/claims_tests.html#claim={name}|part={part}|satisfied"
-        values = f"{row.least:.2g} to {row.most:.2g}, median {row.median:.2g}: " if row.of else ""
+        spread = f"{row.least:.2g} to {row.most:.2g}, median {row.median:.2g}: "
+        values = "" if pd.isna(row.least) else spread
         rows += (
             f"<tr><td>{escape(rule.what)}{aside}</td><td>{_rule(rule)}</td>"
             f"<td><a class=val href='{place}'>{row.satisfied} of {row.of}</a></td>"
@@ -241,7 +215,12 @@ ASSETS = {
 # Name of a TeX source -> file name of its web page.
 PAGES = dict(zip(DOCUMENTS, (INDEX, "supplement.html"), strict=True))
 TITLES = dict(zip(DOCUMENTS, ("Paper", "Supplement"), strict=True))
-LINKS = {"tables.html": "Tables", "claims.html": "Claims", "live.html": "A model, running"}
+# Page -> its title, and the rule without which there is no such page.
+LINKS = {
+    "tables.html": ("Tables", ""),
+    "claims.html": ("Claims", "claims_table"),
+    "live.html": ("A model, running", "live_page"),
+}
 _PREFIX = re.compile(r"\\renewcommand\{?\\thefigure\}?\{([A-Z]+)")
 
 
@@ -256,6 +235,7 @@ def write_article(
     facts: Facts,
     claims: Path,
     added: Added,
+    made: list[str],
     outputs: Mapping[str, str],
     **assets: Path,
 ) -> None:
@@ -266,24 +246,36 @@ def write_article(
     inputs : generated files that the manuscript includes; numbers.json: table cells of its numbers
     figures, pictures : PDF and PNG of each figure
     facts, claims : captions and tables of settings; the file with the rules of the claims
+    made : rules of all tables, figures and pages of the study
     added : name of a list of values in the file ``claims`` -> values that the study adds to it
     assets : templates, style and script (files of `ASSETS`)
     """
-    made = {file["name"]: file.path for file in inputs}
-    origins = json.loads(read_text(made[NUMBERS]))
-    known = fact_tables(Path(machine.path), facts)
+    (numbers,) = (file.path for file in inputs if file["name"] == NUMBERS)
+    origins = json.loads(read_text(numbers))
+    data, hidden = shown_tables(tables)
+    known = fact_tables(Path(machine.path), facts) | data
     csv = {table["name"]: Path(table.path).read_bytes() for table in tables}
-    csv |= {name: known[name].to_csv(index=False, lineterminator="\n").encode() for name in FACTS}
-    known |= {table["name"]: read_table(table.path) for table in tables}
+    for name in known if hidden else FACTS:
+        csv[name] = known[name].to_csv(index=False, lineterminator="\n").encode()
     templates = {name: path.read_text("utf-8") for name, path in assets.items()}
     texts = documents(source[0].parent)
-    pages = {name: PAGES[stem] for stem, text in texts.items() for name in PLACED.findall(text)}
-    rules, plain = load_claims(claims, added), templates["plain"]
+    pages = {
+        name: PAGES[stem]
+        for stem, text in texts.items()
+        for name in PLACED.findall(text)
+        if f"picture_{name}" in outputs
+    }
+    linked = {page: words for page, (words, rule) in LINKS.items() if rule in (*made, "")}
+    links = " ".join(f'<a href="{page}">{words}</a>' for page, words in linked.items())
+    plain = templates["plain"].replace("{{LINKS}}", links)
+    of_table = templates["table"].replace("{{LINKS}}", links.replace('href="', 'href="../'))
+    rules = load_claims(claims, added)
     written = {name: templates[name] for name in ("style", "script")}
     for name, content in csv.items():
-        written[f"table_{name}"] = table_page(name, content, templates["table"])
+        written[f"table_{name}"] = table_page(name, content, of_table)
     written["tables"] = list_page(sorted(csv), plain)
-    written["claims"] = claims_page(rules, known["claims_tests"], known["claims"], pages, plain)
+    if "claims" in outputs:
+        written["claims"] = claims_page(rules, known["claims_tests"], known["claims"], pages, plain)
     drawn = _write_figures(figures, pictures, outputs)
     files = {
         f"{name}.tex": linked_table(tex_rows(name, known), {table: known[table] for table in read})
@@ -296,10 +288,10 @@ def write_article(
         trees[stem] = numbered(
             parsed(prepared(text, stem, origins, facts), files, references),
             Labels(prefix[1] if prefix else "", PAGES[stem], labels),
-            lambda name, node: shown_figure(name, node, *drawn[name], pages),
+            lambda name, node: shown_figure(name, node, *drawn[name], csv),
         )
     for stem, tree in trees.items():
-        others = {PAGES[other]: TITLES[other] for other in texts if other != stem} | LINKS
+        others = {PAGES[other]: TITLES[other] for other in texts if other != stem} | linked
         links = " ".join(f'<a href="{address}">{words}</a>' for address, words in others.items())
         variables = {"pages": links} | ({"part": escape(facts.part)} if facts.part else {})
         written[stem] = page(resolved(tree, labels, rules), assets["text"], variables)

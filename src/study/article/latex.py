@@ -13,7 +13,7 @@ import pandas as pd
 
 from pdrom.view.text import escape
 from study.paper.build import Facts
-from study.paper.macros import NOTED, SHOWN, VAL, closing, matching, note, sentences
+from study.paper.macros import SHOWN, VAL, closing, matching, sentences
 from study.paper.source import COMMENT, PLACED
 from study.paper.textables import Rows, tabular
 
@@ -33,11 +33,14 @@ _TAIL = re.compile(r"(\(|, )(\d[\d/, ]*)([)}]?)$")  # number at the end of a cel
 _FIGURE = r"\begin{figure}\includegraphics{%s.pdf}\caption{%s}\label{fig:%s}\end{figure}"
 # Finds one-line definitions of TeX commands and theorems in the preamble; pandoc can read these.
 # Definitions of layout commands are left out: `REPLACED` has simple ones of the same commands.
-_SHORT = re.compile(r"(?m)^\\(?:newcommand\{\\(?!longtableof|tablefile)\w+\}.*\}|newtheorem.*)$")
+_SHORT = re.compile(
+    r"(?m)^\\(?:newcommand\{\\(?!longtableof|tablefile|pictureof)\w+\}.*\}|newtheorem.*)$"
+)
 REPLACED = r"""
 \newcommand{\longtableof}[4]{\begin{table}\caption{#3}\label{#2}\input{#4}\end{table}}
 \newcommand{\tablefile}[1]{\input{#1.tex}}
 \newenvironment{heretable}{\begin{table}}{\end{table}}
+\newcommand{\pictureof}[2]{\begin{figure}\includegraphics{#1.pdf}\caption{#2}\label{fig:#1}\end{figure}}
 """
 
 
@@ -48,10 +51,10 @@ def prepared(source: str, document: str, origins: Mapping[str, Any], facts: Fact
     which of its ``\\known`` and ``\\row`` blocks are shown. ``facts`` has the figures' captions.
     """
     preamble, begin, text = source.partition(r"\begin{document}")
-    left_out = rf"\emph{{[{note(facts.part, facts.full_study)}]}}"
-    text = COMMENT.sub("", _decided(text, origins["known"][document], left_out))
+    text = COMMENT.sub("", _decided(text, origins["known"][document]))
     text = PLACED.sub(lambda found: _FIGURE % (found[1], facts.captions[found[1]], found[1]), text)
     text = _PART.sub(lambda found: (found[1] if facts.part else found[2]) or "", text)
+    text = text.replace(r"\timesnote", origins["times"])
     full = facts.full_study
     for name, words in {"configuration": facts.part or full, "fullstudy": full}.items():
         shown = rf"\texttt{{{escape(words)}}}".replace("\\", r"\\")
@@ -72,12 +75,11 @@ def _title(preamble: str) -> str:
     return rf"\title{{{': '.join(words).replace('?:', '?')}}}"
 
 
-def _decided(source: str, known: Sequence[str], left_out: str) -> str:
-    r"""Keep, drop or replace by ``left_out`` each block ``\known`` or ``\row``, by ``known``."""
+def _decided(source: str, known: Sequence[str]) -> str:
+    r"""Keep or drop each block ``\known`` or ``\row``, by ``known``."""
     pieces, start = [], 0
     for sentence, decision in zip(sentences(source), known, strict=True):
-        shown = {SHOWN: sentence.text, NOTED: left_out}.get(decision, "")
-        pieces += [source[start : sentence.start], shown]
+        pieces += [source[start : sentence.start], sentence.text if decision == SHOWN else ""]
         start = sentence.end
     return "".join([*pieces, source[start:]])
 

@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
+
 from pdrom.core.store import read_table
 from study.artifact.paths import Place
 
@@ -54,7 +56,10 @@ class EachOf(Every):
 
 @dataclass(frozen=True)
 class TableOf:
-    """Declared input of an artifact: table ``name`` of the study, received as a data frame."""
+    """Declared input of an artifact: table ``name`` of the study, received as a data frame.
+
+    The frame has no columns if the study lacks the table (see `Plan.holds`).
+    """
 
     name: str
 
@@ -62,7 +67,7 @@ class TableOf:
         return sources.table(self.name)
 
     def content(self, paths: Any) -> Any:
-        return read_table(str(paths))
+        return read_table(str(paths)) if paths else pd.DataFrame()
 
 
 class EditedFiles:

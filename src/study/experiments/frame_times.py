@@ -34,7 +34,7 @@ from study.experiments.kit.runfiles import load_reduction
 FULL, CONTROL, REDUCED = "full", "control", "reduced"
 COLUMNS = [
     "process", "scene", "vertices", "frames", "role", "group", "method", "position_basis", "k", "r",
-    "ms_per_frame", "vertices_ms",
+    "ms_per_frame", "vertices_ms", "processor_share",
 ]  # fmt: skip
 SECONDS_COLUMNS = ["scene", "group", "method", "r", "reduction_s"]
 

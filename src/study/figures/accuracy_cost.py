@@ -13,7 +13,7 @@ from pdrom.view.multiples import clipped, label_counts, log_axis, time_axis
 from study.artifact.reads import TableOf
 from study.experiments.alternatives.experiment import REDUCTIONS
 from study.experiments.kit.base import ANDERSON, FOM
-from study.figures.kit.declaration import Drawn, Methods, NothingToDraw, Scenes, figure
+from study.figures.kit.declaration import Drawn, NothingToDraw, figure
 from study.tables.accuracy_cost import FEWER, pareto
 
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "*")
@@ -197,10 +197,12 @@ def handles(found: TradeOffs) -> list[Block]:
 @figure(
     title="What accuracy costs in time",
     reads={"table": TableOf("accuracy_cost"), "runs": TableOf("reduced_reruns")},
+    # the first scene of the study is drawn large, then one for each other group
+    scenes="bar_release spring_oop strain_oop bend_curved bar_twist torus_release disc_strain "
+    "ball_shell starfish_twist",
+    timed=True,
 )
-def accuracy_cost(
-    options: Methods, drawn: Drawn, table: pd.DataFrame, runs: pd.DataFrame
-) -> Figure:
+def accuracy_cost(drawn: Drawn, table: pd.DataFrame, runs: pd.DataFrame) -> Figure:
     """Error within the horizon against the time per frame of every reduced model, and of the
     full-order run with fewer iterations $K$; both against the scene's own full-order run, whose
     time is the vertical line. A colour is a family of models, a marker one of its members (one for
@@ -277,8 +279,11 @@ TRAINED = {
 BARE = "the same without the vertices"
 
 
-@figure(title="Alternatives to projective dynamics", reads={"table": TableOf("alternatives")})
-def alternatives(options: Scenes, table: pd.DataFrame) -> Figure:
+@figure(
+    title="Alternatives to projective dynamics", reads={"table": TableOf("alternatives")},
+    timed=True,
+)  # fmt: skip
+def alternatives(table: pd.DataFrame) -> Figure:
     r"""Error of whole trajectories against the implicit step solved to convergence, over the time
     per frame with the positions of all vertices, on the first held-out motion. Black: the best
     points of all full-order methods, whose settings are the grey dots. Colours: the best points of
@@ -287,7 +292,7 @@ def alternatives(options: Scenes, table: pd.DataFrame) -> Figure:
     same scene with stiffer weights; *: recorded by the extended study. Errors outside
     are drawn on the rim.
     """
-    table = options.rows(table[table.motion == FIRST])
+    table = table[table.motion == FIRST]
     cases = list(table.groupby(["scene", "vertices", "stiffness"]))
     if not cases:
         raise NothingToDraw("no alternatives")

@@ -12,7 +12,7 @@ from pdrom.view.multiples import label_outer, plain_ticks, small_multiples
 from study.artifact.paths import CONTRIBUTIONS, File
 from study.artifact.reads import EachOf, TableOf
 from study.experiments.kit.base import GLOBAL, REST, RIGHT
-from study.figures.kit.declaration import Columns, Drawn, Methods, NothingToDraw, Scenes, figure
+from study.figures.kit.declaration import MESHES, Drawn, NothingToDraw, figure
 from study.tables.effects_cost import NOTHING
 
 # Phases of a frame: (label, colour). The first two form the local step, whose share is printed.
@@ -35,6 +35,7 @@ NAMES = {"fom": "full order", "ecsw": "POD subspace, ecsw"}
 SCALED = {"fom": (style.BLACK, "o"), "ecsw": ("#1B6E6E", ">")}
 ROOM = 2.6  # the axis ends at this multiple of the largest mesh size, to leave space for text
 FRAMES = ["effect", "frame", "force"]
+COLUMNS = 3  # panels in a row of figure `break_even`
 SHOWN = 3  # number of scenes whose forces are drawn
 LOW, HIGH = 1e-12, 1e2
 ROUNDOFF = 1e-14  # smallest drawn force relative to the largest force of the scene
@@ -43,16 +44,17 @@ MARKERS = "*dph8H|"  # for effects that are no constraint groups; each group has
 UNLISTED = "forces, holds, contacts"
 COLOURS = {UNLISTED: style.VERMILLION, RIGHT: style.SKY, GLOBAL: "#3A5A78", REST: "#C9C4BA"}
 Looks = dict[str, tuple[str, str]]
+ACTING = (
+    "cloth_all_oop spring_oop bend_curved strain_oop strain_poke_twin spring_twist_twin "
+    f"strain_twist_twin cloth_all cloth_all_twin bar_release bar_twist {MESHES}"
+)
 
 
-class BreakEven(Methods):
-    """Options of the figure: scenes, methods, and the number of panels in a row."""
-
-    columns: Columns = 3
-
-
-@figure(title="Where the time of a frame goes", reads={"table": TableOf("local_share")})
-def local_share(options: Scenes, drawn: Drawn, table: pd.DataFrame) -> Figure:
+@figure(
+    title="Where the time of a frame goes", reads={"table": TableOf("local_share")},
+    scenes=f"cloth_all spring_oop strain_oop bar_release {MESHES}", timed=True,
+)  # fmt: skip
+def local_share(drawn: Drawn, table: pd.DataFrame) -> Figure:
     """Share of the local step and of the global solve in the time of a full-order frame, for three
     implementations of the same local step; grey is the rest of the frame, such as prediction and
     contacts. The printed number is the share of the local step, that is of both shades of orange:
@@ -100,17 +102,17 @@ def _draw_bars(ax: Axes, rows: pd.DataFrame, scenes: list[str]) -> None:
     ax.tick_params(axis="y", length=0)
 
 
-@figure(title="Cost against mesh size", reads={"table": TableOf("scaling")})
-def scaling(options: Scenes, drawn: Drawn, table: pd.DataFrame) -> Figure:
+@figure(
+    title="Cost against mesh size", reads={"table": TableOf("scaling")},
+    scenes=f"strain_oop spring_oop bar_release {MESHES}", timed=True,
+)  # fmt: skip
+def scaling(drawn: Drawn, table: pd.DataFrame) -> Figure:
     """Time of one local/global iteration against the number of vertices: the full-order run, the
     same with only the local step reduced, and the hyper-reduced run in a position subspace, with
     the positions of all vertices as a line of its own. Beside the ends of curves stands the
     exponent of a fitted power law, where there are three sizes of the mesh or more.
     """
-    asked = options.scenes or tuple(dict.fromkeys(table.scene))
-    scenes = [scene for scene in asked if (table.scene == scene).any()]
-    if not scenes:
-        raise NothingToDraw("no mesh sizes")
+    scenes = drawn.scenes_of(table, "no mesh sizes")
     figure = style.new_figure(2.9)
     times = figure.subplots(1, len(scenes), sharex=True, sharey=True, squeeze=False)[0]
     for ax, scene in zip(times, scenes, strict=True):
@@ -155,8 +157,11 @@ def _draw_times(ax: Axes, rows: pd.DataFrame) -> None:
             )  # fmt: skip
 
 
-@figure(title="When a reduced local step stops paying", reads={"table": TableOf("breakeven")})
-def break_even(options: BreakEven, drawn: Drawn, table: pd.DataFrame) -> Figure:
+@figure(
+    title="When a reduced local step stops paying", reads={"table": TableOf("breakeven")},
+    methods="deim deim-joint block-deim gappy", timed=True,
+)  # fmt: skip
+def break_even(drawn: Drawn, table: pd.DataFrame) -> Figure:
     """Time of the reduced local step over that of the full one, both compiled and on one thread,
     against the number $r$ of basis vectors; one line per scene and method, timed alone on states of
     the full-order run. Above the dashed line the reduction costs more than all projections. Lines
@@ -167,7 +172,7 @@ def break_even(options: BreakEven, drawn: Drawn, table: pd.DataFrame) -> Figure:
     if table.empty:
         raise NothingToDraw("no reduced local step was timed")
     groups = [g for g in drawn.looks if (table.group == g).any()]
-    figure, axes = small_multiples(len(groups), options.columns, legend_rows=2, height=1.8)
+    figure, axes = small_multiples(len(groups), COLUMNS, legend_rows=2, height=1.8)
     styles = style.method_styles([m for m in drawn.methods if (table.method == m).any()])
     for ax, group in zip(axes, groups, strict=True):
         ax.set_title(style.words(group))
@@ -183,7 +188,7 @@ def break_even(options: BreakEven, drawn: Drawn, table: pd.DataFrame) -> Figure:
                 alpha=0.75,
             )  # fmt: skip
         ax.set_xlim(left=0.0)
-    label_outer(axes, options.columns, "basis vectors r", "reduced over full local step")
+    label_outer(axes, COLUMNS, "basis vectors r", "reduced over full local step")
     one = style.handle("break-even", color=style.BLACK, linestyle="--")
     style.legend(figure, [*drawn.handles(styles), one], 3)
     return figure
@@ -192,10 +197,9 @@ def break_even(options: BreakEven, drawn: Drawn, table: pd.DataFrame) -> Figure:
 @figure(
     title="What each effect contributes",
     reads={"table": TableOf("effects_cost"), "contributions": EachOf(CONTRIBUTIONS, "experiments")},
+    scenes=ACTING,
 )
-def effects_contribution(
-    options: Scenes, drawn: Drawn, table: pd.DataFrame, contributions: list[File]
-) -> Figure:
+def effects_contribution(drawn: Drawn, table: pd.DataFrame, contributions: list[File]) -> Figure:
     """Left: norm of the force of each effect on the free vertices over the frames of a scene (of a
     hold: on the vertices that it holds). Right: how far the run moves when an effect is left out,
     before the horizon; the grey bar ends at the sensitivity floor, below which nothing can be told
@@ -264,8 +268,11 @@ def _draw_moved(ax: Axes, rows: pd.DataFrame, scenes: list[str], looks: Looks) -
     style.grid(ax)
 
 
-@figure(title="What each effect costs", reads={"table": TableOf("effects_cost")})
-def effects_cost(options: Scenes, drawn: Drawn, table: pd.DataFrame) -> Figure:
+@figure(
+    title="What each effect costs", reads={"table": TableOf("effects_cost")}, scenes=ACTING,
+    timed=True,
+)  # fmt: skip
+def effects_cost(drawn: Drawn, table: pd.DataFrame) -> Figure:
     """Left: share of each effect in the time of a full-order frame, which is printed beside the
     bar. Right: the frame of one scene built without some of its effects; the tick is the whole less
     what these effects cost in it. A bar that ends at the tick pays nothing for what the scene does

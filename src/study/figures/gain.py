@@ -14,8 +14,7 @@ from pdrom.view.artists import Axes, Figure
 from pdrom.view.multiples import clipped, label_outer
 from pdrom.view.text import plain_words
 from study.artifact.reads import ProjectFile, TableOf
-from study.figures.kit import declaration as kit
-from study.figures.kit.declaration import Beside, Drawn, Experiment, figure
+from study.figures.kit.declaration import MESHES, Drawn, Experiment, NothingToDraw, figure
 from study.tables.kit.results import FAILED, judged_runs
 
 GAINS = (1.0, 1e5)  # limits of the gain axis; points outside are drawn on the limits
@@ -28,12 +27,11 @@ _KEYS = ["scene", "group", "method", "r"]
 @figure(
     title="Error of the run against the gain",
     reads={
-        "reruns": TableOf("reduced_reruns"),
-        "errors": TableOf("reconstruction_error"),
+        "reruns": TableOf("reduced_reruns"), "errors": TableOf("reconstruction_error"),
         "repetitions": TableOf("repetitions"),
     },
-)
-def error_against_gain(options: kit.Methods, drawn: Drawn, **tables: pd.DataFrame) -> Figure:
+)  # fmt: skip
+def error_against_gain(drawn: Drawn, **tables: pd.DataFrame) -> Figure:
     """Left: every run of a sampled method whose basis suffices (the orthogonal projection does not
     fail at the same size), over all scenes and sizes. Dashed: the error from which on a run counts
     as failed. Arrows on the rim lie outside the axes. Crosses: range and median over runs, in some
@@ -42,11 +40,15 @@ def error_against_gain(options: kit.Methods, drawn: Drawn, **tables: pd.DataFram
     """
     runs = drawn.rows(judged_runs(tables["reruns"], tables["errors"]))
     if runs.empty:
-        raise kit.NothingToDraw("no run with a gain")
+        raise NothingToDraw("no run with a gain")
     figure = style.new_figure(3.0)
     left, right = figure.subplots(1, 2, width_ratios=(2.2, 1.0))
-    repeated = tables["repetitions"].query("varied == 'training'")
-    ranges = runs[[*_KEYS, "gain", "error"]].merge(repeated, on=_KEYS)
+    ranges = runs[:0].reindex(
+        columns=[*_KEYS, *(f"{q}_{e}" for q in ("gain", "error") for e in ENDS)]
+    )
+    if len(repeated := tables["repetitions"]):
+        repeated = repeated[repeated.varied == "training"]
+        ranges = runs[[*_KEYS, "gain", "error"]].merge(repeated, on=_KEYS)
     methods = [m for m in drawn.methods if (runs.method == m).any()]
     styles = style.method_styles(methods)
     for method in methods:
@@ -101,8 +103,11 @@ def _draw_decades(ax: Axes, runs: pd.DataFrame) -> None:
     style.grid(ax)
 
 
-@figure(title="One choice after the other", reads={"table": TableOf("ladder")})
-def ladder(options: kit.Scenes, table: pd.DataFrame) -> Figure:
+@figure(
+    title="One choice after the other", reads={"table": TableOf("ladder")},
+    scenes=f"bar_release spring_twist_twin spring_oop strain_twist_twin strain_oop {MESHES}",
+)  # fmt: skip
+def ladder(drawn: Drawn, table: pd.DataFrame) -> Figure:
     """Above the line one ingredient after the other is changed, from the published code to whole
     elements with oversampling; below it each row takes a single ingredient away from the complete
     method or exchanges it. Left the error of the rerun within the horizon, right the gain of the
@@ -110,10 +115,10 @@ def ladder(options: kit.Scenes, table: pd.DataFrame) -> Figure:
     that are trained on as many resampled frames, on some scenes; pale ones that over choices of the
     arbitrary signs of the singular vectors.
     """
-    table = options.rows(table)
+    table = table[table.scene.isin(drawn.scenes)]
     table = table[table.gain.notna() & (table.direction != "square")]
     if table.empty:
-        raise kit.NothingToDraw("no scene that climbs the ladder")
+        raise NothingToDraw("no scene that climbs the ladder")
     climbed = table[table.direction.isin(["up", "down"])]
     rungs = list(dict.fromkeys(zip(climbed.direction, climbed.rung, strict=True)))
     figure = style.new_figure(0.2 * len(rungs) + 1.2)
@@ -170,17 +175,15 @@ VALUES = (1e-17, 3.0)
 SHOWN = (1e-7, 1e3)  # limits of the error axis; errors outside are drawn on the limits
 PUBLISHED = "#B5B5B5"
 PUBLISHED_CODE = "config/reference/published_code"
+# Scene -> similar experiment of the published code, which is drawn beside it.
+BESIDE = {"cloth_all": "all_three", "bend_fall": "bending_only", "bar_release": "bar"}
 REGION = "#F1EFEB"
 HOLLOW = {"markerfacecolor": "white", "markeredgecolor": "#777777"}
 Panel = tuple[Axes, Experiment, pd.DataFrame]
 
 
-class Reconstruction(Beside, kit.Methods):
-    """Options of a figure: reduction methods, and the options that `Beside` declares."""
-
-
 def _panels(
-    options: Beside, drawn: Drawn, table: pd.DataFrame, limits: tuple[float, float], legend: int
+    drawn: Drawn, table: pd.DataFrame, limits: tuple[float, float], columns: int, legend: int
 ) -> tuple[Figure, list[Panel]]:
     """Figure with a panel for each scene and group in ``table``, and space for a legend.
 
@@ -192,49 +195,50 @@ def _panels(
         if len(rows := table[(table.scene == each.scene) & (table.group == each.group)])
     ]
     if not pairs:
-        raise kit.NothingToDraw(f"no experiment of {options.words()}")
-    figure, axes = multiples.small_multiples(len(pairs), options.columns, legend_rows=legend)
+        raise NothingToDraw("no experiment")
+    figure, axes = multiples.small_multiples(len(pairs), columns, legend_rows=legend)
     for ax, (each, _) in zip(axes, pairs, strict=True):
         multiples.log_axis(ax, *limits)
         ax.set_title(each.title)
     return figure, [(ax, *pair) for ax, pair in zip(axes, pairs, strict=True)]
 
 
-def _published(path: Path, columns: list[str], options: Beside, each: Experiment) -> pd.DataFrame:
+def _published(path: Path, columns: list[str], each: Experiment) -> pd.DataFrame:
     """Rows of ``path`` for the group of ``each``, of the published experiment like its scene.
 
     The file has output of the preprint authors' own code, and must have ``columns``;
-    `Beside.published` names the experiment of that code which is similar to the scene.
+    `BESIDE` names the experiment of that code which is similar to the scene.
     """
     output = read_table(path, ["experiment", "group", *columns], result=False)
-    name = options.published.get(each.scene)
+    name = BESIDE.get(each.scene)
     return output[(output.experiment == name) & (output.group == each.group)]
 
 
 @figure(
-    number=9,
-    title="Decay of the singular values",
+    number=9, title="Decay of the singular values",
     reads={
         "table": TableOf("singular_values"),
         "published": ProjectFile(f"{PUBLISHED_CODE}/singular_values.csv"),
     },
-)
-def singular_values(options: Beside, drawn: Drawn, table: pd.DataFrame, published: Path) -> Figure:
+    scenes="cloth_all bend_fall bend_poke bend_curved spring_stretch spring_twist spring_oop "
+    f"strain_stretch strain_twist strain_poke strain_oop bar_release bar_twist {MESHES}",
+)  # fmt: skip
+def singular_values(drawn: Drawn, table: pd.DataFrame, published: Path) -> Figure:
     """Singular values of the training snapshots, relative to the first. Hollow ones lie below the
     round-off of the projections and are noise. Grey lines are the output of the published code for
     the scene that comes closest.
     """
-    figure, panels = _panels(options, drawn, table, VALUES, legend=2)
+    figure, panels = _panels(drawn, table, VALUES, 4, legend=2)
     reference = False
     for ax, each, rows in panels:
-        output = _published(published, ["component", "singular_value"], options, each)
+        output = _published(published, ["component", "singular_value"], each)
         values = output.sort_values("component").singular_value.to_numpy(float)
         if len(values) and values[0] > 0.0:
             reference = True
             shown = np.clip(values / values[0], VALUES[0], None)
             ax.plot(np.arange(1, len(values) + 1), shown, color=PUBLISHED, linewidth=0.9, zorder=1)
         _draw_values(ax, rows.sort_values("component"), *drawn.looks[each.group])
-    label_outer([ax for ax, *_ in panels], options.columns, "component", "singular value / first")
+    label_outer([ax for ax, *_ in panels], 4, "component", "singular value / first")
     groups = dict.fromkeys(each.group for _, each, _ in panels)
     handles = style.handles({style.words(group): drawn.looks[group] for group in groups})
     handles.append(style.handle("below round-off", linestyle="none", marker="o", **HOLLOW))
@@ -270,28 +274,26 @@ def _draw_values(ax: Axes, rows: pd.DataFrame, colour: str, marker: str) -> None
 
 
 @figure(
-    number=8,
-    title="Reconstruction error of three scenes of the preprint",
+    number=8, title="Reconstruction error of three scenes of the preprint",
     reads={
         "table": TableOf("reconstruction_error"),
         "published": ProjectFile(f"{PUBLISHED_CODE}/reconstruction_error.csv"),
-    },
-)
-def reconstruction_error(
-    options: Reconstruction, drawn: Drawn, table: pd.DataFrame, published: Path
-) -> Figure:
+    }, scenes=f"spring_twist strain_stretch bar_release {MESHES}",
+    methods="pod deim deim-joint published block-deim",
+)  # fmt: skip
+def reconstruction_error(drawn: Drawn, table: pd.DataFrame, published: Path) -> Figure:
     """Relative error of reconstructed projections against the number $r$ of basis vectors, for the
     snapshots used (train), the frames between them (test) and another run (held out). Errors above
     the axis are drawn on its rim with an arrow head.
     """
     methods = [m for m in drawn.methods if (table.method == m).any()]
     if not methods:
-        raise kit.NothingToDraw(f"reconstruction errors of {options.words()}")
-    figure, panels = _panels(options, drawn, table, SHOWN, legend=3)
+        raise NothingToDraw("no reconstruction errors")
+    figure, panels = _panels(drawn, table, SHOWN, 3, legend=3)
     reference = False
     for ax, each, rows in panels:
         columns = ["split", "num_points", "relative_error_x"]
-        output = _published(published, columns, options, each)
+        output = _published(published, columns, each)
         output = output[output.split == "train"].sort_values("num_points")
         for axis in ("x", "y") if len(output) else ():
             reference = True
@@ -305,7 +307,7 @@ def reconstruction_error(
                 bbox={"facecolor": "white", "edgecolor": "none", "pad": 2},
             )  # fmt: skip
         ax.set_xlim(0, max(float(rows.r.max()), 1.0) * 1.02)
-    label_outer([ax for ax, *_ in panels], options.columns, "basis size r", "relative error")
+    label_outer([ax for ax, *_ in panels], 3, "basis size r", "relative error")
     handles = drawn.handles(style.method_styles(methods)) + style.split_handles(style.SPLITS)
     if reference:
         label = "published code's output (x, y)"

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 import pandas as pd
@@ -17,9 +18,10 @@ from pdrom.view.read import RerunInfo, choose_ranks, positions_at, rerun_infos
 from study.artifact.paths import MESH, NOISE_RUNS, RERUNS, SUBSPACES, TRAIN, File
 from study.artifact.reads import EachOf, Every, Read, TableOf
 from study.experiments.kit.base import Horizon
-from study.figures.kit.declaration import Drawn, Experiment, NothingToDraw, ReducedRuns, figure
+from study.figures.kit.declaration import Drawn, Experiment, NothingToDraw, camera_of, figure
 from study.figures.kit.elements import magnitudes
 from study.figures.sensitivity_floor import FLOORS, Floors
+from study.tables.errors import VOLUMES
 from study.tables.kit.results import trained
 
 NOISY = {"all": "all axes", "plane": "in the plane", "vertex": "one vertex across"}
@@ -28,6 +30,9 @@ DISTANCES = (1e-4, 1.0)  # limits of colours: distance from full order / longest
 FOOTER = 0.55  # height of the colour scale, inches
 TOLERANCE = "ecsw-1e-02"  # method of the run in a position subspace that figure `teaser` shows
 MODES = 20  # largest allowed number of modes k of the position subspace in figure `teaser`
+Ranks = tuple[int | Literal["full"], ...]
+PAIR = "deim-joint block-deim"
+RANKS: Ranks = (6, 10, 20, "full")  # basis sizes; full stands for the numerical rank
 Files = list[File]
 RUNS: dict[str, Read] = {
     "meshes": EachOf(MESH, "experiments"),
@@ -92,9 +97,10 @@ class Shown:
 class Runs:
     """Inputs of figures of runs: a file per scene; in ``reruns`` per scene, group and method."""
 
-    options: ReducedRuns
     drawn: Drawn
     horizon: Horizon
+    ranks: Ranks
+    frames: tuple[float, ...]  # instants that are drawn, as fractions of the run
     meshes: Files
     full_order: Files
     reruns: Files
@@ -102,7 +108,7 @@ class Runs:
 
     def __post_init__(self) -> None:
         if not self.drawn.experiments or not self.drawn.methods:
-            raise NothingToDraw(self.options.words())
+            raise NothingToDraw("no reduced run")
 
     @cached_property
     def floors(self) -> Floors:
@@ -110,13 +116,13 @@ class Runs:
         return Floors(self.sensitivity, self.horizon)
 
     def shown(self, experiment: Experiment) -> Shown:
-        """Return the scene of ``experiment`` at the last of the instants listed in the options."""
-        path, instant = experiment.path(self.full_order), self.options.frames[-1:]
+        """Return the scene of ``experiment`` at the last of the instants."""
+        path, instant = experiment.path(self.full_order), self.frames[-1:]
         (frame,), full = positions_at(path, instant)
         return Shown(
             experiment,
             load_mesh(experiment.path(self.meshes)),
-            self.options.camera(experiment),
+            camera_of(experiment),
             frame,
             self.floors.instant(experiment.scene, frame).replace(", ", "\n"),
             full,
@@ -125,11 +131,11 @@ class Runs:
         )
 
     def reduced(self, shown: Shown) -> dict[str, list[RunPanel]]:
-        """Return method -> panels of its reduced runs, for the basis sizes in the options."""
+        """Return method -> panels of its reduced runs, for the basis sizes `ranks`."""
         found = {}
         for method in self.drawn.methods:
             path = shown.experiment.path(self.reruns, method=method)
-            infos = choose_ranks(rerun_infos(path), self.options.ranks)
+            infos = choose_ranks(rerun_infos(path), self.ranks)
             found[method] = [shown.panel(path, info) for info in infos]
         return found
 
@@ -149,7 +155,7 @@ class Runs:
     def draw(self) -> Figure:
         """Draw a row for each scene and method: the full-order run, then reduced runs by size.
 
-        All pictures of a scene show the last instant in the options with the same camera. A picture
+        All pictures of a scene show the last instant with the same camera. A picture
         too large for the common scale has a border, and its scale below. The grey outline is the
         full-order run.
         """
@@ -171,32 +177,41 @@ def obstacles_of(experiment: Experiment, positions: np.ndarray) -> list[Mesh] | 
     return None if floor and len(bodies) == 1 else bodies
 
 
-@figure(title="The bar, reduced", more=COMPARED, reads=RUNS)
-def bar_runs(options: ReducedRuns, drawn: Drawn, horizon: Horizon, **files: Files) -> Figure:
+@figure(
+    title="The bar, reduced", more=COMPARED, reads=RUNS,
+    scenes="bar_release bar_twist torus_release starfish_twist", methods=PAIR,
+    groups=" ".join(VOLUMES),
+)  # fmt: skip
+def bar_runs(drawn: Drawn, horizon: Horizon, **files: Files) -> Figure:
     """Bars with tetrahedral constraints:"""
-    return Runs(options, drawn, horizon, **files).draw()
-
-
-@figure(number=6, title="Springs only, reduced", more=COMPARED, reads=RUNS)
-def spring_runs(options: ReducedRuns, drawn: Drawn, horizon: Horizon, **files: Files) -> Figure:
-    """Sheets with edge springs only:"""
-    return Runs(options, drawn, horizon, **files).draw()
-
-
-@figure(number=7, title="Triangle strain only, reduced", more=COMPARED, reads=RUNS)
-def strain_runs(options: ReducedRuns, drawn: Drawn, horizon: Horizon, **files: Files) -> Figure:
-    """Sheets with triangle strain only:"""
-    return Runs(options, drawn, horizon, **files).draw()
+    return Runs(drawn, horizon, RANKS, (0.65,), **files).draw()
 
 
 @figure(
-    number=5,
-    title="Bending only, reduced",
+    number=6, title="Springs only, reduced", more=COMPARED, reads=RUNS,
+    scenes="spring_stretch spring_twist ball_shell", methods=PAIR, groups="spring",
+)  # fmt: skip
+def spring_runs(drawn: Drawn, horizon: Horizon, **files: Files) -> Figure:
+    """Sheets with edge springs only:"""
+    return Runs(drawn, horizon, RANKS, (0.3,), **files).draw()
+
+
+@figure(
+    number=7, title="Triangle strain only, reduced", more=COMPARED, reads=RUNS,
+    scenes="strain_stretch strain_twist strain_poke disc_strain", methods=PAIR,
+    groups="strain area",
+)  # fmt: skip
+def strain_runs(drawn: Drawn, horizon: Horizon, **files: Files) -> Figure:
+    """Sheets with triangle strain only:"""
+    return Runs(drawn, horizon, RANKS, (0.3,), **files).draw()
+
+
+@figure(
+    number=5, title="Bending only, reduced",
     reads={**RUNS, "noise": TableOf("noise"), "noise_runs": Every(NOISE_RUNS)},
-)
-def bending_runs(
-    options: ReducedRuns, drawn: Drawn, horizon: Horizon, noise: pd.DataFrame, **files: Files
-) -> Figure:
+    scenes="bend_fall bend_poke bend_curved", methods=PAIR, groups="bending",
+)  # fmt: skip
+def bending_runs(drawn: Drawn, horizon: Horizon, noise: pd.DataFrame, **files: Files) -> Figure:
     """Sheets with bending constraints only, near the end of the run: full order against reduced
     projections. The projections of a flat sheet are round-off: in the preprint's two scenes the
     basis is one of noise, and what it does depends on which axes the round-off of the start reaches
@@ -205,7 +220,7 @@ def bending_runs(
     sheet has projections that matter.
     """
     noise_runs = files.pop("noise_runs")
-    runs, rows = Runs(options, drawn, horizon, **files), []
+    runs, rows = Runs(drawn, horizon, RANKS, (0.6,), **files), []
     for each in drawn.experiments:
         found, path = runs.rows(each), each.find(noise_runs)
         if found[0].note == NOTHING_RAN and path is not None:
@@ -251,8 +266,11 @@ def _alike(table: pd.DataFrame) -> dict[tuple[tuple[int, str], ...], list[str]]:
     return kinds
 
 
-@figure(number=4, title="Three constraint groups, one of them reduced", reads=RUNS)
-def cloth_all_grid(options: ReducedRuns, drawn: Drawn, horizon: Horizon, **files: Files) -> Figure:
+@figure(
+    number=4, title="Three constraint groups, one of them reduced", reads=RUNS, scenes="cloth_all",
+    methods=PAIR, several=True,
+)  # fmt: skip
+def cloth_all_grid(drawn: Drawn, horizon: Horizon, **files: Files) -> Figure:
     """The cloth with bending, springs and strain at instants up to the scene's horizon, beyond
     which no difference could be blamed on a reduction: the full-order run, then runs that reduce
     the projections of one group only, by two methods. Triangles are coloured by their distance to
@@ -260,10 +278,12 @@ def cloth_all_grid(options: ReducedRuns, drawn: Drawn, horizon: Horizon, **files
     below it. Springs carry nearly all of the force, so that reducing strain changes little whatever
     the method.
     """
-    runs, one = Runs(options, drawn, horizon, **files), drawn.experiments[0]
-    mesh, camera = load_mesh(one.path(runs.meshes)), options.camera(one)
+    # instants as fractions of the horizon
+    runs = Runs(drawn, horizon, (20, 10, "full"), (0.5, 0.75, 1.0), **files)
+    one = drawn.experiments[0]
+    mesh, camera = load_mesh(one.path(runs.meshes)), camera_of(one)
     end = runs.floors.horizon(one.scene)
-    frames, full = positions_at(one.path(runs.full_order), options.frames, end)
+    frames, full = positions_at(one.path(runs.full_order), runs.frames, end)
     first = [
         RunPanel(f"frame {f}", style.FULL_ORDER, q, reference=True)
         for f, q in zip(frames, full, strict=True)
@@ -279,9 +299,7 @@ def cloth_all_grid(options: ReducedRuns, drawn: Drawn, horizon: Horizon, **files
     rows = [row("full order", first * len(drawn.methods), None)]
     for each in drawn.of(one.scene):
         reduced = [
-            _over_time(
-                each.path(runs.reruns, method=m), options, drawn.title(m), frames, full, mesh
-            )
+            _over_time(each.path(runs.reruns, method=m), runs, drawn.title(m), frames, full, mesh)
             for m in drawn.methods
         ]
         blank = [RunPanel("", style.GREY, None, remark="not run")] * len(frames)
@@ -298,13 +316,13 @@ def cloth_all_grid(options: ReducedRuns, drawn: Drawn, horizon: Horizon, **files
 
 
 def _over_time(
-    path: str, options: ReducedRuns, title: str, frames: list[int], full: np.ndarray, mesh: Mesh
+    path: str, runs: Runs, title: str, frames: list[int], full: np.ndarray, mesh: Mesh
 ) -> list[RunPanel] | None:
     """Panels of a reduced run at ``frames``, coloured by the distance to the full-order run.
 
     ``full`` : (F, N, 3) m, full-order positions. Returns None if all sizes r exceed the rank.
     """
-    infos = choose_ranks(rerun_infos(path), options.ranks)
+    infos = choose_ranks(rerun_infos(path), runs.ranks)
     info = next((i for i in infos if not i.marked), None)
     if info is None:
         return None
@@ -331,14 +349,11 @@ def _colours() -> ScalarMappable:
 @figure(
     title="Two scenes under five reductions",
     reads={
-        **RUNS,
-        "subspaces": EachOf(SUBSPACES, "drawn_subspaces"),
+        **RUNS, "subspaces": EachOf(SUBSPACES, "drawn_subspaces"),
         "errors": TableOf("reduced_reruns"),
-    },
-)
-def teaser(
-    options: ReducedRuns, drawn: Drawn, horizon: Horizon, errors: pd.DataFrame, **files: Files
-) -> Figure:
+    }, scenes="bar_release spring_oop", methods="deim-joint deim block-deim gappy",
+)  # fmt: skip
+def teaser(drawn: Drawn, horizon: Horizon, errors: pd.DataFrame, **files: Files) -> Figure:
     """One instant of the motion that trained all of them. `deim-joint` is the preprint's method:
     joint rows, a system for each axis. `deim` samples single entries, `block-deim` whole elements,
     `gappy` three elements a mode, all with shared coefficients. `ecsw` reduces positions and sums
@@ -347,7 +362,7 @@ def teaser(
     scale given below it.
     """
     subspaces = files.pop("subspaces")
-    runs, errors = Runs(options, drawn, horizon, **files), trained(errors)
+    runs, errors = Runs(drawn, horizon, (20,), (0.65,), **files), trained(errors)
     return view.draw_rows(
         [_teaser_row(runs, each, errors, each.find(subspaces)) for each in drawn.experiments]
     )
@@ -369,8 +384,7 @@ def _teaser_row(
     for method, found in reduced.items() if ran else ():
         own = errors[(errors.group == experiment.group) & (errors.method == method)]
         drawn = [panel for panel in found if panel.positions is not None]
-        # without sizes in the options, show one size only: the largest
-        sizes = (drawn or found)[-(len(runs.options.ranks) or 1) :]
+        sizes = (drawn or found)[-len(runs.ranks) :]
         own = own[own.position_basis == "full"]
         panels += [_with_error(panel, method, own, "r") for panel in sizes]
     if sampled := subspace and _subspace(shown.frame, subspace):

@@ -18,9 +18,8 @@ from pdrom.view.panels import fit_aspect
 from pdrom.view.read import SamplingView, positions_at, read_samplings
 from study.artifact.paths import BASIS, MESH, SAMPLING, SNAPSHOTS, TRAIN, File
 from study.artifact.reads import EachOf
-from study.figures.kit import declaration as kit
 from study.figures.kit import elements as shapes
-from study.figures.kit.declaration import figure
+from study.figures.kit.declaration import MESHES, Drawn, NothingToDraw, camera_of, figure
 
 EARLIER = {
     "markerfacecolor": "#FFFFFF", "markeredgecolor": style.BLACK, "markeredgewidth": 0.8,
@@ -32,20 +31,11 @@ NEWEST = {
 }  # fmt: skip
 SEVERAL = "several"  # stands for x, y or z if entries of several axes of an element are sampled
 AXES = {**style.AXES, SEVERAL: "#333333"}
+SCENES = f"strain_oop strain_twist_twin spring_stretch bar_release {MESHES}"
+STEPS, COLUMNS = 6, 3  # selection steps of figure `deim_iterations`, and panels in a row
+ENTRIES = 20  # basis size of figure `deim_entries`; the largest one where there is none
+INSTANTS, MODES = (0.15, 0.5, 0.85), 4  # snapshots of a run, as fractions of it, and modes
 ROW_HEIGHT = 1.85  # height of a row of panels, inches
-
-
-class Steps(kit.View):
-    """Options of the figure: camera, and ``count``, how many steps of the selection are drawn."""
-
-    count: kit.Count = 6
-    columns: kit.Columns = 3
-
-
-class Entries(kit.View):
-    """Options of the figure: camera, and basis sizes, of which the first with samples is drawn."""
-
-    ranks: kit.Ranks = ()
 
 
 @dataclass(frozen=True)
@@ -67,16 +57,14 @@ class Iteration:
 
 
 @figure(
-    number=2,
-    title="The first iterations of DEIM",
+    number=2, title="The first iterations of DEIM",
     reads={
-        "meshes": EachOf(MESH, "first_run"),
-        "bases": EachOf(BASIS, "first_run"),
+        "meshes": EachOf(MESH, "first_run"), "bases": EachOf(BASIS, "first_run"),
         "samples": EachOf(SAMPLING, "first_run"),
-    },
-)
+    }, scenes=SCENES, methods="deim block-deim deim-joint",
+)  # fmt: skip
 def deim_iterations(
-    options: Steps, drawn: kit.Drawn, meshes: list[File], bases: list[File], samples: list[File]
+    drawn: Drawn, meshes: list[File], bases: list[File], samples: list[File]
 ) -> Figure:
     """In step $k$ the residual of mode $k$ is taken against the modes before it, interpolated at
     the entries picked so far, and the entry where it is largest in absolute value is picked next.
@@ -86,16 +74,16 @@ def deim_iterations(
     """
     method, reduction = next(iter(drawn.reductions.items()), ("", None))
     if not samples or reduction is None or reduction.rows == "all":
-        raise kit.NothingToDraw(f"samples of {options.words()}")
+        raise NothingToDraw("no samples")
     experiment, path = drawn.experiments[0], samples[0].path
     basis, samplings = load_basis(bases[0].path), read_samplings(path)
     if not samplings:
-        raise kit.NothingToDraw(f"nothing was sampled for {experiment.title}")
-    entries, camera = samplings[-1].entries, options.camera(experiment)
-    steps = iterations(basis.V, entries, basis.rows_per_element, reduction.rows, options.count)
+        raise NothingToDraw(f"nothing was sampled for {experiment.title}")
+    entries, camera = samplings[-1].entries, camera_of(experiment, 45.0)
+    steps = iterations(basis.V, entries, basis.rows_per_element, reduction.rows, STEPS)
     mesh = load_mesh(meshes[0].path)
     elements = shapes.element_map(experiment.group, mesh, basis.elements, source=str(path))
-    columns = min(options.columns, len(steps))
+    columns = min(COLUMNS, len(steps))
     window = fit_aspect(window_of(camera, [mesh.points], 0.06))
     height = style.WIDTH / columns * min(window.height / window.width, 1.0) * 0.9 + 0.45
     figure = style.new_figure(rows_of(len(steps), columns) * height + 0.35)
@@ -181,15 +169,15 @@ def _joint_residual(V: np.ndarray, entries: np.ndarray, k: int) -> np.ndarray:
 
 
 @figure(
-    number=3,
-    title="Elements hit by the entries of vectorised DEIM",
+    number=3, title="Elements hit by the entries of vectorised DEIM",
     reads={
-        "meshes": EachOf(MESH, "experiments"),
-        "snapshots": EachOf(SNAPSHOTS, "experiments"),
+        "meshes": EachOf(MESH, "experiments"), "snapshots": EachOf(SNAPSHOTS, "experiments"),
         "samples": EachOf(SAMPLING, "runs"),
     },
-)
-def deim_entries(options: Entries, drawn: kit.Drawn, **files: list[File]) -> Figure:
+    scenes="spring_twist strain_twist_twin bar_release disc_strain torus_release starfish_twist",
+    methods="deim qdeim block-deim",
+)  # fmt: skip
+def deim_entries(drawn: Drawn, **files: list[File]) -> Figure:
     """Single entries, picked without regard to elements, scatter over the mesh. Left: the elements
     they belong to, by axis. Middle: how many of its entries each touched element contributes.
     Right: numbers that have to be computed for $r$ interpolation entries, because a projection
@@ -198,14 +186,14 @@ def deim_entries(options: Entries, drawn: kit.Drawn, **files: list[File]) -> Fig
     methods = drawn.methods
     scalar = [m for m in methods if drawn.reductions[m].rows == "scalar"]
     if not scalar:
-        raise kit.NothingToDraw("no method that samples single entries (deim, qdeim)")
+        raise NothingToDraw("no method that samples single entries (deim, qdeim)")
     sampled = []
     for each in drawn.experiments:
         samplings = {m: read_samplings(each.path(files["samples"], method=m)) for m in methods}
         if samplings[scalar[0]]:
             sampled.append((each, samplings))
     if not sampled:
-        raise kit.NothingToDraw(f"samples of {options.words()}")
+        raise NothingToDraw("no samples")
     figure = style.new_figure(ROW_HEIGHT * len(sampled) + 0.55)
     axes = figure.subplots(len(sampled), 3, squeeze=False, width_ratios=[1.25, 1.0, 1.1])
     for row, (each, samplings) in zip(axes, sampled, strict=True):
@@ -215,9 +203,8 @@ def deim_entries(options: Entries, drawn: kit.Drawn, **files: list[File]) -> Fig
         mesh = load_mesh(each.path(files["meshes"]))
         elements = shapes.element_map(each.group, mesh, count, source=source)
         views = samplings[scalar[0]]
-        asked = [view for rank in options.ranks for view in views if view.r == rank]
-        chosen = (asked or views[-1:])[0]
-        _draw_hits(row[0], elements, chosen.entries, 3 * rows, options.camera(each))
+        chosen = next((view for view in views if view.r == ENTRIES), views[-1])
+        _draw_hits(row[0], elements, chosen.entries, 3 * rows, camera_of(each))
         row[0].set_title(f"{each.title}\nr = {chosen.r} entries")
         _draw_counts(row[1], chosen, 3 * rows)
         _draw_evaluations(row[2], samplings, 3 * rows)
@@ -290,24 +277,14 @@ ABOVE, TITLE, FOOTER = 0.36, 0.34, 0.44  # heights, inches: two text lines, titl
 LEFT, TALLEST = 0.75, 1.45  # left edge and largest height of pictures of the mesh, inches
 
 
-class Snapshots(kit.View):
-    """Options of the figure: camera, instants of the snapshots, and number of modes."""
-
-    frames: kit.Instants = (0.1, 0.5, 0.9)
-    count: kit.Count = 6
-
-
 @figure(
-    number=1,
-    title="Snapshots of the projections and their modes",
+    number=1, title="Snapshots of the projections and their modes",
     reads={
-        "meshes": EachOf(MESH, "first_run"),
-        "full_order": EachOf(TRAIN, "first_run"),
-        "sets": EachOf(SNAPSHOTS, "first_run"),
-        "bases": EachOf(BASIS, "first_run"),
-    },
-)
-def snapshots_and_modes(options: Snapshots, drawn: kit.Drawn, **files: list[File]) -> Figure:
+        "meshes": EachOf(MESH, "first_run"), "full_order": EachOf(TRAIN, "first_run"),
+        "sets": EachOf(SNAPSHOTS, "first_run"), "bases": EachOf(BASIS, "first_run"),
+    }, scenes=SCENES, methods="deim block-deim pod",
+)  # fmt: skip
+def snapshots_and_modes(drawn: Drawn, **files: list[File]) -> Figure:
     """The snapshots of one constraint group, a column each, less their mean, are the product of
     modes, singular values (a diagonal, dark where large) and coefficients; red entries are
     positive, blue ones negative. Below, columns of the first matrix on the moving mesh and the
@@ -315,20 +292,20 @@ def snapshots_and_modes(options: Snapshots, drawn: kit.Drawn, **files: list[File
     row are named, relative to the largest.
     """
     if not files["bases"]:
-        raise kit.NothingToDraw(options.words())
+        raise NothingToDraw("no basis")
     experiment, path = drawn.experiments[0], files["bases"][0].path
     basis, snapshots = load_basis(path), load_snapshots(files["sets"][0].path)
     mesh = load_mesh(files["meshes"][0].path)
     elements = shapes.element_map(experiment.group, mesh, snapshots.elements, source=str(path))
     centred = snapshots.train.reshape(len(snapshots.train), -1).T - basis.mean[:, None]
-    frames, positions = positions_at(files["full_order"][0].path, options.frames)
-    camera = options.camera(experiment)
+    frames, positions = positions_at(files["full_order"][0].path, INSTANTS)
+    camera = camera_of(experiment, 28.0)
     taken = [int(np.argmin(np.abs(snapshots.frames["train"] - (f - 1)))) for f in frames]
     moving = [window_of(camera, [q], 0.04) for q in positions]
     size = (max(w.width for w in moving), max(w.height for w in moving))
     moving = [window.resized(*size) for window in moving]
     resting = fit_aspect(window_of(camera, [mesh.points], 0.05))
-    count = min(options.count, basis.rank)
+    count = min(MODES, basis.rank)
     heights = [_height(moving[0], len(frames)), _height(resting, count) if count else 0.3]
     total = ABOVE + BLOCKS[0][2] + sum(heights) + 2 * TITLE + FOOTER
     figure = style.new_figure(total, None)

@@ -12,7 +12,7 @@ from pdrom.view.multiples import clipped, label_outer, log_axis, small_multiples
 from study.artifact.paths import SENSITIVITY, File
 from study.artifact.reads import EachOf, Read, Setting
 from study.experiments.kit.base import Horizon, floor_of, horizon
-from study.figures.kit.declaration import Columns, Drawn, NothingToDraw, Scenes, figure
+from study.figures.kit.declaration import MESHES, Drawn, NothingToDraw, figure
 from study.tables.kit.results import TWIN
 
 # Inputs from which figures make `Floors`: the sensitivity floor and horizon of each scene.
@@ -54,16 +54,12 @@ class Floors:
 LOW, HIGH = 1e-12, 1e2
 
 
-class Floored(Scenes):
-    """Options of the figure: scenes, and the number of panels in a row."""
-
-    columns: Columns = 3
-
-
-@figure(title="Sensitivity floor and horizon", reads=FLOORS)
-def sensitivity_floor(
-    options: Floored, drawn: Drawn, sensitivity: list[File], horizon: Horizon
-) -> Figure:
+@figure(
+    title="Sensitivity floor and horizon", reads=FLOORS,
+    scenes="cloth_all cloth_all_twin cloth_all_oop strain_stretch strain_twist strain_stretch_twin "
+    f"strain_twist_twin strain_oop bar_release bar_twist {MESHES}",
+)  # fmt: skip
+def sensitivity_floor(drawn: Drawn, sensitivity: list[File], horizon: Horizon) -> Figure:
     """Drift of full-order runs whose initial positions differ by {sensitivity.reference} of the
     extent. The horizon, given in the legends, is the first frame above the threshold of
     {sensitivity.threshold}: beyond it a reduced run cannot be judged by its error. Dashed lines are
@@ -76,7 +72,7 @@ def sensitivity_floor(
             kinds.setdefault(_kind(drawn, scene), []).append(scene)
     if not kinds:
         raise NothingToDraw(f"no run perturbed by {floors.perturbation:g}")
-    columns = min(options.columns, len(kinds))
+    columns = min(3, len(kinds))
     figure, axes = small_multiples(len(kinds), columns, height=2.7)
     for ax, (kind, scenes) in zip(axes, kinds.items(), strict=True):
         log_axis(ax, LOW, HIGH)

@@ -8,8 +8,9 @@ import pandas as pd
 from pdrom.view import style
 from pdrom.view.artists import Axes, Figure
 from study.artifact.reads import TableOf
-from study.figures.kit.declaration import Drawn, Methods, NothingToDraw, Ranks, figure
+from study.figures.kit.declaration import Drawn, NothingToDraw, figure
 
+RANKS = (6, 10, 20, "full")  # basis sizes; full stands for the numerical rank
 CELLS = 48  # largest panel width, in cells; blocks of columns that do not fit go to another panel
 ROW = 0.145  # height of a row of cells, inches
 GAP = 0.45  # distance between blocks of columns, in widths of a cell
@@ -106,23 +107,16 @@ def _draw_cell(ax: Axes, x: float, y: float, found: pd.Series) -> None:
         ax.text(x + 0.5, y + 0.52, mark, ha="center", va="center", fontsize=6, color=look.ink)
 
 
-class Sizes(Methods):
-    """Options of the figure: scenes, methods and basis sizes."""
-
-    ranks: Ranks = ()
-
-
 @figure(title="Where each method can be trusted", reads={"table": TableOf("stability")})
-def stability_map(options: Sizes, drawn: Drawn, table: pd.DataFrame) -> Figure:
+def stability_map(drawn: Drawn, table: pd.DataFrame) -> Figure:
     """End of every run on the training motion, by method, size and scene. Accurate or wrong: the
     error within the horizon is at most, or above, {stability.wrong}; left the scene: the bounding
     box exceeds {stability.left} times the largest one of the full-order run; blow-up: numbers that
     are not finite, or an extent beyond the limit, in the frame whose number is printed. Groups
     whose projections are round-off are left out.
     """
-    table = options.rows(table)
     table = table[(table.experiment == "rerun") & (table.group.notna())]
-    strips = _local_strips(table, drawn, options) + _subspace_strips(table)
+    strips = _local_strips(table, drawn) + _subspace_strips(table)
     if not strips:
         raise NothingToDraw("no reduced run")
     rows = [len(strip.rows) for strip in strips]
@@ -143,13 +137,13 @@ def stability_map(options: Sizes, drawn: Drawn, table: pd.DataFrame) -> Figure:
     return figure
 
 
-def _local_strips(table: pd.DataFrame, drawn: Drawn, options: Sizes) -> list[Strip]:
+def _local_strips(table: pd.DataFrame, drawn: Drawn) -> list[Strip]:
     part = table[table.position_basis == "full"]
     ran = part[part.outcome != "not run"]
     held = set(zip(ran.scene, ran.group, strict=True))
     keys = {(each.scene, each.group): each.title for each in drawn.experiments}
     rows = {key: title for key, title in keys.items() if key in held}
-    ranks = [r for r in options.ranks if r == "full" or r in set(part.r)]
+    ranks = [r for r in RANKS if r == "full" or r in set(part.r)]
     largest = ran.sort_values("r", kind="stable").groupby(["scene", "group", "method"]).tail(1)
     blocks = []
     for method in dict.fromkeys(part.method):

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
 import pandas as pd
 from pybtex.backends.latex import Backend
 from pybtex.database import parse_file
@@ -20,15 +21,15 @@ from pdrom.core.store import read_table, read_text, require_intact, write_text
 from pdrom.core.yamlfile import describe
 from pdrom.view.text import replaced
 from study.artifact.artifact import Artifact
-from study.artifact.markup import to_plain
 from study.artifact.paths import FIGURE, MACHINE, PAPER_INPUT, TABLE, File
-from study.artifact.reads import Every, ProjectFile, Read, Setting, SourcesOf, TableOf
+from study.artifact.reads import Every, ProjectFile, Setting, SourcesOf
 from study.figures.kit.declaration import declarations
-from study.paper.macros import captions, decisions, keys_of, macros, number_of, provenance
+from study.paper.macros import HIDDEN, captions, decisions, keys_of, macros, number_of, provenance
 from study.paper.source import COMMENT, DOCUMENTS, PLACED, documents
 from study.paper.tex import build_pdfs
 from study.paper.textables import TEX_TABLES, reads, tex_table
 from study.tables import declared
+from study.tables.effects_cost import unreliable
 
 PAGES = {"main": 16, "supplement": 30}  # largest allowed number of pages of each document
 
@@ -58,36 +59,70 @@ def write_inputs(
     tables: list[File],
     machine: File,
     facts: Facts,
+    made: list[str],
     outputs: Mapping[str, str],
 ) -> None:
     r"""Write macros.tex, figures.tex, TeX tables, bibliographies and the file `NUMBERS`.
 
     Inputs are TeX files ``source``, BibTeX ``references``, CSV ``tables``, the description of the
-    ``machine`` of the run, and ``facts``. ``outputs`` maps names of the written files to paths.
+    ``machine`` of the run, ``facts``, and the rules of all tables, figures and pages that are
+    ``made``. ``outputs`` maps names of the written files to paths.
 
     `NUMBERS` (JSON) has the table cells from which the number of each ``\val`` key is computed, the
     tables from which each TeX table is made, and which ``\known`` and ``\row`` blocks are shown.
     """
     texts = documents(source[0].parent)
     whole = "".join(texts.values())
-    data = {table["name"]: read_table(table.path) for table in tables}
+    data, times = shown_tables(tables)
     for name, frame in data.items():  # raises StorageError if a cell is not of its column's type
         declared()[name].checked(frame.reindex(columns=declared()[name].column_names))
     data |= fact_tables(Path(machine.path), facts)
-    decided = {document: decisions(text, data) for document, text in texts.items()}
-    known = provenance(decided, facts.part, facts.full_study)
+    drawn = [name for name, figure in declarations().items() if figure.rule in made]
+    decided = {document: decisions(text, data, drawn) for document, text in texts.items()}
+    known = provenance(decided, facts.part, facts.full_study, times)
     written = {"macros": macros(whole, data) + known, "figures": captions(facts.captions)}
-    written |= {name: tex_table(name, data) for name in TEX_TABLES}
+    written |= {name: tex_table(name, data) for name in TEX_TABLES if name in outputs}
     for document, text in texts.items():
         written[document] = bibliography(text, references)
     origins = {
         "known": decided,
         "numbers": {key: number_of(key, data)._asdict() for key in keys_of(whole)},
-        "tables": {name: reads(name) for name in TEX_TABLES},
+        "tables": {name: reads(name) for name in TEX_TABLES if name in outputs},
+        "times": times,
     }
     written[Path(NUMBERS).stem] = json.dumps(origins, indent=1, allow_nan=False) + "\n"
     for name, content in written.items():
         write_text(content, outputs[name])
+
+
+TIMES = (
+    r"\par\noindent\textcolor{okred}{The times of this run are unreliable: other programs used the "
+    r"processor while they were measured. They are left out here, and so are all speed-ups.}\par"
+)
+
+
+def shown_tables(tables: list[File]) -> tuple[dict[str, pd.DataFrame], str]:
+    """Return name -> table, and `TIMES` if times are unreliable, or "".
+
+    In this case times are taken out: columns that depend on them are empty and listed in the
+    attribute `HIDDEN`; so is what tables say about claims on times, apart from the verdicts.
+    """
+    data = {table["name"]: read_table(table.path) for table in tables}
+    if "frame_times" not in data or not unreliable(data["frame_times"]):
+        return data, ""
+    for name, frame in data.items():
+        hidden = [c.name for c in declared()[name].columns if c.quantity == "timed"]
+        data[name] = frame.assign(**dict.fromkeys(hidden, np.nan))
+        data[name].attrs[HIDDEN] = hidden
+        if "claim" in frame and "claims_tests" in data:
+            tests = data["claims_tests"]
+            on_times = frame.claim.isin(tests.claim[tests.margin.notna()])
+            said = [c.name for c in declared()[name].columns if c.timed and c.kind != "integer"]
+            said = [
+                c for c in said if c in frame and not c.startswith(("verdict", "same", "answer"))
+            ]
+            data[name].loc[on_times, said] = None
+    return data, TIMES
 
 
 def fact_tables(machine: Path, facts: Facts) -> dict[str, pd.DataFrame]:
@@ -172,6 +207,7 @@ paper_inputs = Artifact(
         "tables": Every(TABLE),
         "machine": MACHINE,
         "facts": Setting("facts"),
+        "made": Setting("made"),
     },
     {Path(name).stem: PAPER_INPUT.where(name=name) for name in FILES},
     write_inputs,
@@ -226,49 +262,3 @@ def figure_numbers(root: Path) -> dict[str, Numbers]:
         placed = PLACED.findall(COMMENT.sub("", source))
         counted |= {name: f"{prefix}{number}" for number, name in enumerate(placed, 1)}
     return {name: Numbers(counted.get(name), f.number) for name, f in declarations().items()}
-
-
-HEAD = """\
-# Figures
-
-`./reproduce figure NAME` draws a figure to `results/figures/NAME.pdf` and `.png`.
-The name may be replaced by the figure's number in `main.pdf` (`figure 5`) or in `supplement.pdf`
-(`figure S7`), or by the number of the figure of the preprint that it rebuilds
-(`figure preprint:8`).
-The keys given here choose in `config/figures.yaml` what it shows.
-"""
-
-
-def figures_page(root: Path = Path()) -> str:
-    """Markdown page about all figures, with their numbers; the manuscript is below ``root``."""
-    parts = [HEAD]
-    numbers = figure_numbers(root)
-    for name, figure in declarations().items():
-        keys = ", ".join(f"`{key}`" for key in figure.options.model_fields)
-        read = filter(None, map(_words, figure.reads.values()))
-        caption = re.sub(r"\. (?=[A-Z`])", ".\n", _text(figure.caption))  # a line per sentence
-        parts.append(
-            f"## {numbers[name].label(f'`{name}`')}\n\n**{_text(figure.title)}.**\n{caption}\n\n"
-            f"Keys: {keys}.\nReads: {', '.join(dict.fromkeys(read))}.\n"
-        )
-    return "\n".join(parts)
-
-
-def _text(marked: str) -> str:
-    """Convert a title or caption from mark-up to Markdown; ``{key}`` of a setting becomes `key`."""
-    plain = re.sub(r"\{([a-z_.]+)\}", r"@\1@", marked)
-    pieces = re.split(r"(`[^`]*`)", plain)
-    words = "".join(p if p.startswith("`") else to_plain(p) for p in pieces)
-    return re.sub(r"@([a-z_.]+)@", r"`\1`", words)
-
-
-def _words(read: Read) -> str | None:
-    """Return the name of the table or files that ``read`` declares as input; None for a setting."""
-    match read:
-        case TableOf():
-            return f"table `{read.name}`"
-        case Every():
-            return f"`{read.place.pattern}`"
-        case ProjectFile():
-            return f"`{read.path}`"
-    return None

@@ -10,12 +10,11 @@ values). A filter is column=value or column!=value. Each key that the source use
 macro, so that no number is typed by hand.
 
 A block ``\known{... \val{key} ...}`` is a sentence, a block ``\row{... & \val{key} \\}`` a row of a
-table. A block is left out if the study's tables have no row for one of its keys. In each paragraph,
-a note about the full study replaces the first sentence that is left out.
+table. A block is left out if the study's tables have no row for one of its keys.
 """
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -28,6 +27,8 @@ VAL = re.compile(r"\\val\{([^{}]*)\}")
 _FILTER = re.compile(r"(.*?)(!?=)(.*)")
 Filter = tuple[str, str, str]  # (column, "=" or "!=", value)
 MISSING = "n/a"
+HIDDEN = "hidden"
+PICTURE = re.compile(r"\\(?:figureof|pictureof)\{(\w+)\}")
 _COUNTS = ("count", "distinct")
 # The text shows a count only if a row of the table has the names in these columns that its key has.
 _LABELS = ("scene", "group", "method", "position_basis", "variant", "direction", "experiment")
@@ -109,12 +110,15 @@ def number_of(key: str, tables: Mapping[str, pd.DataFrame]) -> Number:
 def is_held(key: str, tables: Mapping[str, pd.DataFrame]) -> bool:
     """Return whether ``tables`` have a row that ``key`` selects; the cell there may be empty.
 
+    Columns that the attribute `HIDDEN` of a frame lists (unreliable times) count as missing.
+
     If ``key`` counts cells, only its filters on columns `_LABELS` are used, as 0 is a count, too.
     """
-    table, filters, _, aggregate = _parse(key, tables)
+    table, filters, column, aggregate = _parse(key, tables)
     if aggregate in _COUNTS:
         filters = [entry for entry in filters if entry[0] in _LABELS]
-    return len(matching(tables[table], filters)) > 0
+    hidden = column in tables[table].attrs.get(HIDDEN, ())
+    return not hidden and len(matching(tables[table], filters)) > 0
 
 
 def _parse(
@@ -178,18 +182,15 @@ def format_number(value: Any) -> str:
     return rf"\ensuremath{{{mantissa}\cdot 10^{{{power}}}}}"
 
 
-_OPENING = re.compile(r"\\(known|row)\{")
+_OPENING = re.compile(r"\\(?:known|row)\{")
 _BRACE = re.compile(r"\\.|[{}]")  # a brace, or a backslash with the character that it escapes
-_BLANK_LINE = re.compile(r"\n[ \t]*\n")
-SHOWN, NOTED, DROPPED = "shown", "noted", "dropped"
+SHOWN, DROPPED = "shown", "dropped"
 
 
 class Sentence(NamedTuple):
-    r"""Block ``\known`` or ``\row``: content, paragraph number, and its slice of the TeX source."""
+    r"""Block ``\known`` or ``\row``: content, and its slice of the TeX source."""
 
     text: str
-    paragraph: int
-    is_row: bool
     start: int
     end: int
 
@@ -206,45 +207,45 @@ def sentences(source: str) -> list[Sentence]:
         text = source[opening.end() : end]
         if _OPENING.search(text):
             raise PaperError(f"{opening[0]}{text[:40]} ...: holds another one")
-        paragraph = len(_BLANK_LINE.findall(source[: opening.start()]))
-        found.append(Sentence(text, paragraph, opening[1] == "row", opening.start(), end + 1))
+        found.append(Sentence(text, opening.start(), end + 1))
         opening = _OPENING.search(source, end)
     return found
 
 
-def decisions(source: str, tables: Mapping[str, pd.DataFrame]) -> list[str]:
-    r"""Decide for each ``\known`` or ``\row`` block: show it, replace it by a note, or drop it.
+def decisions(
+    source: str, tables: Mapping[str, pd.DataFrame], drawn: Collection[str] = ()
+) -> list[str]:
+    r"""Decide for each ``\known`` or ``\row`` block: show it, or drop it.
 
-    Blocks are shown if ``tables`` have all their numbers. Of those that are not shown, a note
-    replaces the first ``\known`` block in each paragraph, and the rest is dropped.
+    Blocks are shown if ``tables`` have all their numbers, and their figures are ``drawn``.
     """
-    made, noted = [], set()
-    for sentence in sentences(source):
-        if all(is_held(key, tables) for key in keys_of(sentence.text)):
-            made.append(SHOWN)
-        elif sentence.is_row or sentence.paragraph in noted:
-            made.append(DROPPED)
-        else:
-            made.append(NOTED)
-            noted.add(sentence.paragraph)
-    return made
+    return [
+        SHOWN
+        if {*PICTURE.findall(sentence.text)} <= {*drawn}
+        and all(is_held(key, tables) for key in keys_of(sentence.text))
+        else DROPPED
+        for sentence in sentences(source)
+    ]
 
 
-def provenance(decided: Mapping[str, Sequence[str]], part: str | None, full_study: str) -> str:
-    r"""TeX definitions of ``\known``, ``\row``, ``\ifpart`` and of the two configurations' names.
+def provenance(
+    decided: Mapping[str, Sequence[str]], part: str | None, full_study: str, times: str = ""
+) -> str:
+    r"""TeX definitions of ``\known``, ``\row``, ``\ifpart``, ``\timesnote``, configurations' names.
 
     decided : name of a document (``\jobname`` in TeX) -> result of `decisions` for its source
     part, full_study : as in class `Facts`; ``\ifpart`` is false if ``part`` is None
+    times : what the documents say about unreliable times
     """
     lines = [
         r"\newif\ifpart",
         r"\parttrue" if part is not None else r"\partfalse",
         rf"\newcommand{{\configuration}}{{\texttt{{{escape(part or full_study)}}}}}",
         rf"\newcommand{{\fullstudy}}{{\texttt{{{escape(full_study)}}}}}",
+        rf"\newcommand{{\timesnote}}{{{times}}}",
         r"\makeatletter",
         r"\newcounter{known}",
         r"\let\known@shown\@firstofone",
-        rf"\newcommand{{\known@noted}}[1]{{\textcolor{{okgrey}}{{[{note(part, full_study)}]}}}}",
         r"\let\known@dropped\@gobble",
         r"\newcommand{\known@next}{\csname known@\jobname @\arabic{known}\endcsname}",
         r"\newcommand{\known}[1]{\stepcounter{known}\known@next{#1}}",
@@ -256,14 +257,6 @@ def provenance(decided: Mapping[str, Sequence[str]], part: str | None, full_stud
             name = f"known@{document}@{number}"
             lines.append(rf"\expandafter\let\csname {name}\endcsname\known@{decision}")
     return "\n".join([*lines, r"\makeatother"]) + "\n"
-
-
-def note(part: str | None, full_study: str) -> str:
-    """TeX text in place of sentences without numbers in this study; arguments: see `Facts`."""
-    if part is None:
-        return "Sentences are left out here whose numbers this study does not hold."
-    full = rf"\texttt{{{escape(full_study)}}}"
-    return f"The full study ({full}) holds the numbers of sentences that are left out here."
 
 
 def closing(source: str, start: int) -> int:

@@ -11,7 +11,7 @@ from pdrom.model.held_out import PLAYBACK
 from pdrom.view.text import escape
 from study.experiments.alternatives.experiment import ACCELERATED
 from study.figures.kit.declaration import declarations
-from study.paper.macros import format_number
+from study.paper.macros import HIDDEN, format_number
 from study.tables.alternatives import CASE, CURVE
 from study.tables.kit.results import MEDIAN, in_words, over_motions, trained
 
@@ -178,7 +178,9 @@ def break_even(breakeven: pd.DataFrame) -> Rows:
 
     def text(part: pd.DataFrame) -> str:
         crossed = part.breakeven_r.dropna()
-        return NONE if part.empty else "pays" if crossed.empty else _whole(crossed.max())
+        if part.empty or HIDDEN in breakeven.attrs:
+            return NONE
+        return "pays" if crossed.empty else _whole(crossed.max())
 
     keys = ["scene", "group", "vertices"]
     yield "llr" + "r" * len(_METHODS), [*keys, *map(escape, _METHODS)]
@@ -200,7 +202,7 @@ def speedups(speedups: pd.DataFrame) -> Rows:
             _name(row.scene),
             _name(f"{row.method}, {size}"),
             _known(row.full_ms),
-            escape(row.shown) + (" (loses)" if row.loses else ""),
+            _known(row.shown, escape) + (" (loses)" if row.loses == 1 else ""),
             *map(_known, (row.error_train, row.error_heldout, row.playback_error)),
             *map(_known, (row.training_s, row.reduction_s)),
             "never" if pd.isna(frames) else _whole(float(f"{frames:.1e}")),
@@ -218,8 +220,9 @@ def payoff(payoff: pd.DataFrame) -> Rows:
         unseen = f"{_known(row.error_heldout)} ({row.heldout})"
         errors = _known(row.error_train), unseen, _known(row.playback_error)
         gains = map(_known, (row.least_speedup, row.best_speedup, row.most_speedup))
-        counts = map(str, (row.scenes, row.accurate, row.pays, row.loses))
-        scored = [str(n) if row.heldout else NONE for n in (row.accurate_heldout, row.pays_heldout)]
+        counts = (_known(n, _whole) for n in (row.scenes, row.accurate, row.pays, row.loses))
+        judged = (row.accurate_heldout, row.pays_heldout)
+        scored = [_known(n, _whole) if row.heldout else NONE for n in judged]
         yield [_name(f"{row.method}{basis}"), *counts, *gains, *errors, *scored]
 
 
@@ -240,7 +243,7 @@ def pays(winners: pd.DataFrame) -> Rows:
             NONE
             if pd.isna(row.speedup)
             else in_words(row.speedup, row.speedup_low, row.speedup_high),
-            f"{row.reached} of {row.motions}",
+            f"{_known(row.reached, _whole)} of {row.motions}",
         ]
 
 
@@ -346,7 +349,9 @@ def stability(stability: pd.DataFrame) -> Rows:
     full_order = (stability.method == "full") & (stability.position_basis == FULL)
     table = stability[(stability.outcome != "not run") & ~full_order]
     last = ["energy (median)", "(max)", "$h$, stiffness: accurate", "energy (max)"]
-    yield "l" + r">{\raggedleft\arraybackslash}p{1.25cm}" * 8, ["method", *_OUTCOMES, *last]
+    last = last if (table.experiment == "sweep").any() else last[:2]
+    header = ["method", *_OUTCOMES, *last]
+    yield "l" + r">{\raggedleft\arraybackslash}p{1.25cm}" * (len(header) - 1), header
     for (basis, method), part in table.groupby(["position_basis", "method"], sort=False):
         runs, sweep = (_rows(part, experiment=kind) for kind in ("rerun", "sweep"))
         energies = runs.energy_ratio.median(), runs.energy_ratio.max(), sweep.energy_ratio.max()
@@ -354,7 +359,7 @@ def stability(stability: pd.DataFrame) -> Rows:
         accurate = f"{(sweep.outcome == 'accurate').sum()} of {len(sweep)}"
         counts = [str((runs.outcome == outcome).sum()) for outcome in _OUTCOMES]
         title = method if basis == FULL else f"{method}, {basis} subspace"
-        yield [_name(title), *counts, median, largest, accurate, of_sweep]
+        yield [_name(title), *counts, median, largest, accurate, of_sweep][: len(header)]
 
 
 TEX_TABLES: dict[str, Callable[..., Rows]] = {

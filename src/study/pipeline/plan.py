@@ -6,6 +6,7 @@ The workflow turns each `Job` (files, settings, fingerprint of its code) into on
 import logging
 import os
 import sys
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -20,13 +21,22 @@ from pdrom.view.text import require_typeset
 from study.article.build import article
 from study.artifact.artifact import Artifact, make, modules_in, recorded
 from study.artifact.logs import warnings_to
-from study.artifact.paths import LIVE_MODEL, TABLE, Place
+from study.artifact.paths import (
+    FIGURE,
+    FIGURE_PICTURE,
+    LIVE_MODEL,
+    PAPER_INPUT,
+    TABLE,
+    Place,
+)  # fmt: skip
 from study.artifact.reads import Labels, Paths, listed
 from study.experiments.kit.base import experiments
 from study.experiments.subspaces import LARGEST
-from study.figures.kit.declaration import declarations
+from study.figures.kit.declaration import Declaration, declarations
 from study.live.page import live_page
 from study.paper.build import paper, paper_inputs
+from study.paper.textables import TEX_TABLES
+from study.paper.textables import reads as tables_of
 from study.pipeline.fingerprint import digest, fingerprint
 from study.pipeline.folders import DEFAULT, Folders
 from study.pipeline.scenes import not_taken, require_scenes
@@ -34,6 +44,7 @@ from study.pipeline.study import Study, labels_of, part_of
 from study.pipeline.values import DERIVED, scaled_methods
 from study.tables import declared
 from study.tables.claims.rules import load_claims
+from study.tables.kit.declaration import Table
 
 log = logging.getLogger(__name__)
 
@@ -152,6 +163,8 @@ class Job:
 
 
 OF_STUDY = Folders()
+# Table -> settings of which an own study must list something, or else the table has no row.
+NEEDED = {"speedups": ("subspace_cases", "projection_cases", "large_scenes")}
 
 
 def load_plan(
@@ -184,7 +197,16 @@ class Plan:
         self.study, self.folders, self.results = study, folders, folders.results
         self._jobs: dict[tuple[str, ...], Job] = {}
         self.experiments = experiments()
-        self.tables = declared()
+
+    @cached_property
+    def tables(self) -> dict[str, Table]:
+        """Tables of the study by name."""
+        return {name: table for name, table in declared().items() if self.holds(table)}
+
+    @cached_property
+    def figures(self) -> dict[str, Declaration]:
+        """Figures of the study by name."""
+        return {name: figure for name, figure in declarations().items() if self.holds(figure)}
 
     def check(self) -> None:
         """Check the configuration and files it names, so that faults show before any job starts."""
@@ -208,14 +230,45 @@ class Plan:
         """Subfolder of logs -> jobs for the study as a whole (tables, figures, manuscript ...)."""
         return {
             "tables": [self.job(table) for table in self.tables.values()],
-            "figures": [self.job(figure) for figure in declarations().values()],
-            "article": [self.job(live_page), self.job(article)],
+            "figures": [self.job(figure) for figure in self.figures.values()],
+            "article": [self.job(page) for page in (live_page, article) if self.holds(page)],
             # the paths of the manuscript's PDFs depend on the configuration
             "paper": [
                 self.job(paper_inputs),
                 replace(self.job(paper), outputs=self.folders.documents),
             ],
         }
+
+    def holds(self, artifact: Artifact) -> bool:
+        """Return whether the study has data for ``artifact`` (table, figure, page).
+
+        All but a study with `Study.is_alone` have: their manuscript shows everything. It has none
+        for tables about claims, and where it has no file of the kind that is read first.
+        """
+        if not self.study.is_alone:
+            return True
+        first = next(iter(artifact.files.values()))
+        needed = NEEDED.get(artifact.name)
+        return (
+            "rules" not in artifact.reads
+            and bool(first.paths(self, {"figure": artifact.name}))
+            and (needed is None or any(self.value(key, {}) for key in needed))
+        )
+
+    @property
+    def absent(self) -> str:
+        """Text that counts what an own study leaves out; empty for other studies."""
+        kinds = Counter(name.partition("_")[0] for name in self.left_out)
+        told = f"left out: {kinds['picture']} figures, {kinds['table']} tables, the claims and the "
+        return f"{told}hard cases, about scenes of {DEFAULT}" if self.study.is_alone else ""
+
+    @cached_property
+    def left_out(self) -> set[str]:
+        """Outputs of manuscript and article about tables and figures that the study lacks."""
+        tables = declared().keys() - self.tables.keys()
+        tex = {name for name in TEX_TABLES if tables & {*tables_of(name)}}
+        pictures = {f"picture_{name}" for name in declarations().keys() - self.figures.keys()}
+        return {*tex, *pictures, *(f"table_{name}" for name in tables), *({"claims"} & tables)}
 
     @property
     def made(self) -> list[str]:
@@ -237,7 +290,7 @@ class Plan:
         own = {name: labels[name] for name in artifact.labels}
         key = (artifact.rule, *own.values())
         if key not in self._jobs:
-            known = {**own, "figure": artifact.name}  # figures find their options by this label
+            known = {**own, "figure": artifact.name}  # figures find what they draw by it
             settings = artifact.settings(self, known)
             inputs = {k: read.paths(self, known) for k, read in artifact.files.items()}
             content = artifact.edited(inputs)
@@ -245,7 +298,11 @@ class Plan:
                 artifact,
                 own,
                 inputs,
-                {k: place.at(self.results, **own) for k, place in artifact.writes.items()},
+                {
+                    name: place.at(self.results, **own)
+                    for name, place in artifact.writes.items()
+                    if artifact not in (paper_inputs, article) or name not in self.left_out
+                },
                 artifact.plain(settings),
                 digest(self.study.root, *content) if content else "",
                 fingerprint(artifact.function.__module__, *sorted(set(modules_in(settings)))),
@@ -269,21 +326,30 @@ class Plan:
     def files(self, place: Place, labels: Labels) -> list[str]:
         """All paths of the study of the kind ``place`` whose labels agree with ``labels``."""
         study = self.study.only(labels["scene"]) if "scene" in labels else self.study
+        if place in (TABLE, FIGURE, FIGURE_PICTURE):
+            names: Iterable[str] = self.tables if place == TABLE else self.figures
+            return [place.at(self.results, name=name) for name in names]
+        if place == PAPER_INPUT:
+            return list(self.job(paper_inputs).outputs.values())
         return [
             place.at(self.results, **held)
             for held in labels_of(study, place)
             if all(held[name] == labels[name] for name in held.keys() & labels.keys())
         ]
 
-    def table(self, name: str) -> str:
-        """Path of the table ``name``; ConfigurationError if there is no such table."""
+    def table(self, name: str) -> Paths:
+        """Path of table ``name``, [] if the study lacks it; ConfigurationError if none has it."""
         if name not in declared():
             raise ConfigurationError(f"'{name}': unknown{choices(name, declared())}")
-        return TABLE.at(self.results, name=name)
+        return TABLE.at(self.results, name=name) if self.holds(declared()[name]) else []
 
     def value(self, key: str, labels: Labels) -> Any:
-        """Value of setting ``key`` ("a.b"), configured or computed by a function in `DERIVED`."""
+        """Value of setting ``key`` ("a.b"), configured or computed (`DERIVED`; "made": rules)."""
         head, *parts = key.split(".")
+        if head == "made":
+            pages = [live_page.name] if self.holds(live_page) else []
+            found: list[Artifact] = [*self.tables.values(), *self.figures.values()]
+            return [*(made.rule for made in found), *pages]
         if head not in DERIVED:
             return self.study.value(key)
         return part_of(DERIVED[head](self.study, labels), parts, key)

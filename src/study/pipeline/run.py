@@ -120,7 +120,7 @@ class Run:
         handle(leave)
         try:
             if not self.command.targets:
-                write_text(contents(self.command, plan.results), CONTENTS.at(plan.results))
+                write_text(contents(self.command, plan), CONTENTS.at(plan.results))
             write_manifest(plan, self.command.configuration)
             for path, fault in faults(plan, self.command.targets).items():
                 raise StorageError(f"{path}: {fault} since this run; the next run makes it again")

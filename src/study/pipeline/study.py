@@ -30,11 +30,8 @@ from study.experiments.reruns import Stability, Sweep
 from study.experiments.sensitivity import Sensitivity
 from study.experiments.subspaces import Live, Online, Subspace
 from study.experiments.timing import Scaling, Timing
-from study.figures.kit.declaration import Options, declarations, load_choices
-from study.paper.build import FILES
 from study.pipeline import scenes as scene_kit
 from study.pipeline.folders import DEFAULT
-from study.tables import declared
 
 
 class StudySettings(ConfigModel):
@@ -95,6 +92,13 @@ class Study:
         Raises ConfigurationError (with file, key, value, allowed values) if a setting is wrong.
         """
         self.root, self.configuration = root, configuration
+        file = root / "config" / "figures.yaml"
+        if "figures" in config or file.exists():
+            old = f"{source}: the key 'figures'" if "figures" in config else str(file)
+            raise ConfigurationError(
+                f"{old}: what figures draw now stands in their modules below src/study/figures; "
+                "delete this"
+            )
         self.settings = settings = validate(StudySettings, config, source)
         self.titles: dict[str, str] = {}  # name of a scene -> title, for tables and figures
         self.sizes: dict[str, tuple[int, int]] = {}  # scene -> numbers of vertices and elements
@@ -102,14 +106,11 @@ class Study:
         # changes made to every scene read from config/scenes, in this order
         self._changes = (settings.replicate, settings.coarsen)
         self.scenes = {name: self.scene(name) for name in settings.scenes}
-        self.online = {name: self.scene(name) for name in settings.online.scenes}
+        # an own study runs no large scenes of the full study
+        others = {*self._full.online.scenes} if self.is_alone else ()
+        online = [name for name in settings.online.scenes if name not in others]
+        self.online = {name: self.scene(name) for name in online}
         self.methods: dict[str, MethodSpec] = self.named_methods(settings.methods, "methods")
-
-    @cached_property
-    def figures(self) -> dict[str, Options]:
-        """Name of each figure -> its options, from config/figures.yaml."""
-        known = {"methods": self.every_method, "scenes": scene_kit.scene_names(self.root)}
-        return load_choices(self.root / "config" / "figures.yaml", known)
 
     def value(self, key: str) -> Any:
         """Value of a dotted ``key`` of the configuration; ConfigurationError if there is none."""
@@ -152,6 +153,11 @@ class Study:
     def is_own(self) -> bool:
         """Whether the study has no scene in common with config/default.yaml."""
         return not {*self.settings.scenes} & {*self._full.scenes}
+
+    @property
+    def is_alone(self) -> bool:
+        """Whether an own study leaves out what concerns others' scenes: it decides no claims."""
+        return self.is_own and not self.settings.claim_sets
 
     @property
     def apart(self) -> str:
@@ -223,8 +229,8 @@ def labels_of(study: Study, place: paths.Place) -> list[Labels]:
     names = place.labels
     scenes = SCENES[place](study) if place in SCENES else study.scenes
     known: Iterable[Labels] = [{}]
-    if place in NAMES:
-        known = ({"name": name} for name in NAMES[place]())
+    if place == paths.HARD_CASES and study.is_alone:
+        known = ()
     elif names == ["mesh"]:
         known = ({"mesh": mesh} for mesh in study.meshes)
     elif "group" in names:
@@ -260,13 +266,6 @@ def _with_subspaces(study: Study) -> list[str]:
     return _held(study, section.scenes or takes)
 
 
-# Kind of file that exists once per table, figure or TeX input -> function that returns their names.
-NAMES: dict[paths.Place, Callable[[], Iterable[str]]] = {
-    paths.TABLE: declared,
-    paths.FIGURE: declarations,
-    paths.FIGURE_PICTURE: declarations,
-    paths.PAPER_INPUT: lambda: FILES,
-}
 # Kinds of files with results of reduced models whose vertex positions lie in a subspace.
 MODELS = (
     paths.SUBSPACES, paths.SUBSPACES_TRAIN, paths.SUBSPACES_HELDOUT, paths.SUBSPACES_SECONDS,

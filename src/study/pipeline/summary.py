@@ -1,7 +1,7 @@
 """Texts about a finished run: the last lines it prints, and the overview results/contents.md.
 
 The overview lists every claim, figure and table, and the manuscript, with the command line that
-makes it. Figure captions and table columns follow.
+makes it. The columns of the tables follow.
 """
 
 import shlex
@@ -16,13 +16,12 @@ from snakemake.utils import available_cpu_count
 from pdrom.core.store import Condition, check_file, read_table
 from study.artifact import paths
 from study.figures.kit.declaration import declarations
-from study.paper.build import figures_page
 from study.pipeline.commandline import CommandLine
 from study.pipeline.folders import Folders
 from study.pipeline.plan import Plan
 from study.pipeline.targets import PREPRINT
-from study.tables import declared
 from study.tables.claims.rules import load_claims
+from study.tables.effects_cost import unreliable
 from study.tables.kit.declaration import Table
 
 TABLES_HEAD = """# Tables
@@ -63,7 +62,7 @@ def summary(command: CommandLine, plan: Plan) -> str:
     if command.targets:
         lines.append(f"made: {', '.join(command.targets)}")
     else:
-        if verdicts := verdicts_in(folders.results):
+        if "claims" in plan.tables and (verdicts := verdicts_in(folders.results)):
             words = f"as published / beyond; {apart}" if apart else "as published / beyond"
             said = [f"{claim} {' / '.join(pair)}" for claim, pair in verdicts.items()]
             lines.append(f"verdicts ({words}): {', '.join(said)}")
@@ -71,9 +70,16 @@ def summary(command: CommandLine, plan: Plan) -> str:
         lines.append(f"as pages: {paths.ARTICLE.at(folders.results, name='index.html')}")
         for kind in ("figures", "tables"):
             lines.append(f"{kind}: {len(plan.fixed[kind])} in {folders.results}/{kind}")
+        if absent := plan.absent:
+            lines.append(absent)
         lines.append("report: ./reproduce --report report.html")
     cores, used = available_cpu_count(), processor_seconds()
     lines.append(f"time: {minutes(wall)} on {cores} cores, {minutes(used)} of processor time")
+    times = Path(paths.TABLE.at(folders.results, name="frame_times"))
+    if times.is_file() and check_file(times) is Condition.INTACT and unreliable(read_table(times)):
+        lines.append(
+            "times: unreliable, other programs used the processor; none is in the manuscript"
+        )
     return "\n".join(f"pdrom: {line}" for line in lines) + "\n"
 
 
@@ -118,28 +124,28 @@ def _section(table: Table) -> str:
     return "\n".join(lines) + "\n"
 
 
-def entries() -> Iterator[tuple[str, str, tuple[str, ...]]]:
+def entries(plan: Plan) -> Iterator[tuple[str, str, tuple[str, ...]]]:
     """Yield kind, name and words for ``./reproduce`` of claims, figures, tables, the manuscript."""
-    for name in load_claims(Path("config/claims.yaml")):
+    for name in load_claims(Path("config/claims.yaml")) if "claims" in plan.tables else ():
         yield "claim", name, ("claims",)
-    for name, figure in declarations().items():
+    for name, figure in plan.figures.items():
         yield "figure", name, ("figure", f"{PREPRINT}{figure.number}" if figure.number else name)
-    for name in declared():
+    for name in plan.tables:
         # a name that a table and a figure share would request both: request this table by its path
         path = paths.TABLE.at(paths.RESULTS, name=name)
         yield "table", name, (path if name in declarations() else name,)
     yield "manuscript", Folders().manuscript, ()
 
 
-def contents(command: CommandLine, results: str) -> str:
-    """Return the text of results/contents.md after the run of ``command`` made all ``results``."""
-    verdicts, lines = verdicts_in(results), []
-    for kind, name, words in entries():
+def contents(command: CommandLine, plan: Plan) -> str:
+    """Return the text of results/contents.md after the run of ``command`` made all results."""
+    verdicts, lines = verdicts_in(plan.results), []
+    for kind, name, words in entries(plan):
         line = shlex.join(["./reproduce", *words, *command.configuration])
         judged = verdicts.get(name, ("", "")) if kind == "claim" else ("", "")
         lines.append(f"| {' | '.join((kind, name, f'`{line}`', *judged))} |\n")
     head = HEAD.format(configuration=configuration(command)) + "".join(lines)
-    tables = declared().values()
+    tables = plan.tables.values()
     names = "\n".join(f"- [{table.name}](#{table.name}): {table.title}" for table in tables)
     described = [TABLES_HEAD, f"{names}\n", *map(_section, tables)]
-    return "\n".join([head, figures_page(Path()), *described])
+    return "\n".join([head, *described])

@@ -96,7 +96,9 @@ def _allowed(study: Study, labels: Mapping[str, str]) -> Iterator[tuple[str, Col
 
 def _unknown(plan: Plan, target: str, rules: Collection[str]) -> str:
     """Return why ``target`` is unknown, for a message; suggestions may be names of ``rules``."""
-    known = plan.own_files if "/" in target else [*declarations(), *plan.tables, *rules]
+    if Path(target).stem in {**declared(), **declarations()}.keys() - {*plan.figures, *plan.tables}:
+        return "it is about scenes that this configuration does not have"
+    known = plan.own_files if "/" in target else [*plan.figures, *plan.tables, *rules]
     return (
         f"nothing makes it{suggestion(target, known)}; targets are names of figures and tables, "
         f"and files, as {paths.FULL_ORDER.at(plan.results, scene='SCENE', run='train')}"

@@ -5,7 +5,7 @@ parameter for a section with a base class of the section's class, the job depend
 settings that this base class declares.
 
 Functions in `DERIVED` get ``labels``, a map of "scene", "group" ... to values for the job. For a
-figure it maps "figure" to the figure's name, which selects the options of the figure.
+figure it maps "figure" to the figure's name, which selects what it draws.
 """
 
 from collections.abc import Callable, Mapping
@@ -26,7 +26,7 @@ from study.experiments.kit.base import Horizon, OfScene
 from study.experiments.repetitions import Cell, Repeated
 from study.experiments.reruns import Stability
 from study.experiments.subspaces import JOINT, JointRows
-from study.figures.kit.declaration import Experiment, Options, Reduction, declarations
+from study.figures.kit.declaration import Experiment, Reduction, declarations
 from study.paper.build import PAGES, Facts
 from study.paper.source import source_files
 from study.pipeline.folders import DEFAULT
@@ -120,64 +120,42 @@ def _repeated(study: Study, labels: Labels) -> tuple[Repeated, ...]:
     )
 
 
-class Run(Experiment):
-    """A reduced group of a scene together with one reduction method."""
-
-    method: str
-
-    @property
-    def labels(self) -> dict[str, str]:
-        """Mapping of "scene", "group", "method" ... to their values in the paths of files."""
-        return {**super().labels, "method": self.method}
-
-
-def _options(study: Study, labels: Labels) -> Options:
-    """Options of a figure without the scenes that are not in the study.
-
-    If none of the listed scenes (or methods) is in the study, the list becomes empty: then the
-    figure shows all scenes (or methods) of the study.
-    """
-    chosen = study.figures[labels["figure"]]
-    update: dict[str, tuple[str, ...]] = {}
-    if {*chosen.names("methods")}.isdisjoint(study.methods) and chosen.names("methods"):
-        update["methods"] = ()
-    if scenes := chosen.names("scenes"):
-        update["scenes"] = tuple(scene for scene in scenes if scene in study.scenes)
-    return chosen.model_copy(update=update)
-
-
 def _experiments(study: Study, labels: Labels) -> tuple[Experiment, ...]:
-    """Reduced groups that the options of a figure select, in the configured order."""
-    chosen = _options(study, labels)
-    found = []
-    for scene in chosen.names("scenes") or tuple(study.scenes):
-        config = study.scenes[scene]
-        reduced = tuple(config.reduce)
-        found += [
-            Experiment(
-                scene=scene,
-                group=group,
-                mesh=config.mesh.identifier,
-                effects=config.effects,
-                only=len(reduced) == 1,
-            )
-            for group in reduced
-        ]
-    return tuple(found)
+    """Reduced groups that a figure draws: of the scenes it names, or else of those it is about."""
+    figure = declarations()[labels["figure"]]
+    about = {
+        name: config
+        for name, config in study.scenes.items()
+        if len(config.reduce) > figure.several
+        and not (figure.groups and {*figure.groups}.isdisjoint(config.reduce))
+    }
+    named = {name: study.scenes[name] for name in figure.scenes if name in study.scenes}
+    return tuple(
+        Experiment(
+            scene=scene,
+            group=group,
+            mesh=config.mesh.identifier,
+            effects=config.effects,
+            only=len(config.reduce) == 1,
+        )
+        for scene, config in (named or about).items()
+        for group in config.reduce
+    )
 
 
 def _reductions(study: Study, labels: Labels) -> dict[str, Reduction]:
-    """Name -> method, for those that the figure ``labels["figure"]`` shows, in configured order."""
-    named = _options(study, labels).names("methods") or tuple(study.methods)
-    held = {name: study.methods[name] for name in named if name in study.methods}
-    return {name: Reduction(title=spec.title, rows=spec.rows) for name, spec in held.items()}
+    """Name -> method, for those that a figure names, or else all of the study."""
+    named = declarations()[labels["figure"]].methods
+    held = [name for name in named if name in study.methods] or study.methods
+    specs = {name: study.methods[name] for name in held}
+    return {name: Reduction(title=spec.title, rows=spec.rows) for name, spec in specs.items()}
 
 
-def _runs(study: Study, labels: Labels) -> tuple[Run, ...]:
+def _runs(study: Study, labels: Labels) -> tuple[Experiment, ...]:
     """All combinations of the reduced groups and the methods that a figure shows."""
     methods = _reductions(study, labels)
     return tuple(
-        Run(**experiment.model_dump(), method=method)
+        experiment.model_copy(update={"method": method})
         for experiment in _experiments(study, labels)
         for method in methods
     )
@@ -245,6 +223,8 @@ def _scene(study: Study, name: str) -> dict[str, Any]:
 
 
 DERIVED: dict[str, Callable[[Study, Labels], Any]] = {
+    # recorded rows are about scenes of the full study
+    "recorded": lambda study, _: study.settings.recorded and not study.is_alone,
     "scene": lambda study, labels: study.scene(labels["scene"]),
     "title": lambda study, labels: study.titles[study.scene(labels["scene"]).name],
     "mesh": lambda study, labels: study.mesh(labels["mesh"]),
@@ -281,7 +261,6 @@ DERIVED: dict[str, Callable[[Study, Labels], Any]] = {
     "projection_methods": lambda study, labels: {
         case.method: study.methods[case.method] for case in _projection_cases(study, labels)
     },
-    "options": _options,
     "experiments": _experiments,
     "reductions": _reductions,
     "runs": _runs,

@@ -204,6 +204,7 @@ _ERROR = "relative_error_within_horizon"
 # As a control, the full-order run is timed twice. Speed-ups are not shown if the two times differ
 # by more than this factor, which was fixed on 2026-11-22, before any control was measured.
 CONFIRMED = 1.5
+ENOUGH = 0.9  # of a processor, or else other programs have disturbed the times
 UNCONFIRMED = "not confirmed by its control"
 _ERRORS = {
     "error_train": "relative_error_train", results.MEDIAN: "relative_error_heldout",
@@ -222,6 +223,7 @@ _TIMES = ["ms_per_frame", "vertices_ms", "speedup", "speedup_low", "speedup_high
         timed(number("control_ratio", "time of the same run, timed once more, over this one")),
         *map(timed, interval("control_low control_high")),
         timed(flag("control_agrees", "the quantiles enclose one")),
+        timed(number("processor_share", "processor time over time, while the process measured")),
         timed(number("twin_ratio", "time of the scene's twin, the same frames, over this one")),
         *map(timed, interval("twin_low twin_high")),
     ),
@@ -251,6 +253,7 @@ def frame_times(parts: list[File]) -> pd.DataFrame:
             twin = full[f"{scene}{results.TWIN}"] / full[scene]
             values["twin_ratio", "twin_low", "twin_high"] = twin
         row = {"scene": scene, "vertices": vertices[scene], "processes": len(full)}
+        row["processor_share"] = float(rows.processor_share[rows.scene == scene].median())
         for names, measured in values.items():
             row |= zip(names, results.median_interval(measured.to_numpy(float)), strict=True)
         low, high = row["control_low"], row["control_high"]
@@ -319,8 +322,7 @@ def timed_reductions(rows: pd.DataFrame, times: pd.DataFrame) -> Iterator[dict]:
     times : table frame_times
     """
     full = rows[rows.role == FULL].set_index(["scene", "process"]).ms_per_frame
-    control = times.set_index("scene")
-    trusted = (control.control_low >= 1.0 / CONFIRMED) & (control.control_high <= CONFIRMED)
+    trusted = confirmed(times.set_index("scene"))
     reduced = rows[rows.role == REDUCED]
     for labels, own in reduced.groupby(_LABELS, sort=False, dropna=False):
         own = own.set_index(["scene", "process"])
@@ -342,6 +344,21 @@ def timed_reductions(rows: pd.DataFrame, times: pd.DataFrame) -> Iterator[dict]:
             "shown": results.in_words(ratio, low, high) if trusted[scene] else UNCONFIRMED,
             "loses": high < 1.0,
         }
+
+
+def confirmed(times: pd.DataFrame) -> pd.Series:
+    """Whether the control of each scene in table frame_times (``times``) confirms its times."""
+    return (times.control_low >= 1.0 / CONFIRMED) & (times.control_high <= CONFIRMED)
+
+
+def unreliable(times: pd.DataFrame) -> bool:
+    """Return whether table frame_times (``times``) says that no time of the run can be trusted.
+
+    That is so if processes that measured had less than `ENOUGH` of a processor, or if the controls
+    of most scenes do not confirm their times.
+    """
+    enough = times.processor_share.median() >= ENOUGH and confirmed(times).mean() >= 0.5
+    return len(times) > 0 and not enough
 
 
 def _errors(reruns: pd.DataFrame, keys: list[str]) -> pd.DataFrame:

@@ -243,7 +243,8 @@ def gain_interventions(
     """
     runs = judged_runs(reruns, reconstruction)
     rows = []
-    for name, before, after, pairs in _steps(runs, _square(ladder, runs)):
+    square = _square(ladder, runs) if len(ladder) else runs[:0].assign(rows_per_element=1)
+    for name, before, after, pairs in _steps(runs, square):
         volumes = pairs.group.isin(VOLUMES)
         for mesh, own in zip(MESHES, (pairs, pairs[~volumes], pairs[volumes]), strict=True):
             if len(own):

@@ -174,8 +174,9 @@ def in_processes(
 ) -> list[dict[str, Any]]:
     """Time all variants in several new processes; return a row per variant and process.
 
-    The processes run one after the other, each with the variants in a random order of its own. They
-    get the pickled functions ``cases``, which make the variants. Raises PdromError if a process
+    The processes run one after the other, each with the variants in a random order of its own.
+    Column ``processor_share`` is a process's processor time over the time that has passed. They get
+    the pickled functions ``cases``, which make the variants. Raises PdromError if a process
     fails; the message ends with the last line of its output.
     """
     rows: list[dict[str, Any]] = []
@@ -204,8 +205,11 @@ def _in_this_process(given: str, answer: str, process: str) -> None:
         cases, asked = pickle.loads(Path(given).read_bytes())
         variants = [variant for case in cases for variant in case()]
         order = np.random.default_rng(int(process)).permutation(len(variants))
+        begin, used = perf_counter(), process_time()
         measured = measure([variants[i] for i in order], asked.warmup, asked.repeats)
-    rows = [{**measured[i], "process": int(process)} for i in np.argsort(order)]
+        share = (process_time() - used) / (perf_counter() - begin)
+    told = {"process": int(process), "processor_share": share}
+    rows = [{**measured[i], **told} for i in np.argsort(order)]
     Path(answer).write_bytes(pickle.dumps(rows))
 
 

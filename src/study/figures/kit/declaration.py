@@ -1,27 +1,30 @@
-"""Declaration of a figure: title, caption, inputs, options, and the function that draws it.
+"""Declaration of a figure: title, caption, inputs, scenes, and the function that draws it.
 
 A figure is declared by a decorator on its drawing function in a module of `study.figures`, whose
 docstring is the caption::
 
-    @figure(title="Rest shapes", reads={"meshes": EachOf(MESH, "experiments")})
-    def rest_shapes(options: Scenes, drawn: Drawn, meshes: list[File]) -> Figure:
+    @figure(
+        title="Rest shapes",
+        reads={"meshes": EachOf(MESH, "experiments")},
+        scenes="strain_oop bar_release",
+    )
+    def rest_shapes(drawn: Drawn, meshes: list[File]) -> Figure:
         'Vertices of each mesh.'
 """
 
 import logging
 import os
-from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any
 
 import pandas as pd
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict
 
-from pdrom.core.errors import ConfigurationError, choices
+from pdrom.core.errors import ConfigurationError
 from pdrom.core.store import atomic_path
-from pdrom.core.yamlfile import ConfigModel, read_yaml, validate
 from pdrom.model.effects import EFFECTS
 from pdrom.model.effects.base import EffectConfigs
 from pdrom.view import style
@@ -31,15 +34,10 @@ from pdrom.view.text import plain_words
 from study.artifact.artifact import Artifact, declare, declared_in
 from study.artifact.markup import filled, to_plain
 from study.artifact.paths import FIGURE, FIGURE_PICTURE, File
-from study.artifact.reads import Read, Setting, Settings
+from study.artifact.reads import Read, Settings, TableOf
+from study.tables.effects_cost import unreliable
 
-Names = tuple[str, ...]
-# Basis sizes; "full" stands for the largest one, the numerical rank of the snapshots.
-Ranks = tuple[Annotated[int, Field(ge=0)] | Literal["full"], ...]
-Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
-Instants = Annotated[tuple[Fraction, ...], Field(min_length=1)]  # fractions of a run's duration
-Columns = Annotated[int, Field(ge=1, le=6)]  # number of panels in a row
-Count = Annotated[int, Field(ge=1, le=12)]  # number of modes, or of selection steps, to draw
+MESHES = "disc_strain ball_shell torus_release starfish_twist"  # scenes of config/extended.yaml
 AZIMUTH = 30.0  # azimuth of every camera, degrees
 
 
@@ -47,72 +45,13 @@ class NothingToDraw(Exception):
     """Raised if the configuration has no data for a figure; the message names what is missing."""
 
 
-class Options(ConfigModel):
-    """Base class of the options of a figure in config/figures.yaml; subclasses add keys.
-
-    Listed names that the configuration lacks are not drawn. An empty list, or a list of which the
-    configuration has no name, selects everything in the configuration.
-    """
-
-    def names(self, key: str) -> Names:
-        """Names listed under ``key`` (scenes, methods); empty if the figure has no such option."""
-        return getattr(self, key, ())
-
-    def words(self) -> str:
-        """Text that names the chosen scenes and methods."""
-        scenes = ", ".join(self.names("scenes")) or "any scene"
-        methods = ", ".join(self.names("methods"))
-        return f"{scenes} with {methods}" if methods else scenes
-
-    def rows(self, table: pd.DataFrame) -> pd.DataFrame:
-        """Rows of ``table`` for the chosen scenes and methods; an empty choice selects all."""
-        for key, column in (("scenes", "scene"), ("methods", "method")):
-            if names := self.names(key):
-                table = table[table[column].isin(names)]
-        return table
-
-
-class Scenes(Options):
-    """Options of a figure: scenes, in the order in which they are drawn."""
-
-    scenes: Names = ()
-
-
-class Methods(Scenes):
-    """Options of a figure: scenes and reduction methods, in the order in which they are drawn."""
-
-    methods: Names = ()
-
-
-class View(Methods):
-    """Options of a figure: scenes, methods, elevation of the camera (degrees, gravity is down)."""
-
-    elevation: Annotated[float, Field(ge=-90.0, le=90.0)] = 20.0
-
-    def camera(self, experiment: "Experiment") -> Camera:
-        """Return the camera for pictures of the scene of ``experiment``."""
-        return Camera(AZIMUTH, self.elevation, tuple(up_of(experiment.effects).tolist()))
-
-
-class Beside(Scenes):
-    """Options of a figure: scenes, number of panels in a row, experiments of the published code.
-
-    ``published`` maps a scene to a similar experiment of the preprint authors' own program.
-    """
-
-    columns: Columns = 3
-    published: dict[str, str] = Field(default_factory=dict)
-
-
-class ReducedRuns(View):
-    """Options of a figure: basis sizes of reduced runs; instants to draw (fractions of the run)."""
-
-    ranks: Ranks = ()
-    frames: Instants = (0.1, 0.5, 0.9)
-
-
 class _Plain(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+def camera_of(experiment: "Experiment", elevation: float = 20.0) -> Camera:
+    """Return the camera for pictures of the scene of ``experiment`` (elevation in degrees)."""
+    return Camera(AZIMUTH, elevation, tuple(up_of(experiment.effects).tolist()))
 
 
 class Experiment(_Plain):
@@ -120,6 +59,7 @@ class Experiment(_Plain):
 
     mesh, effects : identifier of the mesh of the scene, and all effects of the scene
     only : True if the scene reduces no other group
+    method : reduction of the group, in the paths of its files; empty for all
     """
 
     scene: str
@@ -127,6 +67,7 @@ class Experiment(_Plain):
     mesh: str
     effects: EffectConfigs
     only: bool
+    method: str = ""
 
     @property
     def modules(self) -> tuple[str, ...]:
@@ -135,8 +76,9 @@ class Experiment(_Plain):
 
     @property
     def labels(self) -> dict[str, str]:
-        """Mapping of "scene", "group" and "mesh" to their values in the paths of files."""
-        return {"scene": self.scene, "group": self.group, "mesh": self.mesh}
+        """Mapping of "scene", "group" ... to their values in the paths of files."""
+        labels = {"scene": self.scene, "group": self.group, "mesh": self.mesh}
+        return labels | ({"method": self.method} if self.method else {})
 
     @property
     def title(self) -> str:
@@ -166,7 +108,7 @@ class Reduction(_Plain):
 
 
 class Drawn(_Plain):
-    """Experiments and methods that the options of a figure select, in the order of drawing.
+    """Experiments and methods that a figure draws, in the order of drawing.
 
     experiments : each is a scene with one of its reduced groups
     reductions : name of a method -> its description
@@ -228,6 +170,8 @@ log = logging.getLogger(__name__)
 PACKAGE = "study.figures"
 PNG_DPI = 200
 RASTER_DPI = 300  # dots per inch of the rasterised parts of a PDF
+TIMES = "times_of_run"  # key of the input of a timed figure that says whether times are reliable
+DISTURBED = "these times are unreliable: other programs used the processor"
 ELSEWHERE = "the full study (config/default.yaml) draws it"
 
 
@@ -235,24 +179,25 @@ ELSEWHERE = "the full study (config/default.yaml) draws it"
 class Declaration(Artifact):
     """Figure of the study, named after the function that draws it.
 
-    The function gets its inputs and ``options``; the type of these declares the keys of the figure
-    in config/figures.yaml, and their defaults. The function raises `NothingToDraw` if the
-    configuration has no data for the figure, and StorageError for a damaged file.
+    The function raises `NothingToDraw` if the configuration has no data for the figure, and
+    StorageError for a damaged file.
 
     title, caption : text in the mark-up of `study.artifact.markup`; ``{key}`` in a caption stands
         for the value of a setting
     number : number of the figure of the preprint that this one reproduces; None if there is none
+    scenes, methods : names in the order of drawing, as far as the study has them; all methods if it
+        has none of these
+    groups, several : if the study has none of ``scenes``, its scenes that reduce one of ``groups``
+        (any group if empty), or several groups, are drawn
     """
 
     caption: str = ""
     number: int | None = None
+    scenes: Sequence[str] = ()
+    methods: Sequence[str] = ()
+    groups: Sequence[str] = ()
+    several: bool = False
     rule_pattern = "figure_{}"
-
-    @property
-    def options(self) -> type[Options]:
-        """Type of the options, as annotated in the function that draws the figure."""
-        chosen: type[Options] = self.function.__annotations__["options"]
-        return chosen
 
     def words(self, value: Callable[[str], Any]) -> tuple[str, str]:
         """Title and caption in mark-up; ``value(key)`` is the number put in place of ``{key}``.
@@ -270,22 +215,36 @@ class Declaration(Artifact):
 
     def draw(self, **read: Any) -> Figure:
         """Draw the figure, or a note if it has no data; StorageError: file missing or damaged."""
+        times = read.pop(TIMES, None)
         with style.look():
             try:
-                return self.function(**read)
+                drawn = self.function(**read)
+                if times is not None and unreliable(times):
+                    drawn.suptitle(DISTURBED, fontsize=8, color=style.FAILED)
+                return drawn
             except NothingToDraw as nothing:
                 log.info("figure %s: %s", self.name, nothing)
                 return style.note(f"no data in this configuration: {nothing}\n{ELSEWHERE}")
 
 
 def figure(
-    *, title: str, reads: Mapping[str, Read], number: int | None = None, more: str = ""
+    *,
+    title: str,
+    reads: Mapping[str, Read],
+    number: int | None = None,
+    more: str = "",
+    scenes: str = "",
+    methods: str = "",
+    groups: str = "",
+    several: bool = False,
+    timed: bool = False,
 ) -> Callable[[Callable[..., Figure]], Declaration]:
     """Return a decorator that declares a function as the drawing of a figure.
 
-    The function gets ``options`` and the inputs ``reads``. If it has a parameter ``drawn``, it gets
-    the scenes, groups and methods that the options select. The caption is the docstring of the
-    function followed by ``more``; line breaks count as blanks.
+    The function gets the inputs ``reads``. If it has a parameter ``drawn``, it gets what the figure
+    draws of the study, by the names (separated by blanks) in ``scenes``, ``methods``, ``groups``.
+    The caption is the docstring of the function followed by ``more``; line breaks count as blanks.
+    A ``timed`` figure draws times, and says so if they are unreliable.
 
     Raises TypeError if the docstring is missing, or if the parameters do not match ``reads``.
     """
@@ -294,12 +253,15 @@ def figure(
         name = function.__name__
         writes = {"pdf": FIGURE.where(name=name), "png": FIGURE_PICTURE.where(name=name)}
         drawn = {"drawn": Settings(Drawn)} if "drawn" in function.__annotations__ else {}
-        given = {"options": Setting("options"), **drawn, **reads}
         if not function.__doc__:
             raise TypeError(f"figure {name}: the function has no docstring, which is its caption")
         words = " ".join([*function.__doc__.split(), *more.split()])
-        made = Declaration(name, title, given, writes, function, caption=words, number=number)
-        return declare(made)
+        times = {TIMES: TableOf("frame_times")} if timed else {}
+        made = Declaration(
+            name, title, {**drawn, **reads}, writes, function, caption=words, number=number,
+            scenes=scenes.split(), methods=methods.split(), groups=groups.split(), several=several,
+        )  # fmt: skip
+        return replace(declare(made), reads={**made.reads, **times})
 
     return decorate
 
@@ -336,33 +298,3 @@ def declarations() -> dict[str, Declaration]:
             raise ConfigurationError(f"{PACKAGE}: two figures have the number {number}")
     last = len(found) + max(numbers, default=0)
     return dict(sorted(found.items(), key=lambda item: (item[1].number or last, item[0])))
-
-
-def load_choices(path: Path, known: Mapping[str, Collection[str]]) -> dict[str, Options]:
-    """Read options of every figure from the file ``path``; those not in it have their defaults.
-
-    Raises ConfigurationError if a figure or key is unknown, a value is outside its range, or a name
-    is not in ``known``.
-
-    known : key of options (scenes, methods) -> names that are allowed in it
-    """
-    content = read_yaml(path)
-    content = {} if content is None else content
-    if not isinstance(content, dict):
-        raise ConfigurationError(f"{path}: a mapping of figure names is required")
-    figures = declarations()
-    for name in content:
-        if name not in figures:
-            raise ConfigurationError(f"{path}: unknown figure '{name}'{choices(name, figures)}")
-    chosen = {
-        name: validate(figure.options, content.get(name, {}), f"{path}: {name}")
-        for name, figure in figures.items()
-    }
-    for name, options in chosen.items():
-        for key, allowed in known.items():
-            asked = options.names(key)
-            for each in (*asked, *options.names("published")) if key == "scenes" else asked:
-                if each not in allowed:
-                    place = f"{path}: {name}.{key} = '{each}'"
-                    raise ConfigurationError(f"{place}: unknown{choices(each, allowed)}")
-    return chosen

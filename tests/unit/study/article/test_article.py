@@ -42,6 +42,7 @@ SPECIAL = r"""
 """
 MAIN = r"""
 \begin{document}
+\timesnote
 \begin{abstract}\ifpart Of \configuration{}.\else Full.\fi\end{abstract}
 % \section{Not there}
 \section{First}\label{sec:first}
@@ -95,10 +96,10 @@ TABLES = {
     "claims_tests": frame(
         "part claim what satisfied of least median most verdict",
         *((p, "C1", "all rows", 3, 4, 0.5, 0.75, 1.0, "holds") for p in ("published", "beyond")),
-    ),
+    ).assign(margin=1.5),
     "local_share": frame("implementation local_share", ("numpy", 0.75)),
     "ladder": frame("gain", (2.0,)),
-    "claims": frame("claim verdict verdict_beyond", ("C1", "holds", "depends")),
+    "claims": frame("claim verdict verdict_beyond measured", ("C1", "holds", "depends", "0.25 x")),
 }  # fmt: skip
 
 
@@ -137,6 +138,7 @@ def write_study(folder: Path) -> dict[str, object]:
         "tables": named(folder / "tables", [f"{name}.csv" for name in TABLES]),
         "machine": File(str(folder / "machine.json"), {}),
         "facts": facts,
+        "made": ["claims_table"],
     }
     inputs = {Path(name).stem: folder / "inputs" / name for name in INPUTS}
     build.write_inputs(**given, outputs=inputs)
@@ -160,6 +162,24 @@ def test_a_cell_of_another_type_is_named_before_the_manuscript_is_made(tmp_path,
     monkeypatch.setitem(TABLES, "claims_tests", infinite)
     with pytest.raises(StorageError, match=r"'satisfied' is no integer \(row 1: 'inf'\)"):
         write_study(tmp_path)
+
+
+def test_unreliable_times_are_not_printed_and_the_manuscript_says_so(tmp_path, monkeypatch):
+    columns = "control_low control_high processor_share"
+    for share in (1.0, 0.5):
+        folder = tmp_path / f"{share}"
+        monkeypatch.setitem(TABLES, "frame_times", frame(columns, (1.0, 1.0, share)))
+        pages = write_pages(write_study(folder), folder / "out")
+        texts = [pages / "index.html", folder / "inputs" / "macros.tex"]
+        index, macros = (text.read_text("utf-8") for text in texts)
+        packed = [(pages / "tables" / f"{name}.html").read_text() for name in ("payoff", "claims")]
+        data = [re.search(r'id="data">([^<]+)', page)[1] for page in packed]
+        data = [gzip.decompress(base64.b64decode(text)).decode() for text in data]
+        reliable = share == 1.0
+        assert ("times of this run are unreliable" in index) is not reliable
+        assert ("times of this run are unreliable" in macros) is not reliable
+        # the error of the fastest run depends on times
+        assert all(("0.25" in text) is reliable for text in (index, macros, *data))
 
 
 def named(folder: Path, names: Iterable[str]) -> list[File]:
@@ -427,26 +447,6 @@ def test_a_link_opens_its_rows(small):
                 for key, found in zip(keys, rows, strict=True):
                     assert set(numbers[key]["rows"]) <= set(found), key
                     assert numbers[key]["take"] or len(found) <= 1, key
-
-
-@pytest.mark.slow
-def test_a_figure_shows_the_scenes_of_another(small):
-    write_verified({"figure spring_runs": "reproduced"}, small)
-    with page_at((small / "supplement.html").as_uri(), 900, 700) as page:
-        figure = page.locator("figure", has_text="Springs.")
-        own = figure.locator("img").get_attribute("alt")
-        figure.locator("select").select_option("bar_runs")
-        other = page.locator("[id='fig:spring_runs']")
-        assert other.locator("img").get_attribute("src") == "figures/bar_runs.webp"
-        assert "./reproduce figure bar_runs" in other.inner_text()
-        assert "Springs." not in other.inner_text()
-        assert "Last verification: not yet" in other.inner_text()
-        other.locator("select").select_option("spring_runs")
-        assert other.locator("img").get_attribute("alt") == own
-        assert "Springs." in other.inner_text()
-        assert "Last verification: reproduced" in other.inner_text()
-        assert page.said == []
-    write_verified({}, small)
 
 
 @pytest.mark.slow

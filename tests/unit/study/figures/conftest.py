@@ -1,9 +1,10 @@
 """Results of invented studies in the documented formats: bent sheets, a bar, random bases."""
 
 from collections.abc import Callable, Mapping, Sequence
-from copy import copy
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from unittest.mock import patch
 
 import numpy as np
 import pandas as pd
@@ -59,11 +60,10 @@ class Invented:
         return Plan(self.study, Folders(str(self.root))).file(place, labels)
 
     def job(self, name: str, root: Path | None = None, **changes: object) -> Job:
-        """Job of a figure whose options have ``changes``."""
-        study = copy(self.study)
-        options = study.figures[name].model_copy(update=changes)
-        study.figures = {**study.figures, name: options}
-        return Plan(study, Folders(str(root or self.root))).job(declarations()[name], {})
+        """Job of a figure that is declared with ``changes``."""
+        figure = replace(declarations()[name], **changes)
+        with patch.dict(declarations(), {name: figure}):
+            return Plan(self.study, Folders(str(root or self.root))).job(figure, {})
 
     def read(self, name: str, root: Path | None = None, **changes: object) -> dict[str, object]:
         """What the function of a figure gets."""

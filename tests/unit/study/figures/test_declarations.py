@@ -1,4 +1,4 @@
-"""What figures declare, config/figures.yaml, and the inputs that follow from both."""
+"""What figures declare, and the inputs that follow for a study."""
 
 import os
 import subprocess
@@ -6,11 +6,12 @@ import sys
 
 import pytest
 
-from pdrom.core.errors import ConfigurationError
+from pdrom.model.effects import EFFECTS
+from pdrom.reduction.method import load_methods
+from places import CONFIG, ROOT
 from study.artifact.paths import MESH, RERUNS
-from study.figures.kit.declaration import Scenes, declarations, figure, load_choices
-
-ENTRY = "singular_values:\n  columns: 2\n"
+from study.figures.kit.declaration import declarations, figure
+from study.pipeline.scenes import scene_names
 
 
 def test_figures_of_the_paper_come_first_in_their_order():
@@ -21,33 +22,18 @@ def test_figures_of_the_paper_come_first_in_their_order():
 
 def test_a_figure_has_a_caption():
     with pytest.raises(TypeError, match="no docstring, which is its caption"):
-        figure(title="Nothing", reads={})(lambda options: options)
+        figure(title="Nothing", reads={})(lambda drawn: drawn)
 
 
-def test_a_figure_without_an_entry_has_its_defaults(tmp_path):
-    path = tmp_path / "figures.yaml"
-    path.write_text(ENTRY)
-    chosen = load_choices(path, {})
-    assert list(chosen) == list(declarations())
-    assert chosen["ladder"] == Scenes()
-    assert chosen["singular_values"].columns == 2
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("ladder:\n  columns: 2\n", r"unknown key 'columns' \(allowed: scenes\)"),
-        (ENTRY + "  caption: Another caption.\n", "unknown key 'caption'"),
-        ("bar_runs:\n  frames: []\n", "frames"),
-        ("bar_runs:\n  ranks: [-1]\n", "ranks"),
-    ],
-)
-def test_faults_are_named(tmp_path, text, message):
-    path = tmp_path / "figures.yaml"
-    path.write_text(text)
-    with pytest.raises(ConfigurationError, match=message) as error:
-        load_choices(path, {})
-    assert str(path) in str(error.value)
+def test_figures_name_scenes_methods_and_groups_that_exist():
+    known = {
+        "scenes": {*scene_names(ROOT)}, "methods": {*load_methods(CONFIG / "methods.yaml")},
+        "groups": {*EFFECTS},
+    }  # fmt: skip
+    for name, made in declarations().items():
+        assert [
+            kind for kind, names in known.items() if not {*getattr(made, kind)} <= names
+        ] == [], name
 
 
 def test_files_follow_the_configuration(study, small_study):
@@ -60,15 +46,14 @@ def test_files_follow_the_configuration(study, small_study):
     assert len(study.job("deim_entries").inputs["samples"]) > 1
 
 
-@pytest.mark.parametrize("name", ["bar_runs", "spring_runs", "teaser", "local_share", "ladder"])
-def test_a_list_of_which_a_study_holds_nothing_means_all_that_it_holds(small_study, name):
-    invented = small_study(["strain_twist"], ["pod"])
-    assert "strain_twist" not in invented.study.figures[name].scenes
-    settings = invented.job(name).settings
-    assert settings["options"]["scenes"] == []
-    if "drawn" in settings:
-        assert [each["scene"] for each in settings["drawn"]["experiments"]] == ["strain_twist"]
-        assert [*settings["drawn"]["reductions"]] == ["pod"]
+@pytest.mark.parametrize("name", ["strain_runs", "teaser", "local_share", "ladder", "spring_runs"])
+def test_a_study_without_the_scenes_of_a_figure_draws_its_own_that_fit(small_study, name):
+    drawn = (
+        small_study(["strain_twist"], ["pod"]).job(name, scenes=("strain_oop",)).settings["drawn"]
+    )
+    fitting = [] if name == "spring_runs" else ["strain_twist"]
+    assert [each["scene"] for each in drawn["experiments"]] == fitting
+    assert [*drawn["reductions"]] == ["pod"]
 
 
 def test_planning_loads_no_plotting_library():

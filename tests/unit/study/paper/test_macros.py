@@ -130,9 +130,12 @@ def test_faulty_blocks_are_named(source):
         tex.sentences(source)
 
 
-def test_a_sentence_needs_all_of_its_numbers_and_a_row_goes_without_a_note():
-    assert tex.decisions(BLOCKS, HELD) == ["shown", "noted", "dropped", "noted", "shown", "dropped"]
-    assert tex.decisions(rf"\row{{{CLOTH} \\}} \known{{{CLOTH}}}", HELD) == ["dropped", "noted"]
+def test_a_block_needs_all_of_its_numbers_and_its_figure():
+    made = tex.decisions(BLOCKS, HELD)
+    assert made == ["shown", "dropped", "dropped", "dropped", "shown", "dropped"]
+    picture = r"\known{\pictureof{bars}{Bars.}}"
+    assert tex.decisions(picture, HELD, ["bars"]) == ["shown"]
+    assert tex.decisions(picture, HELD, ["sheets"]) == ["dropped"]
 
 
 @pytest.mark.parametrize(
@@ -150,9 +153,8 @@ def test_what_a_configuration_holds(key, held):
     assert tex.is_held(key, HELD) is held
 
 
-def test_the_note_names_the_configuration_that_holds_the_numbers():
-    text = tex.provenance({"main": ["noted"]}, "config/tiny.yaml", "config/default.yaml")
+def test_the_text_names_the_configuration_that_it_was_made_from():
+    text = tex.provenance({"main": ["dropped"]}, "config/tiny.yaml", "config/default.yaml")
     assert r"\parttrue" in text
     assert r"\newcommand{\configuration}{\texttt{config/tiny.yaml}}" in text
-    assert r"[The full study (\texttt{config/default.yaml}) holds" in text
     assert r"\partfalse" in tex.provenance({}, None, "config/default.yaml")

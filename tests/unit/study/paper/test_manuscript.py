@@ -63,7 +63,7 @@ def test_no_result_is_typed(document):
 def test_the_text_of_other_scenes_speaks_of_what_it_shows_and_of_no_claim():
     source = "".join(text.partition(r"\title")[2] for text in OWN.values())
     assert re.findall(r"verdict|claim|preprint|replication|ifpart", source) == []
-    figures = set(re.findall(r"(?:figureof\{|keepaspectratio\]\{)(\w+)", source))
+    figures = set(re.findall(r"(?:figureof|pictureof)\{(\w+)", source))
     tables = set(re.findall(r"(?:label\{|\}\{)tab:(\w+)\}", source))
     assert set(re.findall(r"\\ref\{fig:(\w+)\}", source)) <= figures <= set(declarations())
     assert set(re.findall(r"\\ref\{tab:(\w+)\}", source)) == tables != set()

@@ -3,8 +3,12 @@
 import pytest
 
 from builders import frame
+from pdrom.core.store import write_table
+from study.artifact.paths import File
+from study.paper.build import shown_tables
 from study.paper.tex import build_pdfs
 from study.paper.textables import TEX_TABLES, longtable, tabular, tex_table
+from study.tables import declared
 
 ERROR = "relative_error_within_horizon"
 
@@ -88,7 +92,7 @@ TABLES = {
         ("C1", "published", "others", True, ">=", 0.1, 3, 4, 0.0, 0.5, 1.0),
         ("C1", "published", "aside", False, "<=", 0.1, 5, 6, 0.0, 0.5, 1.0),
         ("C1", "beyond", "all", True, "<=", 0.05, 0, 0, None, None, None),
-    ),
+    ).assign(margin=1.5),
     "speedups": frame(
         "scene method position_basis k r full_ms shown loses error_train "
         "error_heldout playback_error training_s reduction_s frames_to_break_even",
@@ -181,6 +185,21 @@ def test_rows_of_a_table(name):
     _, after = MADE.replace("\n  ", " ").split(f"\n% {name.removeprefix('tab_')}\n")
     assert [x for x in lines if x != head] == after.partition("\n%")[0].splitlines()
     assert len({line.replace(r"\&", "").count("&") for line in (head, *lines)}) == 1
+
+
+def test_unreliable_times_leave_no_speed_up_in_any_table(tmp_path):
+    times = frame("control_low control_high processor_share", (1.0, 1.0, 0.5))
+    files = []
+    for name in TABLES.keys() & declared().keys() | {"frame_times"}:
+        files.append(File(f"{tmp_path}/{name}.csv", {"name": name}))
+        write_table(TABLES.get(name, times), files[-1].path)
+    tables, said = shown_tables(files)
+    assert "unreliable" in said
+    text = "".join(tex_table(name, TABLES | tables) for name in TEX_TABLES)
+    before = "".join(tex_table(name, TABLES) for name in TEX_TABLES)
+    for number in ("66 to 73", "17 (15 to 20)", "(loses)", "150", "& pays &", "0.80"):
+        assert number in before
+        assert number not in text
 
 
 PAGE = r"""\documentclass{article}\usepackage[T1]{fontenc}\usepackage{lmodern}\usepackage{longtable}

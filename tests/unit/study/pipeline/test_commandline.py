@@ -24,7 +24,6 @@ def project(tmp_path, monkeypatch):
     for name, text in {
         "config/default.yaml": "ranks: [3]",
         "config/tiny.yaml": "ranks: [4]",
-        "config/figures.yaml": "scaling: {}",
         "my.yaml": "ranks: [3]",
         "named.yaml": "study: my-name",
         "a b.yaml": "ranks: [4]",

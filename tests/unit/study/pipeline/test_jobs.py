@@ -7,12 +7,15 @@ import pytest
 
 from bad_input.project import MESH, SCENE, SQUARE, STUDY, load_project, make_project, with_mesh
 from pdrom.core.errors import ConfigurationError
+from pdrom.core.yamlfile import read_yaml
+from places import CONFIG as CONFIG_FOLDER
 from places import ROOT
 from study.artifact import paths
 from study.artifact.reads import Setting, TableOf
 from study.experiments.fom import mesh
 from study.experiments.subspaces import online
 from study.experiments.timing import scaling
+from study.figures.kit.declaration import declarations
 from study.pipeline.folders import Folders
 from study.pipeline.manifest import study_files
 from study.pipeline.plan import Plan
@@ -37,6 +40,31 @@ def test_every_table_finds_what_it_reads_in_the_order_of_the_study():
     assert made["winners"].inputs["rows"] == "out/tables/alternatives.csv"
     assert made["online"].inputs["parts"] == []
     assert made["claims"].inputs["rules"] == "config/claims.yaml"
+
+
+def test_an_own_study_plans_only_what_its_own_scenes_have():
+    default = read_yaml(CONFIG_FOLDER / "default.yaml")
+    own = Plan(Study(default | {"scenes": ["ball_shell", "torus_release"]}, ROOT), Folders("out"))
+    own.check()
+    known = [labels for path in own.own_files for labels in paths.labels_in(path, "out")]
+    assert {labels["scene"] for labels in known if "scene" in labels} == {
+        "ball_shell",
+        "torus_release",
+    }
+    jobs = [job for jobs in own.fixed.values() for job in jobs]
+    assert {path for job in jobs for path in job.results} <= own.own_files
+    assert not [path for job in jobs for path in job.files if "recorded" in path]
+    named = {path.rpartition("/")[2].partition(".")[0] for path in own.own_files}
+    about_others = {
+        "alternatives", "winners", "scaling", "ladder", "online", "speedups", "claims",
+        "tab_claims", "cases", "live", "strain_runs", "noise",
+    }  # fmt: skip
+    assert about_others & named == set()
+    assert {"spring_runs", "bar_runs", "error_against_gain", "payoff", "tab_reruns"} <= named
+    # the full study and one that decides the claims on other scenes have everything
+    for changes in ({}, {"scenes": ["ball_shell"], "claim_sets": {"sound_scenes": ["ball_shell"]}}):
+        whole = Plan(Study(default | changes, ROOT), Folders("out"))
+        assert {*whole.tables, *whole.figures} == {*declared(), *declarations()}
 
 
 @pytest.mark.parametrize(

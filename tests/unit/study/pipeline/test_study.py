@@ -73,7 +73,7 @@ def root(tmp_path):
     """A project with a scene of its own, in which wind blows."""
     scenes = tmp_path / "config" / "scenes"
     scenes.mkdir(parents=True)
-    files = ("methods.yaml", "scenes/spring_oop.yaml")
+    files = ("methods.yaml", "default.yaml", "scenes/spring_oop.yaml")
     for name in files:
         shutil.copy(ROOT / "config" / name, tmp_path / "config" / name)
     scene = yaml.safe_load((scenes / "spring_oop.yaml").read_text())

@@ -37,7 +37,10 @@ def project(tmp_path, monkeypatch):
 def lines(*arguments: str, words: str = "") -> dict[str, str]:
     listed = {"figures": FIGURES, "tables": TABLES}
     fixed = {k: [SimpleNamespace(outputs={"": path}) for path in v] for k, v in listed.items()}
-    plan = SimpleNamespace(folders=Folders(), study=SimpleNamespace(apart=words), fixed=fixed)
+    plan = SimpleNamespace(
+        folders=Folders(), study=SimpleNamespace(apart=words), fixed=fixed, tables=["claims"],
+        absent=""
+    )  # fmt: skip
     text = summary(CommandLine(arguments), plan)
     assert text.endswith("\n")
     said = [line.removeprefix("pdrom: ") for line in text.splitlines()]
@@ -45,7 +48,11 @@ def lines(*arguments: str, words: str = "") -> dict[str, str]:
 
 
 def test_a_whole_study():
+    assert "times" not in lines()
+    times = {"control_low": [1.0], "control_high": [1.0], "processor_share": [0.5]}
+    write_table(pd.DataFrame(times), "results/tables/frame_times.csv")
     said = lines("--config", "ranks=[3]")
+    assert said["times"].startswith("unreliable")  # the processor is shared
     assert said["configuration"] == "config/default.yaml, ranks=[3]"
     assert said["verdicts (as published / beyond)"] == "C1 holds / depends, C2 fails / x"
     assert said["manuscript"] == "paper/main.pdf, paper/supplement.pdf"

@@ -11,7 +11,7 @@ from builders import frame
 from pdrom.core.store import write_table
 from study.artifact.paths import File
 from study.experiments.frame_times import COLUMNS
-from study.tables.effects_cost import frame_times, online, scaling, speedups
+from study.tables.effects_cost import frame_times, online, scaling, speedups, unreliable
 from study.tables.errors import repetitions
 from study.tables.kit.results import in_words, median_interval
 
@@ -51,6 +51,7 @@ def measured(tmp_path) -> list[File]:
         ("a", "reduced", "spring", "deim", "full", None, 6, 4.0),
     ).astype({"k": "Int64", "r": "Int64"})  # fmt: skip
     runs = runs.assign(vertices=9, frames=100, vertices_ms=0.1 * runs.ms_per_frame)
+    runs["processor_share"] = 1.0
     times = ["ms_per_frame", "vertices_ms"]
     processes = [
         runs.assign(process=process, **speed * runs[times])
@@ -120,3 +121,11 @@ def test_repetitions_are_told_by_median_and_range(tmp_path):
     assert (row.repetitions, row.ended) == (3, 1)
     assert (row.error_low, row.error_median, row.error_high) == (0.1, 0.2, np.inf)
     assert (row.gain_low, row.gain_median, row.gain_high) == (3.0, 4.0, 5.0)
+
+
+@pytest.mark.parametrize(
+    ("share", "control", "said"), [(0.98, 1.1, False), (0.7, 1.1, True), (0.98, 1.7, True)]
+)
+def test_times_are_unreliable_without_a_processor_or_against_their_controls(share, control, said):
+    times = frame("control_low control_high processor_share", (1.0, control, share))
+    assert unreliable(times) is said
