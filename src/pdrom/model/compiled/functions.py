@@ -9,6 +9,8 @@ from zlib import crc32
 import numpy as np
 from llvmlite import ir
 from numba import cfunc, njit, types
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import Compiler
 from numba.extending import intrinsic
 
 _INTEGER = ir.IntType(types.intp.bitwidth)
@@ -48,23 +50,46 @@ def compiled(function=None, **options):
     return njit(**own | options)(function)
 
 
+class _InnerCode(JITCodeLibrary):  # type: ignore[misc]
+    """Code of an inner function, which its callers optimise and turn into machine code.
+
+    Numba would do both for the function itself, and again in each caller, at each depth of calls.
+    """
+
+    def _finalize_final_module(self):
+        self._finalize_dynamic_globals()
+        self._finalized = True
+
+    def _optimize_final_module(self):
+        pass
+
+    def get_pointer_to_function(self, name):
+        return 0
+
+    @property
+    def codegen(self):
+        return self
+
+    def set_env(self, name, environment):
+        """Do nothing: only code that uses Python objects needs an environment."""
+
+
+class _InnerCompiler(Compiler):  # type: ignore[misc]
+    def __init__(self, context, target, library, *rest):
+        super().__init__(context, target, library, *rest)
+        self.state.library = _InnerCode(self.state.targetctx.codegen(), "inner")
+
+
 def inner(function=None, **options):
     """Compile ``function``, which only compiled functions call, without a cache of its own.
 
-    No wrapper for callers in Python is made: it takes longer to compile than a short function.
+    Its arguments may be functions (Numba caches no such function: it identifies them by a number
+    that changes with the process). Neither wrappers for other callers nor machine code are made.
     """
     if function is None:
         return lambda wrapped: inner(wrapped, **options)
-    own = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-    return njit(error_model="numpy", **own, **options)(function)
-
-
-def template(function):
-    """Compile ``function``, whose arguments may be functions; it is inlined into each caller.
-
-    It has no cache: Numba identifies function arguments by a number that changes with the process.
-    """
-    return njit(error_model="numpy", forceinline=True)(function)
+    own = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "error_model": "numpy"}
+    return njit(pipeline_class=_InnerCompiler, **own, **options)(function)
 
 
 class Callback:

@@ -17,7 +17,7 @@ import numpy as np
 from numba import carray
 from pydantic import Field, model_validator
 
-from pdrom.model.compiled.functions import template
+from pdrom.model.compiled.functions import inner
 from pdrom.model.compiled.rows import doubles
 from pdrom.model.constraints import simplex
 from pdrom.model.constraints.base import GroupConfig
@@ -25,7 +25,7 @@ from pdrom.model.constraints.lanes import LANES, take
 from pdrom.model.mesh.types import Mesh
 
 
-@template
+@inner(forceinline=True)
 def project(y_place, p_place, record, part, rows, gradients, nearest):
     """Write projections of the elements that ``record`` lists; each S_e has ``rows`` rows.
 
@@ -52,7 +52,7 @@ def project(y_place, p_place, record, part, rows, gradients, nearest):
     return 0.0
 
 
-@template
+@inner(forceinline=True)
 def accumulate(y_place, rhs_place, record, part, rows, gradients, nearest, forces):
     """Add S^T W p of the elements of a ``part`` to the right-hand side; return their energy in J.
 
@@ -80,7 +80,7 @@ def accumulate(y_place, rhs_place, record, part, rows, gradients, nearest, force
     return 0.5 * energy
 
 
-@template
+@inner(forceinline=True)
 def project_gradients(d_pointer, range_pointer, p_pointer, m, rows, work_size, nearest):
     """Write projections of m elements; the working array has ``work_size`` numbers an element.
 

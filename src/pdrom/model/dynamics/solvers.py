@@ -220,7 +220,9 @@ class SupernodalSolver(SuperLUSolver):
             own = sparse.csr_array(self._held[unknowns])
             # rows of the few unknowns that are coupled to held vertices
             beside = np.flatnonzero(np.diff(own.indptr))
-            self.coupling = beside, own.indptr, own.indices, own.data
+            # SciPy's index type varies, and each type would be compiled
+            indptr, indices = (a.astype(np.int32, copy=False) for a in (own.indptr, own.indices))
+            self.coupling = beside, indptr, indices, own.data
 
     def set_targets(self, targets: np.ndarray) -> None:
         if len(self.coupling[0]):

@@ -296,7 +296,8 @@ def held_path(
         known += 1
     paths = [b.path(frames[:known], q) for b, q in pairs]
     if single:
-        path = np.array(paths[0], order="C")  # a view would make Numba compile again
+        path = paths[0]
     else:
         path = np.concatenate([np.empty((known, 0, 3)), *paths], axis=1)[:, first]
-    return vertices, path, tuple(now)
+    # a view or another order in memory would make Numba compile again
+    return vertices, np.array(path, order="C"), tuple(now)
