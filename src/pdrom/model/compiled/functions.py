@@ -89,7 +89,11 @@ def inner(function=None, **options):
     if function is None:
         return lambda wrapped: inner(wrapped, **options)
     own = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "error_model": "numpy"}
-    return njit(pipeline_class=_InnerCompiler, **own, **options)(function)
+    made = njit(pipeline_class=_InnerCompiler, **own, **options)(function)
+    # one function for all integers, which Numba would compile for each constant
+    template = made.get_call_template
+    made.get_call_template = lambda args, kws: template([types.unliteral(a) for a in args], kws)
+    return made
 
 
 class Callback:

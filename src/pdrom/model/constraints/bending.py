@@ -5,7 +5,6 @@ from copy import copy
 from typing import Any, Literal, Self
 
 import numpy as np
-from numba import carray
 from scipy import sparse
 
 from pdrom.core.errors import SceneError
@@ -188,23 +187,23 @@ def accumulate_vertices(y_place, rhs_place, record, part):
 
 
 @kernels.gradient_kernel
-def project_gradients(d_pointer, manifold_pointer, p_pointer, m):
+def project_gradients(d_place, manifold_place, p_place, m):
     """Project the curvature vectors S q (m, 3) onto half spheres (`VertexBending`): write p (m, 3).
 
-    The first three arguments are pointers to S q, to the numbers from `lanes.pack`, and to p.
+    The first three arguments are addresses of S q, to the numbers from `lanes.pack`, and to p.
     """
-    d, p = carray(d_pointer, (m, 3)), carray(p_pointer, (m, 3))
+    d, p = rows.doubles(d_place, 3 * m), rows.doubles(p_place, 3 * m)
     blocks = (m + lanes.LANES - 1) // lanes.LANES
-    manifold = carray(manifold_pointer, (blocks * MANIFOLD * lanes.LANES,))
+    manifold = rows.doubles(manifold_place, blocks * MANIFOLD * lanes.LANES)
     work = np.zeros(SIZE * lanes.LANES)
     for block in range(blocks):
         for lane in range(lanes.LANES):
-            e = min(block * lanes.LANES + lane, m - 1)
-            lanes.save(work, H, lane, (d[e, 0], d[e, 1], d[e, 2]))
+            i = 3 * min(block * lanes.LANES + lane, m - 1)
+            lanes.save(work, H, lane, (d[i], d[i + 1], d[i + 2]))
         _half_spheres(work, manifold, block)
         for lane in range(min(lanes.LANES, m - block * lanes.LANES)):
-            i = block * lanes.LANES + lane
-            p[i, 0], p[i, 1], p[i, 2] = lanes.load(work, P, lane)
+            i = 3 * (block * lanes.LANES + lane)
+            p[i], p[i + 1], p[i + 2] = lanes.load(work, P, lane)
 
 
 def interior_vertices(triangles: np.ndarray, vertices: int) -> np.ndarray:

@@ -165,7 +165,7 @@ def _table(kernels: Sequence[LocalKernel], part: int) -> Table:
     return addresses, records, part
 
 
-_GRADIENTS = types.void(*3 * [types.CPointer(types.float64)], types.intp)
+_GRADIENTS = types.void(*4 * [types.intp])
 
 
 def gradient_kernel(function):
@@ -175,9 +175,9 @@ def gradient_kernel(function):
     loop of a subspace calls the result by its attribute ``address``, so that one loop can call any
     combination of groups.
 
-    d : pointer to (m, rows, 3) values of S q
-    parameters : pointer to the numbers of `ConstraintGroup.kernel_parameters`
-    p : pointer to (m, rows, 3) numbers, to which the projections are written
+    d : address of (m, rows, 3) values of S q
+    parameters : address of the numbers of `ConstraintGroup.kernel_parameters`
+    p : address of (m, rows, 3) numbers, to which the projections are written
     """
     return Callback(function, _GRADIENTS)
 

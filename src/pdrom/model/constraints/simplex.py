@@ -176,13 +176,14 @@ def gather_edges(y, corners, block, edges, work):
 
 @lane_function
 def copy_rows(d, count, start, work, first):
-    """Copy a block of S q to ``work`` at offset ``first``: the elements from ``start`` on of
-    ``d`` (m count, 3), in which each of m elements has ``count`` rows."""
-    last = d.shape[0] // count - 1
+    """Copy a block of S q to ``work`` at offset ``first``: the elements from ``start`` on of the
+    flat array ``d``, in which each of m elements has ``count`` rows of three numbers."""
+    last = len(d) // (3 * count) - 1
     for lane in range(LANES):
         base = count * min(start + lane, last)
         for i in range(count):
-            save(work, first + 3 * i, lane, (d[base + i, 0], d[base + i, 1], d[base + i, 2]))
+            k = 3 * (base + i)
+            save(work, first + 3 * i, lane, (d[k], d[k + 1], d[k + 2]))
 
 
 @lane_function

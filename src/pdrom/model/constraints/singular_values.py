@@ -14,7 +14,6 @@ its functions: Numba caches such kernels on disk, but no closures or functions t
 from typing import Annotated, Self
 
 import numpy as np
-from numba import carray
 from pydantic import Field, model_validator
 
 from pdrom.model.compiled.functions import inner
@@ -81,17 +80,17 @@ def accumulate(y_place, rhs_place, record, part, rows, gradients, nearest, force
 
 
 @inner(forceinline=True)
-def project_gradients(d_pointer, range_pointer, p_pointer, m, rows, work_size, nearest):
+def project_gradients(d_place, range_place, p_place, m, rows, work_size, nearest):
     """Write projections of m elements; the working array has ``work_size`` numbers an element.
 
     Parameters
     ----------
-    d_pointer, p_pointer : pointers to deformation gradients S q, and to projections: (rows m, 3)
-    range_pointer : pointer to the least and the largest allowed singular value, or product of them
+    d_place, p_place : addresses of deformation gradients S q, and of projections: (rows m, 3)
+    range_place : address of the least and the largest allowed singular value, or product of them
     nearest : function that computes the projections of a block of elements in the working array
     """
-    d, p = carray(d_pointer, (rows * m, 3)), carray(p_pointer, (3 * rows * m,))
-    allowed = carray(range_pointer, (2,))
+    d, p = doubles(d_place, 3 * rows * m), doubles(p_place, 3 * rows * m)
+    allowed = doubles(range_place, 2)
     work = np.zeros(work_size * LANES)
     for start in range(0, m, LANES):
         simplex.copy_rows(d, rows, start, work, simplex.F)

@@ -3,7 +3,6 @@
 from typing import Literal
 
 import numpy as np
-from numba import carray
 
 from pdrom.model.compiled import arithmetic, rows
 from pdrom.model.compiled.arithmetic import add, choose_within, divide, multiply, subtract
@@ -117,11 +116,11 @@ def _accumulate(y_place, rhs_place, record, part):
 
 
 @gradient_kernel
-def _project_gradients(d_pointer, parameters, p_pointer, m):
-    d, p = carray(d_pointer, (m, 3)), carray(p_pointer, (3 * m,))
+def _project_gradients(d_place, parameters, p_place, m):
+    d, p = rows.doubles(d_place, 3 * m), rows.doubles(p_place, 3 * m)
     packed = (m + LANES - 1) // LANES * LANES
-    numbers = carray(parameters, (packed * (GEOMETRY + REST),))
-    geometry, rest = numbers[: packed * GEOMETRY], numbers[packed * GEOMETRY :]
+    geometry = rows.doubles(parameters, packed * GEOMETRY)
+    rest = rows.doubles(parameters + 8 * packed * GEOMETRY, packed * REST)
     work = np.zeros(simplex.SIZE * LANES)
     for start in range(0, m, LANES):
         simplex.copy_rows(d, 1, start, work, simplex.EDGE)
