@@ -164,7 +164,8 @@ def all_iterations(
         energy = add_part(local, y.ctypes.data, rhs.ctypes.data)
         if stop > start:
             # part 1 of the work (module `local_kernel`) adds to ``other``, which is added to rhs
-            other[WIDTH * start : WIDTH * stop] = 0.0
+            for i in range(WIDTH * start, WIDTH * stop):
+                other[i] = 0.0
             energy += add_part(kernels, y.ctypes.data, other.ctypes.data)
             for i in range(WIDTH * start, WIDTH * stop):
                 rhs[i] += other[i]

@@ -13,7 +13,7 @@ from scipy import linalg, sparse
 from pdrom.core.errors import SceneError
 from pdrom.model.compiled.arithmetic import add, add_scaled, constant
 from pdrom.model.compiled.functions import compiled
-from pdrom.model.compiled.rows import WIDTH, at, load, store, unflat
+from pdrom.model.compiled.rows import WIDTH, at, load, store, unflat, write
 from pdrom.model.constraints.local_kernel import LocalPass
 from pdrom.model.dynamics.acceleration import Anderson, combine, forget, refuse
 from pdrom.model.dynamics.frames import inertia_energy, weighted
@@ -55,7 +55,7 @@ def _plain(y, v, acceleration, step, substeps, iterations, fixed, targets, inert
         begin(y, v, acceleration, step, fixed, targets, before, s)
         base = weighted(inertia, s)
         for _ in range(iterations):
-            rhs[:] = base
+            write(base, rhs)
             add_projections(tables, y, rhs)
             sweep(panels, vertices, loads, work, rhs, y)
         end(y, before, step, v)
@@ -86,7 +86,7 @@ def _anderson(
         base = weighted(inertia, s)
         forget(history)
         for k in range(iterations):
-            rhs[:] = base
+            write(base, rhs)
             objective = add_projections(tables, y, rhs) + inertia_energy(y, s, inertia)
             if not refuse(history, y, objective):
                 sweep(panels, vertices, loads, work, rhs, y)
@@ -116,11 +116,11 @@ def _chebyshev(
         begin(y, v, acceleration, step, fixed, targets, before, s)
         base = weighted(inertia, s)
         weight = 1.0
-        last[:] = y
+        write(y, last)
         for k in range(iterations):
-            rhs[:] = base
+            write(base, rhs)
             add_projections(tables, y, rhs)
-            image[:] = y
+            write(y, image)
             sweep(panels, vertices, loads, work, rhs, image)
             if k == PLAIN:
                 weight = 2.0 / (2.0 - RATE * RATE)
@@ -204,15 +204,15 @@ def _two_level(
         base = weighted(inertia, s)
         forget(history)
         for k in range(iterations):
-            rhs[:] = base
+            write(base, rhs)
             objective = add_projections(tables, y, rhs) + inertia_energy(y, s, inertia)
             # 0: test also the iterate after the first correction, which may raise the objective
             if refuse(history, y, objective, 0):
-                y[:] = plain
+                write(plain, y)
                 continue
             sweep(panels, vertices, loads, work, rhs, y)
             if k < iterations - 1:
-                plain[:] = y
+                write(y, plain)
                 _correct(coarse, history[0], y)
                 combine(history, y)
         end(y, before, step, v)
@@ -224,25 +224,31 @@ def _correct(coarse, start, image):
     span, duals, rows, steps, inverse, vertices, tables, history = coarse
     size, sampled = WIDTH * span.shape[1], WIDTH * len(vertices)
     step, x, at_start = np.zeros(size), np.empty(sampled), np.zeros(sampled)
-    _add_product(duals, image - start, step)
+    change = np.empty(len(image))
+    for i in range(len(image)):
+        change[i] = image[i] - start[i]
+    _add_product(duals, change, step)
     for i in range(len(vertices)):
-        x[WIDTH * i : WIDTH * (i + 1)] = start[WIDTH * vertices[i] : WIDTH * (vertices[i] + 1)]
+        store(x, WIDTH * i, load(start, WIDTH * vertices[i]))
     add_projections(tables, x, at_start)
     first, z, moved, forces = np.zeros(size), np.empty(size), np.empty(sampled), np.empty(sampled)
     _add_product(inverse, step, first)
-    z[:] = first
+    write(first, z)
     forget(history)
     for _ in range(INNER):
         refuse(history, z, np.nan)  # with nan as objective, which is unknown, no iterate is refused
-        moved[:] = x
+        write(x, moved)
         _add_product(rows, z, moved)
-        forces[:] = 0.0
+        for i in range(sampled):
+            forces[i] = 0.0
         add_projections(tables, moved, forces)
-        forces -= at_start
-        z[:] = first
+        for i in range(sampled):
+            forces[i] -= at_start[i]
+        write(first, z)
         _add_product(steps, forces, z)
         combine(history, z)
-    z -= step
+    for i in range(size):
+        z[i] -= step[i]
     _add_product(span, z, image)
 
 
@@ -300,7 +306,7 @@ def _explicit(y, v, acceleration, step, substeps, inverse, tables, stiffness):
     for _ in range(substeps):
         for k in range(len(y)):
             y[k] += 0.5 * step * v[k]
-        pull[:] = 0.0
+            pull[k] = 0.0
         add_projections(tables, y, pull)
         _multiply(stiffness, y, elastic)
         for i in range(len(inverse)):

@@ -16,7 +16,7 @@ import numpy as np
 from pdrom.core.errors import SceneError
 from pdrom.core.registry import Registry
 from pdrom.model.compiled.functions import compiled
-from pdrom.model.compiled.rows import WIDTH, as_vertices, flat
+from pdrom.model.compiled.rows import WIDTH, as_vertices, flat, write
 from pdrom.model.constraints.local_kernel import LocalPass, add_part
 from pdrom.model.dynamics.solvers import Factor
 from pdrom.model.dynamics.space import VertexSpace
@@ -163,7 +163,7 @@ def begin(y, v, acceleration, step, fixed, targets, before, s):
     for j in range(len(fixed)):
         for axis in range(3):
             s[WIDTH * fixed[j] + axis] = targets[j, axis]
-    y[:] = s
+    write(s, y)
 
 
 @compiled(nogil=True)
