@@ -6,18 +6,18 @@ of a row are reduced to four and these to one, to which the last terms (at most 
 
 from pdrom.model.compiled import arithmetic
 from pdrom.model.compiled.arithmetic import add, add_product, constant, of_three
-from pdrom.model.compiled.functions import compiled
+from pdrom.model.compiled.functions import compiled, inner
 from pdrom.model.compiled.rows import WIDTH, at, load
 
 
-@compiled(forceinline=True)
+@inner(forceinline=True)
 def _summed(a, b, c):
     """Return three numbers: the sum of the four lanes of a, that of b and that of c."""
     first, second, third, fourth = arithmetic.transposed(a, b, c, c)
     return arithmetic.first_three(add(add(first, third), add(second, fourth)))
 
 
-@compiled(forceinline=True)
+@inner(forceinline=True)
 def _products(matrix, i, j, k, vector, p, sums):
     """Return the three rows ``sums`` plus, lane by lane, the products of entries p to p + 3 of the
     matrix rows that begin at i, j and k with these entries of ``vector``."""
@@ -29,7 +29,7 @@ def _products(matrix, i, j, k, vector, p, sums):
     )
 
 
-@compiled(forceinline=True, fastmath={"contract"})
+@inner(forceinline=True, fastmath={"contract"})
 def dots(matrix, i, j, k, count, vector, starts):
     """Return ``starts`` (three numbers) plus the inner products of three rows with ``vector``.
 

@@ -12,7 +12,7 @@ from scipy import linalg, sparse
 
 from pdrom.core.errors import SceneError
 from pdrom.model.compiled.arithmetic import add, add_scaled, constant
-from pdrom.model.compiled.functions import compiled
+from pdrom.model.compiled.functions import compiled, inner
 from pdrom.model.compiled.rows import WIDTH, at, load, store, unflat, write
 from pdrom.model.constraints.local_kernel import LocalPass
 from pdrom.model.dynamics.acceleration import Anderson, combine, forget, refuse
@@ -218,7 +218,7 @@ def _two_level(
         end(y, before, step, v)
 
 
-@compiled(nogil=True)
+@inner
 def _correct(coarse, start, image):
     """Correct ``image`` = G(y) on the ``coarse`` level, as in `TwoLevel`; ``start`` is y."""
     span, duals, rows, steps, inverse, vertices, tables, history = coarse
@@ -252,7 +252,7 @@ def _correct(coarse, start, image):
     _add_product(span, z, image)
 
 
-@compiled(nogil=True)
+@inner
 def _add_product(matrix, x, out):
     """Add ``matrix`` (m, n) times ``x`` (n, 4) to ``out`` (m, 4); both are flat arrays."""
     m, n = matrix.shape
@@ -319,7 +319,7 @@ def _explicit(y, v, acceleration, step, substeps, inverse, tables, stiffness):
             y[k] += 0.5 * step * v[k]
 
 
-@compiled(nogil=True)
+@inner
 def _multiply(matrix, y, out):
     """Write ``matrix`` (N, N; CSR) times ``y`` (N, 4) to ``out`` (N, 4); both are flat arrays."""
     indptr, indices, data = matrix

@@ -15,7 +15,7 @@ import numpy as np
 
 from pdrom.core.errors import SceneError
 from pdrom.core.registry import Registry
-from pdrom.model.compiled.functions import compiled
+from pdrom.model.compiled.functions import inner
 from pdrom.model.compiled.rows import WIDTH, as_vertices, flat, write
 from pdrom.model.constraints.local_kernel import LocalPass, add_part
 from pdrom.model.dynamics.solvers import Factor
@@ -143,7 +143,7 @@ class Alternative(Stepper):
         return elimination.factor
 
 
-@compiled(nogil=True)
+@inner
 def begin(y, v, acceleration, step, fixed, targets, before, s):
     """Begin a substep of an implicit method at the prediction s = y + step v + step^2 a.
 
@@ -166,14 +166,14 @@ def begin(y, v, acceleration, step, fixed, targets, before, s):
     write(s, y)
 
 
-@compiled(nogil=True)
+@inner
 def end(y, before, step, v):
     """Set velocities ``v`` to (``y`` - ``before``) / ``step``; ``step`` is the duration in s."""
     for k in range(len(y)):
         v[k] = (y[k] - before[k]) / step
 
 
-@compiled(nogil=True)
+@inner
 def add_projections(tables, y, rhs):
     """Add S^T W p(y) of all groups to ``rhs``; return their potential energy (see the module), J.
 
