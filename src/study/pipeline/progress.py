@@ -1,6 +1,7 @@
 """Estimate of a run's remaining time, and a list of the jobs that a dry run would start."""
 
 import logging
+import re
 from collections import Counter, defaultdict
 from collections.abc import Callable, Mapping
 
@@ -8,6 +9,9 @@ from snakemake_interface_logger_plugins.common import LogEvent
 
 # An estimate needs this share of the work in finished jobs.
 ENOUGH = 0.05
+# Processor seconds that config/tiny.yaml spends on compiling; names of rules that compile nothing.
+COMPILING = 25.0
+IDLE = re.compile("figure_.*|.*_table|mesh|snapshots|pod|live_page|paper.*|article|all")
 FOLLOWS = "input is made again"
 # Beginnings of Snakemake's reasons for running a job -> our shorter texts.
 REASONS = {
@@ -62,13 +66,14 @@ class Preview(logging.Handler):
     seconds : function that maps the path of a job's log to its expected processor seconds
     faults : path of a result -> why its job runs, if Snakemake does not know
     cores : number of cores of the run; a job that measures times needs all of them
+    compiles : whether jobs have to compile their kernels
     """
 
     def __init__(
-        self, seconds: Callable[[str], float], cores: int, faults: Mapping[str, str]
+        self, seconds: Callable[[str], float], cores: int, faults: Mapping[str, str], compiles: bool
     ) -> None:
         super().__init__(logging.INFO)
-        self._faults = faults
+        self._faults, self._compiles = faults, compiles
         self._of_job, self._cores = seconds, cores
         self._jobs: Counter[str] = Counter()
         self._reasons: defaultdict[str, set[str]] = defaultdict(set)
@@ -94,8 +99,11 @@ class Preview(logging.Handler):
             for rule, count in self._jobs.items()
         )
         cores = f"{self._cores} core{'s' * (self._cores > 1)}"
-        total = f"pdrom: {self._jobs.total()} jobs, {rounded(self._wall)} on {cores}"
-        return f"{text}{total}, {rounded(self._processor)} of processor time\n" if text else ""
+        compiling = COMPILING * (self._compiles and not all(map(IDLE.fullmatch, self._jobs)))
+        total = f"pdrom: {self._jobs.total()} jobs, {rounded(self._wall + compiling)} on {cores}"
+        more = f", of which up to {compiling:.0f} s compile kernels" if compiling else ""
+        total += f", {rounded(self._processor + compiling)} of processor time{more}\n"
+        return f"{text}{total}" if text else ""
 
 
 def shortened(reason: str) -> set[str]:

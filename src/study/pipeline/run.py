@@ -14,6 +14,7 @@ from snakemake.scheduling.job_scheduler import JobScheduler
 from pdrom.core.errors import ConfigurationError, PdromError, StorageError
 from pdrom.core.store import read_table, write_text
 from pdrom.core.store.checksum import move_aside
+from pdrom.model.compiled.functions import are_compiled
 from study.artifact import planned
 from study.pipeline import running
 from study.pipeline.commandline import CommandLine, one_line, remember
@@ -96,7 +97,7 @@ class Run:
                 sys.stderr.write(f"pdrom: {path}: {fault}{aside}; it is made again\n")
         force(workflow, found)
         if self.command.plans:
-            preview = Preview(expected_seconds(plan), cores, found)
+            preview = Preview(expected_seconds(plan), cores, found, not are_compiled())
             logging.getLogger("snakemake.logging").addHandler(preview)
             atexit.register(lambda: sys.stdout.write(preview.text()))
 
@@ -105,8 +106,8 @@ class Run:
         # With a limit on the rate of starts, each selection of jobs starts a timer, which selects
         # again: at the end of a run, timers use a third of a core, and the process waits for them.
         workflow.scheduler.job_rate_limiter = None
-        if not any(Path(os.environ.get("NUMBA_CACHE_DIR", "")).glob("dynamics*/*.nbi")):
-            sys.stderr.write("pdrom: the first jobs compile kernels (once, some minutes)\n")
+        if not are_compiled():
+            sys.stderr.write("pdrom: the first jobs compile kernels (once, about half a minute)\n")
         tell_expectation(workflow, plan)
         with one_line():
             write_text(json.dumps(planned.plan()), planned.PLAN, with_checksum=False)

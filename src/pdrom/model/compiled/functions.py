@@ -1,6 +1,10 @@
 """Compilation of functions with Numba, their cache on disk, and a clock for compiled code."""
 
+import gc
+import os
 import time
+from contextlib import ExitStack, suppress
+from fcntl import LOCK_EX, flock
 from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
@@ -8,9 +12,12 @@ from zlib import crc32
 
 import numpy as np
 from llvmlite import ir
-from numba import cfunc, njit, types
+from numba import njit, types
+from numba.core.caching import FunctionCache
+from numba.core.ccallback import CFunc
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
+from numba.core.sigutils import normalize_signature
 from numba.extending import intrinsic
 
 _INTEGER = ir.IntType(types.intp.bitwidth)
@@ -37,6 +44,35 @@ def _mark(function):
     function.__qualname__ += f"_{_checksum(Path(function.__code__.co_filename).parent)}"
 
 
+def are_compiled() -> bool:
+    """Return whether a cache folder, if one is set, has code of the step loop's present text."""
+    folder, files = os.environ.get("NUMBA_CACHE_DIR"), f"*_{_checksum(MODEL / 'dynamics')}-*.nbi"
+    return folder is None or any(Path(folder).glob(f"dynamics*/{files}"))
+
+
+class _Cache(FunctionCache):  # type: ignore[misc]
+    """Cache on disk: of several processes, one compiles a function and the others wait for it."""
+
+    def load_overload(self, signature, context):
+        if (found := super().load_overload(signature, context)) is not None:
+            return found
+        self._held = ExitStack()
+        with suppress(OSError):  # some file systems have no locks
+            os.makedirs(self.cache_path, exist_ok=True)
+            lock = Path(self.cache_path, f"{self._impl.filename_base}.lock")
+            flock(self._held.enter_context(lock.open("w")), LOCK_EX)
+        if (found := super().load_overload(signature, context)) is not None:
+            self._held.close()
+        elif gc.isenabled():  # collections would take a tenth of the time
+            gc.disable()
+            self._held.callback(gc.enable)
+        return found
+
+    def save_overload(self, signature, result):
+        super().save_overload(signature, result)
+        self._held.close()
+
+
 def compiled(function=None, **options):
     """Compile ``function``, cached on disk, with neither checks for division by zero nor fast-math.
 
@@ -46,8 +82,10 @@ def compiled(function=None, **options):
     if function is None:
         return lambda wrapped: compiled(wrapped, **options)
     _mark(function)
-    own = {"cache": True, "error_model": "numpy", "no_cfunc_wrapper": True}
-    return njit(**own | options)(function)
+    own = {"error_model": "numpy", "no_cfunc_wrapper": True}
+    made = njit(**own | options)(function)
+    made._cache = _Cache(function)
+    return made
 
 
 class _InnerCode(JITCodeLibrary):  # type: ignore[misc]
@@ -56,35 +94,25 @@ class _InnerCode(JITCodeLibrary):  # type: ignore[misc]
     Numba would do both for the function itself, and again in each caller, at each depth of calls.
     """
 
-    def _finalize_final_module(self):
-        self._finalize_dynamic_globals()
+    def _finish(self, *_arguments):
         self._finalized = True
-
-    def _optimize_final_module(self):
-        pass
-
-    def get_pointer_to_function(self, name):
         return 0
 
-    @property
-    def codegen(self):
-        return self
-
-    def set_env(self, name, environment):
-        """Do nothing: only code that uses Python objects needs an environment."""
+    _optimize_final_module = _finalize_final_module = get_pointer_to_function = set_env = _finish
+    codegen = property(lambda self: self)
 
 
 class _InnerCompiler(Compiler):  # type: ignore[misc]
-    def __init__(self, context, target, library, *rest):
-        super().__init__(context, target, library, *rest)
+    def __init__(self, *arguments):
+        super().__init__(*arguments)
         self.state.library = _InnerCode(self.state.targetctx.codegen(), "inner")
 
 
 def inner(function=None, **options):
     """Compile ``function``, which only compiled functions call, without a cache of its own.
 
-    Its arguments may be functions (Numba caches no such function: it identifies them by a number
-    that changes with the process). Neither wrappers for other callers nor machine code are made.
+    Its arguments may be functions, which Numba identifies by a number that changes with the process
+    and thus does not cache. Neither wrappers for other callers nor machine code are made.
     """
     if function is None:
         return lambda wrapped: inner(wrapped, **options)
@@ -111,7 +139,10 @@ class Callback:
     @cached_property
     def address(self):
         """Address of the compiled function, valid as long as this object exists."""
-        made = cfunc(self.signature, cache=True, error_model="numpy")(self.function)
+        own = {"nopython": True, "error_model": "numpy"}
+        made: Any = CFunc(self.function, normalize_signature(self.signature), {}, own)
+        made._cache = _Cache(self.function)
+        made.compile()
         self._compiled.append(made)  # two threads may compile at once: keep both results
         return made.address
 

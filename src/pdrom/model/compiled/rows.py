@@ -163,10 +163,7 @@ def store(_context, array, index, _row):
 
 
 def _view(kind):
-    """Return f(address, count) for compiled code: an array (count,) over numbers of a ``kind``.
-
-    Numba's `carray` does the same, but takes several times as long to compile.
-    """
+    """Return f(address, count): an array over numbers in memory; carray compiles more slowly."""
 
     def typed(_context, _address, _count):
         def generate(context, builder, signature, arguments):

@@ -9,6 +9,7 @@ from scipy import sparse
 
 from pdrom.core.errors import SceneError
 from pdrom.model.compiled import arithmetic, rows
+from pdrom.model.compiled.functions import compiled
 from pdrom.model.compiled.rows import WIDTH, at
 from pdrom.model.constraints import lanes
 from pdrom.model.constraints import local_kernel as kernels
@@ -32,7 +33,7 @@ H, P, HEIGHT, SIZE = 0, 3, 6, 7
 ELEMENTS, COUNT, START, INDICES, DATA, SPHERES, WORK, SAMPLED, TAKEN, ARRAYS = range(OWN, OWN + 10)
 
 
-@lanes.kernel
+@compiled(nogil=True)
 def put_poles(manifold, elements, side, normals):
     """Write half-sphere poles ``side`` (m,) * ``normals`` (m, 3) of elements to ``manifold``."""
     for e in elements:
@@ -251,7 +252,7 @@ def _sides(q, triangle):
     )
 
 
-@lanes.kernel
+@compiled(nogil=True)
 def fan_normals(q, vertices, elements, start, fan, triangles, normals):
     """Write area-weighted unit normals at the vertices of ``elements`` to ``normals``.
 

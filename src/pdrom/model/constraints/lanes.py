@@ -11,7 +11,7 @@ off, so that the result of an element does not depend on its lane.
 import numpy as np
 
 from pdrom.model.compiled import rows
-from pdrom.model.compiled.functions import compiled, inner
+from pdrom.model.compiled.functions import inner
 from pdrom.model.compiled.rows import at
 
 LANES = 32
@@ -23,11 +23,6 @@ SMALLEST = 1e-300
 def lane_function(function):
     """Compile a ``function`` of one element: inlined, without checks for division by zero."""
     return inner(function, forceinline=True)
-
-
-def kernel(function):
-    """Compile a ``function`` that Python calls and that releases the interpreter lock."""
-    return compiled(function, nogil=True)
 
 
 def blocks(elements: int) -> int:

@@ -220,9 +220,8 @@ class SupernodalSolver(SuperLUSolver):
             own = sparse.csr_array(self._held[unknowns])
             # rows of the few unknowns that are coupled to held vertices
             beside = np.flatnonzero(np.diff(own.indptr))
-            # SciPy's index type varies, and each type would be compiled
-            indptr, indices = (a.astype(np.int32, copy=False) for a in (own.indptr, own.indices))
-            self.coupling = beside, indptr, indices, own.data
+            index = (each.astype(np.int32) for each in (own.indptr, own.indices))  # of one type
+            self.coupling = beside, *index, own.data
 
     def set_targets(self, targets: np.ndarray) -> None:
         if len(self.coupling[0]):

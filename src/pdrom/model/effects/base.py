@@ -299,5 +299,4 @@ def held_path(
         path = paths[0]
     else:
         path = np.concatenate([np.empty((known, 0, 3)), *paths], axis=1)[:, first]
-    # a view or another order in memory would make Numba compile again
-    return vertices, np.array(path, order="C"), tuple(now)
+    return vertices, np.array(path, order="C"), tuple(now)  # one type, for which Numba compiles

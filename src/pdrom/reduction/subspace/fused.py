@@ -300,16 +300,6 @@ def _objective(weights, d, p, inertia, y, s):
 
 
 @inner
-def _differ(a, b):
-    """Return whether two arrays of vectors differ."""
-    for i in range(len(a)):
-        for axis in range(3):
-            if a[i, axis] != b[i, axis]:
-                return True
-    return False
-
-
-@inner
 def _predict(z, v, acceleration, rate, rates, h, s):
     """Write the prediction s = z + h v + h^2 (a + c v + C v); a, c and C as in `run_frames`."""
     for i in range(len(z)):
@@ -345,12 +335,14 @@ def run_frames(
         began = now(watch)
         before, after, speeds = positions[f], positions[f + 1], velocities[f + 1]
         _predict(before, velocities[f], acceleration, rate, rates, h, s)
+        changed = f == 0
         for i in range(len(fixed)):
             for axis in range(3):
+                changed = changed or targets[f, i, axis] != held[3 * i + axis]
                 s[3 * fixed[i] + axis] = held[3 * i + axis] = targets[f, i, axis]
         product(response, len(free), len(before), nothing, s, constant)
         # with unchanged targets, ``offset`` is that of the previous frame
-        if f == 0 or _differ(targets[f], targets[f - 1]):
+        if changed:
             product(coupling, rows, len(fixed), nothing, held, offset)
         for i in range(len(free)):
             for axis in range(3):

@@ -224,10 +224,7 @@ def _correct(coarse, start, image):
     span, duals, rows, steps, inverse, vertices, tables, history = coarse
     size, sampled = WIDTH * span.shape[1], WIDTH * len(vertices)
     step, x, at_start = np.zeros(size), np.empty(sampled), np.zeros(sampled)
-    change = np.empty(len(image))
-    for i in range(len(image)):
-        change[i] = image[i] - start[i]
-    _add_product(duals, change, step)
+    _add_product(duals, image - start, step)
     for i in range(len(vertices)):
         store(x, WIDTH * i, load(start, WIDTH * vertices[i]))
     add_projections(tables, x, at_start)
