@@ -82,8 +82,7 @@ def compiled(function=None, **options):
     if function is None:
         return lambda wrapped: compiled(wrapped, **options)
     _mark(function)
-    own = {"error_model": "numpy", "no_cfunc_wrapper": True}
-    made = njit(**own | options)(function)
+    made = njit(**{"error_model": "numpy", "no_cfunc_wrapper": True} | options)(function)
     made._cache = _Cache(function)
     return made
 
@@ -94,11 +93,13 @@ class _InnerCode(JITCodeLibrary):  # type: ignore[misc]
     Numba would do both for the function itself, and again in each caller, at each depth of calls.
     """
 
-    def _finish(self, *_arguments):
+    def _finalize_final_module(self):
         self._finalized = True
+
+    def _nothing(self, *_arguments):
         return 0
 
-    _optimize_final_module = _finalize_final_module = get_pointer_to_function = set_env = _finish
+    _optimize_final_module = get_pointer_to_function = set_env = _nothing
     codegen = property(lambda self: self)
 
 
@@ -111,16 +112,14 @@ class _InnerCompiler(Compiler):  # type: ignore[misc]
 def inner(function=None, **options):
     """Compile ``function``, which only compiled functions call, without a cache of its own.
 
-    Its arguments may be functions, which Numba identifies by a number that changes with the process
-    and thus does not cache. Neither wrappers for other callers nor machine code are made.
+    Its arguments may be functions, which Numba identifies by numbers that change with the process.
     """
     if function is None:
         return lambda wrapped: inner(wrapped, **options)
     own = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "error_model": "numpy"}
     made = njit(pipeline_class=_InnerCompiler, **own, **options)(function)
-    # one function for all integers, which Numba would compile for each constant
-    template = made.get_call_template
-    made.get_call_template = lambda args, kws: template([types.unliteral(a) for a in args], kws)
+    own_of = made.get_call_template  # Numba would compile the function for each constant integer
+    made.get_call_template = lambda args, kws: own_of([types.unliteral(a) for a in args], kws)
     return made
 
 

@@ -234,18 +234,16 @@ def _correct(coarse, start, image):
     forget(history)
     for _ in range(INNER):
         refuse(history, z, np.nan)  # with nan as objective, which is unknown, no iterate is refused
-        write(x, moved)
-        _add_product(rows, z, moved)
         for i in range(sampled):
-            forces[i] = 0.0
+            moved[i], forces[i] = x[i], 0.0
+        _add_product(rows, z, moved)
         add_projections(tables, moved, forces)
         for i in range(sampled):
             forces[i] -= at_start[i]
         write(first, z)
         _add_product(steps, forces, z)
         combine(history, z)
-    for i in range(size):
-        z[i] -= step[i]
+    z -= step
     _add_product(span, z, image)
 
 
