@@ -10,7 +10,7 @@ from snakemake_interface_logger_plugins.common import LogEvent
 # An estimate needs this share of the work in finished jobs.
 ENOUGH = 0.05
 # Processor seconds that config/tiny.yaml spends on compiling; names of rules that compile nothing.
-COMPILING = 25.0
+COMPILING = 30.0
 IDLE = re.compile("figure_.*|.*_table|mesh|snapshots|pod|live_page|paper.*|article|all")
 FOLLOWS = "input is made again"
 # Beginnings of Snakemake's reasons for running a job -> our shorter texts.
@@ -98,12 +98,12 @@ class Preview(logging.Handler):
             f"{count:>5} {rule:<{width}}  {', '.join(sorted(self._reasons[rule]))}\n"
             for rule, count in self._jobs.items()
         )
+        own = COMPILING * (self._compiles and not all(map(IDLE.fullmatch, self._jobs)))
         cores = f"{self._cores} core{'s' * (self._cores > 1)}"
-        compiling = COMPILING * (self._compiles and not all(map(IDLE.fullmatch, self._jobs)))
-        total = f"pdrom: {self._jobs.total()} jobs, {rounded(self._wall + compiling)} on {cores}"
-        more = f", of which up to {compiling:.0f} s compile kernels" if compiling else ""
-        total += f", {rounded(self._processor + compiling)} of processor time{more}\n"
-        return f"{text}{total}" if text else ""
+        total = f"pdrom: {self._jobs.total()} jobs, {rounded(self._wall + own)} on {cores}"
+        more = f", of which up to {own:.0f} s compile kernels" if own else ""
+        total += f", {rounded(self._processor + own)} of processor time{more}"
+        return text and f"{text}{total}\n"
 
 
 def shortened(reason: str) -> set[str]:

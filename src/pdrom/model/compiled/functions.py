@@ -118,7 +118,7 @@ def inner(function=None, **options):
         return lambda wrapped: inner(wrapped, **options)
     own = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "error_model": "numpy"}
     made = njit(pipeline_class=_InnerCompiler, **own, **options)(function)
-    own_of = made.get_call_template  # Numba would compile the function for each constant integer
+    own_of = made.get_call_template  # Numba would compile for each constant integer
     made.get_call_template = lambda args, kws: own_of([types.unliteral(a) for a in args], kws)
     return made
 
