@@ -88,10 +88,7 @@ def compiled(function=None, **options):
 
 
 class _InnerCode(JITCodeLibrary):  # type: ignore[misc]
-    """Code of an inner function, which its callers optimise and turn into machine code.
-
-    Numba would do both for the function itself, and again in each caller, at each depth of calls.
-    """
+    """Code of an inner function: only its callers optimise it and turn it into machine code."""
 
     def _finalize_final_module(self):
         self._finalized = True
