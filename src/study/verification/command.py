@@ -36,10 +36,8 @@ def update(subject: Subject, reason: str) -> Path:
         raise ConfigurationError('verify --update: say why, as in --reason "a new method"')
     paths = {name: TABLE.at(subject.results, name=name) for name in declared()}
     for name, path in paths.items():
-        if not Path(path).is_file():
-            raise StorageError(f"{path}: not there; make it by {subject.command(name)}")
-        if check_file(path) is not Condition.INTACT:
-            raise StorageError(f"{path}: damaged; run {subject.command(name)}")
+        if not Path(path).is_file() or check_file(path) is not Condition.INTACT:
+            raise StorageError(f"{path}: not there or damaged; run {subject.command(name)}")
     command = [sys.executable, "-m", "study.pipeline.front", "-n", *subject.options, "--"]
     done = subprocess.run([*command, *declared()], capture_output=True, text=True, check=False)
     if done.returncode != 0:
@@ -137,23 +135,21 @@ def counted(lines: Sequence[Line]) -> str:
 
 
 def page(lines: Sequence[Line], about: str) -> str:
-    """Return a Markdown page: the sentence ``about``, and ``lines`` with all comparisons."""
-    meaning = "What is compared, and what the outcomes mean, is in `docs/verification.md`."
-    parts = ["# Verification", "", about, meaning, "", counted(lines) + ".", ""]
-    for kind in dict.fromkeys(line.kind for line in lines):
-        parts += [f"## {kind.capitalize()}s", "", f"| {kind} | outcome | what |", "|---|---|---|"]
-        for line in lines:
-            if line.kind == kind:
-                text = line.text.replace("|", "\\|")
-                parts.append(f"| {line.name} | {line.outcome} | {text} |")
-        parts.append("")
-    differing = [line for line in lines if line.details]
-    parts += ["## What differs", ""] if differing else []
-    for line in differing:
-        shown, more = line.details[:ON_PAGE], len(line.details) - ON_PAGE
-        parts += [f"### {line.kind} {line.name}", "", *(f"- {text}" for text in shown)]
-        parts += [f"- and {more} more", ""] if more > 0 else [""]
-    return "\n".join(parts)
+    """Return a Markdown page: the sentence ``about``, and all ``lines`` with their differences."""
+    parts = [
+        "# Verification",
+        "",
+        about,
+        "See `docs/verification.md`.",
+        "",
+        f"{counted(lines)}.",
+        "",
+    ]
+    for line in lines:
+        more = len(line.details) - ON_PAGE
+        parts += [f"- {line}", *(f"  - {text}" for text in line.details[:ON_PAGE])]
+        parts += [f"  - and {more} more"] if more > 0 else []
+    return "\n".join([*parts, ""])
 
 
 if __name__ == "__main__":

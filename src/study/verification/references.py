@@ -44,7 +44,7 @@ def folder_of(results: str) -> Path:
 
 def write_reference(table: Table, frame: pd.DataFrame, folder: Path) -> None:
     """Write ``frame``, the content of ``table``, as the expected table into ``folder``."""
-    stored, form = frame[list(kept(table))], f"%.{DIGITS}g"
+    stored, form = frame[[c.name for c in kept(table)]], f"%.{DIGITS}g"
     content = stored.to_csv(index=False, float_format=form, lineterminator="\n").encode()
     path, other = (folder / f"{table.name}{end}" for end in ENDS)
     if len(content) > PACKED_FROM:
