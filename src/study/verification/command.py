@@ -13,7 +13,7 @@ from pdrom.core.store import Condition, check_file, read_table, write_text
 from study.article.build import INDEX, write_verified
 from study.artifact.paths import ARTICLE, TABLE
 from study.tables import declared
-from study.verification.examine import Examination, Line, Outcome
+from study.verification.examine import GOOD, Examination, Line, Outcome
 from study.verification.files import verify_files
 from study.verification.references import LOG, folder_of, note, write_reference
 from study.verification.subject import Status, Subject, ended, options_parser, say
@@ -62,15 +62,10 @@ def update(subject: Subject, reason: str) -> Path:
 
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the arguments after the word ``verify``."""
-    about = "Whether the results of the last run are the expected ones."
-    made = options_parser("verify", about, CODES)
+    made = options_parser("verify", "Compare the last run's results with the expected ones.", CODES)
     what = made.add_mutually_exclusive_group()
-    what.add_argument(
-        "--files",
-        action="store_true",
-        help="compare every file with the manifest, and with what it is made from",
-    )
-    what.add_argument("--update", action="store_true", help="these results are the expected ones")
+    what.add_argument("--files", action="store_true", help="check that no file has changed")
+    what.add_argument("--update", action="store_true", help="expect the results of the last run")
     made.add_argument("--reason", default="", help="why --update")
     return made
 
@@ -118,10 +113,8 @@ def verify_tables(subject: Subject) -> Status:
 def status_of(lines: Iterable[Line]) -> Status:
     """Return `MISSING` if a result is missing, `DIFFERS` if one differs or is new, else `HOLDS`."""
     outcomes = {line.outcome for line in lines}
-    if Outcome.MISSING in outcomes:
-        return Status.MISSING
-    holds = outcomes.isdisjoint((Outcome.DIFFERS, Outcome.NO_REFERENCE))
-    return Status.HOLDS if holds else Status.DIFFERS
+    other = Status.HOLDS if outcomes <= {*GOOD, Outcome.MISSING} else Status.DIFFERS
+    return Status.MISSING if Outcome.MISSING in outcomes else other
 
 
 def counted(lines: Sequence[Line]) -> str:

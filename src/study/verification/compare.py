@@ -103,7 +103,9 @@ class Context:
         amplified = errors[errors.gain.notna()]
         self.chaotic = frames.index[frames.horizon_frame < frames.frames]
         self.modes = above.groupby(["scene", "group"]).component.max().to_dict()
-        self.gains = dict(zip(identities(amplified, SAMPLING), amplified.gain, strict=True))
+        self.gains: dict[tuple[str, ...], float] = dict(
+            zip(identities(amplified, SAMPLING), amplified.gain, strict=True)
+        )
         both = [trained(each) for each in (runs, runs[:0] if found is None else found)]
         self.diverged = [{*identities(t[t[RUN_ERRORS[0]].isna()], REDUCED_RUN)} for t in both]
 
@@ -112,6 +114,7 @@ class Comparison:
     """Comparison of an ``expected`` table with the ``found`` one, cell by cell.
 
     e, f : matching rows of the expected table (e) and of the found table (f), in equal order
+    timed : for each row, the columns whose cell depends on measured times
     """
 
     def __init__(
@@ -124,19 +127,14 @@ class Comparison:
             frame.iloc[rows].reset_index(drop=True)
             for frame, rows in zip(self.frames, self.positions, strict=True)
         )
-
-    @cached_property
-    def _timed(self) -> Sequence[Collection[str]]:
-        """For each row, the columns whose cell depends on measured times."""
-        if self.table.timed_cells is None:
-            return [()] * len(self.e)
-        reads = self.table.reads.items()
-        files = {name: Path(r.path) for name, r in reads if isinstance(r, ProjectFile)}
-        return self.table.timed_cells(self.e, **files)
+        files = {n: Path(r.path) for n, r in table.reads.items() if isinstance(r, ProjectFile)}
+        self.timed: Sequence[Collection[str]] = [()] * len(self.e)
+        if table.timed_cells is not None:
+            self.timed = table.timed_cells(self.e, **files)
 
     def compared(self, column: Column) -> np.ndarray:
         """Boolean array: rows in which the cell of ``column`` depends on no measured time."""
-        return np.array([column.name not in names for names in self._timed], dtype=bool)
+        return np.array([column.name not in names for names in self.timed], dtype=bool)
 
     def unstable(self, column: Column) -> np.ndarray:
         """Boolean array: rows in which rounding errors decide the cell of ``column``."""
@@ -153,20 +151,18 @@ class Comparison:
     def _on_roundoff(self) -> np.ndarray:
         """Rows of degenerate meshes, of noise, or with all modes above round-off but one."""
         rows, modes = self.e, self.context.modes
-        if {"case", "noisy_axes"} & set(rows) or not {"scene", "group", "r"} <= set(rows):
-            return np.full(len(rows), bool({"case", "noisy_axes"} & set(rows)))
+        always = bool({"case", "noisy_axes"} & set(rows))
+        if always or not {"scene", "group", "r"} <= set(rows):
+            return np.full(len(rows), always)
         sizes = zip(rows.scene, rows.group, rows.r.fillna(0), strict=True)
         return np.array([r >= modes.get((s, g), np.inf) - 1 for s, g, r in sizes], dtype=bool)
 
     @cached_property
     def _gain(self) -> np.ndarray:
         """Largest gain in each row and of its sampling, 0 without any."""
-        names = [c.name for c in kept(self.table) if c.name.startswith("gain")]
-        own = self.e[[n for n in names if self.e[n].dtype == float]].max(axis=1).fillna(0.0)
-        if not set(SAMPLING) <= set(self.e):
-            return own.to_numpy(dtype=float)
-        known = [self.context.gains.get(key, 0.0) for key in identities(self.e, SAMPLING)]
-        return np.maximum(own.to_numpy(dtype=float), known)
+        own = self.e.filter(regex="^gain").select_dtypes(float).max(axis=1).fillna(0.0)
+        known = identities(self.e, SAMPLING) if set(SAMPLING) <= set(self.e) else [()] * len(own)
+        return np.maximum(own.to_numpy(float), [self.context.gains.get(key, 0.0) for key in known])
 
     def tolerances(self, column: Column) -> np.ndarray:
         """Array (rows) with the tolerance of each cell of ``column``."""
@@ -232,8 +228,7 @@ def _rows(comparison: Comparison) -> Iterator[Difference]:
         for row in range(len(rows)):
             place = _place(table, rows, row)
             yield np.inf, f"{place}: expected {words[side]}, found {words[1 - side]}"
-    moved = np.flatnonzero(np.diff(comparison.positions[1]) < 0)
-    for row in moved[:1]:
+    for row in np.flatnonzero(np.diff(comparison.positions[1]) < 0)[:1]:
         yield np.inf, f"order of the rows: {_place(table, comparison.e, int(row) + 1)} has moved up"
 
 
@@ -255,8 +250,8 @@ def _stable(comparison: Comparison, column: Column, cells: np.ndarray) -> Iterat
     names = [c.name for c in comparison.table.columns if identifies(c) and c.kind == "text"]
     groups = [("", np.arange(len(used)), MEDIAN_CELLS_OF_COLUMN)]
     for name in names if column.quantity == "error" else ():
-        for value, rows in comparison.e.groupby(name).indices.items():
-            groups.append((f" of {name} {value}", rows, MEDIAN_CELLS_OF_NAME))
+        indices = comparison.e.groupby(name).indices.items()
+        groups += [(f" of {name} {value}", rows, MEDIAN_CELLS_OF_NAME) for value, rows in indices]
     for name, rows, least in groups:
         chosen = size[rows][used[rows]]
         if len(chosen) >= least and (median := float(np.median(chosen))) > MEDIAN_LIMIT:

@@ -8,8 +8,6 @@ to be repeated; of their results only the checksums are compared.
 
 import filecmp
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager
 from itertools import chain
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -89,33 +87,18 @@ def _fault(path: str, entry: Entry | None, ours: bool) -> str:
     return "" if entry.fits(Path(path)) else DAMAGED
 
 
-@contextmanager
-def made(job: Job) -> Iterator[dict[str, Path]]:
-    """Run a job in a temporary folder; yield a mapping of its output paths to the new files.
-
-    Raises StorageError if the job fails on the existing input files.
-    """
-    parents = [os.path.dirname(path) or os.curdir for path in job.outputs.values()]
-    root = os.path.commonpath(parents)  # keep subfolders: two outputs may have equal file names
-    with TemporaryDirectory(prefix="pdrom-again-") as folder:
-        inside = {name: os.path.relpath(path, root) for name, path in job.outputs.items()}
-        outputs = {name: os.path.join(folder, path) for name, path in inside.items()}
-        try:
-            job.make(outputs)
-        except FAULTS as error:
-            fault = " ".join(str(error).split())
-            first = next(iter(job.outputs.values()))
-            raise StorageError(f"{first}: cannot be made again ({fault})") from error
-        yield {path: Path(outputs[name]) for name, path in job.outputs.items()}
-
-
 def differing(job: Job) -> list[str]:
-    """Repeat a job; return the paths of outputs that change, or all its outputs if it fails."""
-    try:
-        with made(job) as files:
-            return [old for old, new in files.items() if not filecmp.cmp(old, new, shallow=False)]
-    except StorageError:
-        return list(job.outputs.values())
+    """Repeat a job elsewhere; return the paths of outputs that change, or all if it fails."""
+    old = list(job.outputs.values())
+    # subfolders are kept: two outputs may have equal file names
+    root = os.path.commonpath([os.path.dirname(path) or os.curdir for path in old])
+    with TemporaryDirectory(prefix="pdrom-again-") as folder:
+        new = [os.path.join(folder, os.path.relpath(path, root)) for path in old]
+        try:
+            job.make(dict(zip(job.outputs, new, strict=True)))
+        except FAULTS:
+            return old
+        return [o for o, n in zip(old, new, strict=True) if not filecmp.cmp(o, n, shallow=False)]
 
 
 def is_derived(name: str) -> bool:

@@ -14,7 +14,7 @@ from study.artifact.paths import TABLE
 from study.artifact.reads import TableOf
 from study.tables import declared
 from study.verification.examine import Examination
-from study.verification.files import is_derived, made
+from study.verification.files import is_derived
 from study.verification.references import folder_of, read_references, write_reference
 from study.verification.subject import Subject
 
@@ -58,9 +58,8 @@ def project(tracked, subject, tmp_path_factory):
             frame = tracked.get(name, table.checked(pd.DataFrame()))
             write_table(timed(table, frame), TABLE.at(RESULTS, name=name))
         for name in derived_tables():
-            with made(subject.plan.job(declared()[name])) as files:
-                [(path, new)] = files.items()
-                write_table(read_table(new), path)
+            job = subject.plan.job(declared()[name])
+            job.make(job.outputs)
         for name, table in declared().items():
             frame = table.checked(read_table(TABLE.at(RESULTS, name=name)))
             write_reference(table, frame, folder_of(RESULTS))

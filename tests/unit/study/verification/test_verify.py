@@ -21,7 +21,7 @@ from study.figures.kit.declaration import declarations
 from study.tables import declared
 from study.verification.command import NOTHING, status_of, update, verify, verify_tables
 from study.verification.examine import Examination, Line, Outcome
-from study.verification.files import differing, made
+from study.verification.files import differing
 from study.verification.references import LOG, folder_of
 from study.verification.subject import Status
 
@@ -51,9 +51,8 @@ def test_a_verdict_that_times_have_changed_is_shown_and_not_judged(examination):
     slow = read_table(path).local_share.median() >= 0.7
     write_table(read_table(path).assign(local_share=0.1 if slow else 0.9), path)
     for name in ("claims", "claims_tests", "claims_sensitivity"):
-        with made(examination.subject.plan.job(declared()[name])) as files:
-            [(path, new)] = files.items()
-            write_table(read_table(new), path)
+        job = examination.subject.plan.job(declared()[name])
+        job.make(job.outputs)
     lines = {line.name: line for line in examination.claims(examination.table("claims"))}
     assert lines["C1"].outcome is Outcome.NOT_COMPARABLE
     now = "does not hold" if slow else "holds"
@@ -139,10 +138,7 @@ def test_tables_that_a_run_would_make_again_are_not_expected(
 def test_a_figure_is_drawn_again_to_the_byte(results, subject):
     """Replaced, with new checksums, by a figure that its table does not give, or another's."""
     job = subject.plan.job(declarations()["local_share"])
-    with made(job) as drawn:
-        for path, new in drawn.items():
-            with atomic_path(path) as temporary:
-                temporary.write_bytes(new.read_bytes())
+    job.make(job.outputs)
     assert differing(job) == []
     edited, *_ = outputs = list(job.outputs.values())
     content = Path(edited).read_bytes()
