@@ -27,9 +27,9 @@ CANDIDATE = ["scene", "factor", "stiffness", *settings.SETTING]
 
 # Relative difference of errors that is allowed between machines: rounding errors decide which steps
 # the two-level methods reject.
-LOOSE = 0.3
+ERROR_TOLERANCE = 0.3
 # The same for an estimated error of a reference: 0.06 was measured.
-ESTIMATE = 0.5
+ESTIMATE_TOLERANCE = 0.5
 REFERENCES = ("implicit", "continuous")
 CASE = ["scene", "vertices", "stiffness", "motion"]
 SPEEDUP = ("reduced_speedup", "reduced_speedup_low", "reduced_speedup_high")
@@ -61,9 +61,9 @@ KNOWN = 3.0  # least limit of errors / error of the reference run "continuous"
         flag("finite", "no frame blew up", compared="error"),
         *shared("ms_per_frame vertices_ms"),
         integer("processes", "processes that timed it, all in the first motion"),
-        number("error_implicit", "against the converged step", tolerance=LOOSE),
-        number("error_continuous", "against continuous time: the total", tolerance=LOOSE),
-        number("reference_error", "estimated error of that motion", tolerance=ESTIMATE),
+        number("error_implicit", "against the converged step", tolerance=ERROR_TOLERANCE),
+        number("error_continuous", "against continuous time: the total", tolerance=ERROR_TOLERANCE),
+        number("reference_error", "estimated error of that motion", tolerance=ESTIMATE_TOLERANCE),
         number("span_error", "error of the nearest motion in the subspace of a reduction"),
         DAY,
     ),

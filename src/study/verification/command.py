@@ -9,9 +9,9 @@ from pathlib import Path
 
 from pdrom.core.errors import ConfigurationError, StorageError
 from pdrom.core.machine import machine
-from pdrom.core.store import Condition, check_file, read_table, write_text
+from pdrom.core.store import write_text
 from study.article.build import INDEX, write_verified
-from study.artifact.paths import ARTICLE, TABLE
+from study.artifact.paths import ARTICLE
 from study.tables import declared
 from study.verification.examine import GOOD, Examination, Line, Outcome
 from study.verification.files import verify_files
@@ -34,24 +34,19 @@ def update(subject: Subject, reason: str) -> Path:
     words = " ".join(reason.split())
     if not words:
         raise ConfigurationError('verify --update: say why, as in --reason "a new method"')
-    paths = {name: TABLE.at(subject.results, name=name) for name in declared()}
-    for name, path in paths.items():
-        if not Path(path).is_file() or check_file(path) is not Condition.INTACT:
-            raise StorageError(f"{path}: not there or damaged; run {subject.command(name)}")
+    examination = Examination(subject)
+    tables = {name: examination.found(name) for name in declared()}
     command = [sys.executable, "-m", "study.pipeline.front", "-n", *subject.options, "--"]
     done = subprocess.run([*command, *declared()], capture_output=True, text=True, check=False)
     if done.returncode != 0:
         last = (done.stderr.strip().splitlines() or ["no word"])[-1]
         raise StorageError(f"verify --update: the run cannot be planned: {last}")
     if NOTHING not in done.stdout + done.stderr:
-        raise StorageError(
-            f"verify --update: tables are older than what they are made from; run "
-            f"{subject.command()} first"
-        )
-    tables = [(table, table.checked(read_table(paths[name]))) for name, table in declared().items()]
+        fault = f"tables are older than what they are made from; run {subject.command()} first"
+        raise StorageError(f"verify --update: {fault}")
     folder = folder_of(subject.results)
-    for table, frame in tables:
-        write_reference(table, frame, folder)
+    for name, frame in tables.items():
+        write_reference(declared()[name], frame, folder)
     for old in [*folder.glob("*.csv"), *folder.glob("*.csv.xz")]:
         if old.name.partition(".")[0] not in declared():
             old.unlink()  # delete the expected version of a table that no longer exists

@@ -92,7 +92,7 @@ class Examination:
         """
         path, table = TABLE.at(self.subject.results, name=name), declared()[name]
         if not self.intact(path):
-            raise StorageError(f"{path}: not there, or damaged")
+            raise StorageError(f"{path}: not there or damaged; run {self.subject.command(name)}")
         if other := sorted(set(read_table(path).columns) - set(table.column_names)):
             raise StorageError(f"{path}: has the unknown column(s) {', '.join(other)}")
         return table.checked(read_table(path, table.column_names))

@@ -83,15 +83,12 @@ def test_without_a_reason_nothing_is_updated(subject, reason):
         update(subject, reason)
 
 
-@pytest.mark.parametrize(
-    ("content", "message"),
-    [(None, r"not there; make it by ./reproduce --configfile"), ("scene\n", "damaged")],
-)
-def test_from_missing_or_damaged_tables_nothing_is_updated(subject, tmp_path, content, message):
+@pytest.mark.parametrize("content", [None, "scene\n"])
+def test_from_missing_or_damaged_tables_nothing_is_updated(subject, tmp_path, content):
     folder = tmp_path / "results" / "studies" / "tiny" / "tables"
     folder.mkdir(parents=True)
     if content:
         (folder / f"{min(declared())}.csv").write_text(content)
-    with pytest.raises(StorageError, match=message):
+    with pytest.raises(StorageError, match=r"not there or damaged; run \./reproduce"):
         update(subject, "a reason")
     assert not (tmp_path / "results" / "reference").exists()
