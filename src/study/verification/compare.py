@@ -170,9 +170,9 @@ class Comparison:
         if column.quantity == "value" and column.kind == "integer":
             tolerance[selected_by_fit(self.e)] = SELECTION_TOLERANCE
         judged = [name for name in RUN_ERRORS if name in self.e][:1]
+        judged += [column.name] if "error" in column.name else []
         number = column.quantity == "error" and column.kind == "number"
         if number and judged and self.table.name != APPROXIMATIONS:
-            judged += [column.name] if "error" in column.name else []
             wrong = (self.e[judged] > WRONG_ERROR).all(axis=1).to_numpy(dtype=bool)
             tolerance[wrong] = max(column.within, WRONG_TOLERANCE)
         return tolerance

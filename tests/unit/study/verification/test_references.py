@@ -1,7 +1,5 @@
 """Expected tables: what is kept, how it is packed, and who may change it."""
 
-from datetime import date
-
 import pandas as pd
 import pytest
 
@@ -11,7 +9,7 @@ from study.tables import declared
 from study.tables.kit.declaration import TOLERANCES
 from study.verification import references
 from study.verification.command import update
-from study.verification.references import note, read_reference, write_reference
+from study.verification.references import read_reference, write_reference
 from study.verification.subject import Subject
 
 TABLE = declared()["reduced_reruns"]
@@ -46,15 +44,6 @@ def test_a_damaged_reference_is_named(tmp_path):
     (tmp_path / "reduced_reruns.csv.xz").write_bytes(b"no archive")
     with pytest.raises(StorageError, match=r"reduced_reruns\.csv\.xz: cannot be read"):
         read_reference(TABLE, tmp_path)
-
-
-def test_reasons_are_noted_in_their_order(tmp_path):
-    for reason in ("first", "second"):
-        note(tmp_path, reason, date(2026, 1, 2), "0.1.0 (abc)")
-    text = (tmp_path / references.LOG).read_text(encoding="utf-8")
-    assert text.endswith(
-        "- 2026-01-02, code 0.1.0 (abc): first\n- 2026-01-02, code 0.1.0 (abc): second\n"
-    )
 
 
 def test_tracked_references_are_small_and_whole():

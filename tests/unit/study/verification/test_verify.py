@@ -116,8 +116,8 @@ def test_an_update_writes_every_table_and_notes_the_reason(results, subject, mon
     before = {path.name: path.read_bytes() for path in folder.glob("*.csv*")}
     (folder / "ladder.csv").unlink()
     (folder / "of_an_older_version.csv.xz").touch()
-    assert update(subject, " a new\n method ") == folder
-    assert (folder / LOG).read_text("utf-8").endswith("): a new method\n")
+    assert [update(subject, why) for why in (" a new\n method ", "second")] == [folder] * 2
+    assert re.search(r"\): a new method\n- .*\): second\n$", (folder / LOG).read_text("utf-8"))
     (folder / LOG).unlink()
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
 
