@@ -63,7 +63,12 @@ KNOWN = 3.0  # least limit of errors / error of the reference run "continuous"
         integer("processes", "processes that timed it, all in the first motion"),
         number("error_implicit", "against the converged step", tolerance=ERROR_TOLERANCE),
         number("error_continuous", "against continuous time: the total", tolerance=ERROR_TOLERANCE),
-        number("reference_error", "estimated error of that motion", tolerance=ESTIMATE_TOLERANCE),
+        number(
+            "reference_error",
+            "estimated error of that motion",
+            compared="value",
+            tolerance=ESTIMATE_TOLERANCE,
+        ),
         number("span_error", "error of the nearest motion in the subspace of a reduction"),
         DAY,
     ),

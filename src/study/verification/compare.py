@@ -24,7 +24,7 @@ WRONG_ERROR, WRONG_TOLERANCE = 0.1, 0.3
 SELECTION_TOLERANCE = 0.25
 # Median rule: largest median of difference / tolerance, over at least so many cells of a column, or
 # of the rows of a column that share a name (of a method, a scene ...).
-MEDIAN_LIMIT, MEDIAN_CELLS_OF_COLUMN, MEDIAN_CELLS_OF_NAME = 0.1, 3, 10
+MEDIAN_LIMIT, MEDIAN_CELLS_OF_COLUMN, MEDIAN_CELLS_OF_NAME = 0.1, 3, 5
 # Count rule: a run has changed if it ends otherwise or a number differs by more than this factor.
 # This share of the unstable runs of a scene and method may change (rounded up).
 CHANGED_FACTOR, CHANGED_SHARE = 5.0, 0.25

@@ -158,7 +158,7 @@ def test_a_message_names_the_row_and_how_far_it_is_off(tiny):
 def test_numbers_of_a_column_or_of_a_scene_group_or_method_that_change_by_4_per_cent_are_noticed(
     studies,
 ):
-    """From three stable cells of a column on; of errors in rows with a common name, from ten on."""
+    """Of three stable cells of a column, or five errors in rows with a common name, or more."""
     missed, tried = [], set()
     tables = [*studies[1].values(), studies[0]["reduced_reruns"], studies[0]["accuracy_cost"]]
     for alone in tables:
@@ -172,7 +172,7 @@ def test_numbers_of_a_column_or_of_a_scene_group_or_method_that_change_by_4_per_
                 nonzero, changed = (
                     stable(alone, column, least)[rows].sum() for least in (0, 1e-10)
                 )
-                enough = changed >= (3 if value is None else 10) and changed > nonzero / 2
+                enough = changed >= (3 if value is None else 5) and changed > nonzero / 2
                 if enough and (value is None or column.quantity == "error"):
                     other = 1.04 * found.loc[rows, column.name]
                     whole = column.kind == "integer"
