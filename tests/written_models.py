@@ -9,6 +9,7 @@ from pdrom.model.mesh.types import save_mesh
 from pdrom.model.runs import trajectory
 from pdrom.model.scene import Scene
 from pdrom.reduction.subspace import model as subspaces
+from pdrom.reduction.subspace.training import make_columns
 from places import ROOT
 from study.artifact.paths import File
 from study.experiments.subspaces import LiveModels, Options, live
@@ -32,9 +33,7 @@ def write_models(
     (group,) = scene.groups
     elements = np.arange(0, group.elements, every)
     samples = {group.name: subspaces.Samples(elements, np.full(len(elements), float(every)))}
-    model = subspaces.SubspaceModel(
-        "pod", subspaces.make_columns(scene, reference[1:], "pod", k), samples
-    )
+    model = subspaces.SubspaceModel(make_columns([scene], reference[1:], k), samples)
     save_mesh(scene.mesh, folder / "mesh.h5")
     with write_hdf5(folder / "train.h5") as file:
         file["positions"] = reference

@@ -14,7 +14,8 @@ from pdrom.reduction.basis import Basis
 from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.sampling import Reduction, Sampling
 from pdrom.reduction.sampling.gappy_pod_e import eigenvalue_growth
-from pdrom.reduction.subspace.model import Samples, SubspaceModel, make_columns
+from pdrom.reduction.subspace.model import Samples, SubspaceModel
+from pdrom.reduction.subspace.training import make_columns
 from strategies import SEEDS
 
 SHEET = {"kind": "cloth", "rows": 6, "columns": 5, "plane": "xz"}
@@ -51,9 +52,9 @@ def test_what_is_not_sampled_moves_on_uniformly():
     """
     kick = {"effect": "kick", "speed": 1.0, "seed": 3}
     scene = make_scene(kick, {"effect": "spring", "weight": 1e8}, mesh=SHEET, frames=30)
-    columns = make_columns(scene, trajectory(scene)[1:], "pod", 8)
+    columns = make_columns([scene], trajectory(scene)[1:], 8)
     samples = {"spring": Samples(np.array([0, 7]), np.array([20.0, 20.0]))}
-    loop, state = SubspaceModel("pod", columns, samples).loop(scene)
+    loop, state = SubspaceModel(columns, samples).loop(scene)
     group = scene.group("spring")
     strain = (group.S @ columns.B)[[0, 7]]
     mass = columns.B.T @ (scene.masses[:, None] * columns.B)
@@ -71,9 +72,9 @@ def test_a_sampled_run_stays_within_the_bound_of_the_subspace():
     """The theorem in z: |e_n| <= alpha beta in the norm of B^T K_xi B, e to projections of zero."""
     kick = {"effect": "kick", "speed": 3.0, "seed": 3}
     scene = make_scene(kick, {"effect": "spring", "weight": 1e6}, mesh=SHEET, frames=60)
-    columns = make_columns(scene, trajectory(scene)[1:], "pod", 8)
+    columns = make_columns([scene], trajectory(scene)[1:], 8)
     elements, factors = np.arange(0, 40, 5), np.linspace(1.0, 9.0, 8)
-    model = SubspaceModel("pod", columns, {"spring": Samples(elements, factors)})
+    model = SubspaceModel(columns, {"spring": Samples(elements, factors)})
     loop, state = model.loop(scene)
     h, B = scene.config.time_step, columns.B
     stretch = np.sqrt(factors * 1e6)[:, None] * (scene.group("spring").S @ B)[elements]

@@ -5,6 +5,7 @@ import os
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import takewhile
+from time import perf_counter
 from typing import Any
 
 import h5py
@@ -14,11 +15,14 @@ from pdrom.core.store import write_hdf5
 from pdrom.model.dynamics.acceleration import minimise
 from pdrom.model.dynamics.space import VertexSpace
 from pdrom.model.dynamics.stepper import PHASES, FrameReport, State, Stepper
-from pdrom.model.dynamics.system import DEFAULT_SOLVER, GlobalSystem
+from pdrom.model.dynamics.system import GlobalSystem
 from pdrom.model.mesh.types import store_mesh
 from pdrom.model.scene import Scene
 
 log = logging.getLogger(__name__)
+
+# A run ends as a blow-up if its bounding box exceeds this multiple of that of the rest shape.
+BLOWUP_EXTENT = 100.0
 
 
 def trajectory(scene: Scene, perturbation: np.ndarray | None = None, **stepper: Any) -> np.ndarray:
@@ -58,7 +62,8 @@ class ConvergedStepper(Stepper):
     def step(
         self, state: State, frame: int, on_last_iterate: Callable[[np.ndarray], None] | None = None
     ) -> tuple[State, FrameReport]:
-        """Compute ``frame`` from ``state``; ``on_last_iterate`` is ignored, the report is empty."""
+        """Compute ``frame`` from ``state``; ``on_last_iterate`` is ignored."""
+        started = perf_counter()
         s, elimination, base, anchors = self._begin(state, frame)
         rhs = np.empty_like(s)
 
@@ -74,26 +79,36 @@ class ConvergedStepper(Stepper):
         )
         self.changes.append(end.change)
         self.evaluations.append(end.evaluations)
-        return self._finish(state, end.y, frame, anchors), FrameReport(np.empty(0), np.zeros(4))
+        after, seconds = self._finish(state, end.y, frame, anchors), np.zeros(len(PHASES))
+        seconds[1] = perf_counter() - started  # its phases are not told apart
+        return after, FrameReport(np.empty(0), seconds)
 
 
-def converged_run(scene: Scene, tolerance: float, limit: int) -> np.ndarray | None:
+def converged_run(
+    scene: Scene,
+    tolerance: float,
+    limit: int,
+    on_frame: Callable[[int, FrameReport], None] = lambda frame, report: None,
+) -> np.ndarray | None:
     """Positions (F + 1, N, 3) m of a run of ``scene`` in which every frame has converged.
 
     Initial positions come first. None if, after ``limit`` evaluations of a frame's objective, one
     more iteration would move a vertex by over ``tolerance`` times the mesh's longest side.
+    ``on_frame`` is called after each frame with its number and report.
     """
     best, state = ConvergedStepper(scene, scene.system, tolerance, limit), scene.initial_state()
     ends = takewhile(lambda _: best.converged, best.run(state, range(scene.config.frames)))
-    positions = np.stack([state.positions, *(after.positions for after, _ in ends)])
-    return positions if best.converged else None
+    positions = [state.positions]
+    for frame, (after, report) in enumerate(ends):
+        positions.append(after.positions)
+        on_frame(frame, report)
+    return np.stack(positions) if best.converged else None
 
 
 def run(
     scene: Scene,
     path: str | os.PathLike[str],
     snapshot_frames: Mapping[str, np.ndarray],
-    solver: str = DEFAULT_SOLVER,
     with_mesh: bool = False,
     on_frame: Callable[[int, FrameReport], None] = lambda frame, report: None,
 ) -> None:
@@ -106,12 +121,9 @@ def run(
     with_mesh : whether the mesh is written, too, so that the file can be used without the scene
     on_frame : called after each frame with its number and report
     path : HDF5 file that is written
-    solver : name of a sparse solver of `pdrom.model.dynamics.solvers`
     """
     frames = scene.config.frames
-    system = scene.system_with(solver)
-    loop = scene.stepper(system)
-    state = scene.initial_state()
+    loop, state = scene.stepper(), scene.initial_state()
     with write_hdf5(path) as file:
         if with_mesh:
             store_mesh(scene.mesh, file.create_group("mesh"))
@@ -139,7 +151,7 @@ def run(
             on_frame(frame, report)
             if (frame + 1) % max(1, frames // 10) == 0:
                 log.info("%s: frame %d of %d", scene.config.name, frame + 1, frames)
-        file.attrs["factorisations"] = system.factorisations
+        file.attrs["factorisations"] = scene.system.factorisations
 
 
 class _SnapshotRecorder:

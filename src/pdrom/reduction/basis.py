@@ -1,8 +1,9 @@
-"""POD bases computed from snapshots of projections: weighting, centring, signs, numerical rank."""
+"""POD bases computed from snapshots of projections: centring, signs, numerical rank."""
 
 import os
 from dataclasses import dataclass, replace
 
+import h5py
 import numpy as np
 from scipy import linalg
 
@@ -24,10 +25,9 @@ class Basis:
     The group has e elements with p rows of three numbers (x, y, z) each. Entry i of a vector is
     axis i % 3 of row i // 3, which belongs to element i // (3 p).
 
-    V : (3 e p, rank); orthonormal (with mass weighting in the inner product of the row masses), or
-        orthonormal axis by axis if ``separate_axes``
+    V : (3 e p, rank); orthonormal, with centring "mean-in-modes" axis by axis
     mean : (3 e p,), zero unless the snapshots are centred
-    singular_values : all singular values of the matrix of weighted, centred training snapshots
+    singular_values : all singular values of the matrix of centred training snapshots
     rank : number of singular values above round-off, which is the number of columns of V
     roundoff : singular values up to this absolute size are noise
     active_axes : for each axis x, y, z, whether its snapshots exceed round-off
@@ -40,7 +40,6 @@ class Basis:
     rank: int
     roundoff: float
     rows_per_element: int
-    separate_axes: bool
     active_axes: tuple[bool, ...]
     origin: str = "basis"
 
@@ -62,35 +61,43 @@ class Basis:
 
 
 _ARRAYS = ("V", "mean", "singular_values")
-_ATTRIBUTES = ("rank", "roundoff", "rows_per_element", "separate_axes", "active_axes")
+_ATTRIBUTES = ("rank", "roundoff", "rows_per_element", "active_axes")
 
 
 def save_basis(basis: Basis, path: str | os.PathLike[str]) -> None:
     """Write ``basis`` to the HDF5 file ``path``."""
     with write_hdf5(path) as file:
-        for name in _ARRAYS:
-            file[name] = getattr(basis, name)
-        for name in _ATTRIBUTES:
-            file.attrs[name] = getattr(basis, name)
+        store_basis(basis, file)
+
+
+def store_basis(basis: Basis, file: h5py.Group) -> None:
+    """Write ``basis`` to the open HDF5 group ``file``."""
+    for name in _ARRAYS:
+        file[name] = getattr(basis, name)
+    for name in _ATTRIBUTES:
+        file.attrs[name] = getattr(basis, name)
 
 
 def load_basis(path: str | os.PathLike[str]) -> Basis:
     """Read the basis file ``path`` that `save_basis` wrote; StorageError if it is damaged."""
     with open_hdf5(path) as file:
-        return Basis(
-            **{name: file[name][...] for name in _ARRAYS},
-            rank=int(file.attrs["rank"]),
-            roundoff=float(file.attrs["roundoff"]),
-            rows_per_element=int(file.attrs["rows_per_element"]),
-            separate_axes=bool(file.attrs["separate_axes"]),
-            active_axes=tuple(bool(a) for a in file.attrs["active_axes"]),
-            origin=str(path),
-        )
+        return stored_basis(file, str(path))
+
+
+def stored_basis(file: h5py.Group, origin: str) -> Basis:
+    """Read the basis that `store_basis` wrote to the HDF5 group ``file``, named ``origin``."""
+    return Basis(
+        **{name: file[name][...] for name in _ARRAYS},
+        rank=int(file.attrs["rank"]),
+        roundoff=float(file.attrs["roundoff"]),
+        rows_per_element=int(file.attrs["rows_per_element"]),
+        active_axes=tuple(bool(a) for a in file.attrs["active_axes"]),
+        origin=origin,
+    )
 
 
 def compute_basis(
     snapshots: np.ndarray,
-    row_mass: np.ndarray,
     roundoff: float,
     rows_per_element: int,
     spec: BasisSpec,
@@ -101,34 +108,29 @@ def compute_basis(
     Parameters
     ----------
     snapshots : (n, e p, 3) projections of e elements with p rows each
-    row_mass : (e p,) kg, used by mass weighting
     roundoff : Frobenius norm of the rounding errors in ``snapshots``
     rows_per_element : p
     signs : generator that draws the sign of each mode; None keeps all signs. Signs matter only with
         centring "mean-in-modes": it adds the first snapshot to every mode, so that the span of the
         modes depends on their signs.
-    spec : weighting, centring and layout
+    spec : centring
 
     Raises
     ------
     SnapshotError
-        Fewer than two snapshots, a wrong shape, NaN or Inf, or mass weighting with a zero mass.
+        Fewer than two snapshots, a wrong shape, NaN or Inf.
     """
-    _check(snapshots, row_mass, rows_per_element, spec)
+    _check(snapshots, rows_per_element)
     require_finite("round-off of the snapshots", np.array([roundoff]), SnapshotError)
     largest = float(np.abs(snapshots).max())
     if largest > 0.0 and not SMALL <= largest <= 1.0 / SMALL:
         unit = 2.0 ** (np.frexp(largest)[1] - 1)  # a power of two, so that scaling is exact
-        scaled = snapshots / unit, row_mass, roundoff / unit
-        made = compute_basis(*scaled, rows_per_element, spec, signs)
+        made = compute_basis(snapshots / unit, roundoff / unit, rows_per_element, spec, signs)
         with np.errstate(over="ignore"):
             sigma = require_finite("singular values", made.singular_values * unit, SnapshotError)
         noise = float(made.roundoff * unit)
         return replace(made, mean=made.mean * unit, singular_values=sigma, roundoff=noise)
     matrix = snapshots.reshape(len(snapshots), -1).T
-    scale = np.ones(3 * len(row_mass))  # square roots of the masses for mass weighting, else 1
-    if spec.weighting == "mass":
-        scale = np.repeat(np.sqrt(row_mass), 3)
     mean, error, shown = np.zeros(len(matrix)), roundoff, matrix
     if spec.centring == "affine":
         # The mean of n snapshots has a rounding error of at most n eps/2 times the mean of their
@@ -141,33 +143,26 @@ def compute_basis(
         shown = matrix - mean[:, None]
     elif spec.centring == "mean-in-modes":
         mean = matrix[:, 0].copy()
-    centred = (matrix - mean[:, None]) * scale[:, None]
-    noise = error * float(scale.max())
+    centred = matrix - mean[:, None]
     # an axis is active if the norm of its snapshots exceeds both the round-off of the data and that
     # of an SVD, which is relative to the largest of the three norms
     norms = np.array([np.linalg.norm(shown[axis::3]) for axis in range(3)])
     least = max(error, max(shown.shape) * np.finfo(float).eps * norms.max())
     active = tuple(bool(norm > least) for norm in norms)
-    if spec.layout == "per-axis":
-        modes, sigma, ranks = _per_axis(centred, noise)
-        active = tuple(a and own > 0 for a, own in zip(active, ranks, strict=True))
-        rank = max(ranks)
-    else:
-        modes, sigma = pod(centred)
-        rank = numerical_rank(sigma, centred.shape, noise)
+    modes, sigma = pod(centred)
+    rank = numerical_rank(sigma, centred.shape, error)
     v = modes[:, : rank if any(active) else 0]
     if spec.centring == "mean-in-modes":
         # on one axis, no more modes can be orthonormal than the axis has rows
-        v = _mean_in_modes(v[:, : len(row_mass)], centred, mean * scale, active, signs)
+        v = _mean_in_modes(v[:, : snapshots.shape[1]], centred, mean, active, signs)
         mean = np.zeros_like(mean)
     return Basis(
-        V=np.ascontiguousarray(v / scale[:, None]),
+        V=np.ascontiguousarray(v),
         mean=mean,
         singular_values=sigma,
         rank=v.shape[1],
-        roundoff=noise,
+        roundoff=error,
         rows_per_element=rows_per_element,
-        separate_axes=spec.separate_axes,
         active_axes=active,
     )
 
@@ -183,12 +178,10 @@ def basis_of(
     Snapshots ``train`` (n, e p, 3) replace them if given; ``signs`` draws random signs of modes.
     """
     snapshots, p = data.train if train is None else train, data.rows_per_element
-    return compute_basis(snapshots, data.row_mass, data.roundoff, p, spec, signs)
+    return compute_basis(snapshots, data.roundoff, p, spec, signs)
 
 
-def _check(
-    snapshots: np.ndarray, row_mass: np.ndarray, rows_per_element: int, spec: BasisSpec
-) -> None:
+def _check(snapshots: np.ndarray, rows_per_element: int) -> None:
     if snapshots.ndim != 3 or snapshots.shape[2] != 3 or len(snapshots) < 2:
         raise SnapshotError(f"snapshots of shape {snapshots.shape}, required: (n >= 2, e p, 3)")
     rows = snapshots.shape[1]
@@ -197,32 +190,7 @@ def _check(
             f"snapshots of {rows} rows, required: a multiple of rows_per_element "
             f"= {rows_per_element}"
         )
-    if row_mass.shape != (rows,):
-        raise SnapshotError(f"row_mass of shape {row_mass.shape}, required: ({rows},)")
     require_finite("snapshots", snapshots, SnapshotError)
-    if spec.weighting == "mass":
-        require_finite("row_mass", row_mass, SnapshotError)
-        if row_mass.min() <= 0.0:
-            row = int(np.argmin(row_mass))
-            raise SnapshotError(f"row_mass: row {row} has {row_mass[row]} kg, required: above 0")
-
-
-def _per_axis(centred: np.ndarray, noise: float) -> tuple[np.ndarray, np.ndarray, list[int]]:
-    """Return one POD basis per axis as (modes, singular values, rank of each axis).
-
-    Singular values of an axis up to ``noise`` do not count for its rank, and modes beyond the rank
-    are zero. The returned singular value k is the 2-norm of the k-th ones of the three axes.
-    """
-    n, m = centred.shape
-    modes = np.zeros((n, min(n // 3, m)))
-    sigma = np.zeros((3, min(n // 3, m)))
-    ranks = []
-    for axis in range(3):
-        u, sigma[axis] = pod(centred[axis::3])
-        own = numerical_rank(sigma[axis], centred[axis::3].shape, noise)
-        modes[axis::3, :own] = u[:, :own]
-        ranks.append(own)
-    return modes, np.linalg.norm(sigma, axis=0), ranks
 
 
 def _mean_in_modes(

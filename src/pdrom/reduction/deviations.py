@@ -5,15 +5,18 @@ Positions, velocities, shapes (the difference after the best rigid motion of eac
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import cached_property
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
+from pdrom.model.dynamics.stepper import State, Stepper
 from pdrom.model.energy import STRIDE, EnergyScale
 from pdrom.model.metrics import shape_differences, trajectory_error
+from pdrom.model.runs import BLOWUP_EXTENT
 from pdrom.model.scene import Scene
-from pdrom.reduction.rerun import Rerun, displacement_norms, step_norms
+from pdrom.reduction.rerun import Rerun, displacement_norms, rerun, step_norms
 
 # Number of frames compared at a time, so that the memory used does not grow with the run.
 BLOCK = 32
@@ -29,6 +32,14 @@ ERRORS = (
     "velocity_error", "energy_drift", "contact_delay",
 )  # fmt: skip
 Series = Mapping[str, np.ndarray]
+
+
+class Reduced(Protocol):
+    """A reduced model, which makes the step loop of a scene and maps its unknowns to positions."""
+
+    def loop(self, scene: Scene) -> tuple[Stepper, State]: ...
+
+    def positions(self, y: np.ndarray) -> np.ndarray: ...
 
 
 class Yardstick:
@@ -66,6 +77,29 @@ class Yardstick:
             "contact": np.concatenate([self._touched(q[1:]) for q in blocks]),
         }
 
+    def run(self, model: Reduced, offset: np.ndarray | None = None) -> Rerun:
+        """Run the scene with ``model``, from positions moved by ``offset`` (N, 3) m."""
+        loop, start = model.loop(self.scene)
+        if offset is not None:
+            start = replace(start, positions=start.positions + offset)
+        reference, limit = self.reference, BLOWUP_EXTENT
+        return rerun(self.scene, loop, start, reference, limit, model.positions)
+
+    def row(self, outcome: Rerun) -> dict[str, Any]:
+        """Map table columns to results of ``outcome``; no error if the run ended early.
+
+        The error is || Q - Q_fom || / || Q_fom - Q_0 ||, norms over all frames of positions Q.
+        """
+        end = len(self.displacement)
+        error = error_within(outcome.difference, self.displacement, end)
+        return {
+            "frames": outcome.frames,
+            "finite": outcome.finite,
+            "blowup_frame": outcome.blowup_frame,
+            "max_extent": outcome.max_extent,
+            "relative_error": error if outcome.finite else None,
+        }
+
     @property
     def units(self) -> dict[str, float]:
         """Extent norm, m, and time step, s: keyword arguments of `errors_within`.
@@ -97,11 +131,6 @@ class Yardstick:
             "energy": self.scale.relative(outcome.positions),
             "contact": np.concatenate(contacts),
         }
-
-    def errors(self, outcome: Rerun) -> dict[str, float | None]:
-        """Map column names to errors of ``outcome`` over all frames; None if it ended earlier."""
-        end = len(self.displacement)
-        return errors_within(self.deviations(outcome), self.series, end, **self.units)
 
     def _touched(self, positions: np.ndarray) -> np.ndarray:
         """Array (f,): 1 if a vertex touches an obstacle in a frame of ``positions`` (f, N, 3) m.

@@ -1,13 +1,14 @@
 """A run of a reduced model, compared with the full-order run frame by frame."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from pdrom.core.packed import brief
-from pdrom.model.metrics import trajectory_error
+from pdrom.model.dynamics.stepper import State, Stepper
 from pdrom.model.runs import BoundedRun
+from pdrom.model.scene import Scene
 
 
 @dataclass(frozen=True)
@@ -44,38 +45,35 @@ class Rerun:
         """Longest side of any frame's bounding box, divided by that at rest; 0 without frames."""
         return float(self.extent.max(initial=0.0))
 
-    def row(self, displacement: np.ndarray) -> dict[str, Any]:
-        """Map table columns to results; `error` describes the argument ``displacement`` (F,) m."""
-        return {
-            "frames": self.frames,
-            "finite": self.finite,
-            "blowup_frame": self.blowup_frame,
-            "max_extent": self.max_extent,
-            "relative_error": self.error(displacement),
-        }
 
-    def error(self, displacement: np.ndarray) -> float | None:
-        """Error || Q - Q_fom || / || Q_fom - Q_0 || of positions Q; None if the run ended early.
+def rerun(
+    scene: Scene,
+    loop: Stepper,
+    start: State,
+    reference: np.ndarray,
+    limit: float,
+    positions: Callable[[np.ndarray], np.ndarray] = lambda y: y,
+) -> Rerun:
+    """Run ``loop`` from ``start``; compare it with the full-order run ``reference`` of ``scene``.
 
-        ``displacement`` (F,) m is || Q_fom - Q_0 ||_F in each full-order frame; Q_0: at the start.
-        """
-        if not self.finite or self.frames < len(displacement):
-            return None
-        return trajectory_error(self.difference, displacement)
-
-
-def compare(run: BoundedRun, reference: np.ndarray) -> Rerun:
-    """Execute ``run``; compare it with full-order positions ``reference`` (F + 1, N, 3) m."""
-    coordinates = [run.state.positions]
-    positions = [run.positions(run.state.positions)]
+    Parameters
+    ----------
+    reference : (F + 1, N, 3) m
+    limit : the run ends if its bounding box exceeds this multiple of that at rest
+    positions : function that maps the unknowns of ``loop`` to vertex positions (N, 3) m
+    """
+    frames, unit = scene.config.frames, scene.mesh.extent
+    run = BoundedRun(loop.run, start, frames, limit, unit, positions)
+    coordinates = [start.positions]
+    reached = [positions(start.positions)]
     difference, extents = [], []
     for frame in run:
         coordinates.append(frame.state.positions)
-        positions.append(frame.positions)
+        reached.append(frame.positions)
         difference.append(float(np.linalg.norm(frame.positions - reference[frame.number + 1])))
         extents.append(frame.extent)
-    stacked = np.stack(positions)
-    unknowns = stacked if positions[0] is coordinates[0] else np.stack(coordinates)
+    stacked = np.stack(reached)
+    unknowns = stacked if reached[0] is coordinates[0] else np.stack(coordinates)
     return Rerun(stacked, np.array(difference), np.array(extents), run.blowup_frame, unknowns)
 
 

@@ -4,11 +4,12 @@ import os
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import sparse
 
 from pdrom.core.errors import SnapshotError
 from pdrom.core.store import open_hdf5, require_finite, write_hdf5
 from pdrom.model.constraints.base import ConstraintGroup
+from pdrom.model.dynamics.stepper import State
+from pdrom.model.scene import Scene
 
 SPLITS = ("train", "test", "heldout")
 
@@ -29,23 +30,26 @@ def stored_frames(frames: int, count: int) -> np.ndarray:
     return np.sort(np.concatenate([training_frames(frames, count), test_frames(frames)]))
 
 
-def row_masses(group: ConstraintGroup, masses: np.ndarray) -> np.ndarray:
-    """Lumped mass (e p,) kg of each operator row: e elements of p rows, vertex ``masses`` (N,) kg.
+def recorded(
+    scene: Scene, group: str, state: State, frames: int | None = None
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Run a scene in full order from ``state``, and project the last iterate of every frame.
 
-    Every vertex divides its mass equally among the elements that contain it, so that the element
-    masses sum to the mass of all vertices of elements; each row has the mass of its element.
+    Return, for the first ``frames`` frames (None: all), positions (F + 1, N, 3) m, projections
+    (F, e p, 3) of the constraint ``group`` with e elements of p rows in the last local step of
+    every frame, and norms (F,) of their rounding errors.
     """
-    element = touched_vertices(group)
-    valence = np.asarray(element.sum(axis=0)).ravel()
-    share = np.divide(masses, valence, out=np.zeros_like(masses), where=valence > 0)
-    return np.repeat(element @ share, group.rows_per_element)
+    loop, positions = scene.stepper(track_objective=False), [state.positions]
+    own, projections, roundoff = loop.local_step(group), list[np.ndarray](), list[float]()
 
+    def watch(y: np.ndarray) -> None:
+        projections.append(own.project(y))
+        roundoff.append(own.roundoff(y))
 
-def touched_vertices(group: ConstraintGroup) -> sparse.csr_array:
-    """Matrix (e, N): 1 where the operator of an element of ``group`` uses a vertex, else 0."""
-    rows = group.rows_per_element
-    touches = (group.S != 0).astype(np.float64)
-    return (sum(touches[row::rows] for row in range(rows)) != 0).astype(np.float64)
+    for frame in range(scene.config.frames if frames is None else frames):
+        state, _ = loop.step(state, frame, watch)
+        positions.append(state.positions)
+    return np.stack(positions), np.stack(projections), np.array(roundoff)
 
 
 @dataclass(frozen=True)
@@ -60,7 +64,6 @@ class SnapshotSet:
     test: np.ndarray
     heldout: np.ndarray
     frames: dict[str, np.ndarray]
-    row_mass: np.ndarray
     elements: int
     rows_per_element: int
     roundoff: float
@@ -70,7 +73,6 @@ def collect(
     training_run: str | os.PathLike[str],
     heldout_run: str | os.PathLike[str],
     group: ConstraintGroup,
-    masses: np.ndarray,
     train: np.ndarray,
 ) -> SnapshotSet:
     """Read snapshots of ``group``: training and test frames of one run, frames of a held-out run.
@@ -80,7 +82,6 @@ def collect(
     Parameters
     ----------
     training_run, heldout_run : files of the two full-order runs
-    masses : (N,) kg, masses of the vertices
     train : (n,) numbers of the training frames, ascending
     """
     p, frames, roundoff = _read(training_run, group.name)
@@ -97,7 +98,6 @@ def collect(
         test=p[odd],
         heldout=held,
         frames={"train": frames[is_train], "test": frames[odd], "heldout": held_frames},
-        row_mass=row_masses(group, masses),
         elements=group.elements,
         rows_per_element=group.rows_per_element,
         roundoff=float(np.linalg.norm(roundoff[is_train])),
@@ -114,13 +114,11 @@ def _read(path: str | os.PathLike[str], group: str) -> tuple[np.ndarray, np.ndar
 
 
 def save_snapshots(snapshots: SnapshotSet, path: str | os.PathLike[str]) -> None:
-    """Write ``snapshots`` to ``path`` (datasets train, test, heldout, <split>_frames, row_mass)."""
+    """Write ``snapshots`` to ``path`` (datasets train, test, heldout, <split>_frames)."""
     with write_hdf5(path) as file:
         for split in SPLITS:
             file[split] = getattr(snapshots, split)
             file[f"{split}_frames"] = snapshots.frames[split]
-        file["row_mass"] = snapshots.row_mass
-        file["row_mass"].attrs["unit"] = "kg"
         for name in ("elements", "rows_per_element", "roundoff"):
             file.attrs[name] = getattr(snapshots, name)
 
@@ -131,7 +129,6 @@ def load_snapshots(path: str | os.PathLike[str]) -> SnapshotSet:
         return SnapshotSet(
             **{split: file[split][...] for split in SPLITS},
             frames={split: file[f"{split}_frames"][...] for split in SPLITS},
-            row_mass=file["row_mass"][...],
             elements=int(file.attrs["elements"]),
             rows_per_element=int(file.attrs["rows_per_element"]),
             roundoff=float(file.attrs["roundoff"]),

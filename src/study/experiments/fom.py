@@ -10,7 +10,7 @@ from pdrom.model.scene import SceneConfig
 from pdrom.reduction import snapshots as sets
 from study.artifact.paths import HELDOUT, KICK, MESH, SNAPSHOTS, STIFFNESS, TRAIN, File
 from study.artifact.reads import Setting, SourcesOf
-from study.experiments.kit.base import Solver, experiment, scene_of
+from study.experiments.kit.base import experiment, scene_of
 
 
 @experiment(
@@ -30,10 +30,10 @@ def mesh(sources: list[Path], config: MeshConfig, out: File) -> None:
 
 @experiment(
     "Full-order runs of {scene}",
-    reads={"mesh": MESH, "config": Setting("scene"), "solver": Setting("solver")},
+    reads={"mesh": MESH, "config": Setting("scene")},
     writes={"train": TRAIN, "heldout": HELDOUT, "kick": KICK, "stiffness": STIFFNESS},
 )
-def fom(mesh: File, config: SceneConfig, solver: Solver, **runs: File) -> None:
+def fom(mesh: File, config: SceneConfig, **runs: File) -> None:
     """Simulate the training motion and the held-out motions of a scene, each into one of ``runs``.
 
     The training run and, in odd frames only, the first held-out run also store projections for the
@@ -45,7 +45,7 @@ def fom(mesh: File, config: SceneConfig, solver: Solver, **runs: File) -> None:
         "heldout": dict.fromkeys(plans, sets.test_frames(frames)),
     }
     for motion, file in runs.items():
-        run(scene_of(config, mesh, motion), file.path, wanted.get(motion, {}), solver)
+        run(scene_of(config, mesh, motion), file.path, wanted.get(motion, {}))
 
 
 @experiment(
@@ -58,5 +58,5 @@ def snapshots(mesh: File, train: File, heldout: File, config: SceneConfig, out: 
     group = out["group"]
     scene = scene_of(config, mesh)
     frames = sets.training_frames(scene.config.frames, scene.config.reduce[group].train)
-    found = sets.collect(train.path, heldout.path, scene.group(group), scene.masses, frames)
+    found = sets.collect(train.path, heldout.path, scene.group(group), frames)
     sets.save_snapshots(found, out.path)

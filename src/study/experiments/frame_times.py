@@ -4,7 +4,6 @@ Every process times all runs, in a random order of its own. As a control, the fu
 scene is timed twice: speed-ups as small as the difference between these two times mean nothing.
 """
 
-from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -20,15 +19,15 @@ from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.basis import basis_of, load_basis
 from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.sampling import select
-from pdrom.reduction.sampling.local_step import ReducedLocalStep, replace_group
+from pdrom.reduction.sampling.model import ProjectionModel
 from pdrom.reduction.snapshots import load_snapshots
-from pdrom.reduction.subspace.model import load_models
+from pdrom.reduction.subspace.model import SubspaceModel, load_models
 from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import EachOf, Settings
-from study.experiments.kit.base import Modes, OfScene, PositionBasis, Solver, experiment
+from study.experiments.kit.base import Modes, OfScene, PositionBasis, experiment
 from study.experiments.kit.costs import variant
-from study.experiments.kit.measurement import Processes, Variant, in_processes
+from study.experiments.kit.measurement import Processes, Variant, in_processes, model_variant
 from study.experiments.kit.runfiles import load_reduction
 
 FULL, CONTROL, REDUCED = "full", "control", "reduced"
@@ -80,51 +79,29 @@ class Options(ConfigModel):
     subspace_cases: tuple[SubspaceCase, ...]
     projection_cases: tuple[ProjectionCase, ...]
     projection_methods: dict[str, MethodSpec]
-    solver: Solver
 
 
 @dataclass(frozen=True)
 class TimedScene:
-    """A scene whose full-order run (twice, once as a control) and reductions are timed.
+    """A scene whose full-order run (twice, once as a control) and labelled ``models`` are timed."""
 
-    mesh : file of the mesh; None builds the mesh from the configuration
-    projections : reduced local steps to time: (group, method and size; specification of the method;
-        file of the basis; file of the samples)
-    models : file of position subspaces -> (method, kind of basis, number of modes) of the models
-        to time; None times all models in the file
-    """
-
-    scene: SceneConfig
-    solver: str
+    scene: Scene
     frames: int
-    mesh: str | None = None
-    projections: list[tuple[ProjectionCase, MethodSpec, str, str]] = field(default_factory=list)
-    models: dict[str, list[tuple[str, str, int]] | None] = field(default_factory=dict)
+    models: list[tuple[dict[str, Any], ProjectionModel | SubspaceModel]] = field(
+        default_factory=list
+    )
 
     def variants(self) -> Iterator[Variant]:
         """Yield the step loops to time: full order, full order as a control, and reductions."""
-        config = self.scene
-        mesh = config.mesh.build(Path()) if self.mesh is None else load_mesh(self.mesh)
-        scene = Scene.build(config, mesh)
-        system = scene.system_with(self.solver)
+        scene, config = self.scene, self.scene.config
         frames = min(self.frames, config.frames)
-        common = {"scene": config.name, "vertices": mesh.vertices, "frames": config.frames}
+        common = {"scene": config.name, "vertices": scene.mesh.vertices, "frames": config.frames}
         for role in (FULL, CONTROL):
-            yield variant(scene, system, scene.groups, frames, {**common, "role": role})
-        reduced: dict[str, Any] = {**common, "role": REDUCED}
-        for own, spec, basis, sampling in self.projections:
-            reduction = load_reduction(load_basis(basis), sampling, spec, r=own.r)
-            step = ReducedLocalStep(scene.group(own.group), reduction)
-            steps = replace_group(scene, own.group, step)
-            labels = {**reduced, **own.model_dump(), "position_basis": "full"}
-            yield variant(scene, system, steps, frames, labels)
-        for path, wanted in self.models.items():
-            for found, model in load_models(path):
-                own_labels = found["method"], found["position_basis"], found["k"]
-                if wanted is None or own_labels in wanted:
-                    sizes = {"group": "all", "r": model.elements_evaluated(scene)}
-                    labels = {**reduced, **sizes, **found}
-                    yield Variant(labels, *model.loop(scene), frames, output=model.output())
+            yield variant(scene, frames, {**common, "role": role})
+        for own, model in self.models:
+            sizes = {"group": "all", "r": model.elements_evaluated(scene)}
+            labels = {**common, "role": REDUCED, **sizes, **own}
+            yield model_variant(labels, scene, model, frames)
 
 
 @experiment(
@@ -146,24 +123,28 @@ def frame_times(settings: Options, times: File, seconds: File, **files: list[Fil
     asked = settings.frame_times
     scenes: dict[str, TimedScene] = {}
     for named, file in zip(settings.timed_scenes, files["meshes"], strict=True):
-        scenes[named.scene] = TimedScene(named.config, settings.solver, asked.frames, file.path)
+        scene = Scene.build(named.config, load_mesh(file.path))
+        scenes[named.scene] = TimedScene(scene, asked.frames)
     rows = []
     given = (files[name] for name in ("bases", "samplings", "snapshots"))
     for own, basis, sampling, data in zip(settings.projection_cases, *given, strict=True):
         spec = settings.projection_methods[own.method]
-        scenes[own.scene].projections.append((own, spec, basis.path, sampling.path))
+        reduction = load_reduction(load_basis(basis.path), sampling.path, spec, r=own.r)
+        labels = own.model_dump() | {"position_basis": "full"}
+        scenes[own.scene].models.append((labels, ProjectionModel(own.group, reduction)))
         known = load_snapshots(data.path)
         before = process_time()
         select(basis_of(known, spec), spec, own.r)
         rows.append((*own.model_dump().values(), process_time() - before))
-    chosen: dict[str, list[tuple[str, str, int]]] = defaultdict(list)
     for case, file in zip(settings.subspace_cases, files["subspaces"], strict=True):
-        chosen[file.path].append((case.method, case.position_basis, case.k))
-        scenes[case.scene].models[file.path] = chosen[file.path]
+        wanted, held = case.model_dump(exclude={"scene"}), load_models(file.path)
+        scenes[case.scene].models.extend(each for each in held if each[0] == wanted)
     # time all models in the file of a large scene, also if ``timed_scenes`` lists this scene, too
     for named, file in zip(settings.large_scenes, files["large"], strict=True):
-        scene = TimedScene(named.config, settings.solver, asked.frames)
-        scenes.setdefault(named.scene, scene).models[file.path] = None
+        if named.scene not in scenes:
+            scene = Scene.build(named.config, named.config.mesh.build(Path()))
+            scenes[named.scene] = TimedScene(scene, asked.frames)
+        scenes[named.scene].models.extend(load_models(file.path))
     timed = [scene.variants for scene in scenes.values()]
     table = pd.DataFrame(in_processes(timed, asked), columns=COLUMNS)
     write_table(table.astype({"k": "Int64", "r": "Int64"}), times.path)

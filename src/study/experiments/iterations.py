@@ -60,7 +60,6 @@ class IterationSweep(IterationCounts):
         "config": Setting("scene"),
         "sweep": Setting("iterations"),
         "horizon": Setting("horizon"),
-        "solver": Setting("solver"),
     },
     writes={"out": paths.ITERATIONS, "models": paths.SUBSPACES_CONVERGED},
 )
@@ -69,24 +68,18 @@ def iterations(
     config: SceneConfig,
     sweep: IterationSweep,
     horizon: kit.Horizon,
-    solver: kit.Solver,
     **files: paths.File,
 ) -> None:
     """Run a scene with every number K of iterations, and once to convergence.
 
-    Runs end before the first frame in which perturbed full-order runs differ too much. Each K is
-    run without (``window`` 0) and, if above 2, with Anderson acceleration. A row has the errors for
-    one K against the converged run, and against the run with the scene's K. The last row is the
+    Runs end at the horizon. A row has the errors for one K against the converged run (empty if a
+    frame of it did not converge), and against the run with the scene's K. The last row is the
     converged run itself (empty ``iterations``) with its largest residual: the change by one more
-    iteration, divided by the longest side of the mesh. If one of its frames did not converge,
-    errors against this run are empty.
-
-    The table ``models`` has the errors of stored reduced runs in position subspaces (training
-    motion, the scene's K) against the converged run.
+    iteration, divided by the longest side of the mesh. The table ``models`` has the errors of
+    stored reduced runs of the training motion in position subspaces against the converged run.
     """
     scene = kit.scene_of(config, files["mesh"])
-    system = scene.system_with(solver)
-    name = scene.config.name
+    system, name = scene.system, scene.config.name
     frames = max(1, horizon.frames(files["sensitivity"]))
     own = kit.positions_of(files["fom"], frames)
     best = ConvergedStepper(scene, system, sweep.tolerance, limit=sweep.limit)

@@ -2,7 +2,7 @@
 
 The units are the processor times, on one thread, of 1e9 dependent steps x <- a x + b (scalar), of
 1e9 sums and products in independent vectors of four doubles (vector), and of reading 1e9 bytes of
-an array of 256 MiB (memory). Each is measured with fewer steps, as the minimum over some repeats.
+an array of 256 MiB (memory), each the minimum over some repeats of fewer steps.
 ``./reproduce run python -m study.experiments.machine`` measures and prints them in a few seconds.
 """
 

@@ -1,16 +1,13 @@
 """Reduced runs: repeated, with one choice changed, or with bases computed from rounding errors.
 
-A run depends on arbitrary choices: the training frames, and the last digits of the start. If a
-conclusion rests on the error of a run, repetitions with other choices show the scatter of the
-error. With several training motions, held-out motions are repetitions, too. A "ladder" is a list of
-methods ("rungs") that leads from the published choices to sound ones and changes one choice at a
-time. Where projections are rounding errors only, bases are computed from these errors.
+A run depends on arbitrary choices: the training frames, and the last digits of the start.
+Repetitions with other choices show the scatter of its error. A "ladder" is a list of methods
+("rungs") that leads from the published choices to sound ones and changes one choice at a time.
 """
 
 import logging
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from typing import Annotated, Any, Literal
 
 import h5py
@@ -26,11 +23,11 @@ from pdrom.model.runs import trajectory
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction import snapshots as sets
 from pdrom.reduction.basis import Basis, basis_of, compute_basis
-from pdrom.reduction.deviations import error_within
+from pdrom.reduction.deviations import Yardstick, error_within
 from pdrom.reduction.method import MethodSpec
-from pdrom.reduction.rerun import Rerun, displacement_norms
+from pdrom.reduction.rerun import Rerun
 from pdrom.reduction.sampling import Reduction, reductions
-from pdrom.reduction.sampling.local_step import rerun_reduced
+from pdrom.reduction.sampling.model import ProjectionModel
 from study.artifact import paths
 from study.artifact.reads import Settings
 from study.experiments.kit import base as kit
@@ -52,50 +49,39 @@ NOISE_COLUMNS = [
     "blowup_frame", "relative_error",
 ]  # fmt: skip
 ALL, PLANE, VERTEX = "all", "plane", "vertex"
-Methods = Mapping[str, MethodSpec]
+# Displacements of vertices, over the mesh's longest side: in repetitions, and of a few round-offs.
+MOVED, NOISE = 1e-10, 1e-15
+TRAINED_ON = (1, 2, 4, 8)  # numbers of training motions of bases that run held-out motions
 Runs = list[tuple[dict[str, Any], Rerun | None]]  # pairs (table row, run); equal initial positions
 Rungs = Annotated[tuple[MethodSpec, ...], Field(min_length=1)]
 
 
 class Repetitions(ConfigModel):
-    """Settings of repeated runs.
+    """Settings of repeated runs: their number; random choices are drawn by the seeds 1, 2, ..."""
 
-    repetitions : number of runs with different random choices, drawn by the seeds 1, 2, ...
-    perturbation : length of random displacements of the start, relative to the mesh's longest side
-    """
-
-    repetitions: Annotated[int, Field(ge=1, le=1000)] = 5
-    perturbation: kit.Tolerance = 1e-10
+    repetitions: kit.Repeats = 5
 
 
 @dataclass(frozen=True)
 class ReducedRuns:
-    """Runs of a scene with one constraint group reduced, compared with the full-order run.
+    """Runs with one constraint group reduced, compared with the full-order run.
 
     data : snapshots of the group's projections
-    reference : (F + 1, N, 3) m, positions of the full-order run
+    full : the full-order run
     end : first frame that is not compared, because perturbed full-order runs differ too much in it
-    blowup_extent : a run ends as a blow-up if its bounding box exceeds this times that at rest
     """
 
-    scene: Scene
     group: str
     data: sets.SnapshotSet
-    reference: np.ndarray
+    full: Yardstick
     end: int
-    blowup_extent: float
     _bases: dict[tuple[str, int | None, int | None], Basis] = field(default_factory=dict)
 
-    @cached_property
-    def displacement(self) -> np.ndarray:
-        """Norm of the full-order run's displacement from its first positions, by frame: (F,) m."""
-        return displacement_norms(self.reference)
-
     def until_the_end(self) -> "ReducedRuns":
-        """Return a copy with at most max(2, `end`) frames of the scene and of the reference run."""
-        frames = min(self.scene.config.frames, max(2, self.end))
-        scene = self.scene.changed(frames=frames)
-        return replace(self, scene=scene, reference=self.reference[: frames + 1])
+        """Return a copy with at most max(2, `end`) frames of the full-order run."""
+        frames = min(self.full.scene.config.frames, max(2, self.end))
+        scene = self.full.scene.changed(frames=frames)
+        return replace(self, full=Yardstick(scene, self.full.reference[: frames + 1]))
 
     def basis(
         self, method: MethodSpec, frames: int | None = None, signs: int | None = None
@@ -114,13 +100,20 @@ class ReducedRuns:
 
     def run(self, reduction: Reduction, offset: np.ndarray | None = None) -> Rerun:
         """Run with ``reduction`` from initial positions displaced by ``offset`` (N, 3) m."""
-        return rerun_reduced(
-            self.scene, self.group, reduction, self.reference, self.blowup_extent, offset=offset
-        )
+        return self.full.run(ProjectionModel(self.group, reduction), offset)
 
     def error(self, outcome: Rerun) -> float | None:
         """Relative error of a run over the frames before ``end``; None if it stopped earlier."""
-        return error_within(outcome.difference, self.displacement, self.end)
+        return error_within(outcome.difference, self.full.displacement, self.end)
+
+    def row(
+        self, reduction: Reduction, seed: int, offset: np.ndarray | None = None
+    ) -> dict[str, Any]:
+        """Row of a run with ``reduction``; the error of one that ended before `end` is inf."""
+        outcome = self.run(reduction, offset)
+        error = self.error(outcome)
+        row = {"r": reduction.r, "seed": seed, "gain": reduction.gain, "finite": outcome.finite}
+        return {**row, "error": np.inf if error is None else error}
 
     def repeat(
         self, method: MethodSpec, sizes: Sequence[int], varied: Varied, asked: Repetitions
@@ -128,21 +121,15 @@ class ReducedRuns:
         """Return rows of all repetitions of ``method``, at each of ``sizes`` up to the rank.
 
         ``varied`` tells if initial positions ("start") or training snapshots ("training") are drawn
-        at random. Errors cover the frames before attribute `end`; inf for a run that ended earlier.
+        at random.
         """
-        rows, made, offset = [], {}, None
-        if varied == "start":
-            made = reductions(self.basis(method), method, sizes)
+        rows, offset, start = [], None, varied == "start"
         for seed in range(1, asked.repetitions + 1):
-            if varied == "start":
-                offset = kit.perturbation_field(self.scene, asked.perturbation, seed)
-            else:
-                made = reductions(self.basis(method, frames=seed), method, sizes)
-            for r, reduction in made.items():
-                outcome = self.run(reduction, offset)
-                error = self.error(outcome)
-                row = {"r": r, "seed": seed, "gain": reduction.gain, "finite": outcome.finite}
-                rows.append({**row, "error": np.inf if error is None else error})
+            if start:
+                offset = kit.perturbation_field(self.full.scene, MOVED, seed)
+            basis = self.basis(method, frames=None if start else seed)
+            made = reductions(basis, method, sizes).values()
+            rows += [self.row(reduction, seed, offset) for reduction in made]
         return sorted(rows, key=lambda row: row["r"])
 
     def on_motions(
@@ -151,44 +138,23 @@ class ReducedRuns:
         """Yield a row per number of training motions (in ``counts``), size r and held-out motion.
 
         The first training motion is the scene's own, further ones are random variants. Of
-        each of n training motions, every n-th training snapshot is used. Errors are over
-        the frames before frame ``self.end``, inf for a run that stopped earlier.
+        each of n training motions, every n-th training snapshot is used.
         """
-        config, mesh = self.scene.config, self.scene.mesh
+        config, mesh = self.full.scene.config, self.full.scene.mesh
         frames = self.data.frames["train"]
         found = [self.data.train]
         for seed in range(1, max(counts)):
             scene = Scene.build(config.training_variant(seed), mesh)
-            found.append(recorded(scene, self.group)[1][frames])
+            found.append(sets.recorded(scene, self.group, scene.initial_state())[1][frames])
         tests = [Scene.build(config.heldout_variant(motion), mesh) for motion in MOTIONS]
-        runs = [replace(self, scene=s, reference=trajectory(s)) for s in tests]
+        runs = [replace(self, full=Yardstick(scene, trajectory(scene))) for scene in tests]
         for count in counts:
             train = np.concatenate([p[::count] for p in found[:count]])
             made = reductions(basis_of(self.data, method, train), method, sizes)
-            for r, reduction in made.items():
-                row = {"r": r, "varied": f"held out, {count} trained", "gain": reduction.gain}
+            varied = {"varied": f"held out, {count} trained"}
+            for reduction in made.values():
                 for number, own in enumerate(runs, 1):
-                    outcome = own.run(reduction)
-                    error = own.error(outcome)
-                    row |= {"seed": number, "finite": outcome.finite}
-                    yield {**row, "error": np.inf if error is None else error}
-
-
-def recorded(
-    scene: Scene, group: str, start: np.ndarray | None = None
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return positions (F + 1, N, 3) m of the full-order run, and projections (F, e p, 3).
-
-    The projections are those of the constraint ``group`` (e elements of p rows each) at the last
-    iterate of every frame. ``start`` (N, 3) m is added to the initial positions.
-    """
-    loop, state = scene.stepper(), scene.initial_state(start)
-    own, projections = loop.local_step(group), list[np.ndarray]()
-    positions = [state.positions]
-    for frame in range(scene.config.frames):
-        state, _ = loop.step(state, frame, lambda y: projections.append(own.project(y)))
-        positions.append(state.positions)
-    return np.stack(positions), np.stack(projections)
+                    yield own.row(reduction, number) | varied
 
 
 def drawn(data: sets.SnapshotSet, seed: int) -> np.ndarray:
@@ -205,12 +171,10 @@ class Cell(ConfigModel):
 
     sizes : basis sizes of the runs
     varied : what differs in repetitions: initial positions, training frames, or held-out motion
-    training_motions : all held-out motions are run with each of these numbers of training motions
     """
 
     sizes: Annotated[tuple[kit.Modes, ...], Field(min_length=1)]
     varied: tuple[Varied, ...] = ("start", "training")
-    training_motions: Annotated[tuple[kit.Count, ...], Field(min_length=1)] = (1, 2, 4, 8)
 
 
 class Cells(Cell):
@@ -259,17 +223,18 @@ class Ladder(Repetitions):
 
         A setting is "up", "down", "signs" or "square", see `Ladder`. Elements have ``p`` rows.
         """
-        rows: list[tuple[str, MethodSpec, int | None, int]] = []
-        rows += [("up", method, None, self.r) for method in self.up]
-        rows += [("down", method, None, self.r) for method in self.down]
-        rows += [("signs", self.up[0], seed, self.r) for seed in range(1, self.signs + 1)]
         square = [
             method.model_copy(update={"oversampling": p * method.oversampling})
             if method.rows == "joint"
             else method
             for method in self.square
         ]
-        return rows + [("square", method, None, r) for r in self.sizes for method in square]
+        return [
+            *(("up", method, None, self.r) for method in self.up),
+            *(("down", method, None, self.r) for method in self.down),
+            *(("signs", self.up[0], seed, self.r) for seed in range(1, self.signs + 1)),
+            *(("square", method, None, r) for r in self.sizes for method in square),
+        ]
 
 
 class LadderSection(Ladder):
@@ -281,14 +246,11 @@ class LadderSection(Ladder):
 class NoiseRuns(ConfigModel):
     """Settings of runs with bases computed from projections that are only rounding errors.
 
-    sizes : numbers of modes
-    repetitions : number of randomly displaced initial positions
-    perturbation : displacement of a vertex (a few round-offs), relative to the mesh's longest side
+    They are the numbers of modes, and the number of randomly displaced initial positions.
     """
 
     sizes: Annotated[tuple[kit.Modes, ...], Field(min_length=1)] = (6, 10, 20)
-    repetitions: Annotated[int, Field(ge=1, le=1000)] = 20
-    perturbation: Annotated[float, Field(gt=0.0, le=1e-12)] = 1e-15
+    repetitions: kit.Repeats = 20
 
 
 class Noise(NoiseRuns):
@@ -311,7 +273,6 @@ class Options(ConfigModel):
     own_noise: NoiseRuns | None
     noise_methods: dict[str, MethodSpec]
     horizon: kit.Horizon
-    blowup_extent: kit.BlowupExtent
 
 
 @experiment(
@@ -337,12 +298,10 @@ def repetitions(settings: Options, **files: paths.File) -> None:
     """
     labels = files["out"].labels
     runs = ReducedRuns(
-        kit.scene_of(settings.scene, files["mesh"]),
         labels["group"],
         sets.load_snapshots(files["snapshots"].path),
-        reference=kit.positions_of(files["fom"]),
+        Yardstick(kit.scene_of(settings.scene, files["mesh"]), kit.positions_of(files["fom"])),
         end=settings.horizon.frames(files["sensitivity"]),
-        blowup_extent=settings.blowup_extent,
     )
     short = runs.until_the_end()
     rows = []
@@ -350,7 +309,7 @@ def repetitions(settings: Options, **files: paths.File) -> None:
         for varied in own.varied:
             cell = {**labels, "method": own.method, "varied": varied}
             if varied == "motions":
-                found = list(runs.on_motions(own.spec, own.sizes, own.training_motions))
+                found = list(runs.on_motions(own.spec, own.sizes, TRAINED_ON))
             else:
                 found = short.repeat(own.spec, own.sizes, varied, settings.repetitions)
             rows += [cell | row for row in found]
@@ -360,10 +319,10 @@ def repetitions(settings: Options, **files: paths.File) -> None:
     table = pd.DataFrame([{**labels, **row} for row in climbed], columns=LADDER_COLUMNS)
     whole = dict.fromkeys(("blowup_frame", "repetitions", "entries"), "Int64")
     write_table(table.astype(whole), files["rungs"].path)
-    methods, limit, reduced = settings.noise_methods, settings.blowup_extent, []
+    methods, reduced = settings.noise_methods, []
     with write_hdf5(files["noise_runs"].path) as file:
         if settings.own_noise is not None:
-            reduced = noisy_runs(short.scene, runs.group, settings.own_noise, methods, limit, file)
+            reduced = noisy_runs(short.full.scene, runs.group, settings.own_noise, methods, file)
     table = pd.DataFrame([{**labels, **row} for row in reduced], columns=NOISE_COLUMNS)
     write_table(table.astype({"frames": "Int64", "blowup_frame": "Int64"}), files["noise"].path)
 
@@ -382,7 +341,7 @@ def _ladder(runs: ReducedRuns, short: ReducedRuns, ladder: Ladder) -> Iterator[d
         # there is no reduction without modes, that is if all projections are rounding errors
         for reduction in reductions(basis, method, [size] if size else []).values():
             outcome = runs.run(reduction)
-            row |= {**outcome.row(runs.displacement), "r": size}
+            row |= {**runs.full.row(outcome), "r": size}
             row["relative_error_within_horizon"] = runs.error(outcome)
             row["entries"] = sum(len(block.entries) for block in reduction.blocks)
             row |= {"condition": reduction.condition, "gain": reduction.gain}
@@ -390,7 +349,7 @@ def _ladder(runs: ReducedRuns, short: ReducedRuns, ladder: Ladder) -> Iterator[d
                 p = getattr(data, split)
                 found = relative_errors(p, reduction.reconstruct(p), data.roundoff)
                 row[f"error_{split}"] = found[0]
-            repeated = runs.scene.config.name in ladder.repeated
+            repeated = runs.full.scene.config.name in ladder.repeated
             if repeated and seed is None and direction != "square":
                 again = short.repeat(method, [size], "training", ladder)
                 errors, gains = ([own[name] for own in again] for name in ("error", "gain"))
@@ -403,7 +362,7 @@ def _ladder(runs: ReducedRuns, short: ReducedRuns, ladder: Ladder) -> Iterator[d
 
 
 def noisy_runs(
-    scene: Scene, group: str, asked: NoiseRuns, methods: Methods, limit: float, file: h5py.File
+    scene: Scene, group: str, asked: NoiseRuns, methods: runfiles.Methods, file: h5py.File
 ) -> list[dict[str, Any]]:
     """Run a scene from perturbed starts, in full order and with bases of these runs' round-off.
 
@@ -411,14 +370,13 @@ def noisy_runs(
     `kinds` of perturbed start, ``file`` gets the reduced runs of one start, an HDF5 group each: of
     the first start at which only some runs of a method blow up (`irregular`), else of the first.
     No run has a size r above the rank: its row has no results and its HDF5 group ``marked`` = True.
-    A run ends as a blow-up if its bounding box is longer than ``limit`` times the rest shape's.
     """
     rows = []
     for axes in kinds(scene):
         kept: Runs = []
         for seed in range(1, asked.repetitions + 1):
-            start = roundoff_field(scene, axes, asked.perturbation, seed=seed)
-            found = list(_noisy(scene, group, start, asked.sizes, methods, limit))
+            start = roundoff_field(scene, axes, NOISE, seed=seed)
+            found = list(_noisy(scene, group, start, asked.sizes, methods))
             rows += [{"noisy_axes": axes, "seed": seed, **row} for row, _ in found]
             if not kept or (irregular(found) and not irregular(kept)):
                 kept = found
@@ -466,7 +424,7 @@ def roundoff_field(scene: Scene, axes: str, size: float, seed: int) -> np.ndarra
 
 
 def _noisy(
-    scene: Scene, name: str, start: np.ndarray, sizes: Sequence[int], methods: Methods, limit: float
+    scene: Scene, name: str, start: np.ndarray, sizes: Sequence[int], methods: runfiles.Methods
 ) -> Iterator[tuple[dict[str, Any], Rerun | None]]:
     """Yield (row, run) of all reductions, with initial positions displaced by ``start`` (N, 3) m.
 
@@ -476,18 +434,17 @@ def _noisy(
     published; in all other runs of the study, such an axis has none.
     """
     group, plan, frames = scene.group(name), scene.config.reduce[name], scene.config.frames
-    reference, projections = recorded(scene, name, start)
+    reference, projections, _ = sets.recorded(scene, name, scene.initial_state(start))
     even = sets.training_frames(frames, min(plan.train, (frames + 1) // 2))
-    trained_on, masses = projections[even], sets.row_masses(group, scene.masses)
-    displacement = displacement_norms(reference)
+    full = Yardstick(scene, reference)
     for method, spec in methods.items():
-        basis = compute_basis(trained_on, masses, 0.0, group.rows_per_element, spec)
+        basis = compute_basis(projections[even], 0.0, group.rows_per_element, spec)
         basis = replace(basis, active_axes=(True, True, True))
         made = reductions(basis, spec, sizes)
         for r in sizes:
             row = {"method": method, "r": r, "rank": basis.rank, "frames": 0}
             outcome = None
             if r in made:
-                outcome = rerun_reduced(scene, name, made[r], reference, limit)
-                row |= {"gain": made[r].gain, **outcome.row(displacement)}
+                outcome = full.run(ProjectionModel(name, made[r]))
+                row |= {"gain": made[r].gain, **full.row(outcome)}
             yield row, outcome

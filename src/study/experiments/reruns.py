@@ -5,26 +5,27 @@
 
 import logging
 from collections.abc import Iterator
-from typing import Annotated, Any, Self
+from typing import Annotated, Any
 
 import h5py
 import numpy as np
 import pandas as pd
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from pdrom.core.store import write_hdf5, write_table
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.model.energy import largest
 from pdrom.model.metrics import relative_errors
+from pdrom.model.runs import BLOWUP_EXTENT
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.basis import Basis, load_basis
 from pdrom.reduction.deviations import Yardstick
 from pdrom.reduction.method import MethodSpec
-from pdrom.reduction.rerun import Rerun
-from pdrom.reduction.sampling import Reduction, reductions
-from pdrom.reduction.sampling.local_step import rerun, rerun_reduced
+from pdrom.reduction.rerun import Rerun, rerun
+from pdrom.reduction.sampling import reductions
+from pdrom.reduction.sampling.model import ProjectionModel
 from pdrom.reduction.snapshots import SPLITS, SnapshotSet, load_snapshots
-from pdrom.reduction.subspace.model import SubspaceModel, load_models, rerun_model
+from pdrom.reduction.subspace.model import SubspaceModel, load_models
 from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, Setting, Settings
@@ -46,17 +47,13 @@ ERROR_COLUMNS = [
 MOTION = "motion"  # column that only the table of held-out motions has
 
 
-class Sweep(ConfigModel):
-    """Basis sizes r for reconstruction errors: all up to ``dense_to``, then every ``step``-th."""
+DENSE, STEP = 10, 10
 
-    dense_to: kit.Count = 10
-    step: kit.Count = 10
 
-    def ranks(self, largest: int) -> list[int]:
-        """Return the basis sizes from 1 to ``largest``, always including ``largest``."""
-        dense = range(1, min(self.dense_to, largest) + 1)
-        coarse = range(self.dense_to + self.step, largest + 1, self.step)
-        return sorted({*dense, *coarse, largest} - {0})
+def sweep(largest: int) -> set[int]:
+    """Basis sizes of reconstruction errors: all to `DENSE`, then every `STEP`-th; ``largest``."""
+    coarse = range(DENSE + STEP, largest + 1, STEP)
+    return {*range(1, min(DENSE, largest) + 1), *coarse, largest} - {0}
 
 
 class Options(ConfigModel):
@@ -64,10 +61,7 @@ class Options(ConfigModel):
 
     scene: SceneConfig
     method: MethodSpec
-    sweep: Sweep
     ranks: tuple[kit.Rank, ...]
-    blowup_extent: kit.BlowupExtent
-    solver: kit.Solver
 
 
 @experiment(
@@ -117,12 +111,10 @@ def _runs(
 ) -> Iterator[dict[str, Any]]:
     """Run a motion at every basis size r, store the runs in ``file``, and yield their table rows.
 
-    A size above the rank is not run: its row has no results, and the attribute ``marked`` of its
-    HDF5 group is True. Positions are stored only for the training motion, whose ``file`` is the
-    root group, because figures show no other motion.
+    A size above the rank is not run: its row has no results, its group is ``marked``. Positions
+    are stored for the training motion only, whose ``file`` is the root group.
     """
-    labels, scene = sampling.labels, yardstick.scene
-    system = scene.system_with(settings.solver)
+    labels = sampling.labels
     for r in kit.resolve_ranks(settings.ranks, basis.rank):
         store = file.create_group(f"r{r:04d}")
         store.attrs.update(r=r, full=r == basis.rank, marked=r > basis.rank)
@@ -131,9 +123,7 @@ def _runs(
             yield {**labels, "r": r, "frames": 0}
             continue
         reduction = runfiles.load_reduction(basis, sampling.path, settings.method, r=r)
-        outcome = rerun_reduced(
-            scene, labels["group"], reduction, yardstick.reference, settings.blowup_extent, system
-        )
+        outcome = yardstick.run(ProjectionModel(labels["group"], reduction))
         apart = yardstick.deviations(outcome)
         error = outcome.difference / np.sqrt(np.mean(yardstick.displacement**2))
         for name, values in {**apart, "error": error, "extent": outcome.extent}.items():
@@ -141,22 +131,20 @@ def _runs(
         runfiles.store_end(store, outcome, with_positions=file.name == "/")
         store.attrs["finite"] = outcome.finite
         measured = {"energy_ratio": largest(apart["energy"]), "gain": reduction.gain}
-        yield {**labels, "r": r, **outcome.row(yardstick.displacement), **measured}
+        yield {**labels, "r": r, **yardstick.row(outcome), **measured}
         log.info("r = %d: %d frames, blow-up %s", r, outcome.frames, outcome.blowup_frame)
 
 
 def _sample(
     basis: Basis, data: SnapshotSet, settings: Options, sampling: File, errors: File
 ) -> None:
-    """Select samples at all basis sizes r; write them, and errors of reconstructed snapshots.
+    """Select samples of ``basis`` at all sizes r; write them, and errors of reconstructed ``data``.
 
-    basis, data : basis of the group, from its training snapshots, and all of its snapshots
-    sampling, errors : files for the samples, and for the table of errors, whose first columns are
-        the scene, group and method that the path of ``sampling`` names
+    The first columns of the table are the labels (scene, group, method) of the file ``sampling``.
     """
     labels = sampling.labels
     asked = kit.resolve_ranks(settings.ranks, basis.rank)
-    wanted = {*settings.sweep.ranks(basis.rank), *asked} if basis.rank else set()
+    wanted = {*sweep(basis.rank), *asked} if basis.rank else set()
     rows = []
     with write_hdf5(sampling.path) as file:
         for r, reduction in reductions(basis, settings.method, sorted(wanted)).items():
@@ -182,8 +170,8 @@ SHORT_COLUMNS = [
     "scene", "method", "r", "h", "stiffness_ratio", "finite", "blowup_frame", "max_extent",
     "energy_ratio", "gain", "group", "position_basis", "k", "frames", "relative_error",
 ]  # fmt: skip
-Local = list[tuple[dict[str, Any], Reduction | None]]  # pairs (row labels, reduction or None)
-Models = list[tuple[dict[str, Any], SubspaceModel]]
+FEWEST, MOST = 30, 120  # limits of the number of frames of a short run
+Models = list[tuple[dict[str, Any], SubspaceModel | ProjectionModel | None]]
 
 
 class ShortRuns(ConfigModel):
@@ -195,23 +183,13 @@ class ShortRuns(ConfigModel):
     ranks : basis sizes r of reductions; position subspaces are run at their largest size only
     time_steps : time steps in seconds, in addition to the scene's own one
     stiffness_ratios : factors by which weights of reduced groups are multiplied, in addition to 1
-    duration : simulated seconds; a run has at least ``min_frames``, at most ``max_frames`` frames
+    duration : simulated seconds; a run has `FEWEST` to `MOST` frames
     """
 
     ranks: tuple[kit.Rank, ...] = ()
     time_steps: tuple[Annotated[float, Field(gt=0.0, le=10.0)], ...] = ()
     stiffness_ratios: tuple[Annotated[float, Field(gt=0.0, le=1e8)], ...] = ()
     duration: Annotated[float, Field(gt=0.0)] = 1.0
-    min_frames: Annotated[int, Field(ge=2)] = 30
-    max_frames: Annotated[int, Field(ge=2)] = 120
-
-    @model_validator(mode="after")
-    def _ordered(self) -> Self:
-        if self.max_frames < self.min_frames:
-            raise ValueError(
-                f"max_frames = {self.max_frames}: at least min_frames = {self.min_frames}"
-            )
-        return self
 
 
 class Stability(ShortRuns):
@@ -219,18 +197,13 @@ class Stability(ShortRuns):
 
     scenes : names of the scenes; those that are not in the study are ignored
     wrong : a finite run counts as wrong if its relative error exceeds this value
-    departure : a run counts as having left the scene if its bounding box exceeds this multiple of
-        the full-order run's largest one; the key in the configuration is ``left``
+    left : a run counts as having left the scene if its bounding box exceeds this multiple of the
+        full-order run's largest one
     """
 
     scenes: tuple[str, ...] = ()
     wrong: Annotated[float, Field(gt=0.0)] = 0.1
-    departure: Annotated[float, Field(gt=1.0, alias="left")] = 2.0
-
-    @property
-    def left(self) -> float:
-        """Attribute for the key ``left`` of the configuration, which is stored as `departure`."""
-        return self.departure
+    left: Annotated[float, Field(gt=1.0)] = 2.0
 
 
 @experiment(
@@ -243,69 +216,55 @@ class Stability(ShortRuns):
         "config": Setting("scene"),
         "methods": Setting("methods"),
         "short": Setting("stability"),
-        "blowup_extent": Setting("blowup_extent"),
-        "solver": Setting("solver"),
     },
     writes={"out": paths.STABILITY},
 )
 def stability(
     mesh: File,
     config: SceneConfig,
-    methods: dict[str, MethodSpec],
+    methods: runfiles.Methods,
     short: ShortRuns,
-    blowup_extent: kit.BlowupExtent,
-    solver: kit.Solver,
     out: File,
     **files: list[File],
 ) -> None:
     """Make full-order and reduced runs with each time step, then with each stiffness of `short`."""
     scene = kit.scene_of(config, mesh)
-    local: Local = []
-    for file in files["samplings"]:
-        spec = methods[file["method"]]
-        basis = load_basis(runfiles.basis_of(file, spec, files["bases"]).path)
-        for r in kit.resolve_ranks(short.ranks, basis.rank):
-            labels = {"group": file["group"], "method": file["method"], "r": r}
-            known = r <= basis.rank
-            reduction = runfiles.load_reduction(basis, file.path, spec, r=r) if known else None
-            local.append((labels | {"position_basis": "full"}, reduction))
-    models: Models = []
+    given = files["samplings"], files["bases"], methods, short.ranks
+    models: Models = [
+        (labels | {"position_basis": "full"}, model)
+        for labels, model in runfiles.projection_models(*given)
+    ]
     for file in files["subspaces"]:
-        found: Models = load_models(file.path)
+        found = load_models(file.path)
         largest = max(labels["k"] for labels, _ in found)
-        models += [(labels, model) for labels, model in found if labels["k"] == largest]
+        models += [({"group": "all", **own}, model) for own, model in found if own["k"] == largest]
     # time step and stiffness are varied one at a time, never both
-    h, limits = scene.config.time_step, (short.min_frames, short.max_frames)
-    ratios = sorted({1.0, *short.stiffness_ratios} - {1.0})
+    h, ratios = scene.config.time_step, sorted({1.0, *short.stiffness_ratios} - {1.0})
     grid = [(step, 1.0) for step in sorted({h, *short.time_steps})] + [(h, own) for own in ratios]
     rows = []
     for step, ratio in grid:
-        other = kit.varied(scene.config, step, ratio, duration=short.duration, frames=limits)
-        case = Scene.build(other, scene.mesh)
+        other = kit.varied(scene.config, step, ratio, short.duration, (FEWEST, MOST))
         own = {"scene": config.name, "h": step, "stiffness_ratio": ratio}
-        rows += [own | row for row in _rows(case, local, models, solver, blowup_extent)]
+        rows += [own | row for row in _rows(Scene.build(other, scene.mesh), models)]
         log.info("h = %g s, stiffness times %g: %d frames", step, ratio, other.frames)
     table = pd.DataFrame(rows, columns=SHORT_COLUMNS)
     whole = ["r", "blowup_frame", "k", "frames"]
     write_table(table.astype(dict.fromkeys(whole, "Int64")), out.path)
 
 
-def _rows(
-    scene: Scene, local: Local, models: Models, solver: str, limit: float
-) -> Iterator[dict[str, Any]]:
+def _rows(scene: Scene, models: Models) -> Iterator[dict[str, Any]]:
     """Yield rows of the full-order run of ``scene`` and, if it is finite, of all reduced runs.
 
-    A run ends as a blow-up if its bounding box exceeds ``limit`` times that of the rest shape.
-    A reduction in ``local`` is None if the basis has too few modes; its row then has no results.
+    A model of a basis with too few modes is None; its row has no results.
     """
-    system = scene.system_with(solver)
     nothing = np.zeros((scene.config.frames + 1, *scene.mesh.points.shape))
-    full = rerun(scene, system, scene.groups, reference=nothing, blowup_extent=limit)
+    loop, start = scene.stepper(track_objective=False), scene.initial_state()
+    full = rerun(scene, loop, start, nothing, BLOWUP_EXTENT)
     own = Yardstick(scene, full.positions)
 
     def row(labels: dict[str, Any], outcome: Rerun) -> dict[str, Any]:
         energy = {"energy_ratio": own.scale.ratio(outcome.positions)}
-        return {**labels, **outcome.row(own.displacement), **energy}
+        return {**labels, **own.row(outcome), **energy}
 
     whole = row({"method": "full", "position_basis": "full"}, full)
     if not full.finite:
@@ -313,12 +272,9 @@ def _rows(
         yield whole
         return
     yield {**whole, "relative_error": 0.0}
-    for labels, reduction in local:
-        if reduction is None:
+    for labels, model in models:
+        if model is None:
             yield {**labels, "frames": 0}
             continue
-        outcome = rerun_reduced(scene, labels["group"], reduction, own.reference, limit, system)
-        yield row({**labels, "gain": reduction.gain}, outcome)
-    for labels, model in models:
-        outcome = rerun_model(scene, model, own.reference, blowup_extent=limit)
-        yield row({"group": "all", **labels}, outcome)
+        gain = {"gain": model.reduction.gain} if isinstance(model, ProjectionModel) else {}
+        yield row({**labels, **gain}, own.run(model))

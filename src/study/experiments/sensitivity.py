@@ -1,9 +1,8 @@
 """Differences of full-order runs that should be equal (docs/study.md); forces of each effect.
 
-A run whose start is moved by 1e-10 of the mesh's size differs more and more from the original run.
-No reduced model can be expected to have a smaller error than this difference. For comparison, other
-runs have another linear solver (another order of summation), number of iterations or time step, or
-lack an effect.
+No reduced model can be expected to have a smaller error than the difference of a run whose start is
+moved by 1e-10 of the mesh's size. Other runs have another linear solver (another order of
+summation), number of iterations or time step, or lack an effect.
 """
 
 from collections.abc import Iterator
@@ -40,8 +39,7 @@ class PerturbedRuns(ConfigModel):
     """Settings of runs from randomly moved initial positions, for all ``seeds``.
 
     ``perturbations`` are lengths of the displacement relative to the longest side of the mesh.
-    ``reference`` is the perturbation whose runs decide up to which frame (the horizon) runs of the
-    study are compared, and the only one with which held-out motions are run.
+    ``reference`` is the one that decides the horizon, and with which held-out motions are run.
     """
 
     perturbations: tuple[Perturbation, ...] = (1e-12, 1e-10, 1e-8)

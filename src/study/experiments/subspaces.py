@@ -1,25 +1,21 @@
 """Models in position subspaces, whose projections are full, sampled (ecsw) or interpolated (hrpd).
 
-For a large scene, one job makes the models, runs them, and makes the full-order runs, which no
-other job reads; `study.experiments.frame_times` times the models. `live` writes the models of a
-scene to a file that a web page loads, to run them in the reader's browser.
+For a large scene, one job makes the models and the full-order runs, which no other job reads.
+`live` writes the models of a scene to a file that a web page loads.
 """
 
-import json
 import logging
-from collections import defaultdict
 from collections.abc import Iterator, Mapping
-from math import ceil
+from dataclasses import replace
+from itertools import product
 from pathlib import Path
+from time import process_time
 from typing import Any
 
 import h5py
-import numpy as np
 import pandas as pd
 
-from pdrom.core.errors import StorageError
-from pdrom.core.packed import pack_array, pack_positions
-from pdrom.core.store import write_hdf5, write_table, write_text
+from pdrom.core.store import write_hdf5, write_table
 from pdrom.core.yamlfile import ConfigModel, SceneName
 from pdrom.model.energy import largest
 from pdrom.model.held_out import MOTIONS
@@ -28,38 +24,33 @@ from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.basis import load_basis
 from pdrom.reduction.deviations import Yardstick
 from pdrom.reduction.method import MethodSpec
-from pdrom.reduction.rerun import mean_motion
 from pdrom.reduction.sampling import Reduction
 from pdrom.reduction.snapshots import training_frames
 from pdrom.reduction.subspace import exported
 from pdrom.reduction.subspace import model as subspace
-from pdrom.reduction.subspace.columns import Columns
-from pdrom.reduction.subspace.ecsw import Norm
-from pdrom.reduction.subspace.hrpd import HrpdSpec, SampledSpace, hrpd, sampled_space
-from pdrom.reduction.subspace.interpolation import Interpolation, interpolation_of
+from pdrom.reduction.subspace.hrpd import HrpdSpec, hrpd, sampled_space
+from pdrom.reduction.subspace.interpolation import interpolation_of
+from pdrom.reduction.subspace.training import make_columns, sampled_models
 from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import EachOf, Every, Setting, Settings, SourcesOf
 from study.experiments.kit import base as kit
 from study.experiments.kit import runfiles
 from study.experiments.kit.base import experiment
-from study.experiments.kit.measurement import clocked
 
 log = logging.getLogger(__name__)
 
 _RUN = [
     "scene", "group", "method", "position_basis", "k", "r", "frames", "finite", "blowup_frame",
-    "max_extent", "relative_error",
+    "max_extent", "training_residual", "relative_error",
 ]  # fmt: skip
 COLUMNS = [*_RUN, "energy_ratio"]
-_MADE = [*COLUMNS, "motion", "playback_error", "reduction_s"]
+_MADE = [*COLUMNS, "motion", "playback_error", "tau", "reduction_s"]
 SECONDS_COLUMNS = ["scene", "position_basis", "k", "method", "reduction_s"]
 LARGE_COLUMNS = [
     *_RUN, "motion", "playback_error", "tau", "vertices", "elements", "iterations", "reduction_s",
 ]  # fmt: skip
 FULL, HRPD = "full", "hrpd"
-
-Sampled = Mapping[str, subspace.Samples | Interpolation]
 
 
 class Hrpd(HrpdSpec):
@@ -72,14 +63,13 @@ class SubspaceModels(ConfigModel):
     """Settings of models in position subspaces.
 
     bases, sizes : kinds of basis, and numbers of modes k
-    tolerances, norm : relative residuals of energy-conserving sampling (ecsw), and their norm
+    tolerances : relative residuals of energy-conserving sampling (ecsw)
     hrpd : settings of models with interpolated projections; None for no such models
     """
 
     bases: tuple[kit.PositionBasis, ...] = ("pod", "skinning")
     sizes: tuple[kit.Modes, ...] = (10, 40)
     tolerances: tuple[kit.Tolerance, ...] = (3e-2, 1e-2)
-    norm: Norm = "energy"
     hrpd: Hrpd | None = None
 
     def methods(self, kind: str, k: int) -> list[str]:
@@ -88,7 +78,8 @@ class SubspaceModels(ConfigModel):
             return []
         tolerances = self.tolerances if kind == "pod" else ()
         interpolated = self.hrpd is not None and k in self.hrpd.sizes
-        return [FULL, *map(subspace.ecsw_name, tolerances), *([HRPD] if interpolated else [])]
+        full = [] if isinstance(self, LargeModels) else [FULL]
+        return [*full, *map(subspace.ecsw_name, tolerances), *([HRPD] if interpolated else [])]
 
 
 class Subspace(SubspaceModels):
@@ -104,10 +95,6 @@ class LargeModels(SubspaceModels):
     sizes: tuple[kit.Modes, ...] = (20,)
     tolerances: tuple[kit.Tolerance, ...] = (1e-2,)
 
-    def methods(self, kind: str, k: int) -> list[str]:
-        """Names of models on a basis of ``kind`` with k modes, except `FULL` (all elements)."""
-        return [method for method in super().methods(kind, k) if method != FULL]
-
 
 class Online(LargeModels):
     """Section ``online``: large ``scenes``, and settings of the reduced models made of them."""
@@ -122,7 +109,6 @@ class Online(LargeModels):
         "full_order": Every(paths.FULL_ORDER),
         "config": Setting("scene"),
         "asked": Setting("subspace"),
-        "blowup_extent": Setting("blowup_extent"),
     },
     writes={
         "out": paths.SUBSPACES,
@@ -132,11 +118,7 @@ class Online(LargeModels):
     },
 )
 def subspaces(
-    full_order: list[File],
-    config: SceneConfig,
-    asked: SubspaceModels,
-    blowup_extent: kit.BlowupExtent,
-    **files: File,
+    full_order: list[File], config: SceneConfig, asked: SubspaceModels, **files: File
 ) -> None:
     """Build a model for every basis, size and sampling, and run all motions with each."""
     motions = {
@@ -150,7 +132,7 @@ def subspaces(
             for series, values in motion.series.items():
                 file[f"{series}/{name}"] = values
         file.attrs.update(motions[kit.TRAIN].units)
-        rows = _runs(file, motions, asked, blowup_extent, compared=True)
+        rows = _runs(file, motions, asked, compared=True)
     train, heldout = rows[rows.motion == kit.TRAIN], rows[rows.motion != kit.TRAIN]
     write_table(train[COLUMNS], files["train_table"].path)
     write_table(heldout[[*COLUMNS, "motion"]], files["heldout_table"].path)
@@ -163,17 +145,11 @@ def subspaces(
         "sources": SourcesOf("scene.mesh"),
         "config": Setting("scene"),
         "asked": Setting("online"),
-        "blowup_extent": Setting("blowup_extent"),
     },
     writes={"out": paths.ONLINE, "models": paths.ONLINE_MODELS},
 )
 def online(
-    sources: list[Path],
-    config: SceneConfig,
-    asked: LargeModels,
-    blowup_extent: kit.BlowupExtent,
-    out: File,
-    models: File,
+    sources: list[Path], config: SceneConfig, asked: LargeModels, out: File, models: File
 ) -> None:
     """Build every model of a large scene, and run all motions with each model.
 
@@ -188,11 +164,8 @@ def online(
     }
     log.info("%s: full-order runs of %d vertices", config.name, mesh.vertices)
     with write_hdf5(models.path) as file:
-        rows = _runs(file, motions, asked, blowup_extent, compared=False)
+        rows = _runs(file, motions, asked, compared=False)
     table = rows.assign(
-        tau=rows.method.map(
-            {subspace.ecsw_name(tolerance): tolerance for tolerance in asked.tolerances}
-        ),
         vertices=mesh.vertices,
         elements=sum(group.elements for group in scenes[kit.TRAIN].groups),
         iterations=config.iterations,
@@ -201,94 +174,75 @@ def online(
 
 
 def _runs(
-    file: h5py.File,
-    motions: Mapping[str, Yardstick],
-    settings: SubspaceModels,
-    limit: float,
-    compared: bool,
+    file: h5py.File, motions: Mapping[str, Yardstick], settings: SubspaceModels, compared: bool
 ) -> pd.DataFrame:
     """Train every model on the training motion, run all motions with it, and return the rows.
 
-    file : file that receives the models
-    limit : a run ends as a blow-up if its bounding box exceeds this multiple of that at rest
-    compared : True to store in ``file`` also the subspace coordinates of each run, and its
-        deviations from the full-order run
+    ``file`` receives the models and, if ``compared``, also the subspace coordinates of each run and
+    its deviations from the full-order run.
     """
     rows: list[dict[str, Any]] = []
+    training = motions[kit.TRAIN]
     played = {
-        name: runfiles.run_error(motions[kit.TRAIN].reference, m.reference)
-        for name, m in motions.items()
+        name: runfiles.run_error(training.reference, m.reference) for name, m in motions.items()
     }
-    made = clocked(_subspaces(motions[kit.TRAIN], settings))
-    for of_columns, (base, columns, kind, k, models) in made:
-        subspace.store_columns(file.create_group(f"columns/{base}"), columns)
-        spent: dict[str, float] = defaultdict(float)
-        for of_model, (method, samples) in clocked(models):
-            # all ECSW samples are selected with the first model: its time is added to later models'
-            family = subspace.ECSW if method.startswith(subspace.ECSW) else method
-            spent[family] += of_model
-            model = subspace.SubspaceModel(kind, columns, samples)
-            labels: dict[str, Any] = {"method": method, "position_basis": kind, "k": k}
-            store = file.create_group(f"models/{base}_{method}")
-            subspace.store_model(store, {**labels, "base": base}, samples)
-            labels |= {"group": "all", "reduction_s": of_columns + spent[family]}
-            for name, motion in motions.items():
-                scene = motion.scene
-                outcome = subspace.rerun_model(scene, model, motion.reference, blowup_extent=limit)
-                row = outcome.row(motion.displacement) | labels | {"motion": name}
-                row["playback_error"] = played[name]
-                row |= {"scene": scene.config.name, "r": model.elements_evaluated(scene)}
-                if compared:
-                    seen = motion.deviations(outcome)
-                    row["energy_ratio"] = largest(seen["energy"])
-                    kept = {"coordinates": outcome.coordinates, "extent": outcome.extent, **seen}
-                    for series, values in kept.items():
-                        store[f"{name}/{series}"] = values
-                rows.append(row)
-                log.info("%s %s, %s: error %s", base, method, name, row["relative_error"])
+    for labels, model in _models(training, settings):
+        base = f"{labels['position_basis']}_k{labels['k']:03d}"
+        if f"columns/{base}" not in file:
+            subspace.store_columns(file.create_group(f"columns/{base}"), model.columns)
+        store = file.create_group(f"models/{base}_{labels['method']}")
+        kept = {name: labels[name] for name in ("method", "position_basis", "k")}
+        subspace.store_model(store, {**kept, "base": base}, model.samples)
+        for name, motion in motions.items():
+            outcome = motion.run(model)
+            row = motion.row(outcome) | labels | {"motion": name, "group": "all"}
+            row |= {"playback_error": played[name], "training_residual": model.residual}
+            row |= {"scene": motion.scene.config.name, "r": model.elements_evaluated(motion.scene)}
+            if compared:
+                seen = motion.deviations(outcome)
+                row["energy_ratio"] = largest(seen["energy"])
+                series = {"coordinates": outcome.coordinates, "extent": outcome.extent, **seen}
+                for key, values in series.items():
+                    store[f"{name}/{key}"] = values
+            rows.append(row)
+            log.info("%s %s, %s: error %s", base, labels["method"], name, row["relative_error"])
     order = list(motions)
     return pd.DataFrame(sorted(rows, key=lambda row: order.index(row["motion"])), columns=_MADE)
 
 
-def _subspaces(
-    motion: Yardstick, settings: SubspaceModels
-) -> Iterator[tuple[str, Columns, str, int, Iterator[tuple[str, Sampled]]]]:
-    """Yield name, columns, kind and size k of every subspace, and an iterator over its models.
+def _models(motion: Yardstick, settings: SubspaceModels) -> Iterator[subspace.Labelled]:
+    """Yield labels (with the time of the training) and model for each of ``settings``.
 
-    A model is a pair of method and samples. Only even frames are used for training, as for bases of
-    projections.
+    Only even frames of the ``motion`` are used for training, as for bases of projections.
     """
     scene, points = motion.scene, motion.scene.mesh.points
     count = max(plan.train for plan in scene.config.reduce.values())
     frames = training_frames(scene.config.frames, count)
-    spaces: dict[str, SampledSpace | None] = {}
-    if settings.hrpd is not None:
-        spaces = {g.name: sampled_space(g, points, settings.hrpd) for g in scene.groups}
-
-    def samplings(columns: Columns, methods: list[str]) -> Iterator[tuple[str, Sampled]]:
-        """Yield pairs (method, samples) of all models in the subspace spanned by ``columns``."""
+    for kind, k in product(settings.bases, settings.sizes):
+        methods, modes = settings.methods(kind, k), dict[str, Any]({kind: k})
+        started = process_time()
+        columns = make_columns([scene], motion.reference[1:][frames], **modes)
+        spent = process_time() - started
+        labels: dict[str, Any] = {"position_basis": kind, "k": k, "reduction_s": spent}
         if FULL in methods:
-            yield FULL, {}
-        if any(method.startswith(subspace.ECSW) for method in methods):
-            asked, norm = settings.tolerances, settings.norm
-            found = subspace.sample_elements(scene, columns, frames, asked, norm=norm)
-            for tolerance, samples in zip(asked, found, strict=True):
-                yield subspace.ecsw_name(tolerance), samples
-        if HRPD in methods:
-            yield HRPD, {g.name: hrpd(g, columns, spaces[g.name]) for g in scene.groups}
+            yield labels | {"method": FULL}, subspace.SubspaceModel(columns)
+        tolerances = [t for t in settings.tolerances if subspace.ecsw_name(t) in methods]
+        if tolerances:
+            started = process_time()
+            models = sampled_models([scene], columns, frames, tolerances)
+            seconds = spent + process_time() - started
+            for tau, model in zip(tolerances, models, strict=True):
+                name = subspace.ecsw_name(tau)
+                yield labels | {"method": name, "tau": tau, "reduction_s": seconds}, model
+        if settings.hrpd is not None and HRPD in methods:
+            started, spec = process_time(), settings.hrpd
+            found = {g.name: hrpd(g, columns, sampled_space(g, points, spec)) for g in scene.groups}
+            seconds = spent + process_time() - started
+            model = subspace.SubspaceModel(columns, found)
+            yield labels | {"method": HRPD, "reduction_s": seconds}, model
 
-    for kind in settings.bases:
-        for k in settings.sizes:
-            columns = subspace.make_columns(scene, motion.reference[1:][frames], kind, k=k)
-            models = samplings(columns, settings.methods(kind, k))
-            yield f"{kind}_k{k:03d}", columns, kind, k, models
 
-
-LARGEST = 3_000_000  # largest size of the file for the web page, bytes
-GHOST = 250_000  # the file has at most about so many vertex positions of the full-order run
 JOINT = "deim-joint"
-FORMAT = 1
-Labelled = tuple[dict[str, Any], subspace.SubspaceModel]
 
 
 class LiveModels(ConfigModel):
@@ -345,12 +299,12 @@ def live(mesh: File, train: File, settings: Options, out: File, **files: list[Fi
     """Write reduced models of a scene and its full-order run to the file that the web page loads.
 
     ``bases`` and ``samplings`` are files of the groups that ``settings.joint_rows`` lists: each
-    sampled row is used for x, y and z. StorageError if the file would be larger than `LARGEST`.
+    sampled row is used for x, y and z.
     """
     scene = kit.scene_of(settings.scene, mesh)
     reference = kit.positions_of(train)
     asked = settings.live
-    chosen: list[Labelled] = []
+    chosen: list[subspace.Labelled] = []
     tolerances = {subspace.ecsw_name(tolerance): tolerance for tolerance in asked.tolerances}
     for file in (*files["subspaces"], *files["online"]):
         for own, model in subspace.load_models(file.path):
@@ -366,36 +320,13 @@ def live(mesh: File, train: File, settings: Options, out: File, **files: list[Fi
         size = min(asked.joint_rows, basis.rank)
         reduction = runfiles.load_reduction(basis, sampling.path, case.spec, size)
         chosen += list(_joint(scene, case.group, reduction, chosen))
-    used, triangles = np.unique(scene.mesh.triangles, return_inverse=True)
-    stride = max(1, ceil((len(reference) - 1) * len(used) / GHOST))
-    content = {
-        "format": FORMAT,
-        "scene": settings.scene.name,
-        "title": settings.title,
-        **exported.export_scene(scene),
-        **_models(scene, chosen),
-        # the surface, and positions of its vertices in every ``stride``-th full-order frame
-        "shown": {
-            "vertices": pack_array(used, "u4"),
-            "triangles": pack_array(triangles.reshape(-1, 3), "u4"),
-            "stride": stride,
-            "full": pack_positions(reference[::stride, used]),
-        },
-        "motion": mean_motion(reference),
-    }
-    text = f"pdromLive({json.dumps(content, separators=(',', ':'), allow_nan=False)});\n"
-    if len(text) > LARGEST:
-        raise StorageError(
-            f"{out.path}: {len(text) / 1e6:.1f} MB, allowed are {LARGEST / 1e6:.1f}: choose fewer "
-            "sizes or tolerances (keys live.sizes, live.tolerances)"
-        )
-    write_text(text, out.path)
-    log.info("%s: %d models, %.1f MB", settings.scene.name, len(chosen), len(text) / 1e6)
+    exported.write_page_models(scene, settings.title, reference, chosen, out.path)
+    log.info("%s: %d models", settings.scene.name, len(chosen))
 
 
 def _joint(
-    scene: Scene, group: str, reduction: Reduction, beside: list[Labelled]
-) -> Iterator[Labelled]:
+    scene: Scene, group: str, reduction: Reduction, beside: list[subspace.Labelled]
+) -> Iterator[subspace.Labelled]:
     """Yield a model for each subspace in ``beside``, with ``group`` interpolated by ``reduction``.
 
     Other groups have the sampled elements of a model ``beside`` with this subspace. ``reduction``
@@ -404,23 +335,4 @@ def _joint(
     for model in {id(model.columns): model for _, model in beside}.values():
         joint = interpolation_of(scene.group(group), model.columns, reduction)
         labels = {"family": "joint", "k": model.columns.modes, "r": reduction.r}
-        samples = {**model.samples, group: joint}
-        yield labels, subspace.SubspaceModel(model.position_basis, model.columns, samples)
-
-
-def _models(scene: Scene, chosen: list[Labelled]) -> dict[str, Any]:
-    """Contents of the file for the web page: all bases, and models, each with its basis's index."""
-    by_basis: dict[int, list[subspace.SubspaceModel]] = {}
-    for _, model in chosen:
-        by_basis.setdefault(id(model.columns), []).append(model)
-    places = {key: place for place, key in enumerate(by_basis)}
-    return {
-        "bases": [
-            exported.export_basis(scene, own[0].columns, exported.needed_vertices(scene, own))
-            for own in by_basis.values()
-        ],
-        "models": [
-            {**labels, "basis": places[id(model.columns)], **exported.export_model(scene, model)}
-            for labels, model in chosen
-        ],
-    }
+        yield labels, replace(model, samples={**model.samples, group: joint})

@@ -18,14 +18,15 @@ from scipy import sparse
 from pdrom.core.store import open_hdf5, write_table
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.model.constraints.base import ConstraintGroup
-from pdrom.model.dynamics.system import GlobalSystem
 from pdrom.model.scene import Scene, SceneConfig
-from pdrom.reduction.basis import compute_basis, load_basis
+from pdrom.reduction.basis import compute_basis
 from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.sampling import Reduction, reductions
-from pdrom.reduction.sampling.local_step import ReducedLocalStep, replace_group
-from pdrom.reduction.snapshots import row_masses
-from pdrom.reduction.subspace.model import SubspaceModel, load_models, make_columns, sample_elements
+from pdrom.reduction.sampling.local_step import ReducedLocalStep
+from pdrom.reduction.sampling.model import ProjectionModel
+from pdrom.reduction.snapshots import recorded
+from pdrom.reduction.subspace.model import load_models
+from pdrom.reduction.subspace.training import make_columns, sampled_models
 from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, Settings, SourcesOf
@@ -34,7 +35,7 @@ from study.experiments.kit import base as kit
 from study.experiments.kit import runfiles
 from study.experiments.kit.base import experiment
 from study.experiments.kit.costs import effect_costs, left_out, local_costs, variant
-from study.experiments.kit.measurement import Protocol, Variant, measure
+from study.experiments.kit.measurement import Protocol, Variant, measure, model_variant
 
 
 class NumpyLocalStep:
@@ -44,18 +45,16 @@ class NumpyLocalStep:
     """
 
     def __init__(self, group: ConstraintGroup) -> None:
-        group = group.for_run()
-        self.name, self.group, self.begin_frame = group.name, group, group.begin_frame
-        self.assembly_seconds = 0.0
+        self.group = group = group.for_run()
+        self.name, self.begin_frame, self.assembly_seconds = group.name, group.begin_frame, 0.0
         self._shape = (group.elements, group.rows_per_element, 3)
-        self._all = np.arange(group.elements)
         self._weights = group.row_weights[:, None]
         self._lift = sparse.csr_array(group.S.T.multiply(group.row_weights[None, :]))
 
     def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
         """Add S^T W p(y), p the projections at ``y`` (N, 3) m, to ``rhs``; return the energy, J."""
-        d = self.group.S @ y
-        p = self.group.reference_project(d.reshape(self._shape), self._all).reshape(d.shape)
+        d, every = self.group.S @ y, np.arange(self.group.elements)
+        p = self.group.reference_project(d.reshape(self._shape), every).reshape(d.shape)
         energy = 0.5 * float(np.sum(self._weights * (d - p) ** 2))
         before = perf_counter()
         rhs += self._lift @ p
@@ -63,13 +62,11 @@ class NumpyLocalStep:
         return energy
 
 
-class InterpretedLocalStep:
+class InterpretedLocalStep(NumpyLocalStep):
     """Local step by interpreted Python code that projects one element after the other."""
 
     def __init__(self, group: ConstraintGroup) -> None:
-        group = group.for_run()
-        self.name, self.group, self.begin_frame = group.name, group, group.begin_frame
-        self.assembly_seconds = 0.0
+        super().__init__(group)
         rows = group.rows_per_element
         self._blocks = []
         for e in range(group.elements):
@@ -108,6 +105,9 @@ ITERATIONS = [
     "scene", "method", "vertices", "elements", "r", "k", "elements_sampled",
     "ms_per_iteration", "local_ms", "global_ms", "vertices_ms", "local_share",
 ]  # fmt: skip
+# Methods whose local steps are timed on meshes of increasing size; the one that is run, and the
+# tolerance of the sampling beside it.
+SCALED, METHOD, TOLERANCE = ("deim-joint", "block-deim"), "block-deim", 1e-2
 STATES, SIZED_STATES = 5, 4  # `timing`, `scaling` time local steps at positions of so many frames
 TrainingFrames = Annotated[int, Field(ge=3, le=1000)]
 
@@ -115,9 +115,7 @@ TrainingFrames = Annotated[int, Field(ge=3, le=1000)]
 class Timing(Protocol):
     """Section ``timing``: numbers of frames, iterations and repeats in timing jobs.
 
-    Slow implementations of the full-order run are timed over fewer frames, the interpreted one also
-    over fewer iterations. ``breakeven`` are sizes r of reduced local steps that are timed by
-    themselves, not in runs, with ``breakeven_repeats`` short repeats.
+    ``breakeven`` are sizes r of reduced local steps that are timed by themselves, not in runs.
     """
 
     numpy_frames: kit.Count = 4
@@ -135,7 +133,6 @@ class Options(ConfigModel):
     ranks: tuple[kit.Rank, ...]
     iterations: IterationCounts
     timing: Timing
-    solver: kit.Solver
 
 
 @experiment(
@@ -159,36 +156,28 @@ class Options(ConfigModel):
 def timing(mesh: File, fom: File, settings: Options, **files: Any) -> None:
     """Measure times of frames, local steps and effects, and of frames with an effect left out."""
     scene, asked = kit.scene_of(settings.scene, mesh), settings.timing
-    system, name = scene.system_with(settings.solver), scene.config.name
-    frames = min(asked.frames, scene.config.frames)
+    name, frames = scene.config.name, min(asked.frames, scene.config.frames)
     common = {"scene": name, "vertices": scene.mesh.vertices, "iterations": scene.config.iterations}
-    slow, quick = _full_order(scene, system, frames, asked, common)
-    quick += _other_counts(scene, system, frames, settings.iterations, common)
+    slow, quick = _full_order(scene, frames, asked, common)
+    quick += _other_counts(scene, frames, settings.iterations, common)
+    common["implementation"] = "compiled"
     alone: dict[tuple[str, str, int], ReducedLocalStep] = {}
-    for sampling in files["samplings"]:
-        spec = settings.methods[sampling["method"]]
-        basis = load_basis(runfiles.basis_of(sampling, spec, files["bases"]).path)
-        with open_hdf5(sampling.path) as stored:  # find the sizes r in the file
-            held = {int(key[1:]) for key in stored if key.startswith("r")}
-        timed = held.intersection(kit.resolve_ranks(settings.ranks, basis.rank))
-        sizes = held.intersection(kit.resolve_ranks(asked.breakeven, basis.rank))
-        sizes = set() if spec.rows == "all" else sizes
-        group = scene.group(sampling["group"])
-        for r in sorted(timed | sizes):
-            reduction = runfiles.load_reduction(basis, sampling.path, spec, r=r)
-            step = ReducedLocalStep(group, reduction)
-            if r in timed:
-                own = {"group": group.name, "method": sampling["method"], "r": r}
-                labels = {**common, **own, "implementation": "compiled"}
-                steps = replace_group(scene, group.name, step)
-                quick.append(variant(scene, system, steps, frames, labels))
-            if r in sizes:
-                alone[group.name, sampling["method"], r] = step
+    sizes = (*settings.ranks, *asked.breakeven)
+    given = files["samplings"], files["bases"], settings.methods, sizes
+    for labels, reduced in runfiles.projection_models(*given):
+        if reduced is None:
+            continue
+        reduction, r = reduced.reduction, labels["r"]
+        if r in kit.resolve_ranks(settings.ranks, reduction.basis.rank):
+            quick.append(model_variant({**common, **labels}, scene, reduced, frames))
+        by_itself = r in kit.resolve_ranks(asked.breakeven, reduction.basis.rank)
+        if by_itself and reduction.spec.rows != "all":
+            step = ReducedLocalStep(scene.group(reduced.group), reduction)
+            alone[reduced.group, labels["method"], r] = step
     for file in files["subspaces"]:
         for own, model in load_models(file.path):
-            labels = {**common, "iterations": None, "implementation": "compiled", "group": "all"}
-            loop, start = model.loop(scene)
-            quick.append(Variant({**labels, **own}, loop, start, frames, output=model.output()))
+            labels = {**common, "iterations": None, "group": "all", **own}
+            quick.append(model_variant(labels, scene, model, frames))
     log.info("%s: %d runs of %d frames", name, len(quick) + 1, frames)
     results = measure(quick, asked.warmup, asked.repeats) + measure([slow], 0, asked.repeats)
     write_table(pd.DataFrame(results, columns=COLUMNS), files["out"].path)
@@ -201,29 +190,27 @@ def timing(mesh: File, fom: File, settings: Options, **files: Any) -> None:
     write_table(times.assign(factor=1.0), files["breakeven"].path)
     log.info("%s: effects", name)
     often = {"warmup": asked.warmup, "repeats": asked.repeats}
-    write_table(costs := effect_costs(scene, system, frames, **often), files["effects"].path)
-    without = left_out(scene, costs, frames, **often, solver=settings.solver)
+    write_table(costs := effect_costs(scene, frames, **often), files["effects"].path)
+    without = left_out(scene, costs, frames, **often)
     write_table(without, files["without"].path)
 
 
 def _full_order(
-    scene: Scene, system: GlobalSystem, frames: int, asked: Timing, common: dict[str, Any]
+    scene: Scene, frames: int, asked: Timing, common: dict[str, Any]
 ) -> tuple[Variant, list[Variant]]:
     """Return the full-order runs to time: interpreted code with fewer iterations; all others."""
-    quick = variant(scene, system, scene.groups, frames, {**common, "implementation": "compiled"})
-    made = [quick]
+    made = [variant(scene, frames, {**common, "implementation": "compiled"})]
     for name, step in IMPLEMENTATIONS.items():
         steps = [step(group) for group in scene.groups]
         fewer = min(frames, getattr(asked, f"{name}_frames"))
-        labels = {**common, "implementation": name}
-        made.append(variant(scene, system, steps, fewer, labels))
+        made.append(variant(scene, fewer, {**common, "implementation": name}, steps))
     slow, whole = made.pop(), scene.config.iterations
     slow.loop.iterations = min(whole, asked.interpreted_iterations)
     return replace(slow, share=slow.loop.iterations / whole), made
 
 
 def _other_counts(
-    scene: Scene, system: GlobalSystem, frames: int, asked: IterationCounts, common: dict[str, Any]
+    scene: Scene, frames: int, asked: IterationCounts, common: dict[str, Any]
 ) -> list[Variant]:
     """Full-order runs with iteration counts other than the scene's, or Anderson acceleration."""
     variants = []
@@ -231,20 +218,16 @@ def _other_counts(
     own = (scene.config.iterations, scene.config.anderson_window)
     for count, size in accelerated(counts, asked.anderson_window):
         if (count, size) != own:
-            loop = scene.iterated(count, size).stepper(system, track_objective=False)
             method = kit.ANDERSON if size else kit.FOM
             labels = {"method": method, "iterations": count, "implementation": "compiled"}
-            variants.append(Variant({**common, **labels}, loop, scene.initial_state(), frames))
+            loop = scene.iterated(count, size).stepper(scene.system, track_objective=False)
+            variants.append(Variant(common | labels, loop, scene.initial_state(), frames))
     return variants
 
 
 class SizedBreakEven(ConfigModel):
-    """Settings of reduced local steps that are timed outside of runs, on every mesh size.
+    """Settings of reduced local steps of sizes r that are timed outside of runs, on every mesh."""
 
-    ``sizes`` are basis sizes r. Bases use the first ``training_frames`` frames of the full order.
-    """
-
-    methods: tuple[str, ...] = ("deim-joint", "block-deim")
     sizes: tuple[kit.Modes, ...] = (5, 10, 20, 40, 80)
     training_frames: TrainingFrames = 84
     repeats: kit.Repeats = 20
@@ -253,15 +236,12 @@ class SizedBreakEven(ConfigModel):
 class Sized(Protocol):
     """Settings of the timing on one mesh size.
 
-    Two reductions are trained on ``training_frames`` frames and timed over ``frames`` frames:
-    ``method`` with r modes (reduced local step), and energy-conserving sampling to ``tolerance`` in
-    a position subspace of k modes.
+    Trained on ``training_frames`` frames and timed are a reduced local step with r modes, and
+    energy-conserving sampling in a position subspace of k modes.
     """
 
-    method: str = "block-deim"
     r: kit.Modes = 10
     k: kit.Modes = 20
-    tolerance: kit.Tolerance = 1e-2
     training_frames: TrainingFrames = 16
     repeats: kit.Repeats = 9
     breakeven: SizedBreakEven = SizedBreakEven()
@@ -279,7 +259,6 @@ class SizedOptions(ConfigModel):
     scene: SceneConfig
     scaled_methods: dict[str, MethodSpec]
     scaling: Sized
-    solver: kit.Solver
 
 
 @experiment(
@@ -295,25 +274,21 @@ def scaling(sources: list[Path], settings: SizedOptions, iterations: File, break
     factor = float(iterations["factor"])
     config = config.coarsened(factor, 1.0)
     scene = Scene.build(config, config.mesh.build(Path()))
-    system = scene.system_with(settings.solver)
     group, few = scene.groups[0], sized.training_frames
-    positions, projections, roundoff = _training(scene, system, max(few, alone.training_frames))
-    columns = make_columns(scene, positions[:few], "pod", k=sized.k)
+    many, start = max(few, alone.training_frames), scene.initial_state()
+    positions, projections, roundoff = recorded(scene, group.name, start, many)
+    positions = positions[1:]
+    columns = make_columns([scene], positions[:few], sized.k)
     trained_on = np.arange(len(positions[:few]))
-    (samples,) = sample_elements(scene, columns, trained_on, tolerances=[sized.tolerance])
-    model = SubspaceModel("pod", columns, samples)
+    (model,) = sampled_models([scene], columns, trained_on, [TOLERANCE])
     inside = {"k": columns.modes, "elements_sampled": model.elements_evaluated(scene)}
-    (reduction,) = _reductions(
-        scene, projections[:few], roundoff[:few], specs[sized.method], [sized.r]
-    )
+    (reduction,) = _reductions(scene, projections[:few], roundoff[:few], specs[METHOD], [sized.r])
     sampled = {"r": reduction.r, "elements_sampled": len(reduction.elements)}
-    steps = replace_group(scene, group.name, ReducedLocalStep(group, reduction))
+    local = ProjectionModel(group.name, reduction)
     variants = [
-        variant(scene, system, scene.groups, sized.frames, {"method": kit.FOM}),
-        variant(scene, system, steps, sized.frames, {"method": sized.method, **sampled}),
-        Variant(
-            {"method": "ecsw", **inside}, *model.loop(scene), sized.frames, output=model.output()
-        ),
+        variant(scene, sized.frames, {"method": kit.FOM}),
+        model_variant({"method": METHOD, **sampled}, scene, local, sized.frames),
+        model_variant({"method": "ecsw", **inside}, scene, model, sized.frames),
     ]
     times = pd.DataFrame(measure(variants, sized.warmup, sized.repeats)).assign(
         scene=config.name,
@@ -329,33 +304,13 @@ def scaling(sources: list[Path], settings: SizedOptions, iterations: File, break
     few = alone.training_frames
     reduced = {
         (group.name, name, own.r): ReducedLocalStep(group, own)
-        for name in alone.methods
+        for name in SCALED
         for own in _reductions(scene, projections[:few], roundoff[:few], specs[name], alone.sizes)
     }
     states = positions[:: len(positions) // SIZED_STATES][:SIZED_STATES]
     costs = local_costs(scene, reduced, states, warmup=sized.warmup, repeats=alone.repeats)
     write_table(costs.assign(factor=factor), breakeven.path)
     log.info("%s: %d vertices done", config.name, scene.mesh.vertices)
-
-
-def _training(scene: Scene, system: GlobalSystem, frames: int) -> tuple[np.ndarray, ...]:
-    """Run the first n ``frames`` in full order; return positions, projections, rounding errors.
-
-    Positions (n, N, 3) in m are those at the ends of frames. Projections (n, e p, 3) of the first
-    group of ``scene`` and their rounding errors (n,) are those of the last local step of a frame.
-    """
-    loop, state = scene.stepper(system, track_objective=False), scene.initial_state()
-    group = loop.local_step(scene.groups[0].name)
-    positions, projections, roundoff = [], [], []
-
-    def watch(y: np.ndarray) -> None:
-        projections.append(group.project(y))
-        roundoff.append(group.roundoff(y))
-
-    for frame in range(frames):
-        state, _ = loop.step(state, frame, watch)
-        positions.append(state.positions)
-    return np.stack(positions), np.stack(projections), np.array(roundoff)
 
 
 def _reductions(
@@ -366,13 +321,7 @@ def _reductions(
     asked: Sequence[int],
 ) -> list[Reduction]:
     """Reductions of the first group to r modes (at most the basis's rank) for each r ``asked``."""
-    group = scene.groups[0]
-    basis = compute_basis(
-        projections,
-        row_masses(group, scene.masses),
-        float(np.linalg.norm(roundoff)),
-        rows_per_element=group.rows_per_element,
-        spec=spec,
-    )
+    noise = float(np.linalg.norm(roundoff))
+    basis = compute_basis(projections, noise, scene.groups[0].rows_per_element, spec)
     sizes = sorted({min(r, basis.rank) for r in asked})
     return list(reductions(basis, spec, sizes).values())

@@ -16,7 +16,7 @@ from typing import Any
 
 from pdrom.core.errors import ConfigurationError, SceneError, choices
 from pdrom.core.provenance import ORIGIN, provenance
-from pdrom.reduction.subspace.exported import DOUBLES, require_known
+from pdrom.reduction.subspace.exported import DOUBLES, LARGEST, require_known
 from pdrom.view.text import require_typeset
 from study.article.build import article
 from study.artifact.artifact import Artifact, make, modules_in, recorded
@@ -31,7 +31,6 @@ from study.artifact.paths import (
 )  # fmt: skip
 from study.artifact.reads import Labels, Paths, listed
 from study.experiments.kit.base import experiments
-from study.experiments.subspaces import LARGEST
 from study.figures.kit.declaration import Declaration, declarations
 from study.live.page import live_page
 from study.paper.build import paper, paper_inputs

@@ -14,7 +14,6 @@ from pydantic import Field, model_validator
 
 from pdrom.core.errors import ConfigurationError, choices
 from pdrom.core.yamlfile import ConfigModel, SceneName, read_yaml, validate
-from pdrom.model.dynamics.system import DEFAULT_SOLVER
 from pdrom.model.held_out import MOTIONS
 from pdrom.model.mesh.config import MeshConfig
 from pdrom.model.scene import SceneConfig
@@ -24,9 +23,9 @@ from study.experiments.alternatives.experiment import Alternatives
 from study.experiments.frame_times import FrameTimes
 from study.experiments.hard_cases.outcomes import HardCases
 from study.experiments.iterations import IterationSweep
-from study.experiments.kit.base import BlowupExtent, Rank, Solver
+from study.experiments.kit.base import Rank
 from study.experiments.repetitions import LadderSection, Noise, RepetitionSection
-from study.experiments.reruns import Stability, Sweep
+from study.experiments.reruns import Stability
 from study.experiments.sensitivity import Sensitivity
 from study.experiments.subspaces import Live, Online, Subspace
 from study.experiments.timing import Scaling, Timing
@@ -45,9 +44,6 @@ class StudySettings(ConfigModel):
     scenes: Annotated[tuple[SceneName, ...], Field(min_length=1)]
     methods: Annotated[tuple[str, ...], Field(min_length=1)]
     ranks: Annotated[tuple[Rank, ...], Field(min_length=1)] = (6, 10, 20, "full")
-    sweep: Sweep = Sweep()
-    solver: Solver = DEFAULT_SOLVER
-    blowup_extent: BlowupExtent = 100.0
     coarsen: scene_kit.Coarsen = scene_kit.Coarsen()
     replicate: scene_kit.Replicate = scene_kit.Replicate()
     claim_sets: dict[str, tuple[SceneName, ...]] = Field(default_factory=dict)

@@ -16,16 +16,19 @@ from pdrom.model import constraints
 from pdrom.model.constraints.base import GroupConfig
 from pdrom.model.effects import EFFECTS
 from pdrom.model.held_out import HeldOut
+from pdrom.model.runs import BLOWUP_EXTENT
 from pdrom.model.scene import SceneConfig
 from pdrom.reduction.method import MethodSpec
 from study.artifact import paths
 from study.artifact.markup import to_tex
 from study.artifact.reads import Labels
+from study.experiments.alternatives.experiment import CONTINUOUS_TOLERANCE
 from study.experiments.frame_times import NamedScene, ProjectionCase, SubspaceCase
 from study.experiments.kit.base import Horizon, OfScene
 from study.experiments.repetitions import Cell, Repeated
 from study.experiments.reruns import Stability
 from study.experiments.subspaces import JOINT, JointRows
+from study.experiments.timing import SCALED
 from study.figures.kit.declaration import Experiment, Reduction, declarations
 from study.paper.build import PAGES, Facts
 from study.paper.source import source_files
@@ -105,9 +108,7 @@ def scaled_methods(study: Study, labels: Labels) -> dict[str, MethodSpec]:
 
     They need not be among the methods of the study. ``labels`` are not used.
     """
-    section = study.settings.scaling
-    found = study.named_methods([section.method], "scaling.method")
-    return found | study.named_methods(section.breakeven.methods, "scaling.breakeven.methods")
+    return study.named_methods(SCALED, "scaling")
 
 
 def _repeated(study: Study, labels: Labels) -> tuple[Repeated, ...]:
@@ -194,12 +195,12 @@ def _numbers(study: Study) -> dict[str, Any]:
         "timed_frames": settings.timing.frames,
         "processes": settings.frame_times.processes,
         "process_frames": settings.frame_times.frames,
-        "blowup_extent": settings.blowup_extent,
+        "blowup_extent": BLOWUP_EXTENT,
         "ranks": ", ".join(str(r) for r in settings.ranks),
         "wrong": settings.stability.wrong,
         "left": settings.stability.left,
         "tolerance": settings.iterations.tolerance,
-        "continuous_tolerance": settings.alternatives.continuous.tolerance,
+        "continuous_tolerance": CONTINUOUS_TOLERANCE,
         "opponent_frames": settings.alternatives.frames,
         "opponent_processes": settings.alternatives.processes,
         "far": FAR,

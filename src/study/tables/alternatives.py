@@ -55,7 +55,7 @@ KNOWN = 3.0  # least limit of errors / error of the reference run "continuous"
         ITERATIONS,
         integer("training_motions", "motions that a reduction is trained on"),
         timed(number("offline_s", "processor time of its training, full-order runs included", "s")),
-        *shared("k elements_sampled"),
+        *shared("k elements_sampled training_residual"),
         MOTION,
         integer("frames", "frames that errors are taken over"),
         flag("finite", "no frame blew up", compared="error"),

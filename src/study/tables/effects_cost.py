@@ -393,7 +393,7 @@ def _first_known(made: pd.DataFrame, sources: list[pd.DataFrame], column: str) -
         integer("elements", "elements of all groups"),
         *shared("position_basis k"),
         number("tau", "tolerance of the element sampling", compared="exact"),
-        *shared("elements_sampled"),
+        *shared("elements_sampled training_residual"),
         number("relative_error_train", "error of the positions in the training motion"),
         number("relative_error_heldout", "the same in held-out motions: their median"),
         number("relative_error_heldout_high", "the largest"),

@@ -23,6 +23,7 @@ from study.tables.kit.results import KEYS, TRAIN, joined, timings_in_one_time, t
     title="Reduced runs of the training and the held-out motions",
     columns=(
         *shared("scene group method position_basis k r frames finite blowup_frame max_extent"),
+        *shared("training_residual"),
         *shared("relative_error relative_error_within_horizon playback_error"),
         *shared("horizon_frame sensitivity_floor"),
         *shared("ms_per_frame vertices_ms local_ms global_ms speedup"),

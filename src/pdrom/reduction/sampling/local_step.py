@@ -5,7 +5,6 @@ sampled entries of p(y), then the reconstruction ("lift"). All axes x, y, z shar
 coefficients, or each has its own set. A column of the lift adds the reconstruction by one set of
 coefficients to one axis of the right-hand side."""
 
-from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from typing import Self
@@ -20,10 +19,7 @@ from pdrom.model.constraints import local_kernel as kernels
 from pdrom.model.constraints.base import ConstraintGroup
 from pdrom.model.constraints.local_kernel import OWN, LocalKernel, LocalPass
 from pdrom.model.dynamics.stepper import LocalStep
-from pdrom.model.dynamics.system import GlobalSystem
-from pdrom.model.runs import BoundedRun
 from pdrom.model.scene import Scene
-from pdrom.reduction.rerun import Rerun, compare
 from pdrom.reduction.sampling.reduction import Reduction
 
 SPLIT_FROM = 1 << 17  # vertices times modes from which the kernel's work is done in two `PARTS`
@@ -293,43 +289,3 @@ def replace_group(scene: Scene, group: str, replacement: LocalStep) -> list[Loca
     """Local steps of ``scene``, with ``replacement`` for the constraint group named ``group``."""
     scene.group(group)
     return [replacement if g.name == group else g for g in scene.groups]
-
-
-def rerun(
-    scene: Scene,
-    system: GlobalSystem,
-    local_steps: Sequence[LocalStep],
-    reference: np.ndarray,
-    blowup_extent: float,
-    offset: np.ndarray | None = None,
-) -> Rerun:
-    """Run a scene with given local steps and compare it with its full-order trajectory.
-
-    Parameters
-    ----------
-    reference : (F + 1, N, 3) m, positions of the full-order run
-    blowup_extent : the run ends if its bounding box exceeds this multiple of that at rest
-    offset : (N, 3) m, added to the initial positions
-    system : factored system of the scene's global step
-    local_steps : local steps that are used instead of the groups of the scene
-    """
-    loop = scene.stepper(system, local_steps, track_objective=False)
-    start, frames, unit = scene.initial_state(offset), scene.config.frames, scene.mesh.extent
-    return compare(BoundedRun(loop.run, start, frames, blowup_extent, unit), reference)
-
-
-def rerun_reduced(
-    scene: Scene,
-    group: str,
-    reduction: Reduction,
-    reference: np.ndarray,
-    blowup_extent: float,
-    system: GlobalSystem | None = None,
-    offset: np.ndarray | None = None,
-) -> Rerun:
-    """Run a scene with the projections of ``group`` reduced; compare it with the full-order run.
-
-    ``system`` is by default the scene's; `rerun` explains the arguments from ``reference`` on.
-    """
-    steps = replace_group(scene, group, ReducedLocalStep(scene.group(group), reduction))
-    return rerun(scene, system or scene.system, steps, reference, blowup_extent, offset)

@@ -4,27 +4,34 @@ The engine computes strains and the reduced system from basis, rest shape and sa
 formulas of `pdrom.reduction.subspace`. Exported numbers are doubles unless stated otherwise.
 """
 
-from collections.abc import Iterable
+import json
+import os
+from collections.abc import Iterable, Sequence
+from math import ceil
 from typing import Any
 
 import numpy as np
 
-from pdrom.core.errors import SceneError, choices
-from pdrom.core.packed import pack_array
+from pdrom.core.errors import SceneError, StorageError, choices
+from pdrom.core.packed import pack_array, pack_positions
+from pdrom.core.store import write_text
 from pdrom.model.constraints.base import ConstraintGroup, StencilGroup
 from pdrom.model.effects import EFFECTS
 from pdrom.model.effects.base import Force, Start
 from pdrom.model.effects.hold import Pins
 from pdrom.model.effects.obstacle import Floor
 from pdrom.model.scene import Scene, SceneConfig
-from pdrom.reduction.subspace.columns import Columns
-from pdrom.reduction.subspace.interpolation import Interpolation
-from pdrom.reduction.subspace.model import Samples, SubspaceModel
+from pdrom.reduction.rerun import mean_motion
+from pdrom.reduction.subspace.ecsw import Samples
+from pdrom.reduction.subspace.model import Labelled, SubspaceModel
 from pdrom.reduction.subspace.space import PROBES, ReducedSpace, probe_vertices, reduced_state
 
 # Bases of more entries are exported in single precision, except rows of sampled or probe vertices.
 DOUBLES = 60_000
 MANIFOLDS = ("clamped", "length")
+LARGEST = 3_000_000  # largest size of a file for the page, bytes
+GHOST = 250_000  # the file has at most about so many vertex positions of the full-order run
+FORMAT = 1
 
 
 def export_scene(scene: Scene) -> dict[str, Any]:
@@ -83,21 +90,35 @@ def require_known(config: SceneConfig) -> None:
         )
 
 
-def export_basis(scene: Scene, columns: Columns, needed: np.ndarray) -> dict[str, Any]:
-    """Export the data that models of ``scene`` with the same ``columns`` share.
+def export_models(scene: Scene, models: Sequence[Labelled]) -> dict[str, Any]:
+    """Export the bases of all ``models``, and each model with its labels and its basis's index."""
+    of_basis: dict[int, list[SubspaceModel]] = {}
+    for _, model in models:
+        of_basis.setdefault(id(model.columns), []).append(model)
+    places = list(of_basis)
+    return {
+        "bases": [_basis(scene, own) for own in of_basis.values()],
+        "models": [
+            {**labels, "basis": places.index(id(model.columns)), **_model(scene, model)}
+            for labels, model in models
+        ],
+    }
+
+
+def _basis(scene: Scene, models: Sequence[SubspaceModel]) -> dict[str, Any]:
+    """Export the data that ``models`` with the same columns share.
 
     They are the columns, the inertia matrix, the initial state and the forces in the subspace. Rows
-    of the ``needed`` vertices (n,), which iterations use, are always exported as doubles.
+    of vertices that iterations use are always exported as doubles.
     """
-    space = ReducedSpace(scene, columns, [])
-    start = reduced_state(scene, columns)
-    exact = columns.B.size <= DOUBLES
+    columns = models[0].columns
+    space, start = ReducedSpace(scene, columns, []), reduced_state(scene, columns)
+    needed, exact = needed_vertices(scene, models), columns.B.size <= DOUBLES
     rows = np.unique(np.concatenate([needed, probe_vertices(scene.mesh.vertices)]))
+    kept = {"vertices": pack_array(rows, "u4"), "rows": pack_array(columns.B[rows], "f8")}
     return {
         "B": pack_array(columns.B, "f8" if exact else "f4"),
-        "exact": None
-        if exact
-        else {"vertices": pack_array(rows, "u4"), "rows": pack_array(columns.B[rows], "f8")},
+        "exact": None if exact else kept,
         "atoms": [atom.tolist() for atom in columns.atoms],
         "atomColumns": [own.tolist() for own in columns.atom_columns],
         "inertia": pack_array(space.inertia_matrix, "f8"),
@@ -110,7 +131,7 @@ def export_basis(scene: Scene, columns: Columns, needed: np.ndarray) -> dict[str
     }
 
 
-def export_model(scene: Scene, model: SubspaceModel) -> dict[str, Any]:
+def _model(scene: Scene, model: SubspaceModel) -> dict[str, Any]:
     """Export each group's elements sampled by ``model``, with weights or interpolation matrices."""
     groups = {}
     for group in scene.groups:
@@ -121,17 +142,63 @@ def export_model(scene: Scene, model: SubspaceModel) -> dict[str, Any]:
             names = ("operator", "modes", "offset", "stiffness")
             arrays = {name: getattr(chosen, name) for name in names}
         packed = {name: pack_array(array, "f8") for name, array in arrays.items()}
-        groups[group.name] = {"stencil": pack_array(_stencil(group, chosen), "u4"), **packed}
+        groups[group.name] = {"stencil": pack_array(_stencil(group, model), "u4"), **packed}
     return {"evaluated": model.elements_evaluated(scene), "groups": groups}
 
 
-def _stencil(group: ConstraintGroup, chosen: Samples | Interpolation) -> np.ndarray:
-    """Vertex indices (m, corners) of the m sampled elements of ``group``."""
+def _stencil(group: ConstraintGroup, model: SubspaceModel) -> np.ndarray:
+    """Vertex indices (m, corners) of the m elements of ``group`` that ``model`` samples."""
     assert isinstance(group, StencilGroup)  # `require_known` refuses other groups
-    return group.stencil[chosen.elements]
+    return group.stencil[model.chosen(group).elements]
 
 
 def needed_vertices(scene: Scene, models: Iterable[SubspaceModel]) -> np.ndarray:
     """Vertices (n,) of all elements of ``scene`` that any of the ``models`` samples."""
-    found = [_stencil(g, model.chosen(g)).ravel() for model in models for g in scene.groups]
+    found = [_stencil(group, model).ravel() for model in models for group in scene.groups]
     return np.unique(np.concatenate([np.empty(0, np.int64), *found]))
+
+
+def write_page_models(
+    scene: Scene,
+    title: str,
+    reference: np.ndarray,
+    models: Sequence[Labelled],
+    path: str | os.PathLike[str],
+) -> None:
+    """Write ``models`` and a full-order run of ``scene`` to a script (.js) that a page loads.
+
+    Parameters
+    ----------
+    reference : (F + 1, N, 3) m, positions of the full-order run, of which some frames are shown
+    models : pairs (labels, which the page shows; model)
+    path : file to write
+
+    Raises
+    ------
+    SceneError, StorageError
+        The browser's code cannot run the scene; the file would be larger than `LARGEST`.
+    """
+    used, triangles = np.unique(scene.mesh.triangles, return_inverse=True)
+    stride = max(1, ceil((len(reference) - 1) * len(used) / GHOST))
+    content = {
+        "format": FORMAT,
+        "scene": scene.config.name,
+        "title": title,
+        **export_scene(scene),
+        **export_models(scene, models),
+        # the surface, and positions of its vertices in every ``stride``-th full-order frame
+        "shown": {
+            "vertices": pack_array(used, "u4"),
+            "triangles": pack_array(triangles.reshape(-1, 3), "u4"),
+            "stride": stride,
+            "full": pack_positions(reference[::stride, used]),
+        },
+        "motion": mean_motion(reference),
+    }
+    text = f"pdromLive({json.dumps(content, separators=(',', ':'), allow_nan=False)});\n"
+    if len(text) > LARGEST:
+        raise StorageError(
+            f"{path}: {len(text) / 1e6:.1f} MB, allowed are {LARGEST / 1e6:.1f}: choose fewer "
+            "sizes or tolerances (keys live.sizes, live.tolerances)"
+        )
+    write_text(text, path)

@@ -1,29 +1,26 @@
 """Model of a scene in a position subspace: columns, sampled elements, step loop, and storage."""
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 import h5py
 import numpy as np
 
+from pdrom.core.errors import NotReducibleError
 from pdrom.core.store import open_hdf5
 from pdrom.model.compiled.functions import compiled
 from pdrom.model.constraints.base import ConstraintGroup
 from pdrom.model.dynamics.stepper import State, Stepper
-from pdrom.model.runs import BoundedRun
 from pdrom.model.scene import Scene
-from pdrom.reduction.rerun import Rerun, compare
 from pdrom.reduction.subspace import columns as spaces
 from pdrom.reduction.subspace import interpolation
-from pdrom.reduction.subspace.ecsw import Norm, ecsw_elements, training_run
+from pdrom.reduction.subspace.ecsw import Samples
 from pdrom.reduction.subspace.fused import FusedStepper
 from pdrom.reduction.subspace.interpolation import Interpolation
 from pdrom.reduction.subspace.space import ReducedSpace, reduced_state
 
-# Elements are sampled on the iterates of this many frames, in equal shares of all training motions.
-FRAMES = 70
 ECSW = "ecsw"
 
 
@@ -33,27 +30,30 @@ def ecsw_name(tolerance: float) -> str:
 
 
 @dataclass(frozen=True)
-class Samples:
-    """Indices (m,) of sampled elements and the factors (m,) >= 0 that multiply their weights."""
-
-    elements: np.ndarray
-    factors: np.ndarray
-
-
-@dataclass(frozen=True)
 class SubspaceModel:
-    """Reduced model: kind of position basis (see `make_columns`), its columns, samples of groups.
+    """Reduced model: columns of a position subspace, and samples of constraint groups.
 
-    A constraint group without samples evaluates all elements with factor one.
+    A group without samples evaluates all elements with factor one.
     """
 
-    position_basis: str
     columns: spaces.Columns
     samples: Mapping[str, Samples | Interpolation] = field(default_factory=dict)
 
     def elements_evaluated(self, scene: Scene) -> int:
         """Number of elements of ``scene`` whose projections an iteration evaluates."""
         return sum(len(self.chosen(group).elements) for group in scene.groups)
+
+    @property
+    def title(self) -> str:
+        """Numbers of modes and of sampled elements."""
+        sampled = sum(len(own.elements) for own in self.samples.values())
+        return f"{self.columns.modes} modes, {sampled or 'all'} elements"
+
+    @property
+    def residual(self) -> float | None:
+        """Largest relative residual of the training equations of a group; None without samples."""
+        found = [own.residual for own in self.samples.values() if isinstance(own, Samples)]
+        return max(found, default=None)
 
     def chosen(self, group: ConstraintGroup) -> Samples | Interpolation:
         """Samples or interpolation of ``group``; all elements with factor 1 if it has neither."""
@@ -82,6 +82,7 @@ class SubspaceModel:
         return Output(self.columns.B)
 
 
+Labelled = tuple[dict[str, Any], SubspaceModel]
 PANEL, TERMS = 512, 4
 
 
@@ -129,70 +130,18 @@ def _multiply(panels, z, sums, result):
             result[first + i, 0], result[first + i, 1], result[first + i, 2] = a[i], b[i], c[i]
 
 
-def make_columns(scene: Scene, training: np.ndarray, kind: str, k: int) -> spaces.Columns:
-    """Columns of a position subspace with k modes of a ``kind``, or all modes if fewer exist.
-
-    Parameters
-    ----------
-    training : (n, N, 3) m, positions in the training frames
-    kind : "pod", "skinning", or "pod+skinning" with k modes of each
-    scene : scene whose rest shape, masses and boundary conditions are used
-    """
-    points, masses = scene.mesh.points, scene.masses
-    parts = []
-    if "pod" in kind:
-        parts.append(spaces.displacement_modes(training, points, masses, k))
-    if "skinning" in kind:
-        parts.append(spaces.skinning_modes(points, masses, k))
-    atoms = spaces.atoms(scene.boundaries, len(points))
-    return spaces.build_columns(np.hstack(parts), points, masses, atoms, training)
-
-
-def sample_elements(
-    scene: Scene,
-    columns: spaces.Columns,
-    frames: np.ndarray,
-    tolerances: Sequence[float],
-    start: State | None = None,
-    norm: Norm = "energy",
-    others: Sequence[Scene] = (),
-) -> list[dict[str, Samples]]:
-    """Select energy-conserving samples of every constraint group for each of ``tolerances`` tau.
-
-    Training data are iterates of runs in the subspace, with all elements projected: of ``scene``
-    and ``others`` (scenes with other training motions). Of each run, equally many of ``frames`` are
-    used, about `FRAMES` in total. The run of ``scene`` begins at ``start``, in subspace
-    coordinates, or (if None) at its initial state. Residuals of the training equations are measured
-    in ``norm`` (module `ecsw`).
-    """
-    count = -(-FRAMES // (1 + len(others)))
-    chosen = frames[np.unique(np.linspace(0, len(frames) - 1, count).round().astype(int))]
-    training = training_run(scene, columns, chosen, start, norm)
-    for other in others:
-        training += training_run(other, columns, chosen, norm=norm)
-    found = {
-        group.name: ecsw_elements(group, columns, training, tolerances) for group in scene.groups
-    }
-    return [
-        {name: Samples(*solutions[i]) for name, solutions in found.items()}
-        for i in range(len(tolerances))
-    ]
-
-
-def rerun_model(
-    scene: Scene, model: SubspaceModel, reference: np.ndarray, blowup_extent: float = np.inf
-) -> Rerun:
-    """Run ``scene`` with ``model`` and compare it with the full-order run ``reference``.
-
-    Parameters
-    ----------
-    reference : (F + 1, N, 3) m
-    blowup_extent : the run ends if its bounding box exceeds this multiple of that at rest
-    """
-    loop, start = model.loop(scene)
-    frames, unit = scene.config.frames, scene.mesh.extent
-    run = BoundedRun(loop.run, start, frames, blowup_extent, unit, model.positions)
-    return compare(run, reference)
+def require_holds(scene: Scene, columns: spaces.Columns) -> None:
+    """Raise NotReducibleError if ``scene`` fixes vertices for which there are no ``columns``."""
+    for boundary in scene.boundaries:
+        for unit in boundary.units():
+            inside = [atom for atom in columns.atoms if np.isin(atom, unit).any()]
+            found = np.sort(np.concatenate([np.empty(0, np.int64), *inside]))
+            if not np.array_equal(found, np.sort(unit)):
+                held = boundary.side or f"{len(unit)} vertices"
+                raise NotReducibleError(
+                    f"scene '{scene.config.name}', effect '{boundary.name}': holds {held}; the "
+                    "training neither held these nor declared them (hold=[...], --hold)"
+                )
 
 
 def store_columns(store: h5py.Group, columns: spaces.Columns) -> None:
@@ -211,29 +160,35 @@ def store_model(
     for name, chosen in samples.items():
         kept = store.create_group(f"samples/{name}")
         for key, value in vars(chosen).items():
-            (kept.attrs if key == "gain" else kept)[key] = value
+            (kept if isinstance(value, np.ndarray) else kept.attrs)[key] = value
 
 
-def load_models(path: str | os.PathLike[str]) -> list[tuple[dict[str, object], SubspaceModel]]:
+def stored_samples(store: h5py.Group) -> dict[str, Samples | Interpolation]:
+    """Samples of each constraint group in the HDF5 group ``store`` by `store_model`."""
+    found: dict[str, Samples | Interpolation] = {}
+    for name, kept in store.get("samples", {}).items():
+        arrays = {key: array[...] for key, array in kept.items()}
+        numbers: dict[str, Any] = {key: float(value) for key, value in kept.attrs.items()}
+        kind = Interpolation if "gain" in numbers else Samples
+        found[name] = kind(**arrays, **numbers)
+    return found
+
+
+def load_models(path: str | os.PathLike[str]) -> list[Labelled]:
     """Read pairs (labels, model) from the file ``path``; labels: method, position_basis and k."""
     with open_hdf5(path) as file:
-        columns = {base: _columns(store) for base, store in file["columns"].items()}
+        columns = {base: stored_columns(store) for base, store in file["columns"].items()}
         models = []
         for store in file["models"].values():
             base = str(store.attrs["base"])
             labels = {key: store.attrs[key] for key in ("method", "position_basis", "k")}
             labels["k"] = int(labels["k"])
-            samples: dict[str, Samples | Interpolation] = {}
-            for name, kept in store.get("samples", {}).items():
-                arrays = {key: array[...] for key, array in kept.items()}
-                gain: dict[str, Any] = {key: float(value) for key, value in kept.attrs.items()}
-                samples[name] = Interpolation(**arrays, **gain) if gain else Samples(**arrays)
-            model = SubspaceModel(str(labels["position_basis"]), columns[base], samples)
-            models.append((labels, model))
+            models.append((labels, SubspaceModel(columns[base], stored_samples(store))))
     return models
 
 
-def _columns(store: h5py.Group) -> spaces.Columns:
+def stored_columns(store: h5py.Group) -> spaces.Columns:
+    """Columns in the HDF5 group ``store`` by `store_columns`."""
     atoms = list(store["atoms"].values()) if "atoms" in store else []
     return spaces.Columns(
         B=store["B"][...],

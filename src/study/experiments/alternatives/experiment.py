@@ -6,30 +6,29 @@ implicit step deviates from it. All methods run the held-out motions; only subsp
 """
 
 import logging
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from time import process_time
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, Final, Literal
 
 import numpy as np
 import pandas as pd
-from pydantic import AfterValidator, Field
+from pydantic import Field
 
-from pdrom.core.errors import choices
 from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.model.constraints.base import GroupConfig
 from pdrom.model.dynamics.stepper import State, Stepper
 from pdrom.model.dynamics.system import GlobalSystem
-from pdrom.model.held_out import FIRST, MOTIONS, PLAYBACK, HeldOutMotion
-from pdrom.model.runs import BoundedRun, converged_run, trajectory
+from pdrom.model.held_out import FIRST, MOTIONS, PLAYBACK
+from pdrom.model.runs import BLOWUP_EXTENT, BoundedRun, converged_run, trajectory
 from pdrom.model.scene import Scene, SceneConfig
-from pdrom.reduction.subspace.columns import Columns
-from pdrom.reduction.subspace.model import SubspaceModel, make_columns, sample_elements
+from pdrom.reduction.subspace.model import SubspaceModel
 from pdrom.reduction.subspace.space import coordinates, projector
+from pdrom.reduction.subspace.training import make_columns, sampled_models
 from study.artifact.paths import ALTERNATIVE_TIMES, ALTERNATIVES, File
-from study.artifact.reads import Settings, SourcesOf
+from study.artifact.reads import Setting, SourcesOf
 from study.experiments.alternatives.solvers.methods import WINDOW, TwoLevel, continuous
 from study.experiments.alternatives.solvers.substeps import METHODS
 from study.experiments.kit import base as kit
@@ -53,96 +52,55 @@ Steps = Annotated[
 ]
 
 
-def _with_the_first(motions: tuple[HeldOutMotion, ...]) -> tuple[HeldOutMotion, ...]:
-    if motions[:1] != (FIRST,):
-        raise ValueError(f"begins with '{FIRST}', the one that is timed")
-    return motions
+Method = Literal[
+    "projective", "anderson", "chebyshev", "explicit", "two-level", "ecsw", "ecsw-anderson"
+]
 
 
-def _known(by_method: dict[str, Any]) -> dict[str, Any]:
-    allowed = (*METHODS, *TRAINED, CONVERGED, TRAINING)
-    for name in by_method:
-        if name not in allowed:
-            raise ValueError(f"unknown method '{name}'{choices(name, allowed)}")
-    return by_method
-
-
-def _methods(steps: dict[str, Any]) -> dict[str, Any]:
-    for name in {CONVERGED, TRAINING}.intersection(steps):
-        raise ValueError(f"{name}: has no steps, only a limit of its work")
-    return steps
-
-
-# Method -> pairs (substeps of a frame, iterations of each substep): one substep with several
-# iterations, or several substeps with one. Other pairs are slower at the same error.
-STEPS: dict[str, tuple[Steps, ...]] = {
-    "projective": (
-        (1, 1), (1, 2), (1, 3), (1, 4), (1, 5), (1, 10), (1, 20), (1, 40), (1, 80),
-        (2, 1), (5, 1), (10, 1), (20, 1), (40, 1), (5, 4),
-    ),
-    "anderson": ((1, 5), (1, 10), (1, 20), (1, 40), (1, 80), (5, 5), (10, 5)),
-    "chebyshev": ((1, 10), (1, 20), (1, 40), (1, 80)),
-    TWO_LEVEL: ((1, 2), (1, 3), (1, 5), (1, 10), (1, 20)),
-    REDUCED: ((1, 5), (1, 10), (1, 20), (1, 40)),
-    ACCELERATED: ((1, 5), (1, 10), (1, 20)),
-}  # fmt: skip
+# The motion in continuous time is computed by explicit steps, `EXPLICIT_STEPS` per frame in the
+# first run, and halved until the estimated error is below `CONTINUOUS_TOLERANCE`.
+EXPLICIT_STEPS, CONTINUOUS_TOLERANCE = 40, 1e-4
+# Frames of training runs converge to this part of the mesh; projections are evaluated up to `MOST`
+# times in a frame, also of the implicit reference.
+TRAINING_TOLERANCE, MOST = 1e-5, 4000
+# Sampling tolerances of reductions, and of the coarse level of the two-level method.
+TAU, COARSE_TAU = 1e-2, 5e-3
 
 
 class ContinuousReference(ConfigModel):
-    """Settings of the motion in continuous time, computed by explicit steps.
+    """Largest product (``limit``) of vertices and explicit steps of a frame."""
 
-    The first run has ``substeps`` per frame. The step is halved until the estimated error is below
-    ``tolerance``, as long as the product of vertices and steps of a frame is at most ``limit``.
-    """
-
-    substeps: kit.Count = 40
     limit: Work = 2_400_000
-    tolerance: kit.Tolerance = 1e-4
 
 
 class ImplicitReference(ConfigModel):
-    """Settings of the converged implicit step.
-
-    A frame has converged when one more local/global iteration moves no vertex by more than
-    ``tolerance`` times the longest side of the mesh, or ``training_tolerance`` times it in runs on
-    which reductions are trained. Projections are evaluated at most ``limit`` times in a frame.
-    """
+    """Tolerance of the converged implicit step, over the longest side of the mesh."""
 
     tolerance: kit.Tolerance = 1e-7
-    training_tolerance: kit.Tolerance = 1e-5
-    limit: Annotated[int, Field(ge=2)] = 4000
 
 
 class Comparison(Processes):
     """Settings of the comparison of methods on one scene and one mesh.
 
-    Each of ``processes`` new processes times ``frames`` frames of the first of ``motions``.
+    Each of ``processes`` new processes times ``frames`` frames of the first held-out motion.
 
     stiffness : scene -> factors by which its groups' weights are multiplied; 1 without an entry
     steps : method -> pairs (substeps of a frame, iterations of each substep)
     work : method -> largest product vertices x substeps x iterations (for ``training``: vertices x
         motions); runs with more work are left out
-    modes, tau : numbers of modes of reductions, and tolerance to which elements are sampled
+    modes : numbers of modes of reductions
     training_motions : numbers of motions on which reductions are trained, the scene's motion first
-    coarse_tau : tolerance of the coarse level of the two-level method, which is trained on the
-        smallest number of motions
-    motions : held-out motions; errors cover all of their frames
     """
 
     stiffness: dict[str, Factors] = Field(default_factory=dict)
-    steps: Annotated[
-        dict[str, tuple[Steps, ...]], AfterValidator(_known), AfterValidator(_methods)
-    ] = STEPS
-    work: Annotated[dict[str, Work], AfterValidator(_known)] = Field(default_factory=dict)
+    steps: dict[Method, tuple[Steps, ...]] = Field(default_factory=dict)
+    work: dict[Method | Literal["converged", "training"], Work] = Field(default_factory=dict)
     modes: Annotated[tuple[kit.Modes, ...], Field(min_length=1)] = (40,)
-    tau: kit.Tolerance = 1e-2
-    coarse_tau: kit.Tolerance = 5e-3
     training_motions: Annotated[
         tuple[Annotated[int, Field(ge=1, le=64)], ...], Field(min_length=1)
     ] = (1, 2, 4, 8)
     implicit: ImplicitReference = ImplicitReference()
     continuous: ContinuousReference = ContinuousReference()
-    motions: Annotated[tuple[HeldOutMotion, ...], AfterValidator(_with_the_first)] = MOTIONS
     frames: kit.Count = 20
     repeats: kit.Repeats = 1
 
@@ -150,12 +108,12 @@ class Comparison(Processes):
         """Factors of groups' weights in ``scene``; just (1.0,) unless ``size`` of its mesh is 1."""
         return self.stiffness.get(scene, (1.0,)) if size == 1.0 else (1.0,)
 
-    def pairs(self, method: str, vertices: int) -> list[tuple[int, int]]:
+    def pairs(self, method: Any, vertices: int) -> list[tuple[int, int]]:
         """Pairs (substeps, iterations) of ``method`` that `affords` allows for ``vertices``."""
         steps = self.steps.get(method, ())
         return [(n, k) for n, k in steps if self.affords(method, vertices * n * k)]
 
-    def affords(self, method: str, work: int) -> bool:
+    def affords(self, method: Any, work: int) -> bool:
         """Whether ``work`` (vertices x substeps x iterations) is within the limit of ``method``."""
         return work <= self.work.get(method, work)
 
@@ -177,19 +135,17 @@ TIME_COLUMNS = [
 log = logging.getLogger(__name__)
 COLUMNS = [
     "scene", "factor", "vertices", "stiffness", "method", "substeps", "iterations",
-    "training_motions", "offline_s", "k", "elements_sampled", "motion", "frames", "finite",
-    "error_implicit", "error_continuous", "reference_error", "span_error",
+    "training_motions", "offline_s", "k", "elements_sampled", "training_residual", "motion",
+    "frames", "finite", "error_implicit", "error_continuous", "reference_error", "span_error",
 ]  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Trained:
-    """A reduced model and its training.
+    """A reduced model, trained on a number of motions, for a number of substeps of a frame.
 
-    motions : number of motions on which the model was trained
-    substeps : number of steps of a frame for which the model was trained
     seconds : processor time of the training and of its full-order runs, s
-    coarse : True for the coarse level of the two-level method, False for a reduction
+    coarse : whether the model is the coarse level of the two-level method
     """
 
     motions: int
@@ -204,37 +160,33 @@ class Candidate:
     """A method with its settings, ready to run on one scene.
 
     steps : number of steps (frames of ``loop``) into which a frame of the scene is divided
-    positions : function that maps coordinates in a position subspace to positions of all vertices
-    output : the same function in single precision, which is timed; None without a subspace
-    columns : columns of the position subspace; None without a subspace
+    model : the reduction in whose position subspace the method runs; None without one
     """
 
     labels: dict[str, object]
     loop: Stepper
     start: State
     steps: int = 1
-    positions: Callable[[np.ndarray], np.ndarray] = field(default=lambda y: y)
-    output: Callable[[np.ndarray], np.ndarray] | None = None
-    columns: Columns | None = None
+    model: SubspaceModel | None = None
 
     def state(self, state: State, scene: Scene) -> State:
         """Convert ``state`` of all vertices to coordinates in the method's subspace, if any."""
-        if self.columns is None:
+        if self.model is None:
             return state
-        own = (self.columns, scene.masses)
+        own = (self.model.columns, scene.masses)
         q, v = (coordinates(*own, field) for field in (state.positions, state.velocities))
         return State(q, v, state.anchors)
 
-    def run(self, frames: int, limit: float, extent: float) -> np.ndarray | None:
+    def run(self, frames: int, extent: float) -> np.ndarray | None:
         """Run the method; return positions (F + 1, N, 3) m at the start and at the ends of frames.
 
         None is returned if the run is not finite, or if a side of its bounding box exceeds
-        ``limit`` times the ``extent`` (m).
+        `BLOWUP_EXTENT` times the ``extent`` (m).
         """
-        run = BoundedRun(
-            self.loop.run, self.start, frames * self.steps, limit, extent, self.positions
-        )
-        found = [self.positions(self.start.positions)]
+        loop, steps, limit = self.loop.run, frames * self.steps, BLOWUP_EXTENT
+        positions = (lambda y: y) if self.model is None else self.model.positions
+        run = BoundedRun(loop, self.start, steps, limit, extent, positions)
+        found = [positions(self.start.positions)]
         found += [f.positions for f in run if (f.number + 1) % self.steps == 0]
         return None if run.blowup_frame is not None else np.stack(found)
 
@@ -250,7 +202,9 @@ def candidates(
     start, reduced = scene.initial_state(), []
     for method in settings.steps:
         for substeps, iterations in settings.pairs(method, scene.mesh.vertices):
-            labels = {"method": method, "substeps": substeps, "iterations": iterations}
+            labels: dict[str, object] = {
+                "method": method, "substeps": substeps, "iterations": iterations,
+            }  # fmt: skip
             if method in TRAINED:
                 reduced.append((method, substeps, iterations, labels))
                 continue
@@ -262,6 +216,7 @@ def candidates(
     for own in models:
         sizes: dict[str, object] = {"training_motions": own.motions, "k": own.model.columns.modes}
         sizes |= {"offline_s": own.seconds, "elements_sampled": own.model.elements_evaluated(scene)}
+        sizes["training_residual"] = own.model.residual
         for method, substeps, iterations, labels in reduced:
             if substeps != own.substeps or own.coarse != (method == TWO_LEVEL):
                 continue
@@ -271,21 +226,17 @@ def candidates(
                 continue
             window = WINDOW if method == ACCELERATED else 0
             other = substepped(scene, substeps, iterations, window)
-            yield Candidate(
-                labels | sizes, *own.model.loop(other), substeps, own.model.positions,
-                own.model.output(), own.model.columns,
-            )  # fmt: skip
+            yield Candidate(labels | sizes, *own.model.loop(other), substeps, own.model)
 
 
 def trained(training: Scene, settings: Comparison) -> Iterator[Trained]:
     """Yield models in position subspaces with sampled elements, trained on one or more motions.
 
-    The first motion is that of ``training``, others are random variants of it. Every frame is
-    iterated nearly to convergence. POD modes of every n-th frame of n motions span a subspace; its
-    elements are sampled on iterates of these motions in it, once for each number of substeps in
-    ``settings``. The coarse level of the two-level method is trained only for the smallest n.
+    The first motion is that of ``training``, others are random variants of it. POD modes of every
+    n-th converged frame of n motions span a subspace; its elements are sampled once for each number
+    of substeps. The coarse level of the two-level method is trained only for the smallest n.
     """
-    vertices, own = training.mesh.vertices, settings.implicit
+    vertices = training.mesh.vertices
     taken, coarse = (
         sorted({n for m in methods for n, _ in settings.pairs(m, vertices)})
         for methods in (REDUCTIONS, (TWO_LEVEL,))
@@ -299,7 +250,7 @@ def trained(training: Scene, settings: Comparison) -> Iterator[Trained]:
             further = training.config.training_variant(len(scenes))
             scenes.append(Scene.build(further, training.mesh))
         for scene in scenes[len(runs) :]:
-            run = converged_run(scene, own.training_tolerance, own.limit)
+            run = converged_run(scene, TRAINING_TOLERANCE, MOST)
             if run is None:
                 log.warning("%s: a training motion does not converge", training.config.name)
                 return
@@ -307,19 +258,19 @@ def trained(training: Scene, settings: Comparison) -> Iterator[Trained]:
         spent += process_time() - started
         for k in settings.modes:
             started = process_time()
-            columns = make_columns(training, np.concatenate([r[::count] for r in runs]), "pod", k=k)
+            frames = np.concatenate([run[::count] for run in runs])
+            columns = make_columns([training], frames, k)
             in_columns = process_time() - started
             for substeps in sorted({*taken, *coarse}):
                 started = process_time()
                 level = count == min(settings.training_motions) and substeps in coarse
-                tolerances = [settings.tau, *([settings.coarse_tau] if level else [])]
-                scene, *others = (substepped(s, substeps, s.config.iterations) for s in scenes)
-                ends = np.arange(substeps - 1, scene.config.frames, substeps)
-                made = sample_elements(scene, columns, ends, tolerances, others=others)
+                tolerances = [TAU, *([COARSE_TAU] if level else [])]
+                split = [substepped(s, substeps, s.config.iterations) for s in scenes]
+                ends = np.arange(substeps - 1, split[0].config.frames, substeps)
+                made = sampled_models(split, columns, ends, tolerances)
                 seconds = spent + in_columns + process_time() - started
-                for tau, samples in dict(zip(tolerances, made, strict=True)).items():
-                    model = SubspaceModel("pod", columns, samples)
-                    yield Trained(count, substeps, model, seconds, coarse=tau != settings.tau)
+                for tau, model in dict(zip(tolerances, made, strict=True)).items():
+                    yield Trained(count, substeps, model, seconds, coarse=tau != TAU)
 
 
 def substepped(scene: Scene, substeps: int, iterations: int, window: int = 0) -> Scene:
@@ -360,49 +311,43 @@ class Timed:
         states += [end for end, _ in loop.run(states[0], range(scene.config.frames))]
         for each in candidates(scene, self.models, self.settings):
             labels = {**self.labels, **each.labels, "steps": each.steps}
+            output = None if each.model is None else each.model.output()
             starts = tuple((each.state(states[f], scene), f * each.steps) for f in places)
             yield Variant(
-                labels, each.loop, each.start, wanted * each.steps, output=each.output,
-                steps=each.steps, starts=starts, warm=len(first) * each.steps,
+                labels, each.loop, each.start, wanted * each.steps, steps=each.steps, starts=starts,
+                output=output, warm=len(first) * each.steps,
             )  # fmt: skip
-
-
-class Options(ConfigModel):
-    """Settings of `alternatives`: scene, compared methods, size ratio that counts as a blow-up."""
-
-    scene: SceneConfig
-    alternatives: Comparison
-    blowup_extent: kit.BlowupExtent
 
 
 @experiment(
     "Alternatives to projective dynamics in {scene} with {factor} times the vertices along a side",
-    reads={"sources": SourcesOf("scene.mesh"), "settings": Settings(Options)},
+    reads={
+        "sources": SourcesOf("scene.mesh"),
+        "config": Setting("scene"),
+        "section": Setting("alternatives"),
+    },
     writes={"out": ALTERNATIVES, "times": ALTERNATIVE_TIMES},
     alone=True,
 )
-def alternatives(sources: list[Path], settings: Options, out: File, times: File) -> None:
-    """Compare all methods on one mesh of a scene.
-
-    sources : files of the mesh, on which the job depends
-    out, times : tables of errors and of times; their paths contain the ``factor`` by which the mesh
-        has more vertices along each side than the scene's mesh
-    """
-    factor, section = float(out["factor"]), settings.alternatives
+def alternatives(
+    sources: list[Path], config: SceneConfig, section: Comparison, out: File, times: File
+) -> None:
+    """Compare all methods on the mesh with ``out["factor"]`` times the vertices along a side."""
+    factor = float(out["factor"])
     rows, cases = [], []
-    for stiffness in section.factors(settings.scene.name, factor):
-        config = sized(settings.scene, factor, stiffness)
-        training = Scene.build(config, config.mesh.build(Path()))
+    for stiffness in section.factors(config.name, factor):
+        finer = sized(config, factor, stiffness)
+        training = Scene.build(finer, finer.mesh.build(Path()))
         models = tuple(trained(training, section))
         recorded = trajectory(training, track_objective=False)
         own = {"scene": config.name, "factor": factor, "stiffness": stiffness}
-        for motion in section.motions:
-            scene = Scene.build(config.heldout_variant(motion), training.mesh)
-            for row in _rows(scene, recorded, models, settings):
+        for motion in MOTIONS:
+            scene = Scene.build(finer.heldout_variant(motion), training.mesh)
+            for row in _rows(scene, recorded, models, section):
                 rows.append({**own, "motion": motion, **row})
             if motion == FIRST:
                 cases.append(Timed(own, scene, models, section).variants)
-        log.info("%s: stiffness %g done", settings.scene.name, stiffness)
+        log.info("%s: stiffness %g done", config.name, stiffness)
     write_table(pd.DataFrame(rows, columns=COLUMNS), out.path)
     measured = pd.DataFrame(in_processes(cases, section))
     measured[["ms_per_frame", "vertices_ms"]] *= measured.steps.to_numpy()[:, None]
@@ -422,26 +367,25 @@ def sized(config: SceneConfig, factor: float, stiffness: float) -> SceneConfig:
 
 
 def _rows(
-    scene: Scene, recorded: np.ndarray, models: tuple[Trained, ...], settings: Options
+    scene: Scene, recorded: np.ndarray, models: tuple[Trained, ...], section: Comparison
 ) -> Iterator[dict[str, Any]]:
     """Yield rows with errors of runs in the motion of ``scene``, one row for each run.
 
-    The first is the converged implicit step. In the second the ``recorded`` training motion stands
-    for a run of ``scene``. All candidates follow. Errors against the implicit step are None if a
-    frame of this step did not converge or its work exceeds the limit in ``settings``. Runs that
-    blew up have no errors (None) at all.
+    The first is the converged implicit step, the second the ``recorded`` training motion, shown
+    instead. Errors against the implicit step are None if a frame of it did not converge or its work
+    exceeds the limit in ``section``. Runs that blew up have no errors (None) at all.
     """
-    section, name, vertices = settings.alternatives, scene.config.name, scene.mesh.vertices
-    frames, wanted, implicit = scene.config.frames, section.continuous, None
-    limit = wanted.limit // vertices
-    exact = continuous(scene, frames, wanted.tolerance, substeps=wanted.substeps, limit=limit)
+    name, vertices = scene.config.name, scene.mesh.vertices
+    frames, implicit = scene.config.frames, None
+    limit = section.continuous.limit // vertices
+    exact = continuous(scene, frames, CONTINUOUS_TOLERANCE, EXPLICIT_STEPS, limit)
     log.info("%s: %d explicit steps a frame, error %.1e", name, exact.substeps, exact.error)
-    if not exact.error <= wanted.tolerance:
+    if not exact.error <= CONTINUOUS_TOLERANCE:
         log.warning("%s: motion in continuous time is known to %.1e only", name, exact.error)
     if section.affords(CONVERGED, vertices):
-        implicit = converged_run(scene, section.implicit.tolerance, section.implicit.limit)
+        implicit = converged_run(scene, section.implicit.tolerance, MOST)
         if implicit is None:
-            log.warning("%s: no convergence in %d evaluations", name, section.implicit.limit)
+            log.warning("%s: no convergence in %d evaluations", name, MOST)
     against = {"error_implicit": implicit, "error_continuous": exact.positions}
 
     def errors(run: np.ndarray | None) -> dict[str, float | None]:
@@ -456,10 +400,10 @@ def _rows(
     spans: dict[int, float | None] = {}
     for candidate in candidates(scene, models, section):
         with np.errstate(over="ignore", invalid="ignore"):
-            reached = candidate.run(frames, settings.blowup_extent, scene.mesh.extent)
+            reached = candidate.run(frames, scene.mesh.extent)
         row = {**common, **candidate.labels, "finite": reached is not None, **errors(reached)}
-        if implicit is not None and candidate.columns is not None:
-            own = candidate.columns
+        if implicit is not None and candidate.model is not None:
+            own = candidate.model.columns
             if id(own) not in spans:
                 project = projector(own, scene.masses)
                 nearest = np.stack([own.B @ (project @ q) for q in implicit])

@@ -1,11 +1,9 @@
 """Declaration of experiments, settings that several of them share, and scenes from files.
 
-An experiment is a function that runs models and writes its results to files.
-
 The sensitivity floor of a scene is the relative difference, in each frame, between its full-order
-run and one from a slightly displaced start, the largest over several random displacements (module
-`study.experiments.sensitivity`). The horizon is the first frame in which the floor exceeds a
-threshold: from this frame on, errors of reduced runs say nothing about a method.
+run and one from a slightly displaced start, the largest over several random displacements. The
+horizon is the first frame in which the floor exceeds a threshold: from this frame on, errors of
+reduced runs say nothing about a method.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -13,12 +11,11 @@ from typing import Annotated, Any, Literal, cast
 
 import numpy as np
 import pandas as pd
-from pydantic import AfterValidator, Field
+from pydantic import Field
 
 from pdrom.core.store import open_hdf5, read_table
 from pdrom.core.yamlfile import ConfigModel, SceneName
 from pdrom.model.constraints.base import GroupConfig
-from pdrom.model.dynamics.solvers import SOLVERS
 from pdrom.model.held_out import HeldOutMotion
 from pdrom.model.mesh.types import load_mesh
 from pdrom.model.scene import Scene, SceneConfig
@@ -57,8 +54,6 @@ ANDERSON = "fom-anderson"  # method in tables: full-order run with Anderson acce
 
 # names of those phases of a frame that belong to no effect
 RIGHT, GLOBAL, REST = "right-hand side", "global solve", "rest of the frame"
-# A run ends as a blow-up if its bounding box exceeds this multiple of that of the rest shape.
-BlowupExtent = Annotated[float, Field(gt=1.0, le=1e12)]
 Count = Annotated[int, Field(ge=1, le=100_000)]
 Repeats = Annotated[int, Field(ge=1, le=1000)]
 Modes = Annotated[int, Field(ge=1, le=1000)]
@@ -83,10 +78,8 @@ class OfScene(ConfigModel):
 def floor_of(table: pd.DataFrame, scene: str, perturbation: float | str) -> np.ndarray:
     """Sensitivity floor (F,) of a scene, by frame, for one size or name of the perturbation.
 
-    It is the largest difference from the unperturbed run, over all seeds; empty without such runs.
-
-    table : perturbed runs, with columns scene, perturbation, frame and relative_difference; rows
-        may be those of single seeds, or the largest over all seeds
+    The ``table`` of perturbed runs has columns scene, perturbation, frame and relative_difference;
+    the floor is the largest difference over its seeds, and empty without such runs.
     """
     label = perturbation if isinstance(perturbation, str) else f"{perturbation:g}"
     # if all perturbations are numbers, the column was read from its file as floats
@@ -101,21 +94,9 @@ def horizon(floor: np.ndarray, threshold: float) -> int:
 
 
 def horizons(table: pd.DataFrame, perturbation: float | str, threshold: float) -> dict[str, int]:
-    """Map names of scenes to the first frame in which the sensitivity floor exceeds ``threshold``.
-
-    table, perturbation : arguments of `floor_of`
-    """
+    """Map scenes to the first frame in which the floor (`floor_of`) exceeds ``threshold``."""
     scenes = table.scene.unique()
     return {s: horizon(floor_of(table, s, perturbation), threshold) for s in scenes}
-
-
-def _known(solver: str) -> str:
-    if solver not in SOLVERS:
-        raise ValueError(f"allowed are {', '.join(SOLVERS)}")
-    return solver
-
-
-Solver = Annotated[str, AfterValidator(_known)]
 
 
 class Horizon(ConfigModel):
@@ -171,9 +152,8 @@ def varied(
 ) -> SceneConfig:
     """Return ``config`` with another ``time_step`` (s) and other weights of reduced groups.
 
-    The weights of reduced groups are multiplied by ``stiffness_ratio``. Effects begin and end at
-    the same times in s, so that the numbers of these frames change. The run lasts ``duration``
-    seconds, but has at least ``frames[0]`` and at most ``frames[1]`` frames.
+    The weights are multiplied by ``stiffness_ratio``. Effects begin and end at the same times in s.
+    The run lasts ``duration`` seconds, in ``frames[0]`` to ``frames[1]`` frames.
     """
     count = min(max(round(duration / time_step), frames[0]), frames[1])
     effects = []

@@ -19,7 +19,6 @@ from pdrom.model.constraints.base import ConstraintGroup
 from pdrom.model.constraints.local_kernel import OWN, PREPARE, LocalKernel, call, local_kernel
 from pdrom.model.dynamics.space import VertexSpace
 from pdrom.model.dynamics.stepper import LocalStep, Stepper
-from pdrom.model.dynamics.system import GlobalSystem
 from pdrom.model.effects.base import Effect
 from pdrom.model.scene import Scene
 from pdrom.reduction.sampling.local_step import ReducedLocalStep
@@ -43,10 +42,13 @@ KERNEL, RECORD, SECONDS, CLOCKS, SIZE = range(OWN, OWN + 5)
 
 
 def variant(
-    scene: Scene, system: GlobalSystem, steps: Sequence[LocalStep], frames: int, labels: dict
+    scene: Scene, frames: int, labels: dict, steps: Sequence[LocalStep] | None = None
 ) -> Variant:
-    """Return a variant to be timed: ``scene`` with local ``steps``; no objective is computed."""
-    loop = scene.stepper(system, steps, track_objective=False)
+    """Return a variant to be timed: ``scene`` in full order, with other local ``steps`` if given.
+
+    No objective is computed.
+    """
+    loop = scene.stepper(local_steps=steps, track_objective=False)
     return Variant(labels, loop, scene.initial_state(), frames)
 
 
@@ -57,9 +59,8 @@ def local_costs(
 
     Times are means over ``states``. A row also has times of two phases of the reduced local step,
     each measured separately: the dense product that yields the coefficients c of the modes, and the
-    sum of S^T W (mean + V c), which all elements enter. All steps are measured in turn.
+    sum of S^T W (mean + V c), which all elements enter.
 
-    often : ``warmup``, ``repeats``: numbers of unmeasured and of measured evaluations
     reduced : (group, method, r) -> reduced local step of a group of ``scene``
     states : (n, N, 3) m, positions; the local steps prepare a frame that begins at states[0]
     """
@@ -137,21 +138,17 @@ class Timed:
         return answer
 
 
-def effect_costs(
-    scene: Scene, system: GlobalSystem, frames: int, warmup: int, repeats: int
-) -> pd.DataFrame:
+def effect_costs(scene: Scene, frames: int, warmup: int, repeats: int) -> pd.DataFrame:
     """Times per frame of the full-order run: effects, right-hand side, global solve, the rest.
 
     The table has the columns `COSTS`; several effects of one name have one row. ``elements`` counts
     the elements of a group, the vertices that pins or handles may fix, or else all vertices. Time
     of the compiled local steps outside the groups' kernels counts as that of the right-hand side.
-
-    warmup, repeats : numbers of unmeasured and of measured runs
     """
     questions = zip(_roles(scene), _QUESTIONS, strict=True)
     by_role: Any = [[Timed(effect, asked) for effect in role] for role, asked in questions]
     groups, *others = by_role
-    space, config = VertexSpace(system, *others), scene.config
+    space, config = VertexSpace(scene.system, *others), scene.config
     loop = Stepper(space, config.time_step, config.iterations, groups, track_objective=False)
     stands = [stand for role in by_role for stand in role]
     names = list(dict.fromkeys(stand.name for stand in stands))
@@ -200,7 +197,7 @@ def left_out_sets(scene: Scene) -> list[tuple[str, ...]]:
     """Sets of effects to leave out: none; each single effect; for each group, all other groups.
 
     The list is empty for a scene with a single constraint group, which cannot be left out. Effects
-    that only change the start, such as a kick, cost no time in a frame and are never left out.
+    that only change the start, such as a kick, are never left out.
     """
     groups = scene.config.groups
     if len(groups) < 2:
@@ -213,13 +210,12 @@ def left_out_sets(scene: Scene) -> list[tuple[str, ...]]:
 
 
 def left_out(
-    scene: Scene, costs: pd.DataFrame, frames: int, warmup: int, repeats: int, solver: str
+    scene: Scene, costs: pd.DataFrame, frames: int, warmup: int, repeats: int
 ) -> pd.DataFrame:
     """Times per frame of the scene built without some of its effects; columns are `LEFT_OUT`.
 
     Column ``own_ms`` is the time that the effects left out take in the complete scene, from the
-    table ``costs`` (made by `effect_costs`). ``solver`` names the linear solver; ``warmup`` and
-    ``repeats`` are numbers of unmeasured and of measured runs.
+    table ``costs`` by `effect_costs`.
     """
     sets = left_out_sets(scene)
     if not sets:
@@ -235,7 +231,7 @@ def left_out(
             "elements": int(own.elements.sum()),
             "own_ms": float(own.ms_per_frame.sum()),
         }
-        variants.append(variant(part, part.system_with(solver), part.groups, frames, labels))
+        variants.append(variant(part, frames, labels))
     return pd.DataFrame(measure(variants, warmup, repeats))[LEFT_OUT]
 
 

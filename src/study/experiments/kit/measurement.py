@@ -13,12 +13,12 @@ import logging
 import pickle
 import subprocess
 import sys
-from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import perf_counter, process_time
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import Field
@@ -27,10 +27,12 @@ from pdrom.core.errors import PdromError
 from pdrom.core.store.checksum import damaged_set_aside
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.model.dynamics.stepper import State, Stepper
+from pdrom.model.scene import Scene
+from pdrom.reduction.sampling.model import ProjectionModel
+from pdrom.reduction.subspace.model import SubspaceModel
 from study.artifact import planned
 from study.experiments.kit.base import Count, Repeats
 
-T = TypeVar("T")
 log = logging.getLogger(__name__)
 
 # Columns of the times of a frame: the total; prediction, contacts and velocities; projections of
@@ -67,8 +69,8 @@ class Variant:
     loop, start, frames : step loop, state before the first frame, number of frames
     share : fraction of a frame's iterations that the loop does; the times of phases inside the
         iterations are divided by it
-    output : function that computes the positions of all vertices from coordinates in a subspace; it
-        is called after every ``steps`` steps of the loop
+    output : function of coordinates in a subspace that returns the positions of all vertices; it is
+        called after every ``steps`` steps of the loop
     starts : pairs (state, number of the next step); if there are any, ``steps`` steps are timed
         from each of them in turn, in place of the first ``frames``
     warm : number of frames of an unmeasured run; None for ``frames``
@@ -83,6 +85,13 @@ class Variant:
     steps: int = 1
     starts: tuple[tuple[State, int], ...] = ()
     warm: int | None = None
+
+
+def model_variant(
+    labels: dict[str, Any], scene: Scene, model: SubspaceModel | ProjectionModel, frames: int
+) -> Variant:
+    """Return a variant to be timed: the first ``frames`` frames of ``scene`` with ``model``."""
+    return Variant(labels, *model.loop(scene), frames, output=model.output())
 
 
 def measure(variants: Sequence[Variant], warmup: int, repeats: int) -> list[dict[str, Any]]:
@@ -116,18 +125,6 @@ def measure_calls(
             call()
             samples[key].append(1e3 * (perf_counter() - before))
     return {key: float(np.median(values[warmup:])) for key, values in samples.items()}
-
-
-def clocked(made: Iterable[T]) -> Iterator[tuple[float, T]]:
-    """Yield pairs (processor time in s to make an item, item) for all items of ``made``."""
-    items = iter(made)
-    while True:
-        before = process_time()
-        try:
-            item = next(items)
-        except StopIteration:
-            return
-        yield process_time() - before, item
 
 
 def _time_once(variant: Variant, frames: int) -> np.ndarray:
@@ -174,10 +171,9 @@ def in_processes(
 ) -> list[dict[str, Any]]:
     """Time all variants in several new processes; return a row per variant and process.
 
-    The processes run one after the other, each with the variants in a random order of its own.
-    Column ``processor_share`` is a process's processor time over the time that has passed. They get
-    the pickled functions ``cases``, which make the variants. Raises PdromError if a process
-    fails; the message ends with the last line of its output.
+    The processes run one after the other, each with the variants in a random order of its own. They
+    get the pickled functions ``cases``, which make the variants. Column ``processor_share`` is a
+    process's processor time over the time that has passed. PdromError if a process fails.
     """
     rows: list[dict[str, Any]] = []
     command = [sys.executable, "-m", planned.__name__, __name__]

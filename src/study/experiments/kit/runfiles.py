@@ -1,7 +1,8 @@
 """Functions that load reductions, find bases, compute errors of runs, and store runs."""
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
 
 import h5py
 import numpy as np
@@ -9,11 +10,15 @@ import numpy as np
 from pdrom.core.errors import StorageError
 from pdrom.core.store import open_hdf5
 from pdrom.model.metrics import trajectory_error
-from pdrom.reduction.basis import Basis
+from pdrom.reduction.basis import Basis, load_basis
 from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.rerun import Rerun, displacement_norms
+from pdrom.reduction.sampling.model import ProjectionModel
 from pdrom.reduction.sampling.reduction import Reduction, Sampling
 from study.artifact.paths import File
+from study.experiments.kit import base as kit
+
+Methods = Mapping[str, MethodSpec]
 
 
 def load_reduction(
@@ -26,16 +31,29 @@ def load_reduction(
     return Reduction(basis, stored, method, r=r)
 
 
-def basis_of(sampling: File, method: MethodSpec, bases: Sequence[File]) -> File:
-    """Return the file in ``bases`` from whose basis the samples in ``sampling`` were selected.
+def projection_models(
+    samplings: Sequence[File], bases: Sequence[File], methods: Methods, ranks: Sequence[kit.Rank]
+) -> Iterator[tuple[dict[str, Any], ProjectionModel | None]]:
+    """Yield labels (group, method, r) and model for each of ``samplings`` and basis size r.
 
-    ``method`` selected them. Raises StorageError if the basis is not among the files.
+    ``ranks`` are the sizes; the model is None if the file has no samples of this size. StorageError
+    if the basis of samples is not among the files ``bases``.
     """
-    wanted = {"scene": sampling["scene"], "group": sampling["group"], "basis": method.basis_id}
-    for basis in bases:
-        if basis.labels == wanted:
-            return basis
-    raise StorageError(f"{sampling.path}: its basis {method.basis_id} is not among the files read")
+    for file in samplings:
+        spec, group = methods[file["method"]], file["group"]
+        wanted = {"scene": file["scene"], "group": group, "basis": spec.basis_id}
+        found = next((each for each in bases if each.labels == wanted), None)
+        if found is None:
+            fault = f"its basis {spec.basis_id} is not among the files read"
+            raise StorageError(f"{file.path}: {fault}")
+        basis = load_basis(found.path)
+        with open_hdf5(file.path) as stored:
+            held = set(stored)
+        for r in kit.resolve_ranks(ranks, basis.rank):
+            model = None
+            if f"r{r:04d}" in held:
+                model = ProjectionModel(group, load_reduction(basis, file.path, spec, r=r))
+            yield {"group": group, "method": file["method"], "r": r}, model
 
 
 def run_error(run: np.ndarray, reference: np.ndarray) -> float | None:

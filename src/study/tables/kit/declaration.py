@@ -159,6 +159,11 @@ _SHARED = (
     integer("vertices", "vertices of the mesh"),
     integer("elements", "elements of the group"),
     integer("elements_sampled", "elements that are evaluated", compared="value"),
+    number(
+        "training_residual",
+        "residual of the training equations that sampled elements leave, over their right-hand "
+        "sides; the sampling tolerance is its bound",
+    ),
     integer("frames", "frames that the run reached", compared="error"),
     flag("finite", "no frame blew up", compared="error"),
     integer("blowup_frame", "first frame that blew up", compared="error"),

@@ -8,7 +8,14 @@ import pytest
 from builders import OBSTACLES, make_scene, random_rotation
 from pdrom.model.runs import trajectory
 from pdrom.reduction import deviations
-from pdrom.reduction.deviations import DEVIATIONS, ERRORS, REFERENCE, TOUCH, Yardstick
+from pdrom.reduction.deviations import (
+    DEVIATIONS,
+    ERRORS,
+    REFERENCE,
+    TOUCH,
+    Yardstick,
+    errors_within,
+)
 from pdrom.reduction.rerun import displacement_norms
 
 SPRING = {"effect": "spring", "weight": 1e4}
@@ -24,7 +31,8 @@ def yardstick(*effects, **settings) -> Yardstick:
 def errors(measure: Yardstick, positions: np.ndarray) -> dict:
     apart = (positions - measure.reference[: len(positions)])[1:]
     difference = np.linalg.norm(apart, axis=(1, 2))
-    return measure.errors(SimpleNamespace(positions=positions, difference=difference))
+    found = measure.deviations(SimpleNamespace(positions=positions, difference=difference))
+    return errors_within(found, measure.series, len(measure.displacement), **measure.units)
 
 
 FLOOR = {"effect": "floor", "height": 1.5}

@@ -12,7 +12,6 @@ from pdrom.model.runs import followed
 from pdrom.model.scene import Scene
 from pdrom.reduction.subspace import exported
 from pdrom.reduction.subspace.exported import export_scene
-from study.experiments import subspaces as module
 from written_models import write_models
 
 FRAMES = 24
@@ -79,7 +78,7 @@ def test_the_file_says_what_it_is_and_a_handle_takes_its_vertices_where_the_read
 
 
 def test_a_file_that_is_too_large_names_the_keys(tmp_path, monkeypatch):
-    monkeypatch.setattr(module, "LARGEST", 100)
+    monkeypatch.setattr(exported, "LARGEST", 100)
     with pytest.raises(StorageError, match=r"live\.sizes, live\.tolerances"):
         write_models(scene_with("spring"), tmp_path)
     assert not (tmp_path / "test.js").exists()

@@ -13,13 +13,14 @@ from pdrom.model.held_out import MOTIONS
 from pdrom.model.runs import trajectory
 from pdrom.model.scene import Scene
 from pdrom.reduction.basis import compute_basis
+from pdrom.reduction.deviations import Yardstick
 from pdrom.reduction.method import MethodSpec, load_methods
 from pdrom.reduction.sampling import Reduction, reductions, select
-from pdrom.reduction.snapshots import SnapshotSet
+from pdrom.reduction.snapshots import SnapshotSet, recorded
 from pdrom.view.read import rerun_infos
 from places import ROOT
 from study.experiments import repetitions as module
-from study.experiments.repetitions import LadderSection, ReducedRuns, Repetitions, drawn, recorded
+from study.experiments.repetitions import LadderSection, ReducedRuns, Repetitions, drawn
 from study.pipeline.scenes import Coarsen, load_bound_scene
 
 BLOCK = MethodSpec(title="elements", centring="affine", rows="element", solve="qr")
@@ -36,7 +37,7 @@ def sheet() -> tuple[Scene, np.ndarray, SnapshotSet]:
     data = SnapshotSet(
         train=p[0::2], test=p[1::2], heldout=p[:0],
         frames={"train": np.arange(0, 12, 2), "test": np.arange(1, 12, 2)},
-        row_mass=np.ones(p.shape[1]), elements=group.elements, rows_per_element=1, roundoff=1e-14,
+        elements=group.elements, rows_per_element=1, roundoff=1e-14,
     )  # fmt: skip
     return scene, reference, data
 
@@ -45,7 +46,7 @@ def sheet() -> tuple[Scene, np.ndarray, SnapshotSet]:
 def short(sheet) -> ReducedRuns:
     """Runs up to frame `END`."""
     scene, reference, data = sheet
-    return ReducedRuns(scene, "spring", data, reference, END, 100.0).until_the_end()
+    return ReducedRuns("spring", data, Yardstick(scene, reference), END).until_the_end()
 
 
 def test_drawn_frames_are_stored_ones_in_order(sheet):
@@ -66,12 +67,12 @@ def test_other_training_frames_are_another_basis(short):
     assert one["gain"] != other["gain"]
     assert abs(one["error"] - other["error"]) > 1e-3 * one["error"]
     assert short.repeat(BLOCK, [3], "training", asked) == [one, other]
-    assert short.scene.config.frames == END
+    assert short.full.scene.config.frames == END
 
 
 def test_the_error_is_that_of_the_frames_before_the_end(sheet, short):
     scene, reference, data = sheet
-    whole = ReducedRuns(scene, "spring", data, reference, END, 100.0)
+    whole = ReducedRuns("spring", data, Yardstick(scene, reference), END)
     (reduction,) = reductions(whole.basis(BLOCK), BLOCK, [3]).values()
     one, other = whole.run(reduction), short.run(reduction)
     assert (one.frames, other.frames) == (12, END)
@@ -83,17 +84,17 @@ def test_the_error_is_that_of_the_frames_before_the_end(sheet, short):
 
 def test_bases_of_several_motions_are_run_on_the_held_out_ones(sheet):
     scene, reference, data = sheet
-    runs = ReducedRuns(scene, "spring", data, reference, END, 100.0)
+    runs = ReducedRuns("spring", data, Yardstick(scene, reference), END)
     rows = list(runs.on_motions(BLOCK, [3], [1, 2]))
     trained = [f"held out, {count} trained" for count in (1, 2)]
     assert [row["varied"] for row in rows] == np.repeat(trained, len(MOTIONS)).tolist()
     other = Scene.build(scene.config.heldout_variant(MOTIONS[1]), scene.mesh)
-    held = replace(runs, scene=other, reference=trajectory(other))
+    held = replace(runs, full=Yardstick(other, trajectory(other)))
     (reduction,) = reductions(runs.basis(BLOCK), BLOCK, [3]).values()
     assert rows[1]["error"] == held.error(held.run(reduction))
     assert rows[0]["gain"] == reduction.gain != rows[-1]["gain"]
-    positions, projections = recorded(other, "spring")
-    np.testing.assert_array_equal(positions, held.reference)
+    positions, projections, _ = recorded(other, "spring", other.initial_state())
+    np.testing.assert_array_equal(positions, held.full.reference)
     # the projections are those of the last local step, before the last global one
     np.testing.assert_allclose(
         projections[4], other.group("spring").project(positions[5]), atol=1e-5
@@ -111,11 +112,10 @@ def test_signs_are_drawn_by_a_seed(short):
     np.testing.assert_array_equal(short.basis(BLOCK, signs=1).V, short.basis(BLOCK).V)
 
 
-def test_a_run_that_ends_early_is_wrong_without_bound(sheet):
+def test_a_run_that_ends_early_is_wrong_without_bound(short, monkeypatch):
     """The limit is half of the extent of the sheet, so that the run ends after one frame."""
-    scene, reference, data = sheet
-    narrow = ReducedRuns(scene, "spring", data, reference, END, 0.5).until_the_end()
-    (run,) = narrow.repeat(BLOCK, [3], "start", Repetitions(repetitions=1))
+    monkeypatch.setattr("pdrom.reduction.deviations.BLOWUP_EXTENT", 0.5)
+    (run,) = short.repeat(BLOCK, [3], "start", Repetitions(repetitions=1))
     assert np.isinf(run["error"])
     assert not run["finite"]
 
@@ -128,7 +128,7 @@ def test_every_rung_reproduces_what_is_in_its_space(direction, rng):
     """Each method of the ladder is exact on its affine space, unless it solves with Tikhonov."""
     snapshots = rng.standard_normal((12, 40, 3))
     for method in getattr(LADDER, direction):
-        basis = compute_basis(snapshots, np.ones(40), 0.0, 2, method)
+        basis = compute_basis(snapshots, 0.0, 2, method)
         reduction = Reduction(basis, select(basis, method, 5), method, 5)
         assert np.isfinite(reduction.gain)
         if method.solve == "tikhonov":
@@ -153,7 +153,7 @@ def test_the_square_samples_as_many_entries_in_each_of_its_places(p, rng):
     entries = set()
     for direction, method, _, _ in LADDER.rungs(p):
         if direction == "square":
-            basis = compute_basis(snapshots, np.ones(20 * p), 0.0, p, method)
+            basis = compute_basis(snapshots, 0.0, p, method)
             reduction = Reduction(basis, select(basis, method, 5), method, 5)
             entries.add(sum(len(block.entries) for block in reduction.blocks))
     assert entries == {3 * p * 5}
@@ -188,7 +188,7 @@ def test_the_joint_selection_fails_where_an_axis_carries_nothing(fall, tmp_path)
     methods = {name: METHODS[name] for name in ("deim-joint", "published")}
     runs = tmp_path / "noise.h5"
     with write_hdf5(runs) as file:
-        rows = module.noisy_runs(fall.changed(frames=22), "bending", asked, methods, 100.0, file)
+        rows = module.noisy_runs(fall.changed(frames=22), "bending", asked, methods, file)
     table = pd.DataFrame(rows)
     assert len(table) == 3 * 2 * 2 * 3
     beyond = table.r == 99

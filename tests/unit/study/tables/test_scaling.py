@@ -38,7 +38,6 @@ def test_every_size_is_measured(tmp_path, name):
         scene=scene,
         scaled_methods={"block-deim": SPEC, "deim-joint": JOINT},
         scaling=Sized(r=4, k=5, training_frames=8, frames=1, repeats=2, breakeven=alone),
-        solver="supernodal",
     )
     outputs = {}
     for factor in (0.7, 1.0):

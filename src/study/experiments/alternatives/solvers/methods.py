@@ -20,7 +20,8 @@ from pdrom.model.dynamics.frames import inertia_energy, weighted
 from pdrom.model.dynamics.sweeps import sweep
 from pdrom.model.runs import followed
 from pdrom.model.scene import Scene
-from pdrom.reduction.subspace.model import Samples, SubspaceModel
+from pdrom.reduction.subspace.ecsw import Samples
+from pdrom.reduction.subspace.model import SubspaceModel
 from study.experiments.alternatives.solvers.substeps import (
     Alternative,
     Substeps,

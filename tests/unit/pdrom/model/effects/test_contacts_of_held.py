@@ -10,7 +10,8 @@ from pdrom.model.mesh.generators import cloth
 from pdrom.model.mesh.types import Mesh
 from pdrom.model.runs import trajectory
 from pdrom.model.scene import Scene, SceneConfig
-from pdrom.reduction.subspace.model import SubspaceModel, make_columns
+from pdrom.reduction.subspace.model import SubspaceModel
+from pdrom.reduction.subspace.training import make_columns
 
 SHEET = {"kind": "cloth", "rows": 6, "columns": 5, "lift": 1.0}
 BASE = ({"effect": "gravity"}, {"effect": "strain", "weight": 1e4})
@@ -46,7 +47,7 @@ def test_pins_inside_an_obstacle_hold_are_named_and_let_go_at_rest(name, caplog)
         assert not state.velocities[held].any()
     state, _ = loop.step(state, 12)
     assert (state.positions[held] != rest[held]).any()
-    model = SubspaceModel("pod", make_columns(scene, trajectory(scene)[1:], "pod", 4))
+    model = SubspaceModel(make_columns([scene], trajectory(scene)[1:], 4))
     loop, state = model.loop(scene)
     for frame in range(12):
         state, _ = loop.step(state, frame)

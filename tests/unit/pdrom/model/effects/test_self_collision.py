@@ -10,8 +10,8 @@ from scipy.spatial.distance import pdist
 from builders import GRAVITY, make_scene
 from pdrom.core.errors import NotReducibleError
 from pdrom.model.runs import trajectory
-from pdrom.reduction.subspace.model import make_columns
 from pdrom.reduction.subspace.space import ReducedSpace
+from pdrom.reduction.subspace.training import make_columns
 from strategies import SEEDS
 from study.experiments.hard_cases.record import folded, noisy, scales, scrambled
 
@@ -94,6 +94,6 @@ def test_a_thickness_that_lets_vertices_pass_is_said_in_the_log_and_mended_by_wh
 
 def test_a_position_subspace_refuses_it():
     scene = sheet()
-    columns = make_columns(scene, scene.mesh.points[None], "skinning", 4)
+    columns = make_columns([scene], scene.mesh.points[None], skinning=4)
     with pytest.raises(NotReducibleError, match="effect 'self_collision' needs all vertices"):
         ReducedSpace(scene, columns, [])

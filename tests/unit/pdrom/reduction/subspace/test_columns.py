@@ -1,7 +1,6 @@
 """Position subspaces: atoms, columns, modes."""
 
 import warnings
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,8 +11,8 @@ from builders import TOP, make_scene, random_rotation
 from pdrom.core.errors import SolverError
 from pdrom.model.runs import trajectory
 from pdrom.reduction.subspace import columns as spaces
-from pdrom.reduction.subspace.model import make_columns
 from pdrom.reduction.subspace.space import DenseElimination, coordinates
+from pdrom.reduction.subspace.training import make_columns
 
 SETS = st.lists(
     st.lists(st.sets(st.integers(0, 19), min_size=1, max_size=8), min_size=1, max_size=3),
@@ -23,8 +22,7 @@ SETS = st.lists(
 
 @given(SETS)
 def test_atoms_partition_what_is_held(boundaries):
-    asked = [SimpleNamespace(units=lambda own=own: [[*unit] for unit in own]) for own in boundaries]
-    found = spaces.atoms(asked, 20)
+    found = spaces.atoms([[*unit] for own in boundaries for unit in own], 20)
     units = [unit for boundary in boundaries for unit in boundary]
     members = np.concatenate(found) if found else np.array([], dtype=int)
     assert len(members) == len(set(members.tolist()))
@@ -72,7 +70,7 @@ def test_columns_are_mass_orthonormal_apart_for_atoms_and_hold_affine_motions(mo
     """Coordinates are the best in the mass norm."""
     scene, run = moved
     masses, points = scene.masses, scene.mesh.points
-    columns = make_columns(scene, run[1:], kind, k)
+    columns = make_columns([scene], run[1:], **{kind: k})
     block = columns.B[:, columns.free]
     np.testing.assert_allclose(
         block.T @ (masses[:, None] * block), np.eye(block.shape[1]), atol=1e-10
@@ -121,7 +119,7 @@ def test_displacement_modes_are_the_mass_weighted_pod_and_no_more_than_the_data_
 def test_atoms_get_modes_for_what_they_do_when_released(moved):
     """The bottom row is let go in frame 8 and bends: its motion is in its columns."""
     scene, run = moved
-    columns = make_columns(scene, run[1:], "pod", 8)
+    columns = make_columns([scene], run[1:], 8)
     straight = spaces.build_columns(
         spaces.displacement_modes(run[1:], scene.mesh.points, scene.masses, 8),
         scene.mesh.points, scene.masses, columns.atoms, run[1:8],
@@ -185,7 +183,7 @@ def test_coordinates_do_not_depend_on_the_unit_of_mass(mass, rng):
     scene = make_scene(TOP, SPRING, vertex_mass=mass)
     points = scene.mesh.points
     motion = points + 0.1 * rng.standard_normal((5, *points.shape))
-    columns = make_columns(scene, motion, "pod", 4)
+    columns = make_columns([scene], motion, 4)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         z = coordinates(columns, scene.masses, points)

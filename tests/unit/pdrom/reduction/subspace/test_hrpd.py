@@ -10,6 +10,7 @@ from builders import GROUPS, LEFT, TOP, make_scene, random_rotation
 from pdrom.core.errors import SamplingError
 from pdrom.model.runs import trajectory
 from pdrom.reduction.basis import compute_basis
+from pdrom.reduction.deviations import Yardstick
 from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.sampling import Reduction, select
 from pdrom.reduction.subspace import hrpd
@@ -19,8 +20,9 @@ from pdrom.reduction.subspace.interpolation import (
     SubspaceLocalStep,
     interpolation_of,
 )
-from pdrom.reduction.subspace.model import SubspaceModel, make_columns, rerun_model
+from pdrom.reduction.subspace.model import SubspaceModel
 from pdrom.reduction.subspace.space import coordinates
+from pdrom.reduction.subspace.training import make_columns
 
 
 def test_space_is_orthonormal_starts_with_the_rest_vectors_and_fits_by_least_squares(
@@ -104,7 +106,7 @@ def test_hrpd_is_exact_with_everything_and_for_a_turned_rest_shape(group_scene, 
     size = group.elements * group.rows_per_element
     turned = rest @ random_rotation(rng).T + rng.standard_normal(3)
     bent = rest + 0.1 * rng.standard_normal(rest.shape)
-    few = make_columns(scene, rest[None], "skinning", 3)
+    few = make_columns([scene], rest[None], skinning=3)
     for dimension, samples, columns, q, y in (
         (size, group.elements, whole_space(scene), rest, bent),
         (8, 20, few, turned, turned),
@@ -127,11 +129,11 @@ def test_projections_that_are_round_off_need_no_element():
     """A flat sheet has nothing to bend: no mode, no sample, and the same run as with all."""
     scene = make_scene({"effect": "bending", "weight": 10.0}, SPRING, GRAVITY, TOP, frames=5)
     reference = trajectory(scene)
-    columns = make_columns(scene, reference[1:], "pod", 3)
+    columns = make_columns([scene], reference[1:], 3)
     found = hrpd_of(scene, columns)
     assert len(found["bending"].elements) == 0
     one, two = (
-        rerun_model(scene, SubspaceModel("pod", columns, kept), reference).positions
+        Yardstick(scene, reference).run(SubspaceModel(columns, kept)).positions
         for kept in ({"bending": found["bending"]}, {})
     )
     np.testing.assert_allclose(one, two, atol=1e-9)
@@ -152,9 +154,9 @@ def test_the_right_hand_side_by_a_reduction_is_that_of_its_reconstruction(choice
     run = trajectory(scene, track_objective=False)
     snapshots = np.stack([group.project(q) for q in run])
     spec = MethodSpec(title="x", **choices)
-    basis = compute_basis(snapshots, np.ones(len(group.row_weights)), 1e-12, 2, spec)
+    basis = compute_basis(snapshots, 1e-12, 2, spec)
     reduction = Reduction(basis, select(basis, spec, 4), spec, 4)
-    columns = make_columns(scene, run, "pod", 3)
+    columns = make_columns([scene], run, 3)
     step = InterpolatedLocalStep(group, columns, interpolation_of(group, columns, reduction))
     z = np.random.default_rng(0).standard_normal((columns.B.shape[1], 3))
     rhs = np.zeros_like(z)

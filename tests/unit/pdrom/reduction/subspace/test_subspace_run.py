@@ -10,7 +10,8 @@ from pdrom.core.errors import SceneError
 from pdrom.core.store import write_hdf5
 from pdrom.model.dynamics.stepper import Stepper
 from pdrom.model.runs import trajectory
-from pdrom.reduction.subspace import interpolation
+from pdrom.reduction.deviations import Yardstick
+from pdrom.reduction.subspace import interpolation, training
 from pdrom.reduction.subspace import model as models
 from pdrom.reduction.subspace.columns import atoms, build_columns
 from pdrom.reduction.subspace.fused import FusedStepper
@@ -63,7 +64,7 @@ def hrpd_of(scene, columns):
 def whole_space(scene):
     """Columns that span all motions of all vertices."""
     n = scene.mesh.vertices
-    found = atoms(scene.boundaries, n)
+    found = atoms(training.held_units([scene]), n)
     anything = np.random.default_rng(0).standard_normal((n, n, 3))
     columns = build_columns(np.eye(n), scene.mesh.points, scene.masses, found, anything)
     assert columns.B.shape == (n, n)
@@ -75,8 +76,8 @@ def test_the_whole_space_repeats_the_full_order_run(name):
     scene = SCENES[name]()
     reference = trajectory(scene)
     motion = np.linalg.norm(reference[-1] - reference[0])
-    model = models.SubspaceModel("pod", whole_space(scene))
-    result = models.rerun_model(scene, model, reference).positions
+    model = models.SubspaceModel(whole_space(scene))
+    result = Yardstick(scene, reference).run(model).positions
     assert np.linalg.norm(result[-1] - reference[-1]) < 1e-8 * motion
     np.testing.assert_allclose(result, reference, atol=1e-7)
 
@@ -87,9 +88,9 @@ def test_the_whole_space_repeats_the_full_order_run(name):
 def test_pins_and_handles_are_met_exactly(name, kind, made):
     scene = SCENES[name]()
     reference = trajectory(scene)
-    columns = models.make_columns(scene, reference[1:], kind, 3)
-    model = models.SubspaceModel(kind, columns, made(scene, columns))
-    result = models.rerun_model(scene, model, reference).positions
+    columns = training.make_columns([scene], reference[1:], **{kind: 3})
+    model = models.SubspaceModel(columns, made(scene, columns))
+    result = Yardstick(scene, reference).run(model).positions
     assert np.isfinite(result).all()
     checked = 0
     for boundary in scene.boundaries:
@@ -152,8 +153,8 @@ def test_restricted_group_is_the_full_group_on_its_elements(group_scene, rng):
 def test_a_step_reads_nothing_of_the_mesh(name, made):
     """With everything of the length of the mesh overwritten a second run is the same."""
     scene = SCENES[name]()
-    columns = models.make_columns(scene, trajectory(scene)[1:], "pod", 3)
-    loop, start = models.SubspaceModel("pod", columns, made(scene, columns)).loop(scene)
+    columns = training.make_columns([scene], trajectory(scene)[1:], 3)
+    loop, start = models.SubspaceModel(columns, made(scene, columns)).loop(scene)
 
     def run() -> np.ndarray:
         state, states = start, []
@@ -178,7 +179,7 @@ def test_arrays_of_a_step_have_the_size_of_the_sample():
     sizes = []
     for rows in (32, 64):
         scene = make_scene(SPRING, TOP, mesh={"kind": "cloth", "rows": rows, "columns": 8})
-        columns = models.make_columns(scene, trajectory(scene)[1:], "skinning", 4)
+        columns = training.make_columns([scene], trajectory(scene)[1:], skinning=4)
         group, few, k = scene.groups[0], np.array([3, 11]), columns.B.shape[1]
         fit = interpolation.Interpolation(
             few, np.ones((1, 2)), np.ones((k, 1)), np.zeros((k, 3)), np.eye(k), gain=1.0
@@ -202,8 +203,8 @@ def test_fused_iterations_are_the_plain_ones(name):
     """The compiled loop against the step loop with projections and solve one after the other."""
     scene = SCENES[name]()
     reference = trajectory(scene)
-    columns = models.make_columns(scene, reference[1:], "pod", 4)
-    loop, state = models.SubspaceModel("pod", columns, ecsw_of(scene, columns, 3)).loop(scene)
+    columns = training.make_columns([scene], reference[1:], 4)
+    loop, state = models.SubspaceModel(columns, ecsw_of(scene, columns, 3)).loop(scene)
     assert isinstance(loop, FusedStepper)
     plain = Stepper(loop.space, loop.time_step, loop.iterations, loop.local_steps)
     other, frames = state, range(scene.config.frames)
@@ -222,7 +223,7 @@ def test_forces_that_cannot_be_reduced_are_refused():
     scene = make_scene(SPRING, GRAVITY)
     force = scene.forces[0]
     force.acceleration = lambda positions, velocities: velocities**2
-    columns = models.make_columns(scene, np.stack([scene.mesh.points] * 2), "skinning", 2)
+    columns = training.make_columns([scene], np.stack([scene.mesh.points] * 2), skinning=2)
     with pytest.raises(SceneError, match="'gravity' is not affine in the velocity"):
         ReducedSpace(scene, columns, [np.eye(columns.B.shape[1])])
 
@@ -231,8 +232,8 @@ def test_models_survive_a_file(tmp_path):
     """The layout of rule subspaces."""
     scene = SCENES["handles"]()
     reference = trajectory(scene)
-    columns = models.make_columns(scene, reference[1:], "pod", 4)
-    samples = models.sample_elements(scene, columns, np.arange(8), [1e-2])[0]
+    columns = training.make_columns([scene], reference[1:], 4)
+    samples = training.sampled_models([scene], columns, np.arange(8), [1e-2])[0].samples
     written = {"full": {}, "ecsw": samples, "hrpd": hrpd_of(scene, columns)}
     with write_hdf5(tmp_path / "models.h5") as file:
         models.store_columns(file.create_group("columns/pod_k004"), columns)

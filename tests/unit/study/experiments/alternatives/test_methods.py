@@ -11,7 +11,8 @@ from builders import GRAVITY, GROUPS, LEFT, make_scene
 from pdrom.core.errors import ConfigurationError, SceneError
 from pdrom.model.dynamics.stepper import State
 from pdrom.model.runs import ConvergedStepper, converged_run, followed
-from pdrom.reduction.subspace.model import Samples, SubspaceModel, make_columns
+from pdrom.reduction.subspace.model import Samples, SubspaceModel
+from pdrom.reduction.subspace.training import make_columns
 from study.experiments.alternatives.solvers.methods import TwoLevel, continuous
 from study.experiments.alternatives.solvers.substeps import METHODS
 
@@ -190,8 +191,8 @@ def model_of(scene, modes: int, elements: np.ndarray | None = None) -> SubspaceM
     chosen = np.arange(group.elements) if elements is None else elements
     factors = np.full(len(chosen), group.elements / len(chosen))
     run = converged_run(scene, 1e-10, 4000)
-    columns = make_columns(scene, run[1:], "pod", k=modes)
-    return SubspaceModel("pod", columns, {group.name: Samples(chosen, factors)})
+    columns = make_columns([scene], run[1:], modes)
+    return SubspaceModel(columns, {group.name: Samples(chosen, factors)})
 
 
 @pytest.mark.parametrize("group", ["spring", "strain", "tetrahedron_strain"])
@@ -232,7 +233,7 @@ def test_a_subspace_of_noise_never_raises_the_objective(iterations, rng):
     noise = scene.mesh.points + 0.3 * rng.standard_normal((4, *shape))
     chosen = np.arange(0, scene.groups[0].elements, 9)
     samples = {"spring": Samples(chosen, np.full(len(chosen), 0.01))}
-    model = SubspaceModel("pod", make_columns(scene, noise, "pod", k=4), samples)
+    model = SubspaceModel(make_columns([scene], noise, 4), samples)
     state = scene.initial_state(0.1 * rng.standard_normal(shape))
     once = alternative("projective", scene, 1, 1).step(state, 0)[0]
     after = TwoLevel(scene, 1, iterations, model).step(state, 0)[0]
