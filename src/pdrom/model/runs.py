@@ -5,7 +5,6 @@ import os
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import takewhile
-from time import perf_counter
 from typing import Any
 
 import h5py
@@ -62,8 +61,7 @@ class ConvergedStepper(Stepper):
     def step(
         self, state: State, frame: int, on_last_iterate: Callable[[np.ndarray], None] | None = None
     ) -> tuple[State, FrameReport]:
-        """Compute ``frame`` from ``state``; ``on_last_iterate`` is ignored."""
-        started = perf_counter()
+        """Compute ``frame`` from ``state``; ``on_last_iterate`` is ignored, the report is empty."""
         s, elimination, base, anchors = self._begin(state, frame)
         rhs = np.empty_like(s)
 
@@ -79,30 +77,19 @@ class ConvergedStepper(Stepper):
         )
         self.changes.append(end.change)
         self.evaluations.append(end.evaluations)
-        after, seconds = self._finish(state, end.y, frame, anchors), np.zeros(len(PHASES))
-        seconds[1] = perf_counter() - started  # its phases are not told apart
-        return after, FrameReport(np.empty(0), seconds)
+        return self._finish(state, end.y, frame, anchors), FrameReport(np.empty(0), np.zeros(4))
 
 
-def converged_run(
-    scene: Scene,
-    tolerance: float,
-    limit: int,
-    on_frame: Callable[[int, FrameReport], None] = lambda frame, report: None,
-) -> np.ndarray | None:
+def converged_run(scene: Scene, tolerance: float, limit: int) -> np.ndarray | None:
     """Positions (F + 1, N, 3) m of a run of ``scene`` in which every frame has converged.
 
     Initial positions come first. None if, after ``limit`` evaluations of a frame's objective, one
     more iteration would move a vertex by over ``tolerance`` times the mesh's longest side.
-    ``on_frame`` is called after each frame with its number and report.
     """
     best, state = ConvergedStepper(scene, scene.system, tolerance, limit), scene.initial_state()
     ends = takewhile(lambda _: best.converged, best.run(state, range(scene.config.frames)))
-    positions = [state.positions]
-    for frame, (after, report) in enumerate(ends):
-        positions.append(after.positions)
-        on_frame(frame, report)
-    return np.stack(positions) if best.converged else None
+    positions = np.stack([state.positions, *(after.positions for after, _ in ends)])
+    return positions if best.converged else None
 
 
 def run(

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from pdrom.core.packed import brief
-from pdrom.model.dynamics.stepper import State, Stepper
-from pdrom.model.runs import BoundedRun
+from pdrom.model.dynamics.stepper import State
+from pdrom.model.runs import BoundedRun, Run
 from pdrom.model.scene import Scene
 
 
@@ -48,33 +48,33 @@ class Rerun:
 
 def rerun(
     scene: Scene,
-    loop: Stepper,
+    run: Run,
     start: State,
     reference: np.ndarray,
     limit: float,
     positions: Callable[[np.ndarray], np.ndarray] = lambda y: y,
 ) -> Rerun:
-    """Run ``loop`` from ``start``; compare it with the full-order run ``reference`` of ``scene``.
+    """Execute ``run`` from ``start``; compare it with the full-order run of ``scene``.
 
     Parameters
     ----------
-    reference : (F + 1, N, 3) m
+    reference : (F + 1, N, 3) m, positions of the full-order run
     limit : the run ends if its bounding box exceeds this multiple of that at rest
-    positions : function that maps the unknowns of ``loop`` to vertex positions (N, 3) m
+    positions : function that maps the unknowns of ``run`` to vertex positions (N, 3) m
     """
     frames, unit = scene.config.frames, scene.mesh.extent
-    run = BoundedRun(loop.run, start, frames, limit, unit, positions)
+    bounded = BoundedRun(run, start, frames, limit, unit, positions)
     coordinates = [start.positions]
     reached = [positions(start.positions)]
     difference, extents = [], []
-    for frame in run:
+    for frame in bounded:
         coordinates.append(frame.state.positions)
         reached.append(frame.positions)
         difference.append(float(np.linalg.norm(frame.positions - reference[frame.number + 1])))
         extents.append(frame.extent)
     stacked = np.stack(reached)
     unknowns = stacked if reached[0] is coordinates[0] else np.stack(coordinates)
-    return Rerun(stacked, np.array(difference), np.array(extents), run.blowup_frame, unknowns)
+    return Rerun(stacked, np.array(difference), np.array(extents), bounded.blowup_frame, unknowns)
 
 
 def displacement_norms(reference: np.ndarray) -> np.ndarray:

@@ -17,8 +17,7 @@ from pdrom.model.runs import followed
 from pdrom.reduction.sampling import Reduction, select
 from pdrom.reduction.sampling.local_step import ReducedLocalStep, replace_group
 from pdrom.reduction.subspace.hrpd import HrpdSpec, hrpd, sampled_space
-from pdrom.reduction.subspace.model import Samples, SubspaceModel
-from pdrom.reduction.subspace.training import make_columns
+from pdrom.reduction.subspace.model import Samples, SubspaceModel, make_columns
 
 FRAMES, LAG = 10, 6
 SAMPLED = HrpdSpec(dimension=6, samples=20)
@@ -54,12 +53,12 @@ def loops_of(scene, kind):
         step = ReducedLocalStep(group, Reduction(made, select(made, spec, 3), spec, r=3))
         steps = replace_group(scene, group.name, step)
         return lambda: (scene.stepper(scene.system, steps), scene.initial_state())
-    columns, samples = make_columns([scene], full.positions[1:], 3), {}
+    columns, samples = make_columns(scene, full.positions[1:], "pod", 3), {}
     for each in scene.groups:
         few, space = np.arange(0, each.elements, 3), sampled_space(each, scene.mesh.points, SAMPLED)
         weighted = Samples(few, np.full(len(few), 3.0))
         samples[each.name] = weighted if kind == "subspace" else hrpd(each, columns, space)
-    return lambda: SubspaceModel(columns, samples).loop(scene)
+    return lambda: SubspaceModel("pod", columns, samples).loop(scene)
 
 
 @pytest.mark.parametrize("kind", ["supernodal", "splu", "reduced", "subspace", "interpolated"])
@@ -92,15 +91,14 @@ def test_a_run_writes_neither_to_its_scene_nor_to_another_run(effect, kind):
 def test_threads_get_the_runs_alone(effect):
     scene = scene_with(effect)
     alone, group = api.run(scene), scene.groups[-1].name
-    model = api.train(alone, group=group, r=3)
-    reduced = model.run(scene)
+    reduced = api.reduce(alone, group, "gappy", 3)
     with ThreadPoolExecutor(4) as pool:
         runs = [pool.submit(api.run, scene) for _ in range(3)]
-        others = [pool.submit(model.run, scene) for _ in range(3)]
+        others = [pool.submit(api.reduce, alone, group, "gappy", 3) for _ in range(3)]
     for run, other in zip(runs, others, strict=True):
         np.testing.assert_array_equal(run.result().positions, alone.positions)
         np.testing.assert_array_equal(run.result().snapshots[group].p, alone.snapshots[group].p)
-        np.testing.assert_array_equal(other.result().positions, reduced.positions)
+        np.testing.assert_array_equal(other.result().outcome.positions, reduced.outcome.positions)
 
 
 def test_a_group_of_a_scene_refuses_what_belongs_to_a_run():
