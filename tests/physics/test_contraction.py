@@ -27,7 +27,8 @@ def _case(group: str, method: MethodSpec, r: int = 6) -> tuple[Scene, Reduction,
     scene = make_scene(*MOVING, {"effect": group, "weight": 1e4}, mesh=mesh, frames=24)
     positions, g = trajectory(scene), scene.group(group)
     snapshots = np.stack([g.project(q) for q in positions[1:]])
-    basis = compute_basis(snapshots, 1e-13, g.rows_per_element, method)
+    mass = np.ones(snapshots.shape[1])
+    basis = compute_basis(snapshots, mass, 1e-13, g.rows_per_element, method)
     sampling = select_path(basis, method, [r])[r]
     return scene, Reduction(basis, sampling, method, r), positions
 

@@ -27,7 +27,7 @@ from pdrom.model.dynamics.system import DEFAULT_SOLVER
 from pdrom.model.runs import frame_by_frame
 from pdrom.model.runs import run as run_full_order
 from pdrom.model.scene import GONE, Scene
-from pdrom.reduction.basis import Basis, compute_basis
+from pdrom.reduction.basis import Basis, group_basis
 from pdrom.reduction.method import MethodSpec, load_methods
 from pdrom.reduction.rerun import rerun
 from pdrom.reduction.sampling import Reduction, select
@@ -121,7 +121,7 @@ def basis(full: FullRun, group: str, method: str | MethodSpec = "pod") -> Basis:
     full : full-order run that has the training snapshots
     group : name of a constraint group of its scene
     method : name in config/methods.yaml, or a specification; it sets how the snapshots are centred
-        and whether the axes x, y, z have coefficients in common
+        and weighted, and whether the axes x, y, z have coefficients in common
 
     Returns
     -------
@@ -141,7 +141,7 @@ def basis(full: FullRun, group: str, method: str | MethodSpec = "pod") -> Basis:
         raise SnapshotError(f"group '{group}': the run stored no snapshots of it")
     data = full.snapshots[group]
     roundoff = float(np.linalg.norm(data.roundoff))
-    return compute_basis(data.p, roundoff, chosen.rows_per_element, spec)
+    return group_basis(chosen, full.scene.masses, data.p, roundoff, spec)
 
 
 def methods() -> dict[str, MethodSpec]:

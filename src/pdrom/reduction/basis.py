@@ -1,4 +1,4 @@
-"""POD bases computed from snapshots of projections: centring, signs, numerical rank."""
+"""POD bases computed from snapshots of projections: weighting, centring, signs, numerical rank."""
 
 import os
 from dataclasses import dataclass, replace
@@ -10,8 +10,9 @@ from scipy import linalg
 from pdrom.core.errors import RankError, SnapshotError
 from pdrom.core.packed import brief
 from pdrom.core.store import open_hdf5, require_finite, write_hdf5
+from pdrom.model.constraints.base import ConstraintGroup
 from pdrom.reduction.method import BasisSpec
-from pdrom.reduction.snapshots import SnapshotSet
+from pdrom.reduction.snapshots import SnapshotSet, row_masses
 
 # Snapshots whose largest entry is below this limit or above its inverse are scaled, since squares
 # of their entries could underflow or overflow.
@@ -25,9 +26,10 @@ class Basis:
     The group has e elements with p rows of three numbers (x, y, z) each. Entry i of a vector is
     axis i % 3 of row i // 3, which belongs to element i // (3 p).
 
-    V : (3 e p, rank); orthonormal, with centring "mean-in-modes" axis by axis
+    V : (3 e p, rank); orthonormal (with mass weighting in the inner product of the row masses), or
+        orthonormal axis by axis if the recipe has `BasisSpec.separate_axes`
     mean : (3 e p,), zero unless the snapshots are centred
-    singular_values : all singular values of the matrix of centred training snapshots
+    singular_values : all singular values of the matrix of weighted, centred training snapshots
     rank : number of singular values above round-off, which is the number of columns of V
     roundoff : singular values up to this absolute size are noise
     active_axes : for each axis x, y, z, whether its snapshots exceed round-off
@@ -98,6 +100,7 @@ def stored_basis(file: h5py.Group, origin: str) -> Basis:
 
 def compute_basis(
     snapshots: np.ndarray,
+    row_mass: np.ndarray,
     roundoff: float,
     rows_per_element: int,
     spec: BasisSpec,
@@ -108,29 +111,34 @@ def compute_basis(
     Parameters
     ----------
     snapshots : (n, e p, 3) projections of e elements with p rows each
+    row_mass : (e p,) kg, used by mass weighting
     roundoff : Frobenius norm of the rounding errors in ``snapshots``
     rows_per_element : p
     signs : generator that draws the sign of each mode; None keeps all signs. Signs matter only with
         centring "mean-in-modes": it adds the first snapshot to every mode, so that the span of the
         modes depends on their signs.
-    spec : centring
+    spec : weighting, centring and layout
 
     Raises
     ------
     SnapshotError
-        Fewer than two snapshots, a wrong shape, NaN or Inf.
+        Fewer than two snapshots, a wrong shape, NaN or Inf, or mass weighting with a zero mass.
     """
-    _check(snapshots, rows_per_element)
+    _check(snapshots, row_mass, rows_per_element, spec)
     require_finite("round-off of the snapshots", np.array([roundoff]), SnapshotError)
     largest = float(np.abs(snapshots).max())
     if largest > 0.0 and not SMALL <= largest <= 1.0 / SMALL:
         unit = 2.0 ** (np.frexp(largest)[1] - 1)  # a power of two, so that scaling is exact
-        made = compute_basis(snapshots / unit, roundoff / unit, rows_per_element, spec, signs)
+        scaled = snapshots / unit, row_mass, roundoff / unit
+        made = compute_basis(*scaled, rows_per_element, spec, signs)
         with np.errstate(over="ignore"):
             sigma = require_finite("singular values", made.singular_values * unit, SnapshotError)
         noise = float(made.roundoff * unit)
         return replace(made, mean=made.mean * unit, singular_values=sigma, roundoff=noise)
     matrix = snapshots.reshape(len(snapshots), -1).T
+    scale = np.ones(3 * len(row_mass))  # square roots of the masses for mass weighting, else 1
+    if spec.weighting == "mass":
+        scale = np.repeat(np.sqrt(row_mass), 3)
     mean, error, shown = np.zeros(len(matrix)), roundoff, matrix
     if spec.centring == "affine":
         # The mean of n snapshots has a rounding error of at most n eps/2 times the mean of their
@@ -143,25 +151,31 @@ def compute_basis(
         shown = matrix - mean[:, None]
     elif spec.centring == "mean-in-modes":
         mean = matrix[:, 0].copy()
-    centred = matrix - mean[:, None]
+    centred = (matrix - mean[:, None]) * scale[:, None]
+    noise = error * float(scale.max())
     # an axis is active if the norm of its snapshots exceeds both the round-off of the data and that
     # of an SVD, which is relative to the largest of the three norms
     norms = np.array([np.linalg.norm(shown[axis::3]) for axis in range(3)])
     least = max(error, max(shown.shape) * np.finfo(float).eps * norms.max())
     active = tuple(bool(norm > least) for norm in norms)
-    modes, sigma = pod(centred)
-    rank = numerical_rank(sigma, centred.shape, error)
+    if spec.layout == "per-axis":
+        modes, sigma, ranks = _per_axis(centred, noise)
+        active = tuple(a and own > 0 for a, own in zip(active, ranks, strict=True))
+        rank = max(ranks)
+    else:
+        modes, sigma = pod(centred)
+        rank = numerical_rank(sigma, centred.shape, noise)
     v = modes[:, : rank if any(active) else 0]
     if spec.centring == "mean-in-modes":
         # on one axis, no more modes can be orthonormal than the axis has rows
-        v = _mean_in_modes(v[:, : snapshots.shape[1]], centred, mean, active, signs)
+        v = _mean_in_modes(v[:, : len(row_mass)], centred, mean * scale, active, signs)
         mean = np.zeros_like(mean)
     return Basis(
-        V=np.ascontiguousarray(v),
+        V=np.ascontiguousarray(v / scale[:, None]),
         mean=mean,
         singular_values=sigma,
         rank=v.shape[1],
-        roundoff=error,
+        roundoff=noise,
         rows_per_element=rows_per_element,
         active_axes=active,
     )
@@ -178,10 +192,22 @@ def basis_of(
     Snapshots ``train`` (n, e p, 3) replace them if given; ``signs`` draws random signs of modes.
     """
     snapshots, p = data.train if train is None else train, data.rows_per_element
-    return compute_basis(snapshots, data.roundoff, p, spec, signs)
+    return compute_basis(snapshots, data.row_mass, data.roundoff, p, spec, signs)
 
 
-def _check(snapshots: np.ndarray, rows_per_element: int) -> None:
+def group_basis(
+    group: ConstraintGroup, masses: np.ndarray, p: np.ndarray, roundoff: float, spec: BasisSpec
+) -> Basis:
+    """Compute the POD basis of snapshots ``p`` (n, e p, 3) of ``group``, by the recipe ``spec``.
+
+    ``masses`` (N,) kg are those of the vertices; ``roundoff`` is the norm of rounding errors in p.
+    """
+    return compute_basis(p, row_masses(group, masses), roundoff, group.rows_per_element, spec)
+
+
+def _check(
+    snapshots: np.ndarray, row_mass: np.ndarray, rows_per_element: int, spec: BasisSpec
+) -> None:
     if snapshots.ndim != 3 or snapshots.shape[2] != 3 or len(snapshots) < 2:
         raise SnapshotError(f"snapshots of shape {snapshots.shape}, required: (n >= 2, e p, 3)")
     rows = snapshots.shape[1]
@@ -190,7 +216,32 @@ def _check(snapshots: np.ndarray, rows_per_element: int) -> None:
             f"snapshots of {rows} rows, required: a multiple of rows_per_element "
             f"= {rows_per_element}"
         )
+    if row_mass.shape != (rows,):
+        raise SnapshotError(f"row_mass of shape {row_mass.shape}, required: ({rows},)")
     require_finite("snapshots", snapshots, SnapshotError)
+    if spec.weighting == "mass":
+        require_finite("row_mass", row_mass, SnapshotError)
+        if row_mass.min() <= 0.0:
+            row = int(np.argmin(row_mass))
+            raise SnapshotError(f"row_mass: row {row} has {row_mass[row]} kg, required: above 0")
+
+
+def _per_axis(centred: np.ndarray, noise: float) -> tuple[np.ndarray, np.ndarray, list[int]]:
+    """Return one POD basis per axis as (modes, singular values, rank of each axis).
+
+    Singular values of an axis up to ``noise`` do not count for its rank, and modes beyond the rank
+    are zero. The returned singular value k is the 2-norm of the k-th ones of the three axes.
+    """
+    n, m = centred.shape
+    modes = np.zeros((n, min(n // 3, m)))
+    sigma = np.zeros((3, min(n // 3, m)))
+    ranks = []
+    for axis in range(3):
+        u, sigma[axis] = pod(centred[axis::3])
+        own = numerical_rank(sigma[axis], centred[axis::3].shape, noise)
+        modes[axis::3, :own] = u[:, :own]
+        ranks.append(own)
+    return modes, np.linalg.norm(sigma, axis=0), ranks
 
 
 def _mean_in_modes(

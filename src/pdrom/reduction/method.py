@@ -28,24 +28,29 @@ Solve = Literal["square", "qr", "tikhonov"]
 
 
 class BasisSpec(ConfigModel):
-    """Recipe of a basis from snapshots, of which x, y, z are stacked in one column.
+    """Recipe of a basis from snapshots.
 
+    weighting : "mass" makes modes orthonormal in the inner product with the lumped mass of each row
     centring : "affine" subtracts the mean, and reconstructions add it; "mean-in-modes" follows the
         program published with the preprint: it subtracts the first snapshot, rescales the modes,
         adds that snapshot to every mode and orthogonalises the modes again per axis
+    layout : "vectorised" stacks x, y, z of a snapshot in one column, so that they share the
+        coefficients; "per-axis" makes one basis for each of x, y, z
     """
 
+    weighting: Literal["none", "mass"] = "none"
     centring: Literal["none", "affine", "mean-in-modes"] = "none"
+    layout: Literal["vectorised", "per-axis"] = "vectorised"
 
     @property
     def basis_id(self) -> str:
-        """Name of this basis recipe; part of the basis file's path."""
-        return f"none-{self.centring}-vectorised"
+        """Name of this basis recipe, made of its three settings; part of the basis file's path."""
+        return f"{self.weighting}-{self.centring}-{self.layout}"
 
     @property
     def separate_axes(self) -> bool:
         """Whether the modes are orthonormal on each axis instead of as whole vectors."""
-        return self.centring == "mean-in-modes"
+        return self.layout == "per-axis" or self.centring == "mean-in-modes"
 
 
 class MethodSpec(BasisSpec):
@@ -103,11 +108,13 @@ class MethodSpec(BasisSpec):
                 "'tikhonov' and coefficients that the axes share"
             )
         if self.separate_axes and self.coefficients == "shared":
-            raise ValueError(f"coefficients = 'shared' with {self.centring}: only 'per-axis'")
+            raise ValueError(
+                f"coefficients = 'shared' with {self.layout}, {self.centring}: only 'per-axis'"
+            )
         if self.per_axis and self.rows == "scalar":
             raise ValueError(
-                f"rows = 'scalar' with {self.centring}: separate coefficients per axis need rows = "
-                "'all', 'joint' or 'element'"
+                f"rows = 'scalar' with {self.layout}, {self.centring}: separate coefficients per "
+                "axis need rows = 'all', 'joint' or 'element'"
             )
         if self.repeat_rows and self.solve == "square":
             raise ValueError("repeat_rows with solve = 'square': a repeated row is singular")

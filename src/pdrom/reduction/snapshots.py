@@ -4,6 +4,7 @@ import os
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import sparse
 
 from pdrom.core.errors import SnapshotError
 from pdrom.core.store import open_hdf5, require_finite, write_hdf5
@@ -28,6 +29,25 @@ def test_frames(frames: int) -> np.ndarray:
 def stored_frames(frames: int, count: int) -> np.ndarray:
     """Numbers of the training and test frames of a run of ``frames`` frames, ascending."""
     return np.sort(np.concatenate([training_frames(frames, count), test_frames(frames)]))
+
+
+def row_masses(group: ConstraintGroup, masses: np.ndarray) -> np.ndarray:
+    """Lumped mass (e p,) kg of each operator row: e elements of p rows, vertex ``masses`` (N,) kg.
+
+    Every vertex divides its mass equally among the elements that contain it, so that the element
+    masses sum to the mass of all vertices of elements; each row has the mass of its element.
+    """
+    element = touched_vertices(group)
+    valence = np.asarray(element.sum(axis=0)).ravel()
+    share = np.divide(masses, valence, out=np.zeros_like(masses), where=valence > 0)
+    return np.repeat(element @ share, group.rows_per_element)
+
+
+def touched_vertices(group: ConstraintGroup) -> sparse.csr_array:
+    """Matrix (e, N): 1 where the operator of an element of ``group`` uses a vertex, else 0."""
+    rows = group.rows_per_element
+    touches = (group.S != 0).astype(np.float64)
+    return (sum(touches[row::rows] for row in range(rows)) != 0).astype(np.float64)
 
 
 def recorded(
@@ -64,6 +84,7 @@ class SnapshotSet:
     test: np.ndarray
     heldout: np.ndarray
     frames: dict[str, np.ndarray]
+    row_mass: np.ndarray
     elements: int
     rows_per_element: int
     roundoff: float
@@ -73,6 +94,7 @@ def collect(
     training_run: str | os.PathLike[str],
     heldout_run: str | os.PathLike[str],
     group: ConstraintGroup,
+    masses: np.ndarray,
     train: np.ndarray,
 ) -> SnapshotSet:
     """Read snapshots of ``group``: training and test frames of one run, frames of a held-out run.
@@ -82,6 +104,7 @@ def collect(
     Parameters
     ----------
     training_run, heldout_run : files of the two full-order runs
+    masses : (N,) kg, masses of the vertices
     train : (n,) numbers of the training frames, ascending
     """
     p, frames, roundoff = _read(training_run, group.name)
@@ -98,6 +121,7 @@ def collect(
         test=p[odd],
         heldout=held,
         frames={"train": frames[is_train], "test": frames[odd], "heldout": held_frames},
+        row_mass=row_masses(group, masses),
         elements=group.elements,
         rows_per_element=group.rows_per_element,
         roundoff=float(np.linalg.norm(roundoff[is_train])),
@@ -114,11 +138,13 @@ def _read(path: str | os.PathLike[str], group: str) -> tuple[np.ndarray, np.ndar
 
 
 def save_snapshots(snapshots: SnapshotSet, path: str | os.PathLike[str]) -> None:
-    """Write ``snapshots`` to ``path`` (datasets train, test, heldout, <split>_frames)."""
+    """Write ``snapshots`` to ``path`` (datasets train, test, heldout, <split>_frames, row_mass)."""
     with write_hdf5(path) as file:
         for split in SPLITS:
             file[split] = getattr(snapshots, split)
             file[f"{split}_frames"] = snapshots.frames[split]
+        file["row_mass"] = snapshots.row_mass
+        file["row_mass"].attrs["unit"] = "kg"
         for name in ("elements", "rows_per_element", "roundoff"):
             file.attrs[name] = getattr(snapshots, name)
 
@@ -129,6 +155,7 @@ def load_snapshots(path: str | os.PathLike[str]) -> SnapshotSet:
         return SnapshotSet(
             **{split: file[split][...] for split in SPLITS},
             frames={split: file[f"{split}_frames"][...] for split in SPLITS},
+            row_mass=file["row_mass"][...],
             elements=int(file.attrs["elements"]),
             rows_per_element=int(file.attrs["rows_per_element"]),
             roundoff=float(file.attrs["roundoff"]),

@@ -58,5 +58,5 @@ def snapshots(mesh: File, train: File, heldout: File, config: SceneConfig, out: 
     group = out["group"]
     scene = scene_of(config, mesh)
     frames = sets.training_frames(scene.config.frames, scene.config.reduce[group].train)
-    found = sets.collect(train.path, heldout.path, scene.group(group), frames)
+    found = sets.collect(train.path, heldout.path, scene.group(group), scene.masses, frames)
     sets.save_snapshots(found, out.path)

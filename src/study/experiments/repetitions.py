@@ -22,7 +22,7 @@ from pdrom.model.metrics import relative_errors
 from pdrom.model.runs import trajectory
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction import snapshots as sets
-from pdrom.reduction.basis import Basis, basis_of, compute_basis
+from pdrom.reduction.basis import Basis, basis_of, group_basis
 from pdrom.reduction.deviations import Yardstick, error_within
 from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.rerun import Rerun
@@ -438,7 +438,7 @@ def _noisy(
     even = sets.training_frames(frames, min(plan.train, (frames + 1) // 2))
     full = Yardstick(scene, reference)
     for method, spec in methods.items():
-        basis = compute_basis(projections[even], 0.0, group.rows_per_element, spec)
+        basis = group_basis(group, scene.masses, projections[even], 0.0, spec)
         basis = replace(basis, active_axes=(True, True, True))
         made = reductions(basis, spec, sizes)
         for r in sizes:

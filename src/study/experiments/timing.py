@@ -19,7 +19,7 @@ from pdrom.core.store import open_hdf5, write_table
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.model.constraints.base import ConstraintGroup
 from pdrom.model.scene import Scene, SceneConfig
-from pdrom.reduction.basis import compute_basis
+from pdrom.reduction.basis import group_basis
 from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.sampling import Reduction, reductions
 from pdrom.reduction.sampling.local_step import ReducedLocalStep
@@ -322,6 +322,6 @@ def _reductions(
 ) -> list[Reduction]:
     """Reductions of the first group to r modes (at most the basis's rank) for each r ``asked``."""
     noise = float(np.linalg.norm(roundoff))
-    basis = compute_basis(projections, noise, scene.groups[0].rows_per_element, spec)
+    basis = group_basis(scene.groups[0], scene.masses, projections, noise, spec)
     sizes = sorted({min(r, basis.rank) for r in asked})
     return list(reductions(basis, spec, sizes).values())

@@ -16,7 +16,7 @@ from pdrom.core.yamlfile import ConfigModel, shown
 from pdrom.model.constraints.base import ConstraintGroup
 from pdrom.model.dynamics.stepper import State, Stepper
 from pdrom.model.effects import EFFECTS
-from pdrom.reduction.basis import Basis, compute_basis
+from pdrom.reduction.basis import Basis, group_basis
 from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.sampling import Reduction, select
 from pdrom.reduction.sampling.model import ProjectionModel
@@ -97,9 +97,9 @@ class Training:
         )
 
     def basis(self, spec: MethodSpec) -> Basis:
-        """Return the basis of the snapshots, with the centring of ``spec``."""
+        """Return the basis of the snapshots, with the centring, weights etc. of ``spec``."""
         p, roundoff = self._snapshots
-        return compute_basis(p, roundoff, self.group.rows_per_element, spec)
+        return group_basis(self.group, self.scene.masses, p, roundoff, spec)
 
 
 def names(methods: Methods) -> list[str]:

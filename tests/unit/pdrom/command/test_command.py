@@ -296,7 +296,7 @@ FAULTY = [
     (["new", "nowhere/x"], "No such file"),
     (["show", "a" * 5000], "File name too long"),
     (["show", "."], "is a folder"),
-    (["run", "."], "no such configuration file"),
+    (["run", "."], ".: a folder, name a file in it"),
     (["reduce", "small.yaml", "--error", "0.1"], "--error: runs within a requested error"),
     ([*REDUCE, "--plot", "x.exe"], "--plot x.exe: no kind of picture 'exe' (allowed: pdf, png"),
     ([*REDUCE, "--plot", "x.pgn"], "did you mean 'png'?"),

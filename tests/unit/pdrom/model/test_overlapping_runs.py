@@ -17,7 +17,8 @@ from pdrom.model.runs import followed
 from pdrom.reduction.sampling import Reduction, select
 from pdrom.reduction.sampling.local_step import ReducedLocalStep, replace_group
 from pdrom.reduction.subspace.hrpd import HrpdSpec, hrpd, sampled_space
-from pdrom.reduction.subspace.model import Samples, SubspaceModel, make_columns
+from pdrom.reduction.subspace.model import Samples, SubspaceModel
+from pdrom.reduction.subspace.training import make_columns
 
 FRAMES, LAG = 10, 6
 SAMPLED = HrpdSpec(dimension=6, samples=20)
@@ -53,12 +54,12 @@ def loops_of(scene, kind):
         step = ReducedLocalStep(group, Reduction(made, select(made, spec, 3), spec, r=3))
         steps = replace_group(scene, group.name, step)
         return lambda: (scene.stepper(scene.system, steps), scene.initial_state())
-    columns, samples = make_columns(scene, full.positions[1:], "pod", 3), {}
+    columns, samples = make_columns([scene], full.positions[1:], 3), {}
     for each in scene.groups:
         few, space = np.arange(0, each.elements, 3), sampled_space(each, scene.mesh.points, SAMPLED)
         weighted = Samples(few, np.full(len(few), 3.0))
         samples[each.name] = weighted if kind == "subspace" else hrpd(each, columns, space)
-    return lambda: SubspaceModel("pod", columns, samples).loop(scene)
+    return lambda: SubspaceModel(columns, samples).loop(scene)
 
 
 @pytest.mark.parametrize("kind", ["supernodal", "splu", "reduced", "subspace", "interpolated"])

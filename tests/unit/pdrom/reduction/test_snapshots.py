@@ -31,6 +31,18 @@ def test_training_and_test_frames_are_disjoint_and_spread(frames, data):
     np.testing.assert_array_equal(stored, sorted({*train.tolist(), *test.tolist()}))
 
 
+def test_a_vertex_hands_out_its_mass_in_equal_parts_to_its_elements(group_scene, rng):
+    """All rows of an element have the element's mass; no mass of a touched vertex is left."""
+    group = group_scene.groups[0]
+    masses = rng.uniform(0.5, 2.0, group_scene.mesh.vertices)
+    rows = snapshots.row_masses(group, masses).reshape(group.elements, group.rows_per_element)
+    ends = (group.S.toarray().reshape(*rows.shape, -1) != 0.0).any(axis=1)
+    valence = ends.sum(axis=0)
+    expected = [sum(masses[v] / valence[v] for v in np.flatnonzero(own)) for own in ends]
+    np.testing.assert_allclose(rows, np.tile(expected, (rows.shape[1], 1)).T, rtol=1e-13)
+    assert rows[:, 0].sum() == pytest.approx(masses[valence > 0].sum(), rel=1e-12)
+
+
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory):
     """Scene with a training and a held-out run of 12 frames."""
@@ -45,7 +57,7 @@ def collected(runs, frames=TRAIN, **paths):
     """Snapshots of the runs, or of other files in their place."""
     scene, folder = runs
     files = {name: folder / f"{name}.h5" for name in ("train", "held")} | paths
-    return snapshots.collect(files["train"], files["held"], scene.groups[0], frames)
+    return snapshots.collect(files["train"], files["held"], scene.groups[0], scene.masses, frames)
 
 
 def test_splits_hold_their_frames(runs):
@@ -74,6 +86,7 @@ def test_file_round_trip(runs, tmp_path):
     np.testing.assert_equal(vars(snapshots.load_snapshots(tmp_path / "s.h5")), vars(got))
     with open_hdf5(tmp_path / "s.h5") as file:
         assert file.attrs["elements"] == got.elements
+        assert file["row_mass"].attrs["unit"] == "kg"
 
 
 @pytest.mark.parametrize(

@@ -37,7 +37,7 @@ def sheet() -> tuple[Scene, np.ndarray, SnapshotSet]:
     data = SnapshotSet(
         train=p[0::2], test=p[1::2], heldout=p[:0],
         frames={"train": np.arange(0, 12, 2), "test": np.arange(1, 12, 2)},
-        elements=group.elements, rows_per_element=1, roundoff=1e-14,
+        row_mass=np.ones(p.shape[1]), elements=group.elements, rows_per_element=1, roundoff=1e-14,
     )  # fmt: skip
     return scene, reference, data
 
@@ -128,7 +128,7 @@ def test_every_rung_reproduces_what_is_in_its_space(direction, rng):
     """Each method of the ladder is exact on its affine space, unless it solves with Tikhonov."""
     snapshots = rng.standard_normal((12, 40, 3))
     for method in getattr(LADDER, direction):
-        basis = compute_basis(snapshots, 0.0, 2, method)
+        basis = compute_basis(snapshots, np.ones(40), 0.0, 2, method)
         reduction = Reduction(basis, select(basis, method, 5), method, 5)
         assert np.isfinite(reduction.gain)
         if method.solve == "tikhonov":
@@ -153,7 +153,7 @@ def test_the_square_samples_as_many_entries_in_each_of_its_places(p, rng):
     entries = set()
     for direction, method, _, _ in LADDER.rungs(p):
         if direction == "square":
-            basis = compute_basis(snapshots, 0.0, p, method)
+            basis = compute_basis(snapshots, np.ones(20 * p), 0.0, p, method)
             reduction = Reduction(basis, select(basis, method, 5), method, 5)
             entries.add(sum(len(block.entries) for block in reduction.blocks))
     assert entries == {3 * p * 5}

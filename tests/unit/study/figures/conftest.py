@@ -121,7 +121,7 @@ def _write_bases(results, scene, group, count, rank, rng) -> Basis:
         save_basis(basis, path)
     found = {split: rng.standard_normal((10, rows * count, 3)) for split in SPLITS}
     frames = {split: np.arange(0, FRAMES, 2) + (split != "train") for split in SPLITS}
-    made = SnapshotSet(**found, frames=frames, elements=count,
+    made = SnapshotSet(**found, frames=frames, row_mass=np.ones(rows * count), elements=count,
                        rows_per_element=rows, roundoff=1e-12)  # fmt: skip
     save_snapshots(made, results.path(paths.SNAPSHOTS, scene, group))
     return basis

@@ -1,5 +1,7 @@
 """Bases of snapshots: every ingredient, and hard input."""
 
+import itertools
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -11,19 +13,27 @@ from pdrom.reduction.basis import Basis, compute_basis, load_basis, save_basis
 from pdrom.reduction.method import BasisSpec
 from strategies import SEEDS
 
+WEIGHTINGS, LAYOUTS = ("none", "mass"), ("vectorised", "per-axis")
 CENTRINGS = ("none", "affine", "mean-in-modes")
-SPECS = [BasisSpec(centring=centring) for centring in CENTRINGS]
+SPECS = [
+    BasisSpec(weighting=w, centring=c, layout=layout)
+    for w, c, layout in itertools.product(WEIGHTINGS, CENTRINGS, LAYOUTS)
+]
 ROWS = 12
 
 
-def basis_of(p: np.ndarray, spec: BasisSpec, roundoff: float = 0.0, **kw) -> Basis:
-    """Basis of snapshots with three rows an element."""
-    return compute_basis(p, roundoff, 3, spec, **kw)
+def basis_of(
+    p: np.ndarray, spec: BasisSpec, roundoff: float = 0.0, mass: np.ndarray | None = None, **kw
+) -> Basis:
+    """Basis of snapshots with three rows an element; unit masses unless given."""
+    mass = np.ones(p.shape[1]) if mass is None else mass
+    return compute_basis(p, mass, roundoff, 3, spec, **kw)
 
 
-def snapshots(seed: int, n: int = 7) -> np.ndarray:
-    """Random snapshots (n, 12, 3) about a common mean."""
-    return np.random.default_rng(seed).standard_normal((n, ROWS, 3)) + 3.0
+def snapshots(seed: int, n: int = 7) -> tuple[np.ndarray, np.ndarray]:
+    """Random snapshots (n, 12, 3) about a common mean, and row masses (12,)."""
+    rng = np.random.default_rng(seed)
+    return rng.standard_normal((n, ROWS, 3)) + 3.0, rng.uniform(0.1, 10.0, ROWS)
 
 
 every_spec = pytest.mark.parametrize("spec", SPECS, ids=lambda s: s.basis_id)
@@ -31,26 +41,39 @@ every_spec = pytest.mark.parametrize("spec", SPECS, ids=lambda s: s.basis_id)
 
 @given(seed=SEEDS)
 @every_spec
-def test_modes_are_orthonormal_and_hold_the_snapshots(spec, seed):
-    p = snapshots(seed)
-    kept = p.copy()
-    basis = basis_of(p, spec)
-    np.testing.assert_array_equal(p, kept)
+def test_modes_are_orthonormal_in_their_inner_product_and_hold_the_snapshots(spec, seed):
+    p, mass = snapshots(seed)
+    kept = p.copy(), mass.copy()
+    basis = basis_of(p, spec, mass=mass)
+    np.testing.assert_equal((p, mass), kept)
+    weight = np.repeat(mass if spec.weighting == "mass" else np.ones(ROWS), 3)[:, None]
     columns = p.reshape(len(p), -1).T - basis.mean[:, None]
     for part in (slice(a, None, 3) for a in range(3)) if spec.separate_axes else [slice(None)]:
         v, own = basis.V[part], columns[part]
-        assert np.abs(v.T @ v - np.eye(basis.rank)).max() < 1e-12
+        assert np.abs(v.T @ (weight[part] * v) - np.eye(basis.rank)).max() < 1e-12
         if spec.centring != "mean-in-modes":
             assert np.abs(own - v @ np.linalg.lstsq(v, own, rcond=None)[0]).max() < 1e-10
 
 
-def test_singular_values_are_those_of_the_centred_matrix():
-    p = snapshots(11)
-    basis = basis_of(p, BasisSpec(centring="affine"))
-    centred = (p - p.mean(axis=0)).reshape(len(p), -1).T
-    reference = np.linalg.svd(centred, compute_uv=False)
+def test_singular_values_are_those_of_the_weighted_centred_matrix():
+    p, mass = snapshots(11)
+    basis = basis_of(p, BasisSpec(weighting="mass", centring="affine"), mass=mass)
+    centred = (p - p.mean(axis=0)) * np.sqrt(mass)[:, None]
+    reference = np.linalg.svd(centred.reshape(len(p), -1).T, compute_uv=False)
     np.testing.assert_allclose(basis.singular_values, reference, atol=1e-13 * reference[0])
     assert basis.rank == len(p) - 1
+
+
+def test_per_axis_layout_is_three_separate_pods():
+    p, _ = snapshots(13)
+    basis = basis_of(p, BasisSpec(layout="per-axis"))
+    squares = np.zeros(len(p))
+    for a in range(3):
+        u, sigma, _ = np.linalg.svd(p[:, :, a].T, full_matrices=False)
+        ours = basis.V.reshape(ROWS, 3, -1)[:, a]
+        np.testing.assert_allclose(np.abs(u.T @ ours), np.eye(len(p)), atol=1e-10)
+        squares += sigma**2
+    np.testing.assert_allclose(basis.singular_values, np.sqrt(squares), rtol=1e-12)
 
 
 # The published code's modes -----------------------------------------------------------------
@@ -71,7 +94,7 @@ def published_modes(p: np.ndarray, signs: np.ndarray) -> np.ndarray:
 
 
 def test_mean_in_modes_follows_the_recipe():
-    p = snapshots(17)
+    p, _ = snapshots(17)
     basis = basis_of(p, BasisSpec(centring="mean-in-modes"))
     wanted = published_modes(p, np.ones(len(p)))
     assert basis.V.shape == wanted.shape
@@ -83,7 +106,7 @@ def test_mean_in_modes_follows_the_recipe():
 
 
 def test_mean_in_modes_spans_another_space_with_other_signs():
-    p = snapshots(19)
+    p, _ = snapshots(19)
     spec = BasisSpec(centring="mean-in-modes")
     fixed = basis_of(p, spec)
     seeds = range(6)
@@ -120,15 +143,15 @@ def test_zero_and_round_off_have_no_basis(spec, rng):
 @every_spec
 def test_tiny_and_huge_snapshots_have_the_basis_of_ordinary_ones(spec):
     """Squares of their entries underflow or overflow; a power of two changes no digit."""
-    p = snapshots(23)
-    basis = basis_of(p, spec, roundoff=1e-4)
+    p, mass = snapshots(23)
+    basis = basis_of(p, spec, roundoff=1e-4, mass=mass)
     for unit in (2.0**-1000, 2.0**660, 2.0**1015):
-        other = basis_of(unit * p, spec, roundoff=unit * 1e-4)
+        other = basis_of(unit * p, spec, roundoff=unit * 1e-4, mass=mass)
         assert (other.rank, other.active_axes) == (basis.rank, basis.active_axes)
         np.testing.assert_array_equal(other.V, basis.V)
         np.testing.assert_array_equal(other.mean, unit * basis.mean)
         np.testing.assert_array_equal(other.singular_values, unit * basis.singular_values)
-    assert {basis_of(unit * p, spec).rank for unit in (1e-300, 1e200)} == {basis.rank}
+    assert {basis_of(unit * p, spec, mass=mass).rank for unit in (1e-300, 1e200)} == {basis.rank}
     with pytest.raises(SnapshotError, match="singular values: entry"):
         basis_of(p / p.max() * 1.7e308, BasisSpec())
     with pytest.raises(SnapshotError, match="round-off"):
@@ -136,11 +159,15 @@ def test_tiny_and_huge_snapshots_have_the_basis_of_ordinary_ones(spec):
 
 
 @given(seed=SEEDS, n=st.integers(2, 40), exponent=st.integers(-8, 8))
-def test_constant_snapshots_have_no_basis_but_a_mean(seed, n, exponent):
+@pytest.mark.parametrize("layout", LAYOUTS)
+@pytest.mark.parametrize("weighting", WEIGHTINGS)
+def test_constant_snapshots_have_no_basis_but_a_mean(weighting, layout, seed, n, exponent):
     """What a computed mean leaves is round-off, for every number of snapshots and every scale."""
-    p = np.repeat(snapshots(seed, 1), n, axis=0) * 10.0**exponent
+    one, mass = snapshots(seed, 1)
+    p = np.repeat(one, n, axis=0) * 10.0**exponent
     for centring in ("affine", "mean-in-modes"):
-        assert basis_of(p, BasisSpec(centring=centring)).rank == 0
+        spec = BasisSpec(weighting=weighting, centring=centring, layout=layout)
+        assert basis_of(p, spec, mass=mass).rank == 0
     basis = basis_of(p, BasisSpec(centring="affine"))
     np.testing.assert_allclose(basis.mean, p[0].ravel(), rtol=1e-13)
 
@@ -167,7 +194,7 @@ def test_an_axis_that_stays_where_it_is_needs_no_modes_with_a_mean(rng):
 @every_spec
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
 def test_numbers_that_are_none_are_named(spec, bad):
-    p = snapshots(29)
+    p, _ = snapshots(29)
     p[2, 3, 1] = bad
     with pytest.raises(SnapshotError, match=r"entry \(2, 3, 1\) is -?(nan|inf)"):
         basis_of(p, spec)
@@ -176,7 +203,18 @@ def test_numbers_that_are_none_are_named(spec, bad):
 @pytest.mark.parametrize("shape", [(1, 12, 3), (5, 12), (5, 12, 2), (5, 0, 3), (5, 11, 3)])
 def test_wrong_shapes_are_named(shape):
     with pytest.raises(SnapshotError, match="required"):
-        compute_basis(np.ones(shape), 0.0, 3, BasisSpec())
+        compute_basis(np.ones(shape), np.ones(shape[1]), 0.0, 3, BasisSpec())
+
+
+@pytest.mark.parametrize("mass", [0.0, -1.0, np.nan])
+def test_rows_without_mass_are_named(mass):
+    p, masses = snapshots(31)
+    masses[4] = mass
+    with pytest.raises(SnapshotError, match="row_mass"):
+        basis_of(p, BasisSpec(weighting="mass"), mass=masses)
+    basis_of(p, BasisSpec(), mass=masses)
+    with pytest.raises(SnapshotError, match=r"\(11,\), required: \(12,\)"):
+        basis_of(p, BasisSpec(), mass=masses[1:])
 
 
 # Type and file ------------------------------------------------------------------------------
@@ -185,7 +223,7 @@ def test_wrong_shapes_are_named(shape):
 @every_spec
 def test_file_round_trip(spec, tmp_path):
     path = tmp_path / "scene" / "group" / f"{spec.basis_id}.h5"
-    basis = basis_of(snapshots(41), spec)
+    basis = basis_of(snapshots(41)[0], spec)
     save_basis(basis, path)
     loaded = load_basis(path)
     np.testing.assert_equal(vars(loaded), {**vars(basis), "origin": loaded.origin})

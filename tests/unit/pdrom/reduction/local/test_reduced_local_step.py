@@ -54,7 +54,7 @@ def reduction_of(spec: MethodSpec) -> Reduction:
     """Reduction of size R made from seven snapshots (rows, 3)."""
     rng = np.random.default_rng(1)
     p = rng.standard_normal((7, ROWS, 3)) + 1.0
-    basis = compute_basis(p, 0.0, P, spec)
+    basis = compute_basis(p, rng.uniform(0.5, 2.0, ROWS), 0.0, P, spec)
     return Reduction(basis, select(basis, spec, R), spec, R)
 
 
@@ -66,7 +66,7 @@ def near(points: np.ndarray, count: int) -> np.ndarray:
 def whole(group, p: np.ndarray, preset: str) -> Reduction:
     """Reduction of a group's snapshots by a preset, with all modes."""
     spec = PRESETS[preset]
-    basis = compute_basis(p, 0.0, group.rows_per_element, spec)
+    basis = compute_basis(p, np.ones(p.shape[1]), 0.0, group.rows_per_element, spec)
     return Reduction(basis, select(basis, spec, basis.rank), spec, basis.rank)
 
 
@@ -79,6 +79,10 @@ def added(step: ReducedLocalStep) -> np.ndarray:
 
 VARIANTS = {
     **PRESETS,
+    "mass": MethodSpec(title="t", weighting="mass", centring="affine", rows="element"),
+    "mass-joint": MethodSpec(title="t", weighting="mass", rows="joint"),
+    "per-axis": MethodSpec(title="t", layout="per-axis", centring="affine", rows="joint"),
+    "per-axis-all": MethodSpec(title="t", layout="per-axis", rows="all"),
     "published-all": MethodSpec(title="t", centring="mean-in-modes", rows="all"),
 }
 
@@ -204,8 +208,8 @@ def test_basis_of_all_iterates_reruns_the_full_order_run(group):
 
 
 def steps_of(scene, steps):
-    """Step loop with these local steps, and the initial state."""
-    return scene.stepper(local_steps=steps, track_objective=False), scene.initial_state()
+    """Run of a step loop with these local steps, and the initial state."""
+    return scene.stepper(local_steps=steps, track_objective=False).run, scene.initial_state()
 
 
 def test_full_local_steps_repeat_the_run_to_the_bit():

@@ -46,7 +46,7 @@ REPRODUCED = ("repeated", "rank one", "rank three", "full", "tiny", "huge", "twi
 def basis_of(p: np.ndarray, method: str, roundoff: float | None = None):
     """Basis with the round-off of numbers as they are stored, unless more is given."""
     roundoff = EPS * float(np.linalg.norm(p)) if roundoff is None else roundoff
-    return compute_basis(p, roundoff, ROWS, METHODS[method])
+    return compute_basis(p, np.ones(p.shape[1]), roundoff, ROWS, METHODS[method])
 
 
 @pytest.mark.parametrize("name", SNAPSHOTS)

@@ -22,7 +22,9 @@ ELEMENTS, P = 14, 2
 ROWS = ELEMENTS * P
 PRESETS = load_methods(CONFIG / "methods.yaml")
 INGREDIENTS = {
+    "weighting": ("none", "mass"),
     "centring": ("none", "affine", "mean-in-modes"),
+    "layout": ("vectorised", "per-axis"),
     "rows": ("all", "scalar", "joint", "element"),
     "selection": ("greedy", "pivoted-qr", "s-opt"),
     "solve": ("square", "qr", "tikhonov"),
@@ -43,23 +45,25 @@ def combinations() -> dict[str, MethodSpec]:
 
 EVERY = combinations()
 PROJECTIONS = {n: s for n, s in EVERY.items() if s.rows == "all" or s.solve != "tikhonov"}
+UNWEIGHTED = {n: s for n, s in PROJECTIONS.items() if s.weighting == "none"}
 
 
-def data(seed: int, n: int = 8) -> np.ndarray:
-    """Snapshots (n, rows, 3)."""
-    return np.random.default_rng(seed).standard_normal((n, ROWS, 3)) + 2.0
+def data(seed: int, n: int = 8) -> tuple[np.ndarray, np.ndarray]:
+    """Snapshots (n, rows, 3) and row masses."""
+    rng = np.random.default_rng(seed)
+    return rng.standard_normal((n, ROWS, 3)) + 2.0, rng.uniform(0.5, 2.0, ROWS)
 
 
-def reduction_of(p: np.ndarray, spec: MethodSpec, r: int) -> Reduction:
+def reduction_of(p: np.ndarray, mass: np.ndarray, spec: MethodSpec, r: int) -> Reduction:
     """Basis, selection and operator of one method."""
-    basis = compute_basis(p, 0.0, P, spec)
+    basis = compute_basis(p, mass, 0.0, P, spec)
     return Reduction(basis, select(basis, spec, r), spec, r)
 
 
 def made(spec: MethodSpec, seed: int, r: int = 5) -> tuple[np.ndarray, Reduction]:
     """Snapshots, and their reduction."""
-    p = data(seed)
-    return p, reduction_of(p, spec, r)
+    p, mass = data(seed)
+    return p, reduction_of(p, mass, spec, r)
 
 
 def span_part(reduction: Reduction, p: np.ndarray) -> np.ndarray:
@@ -87,11 +91,11 @@ def test_reconstruction_stays_in_the_space_and_projections_reproduce_it(name, se
         np.testing.assert_allclose(reduction.reconstruct(inside), inside, atol=tolerance)
 
 
-@given(seed=SEEDS, name=st.sampled_from(list(PROJECTIONS)))
+@given(seed=SEEDS, name=st.sampled_from(list(UNWEIGHTED)))
 def test_gain_is_the_norm_of_the_pseudo_inverse_and_bounds_the_error(name, seed):
     """|| p - p^ || <= gain || (I - V V^T)(p - mean) || for data outside the training set."""
     p, reduction = made(PROJECTIONS[name], seed)
-    if PROJECTIONS[name].rows != "all":
+    if UNWEIGHTED[name].rows != "all":
         matrices = [block.matrix for block in reduction.blocks]
         norm = max(np.linalg.norm(np.linalg.pinv(a), 2) for a in matrices)
         assert reduction.gain == pytest.approx(norm, rel=1e-6)
@@ -103,6 +107,23 @@ def test_gain_is_the_norm_of_the_pseudo_inverse_and_bounds_the_error(name, seed)
     error = unseen - reduction.reconstruct(unseen)
     bound = reduction.gain * np.linalg.norm(best, axis=(1, 2))
     assert (np.linalg.norm(error, axis=(1, 2)) <= bound * (1.0 + 1e-10)).all()
+
+
+@given(seed=SEEDS)
+@pytest.mark.parametrize("rows", ["scalar", "element"])
+def test_error_with_mass_weighting_has_its_factor_in_the_mass_norm(rows, seed):
+    """|| (P^T V)^+ P^T M^(-1/2) ||_2 takes the place of the gain, see `Reduction.gain`."""
+    spec = MethodSpec(title="t", weighting="mass", centring="affine", rows=rows, solve="qr")
+    p, mass = data(seed)
+    reduction = reduction_of(p, mass, spec, 5)
+    block, weight = reduction.blocks[0], np.repeat(mass, 3)
+    factor = np.linalg.norm(block.operator / np.sqrt(weight[block.entries]), 2)
+    unseen = np.random.default_rng(seed + 1).standard_normal(p.shape)
+    centred = unseen.reshape(8, -1) - reduction.basis.mean
+    best = centred - (centred * weight) @ reduction.v @ reduction.v.T
+    error = (unseen - reduction.reconstruct(unseen)).reshape(8, -1)
+    norms = [np.linalg.norm(e * np.sqrt(weight), axis=1) for e in (error, best)]
+    assert (norms[0] <= factor * norms[1] * (1.0 + 1e-10)).all()
 
 
 @pytest.mark.parametrize("preset", ["deim", "qdeim", "deim-joint"])
@@ -146,10 +167,10 @@ def test_selections_and_numbers_of_rows_and_elements_are_those_of_the_presets():
 
 def test_round_off_axis_does_not_enter_the_joint_method():
     """A planar scene: z is round-off, its coefficients are zero and the gain is that of x, y."""
-    p = data(13)
+    p, mass = data(13)
     p[:, :, 2] = 1e-17 * np.random.default_rng(1).standard_normal(p.shape[:2])
     spec = PRESETS["deim-joint"]
-    basis = compute_basis(p, 1e-13, P, spec)
+    basis = compute_basis(p, mass, 1e-13, P, spec)
     reduction = Reduction(basis, select(basis, spec, 5), spec, 5)
     assert [b.axis for b in reduction.blocks] == [0, 1]
     assert np.isfinite(reduction.gain)
@@ -163,7 +184,7 @@ def test_singular_axis_is_a_failure_that_raises_nothing():
     p = np.zeros((6, ROWS, 3))
     p[:5, :, :2] = 10.0 * rng.standard_normal((5, ROWS, 2))
     p[5, :, 2] = 1e-3 * rng.standard_normal(ROWS)
-    basis = compute_basis(p, 1e-10, P, spec)
+    basis = compute_basis(p, np.ones(ROWS), 1e-10, P, spec)
     # exact zeros, as an exactly planar run gives them
     v = basis.V.copy()
     v.reshape(ROWS, 3, -1)[:, 2, :5] = 0.0
@@ -176,14 +197,25 @@ def test_singular_axis_is_a_failure_that_raises_nothing():
     assert np.isfinite(result[:, :, :2]).all()
 
 
+def test_poorer_axis_of_a_basis_per_axis_fails_beyond_its_rank_only():
+    rng = np.random.default_rng(3)
+    p, mass = data(15)
+    p[:, :, 2] = rng.standard_normal((8, 2)) @ rng.standard_normal((2, ROWS))
+    joint = MethodSpec(title="t", layout="per-axis", rows="joint", solve="qr")
+    assert np.isfinite(reduction_of(p, mass, joint, 2).gain)
+    assert reduction_of(p, mass, joint, 5).gain == np.inf
+    full = reduction_of(p, mass, MethodSpec(title="t", layout="per-axis", rows="all"), 8)
+    np.testing.assert_allclose(full.reconstruct(p), p, atol=1e-11)
+
+
 # Selection ----------------------------------------------------------------------------------
 
 
 @given(name=st.sampled_from(list(EVERY)))
 def test_path_holds_the_selection_of_every_rank(name):
     spec = EVERY[name]
-    p = data(19)
-    basis = compute_basis(p, 0.0, P, spec)
+    p, mass = data(19)
+    basis = compute_basis(p, mass, 0.0, P, spec)
     path = select_path(basis, spec, [2, 5, 3])
     assert set(path) == {2, 3, 5}
     for r, sampling in path.items():
@@ -196,7 +228,7 @@ def test_path_holds_the_selection_of_every_rank(name):
 
 def test_more_modes_than_rows_end_in_an_infinite_gain():
     p = np.random.default_rng(23).standard_normal((30, 6, 3))
-    reduction = reduction_of(p, PRESETS["deim-joint"], 9)
+    reduction = reduction_of(p, np.ones(6), PRESETS["deim-joint"], 9)
     assert reduction.gain == np.inf
     assert len(reduction.elements) == 3
 
@@ -204,8 +236,8 @@ def test_more_modes_than_rows_end_in_an_infinite_gain():
 @pytest.mark.parametrize("preset", PRESETS)
 def test_reduction_from_files_is_the_same(preset, tmp_path):
     spec = PRESETS[preset]
-    p = data(27)
-    basis = compute_basis(p, 0.0, P, spec)
+    p, mass = data(27)
+    basis = compute_basis(p, mass, 0.0, P, spec)
     sampling = select(basis, spec, 4)
     with write_hdf5(tmp_path / "sampling.h5") as file:
         file["r0004/entries"], file["r0004/elements"] = sampling.entries, sampling.elements
@@ -222,10 +254,10 @@ def test_reduction_from_files_is_the_same(preset, tmp_path):
 @pytest.mark.parametrize("rows", ["scalar", "element"])
 def test_oversampling_starts_from_the_selection_and_lowers_the_gain(rows, selection):
     """Single entries and elements, with three samples a mode and with a bound on the gain."""
-    p = data(11)
+    p, mass = data(11)
     start = MethodSpec(title="t", centring="affine", rows=rows, selection=selection, solve="qr")
     reductions = {
-        key: reduction_of(p, start.model_copy(update=changes), 4)
+        key: reduction_of(p, mass, start.model_copy(update=changes), 4)
         for key, changes in {
             "start": {},
             "three": {"oversampling": 3},

@@ -154,7 +154,7 @@ def test_the_right_hand_side_by_a_reduction_is_that_of_its_reconstruction(choice
     run = trajectory(scene, track_objective=False)
     snapshots = np.stack([group.project(q) for q in run])
     spec = MethodSpec(title="x", **choices)
-    basis = compute_basis(snapshots, 1e-12, 2, spec)
+    basis = compute_basis(snapshots, np.ones(len(group.row_weights)), 1e-12, 2, spec)
     reduction = Reduction(basis, select(basis, spec, 4), spec, 4)
     columns = make_columns([scene], run, 3)
     step = InterpolatedLocalStep(group, columns, interpolation_of(group, columns, reduction))
