@@ -96,12 +96,10 @@ def test_a_sampled_run_stays_within_the_bound_of_the_subspace():
 # What the gain bounds, in each variant.
 
 
-def _reduction(
-    v: np.ndarray, elements: np.ndarray, method: MethodSpec, separate: bool = False
-) -> Reduction:
+def _reduction(v: np.ndarray, elements: np.ndarray, method: MethodSpec) -> Reduction:
     """Reduction of a basis with one row an element (three entries)."""
     count, r = len(v) // 3, v.shape[1]
-    basis = Basis(v, np.zeros(len(v)), np.ones(r), r, 1e-15, 1, separate, (True,) * 3)
+    basis = Basis(v, np.zeros(len(v)), np.ones(r), r, 1e-15, 1, (True,) * 3)
     return Reduction(basis, Sampling.of_elements(elements, 1, count), method, r)
 
 
@@ -123,7 +121,7 @@ def test_gain_bounds_the_error_of_a_regularised_solve(separate, seed, r, t):
         v[part] = _orthonormal(rng, 45 // len(parts), r)
     keys = {"coefficients": "per-axis"} if separate else {}
     method = MethodSpec(title="x", rows="element", solve="tikhonov", tikhonov=t, **keys)
-    made = _reduction(v, rng.permutation(15)[: r + 2], method, separate)
+    made = _reduction(v, rng.permutation(15)[: r + 2], method)
     error = np.linalg.norm(p - made.reconstruct(p.reshape(1, 15, 3)).ravel())
     inside = [v[part].T @ p[part] for part in parts]
     outside = [p[part] - v[part] @ c for part, c in zip(parts, inside, strict=True)]

@@ -11,9 +11,9 @@ import pytest
 from places import tracked
 
 LIMITS = {
-    "lines of src": 35_100,
-    "lines of tests": 22_500,
-    "words of documentation": 24_547,
+    "lines of src": 35_000,
+    "lines of tests": 22_600,
+    "words of documentation": 24_600,
     "tables": 24,
     "figures": 22,
     "experiments": 18,

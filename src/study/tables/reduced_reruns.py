@@ -114,7 +114,7 @@ def _judged(run: File, row: File, end: int, motion: str) -> pd.DataFrame:
         table = table[table.motion == motion]
     with open_hdf5(run.path) as file:
         if "group" in run.labels:
-            table = table.assign(position_basis="full", k=None)
+            table = table.assign(position_basis="full", k=None, training_residual=None)
             store = file if motion == TRAIN else file[motion]
             runs = [store[f"r{r:04d}"] for r in table.r]
             reference = {series: store[series][...] for series in REFERENCE}

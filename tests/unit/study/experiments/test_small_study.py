@@ -19,6 +19,7 @@ from pdrom.core.store.checksum import write_block
 from pdrom.core.yamlfile import read_yaml
 from pdrom.model.held_out import MOTIONS
 from pdrom.model.mesh.types import Mesh, stored_mesh
+from pdrom.model.metrics import trajectory_error
 from places import CONFIG
 from small_scene import run_jobs
 from study.artifact import paths

@@ -115,7 +115,7 @@ def _write_bases(results, scene, group, count, rank, rng) -> Basis:
     rows = EFFECTS.load(group).rows_per_element
     size = 3 * rows * count
     V = np.linalg.qr(rng.standard_normal((size, 14)))[0][:, :rank]
-    numbers = rank, 1e-12, rows, False, (True,) * 3
+    numbers = rank, 1e-12, rows, (True,) * 3
     basis = Basis(V, np.zeros(size), 0.5 ** np.arange(14), *numbers)
     for path in {results.path(paths.BASIS, scene, group, m) for m in results.study.methods}:
         save_basis(basis, path)

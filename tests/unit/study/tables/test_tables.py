@@ -34,7 +34,7 @@ def written(path, *rows) -> File:
 
 def basis_file(path, sigma, rank) -> File:
     axes = (True,) * 3
-    basis = Basis(np.zeros((6, rank)), np.zeros(6), np.array(sigma), rank, 1e-9, 1, False, axes)
+    basis = Basis(np.zeros((6, rank)), np.zeros(6), np.array(sigma), rank, 1e-9, 1, axes)
     path.parent.mkdir(parents=True, exist_ok=True)
     save_basis(basis, path)
     return paths.BASIS.file(str(path))
@@ -132,7 +132,8 @@ def files(tmp_path) -> dict[str, object]:
                 store_series(run, difference)
     rows = [
         {"scene": "b", "group": "all", "method": m, "position_basis": p, "k": k, "r": 33,
-         "frames": 4, "finite": True, "max_extent": 1.0, "relative_error": 0.1}
+         "frames": 4, "finite": True, "max_extent": 1.0, "training_residual": 0.01,
+         "relative_error": 0.1}
         for p, k, m in models
     ]  # fmt: skip
     for name, more in {"models.csv": {}, "models_heldout.csv": {"motion": "heldout"}}.items():
