@@ -36,6 +36,8 @@ def perform(arguments: argparse.Namespace) -> Status:
     require_no_mesh(path)
     path = path if path.suffix in (".yaml", ".yml") else path.with_name(f"{path.name}.yaml")
     merge = arguments.merge
+    if merge and not arguments.mesh:
+        raise ConfigurationError("--merge: --mesh is required, whose vertices it merges")
     file, mesh = _read(arguments.mesh, path, merge) if arguments.mesh else (None, None)
     text = template(path.stem, file, mesh, arguments.up, merge)
     try:
@@ -86,7 +88,7 @@ def template(
     centre = [round(x, 2 - math.floor(math.log10(side))) + 0.0 for x in below.tolist()]
     pull = "" if up == "y" else f", acceleration: {_along(axis, -9.81)}"
     return Template(text).substitute(
-        **names, mesh=made, about=_about(mesh), density=density, total=f"{density * total:.3g}",
+        **names, mesh=made, about=_about(mesh), density=density, total=_plain(density * total),
         up=up, pull=pull, floor=_floor(mesh, axis), held=held, moved=moved, corner=corner,
         offset=_along(axis, _short(0.3 * side)), below=centre, weight=_short(weight),
         bending=_short(BENDING * weight * square), tenth=_short(0.1 * side),
@@ -96,6 +98,10 @@ def template(
 
 def _short(number: float) -> float:
     return float(f"{number:.2g}")
+
+
+def _plain(number: float) -> str:
+    return f"{float(f'{number:.3g}'):.15g}"
 
 
 def _along(axis: int, number: float) -> list[float]:
@@ -123,7 +129,7 @@ def _about(mesh: "Mesh") -> str:
     from pdrom.model.mesh.checks import seams
 
     ends = zip("xyz", mesh.points.min(axis=0), mesh.points.max(axis=0), strict=True)
-    places = (f"{axis} from {low:.3g} to {high:.3g}" for axis, low, high in ends)
+    places = (f"{axis} from {_plain(low)} to {_plain(high)}" for axis, low, high in ends)
     kind = "tetrahedra" if len(mesh.tetrahedra) else "triangles"
     cells = f"{len(getattr(mesh, kind))} {kind}"
     sides = (f"{side} {len(vertices)}" for side, vertices in _sides(mesh).items())
@@ -168,7 +174,7 @@ def _floor(mesh: "Mesh", axis: int) -> str:
     lowest = float(mesh.points[:, axis].min())
     step = 10.0 ** math.floor(math.log10(mesh.extent))
     height = round(math.floor((lowest - mesh.extent / 2.0) / step) * step, 12)
-    below = f"below the mesh, which begins at {'xyz'[axis]} = {lowest:.3g}"
+    below = f"below the mesh, which begins at {'xyz'[axis]} = {_plain(lowest)}"
     if axis == 1:
         return f"{{effect: floor, height: {height}}} # {below}"
     point, normal = (_along(axis, x) for x in (height, 1.0))

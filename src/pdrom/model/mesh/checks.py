@@ -145,7 +145,10 @@ def _check_vertices(mesh: Mesh, cells: np.ndarray, name: str) -> None:
     used[cells] = True
     if not used.all():
         unused = np.flatnonzero(~used)
-        raise MeshError(f"{name}: {len(unused)} vertices in no element, the first is {unused[0]}")
+        raise MeshError(
+            f"{name}: vertices in no element: {len(unused)}, the first is {unused[0]}; "
+            f"`merge: {SEAM:.1e}` below `mesh` leaves out those of a file"
+        )
     _, first, inverse = np.unique(mesh.points, axis=0, return_index=True, return_inverse=True)
     original = first[inverse.ravel()]
     if len(first) < mesh.vertices:
@@ -192,7 +195,8 @@ def seams(mesh: Mesh) -> str:
 def merged(mesh: Mesh, tolerance: float, name: str) -> Mesh:
     """Return ``mesh`` with vertices that are closer than ``tolerance`` m merged into the first.
 
-    Elements of which two vertices become one are left out. ``name`` begins messages.
+    Elements of which two vertices become one, and vertices in no element, are left out. ``name``
+    begins messages.
     """
     pairs = cKDTree(mesh.points).query_pairs(tolerance, output_type="ndarray")
     graph = sparse.coo_array((np.ones(len(pairs)), pairs.T), shape=2 * (mesh.vertices,))
@@ -202,11 +206,13 @@ def merged(mesh: Mesh, tolerance: float, name: str) -> Mesh:
     place[np.argsort(first)] = np.arange(count)
     cells = place[part][mesh.tetrahedra if len(mesh.tetrahedra) else mesh.triangles]
     whole = (np.diff(np.sort(cells, axis=1), axis=1) > 0).all(axis=1)
+    used, corners = np.unique(cells[whole], return_inverse=True)
     log.warning(
-        "%s: %d vertices are merged into %d; %d elements become flat and are left out",
-        name, mesh.vertices, count, len(cells) - whole.sum(),
+        "%s: %d vertices are merged into %d; %d elements become flat and are left out, and %d "
+        "vertices in no element",
+        name, mesh.vertices, count, len(cells) - whole.sum(), count - len(used),
     )  # fmt: skip
-    return mesh_of(mesh.points[np.sort(first)], cells[whole], name)
+    return mesh_of(mesh.points[np.sort(first)[used]], corners.reshape(-1, cells.shape[1]), name)
 
 
 def turned_alike(mesh: Mesh, name: str) -> tuple[Mesh, np.ndarray]:

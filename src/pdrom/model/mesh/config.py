@@ -134,7 +134,8 @@ class MeshFile(MeshModel):
     """A mesh file in the scene file's folder or below; formats with several files are excluded.
 
     path : path of the mesh file, relative to the folder of the scene file
-    merge : vertices that are closer than this fraction of the extent become one
+    merge : vertices that are closer than this fraction of the extent become one; with
+        it, those in no element are left out
     """
 
     kind: Literal["file"]

@@ -149,8 +149,8 @@ def split(points: np.ndarray, polygons: np.ndarray) -> np.ndarray:
     if np.isinf(shortest).any():
         folded = polygons[np.isinf(shortest).argmax()].tolist()
         raise raw.RefusedError(
-            f"holds a polygon, {folded[:10]}, that is too concave to be split: triangulate it in "
-            "Blender or MeshLab"
+            f"holds a polygon, {folded[:10]}, that is too concave to be split or has a corner "
+            "twice: triangulate it in Blender or MeshLab"
         )
     turned = polygons[np.arange(count)[:, None], (best[:, None] + np.arange(size)) % size]
     first = np.repeat(turned[:, :1], size - 2, axis=1)

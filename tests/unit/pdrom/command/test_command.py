@@ -169,7 +169,7 @@ def test_a_new_scene_is_valid_and_replaces_nothing(folder, capsys):
     [
         (None, {"spring"}, {"translate", "strain", "bending"}),
         (cloth(4, 3), {"spring"}, {"translate", "strain", "bending"}),
-        (bar(3, 2, 2), {"tetrahedron_strain"}, {"translate", "volume"}),
+        (bar(3, 2, 2, 20.0), {"tetrahedron_strain"}, {"translate", "volume"}),
     ],
 )
 def test_every_commented_effect_of_a_new_scene_is_valid(folder, mesh, listed, others):
@@ -180,6 +180,7 @@ def test_every_commented_effect_of_a_new_scene_is_valid(folder, mesh, listed, ot
     assert scene.mesh.sources == ([] if mesh is None else ['o\'b "1" ü.obj'])
     for up in "xyz":
         text = template("a", "a.obj", mesh, up).replace("  # - {", "  - {")
+        assert "e+" not in text
         every = SceneConfig.model_validate(yaml.safe_load(text))
         Scene.build(every, every.mesh.build(folder) if mesh is None else mesh)
         assert others <= {effect.effect for effect in every.effects}
@@ -189,7 +190,7 @@ SEAM = "v 0 0 0\nv 1 0 0\nv 0 0 1\nv 1 0 {0}\nv 0 0 {1}\nv 1 0 1\nf 1 2 3\nf 4 6
 
 
 def test_an_open_seam_is_named_and_merged(folder, capsys, caplog):
-    """Vertices of a seam that nearly coincide, or are exact copies."""
+    """Vertices that nearly coincide, or are exact copies, and a vertex in no element."""
     (folder / "a.obj").write_text(SEAM.format("1e-7", "1.0000001"))
     assert run(["new", "a", "--mesh", "a.obj"]) == Status.DONE
     found = "2 connected parts, 2 pairs of vertices closer than 1e-06 of its extent"
@@ -197,7 +198,10 @@ def test_an_open_seam_is_named_and_merged(folder, capsys, caplog):
     assert caplog.messages == [f"a.obj: {found}; `merge: 1.0e-06` below `mesh` merges them"]
     (folder / "b.obj").write_text(SEAM.format(0, 1))
     assert "`merge: 1.0e-06` below `mesh`" in refusal(capsys, ["new", "b", "--mesh", "b.obj"])
-    for name in "ab":
+    (folder / "c.obj").write_text(SEAM.format(0, 1).replace("f 1", "v 9 9 9\nf 1"))
+    assert "leaves out those" in refusal(capsys, ["new", "c", "--mesh", "c.obj"])
+    assert "--mesh is required" in refusal(capsys, ["new", "c", "--merge", "1e-6"])
+    for name in "abc":
         assert run(["new", f"{name}2", "--mesh", f"{name}.obj", "--merge", "1e-6"]) == Status.DONE
         assert run(["run", f"{name}2.yaml"]) == Status.DONE
         assert "100 frames of 4 vertices (1 connected part)" in capsys.readouterr().out

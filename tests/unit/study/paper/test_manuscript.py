@@ -55,6 +55,14 @@ def typed_numbers(source: str) -> list[str]:
     return [m.group(0) for m in re.finditer(r".{0,30}\d[\d.,]*.{0,20}", prose(source))]
 
 
+@pytest.mark.parametrize("document", OWN)
+def test_no_float_waits_where_a_long_table_of_an_own_study_begins(document):
+    """Such a table runs over the end of a page that also takes up a float."""
+    pattern = r"(\\(picture|figure)of|\\begin\{(table|figure)\})(?s:.)*\\longtableof"
+    text = OWN[document].rpartition(r"\begin{document}")[2]
+    assert not any(re.search(pattern, part) for part in text.split(r"\clearpage"))
+
+
 @pytest.mark.parametrize("document", SOURCES)
 def test_no_result_is_typed(document):
     assert typed_numbers(SOURCES[document]) == typed_numbers(OWN[document]) == []
