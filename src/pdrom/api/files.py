@@ -55,7 +55,10 @@ def file_path(path: Any) -> Path:
 
 
 def require_no_mesh(path: Path) -> None:
-    """Raise ConfigurationError if the file ``path``, which should be a scene, is a mesh."""
+    """Raise ConfigurationError if the file ``path``, which should be a scene, is another one."""
+    if path.suffix.lower() in (".h5", ".hdf5") and path.is_file():
+        name = quote(str(path))
+        raise ConfigurationError(f"{path}: this is a result: `pdrom show {name}` says which")
     if path.suffix.lower() in READERS and path.is_file():
         made = f"`pdrom new --mesh {quote(str(path))}` makes a scene of it"
         raise ConfigurationError(f"{path}: this is a mesh: {made}")

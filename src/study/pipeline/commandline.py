@@ -85,8 +85,8 @@ class CommandLine:
         swallowed += [name for name in self.configfiles[1:] if Path(name).suffix not in YAML]
         if swallowed:
             raise ConfigurationError(
-                f"the option before '{swallowed[0]}' takes every value that follows it; write two "
-                "hyphens before the targets: ./reproduce OPTIONS -- TARGETS"
+                f"'{swallowed[0]}': no KEY=VALUE or YAML file, as the option before it takes; "
+                "write two hyphens before the targets: ./reproduce OPTIONS -- TARGETS"
             )
         for key in (setting.partition("=")[0] for setting in self.settings):
             if not KEY.fullmatch(key):

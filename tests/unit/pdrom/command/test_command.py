@@ -300,6 +300,7 @@ FAULTY = [
     (["new", "nowhere/x"], "No such file"),
     (["show", "a" * 5000], "File name too long"),
     (["show", "."], "is a folder"),
+    (["run", "folder.h5"], "folder.h5: this is a result: `pdrom show folder.h5`"),
     (["run", "."], ".: a folder, name a file in it"),
     (["reduce", "small.yaml", "--error", "0.1"], "--error: runs within a requested error"),
     ([*REDUCE, "--plot", "x.exe"], "--plot x.exe: no kind of picture 'exe' (allowed: pdf, png"),
@@ -361,6 +362,7 @@ def test_what_is_not_there_or_cannot_be_written_is_found_before_anything_runs(
         raise AssertionError("a run began")
 
     (folder / "folder.png").mkdir()
+    (folder / "folder.h5").touch()
     monkeypatch.setattr("pdrom.api.load", called)
     monkeypatch.setattr("pdrom.api.runs.run_full_order", called)
     assert words in refusal(capsys, arguments)
