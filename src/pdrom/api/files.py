@@ -55,7 +55,7 @@ def file_path(path: Any) -> Path:
 
 
 def require_no_mesh(path: Path) -> None:
-    """Raise ConfigurationError if the file ``path``, which should be a scene, is another one."""
+    """Raise ConfigurationError if the file ``path`` is a result or a mesh, not a scene."""
     if path.suffix.lower() in (".h5", ".hdf5") and path.is_file():
         name = quote(str(path))
         raise ConfigurationError(f"{path}: this is a result: `pdrom show {name}` says which")
@@ -234,7 +234,7 @@ def _require_consistent(found: AnyRun, file: h5py.File) -> None:
 
 
 def _require_same(fault: str, stored: np.ndarray, known: np.ndarray, size: float = 0.0) -> None:
-    """Raise ValueError unless ``stored`` is ``known``, whose source of a ``size`` was rounded."""
+    """Raise ValueError unless arrays differ by at most 1e-6 of the larger of them and ``size``."""
     least = 1e-6 * max(np.abs(known).max(initial=0.0), size)
     if stored.shape != known.shape or not (np.abs(stored - known) <= least).all():
         raise ValueError(fault)

@@ -43,7 +43,7 @@ FULL_RUN = "pdrom.api.run makes one, load reads one"
 
 
 class _Compilation(event.TimingListener):  # type: ignore[misc]
-    """Measures the compilation of kernels during a run ``name``; logs that it begins."""
+    """Measure how long a run ``name`` compiles kernels; log when this begins."""
 
     def __init__(self, name: str) -> None:
         super().__init__()

@@ -65,7 +65,7 @@ def hold() -> int:
 
 
 def _advice(holder: str) -> str:
-    """What to do about the run of ``holder``, which may be stopped, as by Ctrl-Z."""
+    """Return advice on the run of ``holder``, which may be stopped, as by Ctrl-Z."""
     number = re.fullmatch(rf"process (\d+) on {re.escape(socket.gethostname())}", holder)
     with suppress(psutil.Error):
         if number and psutil.Process(int(number[1])).status() == psutil.STATUS_STOPPED:
