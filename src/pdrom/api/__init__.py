@@ -1,16 +1,18 @@
-"""pdrom from Python: build a scene, run it, make a basis, run it reduced, draw the results.
+"""pdrom from Python: build a scene, run it, train a model, run this, draw the results.
 
 docs/library.md has a worked example.
 """
 
 from pdrom.api.files import build_scene, load, load_scene, save
+from pdrom.api.model import Model, load_model
 from pdrom.api.pictures import plot, view
-from pdrom.api.records import FullRun, ReducedRun
-from pdrom.api.runs import basis, methods, reduce, run
+from pdrom.api.records import Errors, Run
+from pdrom.api.runs import basis, methods, run
+from pdrom.api.training import train
 
 __all__ = [
-    "FullRun", "ReducedRun", "basis", "build_scene", "load", "load_scene", "methods",
-    "plot", "reduce", "run", "save", "view",
+    "Errors", "Model", "Run", "basis", "build_scene", "load", "load_model", "load_scene", "methods",
+    "plot", "run", "save", "train", "view",
 ]  # fmt: skip
 
 

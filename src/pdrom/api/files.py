@@ -2,24 +2,29 @@
 
 import json
 import os
+from inspect import signature
 from pathlib import Path
 from shlex import quote
-from typing import Any, Literal, TypeVar
+from typing import Any, TypeVar
 
 import h5py
 import numpy as np
 
-from pdrom.api.records import AnyRun, FullRun, ReducedRun, Run, arrays_of, full_run
+from pdrom.api.records import Run, store_run, stored_run
 from pdrom.core import store
 from pdrom.core.errors import ConfigurationError, PdromError, StorageError
 from pdrom.core.provenance import made_by
 from pdrom.core.yamlfile import check_lengths, named, read_yaml, shown, validate
 from pdrom.model.mesh.config import GivenMesh, MeshFile, given_mesh
 from pdrom.model.mesh.reader import READERS
-from pdrom.model.mesh.types import store_mesh, stored_mesh
+from pdrom.model.mesh.types import stored_mesh
 from pdrom.model.scene import GONE, Scene, SceneConfig
-from pdrom.reduction.rerun import Rerun, displacement_norms
 
+FULL_RUN = "pdrom.api.run makes one, load reads one"
+OLD = (
+    "a reduced run of an earlier pdrom, which kept the projections of one group only: "
+    "`pdrom train --method` and `pdrom run --model` make it anew"
+)
 T = TypeVar("T")
 R = TypeVar("R", bound=Run)
 
@@ -40,6 +45,15 @@ def require_run(kind: type[R] | tuple[type[R], ...], value: Any, name: str, sour
     run = require(kind, value, name, source)
     run.require_finite(name)
     return run
+
+
+def require_function(function: Any, name: str) -> None:
+    """Raise ConfigurationError unless ``function`` can be called with a number and a report."""
+    try:
+        signature(function).bind(0, None)
+    except (TypeError, ValueError) as error:
+        fault = "a function of a number and a report is required"
+        raise ConfigurationError(f"{name} = {shown(function, 60)}: {fault}") from error
 
 
 def file_path(path: Any) -> Path:
@@ -119,48 +133,29 @@ def bound(config: SceneConfig, folder: Path, source: str) -> Scene:
         raise ConfigurationError(f"{source}: {error}") from error
 
 
-def save(
-    reduced: ReducedRun,
-    path: str | os.PathLike[str],
-    precision: Literal["double", "single"] = "double",
-) -> None:
-    """Write a reduced run and the positions and times of its full-order run to one file.
+def save(run: Run, path: str | os.PathLike[str]) -> None:
+    """Write a run to a file, from which `load` reads it bit for bit.
 
     Parameters
     ----------
-    reduced : run of `pdrom.api.reduce`
+    run : run by `pdrom.api.run` or `Model.run`
     path : file (HDF5) to write
     precision : of positions: "double" keeps all bits, "single" halves the file
 
     Raises
     ------
     ConfigurationError, StorageError
-        ``reduced`` is no reduced run; the precision is unknown; the file cannot be written.
+        ``run`` is no run; the file cannot be written.
     """
-    require_run(ReducedRun, reduced, "reduced", source="pdrom.api.reduce makes one")
-    if not isinstance(precision, str) or precision not in ("double", "single"):
-        raise ConfigurationError(
-            f"precision = {shown(precision, 60)}: required is double or single"
-        )
+    require_run(Run, run, "run", source="run and Model.run make one")
     path = file_path(path)
     store.require_own(path)
-    config = reduced.full.scene.config.model_dump(mode="json")
-    labels = {"group": str(reduced.group), "method": str(reduced.method), "r": reduced.r}
-    outcome = reduced.outcome
-    with made_by("pdrom.api.save", {"scene": config, **labels}), store.write_hdf5(path) as file:
-        file.attrs.update(labels | {"gain": reduced.gain, "ms_per_frame": reduced.ms})
-        file.attrs["blowup_frame"] = -1 if outcome.blowup_frame is None else outcome.blowup_frame
-        store_mesh(reduced.full.scene.mesh, file.create_group("mesh"))
-        _store(file, "reduced", outcome.positions.astype(precision), "m")
-        _store(file, "full", reduced.full.positions.astype(precision), "m")
-        _store(file, "full_ms", reduced.full.ms, "ms")
-        _store(file, "difference", outcome.difference, "m")
-        _store(file, "error", reduced.error, "1")
-        _store(file, "extent", outcome.extent, "1")
-        _store(file, "displacement", displacement_norms(reduced.full.positions), "m")
+    config = {"scene": run.scene.config.model_dump(mode="json"), "method": run.method}
+    with made_by("pdrom.api.save", config), store.write_hdf5(path) as file:
+        store_run(run, file)
 
 
-def load(path: str | os.PathLike[str], unchecked: bool = False) -> AnyRun:
+def load(path: str | os.PathLike[str], unchecked: bool = False) -> Run:
     """Read a run that `save`, `pdrom.api.run` or the pipeline wrote.
 
     Parameters
@@ -179,13 +174,13 @@ def load(path: str | os.PathLike[str], unchecked: bool = False) -> AnyRun:
     try:
         with store.open_hdf5(path, unchecked) as file:
             store.require_self_contained(file, path)
-            found: AnyRun | None = None
+            found: Run | None = None
             if "requested_error" in file.attrs:
                 raise StorageError(f"{path}: {GONE}")
+            if "reduced" in file and "full" in file:
+                raise StorageError(f"{path}: {OLD}")
             if "positions" in file and "timings" in file:
-                found = full_run(_scene(file, path), file)
-            elif "reduced" in file and "full" in file:
-                found = _reduced(_scene(file, path), file)
+                found = stored_run(_scene(file, path), file)
             if found is not None:
                 _require_consistent(found, file)
     except StorageError:
@@ -198,61 +193,32 @@ def load(path: str | os.PathLike[str], unchecked: bool = False) -> AnyRun:
     return found
 
 
-def _require_consistent(found: AnyRun, file: h5py.File) -> None:
+def _require_consistent(found: Run, file: h5py.File) -> None:
     """Raise ValueError if an array in ``file`` is not finite, or contradicts the run ``found``."""
-    for name, (values, _) in arrays_of(found).items():
-        store.require_finite(name, values, ValueError)
-    full = found.full if isinstance(found, ReducedRun) else found
-    scene, moved, points = full.scene, full.positions, full.scene.mesh.points
+    found.require_finite("run")
+    scene, moved, points = found.scene, found.positions, found.scene.mesh.points
     frames, h = scene.config.frames, scene.config.time_step
-    _require_same("frame 0 of the positions is not the mesh", moved[0], points)
-    _require_same("a time is below zero", full.ms, np.abs(full.ms))
+    pairs = [  # fault, stored and expected numbers
+        ("frame 0 of the positions is not the mesh", moved[0], points),
+        ("a time is below zero", found.ms, np.abs(found.ms)),
+    ]
     if "velocities" in file:
         before = moved[:1] - h * scene.initial_state().velocities
         steps = np.diff(moved, axis=0, prepend=before) / h
-        _require_same("velocities are not those of the positions", file["velocities"][...], steps)
-    shape = frames, scene.config.iterations
-    if "objective" in file and file["objective"].shape != shape:
-        raise ValueError(f"objective of shape {file['objective'].shape}")
+        stored = file["velocities"][...]
+        pairs.append(("velocities are not those of the positions", stored, steps))
+    if "objective" in file:
+        known, shape = np.zeros((frames, scene.config.iterations)), file["objective"].shape
+        pairs.append((f"objective of shape {shape}", np.zeros(shape), known))
     for name, own in file.get("snapshots", {}).items():
-        at, group = own["frames"][...], scene.group(name)
+        group = scene.group(name)
         sizes = [int(own.attrs[key]) for key in ("elements", "rows_per_element")]
-        rising = at.dtype.kind in "iu" and (np.diff(at, prepend=-1, append=frames) > 0).all()
-        required = own["roundoff"].shape, [group.elements, group.rows_per_element]
-        if not rising or (at.shape, sizes) != required:
-            listed = f"frames {shown(at.tolist(), 60)} of {frames}"
-            raise ValueError(f"snapshots of {name}: {listed}, elements and rows {sizes}")
-    if isinstance(found, ReducedRun):
-        done, end, side = found.outcome, found.outcome.blowup_frame, scene.mesh.extent
-        if done.frames != frames if end is None else done.frames - end not in (0, 1):
-            raise ValueError(f"{done.frames} of {frames} reduced frames, blow-up in frame {end}")
-        apart = np.linalg.norm(done.positions - moved[: done.frames + 1], axis=(1, 2))[1:]
-        sides, size = np.ptp(done.positions, axis=1).max(axis=1)[1:], float(np.linalg.norm(moved))
-        _require_same("frame 0 of the reduced run is not the mesh", done.positions[0], points)
-        _require_same("difference is not that of the positions", done.difference, apart, size)
-        _require_same("extent is not that of the positions", done.extent * side, sides, size)
-
-
-def _require_same(fault: str, stored: np.ndarray, known: np.ndarray, size: float = 0.0) -> None:
-    """Raise ValueError unless arrays differ by at most 1e-6 of the larger of them and ``size``."""
-    least = 1e-6 * max(np.abs(known).max(initial=0.0), size)
-    if stored.shape != known.shape or not (np.abs(stored - known) <= least).all():
-        raise ValueError(fault)
-
-
-def _store(file: h5py.File, name: str, values: np.ndarray, unit: str) -> None:
-    file[name] = values
-    file[name].attrs["unit"] = unit
-
-
-def _reduced(scene: Scene, file: h5py.File) -> ReducedRun:
-    full = FullRun(scene, file["full"][...].astype(float), file["full_ms"][...], {})
-    positions, blowup = file["reduced"][...].astype(float), int(file.attrs["blowup_frame"])
-    difference, extent = file["difference"][...], file["extent"][...]
-    outcome = Rerun(positions, difference, extent, None if blowup < 0 else blowup, positions)
-    group, method = str(file.attrs["group"]), str(file.attrs["method"])
-    r, gain, ms = int(file.attrs["r"]), float(file.attrs["gain"]), float(file.attrs["ms_per_frame"])
-    return ReducedRun(full, group, method, r, gain, outcome, ms)
+        if sizes != [group.elements, group.rows_per_element]:
+            raise ValueError(f"snapshots of {name}: elements and rows {sizes}")
+    for fault, stored, expected in pairs:
+        least = 1e-6 * np.abs(expected).max(initial=0.0)
+        if stored.shape != expected.shape or not (np.abs(stored - expected) <= least).all():
+            raise ValueError(fault)
 
 
 def _scene(file: h5py.File, path: Path) -> Scene:

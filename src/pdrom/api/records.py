@@ -1,19 +1,20 @@
-"""Classes of the runs that `pdrom.api.run` and `pdrom.api.reduce` return."""
+"""The run of a scene, in full order or with a model, its errors, and its arrays in a file."""
 
-from dataclasses import dataclass, is_dataclass
+from dataclasses import dataclass, field, is_dataclass
 from typing import Annotated, Any, get_type_hints
 
 import h5py
 import numpy as np
 from pydantic import ConfigDict, Field, InstanceOf, create_model
 
-from pdrom.core.errors import SnapshotError
+from pdrom.core.errors import ConfigurationError, SnapshotError
 from pdrom.core.packed import brief
 from pdrom.core.store import require_finite
 from pdrom.core.yamlfile import shown, validate
+from pdrom.model.mesh.types import store_mesh
+from pdrom.model.metrics import deformation_error, trajectory_error
 from pdrom.model.scene import Scene
-from pdrom.reduction.deviations import Yardstick, errors_within
-from pdrom.reduction.rerun import Rerun, mean_motion
+from pdrom.reduction.rerun import displacement_norms, mean_motion
 
 
 def require_types(record: Any) -> None:
@@ -34,130 +35,185 @@ def require_shapes(arrays: dict[str, tuple[np.ndarray, tuple[int, ...]]]) -> Non
             raise SnapshotError(f"{name} of {array.dtype} {array.shape}, required: float {shape}")
 
 
-class Run:
-    """Base of runs: fields have their declared types, arrays the shapes that the scene gives."""
-
-    def __post_init__(self) -> None:
-        require_types(self)
-        require_shapes(arrays_of(self))
-        if isinstance(self, ReducedRun):  # a full-order run that diverged is a result, too
-            self.require_finite("run")
-
-    def require_finite(self, name: str) -> None:
-        """Raise SnapshotError, naming the run ``name``, if it has NaN or infinite numbers."""
-        for array, (values, _) in arrays_of(self).items():
-            if array not in ("difference", "extent"):
-                require_finite(f"{name}: {array}", values, SnapshotError)
-
-
 @dataclass(frozen=True, eq=False)
 class Snapshots:
-    """n training snapshots of a group: projections p (n, rows, 3), norms of round-off in p (n,)."""
+    """n training snapshots of a group of e elements with p rows.
+
+    p : (n, e p, 3) projections in the last local step of the ``frames`` (n,)
+    roundoff : (n,) norm of the round-off in p
+    """
 
     p: np.ndarray
     roundoff: np.ndarray
+    frames: np.ndarray
 
     __repr__ = brief
 
     def __post_init__(self) -> None:
         require_types(self)
 
+    def require_rising(self, name: str, frames: int) -> None:
+        """Raise SnapshotError unless there is one of the ``frames``, ascending, per snapshot."""
+        at, whole = self.frames, self.frames.dtype.kind in "iu"
+        if (
+            at.shape != (self.roundoff.size,)
+            or not whole
+            or (np.diff(at, prepend=-1, append=frames) <= 0).any()
+        ):
+            raise SnapshotError(f"snapshots of {name}: frames {shown(at.tolist(), 60)} of {frames}")
+
+
+FULL = "full order"
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Errors of a run against the run that ``reference`` names.
+
+    position : of the positions, relative to the displacements of the reference; None without any
+    deformation : of the shapes, see `pdrom.model.metrics.deformation_error`; None of a rigid body
+    """
+
+    position: float | None
+    deformation: float | None
+    reference: str
+
+    def __str__(self) -> str:
+        shown = ["none" if e is None else f"{e:.2g}" for e in (self.position, self.deformation)]
+        errors = f"errors {shown[0]} (positions) and {shown[1]} (deformation)"
+        return f"{errors} against {self.reference}"
+
 
 @dataclass(frozen=True, eq=False)
-class FullRun(Run):
-    """A full-order run.
+class Run:
+    """A run of a scene, in full order or with a model.
 
-    positions : (F + 1, N, 3) m; entry 0 is the initial state
-    ms : (F,) milliseconds of each frame
-    snapshots : name of each constraint group -> its training snapshots
+    positions : (F' + 1, N, 3) m; entry 0 is the initial state; F' < F frames of a run that blew up
+    ms : (F',) milliseconds of each frame, with the positions of all vertices
+    snapshots : name of each constraint group -> its training snapshots; empty of a reduced run
+    method : what computed the run: `FULL`, or the title of a model
+    blowup_frame : first frame that blew up; None of a run that did not
     """
 
     scene: Scene
     positions: np.ndarray
     ms: np.ndarray
-    snapshots: dict[str, InstanceOf[Snapshots]]
+    snapshots: dict[str, InstanceOf[Snapshots]] = field(default_factory=dict)
+    method: Annotated[str, Field(pattern=r"^\P{C}+$")] = FULL
+    blowup_frame: Annotated[int, Field(ge=0)] | None = None
+
+    def __post_init__(self) -> None:
+        require_types(self)
+        frames, vertices = self.scene.config.frames, self.scene.mesh.vertices
+        ended, done = self.blowup_frame, self.ms.size
+        if done != frames if ended is None else done - ended not in (0, 1) or ended >= frames:
+            raise SnapshotError(f"{done} of {frames} frames, blow-up in frame {shown(ended, 60)}")
+        arrays = {"positions": (self.positions, (done + 1, vertices, 3)), "ms": (self.ms, (done,))}
+        for name, own in self.snapshots.items():
+            own.require_rising(name, frames)
+            group, count = self.scene.group(name), own.roundoff.size
+            rows = group.elements * group.rows_per_element
+            arrays[f"snapshots of {name}"] = own.p, (count, rows, 3)
+            arrays[f"round-off of {name}"] = own.roundoff, (count,)
+        require_shapes(arrays)
 
     def __repr__(self) -> str:
         held = f"snapshots of {', '.join(self.snapshots)}" if self.snapshots else "no snapshots"
-        return f"FullRun({self.scene!r}, {np.median(self.ms):.3g} ms a frame, {held})"
-
-
-@dataclass(frozen=True, eq=False)
-class ReducedRun(Run):
-    """A run with the projections of one group reduced, compared with its full-order run.
-
-    gain : factor by which sampling can amplify errors; 1 if every projection is evaluated
-    outcome : positions (F' + 1, N, 3) m of F' frames, differences from the full order, any blow-up
-    ms : median milliseconds per frame
-    """
-
-    full: FullRun
-    group: str
-    method: Annotated[str, Field(pattern=r"^\P{C}*$")]
-    r: Annotated[int, Field(ge=1, le=1_000_000_000)]
-    gain: InstanceOf[float]
-    outcome: Rerun
-    ms: InstanceOf[float]
-
-    def __repr__(self) -> str:
-        name, outcome = self.full.scene.config.name, self.outcome
-        ended = f"error {self.error[-1]:.3g} at the end" if outcome.frames else "no frame"
-        ended = ended if outcome.finite else f"blew up at frame {outcome.blowup_frame}"
-        return f"ReducedRun('{name}': {self.title}, gain {self.gain:.3g}, {ended})"
+        speed = f"{np.median(self.ms):.3g} ms a frame" if len(self.ms) else "no frame"
+        ended = "" if self.blowup_frame is None else f", blew up in frame {self.blowup_frame}"
+        return f"Run({self.scene!r}, {self.method}, {speed}, {held}{ended})"
 
     @property
-    def error(self) -> np.ndarray:
-        """Error of each frame (F',), relative to the RMS displacement of the full-order run."""
-        return self.outcome.difference / mean_motion(self.full.positions)
-
-    @property
-    def errors(self) -> dict[str, float | None]:
-        """Errors of the whole run: positions, velocities, shape, energy, first contact.
-
-        Keys are column names of the table reduced_reruns. A value is None if the run ended early,
-        or if the full-order run lacks the quantity, such as a first contact.
-        """
-        yardstick = Yardstick(self.full.scene, self.full.positions)
-        end, seen = len(self.full.ms), yardstick.deviations(self.outcome)
-        return errors_within(seen, yardstick.series, end, **yardstick.units)
+    def full_order(self) -> bool:
+        """Whether the run is one of the full order, and no model's."""
+        return self.method.startswith(FULL)
 
     @property
     def title(self) -> str:
-        """Text with the group, the method and the size r of the reduction."""
-        return f"{self.group.replace('_', ' ')}, {self.method}, r = {self.r}"
+        """What the run is, in words that name it as a reference."""
+        config = self.scene.config
+        again = f", {config.iterations} iterations a frame" if self.method == FULL else ""
+        return f"the run of '{config.name}' by {self.method}{again}"
+
+    def require_finite(self, name: str) -> None:
+        """Raise SnapshotError, naming the run ``name``, if it has NaN or infinite numbers."""
+        for array, values in (("positions", self.positions), ("ms", self.ms)):
+            require_finite(f"{name}: {array}", values, SnapshotError)
+        for group, own in self.snapshots.items():
+            require_finite(f"{name}: snapshots of {group}", own.p, SnapshotError)
+            require_finite(f"{name}: round-off of {group}", own.roundoff, SnapshotError)
+
+    def error(self, reference: "Run") -> Errors:
+        """Errors of the positions and of the deformation against ``reference``, over all frames.
+
+        Both are None if one of the runs blew up.
+
+        Raises
+        ------
+        ConfigurationError
+            ``reference`` has another mesh, time step or number of frames.
+        """
+        self.require_comparable(reference)
+        if self.blowup_frame is not None or reference.blowup_frame is not None:
+            return Errors(None, None, reference.title)
+        moved, other = self.positions[1:], reference.positions[1:]
+        rest, masses = self.scene.mesh.points, reference.scene.masses
+        distance, moved_by = self.differences(reference), displacement_norms(reference.positions)
+        shape = deformation_error(moved, other, rest, masses)
+        return Errors(trajectory_error(distance, moved_by), shape, reference.title)
+
+    def errors(self, reference: "Run") -> np.ndarray:
+        """Error (F',) of the positions in each frame, relative to the RMS displacement."""
+        return self.differences(reference) / mean_motion(reference.positions)
+
+    def differences(self, reference: "Run") -> np.ndarray:
+        """Frobenius norm (F',) m of the difference from ``reference`` in each frame of this run."""
+        other = reference.positions[1 : len(self.positions)]
+        return np.linalg.norm(self.positions[1:] - other, axis=(1, 2))
+
+    def require_comparable(self, reference: Any) -> None:
+        """Raise ConfigurationError unless ``reference`` is a run with which this one compares."""
+        if not isinstance(reference, Run):
+            raise ConfigurationError(f"reference = {shown(reference, 60)}: a Run is required")
+        own, other = self.scene, reference.scene
+        alike = {
+            "mesh": np.array_equal(own.mesh.points, other.mesh.points),
+            "time step": own.config.time_step == other.config.time_step,
+            "number of frames": own.config.frames == other.config.frames,
+        }
+        for name, same in alike.items():
+            if not same:
+                fault = f"another {name} than {reference.title}: errors compare runs frame by frame"
+                raise ConfigurationError(f"{self.title}: {fault}")
 
 
-AnyRun = FullRun | ReducedRun
+_SNAPSHOTS = ("p", "roundoff", "frames")
 
 
-def arrays_of(run: Any) -> dict[str, tuple[np.ndarray, tuple[int, ...]]]:
-    """Arrays of a ``run`` of any kind by name, with the shapes that its scene gives them."""
-    full = run.full if isinstance(run, ReducedRun) else run
-    frames, vertices = full.scene.config.frames, full.scene.mesh.vertices
-    arrays = {"positions": (full.positions, (frames + 1, vertices, 3)), "ms": (full.ms, (frames,))}
-    for name, own in full.snapshots.items():
-        group, count = full.scene.group(name), own.roundoff.size
-        rows = group.elements * group.rows_per_element
-        arrays[f"snapshots of {name}"] = own.p, (count, rows, 3)
-        arrays[f"round-off of {name}"] = own.roundoff, (count,)
-    if isinstance(run, ReducedRun):
-        full.scene.group(run.group)
-        require_types(run.outcome)
-        if run.outcome.blowup_frame not in (None, *range(frames + 1)):
-            raise SnapshotError(f"a blow-up in frame {shown(run.outcome.blowup_frame, 60)}")
-        done, count = run.outcome, min(run.outcome.difference.size, frames)
-        arrays["reduced"] = done.positions, (count + 1, vertices, 3)
-        arrays["difference"] = done.difference, (count,)
-        arrays["extent"] = done.extent, (count,)
-    return arrays
-
-
-def full_run(scene: Scene, file: h5py.File) -> FullRun:
-    """Full-order run of ``scene`` from the open HDF5 ``file``."""
-    stored = file.get("snapshots", {})
-    return FullRun(
+def stored_run(scene: Scene, file: h5py.File) -> Run:
+    """Run of ``scene`` from the open HDF5 ``file``."""
+    stored, ended = file.get("snapshots", {}), int(file.attrs.get("blowup_frame", -1))
+    return Run(
         scene,
         file["positions"][...],
         file["timings"][...].sum(axis=1),
-        {name: Snapshots(s["p"][...], s["roundoff"][...]) for name, s in stored.items()},
+        {name: Snapshots(*(s[key][...] for key in _SNAPSHOTS)) for name, s in stored.items()},
+        str(file.attrs.get("method", FULL)),
+        None if ended < 0 else ended,
     )
+
+
+def store_run(run: Run, file: h5py.File) -> None:
+    """Write ``run``, with its mesh, to the open HDF5 ``file``."""
+    store_mesh(run.scene.mesh, file.create_group("mesh"))
+    file["positions"], file["timings"] = run.positions, run.ms[:, None]
+    for name, unit in (("positions", "m"), ("timings", "ms")):
+        file[name].attrs["unit"] = unit
+    for name, own in run.snapshots.items():
+        kept = file.create_group(f"snapshots/{name}")
+        for key in _SNAPSHOTS:
+            kept[key] = getattr(own, key)
+        group = run.scene.group(name)
+        kept.attrs.update(elements=group.elements, rows_per_element=group.rows_per_element)
+    file.attrs["method"] = run.method
+    file.attrs["blowup_frame"] = -1 if run.blowup_frame is None else run.blowup_frame

@@ -18,7 +18,7 @@ from pdrom.core import checkout
 from pdrom.core.environment import settle
 from pdrom.core.errors import INTERRUPTED, PdromError, choices, reason
 
-COMMANDS = ("new", "run", "reduce", "view", "show")
+COMMANDS = ("new", "run", "train", "view", "show")
 CODES = """exit codes: 0 done; 1 faulty input, or a file that cannot be read or written;
 2 the command was not understood; 3 a reduced run blew up (its file is written all the
 same); 130 interrupted"""
@@ -81,7 +81,10 @@ def _parsed(arguments: Sequence[str]) -> argparse.Namespace:
     """Parse the command line; a misspelt command or option gets a suggestion."""
     top = parser()
     if arguments and arguments[0][:1] != "-" and arguments[0] not in COMMANDS:
-        top.error(f"no command '{arguments[0]}'{choices(arguments[0], COMMANDS)}")
+        gone = "; `pdrom train --method` and `pdrom run --model` replace it" * (
+            arguments[0] == "reduce"
+        )
+        top.error(f"no command '{arguments[0]}'{choices(arguments[0], COMMANDS)}{gone}")
     found, unknown = top.parse_known_args(arguments)
     if unknown:
         known = re.findall(r"--[a-z-]+", found.parser.format_usage())

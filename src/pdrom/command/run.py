@@ -1,41 +1,79 @@
-"""``pdrom run SCENE.yaml``: a full-order run."""
+"""``pdrom run SCENE.yaml``: a run in full order or with a model."""
 
 import argparse
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from pdrom.command.base import SCENE, Command, Status, files_of, require_output
+from pdrom.command.base import SCENE, UNCHECKED, Command, Status, files_of, require_output
+
+if TYPE_CHECKING:
+    from pdrom.api import Model, Run
 
 
 def perform(arguments: argparse.Namespace) -> Status:
     """Run the scene of ``arguments`` with a progress line, and print the path of the result."""
     import numpy as np
 
-    from pdrom.api import load_scene, run
+    from pdrom.api import load, load_model, load_scene, run
     from pdrom.command.progress import Progress
+    from pdrom.core.errors import ConfigurationError
     from pdrom.model.mesh.checks import seams
 
-    file = Path(arguments.scene)
-    out = arguments.out or str(file.parent / f"{file.stem}.h5")
-    scene = load_scene(arguments.scene)
-    require_output(out, files_of(arguments.scene, scene))
-    full = run(scene, out, Progress(scene.config.name, scene.config.frames))
+    file, scene = Path(arguments.scene), load_scene(arguments.scene)
+    read = [*files_of(arguments.scene, scene), *filter(None, (arguments.model, arguments.compare))]
+    if arguments.compare and not arguments.model:
+        raise ConfigurationError("--compare: only of runs with a model (--model)")
+    name = file.stem
+    if arguments.model:
+        name += f"_{Path(arguments.model).stem.removesuffix('.model')}"
+    out = arguments.out or str(file.parent / f"{name}.h5")
+    require_output(out, read)
+    model = load_model(arguments.model) if arguments.model else None
+    reference = load(arguments.compare, arguments.unchecked) if arguments.compare else None
+    progress = Progress(scene.config.name, scene.config.frames)
+    made = model.run(scene, out, progress) if model else run(scene, out, progress)
     sys.stdout.write(
-        f"{out}: {scene.config.frames} frames of {scene.mesh.vertices} vertices "
-        f"({seams(scene.mesh)}), {np.median(full.ms):.2f} ms a frame (median)\n"
+        f"{out}: {len(made.ms)} frames of {scene.mesh.vertices} vertices ({seams(scene.mesh)}), "
+        f"{np.median(made.ms):.2f} ms a frame (median)\n"
     )
+    if model and reference:
+        sys.stdout.write(f"{_compared(model, made, reference)}\n")
+    if made.blowup_frame is not None:
+        sys.stdout.write(f"{out}: blew up in frame {made.blowup_frame}\n")
+        return Status.BLEW_UP
     return Status.DONE
 
 
+def _compared(model: "Model", made: "Run", reference: "Run") -> str:
+    """Errors of a run, and the ratio of times measured here."""
+    speed = model.speed(made.scene)
+    busy = "; unreliable: other programs ran" if speed["busy"] else ""
+    return (
+        f"{made.error(reference)}; {speed['speedup']:.2g} times as fast as the full order "
+        f"({speed['ms']:.3g} for {speed['full_ms']:.3g} ms a frame, measured now, in turn{busy})"
+    )
+
+
 COMMAND = Command(
-    "Run a scene in full order",
+    "Run a scene in full order, or with a model by pdrom train",
     "pdrom run sheet.yaml --out sheet.h5",
     {
         "scene": SCENE,
+        "--model": {
+            "metavar": "MODEL",
+            "help": "file by pdrom train: the model runs the scene",
+        },
+        "--compare": {
+            "metavar": "RUN.h5",
+            "help": "full-order run of the scene, to which the model's run is compared",
+        },
         "--out": {
             "metavar": "FILE",
-            "help": "file to write (HDF5); SCENE.h5 beside the scene without it",
+            "help": "file to write (HDF5); SCENE.h5 beside the scene without it, SCENE_MODEL.h5 "
+            "with a model",
         },
+        "--unchecked": UNCHECKED,
     },
     perform,
 )

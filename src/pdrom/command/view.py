@@ -43,12 +43,12 @@ def perform(arguments: argparse.Namespace) -> Status:
 
 COMMAND = Command(
     "Write a page on which runs are looked at, a picture, or files for ParaView",
-    "pdrom view sheet_spring_gappy_20.h5 --open",
+    "pdrom view pulled_sheet.h5 pulled.h5 --open",
     {
         "results": {
             "metavar": "RESULT",
             "nargs": "+",
-            "help": "files of pdrom run and pdrom reduce",
+            "help": "files of pdrom run",
         },
         "--out": {"metavar": "FILE", "help": "page to write; the first RESULT as .html"},
         "--open": {"action": "store_true", "help": "open it in the browser"},

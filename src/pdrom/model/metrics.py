@@ -65,6 +65,60 @@ def shape_differences(positions: np.ndarray, reference: np.ndarray) -> np.ndarra
     return np.linalg.norm(residuals, axis=(1, 2)) * scale
 
 
+def deformation(positions: np.ndarray, reference: np.ndarray, masses: np.ndarray) -> float:
+    """Return how far two runs differ in shape, m sqrt(kg): the root of the sum of D_f^2.
+
+    D_f(a, b)^2 is the least sum over the vertices of m_i |R a_i + t - b_i|^2, R a rotation, never a
+    reflection (Kabsch 1976), t a translation, in frame f of F.
+
+    Parameters
+    ----------
+    positions : (F, N, 3) m, a; or (N, 3) m, the same shape in all frames
+    reference : (F, N, 3) m, b
+    masses : (N,) kg
+    """
+    scale = max(
+        float(np.abs(positions).max(initial=0.0)), float(np.abs(reference).max(initial=0.0))
+    )
+    if scale == 0.0 or not np.isfinite(scale):
+        return scale
+    weights, root = masses / masses.sum(), np.sqrt(masses / masses.sum())[:, None]
+    total = 0.0
+    for a, b in zip(np.broadcast_to(positions, reference.shape), reference, strict=True):
+        a, b = a / scale, b / scale
+        a, b = root * (a - weights @ a), root * (b - weights @ b)
+        u, _, vt = np.linalg.svd(a.T @ b)
+        u[:, -1] *= np.sign(np.linalg.det(u @ vt))
+        total += float(np.sum((a @ (u @ vt) - b) ** 2))
+    return scale * float(np.sqrt(total * masses.sum()))
+
+
+RIGID = 1e-3  # a body whose deformation is below this fraction of its size counts as rigid
+
+
+def deformation_error(
+    positions: np.ndarray, reference: np.ndarray, rest: np.ndarray, masses: np.ndarray
+) -> float | None:
+    """Return the error of a run's shapes, relative to the deformation of the reference.
+
+    It is 0 for the reference moved rigidly in any way, 1 for a body that does not deform at all,
+    and None if the body is rigid to `RIGID` of its size or the reference has no frame. It does not
+    see errors of the rigid motion: state the error of the positions as well.
+
+    Parameters
+    ----------
+    positions, reference : (F, N, 3) m, without the initial state
+    rest : (N, 3) m, the rest shape
+    masses : (N,) kg
+    """
+    centred = rest - masses @ rest / masses.sum()
+    size = float(np.sqrt(len(reference) * np.sum(masses[:, None] * centred**2)))
+    deformed = deformation(rest, reference, masses)
+    if not deformed > RIGID * size:
+        return None
+    return deformation(positions, reference, masses) / deformed
+
+
 def trajectory_error(difference: np.ndarray, displacement: np.ndarray) -> float | None:
     """Return the relative error || Q_red - Q_fom || / || Q_fom - Q_0 || over F frames of a run.
 

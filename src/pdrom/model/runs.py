@@ -5,6 +5,7 @@ import os
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import takewhile
+from time import perf_counter
 from typing import Any
 
 import h5py
@@ -61,7 +62,8 @@ class ConvergedStepper(Stepper):
     def step(
         self, state: State, frame: int, on_last_iterate: Callable[[np.ndarray], None] | None = None
     ) -> tuple[State, FrameReport]:
-        """Compute ``frame`` from ``state``; ``on_last_iterate`` is ignored, the report is empty."""
+        """Compute ``frame`` from ``state``; ``on_last_iterate`` is ignored."""
+        started = perf_counter()
         s, elimination, base, anchors = self._begin(state, frame)
         rhs = np.empty_like(s)
 
@@ -77,19 +79,30 @@ class ConvergedStepper(Stepper):
         )
         self.changes.append(end.change)
         self.evaluations.append(end.evaluations)
-        return self._finish(state, end.y, frame, anchors), FrameReport(np.empty(0), np.zeros(4))
+        after, seconds = self._finish(state, end.y, frame, anchors), np.zeros(len(PHASES))
+        seconds[1] = perf_counter() - started  # its phases are not told apart
+        return after, FrameReport(np.empty(0), seconds)
 
 
-def converged_run(scene: Scene, tolerance: float, limit: int) -> np.ndarray | None:
+def converged_run(
+    scene: Scene,
+    tolerance: float,
+    limit: int,
+    on_frame: Callable[[int, FrameReport], None] = lambda frame, report: None,
+) -> np.ndarray | None:
     """Positions (F + 1, N, 3) m of a run of ``scene`` in which every frame has converged.
 
     Initial positions come first. None if, after ``limit`` evaluations of a frame's objective, one
     more iteration would move a vertex by over ``tolerance`` times the mesh's longest side.
+    ``on_frame`` is called after each frame with its number and report.
     """
     best, state = ConvergedStepper(scene, scene.system, tolerance, limit), scene.initial_state()
     ends = takewhile(lambda _: best.converged, best.run(state, range(scene.config.frames)))
-    positions = np.stack([state.positions, *(after.positions for after, _ in ends)])
-    return positions if best.converged else None
+    positions = [state.positions]
+    for frame, (after, report) in enumerate(ends):
+        positions.append(after.positions)
+        on_frame(frame, report)
+    return np.stack(positions) if best.converged else None
 
 
 def run(
@@ -197,6 +210,7 @@ class Frame:
     state : state as the step loop has it: positions, or coordinates in a position subspace
     positions : (N, 3) m of the vertices
     extent : longest side of the bounding box, divided by `BoundedRun.unit`
+    seconds : time of the frame, with the positions of the vertices
     """
 
     number: int
@@ -204,6 +218,7 @@ class Frame:
     positions: np.ndarray
     extent: float
     report: FrameReport
+    seconds: float
 
 
 @dataclass
@@ -229,13 +244,15 @@ class BoundedRun:
         for number in range(self.frames):
             with np.errstate(over="ignore", invalid="ignore"):
                 self.state, report = next(states)
+                before = perf_counter()
                 q = self.positions(self.state.positions)
+                seconds = float(report.seconds.sum()) + perf_counter() - before
                 extent = float(np.ptp(q, axis=0).max()) / self.unit
             if not np.isfinite(q).all():
                 self.blowup_frame = number
                 return
             if extent > self.limit:
                 self.blowup_frame = number
-            yield Frame(number, self.state, q, extent, report)
+            yield Frame(number, self.state, q, extent, report, seconds)
             if self.blowup_frame is not None:
                 return

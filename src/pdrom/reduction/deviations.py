@@ -83,7 +83,7 @@ class Yardstick:
         if offset is not None:
             start = replace(start, positions=start.positions + offset)
         reference, limit = self.reference, BLOWUP_EXTENT
-        return rerun(self.scene, loop.run, start, reference, limit, model.positions)
+        return rerun(self.scene, loop, start, reference, limit, model.positions)
 
     def row(self, outcome: Rerun) -> dict[str, Any]:
         """Map table columns to results of ``outcome``; no error if the run ended early.

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from pdrom.core.packed import brief
-from pdrom.model.dynamics.stepper import State
-from pdrom.model.runs import BoundedRun, Run
+from pdrom.model.dynamics.stepper import FrameReport, State, Stepper
+from pdrom.model.runs import BoundedRun
 from pdrom.model.scene import Scene
 
 
@@ -20,6 +20,7 @@ class Rerun:
     extent : (F',) longest side of the bounding box in each frame, divided by that of the rest shape
     blowup_frame : first frame whose extent exceeds `BoundedRun.limit` or is not finite, else None
     coordinates : (F' + 1, K, 3) K unknowns of the step loop: subspace coordinates, or positions
+    ms : (F',) milliseconds of each frame, with the positions of all vertices
     """
 
     positions: np.ndarray
@@ -27,13 +28,14 @@ class Rerun:
     extent: np.ndarray
     blowup_frame: int | None
     coordinates: np.ndarray
+    ms: np.ndarray
 
     __repr__ = brief
 
     @property
     def frames(self) -> int:
         """Number of frames that ran and stayed finite."""
-        return len(self.difference)
+        return len(self.extent)
 
     @property
     def finite(self) -> bool:
@@ -48,33 +50,37 @@ class Rerun:
 
 def rerun(
     scene: Scene,
-    run: Run,
+    loop: Stepper,
     start: State,
-    reference: np.ndarray,
+    reference: np.ndarray | None,
     limit: float,
     positions: Callable[[np.ndarray], np.ndarray] = lambda y: y,
+    on_frame: Callable[[int, FrameReport], None] = lambda frame, report: None,
 ) -> Rerun:
-    """Execute ``run`` from ``start``; compare it with the full-order run of ``scene``.
+    """Run ``loop`` from ``start``; compare it with the full-order run ``reference`` of ``scene``.
 
     Parameters
     ----------
-    reference : (F + 1, N, 3) m, positions of the full-order run
+    reference : (F + 1, N, 3) m; None compares with nothing
     limit : the run ends if its bounding box exceeds this multiple of that at rest
-    positions : function that maps the unknowns of ``run`` to vertex positions (N, 3) m
+    positions : function that maps the unknowns of ``loop`` to vertex positions (N, 3) m
+    on_frame : called after each frame with its number, from 0, and the solver's report
     """
     frames, unit = scene.config.frames, scene.mesh.extent
-    bounded = BoundedRun(run, start, frames, limit, unit, positions)
-    coordinates = [start.positions]
-    reached = [positions(start.positions)]
-    difference, extents = [], []
-    for frame in bounded:
-        coordinates.append(frame.state.positions)
+    run = BoundedRun(loop.run, start, frames, limit, unit, positions)
+    unknowns, reached, extents, ms = [start.positions], [positions(start.positions)], [], []
+    for frame in run:
+        unknowns.append(frame.state.positions)
         reached.append(frame.positions)
-        difference.append(float(np.linalg.norm(frame.positions - reference[frame.number + 1])))
         extents.append(frame.extent)
+        ms.append(1e3 * frame.seconds)
+        on_frame(frame.number, frame.report)
+    pairs = [] if reference is None else zip(reached[1:], reference[1:], strict=False)
+    difference = np.array([float(np.linalg.norm(q - p)) for q, p in pairs])
     stacked = np.stack(reached)
-    unknowns = stacked if reached[0] is coordinates[0] else np.stack(coordinates)
-    return Rerun(stacked, np.array(difference), np.array(extents), bounded.blowup_frame, unknowns)
+    coordinates = stacked if reached[0] is unknowns[0] else np.stack(unknowns)
+    ended = run.blowup_frame
+    return Rerun(stacked, difference, np.array(extents), ended, coordinates, np.array(ms))
 
 
 def displacement_norms(reference: np.ndarray) -> np.ndarray:

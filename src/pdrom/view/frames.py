@@ -1,18 +1,17 @@
 """Files that show a scene's runs: a picture of four frames, and files for ParaView.
 
-The picture has a row for the full-order run and below it one for each reduced run that `shown_runs`
-selects. For ParaView there is a VTU file per frame, and a PVD file with the times.
+The picture has a row for the full-order run and below it one for each reduced run. For ParaView
+there is a VTU file per frame, and a PVD file with the times.
 """
 
 from dataclasses import replace
 from pathlib import Path
+from textwrap import wrap
 from xml.etree import ElementTree
 
 import numpy as np
 
 from pdrom.core.store import MARK, atomic_path
-from pdrom.model.constraints.base import ConstraintGroup
-from pdrom.model.effects import EFFECTS
 from pdrom.view import style
 from pdrom.view.artists import Figure
 from pdrom.view.camera import Camera, obstacles, rotation_to, up_of
@@ -25,7 +24,7 @@ INSTANTS = (0.25, 0.5, 0.75, 1.0)  # times of the pictures, as fractions of the 
 CAMERA = Camera(30.0, 20.0)
 NO_LIMIT = 100.0  # inches, limit of the picture's height: practically none
 NAME, FRAMES = "frame_{:05d}.vtu", "frame_*.vtu"
-SHOWN = 20  # the picture shows the run with most modes r up to this number, if there is one
+LABEL = 24  # characters of a line in the label of a row
 
 
 def write_frames(scene: ViewedScene, png: Path) -> None:
@@ -33,13 +32,6 @@ def write_frames(scene: ViewedScene, png: Path) -> None:
     with style.look(), atomic_path(png, with_checksum=False) as temporary:
         metadata = {"Software": MARK.decode()}
         _draw(scene).savefig(temporary, format="png", dpi=150, metadata=metadata)
-
-
-def shown_runs(scene: ViewedScene) -> list[ViewedRun]:
-    """One run per group and method: that with most modes r <= `SHOWN`, else that with fewest."""
-    pairs = dict.fromkeys((run.group, run.method) for run in scene.runs)
-    every = [scene.sizes(*pair) for pair in pairs]
-    return [([run for run in sizes if run.r <= SHOWN] or sizes[:1])[-1] for sizes in every]
 
 
 def _draw(scene: ViewedScene) -> Figure:
@@ -55,11 +47,9 @@ def _draw(scene: ViewedScene) -> Figure:
         RunPanel(f"frame {frame}", style.FULL_ORDER, q, reference=True)
         for frame, q in zip(numbers, full, strict=True)
     ]
-    labels, groups = [f"{style.words(scene.name)}\nfull order"], {r.group for r in scene.runs}
-    for run in shown_runs(scene):
-        group = f"{style.words(run.group)}\n" if len(groups) > 1 else ""
-        labels.append(f"{group}{plain_words(run.method)}\nr = {run.r}")
-    every = [reference, *([_panel(run, f) for f in numbers] for run in shown_runs(scene))]
+    labels = [f"{style.words(scene.name)}\nfull order"]
+    labels += ["\n".join(wrap(plain_words(run.title), LABEL)) for run in scene.runs]
+    every = [reference, *([_panel(i, run, f) for f in numbers] for i, run in enumerate(scene.runs))]
     windows = [
         shared_window(CAMERA, q, [panels[i] for panels in every]) for i, q in enumerate(full)
     ]
@@ -71,8 +61,8 @@ def _draw(scene: ViewedScene) -> Figure:
     return draw_rows(rows, NO_LIMIT)
 
 
-def _panel(run: ViewedRun, frame: int) -> RunPanel:
-    """Panel of ``run`` at ``frame``, or at its last frame with the reason why it ended before."""
+def _panel(number: int, run: ViewedRun, frame: int) -> RunPanel:
+    """Panel of reduced run ``number`` at ``frame``, or at its last with the reason of its end."""
     last, failure, remark = len(run.positions) - 1, None, None
     if frame > last:
         failure = "ended" if run.blowup_frame is None else f"blew up at frame {run.blowup_frame}"
@@ -80,10 +70,7 @@ def _panel(run: ViewedRun, frame: int) -> RunPanel:
     elif frame:
         remark = f"relative error {run.error[frame - 1]:.1g}"
     positions = run.positions[min(frame, last)].astype(float)
-    # index in `EFFECTS` sets the colour of a constraint group; unknown names get the first colour
-    groups = [name for name in EFFECTS if issubclass(EFFECTS.load(name), ConstraintGroup)]
-    looks, place = style.GROUP_LOOKS, groups.index(run.group) if run.group in groups else 0
-    colour = style.surface_colour(looks[place % len(looks)][0])
+    colour = style.surface_colour(style.GROUP_LOOKS[number % len(style.GROUP_LOOKS)][0])
     return RunPanel("", colour, positions, failure, remark)
 
 
@@ -128,10 +115,10 @@ def point_data(scene: ViewedScene, frame: int) -> dict[str, np.ndarray]:
     """
     now = scene.positions[frame]
     data = {"displacement": now - scene.positions[0]}
-    for run in shown_runs(scene):
+    for run in scene.runs:
         ended = frame >= len(run.positions)
         apart = np.full_like(now, np.nan) if ended else run.positions[frame] - now
-        data[f"{run.group} {run.method} r={run.r}"] = apart
+        data[run.title] = apart
     return {name: np.asarray(values, dtype=np.float32) for name, values in data.items()}
 
 

@@ -24,16 +24,14 @@ from pdrom.view.camera import rotation_to, shown_region, up_of
 class ViewedRun:
     """A reduced run of F' frames.
 
-    group, method : names of the reduced group and of the method
+    title : name of the run among those of its scene
     positions : (F' + 1, N, 3) m, finite, the initial state first
     error : (F',) relative error of each frame
     blowup_frame : frame in which the run blew up and ended; None if all frames of the scene ran
     ms : milliseconds per frame, None if not measured
     """
 
-    group: str
-    method: str
-    r: int
+    title: str
     positions: np.ndarray
     error: np.ndarray
     blowup_frame: int | None
@@ -47,7 +45,7 @@ class ViewedScene:
     time_step : time step of a frame, s
     positions : (F + 1, N, 3) m of the full-order run
     ms : milliseconds per frame of the full-order run, None if not measured
-    runs : reduced runs, sorted by group, method and basis size r
+    runs : reduced runs
     effects : effects of the scene; obstacles among them are drawn
     """
 
@@ -59,10 +57,6 @@ class ViewedScene:
     ms: float | None
     runs: tuple[ViewedRun, ...] = ()
     effects: tuple[EffectConfig, ...] = ()
-
-    def sizes(self, group: str, method: str) -> list[ViewedRun]:
-        """Runs of a group and a method by ascending basis size r."""
-        return [run for run in self.runs if (run.group, run.method) == (group, method)]
 
 
 LARGEST = 25_000_000  # largest number of bytes of a page
@@ -136,9 +130,7 @@ def pack_scene(scene: ViewedScene) -> dict[str, Any]:
         "ms": scene.ms,
         "runs": [
             {
-                "group": run.group,
-                "method": run.method,
-                "r": run.r,
+                "title": run.title,
                 "positions": pack_positions(run.positions[::stride, used]),
                 "error": _numbers(run.error),
                 "blowup": run.blowup_frame,

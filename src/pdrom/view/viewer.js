@@ -26,16 +26,10 @@
     select.disabled = values.length < 2;
   }
 
-  const distinct = (values) => [...new Set(values)];
-
   function chosenRun() {
     const scene = scenes[at("scene").value];
-    fill(at("group"), distinct(scene.runs.map((run) => run.group)), (g) => g.replaceAll("_", " "));
-    const ofGroup = scene.runs.filter((run) => run.group === at("group").value);
-    fill(at("method"), distinct(ofGroup.map((run) => run.method)));
-    const ofMethod = ofGroup.filter((run) => run.method === at("method").value);
-    fill(at("r"), ofMethod.map((run) => run.r));
-    return [scene, ofMethod.find((run) => String(run.r) === at("r").value) || null];
+    fill(at("run"), scene.runs.map((_, i) => i), (i) => scene.runs[i].title);
+    return [scene, scene.runs[at("run").value] || null];
   }
 
   // Whether both runs are in one picture, the full order as wires: two surfaces in one place would flicker.

@@ -259,7 +259,7 @@ def _rows(scene: Scene, models: Models) -> Iterator[dict[str, Any]]:
     """
     nothing = np.zeros((scene.config.frames + 1, *scene.mesh.points.shape))
     loop, start = scene.stepper(track_objective=False), scene.initial_state()
-    full = rerun(scene, loop.run, start, nothing, BLOWUP_EXTENT)
+    full = rerun(scene, loop, start, nothing, BLOWUP_EXTENT)
     own = Yardstick(scene, full.positions)
 
     def row(labels: dict[str, Any], outcome: Rerun) -> dict[str, Any]:

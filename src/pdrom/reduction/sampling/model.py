@@ -2,12 +2,15 @@
 
 from dataclasses import dataclass
 
+import h5py
 import numpy as np
 
 from pdrom.model.dynamics.stepper import State, Stepper
 from pdrom.model.scene import Scene
+from pdrom.reduction.basis import store_basis, stored_basis
+from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.sampling.local_step import ReducedLocalStep, replace_group
-from pdrom.reduction.sampling.reduction import Reduction
+from pdrom.reduction.sampling.reduction import Reduction, Sampling
 
 
 @dataclass(frozen=True)
@@ -16,6 +19,16 @@ class ProjectionModel:
 
     group: str
     reduction: Reduction
+
+    @property
+    def title(self) -> str:
+        """Group, method, number of modes and gain: by how much sampling can amplify errors."""
+        own = self.reduction
+        return f"{self.group}, {own.spec.title}, r = {own.r}, gain {own.gain:.3g}"
+
+    @property
+    def residual(self) -> None:
+        """None: no training equations are fitted."""
 
     def elements_evaluated(self, scene: Scene) -> int:
         """Number of elements of ``scene`` whose projections an iteration evaluates."""
@@ -35,3 +48,18 @@ class ProjectionModel:
 
     def output(self) -> None:
         """None: there are no positions to compute."""
+
+    def store(self, file: h5py.Group) -> None:
+        """Write the model to the HDF5 group ``file``."""
+        own, labels = self.reduction, {"group": self.group, "r": self.reduction.r}
+        file.attrs.update(labels | {"method": own.spec.model_dump_json()})
+        store_basis(own.basis, file.create_group("basis"))
+        file["entries"], file["elements"] = own.sampling.entries, own.sampling.elements
+
+    @classmethod
+    def stored(cls, file: h5py.Group) -> "ProjectionModel":
+        """Read the model from the HDF5 group ``file``."""
+        spec = MethodSpec.model_validate_json(file.attrs["method"])
+        sampling = Sampling(file["entries"][...], file["elements"][...])
+        basis, r = stored_basis(file["basis"], str(file.file.filename)), int(file.attrs["r"])
+        return cls(str(file.attrs["group"]), Reduction(basis, sampling, spec, r=r))

@@ -73,12 +73,13 @@ def build_columns(
     points: np.ndarray,
     masses: np.ndarray,
     atoms: Sequence[np.ndarray],
-    trajectory: np.ndarray,
+    trajectory: np.ndarray | None,
 ) -> Columns:
     """Build a subspace from ``modes`` (N, k) of the free vertices and own columns of each atom.
 
     Each of ``atoms``, vertices fixed and released together, gets affine columns, and POD modes of
-    the non-affine part of its motion in ``trajectory`` (n, N, 3) m, up to the error `OWN_MOTION`.
+    the non-affine part of its motion in ``trajectory`` (n, N, 3) m, up to the error `OWN_MOTION`;
+    if that is None, its rows of ``modes``.
     ``points`` (N, 3) m is the rest shape, ``masses`` (N,) are in kg.
     """
     n = len(points)
@@ -86,7 +87,7 @@ def build_columns(
     weight = np.sqrt(masses[free_vertices])[:, None]
     raw = np.hstack([affine_columns(points), modes])[free_vertices]
     blocks = [(free_vertices, orthonormal(weight * raw) / weight)]
-    blocks += [(a, _atom_columns(a, points, trajectory, modes.shape[1])) for a in atoms]
+    blocks += [(a, _atom_columns(a, points, trajectory, modes)) for a in atoms]
     ends = np.cumsum([block.shape[1] for _, block in blocks])
     ranges = np.split(np.arange(ends[-1]), ends[:-1])
     b = np.zeros((n, ends[-1]))
@@ -96,16 +97,18 @@ def build_columns(
 
 
 def _atom_columns(
-    atom: np.ndarray, points: np.ndarray, trajectory: np.ndarray, most: int
+    atom: np.ndarray, points: np.ndarray, trajectory: np.ndarray | None, modes: np.ndarray
 ) -> np.ndarray:
+    if trajectory is None:
+        return orthonormal(np.hstack([affine_columns(points), modes])[atom])
     affine = orthonormal(affine_columns(points[atom]))
     motion = (trajectory[:, atom] - points[atom]).transpose(1, 0, 2).reshape(len(atom), -1)
     rest = motion - affine @ (affine.T @ motion)
-    modes, sigma = pod(rest)
+    own, sigma = pod(rest)
     scale = max(float(np.linalg.norm(motion)), np.finfo(float).eps * np.linalg.norm(points[atom]))
     found = int(np.count_nonzero(sigma > OWN_MOTION * scale))
-    count = min(found, most, len(atom) - affine.shape[1])
-    return np.hstack([affine, modes[:, :count]])
+    count = min(found, modes.shape[1], len(atom) - affine.shape[1])
+    return np.hstack([affine, own[:, :count]])
 
 
 def orthonormal(columns: np.ndarray) -> np.ndarray:

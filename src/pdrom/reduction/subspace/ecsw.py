@@ -21,10 +21,12 @@ import logging
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import groupby
+from typing import Any
 
 import numpy as np
 from scipy import linalg
 
+from pdrom.core.errors import SamplingError
 from pdrom.model.compiled.functions import compiled
 from pdrom.model.constraints.base import ConstraintGroup
 from pdrom.model.dynamics.stepper import State, Stepper
@@ -50,6 +52,9 @@ class TrainingFrame:
 
 
 Training = Sequence[TrainingFrame]
+Choose = Callable[[np.ndarray, np.ndarray, float], tuple[np.ndarray, np.ndarray]]
+"""Function of equations G (m, e), sums b (m,) and a tolerance; it returns indices (n,) of columns
+and factors x (n,) >= 0 with G x near b."""
 
 
 @dataclass(frozen=True)
@@ -133,6 +138,7 @@ def ecsw_elements(
     columns: Columns,
     training: Training,
     tolerances: Sequence[float],
+    choose: Choose | None = None,
 ) -> list[Samples]:
     """Select elements and their factors xi > 0 for each tolerance.
 
@@ -140,7 +146,7 @@ def ecsw_elements(
     hashing and stored with the samples; it is larger where even all candidates miss the tolerance.
     A group without any force in the training keeps all elements. In a large group, elements are
     chosen from a random (seeded) subset, which is doubled, up to `MOST`, until all tolerances are
-    met; factors fit sums over the whole group.
+    met; factors fit sums over the whole group. ``choose`` replaces the search (see `Choose`).
     """
     count, totals, force = CANDIDATES, list[np.ndarray](), False
     for frame, (_, differences, sums) in zip(
@@ -167,6 +173,9 @@ def ecsw_elements(
             chosen = np.random.default_rng(SEED).choice(group.elements, count, replace=False)
             eligible = np.sort(chosen)
         rows, sums = training_equations(group, columns, training, eligible)
+        if choose is not None:
+            own = [_checked(choose(rows, sums, bound), len(eligible)) for bound in tolerances]
+            return [Samples(eligible[at], xi, residual(eligible[at], xi)) for at, xi in own]
         search = _ActiveSet(rows, sums, apart=1)
         found = _search(search, tolerances, lambda at, xi: residual(eligible[at], xi))  # noqa: B023
         met = all(own[2] <= tolerance for own, tolerance in zip(found, tolerances, strict=True))
@@ -174,6 +183,21 @@ def ecsw_elements(
             return [Samples(eligible[at], factors, left) for at, factors, left in found]
         count *= 2
         del rows, search  # these are large: free them before the next ones are made
+
+
+def _checked(chosen: Any, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return what a `Choose` has ``chosen`` of ``count`` elements; SamplingError if unusable."""
+    try:
+        at, factors = (np.asarray(part) for part in chosen)
+        order = np.argsort(at, kind="stable")
+        at, factors = at[order].astype(np.int64, casting="safe"), factors[order].astype(float)
+    except (TypeError, ValueError, IndexError) as error:
+        raise SamplingError(f"selection: indices and factors are required ({error})") from error
+    if not len(at) or at[0] < 0 or at[-1] >= count or (np.diff(at) == 0).any():
+        raise SamplingError(f"selection: different indices from 0 to {count - 1} are required")
+    if factors.shape != at.shape or not (np.isfinite(factors) & (factors >= 0.0)).all():
+        raise SamplingError("selection: a finite factor >= 0 for each index is required")
+    return at, factors
 
 
 def _forces(

@@ -8,6 +8,7 @@ from typing import Any
 import h5py
 import numpy as np
 
+from pdrom.core.errors import NotReducibleError
 from pdrom.core.store import open_hdf5
 from pdrom.model.compiled.functions import compiled
 from pdrom.model.constraints.base import ConstraintGroup
@@ -41,6 +42,12 @@ class SubspaceModel:
     def elements_evaluated(self, scene: Scene) -> int:
         """Number of elements of ``scene`` whose projections an iteration evaluates."""
         return sum(len(self.chosen(group).elements) for group in scene.groups)
+
+    @property
+    def title(self) -> str:
+        """Numbers of modes and of sampled elements."""
+        sampled = sum(len(own.elements) for own in self.samples.values())
+        return f"{self.columns.modes} modes, {sampled or 'all'} elements"
 
     @property
     def residual(self) -> float | None:
@@ -121,6 +128,20 @@ def _multiply(panels, z, sums, result):
                 c[i] += w * r2 + x * s2 + y * t2 + v * u2
         for i in range(min(PANEL, len(result) - first)):
             result[first + i, 0], result[first + i, 1], result[first + i, 2] = a[i], b[i], c[i]
+
+
+def require_holds(scene: Scene, columns: spaces.Columns) -> None:
+    """Raise NotReducibleError if ``scene`` fixes vertices for which there are no ``columns``."""
+    for boundary in scene.boundaries:
+        for unit in boundary.units():
+            inside = [atom for atom in columns.atoms if np.isin(atom, unit).any()]
+            found = np.sort(np.concatenate([np.empty(0, np.int64), *inside]))
+            if not np.array_equal(found, np.sort(unit)):
+                held = boundary.side or f"{len(unit)} vertices"
+                raise NotReducibleError(
+                    f"scene '{scene.config.name}', effect '{boundary.name}': holds {held}; the "
+                    "training neither held these nor declared them (hold=[...], --hold)"
+                )
 
 
 def store_columns(store: h5py.Group, columns: spaces.Columns) -> None:

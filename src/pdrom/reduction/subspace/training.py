@@ -7,7 +7,7 @@ import numpy as np
 from pdrom.model.dynamics.stepper import State
 from pdrom.model.scene import Scene
 from pdrom.reduction.subspace import columns as spaces
-from pdrom.reduction.subspace.ecsw import ecsw_elements, training_run
+from pdrom.reduction.subspace.ecsw import Choose, ecsw_elements, training_run
 from pdrom.reduction.subspace.model import SubspaceModel
 
 # Elements are sampled on the iterates of this many frames, in equal shares of all training motions.
@@ -19,6 +19,8 @@ def make_columns(
     training: np.ndarray,
     pod: int = 0,
     skinning: int = 0,
+    own: np.ndarray | None = None,
+    hold: Sequence[np.ndarray] = (),
 ) -> spaces.Columns:
     """Columns of a position subspace for all of ``scenes``; fewer if there are not so many modes.
 
@@ -27,15 +29,20 @@ def make_columns(
     scenes : training scenes, on one mesh; what one of them holds has columns of its own
     training : (n, N, 3) m, positions in the training frames
     pod, skinning : numbers of POD modes of the training frames, and of skinning modes
+    own : (N, k) columns instead of POD modes
+    hold : further sets of vertices that a scene may hold
     """
     points, masses = scenes[0].mesh.points, scenes[0].masses
     parts = []
-    if pod or not skinning:
+    if own is not None:
+        parts.append(own)
+    elif pod or not skinning:
         parts.append(spaces.displacement_modes(training, points, masses, pod))
     if skinning:
         parts.append(spaces.skinning_modes(points, masses, skinning))
-    atoms = spaces.atoms(held_units(scenes), len(points))
-    return spaces.build_columns(np.hstack(parts), points, masses, atoms, training)
+    atoms = spaces.atoms([*hold, *held_units(scenes)], len(points))
+    motion = training if own is None else None
+    return spaces.build_columns(np.hstack(parts), points, masses, atoms, motion)
 
 
 def held_units(scenes: Sequence[Scene]) -> list[np.ndarray]:
@@ -49,12 +56,14 @@ def sampled_models(
     frames: np.ndarray,
     tolerances: Sequence[float],
     start: State | None = None,
+    choose: Choose | None = None,
 ) -> list[SubspaceModel]:
     """Models in ``columns`` with energy-conserving samples of every group, one per tolerance.
 
     Training data are iterates of runs of ``scenes`` in the subspace, with all elements projected.
     Of each run, equally many of ``frames`` are used, about `FRAMES` in total. The first run begins
-    at ``start``, in subspace coordinates, or (if None) at its initial state.
+    at ``start``, in subspace coordinates, or (if None) at its initial state. ``choose`` selects
+    elements instead of non-negative least squares.
     """
     count = -(-FRAMES // len(scenes))
     chosen = frames[np.unique(np.linspace(0, len(frames) - 1, count).round().astype(int))]
@@ -62,7 +71,7 @@ def sampled_models(
     for other in scenes[1:]:
         training += training_run(other, columns, chosen[chosen < other.config.frames])
     found = {
-        group.name: ecsw_elements(group, columns, training, tolerances)
+        group.name: ecsw_elements(group, columns, training, tolerances, choose)
         for group in scenes[0].groups
     }
     return [

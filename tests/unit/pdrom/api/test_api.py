@@ -15,9 +15,9 @@ from numba import njit
 from builders import GRAVITY, LEFT
 from pdrom import api
 from pdrom.api.pictures import viewed_scenes
-from pdrom.api.records import Rerun, Snapshots
+from pdrom.api.records import Snapshots
 from pdrom.api.runs import Basis, FrameReport, run_full_order
-from pdrom.core.errors import ConfigurationError, PdromError, RankError, StorageError
+from pdrom.core.errors import ConfigurationError, PdromError, StorageError
 from pdrom.core.store import write_hdf5
 from pdrom.model.mesh.types import Mesh
 from pdrom.model.runs import trajectory
@@ -34,13 +34,13 @@ KEYS = {"mesh": {"kind": "cloth", "rows": 6, "columns": 5, "plane": "xz"}, "fram
 
 
 @pytest.fixture(scope="module")
-def full() -> api.FullRun:
+def full() -> api.Run:
     return api.run(api.build_scene(effects=EFFECTS, **KEYS))
 
 
 @pytest.fixture(scope="module")
-def reduced(full: api.FullRun) -> api.ReducedRun:
-    return api.reduce(full, "spring", "block-deim", 2)
+def reduced(full: api.Run) -> api.Run:
+    return api.train(full, method="block-deim", r=2).run(full.scene)
 
 
 def test_the_pages_example_runs_and_is_short(tmp_path, monkeypatch, capsys):
@@ -49,17 +49,20 @@ def test_the_pages_example_runs_and_is_short(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     exec(compile(code, "library.md", "exec"), {})
     said = capsys.readouterr().out
-    assert "rank of the projections" in said
-    assert said.count("error at the end") == 3
+    assert "Model(a model of 'scene' (10 modes" in said
+    assert "against the run of 'scene' by full order, 10 iterations a frame" in said
     assert (tmp_path / "errors.png").stat().st_size > 10_000
 
 
 def test_the_page_has_every_name_and_no_function_more():
     functions = {n for n in api.__all__ if n[0].islower()}
-    assert set(re.findall(r"`([a-z_]+)\(", PAGE.split("| name |")[1])) == functions
-    assert len(functions) <= 10
+    assert (
+        set(re.findall(r"`([a-z_]+)\(", PAGE.split("| name |")[1].split("| object |")[0]))
+        == functions
+    )
+    assert len(functions) <= 11
     assert all(f"`{name}`" in PAGE for name in set(api.__all__) - functions)
-    for kind in (api.FullRun, api.ReducedRun, Snapshots, Rerun, Basis, Scene, Mesh, FrameReport):
+    for kind in (api.Run, api.Errors, api.Model, Snapshots, Basis, Scene, Mesh, FrameReport):
         (row,) = re.findall(rf"^\| `{kind.__name__}`.*", PAGE, re.MULTILINE)
         own = {field.name for field in fields(kind)}
         own |= {n for n, v in inspect.getmembers(kind) if kind is not Scene or not callable(v)}
@@ -107,36 +110,19 @@ def test_a_run_warns_of_held_vertices_that_enter_an_obstacle(name, caplog):
     assert "held vertices have targets inside 'sphere' and stay there" in caplog.text
 
 
-def test_the_full_rank_reproduces_the_run_and_few_modes_do_not(full):
-    """Snapshots train the basis at even frames; at full rank the rest is interpolation error."""
-    rank = api.basis(full, "spring").rank
-    best, poor = (api.reduce(full, "spring", "pod", r) for r in (rank, 1))
-    assert best.outcome.finite
-    assert best.gain == pytest.approx(1.0)
-    assert best.error[-1] < 0.1 * poor.error[-1]
-    with pytest.raises(RankError, match=f"r = {rank + 1}"):
-        api.reduce(full, "spring", "pod", rank + 1)
-
-
 def test_files_are_read_back(full, reduced, tmp_path):
-    api.save(reduced, tmp_path / "reduced.h5")
-    read = api.load(tmp_path / "reduced.h5")
-    assert isinstance(read, api.ReducedRun)
-    assert (read.title, read.gain, read.ms) == (reduced.title, reduced.gain, reduced.ms)
-    for kept, own in ((read.outcome, reduced.outcome), (read.full, replace(full, snapshots={}))):
-        for name in {*vars(own)} - {"scene"}:
-            assert np.array_equal(getattr(kept, name), getattr(own, name)), name
-    whole = np.sqrt(np.mean(np.square(reduced.error)))
-    errors, found = reduced.errors, read.errors
-    assert errors["relative_error_within_horizon"] == pytest.approx(whole)
-    assert errors.pop("contact_delay") is found.pop("contact_delay") is None  # there is no floor
-    assert found == errors
-    assert read.full.scene.config == full.scene.config
+    blown = replace(reduced, positions=full.positions[:4], ms=full.ms[:3], blowup_frame=3)
+    for run in (full, reduced, blown):
+        api.save(run, tmp_path / "run.h5")
+        read = api.load(tmp_path / "run.h5")
+        assert (read.method, read.blowup_frame) == (run.method, run.blowup_frame)
+        assert np.array_equal(read.positions, run.positions)
+        assert np.array_equal(read.ms, run.ms)
+        assert read.scene.config == full.scene.config
+        for name, own in run.snapshots.items():
+            assert np.array_equal(read.snapshots[name].p, own.p)
     with pytest.raises(PdromError, match="stored no snapshots"):
-        api.basis(read.full, "spring")
-    api.save(read, tmp_path / "again.h5", precision="single")
-    again = api.load(tmp_path / "again.h5")
-    assert np.array_equal(again.outcome.positions, read.outcome.positions.astype(np.float32))
+        api.basis(read, "spring")
     seen: list[int] = []
     stored = api.run(full.scene, tmp_path / "full.h5", lambda frame, report: seen.append(frame))
     assert seen == list(range(12))
@@ -164,32 +150,32 @@ def test_the_path_of_a_mesh_means_the_same_in_every_folder(tmp_path, monkeypatch
         api.load_scene(path)
 
 
-def spring(full, *args, **keys) -> api.ReducedRun:
-    return api.reduce(full, "spring", *args, **keys)
+def spring(full, *args, **keys) -> api.Model:
+    return api.train(full, group="spring", **dict(zip(["method", "r"], args, strict=False)), **keys)
 
 
 FAULTY = {
     "no effects": (lambda *_: api.build_scene(**KEYS), "key 'effects' is missing"),
     "method misspelt": (lambda full, _: spring(full, "gapy"), "did you mean 'gappy'"),
-    "group not there": (lambda full, _: api.reduce(full, "strain"), "no group 'strain'"),
+    "group not there": (lambda full, _: api.train(full, group="strain"), "no group 'strain'"),
     "no snapshots": (lambda full, _: spring(replace(full, snapshots={})), "stored no snapshots"),
     "mesh not there": (lambda _, p: given({"kind": "file", "path": "x.obj"}, folder=p), r"x\.obj"),
     "positions cut": (lambda full, _: replace(full, positions=full.positions[:-1]), "positions of"),
     "mesh no pair": (lambda *_: given((1, 2, 3)), "mesh of 3 parts"),
-    "r a fraction": (lambda full, _: spring(full, r=1.5), "r = 1.5: a whole number"),
-    "r zero": (lambda full, _: spring(full, r=0), "r = 0, the snapshots have"),
-    "no run": (lambda full, _: api.reduce(full.scene, "spring"), "full = Scene.*a FullRun is"),
-    "basis of arrays": (lambda full, _: spring(full, r=1, basis_of_group=1), "a Basis is required"),
-    "requested error": (lambda full, _: api.reduce(full, error=0.1), "error: runs within a req"),
+    "r a fraction": (lambda full, _: spring(full, r=1.5), "r = 1.5: Input should be a val"),
+    "r zero": (lambda full, _: spring(full, r=0), "r = 0: Input should be greater"),
+    "no run": (lambda full, _: api.train(full.scene), "full = Scene.*a Run is"),
+    "basis of a triangle": (lambda full, _: api.train(full, basis=np.eye(3)), "basis: float64"),
+    "basis NaN": (
+        lambda full, _: api.train(full, basis=np.full((30, 2), np.nan)), "basis: entry .* is nan",
+    ),
     "error of a scene": (lambda *_: given((SQUARE, HALVES), requested_error=1), "runs within a"),
-    "argument misspelt": (lambda full, _: spring(full, metod="pod"), "no argument 'metod'"),
-    "plot of a run": (lambda full, _: api.plot(full), "plot = FullRun.*a ReducedRun"),
-    "plot of nothing": (lambda *_: api.plot(), "at least one run"),
+    "plot of a run": (lambda full, _: api.plot(full), "at least one run"),
     "view of nothing": (lambda _, p: api.view(p / "v"), "view"),
     "view into a folder": (lambda full, p: api.view(p, full), "cannot be written .a folder"),
     "load of a folder": (lambda _, p: api.load(p), "is a folder"),
     "run into a folder": (lambda full, p: api.run(full.scene, p), "cannot be written .a folder"),
-    "scene a folder": (lambda _, p: api.load_scene(p), "a folder, name a file in it"),
+    "scene a folder": (lambda _, p: api.load_scene(p), "no such configuration file"),
     "mass NaN": (lambda *_: given((SQUARE, HALVES), vertex_mass=np.nan), "vertex_mass"),
     "mesh nothing": (lambda *_: given(None), "key 'mesh' is"),
     "corner beyond": (lambda *_: given((SQUARE, [[0, 1, 4]])), "names vertex"),
@@ -215,18 +201,6 @@ def test_wrong_arguments_are_named_in_one_line(full, tmp_path, name):
         call(full, tmp_path)
     assert len(str(caught.value).splitlines()) == 1
     assert list(tmp_path.iterdir()) == []
-
-
-def test_a_basis_of_another_scene_is_refused(full):
-    """One that fits gives the run that the function makes by itself."""
-    other = api.build_scene(mesh=KEYS["mesh"] | {"rows": 7}, frames=12, effects=EFFECTS)
-    made = api.basis(api.run(other), "spring", "gappy")
-    with pytest.raises(ConfigurationError, match="group 'spring' of this scene has"):
-        api.reduce(full, "spring", "gappy", 2, basis_of_group=made)
-    own = api.basis(full, "spring", "gappy")
-    fitting = api.reduce(full, "spring", "gappy", np.int64(2), basis_of_group=own)
-    alone = api.reduce(full, "spring", "gappy", 2)
-    assert np.array_equal(fitting.outcome.positions, alone.outcome.positions)
 
 
 SQUARE = [[0.0, 1.0, 0.0], [1.0, 1.0, 0.0], [1.0, 1.0, 1.0], [0.0, 1.0, 1.0]]
@@ -266,20 +240,23 @@ def test_scenes_and_runs_are_copied_and_pickled(full, reduced):
         assert np.array_equal(trajectory(scene), full.positions)
     for again in copies(reduced):
         assert repr(again) == repr(reduced)
-        assert np.array_equal(again.error, reduced.error)
-        one = api.reduce(again.full, "spring", "block-deim", 2)
-        assert np.array_equal(one.outcome.positions, reduced.outcome.positions)
+        assert np.array_equal(again.positions, reduced.positions)
+    model = api.train(full, modes=4, converged=False)
+    for one in copies(model):
+        assert np.array_equal(one.run(full.scene).positions, model.run(full.scene).positions)
 
 
 def test_representations_are_one_line(full):
-    made, reduced = api.basis(full, "spring"), api.reduce(full, "spring", "pod", 2)
+    made, model = api.basis(full, "spring"), api.train(full, method="pod", r=2)
     shown = [
-        (full, "FullRun(Scene('scene', 30 vertices, 12 frames: gravity, pins, spring), "),
+        (full, "Run(Scene('scene', 30 vertices, 12 frames: gravity, pins, spring), full order, "),
         (full.scene, "Scene('scene', 30 vertices"),
         (full.scene.mesh, "Mesh(points=<30 x 3 float64>"),
         (full.snapshots["spring"], "Snapshots(p=<6 x "),
-        (reduced, "ReducedRun('scene': spring, pod, r = 2, gain 1, error "),
-        (reduced.outcome, "Rerun(positions=<13 x 30 x 3 float64>"),
+        (
+            model,
+            "Model(a model of 'scene' (spring, POD projection, r = 2, gain 1): 69 of 69 elements",
+        ),
         (made, "Basis(V=<"),
     ]
     for value, words in shown:
@@ -296,38 +273,37 @@ def test_docstrings_tell_every_argument(name):
         assert f"\n{argument} : " in told
 
 
-def test_a_picture_has_a_line_for_each_run_and_a_cross_for_a_blow_up(reduced):
-    blown = replace(reduced, outcome=replace(reduced.outcome, blowup_frame=7))
-    (axes,) = api.plot(reduced, blown).axes
+def test_a_picture_has_a_line_for_each_run_and_a_cross_for_a_blow_up(full, reduced):
+    blown = replace(reduced, positions=full.positions[:8], ms=full.ms[:7], blowup_frame=7)
+    (axes,) = api.plot(full, reduced, blown).axes
     named = [line for line in axes.lines if not line.get_label().startswith("_")]
-    assert [line.get_label() for line in named] == [reduced.title] * 2
+    assert [line.get_label() for line in named] == [reduced.method] * 2
     assert len(axes.lines) == 3
     time, error = named[0].get_data()
     assert time == pytest.approx(0.016 * np.arange(1, 13))
-    assert error == pytest.approx(np.clip(reduced.error, 1e-7, 1e3))
+    assert error == pytest.approx(np.clip(reduced.errors(full), 1e-7, 1e3))
 
 
-def test_runs_of_one_scene_are_shown_together_by_size(full, reduced):
-    smaller = api.reduce(full, "spring", "block-deim", 1)
-    (shown,) = viewed_scenes(reduced, smaller, full)
-    assert [run.r for run in shown.sizes("spring", "block-deim")] == [1, 2]
-    assert {run.group for run in shown.runs} == {"spring"}
+def test_runs_of_one_scene_are_shown_together(full, reduced):
+    (shown,) = viewed_scenes(reduced, full)
+    assert [run.title for run in shown.runs] == [reduced.method]
     assert np.array_equal(shown.positions, full.positions)
+    (alone,) = viewed_scenes(reduced)
+    assert np.array_equal(alone.positions, reduced.positions)
     other = api.run(api.build_scene(effects=EFFECTS, **KEYS, name="other"))
     assert [one.name for one in viewed_scenes(full, other)] == ["scene", "other"]
 
 
 def test_records_are_compared_and_hashed_by_identity(reduced):
-    for record in (reduced, reduced.full):
-        assert record == record
-        assert record != replace(record)
-        assert len({record, reduced.full.scene}) == 2
+    assert reduced == reduced
+    assert reduced != replace(reduced)
+    assert len({reduced, reduced.scene}) == 2
 
 
 def test_a_run_from_elsewhere_reads_no_other_file(reduced, tmp_path):
     api.save(reduced, tmp_path / "one.h5")
     path = tmp_path / "two.h5"
     with write_hdf5(path) as file:
-        file["positions"] = h5py.ExternalLink(str(tmp_path / "one.h5"), "/full")
+        file["positions"] = h5py.ExternalLink(str(tmp_path / "one.h5"), "/positions")
     with pytest.raises(StorageError, match="leads elsewhere"):
         api.load(path)

@@ -47,18 +47,15 @@ def require_results_or_lines(call: Callable[[Any], object], *more: Any) -> None:
 def known() -> dict[str, Any]:
     """A right value of every argument."""
     full = api.run(api.build_scene(**KEYS))
-    reduced, basis = (make(full, "spring", "pod") for make in (spring, api.basis))
+    model = api.train(full, modes=4, converged=False, tolerance=None)
     return KEYS | {
-        "full": full, "reduced": reduced, "runs": reduced, "group": "spring", "method": "pod",
-        "r": 1, "basis_of_group": basis, "folder": ".", "out": "out.h5",
-        "path": "path.h5", "unchecked": False,
+        "full": full, "others": full, "reference": full, "runs": full, "run": full, "model": model,
+        "group": "spring", "method": "pod", "r": 1, "modes": 4, "tolerance": None,
+        "converged": False, "folder": ".", "out": "out.h5", "path": "path.h5", "unchecked": False,
     }  # fmt: skip
 
 
-def spring(full: api.FullRun, group: str = "spring", method: str = "pod", **keys: Any) -> Any:
-    return api.reduce(full, group, method, 1, **keys)
-
-
+PLACED = ("path", "full", "others", "reference", "runs")
 ARGUMENTS = [
     (name, key)
     for name in filter(str.islower, api.__all__)
@@ -75,41 +72,37 @@ def test_an_argument(known, tmp_path, monkeypatch, capfd, name, key):
         right["scene"] = known["full"].scene
     taken = inspect.signature(function).parameters
     right = {each: right[each] for each in (KEYS if "keys" in taken else taken) if each in right}
+    if name == "train" and key not in ("group", "method", "r"):
+        del right["group"], right["method"], right["r"]
 
     def call(value: Any) -> None:
         given = right | {key: value}
-        function(*[given.pop(each) for each in taken if "runs" in taken], **given)
+        many = {"runs", "others"} & {*taken}
+        function(*[given.pop(each) for each in [*given] if many and each in PLACED], **given)
 
     require_results_or_lines(call)
     assert capfd.readouterr() == ("", "")  # also of compiled libraries, such as LAPACK
 
 
 def use(run: Any) -> None:
-    """Do with a run, or with a basis, all that the package does with it."""
+    """Do with a run all that the package does with it."""
     repr(run)
     api.view("page.html", run)
-    if isinstance(run, api.FullRun):
-        spring(run)
-        return
+    api.train(run, method="pod", r=1)
+    api.plot(run, run)
     api.save(run, "run.h5")
-    if isinstance(run, api.ReducedRun):
-        assert api.plot(run).axes
-        assert run.errors
 
 
-@pytest.mark.parametrize("kind", ["full", "snapshots", "reduced", "rerun", "basis"])
+@pytest.mark.parametrize("kind", ["run", "snapshots"])
 def test_a_field(known, tmp_path, monkeypatch, capfd, kind):
     monkeypatch.chdir(tmp_path)
-    full, reduced = known["full"], known["reduced"]
+    full = known["full"]
     record, tried = {
-        "full": (full, use),
+        "run": (full, use),
         "snapshots": (
             full.snapshots["spring"],
             lambda s: use(replace(full, snapshots={"spring": s})),
         ),
-        "reduced": (reduced, use),
-        "rerun": (reduced.outcome, lambda outcome: use(replace(reduced, outcome=outcome))),
-        "basis": (known["basis_of_group"], lambda basis: spring(full, basis_of_group=basis)),
     }[kind]
     for field in fields(record):
         right, spoilt = np.array(getattr(record, field.name)), ()
@@ -118,4 +111,15 @@ def test_a_field(known, tmp_path, monkeypatch, capfd, kind):
         require_results_or_lines(
             lambda value, name=field.name: tried(replace(record, **{name: value})), *spoilt
         )
+    assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("argument", ["scene", "out", "on_frame", "iterations", "path"])
+def test_an_argument_of_a_models_methods(known, tmp_path, monkeypatch, capfd, argument):
+    monkeypatch.chdir(tmp_path)
+    model, scene = known["model"], known["full"].scene
+    if argument == "path":
+        require_results_or_lines(model.save)
+    else:
+        require_results_or_lines(lambda value: model.run(**{"scene": scene, argument: value}))
     assert capfd.readouterr() == ("", "")

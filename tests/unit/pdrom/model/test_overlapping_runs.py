@@ -92,14 +92,15 @@ def test_a_run_writes_neither_to_its_scene_nor_to_another_run(effect, kind):
 def test_threads_get_the_runs_alone(effect):
     scene = scene_with(effect)
     alone, group = api.run(scene), scene.groups[-1].name
-    reduced = api.reduce(alone, group, "gappy", 3)
+    model = api.train(alone, group=group, r=3)
+    reduced = model.run(scene)
     with ThreadPoolExecutor(4) as pool:
         runs = [pool.submit(api.run, scene) for _ in range(3)]
-        others = [pool.submit(api.reduce, alone, group, "gappy", 3) for _ in range(3)]
+        others = [pool.submit(model.run, scene) for _ in range(3)]
     for run, other in zip(runs, others, strict=True):
         np.testing.assert_array_equal(run.result().positions, alone.positions)
         np.testing.assert_array_equal(run.result().snapshots[group].p, alone.snapshots[group].p)
-        np.testing.assert_array_equal(other.result().outcome.positions, reduced.outcome.positions)
+        np.testing.assert_array_equal(other.result().positions, reduced.positions)
 
 
 def test_a_group_of_a_scene_refuses_what_belongs_to_a_run():

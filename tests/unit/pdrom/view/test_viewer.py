@@ -63,9 +63,9 @@ def viewed(
     bent[..., 1] += 1.5 * t * np.abs(mesh.points[:, 0])
     error = np.linspace(1e-3, 1.0, frames)
     half = frames // 2
-    near = ViewedRun("spring", "near", 6, full + 0.01, error, None, 0.5)
+    near = ViewedRun("near", full + 0.01, error, None, 0.5)
     end = half + 1
-    far = ViewedRun("spring", "far", 6, bent[:end], error[:half], half, None)
+    far = ViewedRun("far", bent[:end], error[:half], half, None)
     return ViewedScene(
         name, "A <sheet> <!--<script> </script>", mesh, 0.02, full, 1.0,
         (near, far)[:runs], tuple(effect_config(entry, i) for i, entry in enumerate(effects)),
@@ -225,7 +225,7 @@ def test_a_page_that_was_cut_says_so(tmp_path: Path) -> None:
 def test_two_methods_and_two_frames_differ_and_their_errors_are_explained(opened: Page) -> None:
     shapes = opened.locator("#shapes")
     assert opened.locator("#state").count() == 0
-    choose(opened, scene="sheet", method="near")
+    choose(opened, scene="sheet", run="near")
     # errors of both runs are from 1e-3 to 1
     assert opened.get_attribute("#errors", "data-decades") == "-3 0"
     assert "over the full order's motion" in opened.inner_text("#about")
@@ -237,7 +237,7 @@ def test_two_methods_and_two_frames_differ_and_their_errors_are_explained(opened
     near = picture(shapes)
     assert differ(start, near)
     assert "frame 6, 0.12 s" in opened.inner_text("#status")
-    choose(opened, method="far")
+    choose(opened, run="far")
     assert differ(near, picture(shapes))
     assert "blew up at frame 6" in opened.inner_text("#about")
 
@@ -245,19 +245,19 @@ def test_two_methods_and_two_frames_differ_and_their_errors_are_explained(opened
 @pytest.mark.slow
 def test_views_and_scenes_are_chosen(opened: Page) -> None:
     shapes = opened.locator("#shapes")
-    choose(opened, scene="sheet", method="near")
+    choose(opened, scene="sheet", run="near")
     beside = picture(shapes)
     choose(opened, view="on top of each other")
     assert differ(beside, picture(shapes))
     choose(opened, scene="other", view="side by side")
-    assert opened.locator("#method").is_disabled()
+    assert opened.locator("#run").is_disabled()
     assert "A <sheet> <!--<script> </script>" in opened.inner_text("#about")
 
 
 @pytest.mark.slow
 def test_folds_are_seen_and_the_colour_of_distances_can_be_left_out(opened: Page) -> None:
     """Lit: the grey sheet, bent as it is, has clearly lighter and darker faces."""
-    choose(opened, scene="sheet", method="far", view="side by side")
+    choose(opened, scene="sheet", run="far", view="side by side")
     go_to(opened, 6)
     shapes = picture(opened.locator("#shapes"))
     red, _, blue = np.moveaxis(shapes, 2, 0)
@@ -280,13 +280,13 @@ def test_folds_are_seen_and_the_colour_of_distances_can_be_left_out(opened: Page
 def test_a_scene_with_another_gravity_is_seen_from_another_side(opened: Page) -> None:
     """The same shape, whose up is another direction."""
     shapes = opened.locator("#shapes")
-    choose(opened, scene="sheet", method="near", view="on top of each other")
+    choose(opened, scene="sheet", run="near", view="on top of each other")
     go_to(opened, 0)
     upright = picture(shapes)
-    choose(opened, scene="sideways", method="near")
+    choose(opened, scene="sideways", run="near")
     go_to(opened, 0)
     assert differ(upright, picture(shapes))
-    choose(opened, scene="sheet", method="near")
+    choose(opened, scene="sheet", run="near")
     go_to(opened, 0)
     assert not differ(upright, picture(shapes))
     choose(opened, view="side by side")
@@ -297,10 +297,10 @@ def test_obstacles_are_seen_in_both_views_and_stay(opened: Page) -> None:
     """Translucent: the sheets behind them still change from frame to frame."""
     shapes = opened.locator("#shapes")
     for view in ("side by side", "on top of each other"):
-        choose(opened, view=view, scene="sheet", method="near")
+        choose(opened, view=view, scene="sheet", run="near")
         go_to(opened, 0)
         without = picture(shapes)
-        choose(opened, scene="obstacles", method="near")
+        choose(opened, scene="obstacles", run="near")
         go_to(opened, 0)
         start = picture(shapes)
         assert differ(without, start)
@@ -311,7 +311,7 @@ def test_obstacles_are_seen_in_both_views_and_stay(opened: Page) -> None:
 
 @pytest.mark.slow
 def test_playing_goes_through_the_frames_and_stops(opened: Page) -> None:
-    choose(opened, scene="sheet", method="near")
+    choose(opened, scene="sheet", run="near")
     go_to(opened, 0)
     opened.focus("#play")
     opened.keyboard.press("Enter")

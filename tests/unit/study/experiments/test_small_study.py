@@ -19,7 +19,6 @@ from pdrom.core.store.checksum import write_block
 from pdrom.core.yamlfile import read_yaml
 from pdrom.model.held_out import MOTIONS
 from pdrom.model.mesh.types import Mesh, stored_mesh
-from pdrom.model.metrics import trajectory_error
 from places import CONFIG
 from small_scene import run_jobs
 from study.artifact import paths
@@ -360,18 +359,19 @@ def test_the_package_and_the_command_give_the_runs_of_the_study(at, array, table
     config = Path(at(paths.MACHINE)).parents[1] / "config"
     full = api.run(api.load_scene(config / "scenes" / f"{SCENE}.yaml"))
     assert np.array_equal(full.positions, array(paths.TRAIN, "positions"))
-    reduced = api.reduce(full, GROUP, METHOD, 2)
+    model = api.train(full, group=GROUP, method=METHOD, r=2)
     row = table(paths.RERUNS_TRAIN).set_index("r").loc[2]
-    moved = norms(full.positions[1:] - full.positions[0])
-    assert trajectory_error(reduced.outcome.difference, moved) == pytest.approx(
-        row.relative_error, rel=1e-9
-    )
-    assert reduced.gain == pytest.approx(row.gain, rel=1e-9)
-    asked = ["--group", GROUP, "--method", METHOD, "--r", "2", "--out", str(tmp_path / "run.h5")]
-    assert main.run(["reduce", str(config / "scenes" / f"{SCENE}.yaml"), *asked]) == 0
-    said = capsys.readouterr().out
-    assert f"relative error {row.relative_error:.2g} " in said
-    assert f"gain {row.gain:.3g} " in said
+    error = model.run(full.scene).error(full).position
+    assert error == pytest.approx(row.relative_error, rel=1e-9)
+    assert model.reduced.reduction.gain == pytest.approx(row.gain, rel=1e-9)
+    scene, out = str(config / "scenes" / f"{SCENE}.yaml"), str(tmp_path / "a.model.h5")
+    asked = ["--group", GROUP, "--method", METHOD, "--r", "2", "--out", out]
+    assert main.run(["train", scene, *asked]) == 0
+    assert f"gain {row.gain:.3g})" in capsys.readouterr().out
+    full_run, run = str(tmp_path / "full.h5"), str(tmp_path / "run.h5")
+    assert main.run(["run", scene, "--out", full_run]) == 0
+    assert main.run(["run", scene, "--model", out, "--compare", full_run, "--out", run]) == 0
+    assert f"errors {row.relative_error:.2g} (positions)" in capsys.readouterr().out
     stored = api.load(at(paths.TRAIN))
     assert np.array_equal(stored.positions, full.positions)
     assert np.array_equal(stored.snapshots[GROUP].p[::2], full.snapshots[GROUP].p)

@@ -208,8 +208,8 @@ def test_basis_of_all_iterates_reruns_the_full_order_run(group):
 
 
 def steps_of(scene, steps):
-    """Run of a step loop with these local steps, and the initial state."""
-    return scene.stepper(local_steps=steps, track_objective=False).run, scene.initial_state()
+    """Step loop with these local steps, and the initial state."""
+    return scene.stepper(local_steps=steps, track_objective=False), scene.initial_state()
 
 
 def test_full_local_steps_repeat_the_run_to_the_bit():

@@ -1,0 +1,317 @@
+"""Reduced models: what `pdrom.api.train` returns; they run scenes, and are saved and loaded."""
+
+import json
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter, process_time
+from typing import Any
+
+import h5py
+import numpy as np
+import pandas as pd
+
+from pdrom.api import files
+from pdrom.api.records import Run
+from pdrom.core import store
+from pdrom.core.errors import ConfigurationError, PdromError, StorageError
+from pdrom.core.provenance import made_by
+from pdrom.core.yamlfile import shown, validate
+from pdrom.model.constraints.base import GroupConfig
+from pdrom.model.dynamics.stepper import FrameReport, State, Stepper
+from pdrom.model.mesh.types import store_mesh, stored_mesh
+from pdrom.model.runs import BLOWUP_EXTENT
+from pdrom.model.scene import Scene, SceneConfig
+from pdrom.reduction.rerun import rerun
+from pdrom.reduction.sampling.model import ProjectionModel
+from pdrom.reduction.subspace import model as subspaces
+from pdrom.reduction.subspace.ecsw import Samples
+from pdrom.reduction.subspace.interpolation import SubspaceLocalStep
+from pdrom.reduction.subspace.model import SubspaceModel
+from pdrom.reduction.subspace.space import ReducedSpace, reduced_state
+
+FORMAT = 1  # version of the file of a model
+BUSY = 1.25  # wall time over processor time from which the processor counts as busy
+OnFrame = Callable[[int, FrameReport], None]
+
+
+def silent(frame: int, report: FrameReport) -> None:
+    """Do nothing after a frame."""
+
+
+@dataclass(frozen=True)
+class Training:
+    """How a model was trained.
+
+    trajectories : names of the training trajectories
+    converged : whether their frames were solved to convergence
+    tolerance : sampling tolerance: bound of the relative residual of the training equations; None
+        without sampling
+    residual : the residual that was reached, the largest of all groups; None without sampling
+    seconds : time of the training, s
+    """
+
+    trajectories: tuple[str, ...]
+    converged: bool
+    tolerance: float | None
+    residual: float | None
+    seconds: float
+
+    def __str__(self) -> str:
+        solved = "converged frames" if self.converged else "the scene's iterations"
+        text = f"trained on {', '.join(self.trajectories)} ({solved}) in {self.seconds:.3g} s"
+        if self.tolerance is None or self.residual is None:
+            return text
+        missed = f", misses the tolerance {self.tolerance:g}" * (self.residual > self.tolerance)
+        return f"{text}, residual {self.residual:.2g}{missed}"
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """A reduced model: runs scenes on the mesh of its training, with the same constraint groups.
+
+    scene : the first scene of the training
+    reduced : what is computed: a position subspace with sampled elements, or all vertices with the
+        projections of a group reduced
+    training : how it was trained
+    validation : table of trajectories: ``trajectory``, ``position_error``, ``deformation_error``,
+        ``replay_error`` (position error of the first training run, shown instead), ``ms`` per
+        frame, ``speedup`` over the full order, ``busy`` (other programs ran: times mean nothing)
+    """
+
+    scene: Scene
+    reduced: SubspaceModel | ProjectionModel
+    training: Training
+    validation: pd.DataFrame
+
+    def __repr__(self) -> str:
+        total = sum(group.elements for group in self.scene.groups)
+        used = f"{self.reduced.elements_evaluated(self.scene)} of {total} elements"
+        return f"Model({self.title}: {used}, {self.training}{self._validated()}, {self._size})"
+
+    @property
+    def title(self) -> str:
+        """Name of the training scene and size of the model."""
+        return f"a model of '{self.scene.config.name}' ({self.reduced.title})"
+
+    @property
+    def _size(self) -> str:
+        own = self.reduced
+        kept = own.columns.B if isinstance(own, SubspaceModel) else own.reduction.basis.V
+        return f"{kept.nbytes / 1e6:.1f} MB"
+
+    def _validated(self) -> str:
+        if self.validation.empty:
+            return ""
+        worst = self.validation[["position_error", "deformation_error"]].astype(float).max()
+        return (
+            f", largest errors {worst.iloc[0]:.2g} (positions), {worst.iloc[1]:.2g} (deformation)"
+        )
+
+    def run(
+        self,
+        scene: Scene,
+        out: str | os.PathLike[str] | None = None,
+        on_frame: OnFrame = silent,
+        iterations: int | None = None,
+    ) -> Run:
+        """Run ``scene``; a run that blows up ends there and is a result like any other.
+
+        Parameters
+        ----------
+        scene : scene with the mesh and the constraint groups of the training; weights, masses,
+            forces and the time step may differ; it may hold what a training scene held or declared
+        out : file (HDF5) to write; None writes no file
+        on_frame : called after each frame with its number, from 0, and the solver's report
+        iterations : local-global iterations of a frame; None: those of the scene
+
+        Returns
+        -------
+        Run
+            Positions of all vertices, and milliseconds of each frame, in which they are included.
+
+        Raises
+        ------
+        ConfigurationError, NotReducibleError, StorageError
+            The scene has another mesh, other groups or holds, or an effect that the model cannot
+            simulate; ``out`` cannot be written.
+        """
+        files.require(Scene, scene, "scene", source="build_scene and load_scene make one")
+        files.require_function(on_frame, "on_frame")
+        if not (iterations is None or (type(iterations) is int and 1 <= iterations <= 10_000)):
+            raise ConfigurationError(
+                f"iterations = {shown(iterations, 60)}: allowed are 1 to 10000"
+            )
+        if out is not None:
+            store.require_place(files.file_path(out))
+            store.require_own(out)
+        scene = scene.iterated(iterations, scene.config.anderson_window) if iterations else scene
+        loop, start = self.loop(scene)
+        next(loop.run(start, range(1)))  # loads compiled code, which no frame's time shall include
+        lift = self.reduced.positions
+        run = rerun(scene, loop, start, None, BLOWUP_EXTENT, lift, on_frame)
+        ended = run.blowup_frame
+        found = Run(scene, run.positions, run.ms, method=self.title, blowup_frame=ended)
+        if out is not None:
+            files.save(found, out)
+        return found
+
+    def loop(self, scene: Scene) -> tuple[Stepper, State]:
+        """Step loop of ``scene`` in the model's unknowns, and the initial state; see `run`."""
+        require_same_mesh(self.scene, scene)
+        if isinstance(self.reduced, SubspaceModel):
+            subspaces.require_holds(scene, self.reduced.columns)
+        return self.reduced.loop(scene)
+
+    def speed(self, scene: Scene, frames: int = 20, repeats: int = 5) -> dict[str, Any]:
+        """Measure the model and the full order in turn, in this process, on ``scene``.
+
+        Return ``ms`` and ``full_ms`` per frame, medians of ``repeats`` runs of the first ``frames``
+        frames, their ratio ``speedup``, and ``busy``, whether other programs ran meanwhile.
+        """
+        frames = min(frames, scene.config.frames)
+        kinds: list[tuple[Callable[[], tuple[Stepper, State]], Callable[..., Any]]] = [
+            (lambda: self.loop(scene), self.reduced.positions),
+            (lambda: (scene.stepper(track_objective=False), scene.initial_state()), lambda q: q),
+        ]
+        made = [(*loop(), lift) for loop, lift in kinds]
+        spent = [[_ms(*one, frames) for one in made] for _ in range(1 + repeats)][1:]
+        (ms, full), share = (
+            np.median([[w for w, _ in pair] for pair in spent], axis=0),
+            np.median([wall / max(used, 1e-9) for pair in spent for wall, used in pair]),
+        )
+        return {"ms": ms, "full_ms": full, "speedup": full / ms, "busy": bool(share > BUSY)}
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the model to the file ``path`` (HDF5), from which `load_model` reads it."""
+        path = files.file_path(path)
+        store.require_own(path)
+        config = {"scene": self.scene.config.model_dump(mode="json")}
+        with made_by("pdrom.api.Model.save", config), store.write_hdf5(path) as file:
+            file.attrs.update(format=FORMAT, kind=type(self.reduced).__name__)
+            store_mesh(self.scene.mesh, file.create_group("mesh"))
+            file["masses"] = self.scene.masses
+            record = file.create_group("training")
+            known: dict[str, Any] = {
+                "tolerance": np.nan,
+                "residual": np.nan,
+            }  # of a model without sampling
+            known |= {name: v for name, v in vars(self.training).items() if v is not None}
+            record["trajectories"] = list(known.pop("trajectories"))
+            record.attrs.update(known)
+            table = file.create_group("validation", track_order=True)
+            for name, values in self.validation.items():
+                table[str(name)] = values.to_list()
+            own = file.create_group("model")
+            if isinstance(self.reduced, ProjectionModel):
+                self.reduced.store(own)
+                return
+            subspaces.store_columns(own.create_group("columns"), self.reduced.columns)
+            subspaces.store_model(own, {}, self.reduced.samples)
+            _export(self.scene, self.reduced, file.create_group("frame"))
+
+
+def require_same_mesh(own: Scene, other: Scene) -> None:
+    """Raise ConfigurationError if ``other`` has another mesh or other groups than ``own``."""
+    for name in ("points", "triangles", "tetrahedra"):
+        if not np.array_equal(getattr(own.mesh, name), getattr(other.mesh, name)):
+            fault = f"another mesh than that of the training ({own.mesh.vertices} vertices)"
+            raise ConfigurationError(f"scene '{other.config.name}': {fault}")
+    wanted, found = (
+        {e.effect: e.model_copy(update={"weight": 1.0})
+         for e in scene.config.effects if isinstance(e, GroupConfig)}
+        for scene in (own, other)
+    )  # fmt: skip
+    if wanted != found:
+        raise ConfigurationError(
+            f"scene '{other.config.name}': groups {', '.join(found)}, required are those of the "
+            f"training with all keys but their weights: {', '.join(wanted)}"
+        )
+
+
+def _ms(loop: Stepper, start: State, lift: Callable[..., Any], frames: int) -> tuple[float, float]:
+    """Milliseconds per frame, wall and processor time, of ``frames`` frames of ``loop``."""
+    wall, used = perf_counter(), process_time()
+    for state, _ in loop.run(start, range(frames)):
+        lift(state.positions)
+    return 1e3 * (perf_counter() - wall) / frames, 1e3 * (process_time() - used) / frames
+
+
+def _export(scene: Scene, model: SubspaceModel, file: h5py.Group) -> None:
+    """Write what a frame of the training scene needs, for programs without pdrom, to ``file``."""
+    steps = {}
+    for group in scene.groups:
+        chosen = model.chosen(group)
+        if not isinstance(chosen, Samples):
+            return
+        steps[group] = SubspaceLocalStep(group, model.columns, chosen.elements, chosen.factors)
+    space = ReducedSpace(scene, model.columns, [step.matrix for step in steps.values()])
+    start = reduced_state(scene, model.columns)
+    fixed, targets, _ = space.fixed(0, start.positions)
+    arrays: dict[str, tuple[Any, str]] = {
+        "held": (fixed, ""), "targets": (targets, ""),
+        "matrix": (space.matrix, "kg/s^2"), "inertia": (space.inertia_matrix, "kg/s^2"),
+        "positions": (start.positions, ""), "velocities": (start.velocities, "1/s"),
+    }  # fmt: skip
+    for i, (constant, rate) in enumerate(space.forces):
+        arrays |= {f"forces/{i}/constant": (constant, "1/s^2"), f"forces/{i}/rate": (rate, "1/s")}
+    for group, step in steps.items():
+        arrays[f"groups/{group.name}/strain"] = step.strain, "1"
+        arrays[f"groups/{group.name}/weights"] = step.group.row_weights, "N/m"
+    for name, (values, unit) in arrays.items():
+        file[name] = values
+        file[name].attrs["unit"] = unit
+    file.attrs.update(time_step=scene.config.time_step, iterations=scene.config.iterations)
+
+
+def load_model(path: str | os.PathLike[str]) -> Model:
+    """Read a model that `Model.save` wrote; it runs with the same bits as the saved one.
+
+    Parameters
+    ----------
+    path : file (HDF5)
+
+    Raises
+    ------
+    StorageError
+        The file is missing, damaged or edited, holds no model, or is of a newer version.
+    """
+    path = files.file_path(path)
+    try:
+        with store.open_hdf5(path) as file:
+            store.require_self_contained(file, path)
+            if "model" not in file or "format" not in file.attrs:
+                raise StorageError(f"{path}: holds no model (pdrom show says what it holds)")
+            version = int(file.attrs["format"])
+            if version > FORMAT:
+                fault = f"a model of version {version}, this pdrom reads up to {FORMAT}"
+                raise StorageError(f"{path}: {fault}: a newer pdrom wrote it")
+            return _model(file, path)
+    except StorageError:
+        raise
+    except (PdromError, ValueError, TypeError, LookupError, RuntimeError, AttributeError) as error:
+        fault = " ".join(str(error).split())[:200]
+        raise StorageError(f"{path}: holds no sound model ({fault})") from error
+
+
+def _model(file: h5py.File, path: Path) -> Model:
+    config = json.loads(file.attrs["configuration"])["scene"]
+    mesh, masses = stored_mesh(file["mesh"]), file["masses"][...]
+    scene = Scene.build(validate(SceneConfig, config, str(path)), mesh, masses)
+    record, table, own = file["training"], file["validation"], file["model"]
+    labels: Mapping[str, Any] = dict(record.attrs)
+    bounds = [float(labels[name]) for name in ("tolerance", "residual")]
+    tolerance, residual = (None if np.isnan(bound) else bound for bound in bounds)
+    training = Training(
+        tuple(record["trajectories"].asstr()[...]), bool(labels["converged"]), tolerance, residual,
+        float(labels["seconds"]),
+    )  # fmt: skip
+    rows = {name: (t.asstr() if t.dtype.kind == "O" else t)[...] for name, t in table.items()}
+    reduced: SubspaceModel | ProjectionModel
+    if file.attrs["kind"] == ProjectionModel.__name__:
+        reduced = ProjectionModel.stored(own)
+    else:
+        columns, samples = subspaces.stored_columns(own["columns"]), subspaces.stored_samples(own)
+        reduced = SubspaceModel(columns, samples)
+    return Model(scene, reduced, training, pd.DataFrame(rows))

@@ -1,0 +1,237 @@
+"""Training of reduced models: trajectories, basis, sampled elements, validation."""
+
+import logging
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from time import perf_counter
+from typing import Annotated, Any
+
+import numpy as np
+import pandas as pd
+from pydantic import Field
+
+from pdrom.api import files
+from pdrom.api.model import Model, OnFrame, Training, require_same_mesh, silent
+from pdrom.api.records import FULL, Run
+from pdrom.api.runs import projections_model, run
+from pdrom.core.errors import ConfigurationError, NotReducibleError, SnapshotError
+from pdrom.core.store import require_finite
+from pdrom.core.yamlfile import ConfigModel
+from pdrom.core.yamlfile import validate as checked
+from pdrom.model.mesh.selection import Selection, select_vertices
+from pdrom.model.runs import converged_run
+from pdrom.model.scene import Scene
+from pdrom.reduction.method import MethodSpec
+from pdrom.reduction.subspace.ecsw import Choose
+from pdrom.reduction.subspace.model import SubspaceModel
+from pdrom.reduction.subspace.training import make_columns, sampled_models
+
+log = logging.getLogger(__name__)
+
+# A frame has converged when one more iteration moves no vertex by more than this part of the mesh.
+CONVERGED, EVALUATIONS = 1e-6, 20_000
+SIZES = (20, 40, 80)  # numbers of modes that are tried for a required error
+VALIDATION = 1_000_000  # first seed of the validation trajectories
+Progress = Callable[[str, int], OnFrame]
+"""Function of the name of a step and its number of frames that returns what each frame calls."""
+
+
+Count = Annotated[int, Field(ge=0, le=10_000)]
+Bound = Annotated[float, Field(gt=0.0, lt=1.0)]
+
+
+class _Asked(ConfigModel):
+    """Arguments of `train` that are numbers, names or selections."""
+
+    modes: Count
+    tolerance: Bound | None
+    skinning: Count
+    hold: tuple[Selection, ...]
+    variations: Count
+    validate_: Annotated[Count, Field(alias="validate")]
+    converged: bool
+    error: Bound | None
+    group: str | None
+    r: Annotated[int, Field(ge=1, le=1_000_000)]
+
+
+def train(
+    full: Run,
+    *others: Run,
+    modes: int = 40,
+    tolerance: float | None = 0.01,
+    skinning: int = 0,
+    basis: np.ndarray | None = None,
+    selection: Choose | None = None,
+    hold: Sequence[Any] = (),
+    variations: int = 0,
+    validate: int = 0,
+    converged: bool = True,
+    error: float | None = None,
+    group: str | None = None,
+    method: str | MethodSpec | None = None,
+    r: int = 20,
+    progress: Progress = lambda name, frames: silent,
+) -> Model:
+    """Train a reduced model of a mesh on one or more runs.
+
+    Parameters
+    ----------
+    full : full-order run
+    others : further runs on the same mesh, with the same constraint groups
+    modes : number of POD modes of the displacements
+    tolerance : bound of the relative residual of the training equations with sampled elements; None
+        keeps all elements
+    skinning : number of skinning columns beside the modes
+    basis : own columns (N, K) instead of modes; affine columns are added, dependent ones dropped
+    selection : own function of equations G (m, elements), sums b (m,) and tolerance that returns
+        indices and factors x >= 0 with G x near b, instead of non-negative least squares
+    hold : sides or other selections of vertices that later scenes may hold, beside those that the
+        training scenes hold
+    variations : number of random variations of the first scene that are trained on, too
+    validate : number of others on which the model is validated
+    converged : solve the training scenes again until every frame has converged
+    error : return the smallest of the models of 20, 40 and 80 modes whose errors of positions and
+        deformation are at most this on all validation trajectories (``validate`` of at least 1)
+    group : reduce the projections of this constraint group instead; needed if there are several
+    method : name in config/methods.yaml, or a specification, of how they are reduced
+    r : number of their modes
+    progress : called with name and number of frames of each long step; returns a function that is
+        called after each of its frames
+
+    Raises
+    ------
+    ConfigurationError, SceneError, SnapshotError, RankError
+        A wrong argument; runs of different meshes; too few modes or snapshots.
+    NotReducibleError
+        No tried model is within ``error``, a training scene does not converge, or it has an effect
+        that no position subspace can simulate.
+    """
+    started = perf_counter()
+    runs = [files.require_run(Run, one, "full", source=files.FULL_RUN) for one in (full, *others)]
+    given, keys = locals(), [field.alias or name for name, field in _Asked.model_fields.items()]
+    plain = {key: v.item() if isinstance(v := given[key], np.generic) else v for key in keys}
+    asked = checked(_Asked, plain, "train")
+    if asked.error is not None and not asked.validate_:
+        raise ConfigurationError("train: error: validate = 0: one validation trajectory is needed")
+    if method is not None or group is not None:
+        if others or asked.variations or asked.error is not None:
+            raise ConfigurationError("train: others, variations, error: without group and method")
+        reduced = projections_model(full, asked.group, method or "gappy", asked.r)
+        done = Training((full.scene.config.name,), False, None, None, perf_counter() - started)
+        tests = [
+            _reference(scene, False, progress) for scene in _tests(full.scene, asked.validate_)
+        ]
+        return _validated(Model(full.scene, reduced, done, pd.DataFrame()), [full], tests)
+    for one in others:
+        require_same_mesh(full.scene, one.scene)
+    more = [_variation(full.scene, "variation", n + 1, n + 1) for n in range(asked.variations)]
+    if asked.converged:
+        references = [_reference(s, True, progress) for s in [*(one.scene for one in runs), *more]]
+    else:
+        references = [*runs, *(_reference(scene, False, progress) for scene in more)]
+    tests = [
+        _reference(scene, asked.converged, progress)
+        for scene in _tests(full.scene, asked.validate_)
+    ]
+    own = _own_columns(full.scene, basis)
+    tried: list[str] = []
+    for size in (asked.modes,) if asked.error is None else SIZES:
+        model = _trained(references, asked, size, own, selection, perf_counter() - started)
+        model = _validated(model, references, tests)
+        if asked.error is None:
+            return model
+        worst = model.validation[["position_error", "deformation_error"]][len(references) :]
+        tried.append(f"{worst.max(axis=None):.2g} with {size} modes")
+        if worst.max(axis=None) <= asked.error:
+            return model
+    fault = f"no model is within error = {asked.error:g}; reached are {', '.join(tried)}"
+    raise NotReducibleError(f"scene '{full.scene.config.name}': {fault}")
+
+
+def _trained(
+    references: Sequence[Run],
+    asked: _Asked,
+    modes: int,
+    own: np.ndarray | None,
+    selection: Choose | None,
+    before: float,
+) -> Model:
+    """Model of this number of ``modes``, or with ``own`` columns (N, K), without validation.
+
+    ``before`` are seconds that the training has taken already.
+    """
+    started, scenes = perf_counter(), [run.scene for run in references]
+    frames = np.concatenate([run.positions[1 :: len(references)] for run in references])
+    hold = [select_vertices(scenes[0].mesh, one) for one in asked.hold]
+    columns = make_columns(scenes, frames, modes, asked.skinning, own, hold)
+    reduced = SubspaceModel(columns)
+    if asked.tolerance is not None:
+        log.info("%d columns: selecting elements", columns.B.shape[1])
+        all_frames, bounds = np.arange(scenes[0].config.frames), [asked.tolerance]
+        (reduced,) = sampled_models(scenes, columns, all_frames, bounds, choose=selection)
+    names, seconds = tuple(one.config.name for one in scenes), before + perf_counter() - started
+    done = Training(names, asked.converged, asked.tolerance, reduced.residual, seconds)
+    return Model(scenes[0], reduced, done, pd.DataFrame())
+
+
+def _own_columns(scene: Scene, basis: Any) -> np.ndarray | None:
+    """Own columns (N, K) as an array of floats, None without; SnapshotError if not finite."""
+    if basis is None:
+        return None
+    try:
+        found = np.asarray(basis)
+    except ValueError:
+        found = np.empty(0, object)
+    if found.dtype.kind not in "fiu" or found.ndim != 2 or len(found) != scene.mesh.vertices:
+        required = f"({scene.mesh.vertices}, K) numbers, a column for each basis vector"
+        raise SnapshotError(f"basis: {found.dtype} {found.shape}, required: {required}")
+    return require_finite("basis", found.astype(float), SnapshotError)
+
+
+def _tests(scene: Scene, count: int) -> list[Scene]:
+    """Scenes of ``count`` validation trajectories."""
+    return [_variation(scene, "validation", n + 1, VALIDATION + n) for n in range(count)]
+
+
+def _variation(scene: Scene, kind: str, number: int, seed: int) -> Scene:
+    """Variation of ``scene`` by ``seed``; its name says its ``kind`` and ``number``."""
+    config = scene.config.training_variant(seed)
+    name = f"{scene.config.name}_{kind}_{number}"
+    return Scene.build(config.model_copy(update={"name": name}), scene.mesh, scene.masses)
+
+
+def _reference(scene: Scene, converged: bool, progress: Progress) -> Run:
+    """Full-order run of ``scene``; NotReducibleError if it shall be ``converged`` and is not."""
+    name, frames = scene.config.name, scene.config.frames
+    if not converged:
+        return run(scene, on_frame=progress(name, frames))
+    started = perf_counter()
+    log.info("%s: solving every frame to convergence", name)
+    tick = progress(f"{name}, converged", frames)
+    found = converged_run(scene, CONVERGED, EVALUATIONS, tick)
+    if found is None:
+        raise NotReducibleError(
+            f"scene '{name}': a frame does not converge in {EVALUATIONS} evaluations; "
+            "converged=False (--unconverged) trains on the frames as they are"
+        )
+    ms = np.full(frames, 1e3 * (perf_counter() - started) / frames)
+    return Run(scene, found, ms, method=f"{FULL}, converged")
+
+
+def _validated(model: Model, training: Sequence[Run], tests: Sequence[Run]) -> Model:
+    """Return ``model`` with the table of its runs of all trajectories."""
+    rows = []
+    for reference in (*training, *tests):
+        errors = model.run(reference.scene).error(reference)
+        steps = reference.scene.config.time_step / training[0].scene.config.time_step
+        at = np.round(steps * np.arange(len(reference.positions))).astype(np.int64)
+        shown = training[0].positions[np.minimum(at, len(training[0].positions) - 1)]
+        replayed = replace(reference, positions=shown).error(reference)
+        speed = model.speed(reference.scene)
+        rows.append({
+            "trajectory": reference.scene.config.name, "position_error": errors.position,
+            "deformation_error": errors.deformation, "replay_error": replayed.position,
+            "ms": speed["ms"], "speedup": speed["speedup"], "busy": speed["busy"],
+        })  # fmt: skip
+    return replace(model, validation=pd.DataFrame(rows))

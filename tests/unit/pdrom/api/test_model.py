@@ -1,0 +1,259 @@
+"""Reduced models from Python: training, runs, errors, files, and what is refused."""
+
+import re
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+
+import h5py
+import numpy as np
+import pytest
+
+from builders import GRAVITY, LEFT
+from pdrom import api
+from pdrom.core.errors import ConfigurationError, NotReducibleError, PdromError, StorageError
+from pdrom.core.store import write_hdf5
+from places import ROOT
+
+MESH = {"kind": "cloth", "rows": 6, "columns": 5, "plane": "xz"}
+SPRING = {"effect": "spring", "weight": 1e4}
+STRAIN = {"effect": "strain", "weight": 1e4}
+KICK = {"effect": "kick", "speed": 1.0, "seed": 3}
+BALL = {"effect": "sphere", "centre": [0.0, 0.3, 0.1], "radius": 0.2}
+
+
+def scene(*effects, **keys):
+    return api.build_scene(
+        effects=[GRAVITY, *(effects or (LEFT, SPRING))], **{"mesh": MESH, "frames": 12, **keys}
+    )
+
+
+@pytest.fixture(scope="module")
+def full() -> api.Run:
+    return api.run(scene())
+
+
+@pytest.fixture(scope="module")
+def model(full) -> api.Model:
+    return api.train(full, modes=8, variations=1, validate=1)
+
+
+@pytest.mark.parametrize(
+    "effects",
+    [
+        (LEFT, SPRING | {"weight": 3e3}),
+        ({"effect": "translate", "select": "left", "offset": [0.3, 0.2, 0.0], "over": 5}, SPRING),
+        (LEFT | {"until": 4}, SPRING, {"effect": "floor", "height": 0.0}),
+        (LEFT, SPRING, BALL),
+        (LEFT, SPRING, KICK, {"effect": "damping", "rate": 0.5}),
+    ],
+    ids=["weight", "handle", "release and floor", "obstacle", "kick and damping"],
+)  # fmt: skip
+def test_all_columns_and_elements_are_the_full_order(full, effects):
+    """Same local-global iterations; weights, masses, forces, holds and the time step differ."""
+    every = api.train(full, basis=np.eye(30), tolerance=None, converged=False)
+    other = scene(*effects, time_step=0.011, vertex_mass=3.0, iterations=7)
+    expected = api.run(other)
+    found = every.run(other)
+    assert found.positions == pytest.approx(expected.positions, abs=1e-9)
+    errors = found.error(expected)
+    assert max(errors.position, errors.deformation) < 1e-8
+    assert errors.reference == "the run of 'scene' by full order, 7 iterations a frame"
+
+
+def test_the_validation_has_the_errors_of_every_trajectory_and_of_replaying(full, model):
+    table = model.validation.set_index("trajectory")
+    assert table.index.tolist() == ["scene", "scene_variation_1", "scene_validation_1"]
+    assert (table[["position_error", "deformation_error"]] < 0.2).all(axis=None)
+    assert table.replay_error["scene"] == 0.0
+    assert table.replay_error["scene_validation_1"] > 0.1
+    assert (table[["ms", "speedup"]] > 0.0).all(axis=None)
+    assert model.training.trajectories == ("scene", "scene_variation_1")
+    shown = repr(model)
+    assert len(shown.splitlines()) == 1
+    for words in ("8 modes", "of 69 elements", "residual", "trained on scene, scene_variation_1"):
+        assert words in shown
+
+
+def test_training_frames_have_converged_unless_asked_otherwise():
+    """A thousand iterations: their shape lies in the space of converged frames."""
+    stiff = LEFT, SPRING | {"weight": 1e6}
+    exact, full = (api.run(scene(*stiff, iterations=k)).positions[-1] for k in (1000, 3))
+    one = api.run(scene(*stiff, iterations=3))
+    left = []
+    for converged in (True, False):
+        b = api.train(one, modes=8, tolerance=None, converged=converged).reduced.columns.B
+        left.append(np.linalg.norm(exact - b @ np.linalg.lstsq(b, exact)[0]))
+    assert np.linalg.norm(exact - full) > 0.1
+    assert left[0] < 0.1 * left[1]
+
+
+def test_the_tolerance_bounds_the_residual_and_a_missed_one_is_said(full, model):
+    (kept,) = model.reduced.samples.values()
+    assert kept.residual <= model.training.tolerance == 0.01
+    assert model.training.residual == kept.residual
+    assert "misses" not in repr(model)
+    few = api.train(
+        full, modes=8, converged=False, selection=lambda g, b, tolerance: ([3, 1], [9, 9])
+    )
+    (chosen,) = few.reduced.samples.values()
+    assert chosen.elements.tolist() == [1, 3]
+    assert chosen.residual > 0.1
+    assert "misses the tolerance 0.01" in repr(few)
+
+
+UNUSABLE = (
+    None,
+    ([], []),
+    ([0, 0], [1, 1]),
+    ([69], [1]),
+    ([1], [-1.0]),
+    ([1], [np.nan]),
+    ([0.5], [1]),
+)
+
+
+@pytest.mark.parametrize("chosen", UNUSABLE)
+def test_an_unusable_selection_is_refused(full, chosen):
+    with pytest.raises(PdromError, match="selection: "):
+        api.train(full, modes=4, converged=False, selection=lambda *_: chosen)
+
+
+def test_the_smallest_model_within_an_error_is_returned_or_the_best_is_named(full):
+    found = api.train(full, validate=1, error=0.9, converged=False)
+    assert found.reduced.columns.modes == 20
+    with pytest.raises(
+        NotReducibleError,
+        match=r"no model is within error = 1e-06; reached are .* with 20 modes, .* with 80 modes",
+    ):
+        api.train(full, validate=1, error=1e-6, converged=False)
+    with pytest.raises(ConfigurationError, match="validation trajectory is needed"):
+        api.train(full, error=0.1)
+
+
+def test_skinning_columns_and_several_runs_enlarge_the_space(full):
+    other = api.run(scene(LEFT, SPRING, KICK, name="kicked", frames=7))
+    plain = api.train(full, modes=4, tolerance=None, converged=False)
+    more = api.train(full, other, modes=4, skinning=6, tolerance=None, converged=False)
+    assert more.training.trajectories == ("scene", "kicked")
+    assert more.reduced.columns.B.shape[1] == plain.reduced.columns.B.shape[1] + 6
+    errors = [m.run(other.scene).error(other).position for m in (plain, more)]
+    assert errors[1] < errors[0]
+
+
+def test_only_holds_of_the_training_or_declared_ones_are_taken(full, model):
+    right = scene({"effect": "pins", "select": "right"}, SPRING)
+    with pytest.raises(NotReducibleError, match="effect 'pins': holds right; the training neither"):
+        model.run(right)
+    declared = api.train(full, modes=8, tolerance=None, hold=["right"], converged=False)
+    found = declared.run(right)
+    held = np.flatnonzero(right.mesh.points[:, 0] == right.mesh.points[:, 0].max())
+    assert found.positions[-1, held] == pytest.approx(right.mesh.points[held], abs=1e-12)
+    with pytest.raises(PdromError, match="selection 'middle'"):
+        api.train(full, hold=["middle"])
+
+
+def test_another_mesh_and_other_groups_are_refused(full, model):
+    faulty = {
+        "another mesh than that of the training": scene(mesh=MESH | {"rows": 7}),
+        "groups spring, strain, required are": scene(LEFT, SPRING, STRAIN),
+        "needs all vertices": scene(LEFT, SPRING, {"effect": "self_collision", "thickness": 0.01}),
+    }  # fmt: skip
+    for words, other in faulty.items():
+        with pytest.raises(PdromError, match=words):
+            model.run(other)
+    with pytest.raises(ConfigurationError, match="another mesh"):
+        api.train(full, api.run(faulty["another mesh than that of the training"]))
+
+
+def test_runs_are_compared_with_runs_of_their_mesh_and_times_only(full, model):
+    for words, other in {
+        "another mesh": scene(mesh=MESH | {"rows": 7}),
+        "another time step": scene(time_step=0.01),
+        "another number of frames": scene(frames=5),
+    }.items():
+        with pytest.raises(ConfigurationError, match=words):
+            full.error(api.run(other))
+    with pytest.raises(ConfigurationError, match="a Run is required"):
+        full.error(full.positions)
+    blown = replace(full, positions=full.positions[:4], ms=full.ms[:3], blowup_frame=3)
+    assert blown.error(full) == api.Errors(None, None, full.title)
+    assert model.run(full.scene).error(full).position < 0.3
+
+
+def test_a_file_gives_the_model_with_the_same_bits(full, model, tmp_path):
+    gappy = api.train(full, method="gappy", r=3, validate=1)
+    for own in (model, gappy):
+        own.save(tmp_path / "a.model.h5")
+        again = api.load_model(tmp_path / "a.model.h5")
+        assert repr(again) == repr(own)
+        assert again.validation.equals(own.validation)
+        one, two = (m.run(full.scene, tmp_path / "run.h5") for m in (own, again))
+        assert np.array_equal(one.positions, two.positions)
+        assert np.array_equal(api.load(tmp_path / "run.h5").positions, two.positions)
+
+
+def test_a_file_that_cannot_be_trusted_is_refused(model, tmp_path):
+    path = tmp_path / "a.model.h5"
+    with pytest.raises(StorageError, match="no such file"):
+        api.load_model(path)
+    model.save(path)
+    whole = path.read_bytes()
+    path.write_bytes(whole[:-100])
+    with pytest.raises(StorageError, match=r"damaged|changed|cut"):
+        api.load_model(path)
+    path.write_bytes(whole)
+    with h5py.File(path, "r") as old, write_hdf5(tmp_path / "newer.h5") as new:
+        for name in old:
+            old.copy(name, new)
+        new.attrs.update(old.attrs)
+        new.attrs["format"] = 99
+    with pytest.raises(StorageError, match="a model of version 99, this pdrom reads up to 1"):
+        api.load_model(tmp_path / "newer.h5")
+    api.save(model.run(model.scene), tmp_path / "run.h5")
+    with pytest.raises(StorageError, match="holds no model"):
+        api.load_model(tmp_path / "run.h5")
+    with pytest.raises(StorageError, match="holds no run"):
+        api.load(path)
+
+
+def test_the_files_page_computes_a_frame_with_numpy_alone(model, tmp_path, monkeypatch):
+    """The script on the page of the library, of at most 40 lines."""
+    page = (ROOT / "docs" / "library.md").read_text("utf-8")
+    (script,) = re.findall(r"```python\n(import h5py.*?)```", page, re.DOTALL)
+    assert len(script.strip().splitlines()) <= 40
+    monkeypatch.chdir(tmp_path)
+    model.save("sheet.model.h5")
+    names: dict = {}
+    exec(compile(script, "library.md", "exec"), names)
+    expected = model.run(model.scene).positions[1]
+    assert names["positions"] == pytest.approx(expected, abs=1e-12)
+
+
+def test_threads_get_the_runs_alone(full, model):
+    other = scene(LEFT, SPRING, KICK)
+    alone = [model.run(s).positions for s in (full.scene, other)]
+    with ThreadPoolExecutor(4) as pool:
+        runs = [pool.submit(model.run, s) for _ in range(3) for s in (full.scene, other)]
+    for i, run in enumerate(runs):
+        assert np.array_equal(run.result().positions, alone[i % 2])
+
+
+def test_projections_of_a_group_are_another_kind_of_model(full):
+    rank = api.basis(full, "spring").rank
+    best, poor = (api.train(full, method="pod", r=r) for r in (rank, 1))
+    errors = [m.run(full.scene).error(full).position for m in (best, poor)]
+    assert errors[0] < 0.1 * errors[1]
+    assert best.reduced.reduction.gain == pytest.approx(1.0)
+    two = api.run(scene(LEFT, SPRING, STRAIN))
+    with pytest.raises(ConfigurationError, match="group: one of spring, strain is required"):
+        api.train(two, method="pod")
+    with pytest.raises(ConfigurationError, match="without group and method"):
+        api.train(full, full, method="pod")
+
+
+def test_a_group_at_rest_is_not_sampled():
+    """Nothing moves: there are no equations to fit."""
+    still = api.build_scene(effects=[SPRING], mesh=MESH, frames=4)
+    model = api.train(api.run(still), modes=4)
+    assert model.training.residual == 0.0
+    assert model.reduced.elements_evaluated(still) == 69

@@ -1,0 +1,63 @@
+"""Deformation error: rigid motions are no error, a rigid body has error one, mass counts."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from pdrom.model.metrics import deformation, deformation_error
+
+
+@pytest.fixture
+def bent(rng):
+    """Rest shape (30, 3), deformed shapes (4, 30, 3) and masses."""
+    rest = rng.standard_normal((30, 3)) * [3.0, 1.0, 0.5]
+    return rest, rest + 0.3 * rng.standard_normal((4, 30, 3)), rng.uniform(0.1, 5.0, 30)
+
+
+def moved(shapes, rng):
+    """Each shape rotated and shifted."""
+    rotations = Rotation.random(len(shapes), random_state=int(rng.integers(1000))).as_matrix()
+    return shapes @ rotations + 10.0 * rng.standard_normal((len(shapes), 1, 3))
+
+
+def test_a_rigid_motion_of_the_reference_is_no_error_and_a_rigid_body_has_error_one(bent, rng):
+    rest, shapes, masses = bent
+    assert deformation_error(moved(shapes, rng), shapes, rest, masses) < 1e-12
+    rigid = moved(np.broadcast_to(rest, shapes.shape), rng)
+    assert deformation_error(rigid, shapes, rest, masses) == pytest.approx(1.0, rel=1e-12)
+    assert deformation_error(shapes * [-1.0, 1.0, 1.0], shapes, rest, masses) > 1.0  # mirrored
+
+
+def test_the_best_rotation_is_no_worse_than_any_other(bent, rng):
+    """Against the smallest of many rotations near the best one, with masses in every sum."""
+    rest, shapes, masses = bent
+    shape = shapes[:1]
+    found = deformation(rest, shape, masses)
+    a, b = (x - masses @ x / masses.sum() for x in (rest, shape[0]))
+    best = Rotation.align_vectors(b, a, weights=masses)[0]
+    tried = [best, *(Rotation.from_rotvec(0.01 * rng.standard_normal(3)) * best for _ in range(50))]
+    sums = [np.sqrt(np.sum(masses[:, None] * (r.apply(a) - b) ** 2)) for r in tried]
+    assert found == pytest.approx(sums[0], rel=1e-9)
+    assert found <= min(sums) * (1 + 1e-9)
+
+
+def test_a_vertex_that_is_split_in_two_changes_nothing(bent, rng):
+    rest, shapes, masses = bent
+    run = shapes + 0.1 * rng.standard_normal(shapes.shape)
+    twice = np.append(np.arange(30), 7)
+    halved = masses[twice].copy()
+    halved[[7, 30]] *= 0.5
+    expected = deformation_error(run, shapes, rest, masses)
+    found = deformation_error(run[:, twice], shapes[:, twice], rest[twice], halved)
+    assert found == pytest.approx(expected, rel=1e-12)
+
+
+def test_a_rigid_reference_has_no_error_and_large_numbers_none_of_their_own(bent, rng):
+    rest, shapes, masses = bent
+    rigid = moved(np.broadcast_to(rest, shapes.shape), rng)
+    assert deformation_error(shapes, rigid + 1e-5, rest, masses) is None
+    assert deformation_error(shapes[:0], shapes[:0], rest, masses) is None
+    with np.errstate(all="raise"):
+        blown_up = deformation_error(1e200 * shapes, shapes, rest, masses)
+    assert np.isfinite(blown_up)
+    assert blown_up > 1e150
