@@ -2,6 +2,8 @@
 
 import json
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from inspect import signature
 from pathlib import Path
 from shlex import quote
@@ -18,42 +20,39 @@ from pdrom.core.yamlfile import check_lengths, named, read_yaml, shown, validate
 from pdrom.model.mesh.config import GivenMesh, MeshFile, given_mesh
 from pdrom.model.mesh.reader import READERS
 from pdrom.model.mesh.types import stored_mesh
-from pdrom.model.scene import GONE, Scene, SceneConfig
+from pdrom.model.scene import Scene, SceneConfig
 
-FULL_RUN = "pdrom.api.run makes one, load reads one"
-OLD = (
-    "a reduced run of an earlier pdrom, which kept the projections of one group only: "
-    "`pdrom train --method` and `pdrom run --model` make it anew"
-)
 T = TypeVar("T")
-R = TypeVar("R", bound=Run)
 
 
-def require(kind: type[T] | tuple[type[T], ...], value: Any, name: str, source: str) -> T:
+def require(kind: type[T], value: Any, name: str, source: str) -> T:
     """Return ``value`` if it is of the type ``kind``, else raise ConfigurationError.
 
     The error names the argument (``name``) and tells what makes such a value (``source``).
     """
     if isinstance(value, kind):
         return value
-    kinds = " or ".join(k.__name__ for k in (kind if isinstance(kind, tuple) else (kind,)))
-    raise ConfigurationError(f"{name} = {shown(value, 60)}: a {kinds} is required ({source})")
+    fault = f"a {kind.__name__} is required ({source})"
+    raise ConfigurationError(f"{name} = {shown(value, 60)}: {fault}")
 
 
-def require_run(kind: type[R] | tuple[type[R], ...], value: Any, name: str, source: str) -> R:
-    """Return ``value`` as `require` does; SnapshotError if it is a run that is not finite."""
-    run = require(kind, value, name, source)
+def require_run(value: Any, name: str) -> Run:
+    """Return ``value`` if it is a run; SnapshotError if it is a run that is not finite."""
+    run = require(Run, value, name, source="run, Model.run and load make one")
     run.require_finite(name)
     return run
 
 
-def require_function(function: Any, name: str) -> None:
-    """Raise ConfigurationError unless ``function`` can be called with a number and a report."""
+def require_runnable(scene: Any, out: Any, on_frame: Any) -> None:
+    """Raise ConfigurationError or StorageError unless a run can have these arguments."""
+    require(Scene, scene, "scene", source="build_scene and load_scene make one")
     try:
-        signature(function).bind(0, None)
+        signature(on_frame).bind(0, None)
     except (TypeError, ValueError) as error:
         fault = "a function of a number and a report is required"
-        raise ConfigurationError(f"{name} = {shown(function, 60)}: {fault}") from error
+        raise ConfigurationError(f"on_frame = {shown(on_frame, 60)}: {fault}") from error
+    if out is not None:
+        store.require_own(file_path(out))
 
 
 def file_path(path: Any) -> Path:
@@ -140,14 +139,13 @@ def save(run: Run, path: str | os.PathLike[str]) -> None:
     ----------
     run : run by `pdrom.api.run` or `Model.run`
     path : file (HDF5) to write
-    precision : of positions: "double" keeps all bits, "single" halves the file
 
     Raises
     ------
     ConfigurationError, StorageError
         ``run`` is no run; the file cannot be written.
     """
-    require_run(Run, run, "run", source="run and Model.run make one")
+    require_run(run, "run")
     path = file_path(path)
     store.require_own(path)
     config = {"scene": run.scene.config.model_dump(mode="json"), "method": run.method}
@@ -171,26 +169,28 @@ def load(path: str | os.PathLike[str], unchecked: bool = False) -> Run:
         no run of a scene, or lacks data that its scene requires.
     """
     path = file_path(path)
+    with opened(path, "run", unchecked) as file:
+        if "reduced" in file or "requested_error" in file.attrs:
+            raise StorageError(f"{path}: a reduced run of an earlier pdrom; make it again")
+        if "positions" not in file or "timings" not in file:
+            raise StorageError(f"{path}: holds no run that could be opened; see pdrom show")
+        found = stored_run(_scene(file, path), file)
+        _require_consistent(found, file)
+        return found
+
+
+@contextmanager
+def opened(path: Path, what: str, unchecked: bool = False) -> Iterator[h5py.File]:
+    """Open the file ``path`` to read a ``what`` from it; StorageError for any fault of it."""
     try:
         with store.open_hdf5(path, unchecked) as file:
             store.require_self_contained(file, path)
-            found: Run | None = None
-            if "requested_error" in file.attrs:
-                raise StorageError(f"{path}: {GONE}")
-            if "reduced" in file and "full" in file:
-                raise StorageError(f"{path}: {OLD}")
-            if "positions" in file and "timings" in file:
-                found = stored_run(_scene(file, path), file)
-            if found is not None:
-                _require_consistent(found, file)
+            yield file
     except StorageError:
         raise
     except (PdromError, ValueError, TypeError, LookupError, RuntimeError, AttributeError) as error:
         fault = " ".join(str(error).split())[:200]
-        raise StorageError(f"{path}: holds no sound run ({fault})") from error
-    if found is None:
-        raise StorageError(f"{path}: holds no run that could be opened here (pdrom show says what)")
-    return found
+        raise StorageError(f"{path}: holds no sound {what} ({fault})") from error
 
 
 def _require_consistent(found: Run, file: h5py.File) -> None:

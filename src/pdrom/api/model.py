@@ -2,7 +2,7 @@
 
 import json
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter, process_time
@@ -15,7 +15,7 @@ import pandas as pd
 from pdrom.api import files
 from pdrom.api.records import Run
 from pdrom.core import store
-from pdrom.core.errors import ConfigurationError, PdromError, StorageError
+from pdrom.core.errors import ConfigurationError, StorageError
 from pdrom.core.provenance import made_by
 from pdrom.core.yamlfile import shown, validate
 from pdrom.model.constraints.base import GroupConfig
@@ -137,15 +137,11 @@ class Model:
             The scene has another mesh, other groups or holds, or an effect that the model cannot
             simulate; ``out`` cannot be written.
         """
-        files.require(Scene, scene, "scene", source="build_scene and load_scene make one")
-        files.require_function(on_frame, "on_frame")
+        files.require_runnable(scene, out, on_frame)
         if not (iterations is None or (type(iterations) is int and 1 <= iterations <= 10_000)):
             raise ConfigurationError(
                 f"iterations = {shown(iterations, 60)}: allowed are 1 to 10000"
             )
-        if out is not None:
-            store.require_place(files.file_path(out))
-            store.require_own(out)
         scene = scene.iterated(iterations, scene.config.anderson_window) if iterations else scene
         loop, start = self.loop(scene)
         next(loop.run(start, range(1)))  # loads compiled code, which no frame's time shall include
@@ -171,11 +167,10 @@ class Model:
         frames, their ratio ``speedup``, and ``busy``, whether other programs ran meanwhile.
         """
         frames = min(frames, scene.config.frames)
-        kinds: list[tuple[Callable[[], tuple[Stepper, State]], Callable[..., Any]]] = [
-            (lambda: self.loop(scene), self.reduced.positions),
-            (lambda: (scene.stepper(track_objective=False), scene.initial_state()), lambda q: q),
+        made: list[tuple[Stepper, State, Callable[..., Any]]] = [
+            (*self.loop(scene), self.reduced.positions),
+            (scene.stepper(track_objective=False), scene.initial_state(), lambda q: q),
         ]
-        made = [(*loop(), lift) for loop, lift in kinds]
         spent = [[_ms(*one, frames) for one in made] for _ in range(1 + repeats)][1:]
         (ms, full), share = (
             np.median([[w for w, _ in pair] for pair in spent], axis=0),
@@ -193,11 +188,7 @@ class Model:
             store_mesh(self.scene.mesh, file.create_group("mesh"))
             file["masses"] = self.scene.masses
             record = file.create_group("training")
-            known: dict[str, Any] = {
-                "tolerance": np.nan,
-                "residual": np.nan,
-            }  # of a model without sampling
-            known |= {name: v for name, v in vars(self.training).items() if v is not None}
+            known = {name: v for name, v in vars(self.training).items() if v is not None}
             record["trajectories"] = list(known.pop("trajectories"))
             record.attrs.update(known)
             table = file.create_group("validation", track_order=True)
@@ -278,21 +269,14 @@ def load_model(path: str | os.PathLike[str]) -> Model:
         The file is missing, damaged or edited, holds no model, or is of a newer version.
     """
     path = files.file_path(path)
-    try:
-        with store.open_hdf5(path) as file:
-            store.require_self_contained(file, path)
-            if "model" not in file or "format" not in file.attrs:
-                raise StorageError(f"{path}: holds no model (pdrom show says what it holds)")
-            version = int(file.attrs["format"])
-            if version > FORMAT:
-                fault = f"a model of version {version}, this pdrom reads up to {FORMAT}"
-                raise StorageError(f"{path}: {fault}: a newer pdrom wrote it")
-            return _model(file, path)
-    except StorageError:
-        raise
-    except (PdromError, ValueError, TypeError, LookupError, RuntimeError, AttributeError) as error:
-        fault = " ".join(str(error).split())[:200]
-        raise StorageError(f"{path}: holds no sound model ({fault})") from error
+    with files.opened(path, "model") as file:
+        if "model" not in file or "format" not in file.attrs:
+            raise StorageError(f"{path}: holds no model (pdrom show says what it holds)")
+        version = int(file.attrs["format"])
+        if version > FORMAT:
+            fault = f"a model of version {version}, this pdrom reads up to {FORMAT}"
+            raise StorageError(f"{path}: {fault}: a newer pdrom wrote it")
+        return _model(file, path)
 
 
 def _model(file: h5py.File, path: Path) -> Model:
@@ -300,12 +284,11 @@ def _model(file: h5py.File, path: Path) -> Model:
     mesh, masses = stored_mesh(file["mesh"]), file["masses"][...]
     scene = Scene.build(validate(SceneConfig, config, str(path)), mesh, masses)
     record, table, own = file["training"], file["validation"], file["model"]
-    labels: Mapping[str, Any] = dict(record.attrs)
-    bounds = [float(labels[name]) for name in ("tolerance", "residual")]
-    tolerance, residual = (None if np.isnan(bound) else bound for bound in bounds)
+    bounds = [record.attrs.get(name) for name in ("tolerance", "residual")]
+    tolerance, residual = (None if bound is None else float(bound) for bound in bounds)
     training = Training(
-        tuple(record["trajectories"].asstr()[...]), bool(labels["converged"]), tolerance, residual,
-        float(labels["seconds"]),
+        tuple(record["trajectories"].asstr()[...]), bool(record.attrs["converged"]), tolerance,
+        residual, float(record.attrs["seconds"]),
     )  # fmt: skip
     rows = {name: (t.asstr() if t.dtype.kind == "O" else t)[...] for name, t in table.items()}
     reduced: SubspaceModel | ProjectionModel

@@ -7,7 +7,7 @@ import numpy as np
 from pdrom.api.files import file_path, require_run
 from pdrom.api.records import Run
 from pdrom.core.errors import SceneError
-from pdrom.core.store import require_own, require_place
+from pdrom.core.store import require_own
 from pdrom.view import style
 from pdrom.view.artists import Figure
 from pdrom.view.multiples import clipped, log_axis
@@ -38,7 +38,7 @@ def plot(reference: Run, *runs: Run) -> Figure:
     if not runs:
         raise SceneError("plot: at least one run beside the reference is required")
     for run in (reference, *runs):
-        require_run(Run, run, "plot", source="pdrom.api.run, Model.run and load make one")
+        require_run(run, "plot")
         run.require_comparable(reference)
     with style.look():
         figure = style.new_figure(3.0)
@@ -74,8 +74,7 @@ def view(path: str | os.PathLike[str], *runs: Run) -> None:
         An argument is no run; no run is given, or two different scenes have one name; the page
         would be too large, or cannot be written.
     """
-    require_place(file_path(path))
-    require_own(path)
+    require_own(file_path(path))
     write_page(viewed_scenes(*runs), path)
 
 
@@ -89,7 +88,7 @@ def viewed_scenes(*runs: Run) -> list[ViewedScene]:
         raise SceneError("view: at least one run is required")
     scenes: dict[str, list[Run]] = {}
     for run in runs:
-        require_run(Run, run, "view", source="pdrom.api.run and Model.run make one")
+        require_run(run, "view")
         known = scenes.setdefault(run.scene.config.name, [])
         if known and known[0].scene.config != run.scene.config:
             raise SceneError(f"view: two different scenes are called '{run.scene.config.name}'")

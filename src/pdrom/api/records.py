@@ -27,14 +27,6 @@ def require_types(record: Any) -> None:
     validate(create_model(kind.__name__, __config__=strict, **fields), vars(record), kind.__name__)
 
 
-def require_shapes(arrays: dict[str, tuple[np.ndarray, tuple[int, ...]]]) -> None:
-    """Raise SnapshotError if one of the ``arrays`` is not of floats and of the shape beside it."""
-    for name, (array, shape) in arrays.items():
-        known = array.dtype in (np.float32, np.float64) and not np.ma.isMaskedArray(array)
-        if array.shape != shape or not known:
-            raise SnapshotError(f"{name} of {array.dtype} {array.shape}, required: float {shape}")
-
-
 @dataclass(frozen=True, eq=False)
 class Snapshots:
     """n training snapshots of a group of e elements with p rows.
@@ -51,16 +43,6 @@ class Snapshots:
 
     def __post_init__(self) -> None:
         require_types(self)
-
-    def require_rising(self, name: str, frames: int) -> None:
-        """Raise SnapshotError unless there is one of the ``frames``, ascending, per snapshot."""
-        at, whole = self.frames, self.frames.dtype.kind in "iu"
-        if (
-            at.shape != (self.roundoff.size,)
-            or not whole
-            or (np.diff(at, prepend=-1, append=frames) <= 0).any()
-        ):
-            raise SnapshotError(f"snapshots of {name}: frames {shown(at.tolist(), 60)} of {frames}")
 
 
 FULL = "full order"
@@ -110,12 +92,19 @@ class Run:
             raise SnapshotError(f"{done} of {frames} frames, blow-up in frame {shown(ended, 60)}")
         arrays = {"positions": (self.positions, (done + 1, vertices, 3)), "ms": (self.ms, (done,))}
         for name, own in self.snapshots.items():
-            own.require_rising(name, frames)
-            group, count = self.scene.group(name), own.roundoff.size
+            group, count, at = self.scene.group(name), own.roundoff.size, own.frames
+            whole = at.shape == (count,) and at.dtype.kind in "iu"
+            if not whole or (np.diff(at, prepend=-1, append=frames) <= 0).any():
+                fault = f"frames {shown(at.tolist(), 60)} of {frames}"
+                raise SnapshotError(f"snapshots of {name}: {fault}")
             rows = group.elements * group.rows_per_element
             arrays[f"snapshots of {name}"] = own.p, (count, rows, 3)
             arrays[f"round-off of {name}"] = own.roundoff, (count,)
-        require_shapes(arrays)
+        for name, (array, shape) in arrays.items():
+            known = array.dtype in (np.float32, np.float64) and not np.ma.isMaskedArray(array)
+            if array.shape != shape or not known:
+                fault = f"of {array.dtype} {array.shape}, required: float {shape}"
+                raise SnapshotError(f"{name} {fault}")
 
     def __repr__(self) -> str:
         held = f"snapshots of {', '.join(self.snapshots)}" if self.snapshots else "no snapshots"

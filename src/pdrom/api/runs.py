@@ -15,7 +15,7 @@ from pdrom.api.records import Run, stored_run
 from pdrom.core import config_file
 from pdrom.core.errors import ConfigurationError, SnapshotError, choices
 from pdrom.core.provenance import made_by
-from pdrom.core.store import open_hdf5, require_own, require_place
+from pdrom.core.store import open_hdf5
 from pdrom.core.yamlfile import shown, validate
 from pdrom.model.dynamics.stepper import FrameReport
 from pdrom.model.dynamics.system import DEFAULT_SOLVER
@@ -29,7 +29,6 @@ from pdrom.reduction.snapshots import training_frames
 
 log = logging.getLogger(__name__)
 SNAPSHOTS = 100  # largest number of training snapshots of a group if the scene sets none
-GROUP = "the name of a constraint group"
 
 
 class _Compilation(event.TimingListener):  # type: ignore[misc]
@@ -72,11 +71,7 @@ def run(
     ConfigurationError, StorageError
         ``scene`` is no scene; ``out`` cannot be written, which is checked before the run.
     """
-    files.require(Scene, scene, "scene", source="build_scene and load_scene make one")
-    files.require_function(on_frame, "on_frame")
-    if out is not None:
-        require_place(files.file_path(out))
-        require_own(out)
+    files.require_runnable(scene, out, on_frame)
     scene.log_holds()
     scene.log_contacts()
     count, plans = scene.config.frames, scene.config.reduce
@@ -120,8 +115,10 @@ def basis(full: Run, group: str, method: str | MethodSpec = "pod") -> Basis:
     ConfigurationError, SceneError, SnapshotError
         ``full`` is no run; the method or group is unknown; snapshots are too few or not finite.
     """
-    files.require_run(Run, full, "full", source=files.FULL_RUN)
-    chosen = full.scene.group(files.require(str, group, "group", source=GROUP))
+    files.require_run(full, "full")
+    chosen = full.scene.group(
+        files.require(str, group, "group", source="the name of a constraint group")
+    )
     spec = _method_spec(method)
     if group not in full.snapshots:
         raise SnapshotError(f"group '{group}': the run stored no snapshots of it")

@@ -108,32 +108,28 @@ def train(
         that no position subspace can simulate.
     """
     started = perf_counter()
-    runs = [files.require_run(Run, one, "full", source=files.FULL_RUN) for one in (full, *others)]
+    runs = [files.require_run(one, "full") for one in (full, *others)]
     given, keys = locals(), [field.alias or name for name, field in _Asked.model_fields.items()]
     plain = {key: v.item() if isinstance(v := given[key], np.generic) else v for key in keys}
     asked = checked(_Asked, plain, "train")
     if asked.error is not None and not asked.validate_:
         raise ConfigurationError("train: error: validate = 0: one validation trajectory is needed")
+    drawn = _variations(full.scene, "validation", asked.validate_, VALIDATION)
     if method is not None or group is not None:
         if others or asked.variations or asked.error is not None:
             raise ConfigurationError("train: others, variations, error: without group and method")
         reduced = projections_model(full, asked.group, method or "gappy", asked.r)
         done = Training((full.scene.config.name,), False, None, None, perf_counter() - started)
-        tests = [
-            _reference(scene, False, progress) for scene in _tests(full.scene, asked.validate_)
-        ]
+        tests = [_reference(scene, False, progress) for scene in drawn]
         return _validated(Model(full.scene, reduced, done, pd.DataFrame()), [full], tests)
     for one in others:
         require_same_mesh(full.scene, one.scene)
-    more = [_variation(full.scene, "variation", n + 1, n + 1) for n in range(asked.variations)]
+    more = _variations(full.scene, "variation", asked.variations, 1)
     if asked.converged:
         references = [_reference(s, True, progress) for s in [*(one.scene for one in runs), *more]]
     else:
         references = [*runs, *(_reference(scene, False, progress) for scene in more)]
-    tests = [
-        _reference(scene, asked.converged, progress)
-        for scene in _tests(full.scene, asked.validate_)
-    ]
+    tests = [_reference(scene, asked.converged, progress) for scene in drawn]
     own = _own_columns(full.scene, basis)
     tried: list[str] = []
     for size in (asked.modes,) if asked.error is None else SIZES:
@@ -189,16 +185,12 @@ def _own_columns(scene: Scene, basis: Any) -> np.ndarray | None:
     return require_finite("basis", found.astype(float), SnapshotError)
 
 
-def _tests(scene: Scene, count: int) -> list[Scene]:
-    """Scenes of ``count`` validation trajectories."""
-    return [_variation(scene, "validation", n + 1, VALIDATION + n) for n in range(count)]
-
-
-def _variation(scene: Scene, kind: str, number: int, seed: int) -> Scene:
-    """Variation of ``scene`` by ``seed``; its name says its ``kind`` and ``number``."""
-    config = scene.config.training_variant(seed)
-    name = f"{scene.config.name}_{kind}_{number}"
-    return Scene.build(config.model_copy(update={"name": name}), scene.mesh, scene.masses)
+def _variations(scene: Scene, kind: str, count: int, seed: int) -> list[Scene]:
+    """Variations of ``scene`` by ``count`` seeds from ``seed`` on; their names say the ``kind``."""
+    names = [f"{scene.config.name}_{kind}_{n + 1}" for n in range(count)]
+    drawn = [scene.config.training_variant(seed + n) for n in range(count)]
+    configs = [c.model_copy(update={"name": name}) for c, name in zip(drawn, names, strict=True)]
+    return [Scene.build(config, scene.mesh, scene.masses) for config in configs]
 
 
 def _reference(scene: Scene, converged: bool, progress: Progress) -> Run:

@@ -54,16 +54,11 @@ def files_of(file: str, scene: "Scene") -> list[str]:
 def require_output(path: str | Path, reads: Sequence[str]) -> None:
     """Check, before a long computation, that the output ``path`` can be written.
 
-    Raises
-    ------
-    StorageError
-        The file cannot be written, would replace a file that pdrom did not write, or is one of
-        the files that the command ``reads``.
+    Raises StorageError if `require_own` does, or if the command ``reads`` this file.
     """
     from pdrom.core.errors import StorageError
-    from pdrom.core.store import require_own, require_place
+    from pdrom.core.store import require_own
 
-    require_place(path)
     if any(Path(path).resolve() == Path(read).resolve() for read in reads):
         raise StorageError(f"{path}: would be overwritten, and is read by this command")
     require_own(path)

@@ -81,9 +81,7 @@ def _parsed(arguments: Sequence[str]) -> argparse.Namespace:
     """Parse the command line; a misspelt command or option gets a suggestion."""
     top = parser()
     if arguments and arguments[0][:1] != "-" and arguments[0] not in COMMANDS:
-        gone = "; `pdrom train --method` and `pdrom run --model` replace it" * (
-            arguments[0] == "reduce"
-        )
+        gone = "; it is `pdrom train --method` now" * (arguments[0] == "reduce")
         top.error(f"no command '{arguments[0]}'{choices(arguments[0], COMMANDS)}{gone}")
     found, unknown = top.parse_known_args(arguments)
     if unknown:

@@ -43,13 +43,9 @@ def settled(
 ) -> dict[str, str]:
     """Return a copy of ``environment`` with this project's settings in place of inherited ones.
 
-    Variables with a prefix of `CLEARED` are removed, except for `KEPT`, then the project's are set.
-    A variable named in ``PDROM_KEEP`` is neither removed nor set.
-
-    Parameters
-    ----------
-    kernels : OpenBLAS's name of the kernels to use; None leaves the choice to OpenBLAS
-    target : variables that set the processor for which Numba compiles, from `compiled_for`
+    Variables with a prefix of `CLEARED` are removed, except for `KEPT`, then the project's are set:
+    also those of `core_type` (``kernels``) and `compiled_for` (``target``). A variable named in
+    ``PDROM_KEEP`` is neither removed nor set.
     """
     asked = environment.get(KEEP, "").split()
     kept = {
@@ -89,11 +85,6 @@ def core_type(system: str, machine: str, features: set[str]) -> str | None:
     On Linux, x86-64: Haswell (2013; also AMD's Zen) if the processor has its instructions, or else
     Nehalem, whose instructions NumPy requires anyway; ARM: the base architecture. None on other
     systems: their library is not OpenBLAS, or they do not list the processor's instructions.
-
-    Parameters
-    ----------
-    system, machine : as `platform.system` and `platform.machine` name them
-    features : flags of the processor, as Linux names them
     """
     if system != "Linux":
         return None
@@ -107,11 +98,6 @@ def compiled_for(machine: str, features: set[str]) -> dict[str, str]:
 
     Haswell if an x86-64 processor has the instruction sets `COMPILED_HASWELL`; on ARM the base
     architecture. Otherwise empty: Numba then compiles for the processor on which it runs.
-
-    Parameters
-    ----------
-    machine : processor architecture, as `platform.machine` names it
-    features : flags of the processor, as Linux names them
     """
     if machine in ("aarch64", "arm64"):
         return {TARGET: "generic", FEATURES: ""}

@@ -29,11 +29,6 @@ from pdrom.model.mesh.types import Mesh, vertex_measures
 
 log = logging.getLogger(__name__)
 
-# What users of a requested error, which earlier versions had, are told.
-GONE = (
-    "runs within a requested error are gone (a reduction served 6 of 225 requests); reduce a group "
-    "to r modes instead, and compare the reduced run with the full-order run"
-)
 # A body that is held (fixed) at fewer vertices than this can rotate about a line.
 FEW = 3
 # Held vertices inside an obstacle by up to this fraction of the mesh's extent cause no warning.
@@ -92,9 +87,7 @@ class SceneConfig(ConfigModel):
     def _without_error(cls, keys: Any) -> Any:
         plans = keys.get("reduce") if isinstance(keys, dict) else None
         if isinstance(plans, dict) and "error" in plans:
-            raise ValueError(f"reduce.error: {GONE}")
-        if isinstance(keys, dict) and "requested_error" in keys:
-            raise ValueError(f"requested_error: {GONE}")
+            raise ValueError("reduce.error: runs within a requested error are gone")
         return keys
 
     @model_validator(mode="after")

@@ -113,10 +113,7 @@ class Artifact:
     def perform(
         self, settings: Mapping[str, Any], inputs: Mapping[str, Any], outputs: Mapping[str, str]
     ) -> None:
-        """Run a job; arguments map the parameters to settings (JSON data), input and output paths.
-
-        Raises ValidationError if a setting does not have the type of the function's annotation.
-        """
+        """Run a job; arguments map parameters to settings (JSON data), input and output paths."""
         made: dict[str, Any] = {"outputs": outputs}
         if "outputs" not in inspect.signature(self.function).parameters:
             made = {name: place.file(str(outputs[name])) for name, place in self.writes.items()}
@@ -131,10 +128,7 @@ class Artifact:
 def recorded(
     made: Artifact, settings: Any, labels: Labels, code: str, content: str, digests: Iterable[str]
 ) -> AbstractContextManager[None]:
-    """Context in which files record the job of ``made`` that has these settings and labels.
-
-    The other arguments are those of `make`; ``digests`` are those of the results that it reads.
-    """
+    """Context in which files record a job as `make` gets it, with ``digests`` of what it reads."""
     inputs = hashlib.sha256("\n".join((content, *digests)).encode()).hexdigest()
     return made_by(made.rule, {**settings, "labels": dict(labels)}, code, inputs)
 
@@ -147,10 +141,7 @@ def make(
     Raises StorageError if an input is damaged or belongs to another result (`damaged_set_aside`),
     and PdromError if a file that the job reads was edited since the plan of the run.
 
-    code : fingerprint (hash) of the code that the job runs
-    labels : scene, group ... of the job, such as {"scene": "bar_release"}
-    content : checksum of hand-edited inputs
-    job : ``settings`` (JSON), ``inputs``, ``outputs`` (paths); each maps parameters to values
+    The other arguments are attributes of a `study.pipeline.plan.Job`.
     """
     made = load(address)
     digests = map(digest_told, made.results(job["inputs"]))
@@ -180,11 +171,9 @@ def load(address: str) -> Artifact:
 
 @cache
 def declared_in(package: str, kind: type[A]) -> dict[str, A]:
-    """Return all artifacts of the class ``kind`` in the modules of a package, sorted by name.
-
-    To save time, modules that import nothing from the module of ``kind`` are not imported.
-    """
+    """Return all artifacts of the class ``kind`` in the modules of a package, sorted by name."""
     found = {}
+    # to save time, modules that import nothing from the module of ``kind`` are not imported
     above, _, own = kind.__module__.rpartition(".")
     needed = f"\nfrom {kind.__module__} import ", f"\nfrom {above} import {own}"
     for name, (_, text) in plan()[0].items():

@@ -96,11 +96,7 @@ def job_log(path: str) -> Iterator[logging.Logger]:
 
 @contextmanager
 def warnings_to(stream: TextIO | None, form: str = "pdrom: warning: %(message)s") -> Iterator[None]:
-    """Write warnings of pdrom and study in ``form`` to ``stream``; suppress them if that is None.
-
-    Each job makes the plan again in its own process and suppresses them: the main process has shown
-    them already.
-    """
+    """Write warnings of pdrom and study in ``form`` to ``stream``; None suppresses them."""
     handler = logging.NullHandler() if stream is None else logging.StreamHandler(stream)
     handler.setLevel(logging.WARNING)
     handler.setFormatter(logging.Formatter(form))

@@ -56,10 +56,7 @@ class EachOf(Every):
 
 @dataclass(frozen=True)
 class TableOf:
-    """Declared input of an artifact: table ``name`` of the study, received as a data frame.
-
-    The frame has no columns if the study lacks the table (see `Plan.holds`).
-    """
+    """Table ``name`` of the study as a data frame, without columns if the study lacks the table."""
 
     name: str
 

@@ -109,10 +109,7 @@ class CommandLine:
 
 
 def parsed(arguments: Sequence[str]) -> dict[str, Any]:
-    """Return the options that Snakemake finds in ``arguments`` and in the profiles that they name.
-
-    Raises ConfigurationError if Snakemake refuses an option or would ignore some of its values.
-    """
+    """Return the options that Snakemake finds in ``arguments`` and the profiles that they name."""
     # not imported at the top: jobs import this module, too, and need no parser
     from snakemake.cli import parse_args
 

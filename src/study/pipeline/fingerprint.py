@@ -92,10 +92,7 @@ def closure(*places: str) -> list[str]:
 
 @cache
 def _read(module: str) -> tuple[list[str], str]:
-    """Names of the project's modules that ``module`` imports, and the hash of its code.
-
-    Parent packages of these modules are included. Imports inside functions are found, too.
-    """
+    """Names of the project's modules (and their packages) that it imports; hash of its code."""
     if module not in plan()[0]:
         raise ConfigurationError(f"fingerprint: no module '{module}' in the packages")
     text, own = (plan()[0][name][1] for name in (module, __name__))
@@ -150,11 +147,7 @@ def digest_of_code(tree: ast.Module, module: str = "") -> str:
 
 
 def digest(root: Path, *names: str) -> str:
-    """Checksum (16 hexadecimal digits) of the hand-edited files ``names`` below ``root``.
-
-    It is a parameter of rules that read these files: jobs are repeated if their content changes.
-    Dates, which Snakemake compares, can be set back by a copy or a wrong clock.
-    """
+    """Checksum (16 hexadecimal digits) of the hand-edited files ``names`` below ``root``."""
     files = [noted(root / name) for name in names]
     content = b"".join(hashlib.sha256(f.read_bytes()).digest() for f in files if f.is_file())
     return hashlib.sha256(content).hexdigest()[:16]

@@ -37,9 +37,6 @@ def folders(configfiles: Iterable[str | Path], settings: Iterable[str]) -> Folde
     has ``results/studies/NAME``. NAME is the value of its key ``study``; without this key, it is
     the name of the last of ``configfiles`` without suffix; without files, it is `OWN`. Raises
     ConfigurationError if NAME has over 60 characters or others than letters, digits, _ and -.
-
-    configfiles : files given by the option ``--configfile``, in order
-    settings : ``key=value`` pairs given by the option ``--config``
     """
     default, pairs = Path(DEFAULT).resolve(), list(settings)
     files = [str(file) for file in configfiles if Path(file).resolve() != default]

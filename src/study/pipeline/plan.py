@@ -21,14 +21,7 @@ from pdrom.view.text import require_typeset
 from study.article.build import article
 from study.artifact.artifact import Artifact, make, modules_in, recorded
 from study.artifact.logs import warnings_to
-from study.artifact.paths import (
-    FIGURE,
-    FIGURE_PICTURE,
-    LIVE_MODEL,
-    PAPER_INPUT,
-    TABLE,
-    Place,
-)  # fmt: skip
+from study.artifact.paths import FIGURE, FIGURE_PICTURE, LIVE_MODEL, PAPER_INPUT, TABLE, Place
 from study.artifact.reads import Labels, Paths, listed
 from study.experiments.kit.base import experiments
 from study.figures.kit.declaration import Declaration, declarations
@@ -49,10 +42,7 @@ log = logging.getLogger(__name__)
 
 
 def check_subspaces(study: Study) -> None:
-    """Warn of scenes with effects that position subspaces cannot represent.
-
-    Raises ConfigurationError if the configuration lists such a scene for models in subspaces.
-    """
+    """Warn of scenes that position subspaces cannot represent, or refuse them where listed."""
     outside = {
         name: effects
         for name, config in {**study.scenes, **study.online}.items()
@@ -172,14 +162,7 @@ def load_plan(
     folders: Folders = OF_STUDY,
     quiet: bool = False,
 ) -> "Plan":
-    """Return the plan of the configuration ``config``, and check it.
-
-    Raises PdromError if the configuration is faulty.
-
-    files : configuration files, for error messages
-    folders : folders of the results
-    quiet : True to suppress warnings
-    """
+    """Return the checked plan of ``config``; PdromError, which names ``files``, if it is faulty."""
     names = [os.path.relpath(path) for path in files] or [DEFAULT]
     source = f"configuration ({', '.join(sorted(set(names)))})"
     others = ", ".join(sorted({*names} - {DEFAULT})) or "the command line"

@@ -65,8 +65,6 @@ class Preview(logging.Handler):
 
     seconds : function that maps the path of a job's log to its expected processor seconds
     faults : path of a result -> why its job runs, if Snakemake does not know
-    cores : number of cores of the run; a job that measures times needs all of them
-    compiles : whether jobs have to compile their kernels
     """
 
     def __init__(

@@ -137,10 +137,7 @@ class Run:
 
 
 def start_batch(workflow: Any) -> None:
-    """Start the fork server for a batch of jobs, if ``workflow`` runs on a node of a cluster.
-
-    Snakemake runs twice on a node: a first process hands the batch on by the executor
-    ``slurm-jobstep`` and needs no fork server, the second one runs the jobs.
-    """
+    """Start the fork server for a batch of jobs, if ``workflow`` runs on a node of a cluster."""
+    # Snakemake runs twice there: a first process, which runs no job, hands on the batch
     if workflow.remote_exec and "slurm-jobstep" not in sys.argv:
         start_server()

@@ -129,8 +129,7 @@ def load_bound_scene(root: Path, name: str, *changes: Change) -> Scene:
 def read_scene(root: Path, name: str, *changes: Change) -> SceneConfig:
     """Read the configuration of scene ``name`` below ``root`` and apply ``changes``.
 
-    No mesh is built. The path of a mesh file becomes relative to ``root``. Raises
-    ConfigurationError if the file is missing or faulty.
+    No mesh is built. The path of a mesh file becomes relative to ``root``.
     """
     require_scenes(root, [name], "scenes")
     path = scene_file(root, name)

@@ -88,13 +88,8 @@ class Study:
         Raises ConfigurationError (with file, key, value, allowed values) if a setting is wrong.
         """
         self.root, self.configuration = root, configuration
-        file = root / "config" / "figures.yaml"
-        if "figures" in config or file.exists():
-            old = f"{source}: the key 'figures'" if "figures" in config else str(file)
-            raise ConfigurationError(
-                f"{old}: what figures draw now stands in their modules below src/study/figures; "
-                "delete this"
-            )
+        if (file := root / "config" / "figures.yaml").exists():
+            raise ConfigurationError(f"{file}: delete it: figures declare what they draw")
         self.settings = settings = validate(StudySettings, config, source)
         self.titles: dict[str, str] = {}  # name of a scene -> title, for tables and figures
         self.sizes: dict[str, tuple[int, int]] = {}  # scene -> numbers of vertices and elements
@@ -196,10 +191,7 @@ class Study:
         return BasisSpec(**{key: getattr(method, key) for key in BasisSpec.model_fields})
 
     def named_methods(self, names: Iterable[str], key: str) -> dict[str, MethodSpec]:
-        """Map the given ``names`` to the methods of config/methods.yaml.
-
-        Raises ConfigurationError for an unknown name; the message says that ``key`` lists it.
-        """
+        """Map ``names``, which ``key`` lists, to methods; ConfigurationError for an unknown one."""
         known = self.every_method
         for name in names:
             if name not in known:
@@ -251,10 +243,7 @@ def _held(study: Study, listed: Iterable[str]) -> list[str]:
 
 
 def _with_subspaces(study: Study) -> list[str]:
-    """Scenes with models in position subspaces: configured ones, else all that allow such models.
-
-    The list is empty if section ``subspace`` has no position bases or no basis sizes.
-    """
+    """Scenes with models in position subspaces: configured ones, else all that allow them."""
     section = study.settings.subspace
     if not (section.bases and section.sizes):
         return []

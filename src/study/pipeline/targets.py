@@ -54,24 +54,15 @@ def files(target: str, folders: Folders) -> list[str]:
     """
     kinds = ((paths.FIGURE, declarations()), (paths.TABLE, declared()))
     found = [place.at(folders.results, name=target) for place, names in kinds if target in names]
-    return found or [own_file(target, folders)]
-
-
-def own_file(path: str, folders: Folders) -> str:
-    """Return ``path`` or, if it is a default path of a result, the result's path in ``folders``."""
-    for document, file in Folders().documents.items():
-        if path == file:
-            return folders.documents[document]
-    inside = path.startswith(f"{paths.RESULTS}/")
-    others = path.startswith(f"{paths.RESULTS}/studies/")
-    return folders.results + path.removeprefix(paths.RESULTS) if inside and not others else path
+    found += [folders.documents[d] for d, file in Folders().documents.items() if target == file]
+    inside, others = f"{paths.RESULTS}/", f"{paths.RESULTS}/studies/"
+    if target.startswith(inside) and not target.startswith(others):
+        found += [folders.results + target.removeprefix(paths.RESULTS)]
+    return found or [target]
 
 
 def check_targets(plan: Plan, targets: Iterable[str], rules: Sequence[Any]) -> None:
-    """Raise ConfigurationError if none of Snakemake's ``rules`` makes one of ``targets``.
-
-    A target is the name of a rule, or a path whose scene, group ... must be known.
-    """
+    """Raise ConfigurationError if none of Snakemake's ``rules`` makes one of ``targets``."""
     own = {rule.name for rule in rules if not rule.has_wildcards()}
     for target in targets:
         if target in own:

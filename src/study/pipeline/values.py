@@ -104,10 +104,7 @@ def _projection_cases(study: Study, labels: Labels) -> tuple[ProjectionCase, ...
 
 
 def scaled_methods(study: Study, labels: Labels) -> dict[str, MethodSpec]:
-    """Name -> method, for methods that are timed on meshes of increasing size.
-
-    They need not be among the methods of the study. ``labels`` are not used.
-    """
+    """Name -> method, for methods that are timed on meshes of increasing size."""
     return study.named_methods(SCALED, "scaling")
 
 

@@ -32,7 +32,7 @@ if TYPE_CHECKING:  # pandas is not loaded by a run that writes no table
 
 __all__ = [
     "MARK", "Condition", "atomic_path", "check_file", "checksum_path", "open_hdf5", "read_table",
-    "read_text", "require_finite", "require_intact", "require_own", "require_place",
+    "read_text", "require_finite", "require_intact", "require_own",
     "require_self_contained", "write_hdf5", "write_table", "write_text",
 ]  # fmt: skip
 # Every page, picture and ParaView file of pdrom has this text in its first or last MARKED bytes.
@@ -45,18 +45,10 @@ _MACHINE = hashlib.blake2b(platform.node().encode(), digest_size=2).hexdigest()
 def atomic_path(path: str | os.PathLike[str], with_checksum: bool = True) -> Iterator[Path]:
     """Yield a temporary path; on success it is renamed to ``path`` with a checksum, else removed.
 
-    Temporary files of ``path`` that killed processes of this machine have left are removed.
-
-    Parameters
-    ----------
-    with_checksum : whether to write a checksum file next to ``path``; False for a file that has
-        its checksum inside or is written to a user's folder
-
-    Raises
-    ------
-    StorageError
-        The folder or file cannot be written (no permission, no space), or ``path`` is not a
-        regular file but a folder, link, device or pipe, which a new file would replace.
+    Temporary files of ``path`` that killed processes of this machine have left are removed. A file
+    that has its checksum inside, or is written to a user's folder, has none next to it. Raises
+    StorageError if the folder or file cannot be written (no permission, no space), or ``path`` is
+    not a regular file but a folder, link, device or pipe, which a new file would replace.
     """
     target = Path(path)
     _require_file(target)
@@ -88,10 +80,11 @@ def atomic_path(path: str | os.PathLike[str], with_checksum: bool = True) -> Ite
                 left.unlink(missing_ok=True)
 
 
-def require_place(path: str | os.PathLike[str]) -> None:
+def require_own(path: str | os.PathLike[str]) -> None:
     """Check, before a long computation of a result, that ``path`` can be written.
 
-    Raises StorageError if it is not a regular file, or its folder cannot be made or written to.
+    Raises StorageError if it is not a regular file, if its folder cannot be made or written to, or
+    if it is a file that pdrom has not made: without an intact checksum and the text `MARK`.
     """
     target = Path(path)
     _require_file(target)
@@ -100,13 +93,6 @@ def require_place(path: str | os.PathLike[str]) -> None:
         fault = "no permission to write" if above.is_dir() else "not a folder"
         raise StorageError(f"{target}: cannot be written ({above}: {fault})")
 
-
-def require_own(path: str | os.PathLike[str]) -> None:
-    """Check that writing to ``path`` would not replace a file that pdrom has not made.
-
-    Raises StorageError if it is a file without an intact checksum and without the text `MARK`.
-    """
-    target = Path(path)
     if not target.is_file():
         return
     hdf5 = sums.is_hdf5(target)
@@ -291,11 +277,8 @@ class _Sink:
 def open_hdf5(path: str | os.PathLike[str], unchecked: bool = False) -> Iterator[h5py.File]:
     """Open the result ``path`` (HDF5) for reading, if it matches its checksum.
 
-    Raises StorageError if it is missing, damaged, or lacks a dataset or attribute that is read.
-
-    Parameters
-    ----------
-    unchecked : whether a file without a checksum is read
+    Raises StorageError if it is missing, damaged, or lacks a dataset or attribute that is read. A
+    file without a checksum is read if ``unchecked``.
     """
     require_intact(path, unchecked)
     try:

@@ -176,16 +176,9 @@ def check_file(path: str | os.PathLike[str]) -> Condition:
 def require_intact(path: str | os.PathLike[str], unchecked: bool = False) -> None:
     """Refuse a result ``path`` that does not match its checksum; every reader calls this first.
 
-    Parameters
-    ----------
-    unchecked : whether a file without a checksum is accepted
-
-    Raises
-    ------
-    StorageError
-        The file is missing, cannot be read, is damaged or has no checksum, or a job of the workflow
-        reads the file of another result. Except if the file is missing, a job renames it to
-        ``*.damaged``, so that the next run makes it again; other readers leave it unchanged.
+    Raises StorageError if the file is missing, cannot be read, is damaged or (if not ``unchecked``)
+    has no checksum, or a job of the workflow reads the file of another result. Except if the file
+    is missing, a job renames it to ``*.damaged``, so that the next run makes it again.
     """
     path = Path(path)
     try:

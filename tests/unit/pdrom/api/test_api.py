@@ -169,7 +169,7 @@ FAULTY = {
     "basis NaN": (
         lambda full, _: api.train(full, basis=np.full((30, 2), np.nan)), "basis: entry .* is nan",
     ),
-    "error of a scene": (lambda *_: given((SQUARE, HALVES), requested_error=1), "runs within a"),
+    "error of a scene": (lambda *_: given((SQUARE, HALVES), requested_error=1), "unknown key"),
     "plot of a run": (lambda full, _: api.plot(full), "at least one run"),
     "view of nothing": (lambda _, p: api.view(p / "v"), "view"),
     "view into a folder": (lambda full, p: api.view(p, full), "cannot be written .a folder"),

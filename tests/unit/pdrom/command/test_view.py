@@ -132,7 +132,7 @@ AT = "snapshots/spring/frames"
         ("small_small", shortened("positions"), SHORT),
         ("small_small", first_of("mesh/triangles", 999), "triangle 0 names vertex"),
         # attribute of a file in which an earlier pdrom stored a run within a requested error
-        ("small", lambda file: file.attrs.modify("requested_error", 0.05), "requested error are"),
+        ("small", lambda file: file.attrs.modify("requested_error", 0.05), "earlier pdrom"),
         ("small", first_of("positions", 5.0), "frame 0 of the"),
         *(("small", first_of("velocities", v), "velocities are not") for v in (1.0, np.inf)),
         ("small", shortened("velocities"), "velocities are not"),

@@ -102,7 +102,7 @@ def test_a_kill_between_the_checksum_and_the_file_is_healed(tmp_path, existed, c
 
 
 @pytest.mark.parametrize("kind", ["a link", "no regular file", "a folder"])
-@pytest.mark.parametrize("place", [store.require_place, lambda path: store.write_text("new", path)])
+@pytest.mark.parametrize("place", [store.require_own, lambda path: store.write_text("new", path)])
 def test_what_is_no_regular_file_is_refused_and_stays(tmp_path, kind, place):
     path = tmp_path / "result.txt"
     if kind == "a link":
