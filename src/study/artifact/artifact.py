@@ -78,15 +78,10 @@ class Artifact:
         reads = self.reads.items()
         return {name: read for name, read in reads if not isinstance(read, SettingRead)}
 
-    def edited(self, inputs: Mapping[str, Any]) -> list[str]:
-        """Paths of files edited by hand among ``inputs`` (parameter -> paths)."""
-        names = [name for name, read in self.files.items() if isinstance(read, EditedFiles)]
-        return [path for name in names for path in listed(inputs[name])]
-
-    def results(self, inputs: Mapping[str, Any]) -> list[str]:
-        """Paths of those ``inputs`` of a job that other jobs make, in the order of `reads`."""
+    def paths(self, inputs: Mapping[str, Any], edited: bool) -> list[str]:
+        """Paths among ``inputs`` of files edited by hand, or else of those that other jobs make."""
         reads = self.files.items()
-        names = [name for name, read in reads if not isinstance(read, EditedFiles)]
+        names = [name for name, read in reads if isinstance(read, EditedFiles) == edited]
         return [str(path) for name in names for path in listed(inputs[name])]
 
     @cached_property
@@ -144,12 +139,12 @@ def make(
     The other arguments are attributes of a `study.pipeline.plan.Job`.
     """
     made = load(address)
-    digests = map(digest_told, made.results(job["inputs"]))
+    digests = map(digest_told, made.paths(job["inputs"], edited=False))
     try:
         with recorded(made, job["settings"], labels, code, content, digests):
             made.perform(**job)
     finally:
-        for message in refused([SCRIPT, *made.edited(job["inputs"])]):
+        for message in refused([SCRIPT, *made.paths(job["inputs"], edited=True)]):
             raise PdromError(message)
 
 

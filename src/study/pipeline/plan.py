@@ -143,7 +143,7 @@ class Job:
     @cached_property
     def results(self) -> list[str]:
         """Input paths of the job that other jobs make."""
-        return self.artifact.results(self.inputs)
+        return self.artifact.paths(self.inputs, edited=False)
 
     @property
     def files(self) -> list[str]:
@@ -275,7 +275,7 @@ class Plan:
             known = {**own, "figure": artifact.name}  # figures find what they draw by it
             settings = artifact.settings(self, known)
             inputs = {k: read.paths(self, known) for k, read in artifact.files.items()}
-            content = artifact.edited(inputs)
+            content = artifact.paths(inputs, edited=True)
             self._jobs[key] = Job(
                 artifact,
                 own,

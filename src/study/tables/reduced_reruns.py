@@ -151,19 +151,15 @@ def _with_times(runs: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
     reduced["local_ms"] += reduced.assembly_ms + reduced.lift_ms
     reduced["speedup"] = reduced.scene.map(reference) / reduced.ms_per_frame
     measured = ["ms_per_frame", "vertices_ms", "local_ms", "global_ms", "speedup"]
-    inside = reduced.position_basis != "full"
-    keys = [k for k in KEYS if k != "k"]
-    local = runs[runs.position_basis == "full"].merge(
-        reduced.loc[~inside, keys + measured], on=keys, how="left"
-    )
+    parts = []
     # match rows of subspace models by the size k, as their r is the number of sampled elements
-    keys = [k for k in KEYS if k != "r"]
-    subspace = runs[runs.position_basis != "full"]
-    if len(subspace) == 0:
-        return local
-    times_inside = reduced.loc[inside, keys + measured].astype({"k": "int64"})
-    subspace = subspace.astype({"k": "int64"}).merge(times_inside, on=keys, how="left")
-    return pd.concat([local, subspace], ignore_index=True)
+    for inside, left_out in ((False, "k"), (True, "r")):
+        keys, whole = [k for k in KEYS if k != left_out], {"k": "int64"} if inside else {}
+        rows, found = (each[(each.position_basis != "full") == inside] for each in (runs, reduced))
+        if len(rows):
+            found = found[keys + measured].astype(whole)
+            parts.append(rows.astype(whole).merge(found, on=keys, how="left"))
+    return pd.concat(parts, ignore_index=True)
 
 
 # Possible outcomes of a run.

@@ -3,6 +3,7 @@
 This file is started for every job, and imports only a few standard modules to start fast.
 """
 
+import marshal
 import os
 import signal
 import socket
@@ -75,14 +76,13 @@ def ask(connection: socket.socket) -> bytes:
 
     The server gets the standard streams, and a pipe with folder, script and environment of the job.
     """
-    environment = [f"{key}={value}" for key, value in os.environ.items() if key != ADDRESS]
-    parts = [os.getcwd(), os.path.abspath(sys.argv[1]), *environment]
+    environment = {key: value for key, value in os.environ.items() if key != ADDRESS}
     reader, writer = os.pipe()
     try:
         socket.send_fds(connection, [b"\n"], [0, 1, 2, reader])
         os.close(reader)
         with open(writer, "wb") as request:
-            request.write("\0".join([*parts, "", ""]).encode("utf-8", "surrogateescape"))
+            marshal.dump((os.getcwd(), os.path.abspath(sys.argv[1]), environment), request)
     except OSError:
         return b""
     return receive(connection)

@@ -9,6 +9,7 @@ import atexit
 import ctypes
 import gc
 import importlib
+import marshal
 import os
 import runpy
 import select
@@ -30,8 +31,7 @@ class Server:
     """Server that forks a job for each request until its owner, the process of the run, ends.
 
     A request is a message with file descriptors of the three standard streams and of a pipe. From
-    the pipe, the fork reads the folder, the script and the variables of the environment. Each of
-    these texts ends with a zero byte; one more zero byte ends the request.
+    the pipe, the fork reads the folder, the script and the variables of the environment.
 
     listener : socket to which clients connect
     owner : read end of a pipe whose write end only the owner has open
@@ -126,16 +126,14 @@ class Server:
             os.dup2(stream, number)
         for descriptor in (self.owner, self.wake, self._waker, *streams[:3]):
             os.close(descriptor)
-        with open(streams[3], encoding="utf-8", errors="surrogateescape", newline="") as request:
-            content = request.read()
-        if not content.endswith("\0\0"):
-            os._exit(1)  # the client was killed while it wrote the request
-        folder, script, *environment = content.removesuffix("\0\0").split("\0")
+        try:
+            with open(streams[3], "rb") as request:
+                folder, script, environment = marshal.load(request)
+        except (EOFError, ValueError, TypeError):  # the client was killed while it wrote
+            os._exit(1)
         os.chdir(folder)
         os.environ.clear()
-        for entry in environment:
-            key, _, value = entry.partition("=")
-            os.environ[key] = value
+        os.environ.update(environment)
         sys.argv = [script]
         sys.path[0] = os.path.dirname(script)
         return script

@@ -1,5 +1,6 @@
 """Jobs that are forked from a server: they behave as scripts of a plain interpreter do."""
 
+import marshal
 import os
 import shlex
 import signal
@@ -178,7 +179,7 @@ class ForkServer:
         socket.send_fds(connection, [b"x"], [stream, stream, stream, reader])
         os.close(reader)
         with open(writer, "wb") as request:
-            request.write(f"/\0{self.job}\0A=b\0\0".encode())
+            marshal.dump(("/", str(self.job), {"A": "b"}), request)
 
     def serves(self) -> bool:
         """Whether another client gets its job, and the job's end."""
@@ -198,7 +199,7 @@ def test_no_request_is_dropped_a_silent_client_and_half_a_request_keep_nobody_wa
                 assert connection.recv(20) == b""
             assert server.serves()
         socket.send_fds(half, [b"x"], [0, 1, 2, reader])
-        os.write(writer, b"/\0")
+        os.write(writer, marshal.dumps(("/", "/"))[:4])
         assert server.serves()
         silent.close()
         os.close(writer)
