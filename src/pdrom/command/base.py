@@ -21,13 +21,7 @@ class Status(IntEnum):
 
 @dataclass(frozen=True)
 class Command:
-    """A command of ``pdrom``.
-
-    title : description in one line
-    example : example of a call
-    arguments : name of each argument -> keywords of `argparse.ArgumentParser.add_argument`
-    perform : function that executes the command and returns the exit code
-    """
+    """A command of ``pdrom``; ``arguments`` maps names to keywords of argparse's `add_argument`."""
 
     title: str
     example: str

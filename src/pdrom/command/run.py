@@ -60,10 +60,7 @@ COMMAND = Command(
     "pdrom run sheet.yaml --out sheet.h5",
     {
         "scene": SCENE,
-        "--model": {
-            "metavar": "MODEL",
-            "help": "file by pdrom train: the model runs the scene",
-        },
+        "--model": {"metavar": "MODEL", "help": "file by pdrom train: the model runs the scene"},
         "--compare": {
             "metavar": "RUN.h5",
             "help": "full-order run of the scene, to which the model's run is compared",

@@ -84,12 +84,7 @@ COMMAND = Command(
             "help": "reduce the projections of a group instead, by a method of config/methods.yaml",
         },
         "--group": {"metavar": "G", "help": "the group; needed if the scene has several"},
-        "--r": {
-            "metavar": "R",
-            "type": int,
-            "default": 20,
-            "help": "their modes (20)",
-        },
+        "--r": {"metavar": "R", "type": int, "default": 20, "help": "their modes (20)"},
         "--out": {"metavar": "FILE", "help": "file to write (HDF5); SCENE.model.h5 without it"},
         "--unchecked": UNCHECKED,
     },

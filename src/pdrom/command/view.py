@@ -45,11 +45,7 @@ COMMAND = Command(
     "Write a page on which runs are looked at, a picture, or files for ParaView",
     "pdrom view pulled_sheet.h5 pulled.h5 --open",
     {
-        "results": {
-            "metavar": "RESULT",
-            "nargs": "+",
-            "help": "files of pdrom run",
-        },
+        "results": {"metavar": "RESULT", "nargs": "+", "help": "files of pdrom run"},
         "--out": {"metavar": "FILE", "help": "page to write; the first RESULT as .html"},
         "--open": {"action": "store_true", "help": "open it in the browser"},
         "--png": {"metavar": "FILE", "help": "picture of four frames of each run, too"},

@@ -41,10 +41,7 @@ def pack_positions(positions: np.ndarray) -> dict[str, Any]:
 
 
 def brief(record: Any) -> str:
-    """Text of the dataclass ``record``: name and fields; an array is shown by shape and type.
-
-    Classes use this function as their ``__repr__``.
-    """
+    """Text of the dataclass ``record``, for its repr; an array is shown by shape and type."""
     shown = []
     for field in fields(record):
         value = getattr(record, field.name)

@@ -140,10 +140,7 @@ class Usage:
 
 
 def usage_since(start: float) -> Usage:
-    """Return wall time since ``start`` (s, monotonic clock), processor time and memory.
-
-    Processor time counts from the start of this process, for a forked job from the fork.
-    """
+    """Return wall time since ``start`` (s, monotonic clock), this process's time and memory."""
     used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
     return Usage(
         wall=time.monotonic() - start,

@@ -123,15 +123,8 @@ class Job:
 
     def make(self, outputs: Mapping[str, str]) -> None:
         """Run the job in this process; write its files to ``outputs`` (parameter -> path)."""
-        make(
-            self.artifact.address,
-            settings=self.settings,
-            labels=self.labels,
-            code=self.code,
-            content=self.content,
-            inputs=self.inputs,
-            outputs=outputs,
-        )
+        own = ("settings", "labels", "code", "content", "inputs")
+        make(self.artifact.address, outputs=outputs, **{name: getattr(self, name) for name in own})
 
     def origin(self, path: str, digests: Iterable[str]) -> dict[str, str]:
         """Entries of the checksum of the output ``path`` if `results` have these ``digests``."""
@@ -265,10 +258,7 @@ class Plan:
         return {*self.made, *(path for place in places for path in self.files(place, {}))}
 
     def job(self, artifact: Artifact, labels: Labels = MappingProxyType({})) -> Job:
-        """Return the job of ``artifact`` for the scene, group ... in ``labels``.
-
-        Raises ConfigurationError if the configuration lacks an input that the artifact declares.
-        """
+        """Return the job of ``artifact`` for the scene, group ... in ``labels``."""
         own = {name: labels[name] for name in artifact.labels}
         key = (artifact.rule, *own.values())
         if key not in self._jobs:

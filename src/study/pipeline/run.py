@@ -35,8 +35,7 @@ from study.pipeline.unfit import MISSING, UNUSUAL, faults, force
 def expected_seconds(plan: Plan) -> Callable[[str], float]:
     """Return a function that maps the path of a job's log to its expected processor seconds.
 
-    It is the mean of measured jobs of the same kind, in a study with or without coarse meshes; for
-    kinds that were never measured, the median of all kinds.
+    They are the mean of measured jobs of the same kind, without any the median of all kinds.
     """
     full = plan.study.settings.coarsen == Coarsen()
     table = read_table(plan.study.root / COSTS, COLUMNS, result=False)

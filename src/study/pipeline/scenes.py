@@ -84,7 +84,6 @@ def checked_scene(root: Path, name: str, *changes: Change) -> tuple[SceneConfig,
 
     It is not built if an earlier command has built it by the same code from the same files, under
     the same limits of meshes. Returns its configuration and its numbers of vertices and elements.
-    Raises ConfigurationError as `load_bound_scene` does.
     """
     config, own = read_scene(root, name, *changes), io.StringIO()
 
@@ -106,11 +105,7 @@ def checked_scene(root: Path, name: str, *changes: Change) -> tuple[SceneConfig,
 
 
 def load_bound_scene(root: Path, name: str, *changes: Change) -> Scene:
-    """Read scene ``name`` below ``root``, apply ``changes``, and build it on its mesh.
-
-    Raises ConfigurationError if the scene or its variant for held-out motions is faulty; the
-    message names file and fault.
-    """
+    """Read scene ``name`` below ``root``, apply ``changes``, and build it on its mesh."""
     scene, source = read_scene(root, name, *changes), scene_file(root, name)
     try:
         mesh = scene.mesh.build(root)

@@ -25,8 +25,7 @@ def figure_files(words: Sequence[str]) -> list[str]:
     """Return the default paths of the figures that ``words`` name; they are printed, too.
 
     A figure is given by its name, its number in the paper (``3``), in the supplement (``S3``) or in
-    the preprint (``preprint:3``). Raises ConfigurationError if no figure is given, or if a given
-    figure does not exist.
+    the preprint (``preprint:3``).
     """
     numbers = figure_numbers(Path())
     by_place = {n.manuscript: name for name, n in numbers.items() if n.manuscript}

@@ -43,10 +43,7 @@ def kind_of(log: str, results: str) -> str:
 
 
 def measured_costs(results: str, coarse: str) -> pd.DataFrame:
-    """Return columns `COLUMNS` of each kind of job, from logs below two folders of results.
-
-    The study in ``coarse`` has coarse meshes. Raises PdromError before the first run of a study.
-    """
+    """Return columns `COLUMNS` of each kind of job, from logs of a full and a ``coarse`` study."""
 
     def used(folder: str) -> Any:
         logs = {str(log): usage_of(log) for log in sorted(Path(folder, "logs").rglob("*.log"))}

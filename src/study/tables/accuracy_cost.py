@@ -24,7 +24,6 @@ from study.tables.kit.results import FAILED, joined, trained, with_held_out
 FEWER = "fewer-iterations"
 _MODEL = ["scene", "position_basis", "k", "method"]
 _POINT = ["relative_error_within_horizon", "ms_per_frame"]
-CONVERGED, OWN = "converged", "own iterations"
 
 
 @table(
@@ -62,8 +61,6 @@ def accuracy_cost(
     """One row for each full-order run, and for each reduced run with a time and an error.
 
     The column ``pareto`` compares rows of the same scene whose errors have the same reference.
-
-    iterations : scene -> number K of local/global iterations per frame in the scene's settings
     """
     times = results.timings_in_one_time(files["timings"], frame_times)
     times = times[times.implementation == "compiled"]
@@ -79,7 +76,8 @@ def accuracy_cost(
     full["error_converged"] = [own.get((scene, iterations[scene]), np.nan) for scene in full.scene]
     parts = [full.assign(iterations=full.scene.map(iterations)), points, sweep]
     points = pd.concat([part for part in parts if len(part)], ignore_index=True)
-    for _, rows in points.groupby(["scene", reference_of(points)], sort=False):
+    against_converged = points.method.isin([FOM, ANDERSON])
+    for _, rows in points.groupby(["scene", against_converged], sort=False):
         points.loc[rows.index, "pareto"] = pareto(*rows[_POINT].to_numpy(float).T)
     order = points.scene.map({scene: i for i, scene in enumerate(iterations)})
     return points.iloc[np.argsort(order, kind="stable")]
@@ -100,11 +98,6 @@ def _sweep(errors: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
     points = pd.concat([every, fewer], ignore_index=True)
     points = points.assign(position_basis="full", k=None, r=None)
     return points.dropna(subset=_POINT)
-
-
-def reference_of(points: pd.DataFrame) -> pd.Series:
-    """Kind of each row's reference run: converged frames, or the scene's number of iterations."""
-    return points.method.isin([FOM, ANDERSON]).map({True: CONVERGED, False: OWN})
 
 
 def pareto(error: Sequence[float], cost: Sequence[float]) -> list[bool]:
@@ -140,8 +133,6 @@ _ERROR = "relative_error_within_horizon"
 def breakeven(own: list[paths.File], sized: list[paths.File]) -> pd.DataFrame:
     """One row per scene, group, method, mesh and size r: local-step times and break-even size.
 
-    Files ``own`` are for the configured mesh of each scene, ``sized`` for other mesh sizes.
-
     ``breakeven_r``, the size from which on the reduction is not faster, is equal in rows that only
     differ in r. It is empty if the reduction is faster at the largest size (full rank), and the
     smallest size if it is never faster.
@@ -161,11 +152,9 @@ def breakeven(own: list[paths.File], sized: list[paths.File]) -> pd.DataFrame:
 def break_even(r: Sequence[int], ratio: Sequence[float]) -> int | None:
     """Smallest size from which on the reduced local step costs at least as much as the full one.
 
-    The ratio is interpolated linearly between the last size with a ratio below one and the next.
-    Return None if the ratio is below one at the largest size; if it never is, the smallest size.
-
-    r : sizes, ascending
-    ratio : time of the reduced local step divided by that of the full one, at each size
+    The ratio of both times at each size ``r`` (ascending) is interpolated linearly between the last
+    size with a ratio below one and the next. Return None if the ratio is below one at the largest
+    size; if it never is, the smallest size.
     """
     sizes, values = np.asarray(r, dtype=float), np.asarray(ratio, dtype=float)
     below = np.flatnonzero(values < 1.0)

@@ -63,12 +63,7 @@ def effects_cost(
 
     Phases are right-hand side, global solve and the rest. Column ``moved`` (largest difference of
     runs with and without the effect) is empty for a scene's only constraint group: no run lacks it.
-
-    parts, left_out : times of effects, and of scenes without some effects; a factor for each scene
-        makes full-order times measured with them equal to those of table ``frame_times``
-    contributions : forces and energies of effects in each frame
-    sensitivity, horizon : how far runs from a perturbed start, or without an effect, differ from
-        the full-order run, and the limit of this difference, above which frames are not compared
+    Times are scaled to those in ``frame_times`` (`in_one_time`).
     """
     costs, removed = results.joined(files["parts"]), results.joined(files["left_out"])
     if costs.empty:
@@ -141,9 +136,8 @@ def _acting(frames: pd.DataFrame, sensitivity: pd.DataFrame, horizon: Horizon) -
 def local_share(timings: list[File], frame_times: pd.DataFrame) -> pd.DataFrame:
     """One row per scene and implementation of the local step, with its share of the frame's time.
 
-    The share is (local_ms + assembly_ms) / ms_per_frame: it includes the assembly of the right-hand
-    side, because compiled kernels compute it together with the projections, so that their
-    assembly_ms is 0. Times are scaled to those in ``frame_times`` (`in_one_time`).
+    The share includes the assembly of the right-hand side, which compiled kernels compute together
+    with the projections. Times are scaled to those in ``frame_times`` (`in_one_time`).
     """
     times = results.timings_in_one_time(timings, frame_times)
     full = times[times.method.isna()].copy()
@@ -177,9 +171,8 @@ def scaling(parts: list[File]) -> pd.DataFrame:
     Compiled code runs the local step and the solve of ecsw as one, whose time counts as local, so
     that local_share is the share of all iterations there.
 
-    Speed-ups compare the time of an iteration with the full-order run. The exponent is that of the
-    time of an iteration as a power of the number of vertices, fitted in logarithms to all meshes
-    of a scene and method. It is empty for fewer than three meshes: any two points fit a power law.
+    The exponent is fitted in logarithms to all meshes of a scene and method. It is empty for fewer
+    than three meshes: any two points fit a power law.
     """
     rows = results.joined(parts)
     if rows.empty:
@@ -230,11 +223,7 @@ _TIMES = ["ms_per_frame", "vertices_ms", "speedup", "speedup_low", "speedup_high
     reads={"parts": Every(paths.FRAME_TIMES)},
 )
 def frame_times(parts: list[File]) -> pd.DataFrame:
-    """One row per scene: medians over processes of the full-order run's frame time and of ratios.
-
-    The ratios are the frame times of an equal run (control) and of the scene's variant ("twin"),
-    each divided by that of the full-order run.
-    """
+    """One row per scene: medians over processes of full-order frame times and of their ratios."""
     rows = results.joined(parts)
     if rows.empty:
         return rows
@@ -287,12 +276,7 @@ def frame_times(parts: list[File]) -> pd.DataFrame:
     },
 )
 def speedups(times: pd.DataFrame, reruns: pd.DataFrame, **files: list[File]) -> pd.DataFrame:
-    """One row per timed reduction; speed-ups compare runs of one and the same process.
-
-    times, reruns : tables frame_times and reduced_reruns
-    parts : frame times in each process; projections, subspaces : times of making reductions
-    large : errors of the models of scenes in section ``online``, and times of making the models
-    """
+    """One row per timed reduction; speed-ups compare runs of one and the same process."""
     rows = results.joined(files["parts"])
     if rows.empty or not (rows.role == REDUCED).any():
         return pd.DataFrame()
@@ -316,11 +300,7 @@ def speedups(times: pd.DataFrame, reruns: pd.DataFrame, **files: list[File]) -> 
 
 
 def timed_reductions(rows: pd.DataFrame, times: pd.DataFrame) -> Iterator[dict]:
-    """Yield a row for each reduction: scene, group, method ..., median times, and speed-up.
-
-    rows : times measured in each process, with the role of the run (full order or reduced)
-    times : table frame_times
-    """
+    """Yield a row for each reduction in ``rows``, which have its time in each process."""
     full = rows[rows.role == FULL].set_index(["scene", "process"]).ms_per_frame
     trusted = confirmed(times.set_index("scene"))
     reduced = rows[rows.role == REDUCED]

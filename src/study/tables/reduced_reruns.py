@@ -58,11 +58,6 @@ def reduced_reruns(
     a scene and motion is the first frame in which perturbed full-order runs differ from unperturbed
     ones by more than a limit. Errors "within the horizon" use earlier frames only, and are empty if
     a run blew up in these. Rows of method `PLAYBACK` compare the training with a held-out motion.
-
-    full_order : files of the full-order runs of all motions
-    runs, rows, rows_heldout : HDF5 files of the reduced runs, and their tables in the same order
-    subspaces, subspace_rows, subspace_rows_heldout : the same for runs in position subspaces
-    sensitivity, horizon : differences of perturbed from unperturbed runs; settings with the limit
     """
     judged: list[pd.DataFrame] = []
     for motion in (TRAIN, *MOTIONS):
@@ -88,10 +83,7 @@ def reduced_reruns(
 
 
 def _played(full_order: list[File], ends: Mapping[str, int], motion: str) -> pd.DataFrame:
-    """Errors if the recorded training motion is played back in place of a run of ``motion``.
-
-    One row per scene. ``ends`` : scene -> horizon, the frame from which on runs are not compared.
-    """
+    """Errors, a row per scene, if the training motion is played back in place of ``motion``."""
     runs = {(run["scene"], run["run"]): run for run in full_order}
     rows = []
     for scene in dict.fromkeys(run["scene"] for run in full_order):
@@ -202,10 +194,6 @@ def stability(
 
     Method "full" with position basis "full" is the full-order run. The error of a "rerun" row is
     taken over the frames in which perturbed runs still agree, that of a "sweep" row over all.
-
-    time_steps : scene -> time step h in seconds
-    wrong, departure : limits of the error, and of the size of the bounding box relative to that of
-        the full-order run; beyond them a run fails (see `outcomes`)
     """
     reruns = _rerun_rows(files["reruns"], files["subspaces"], reduced_reruns)
     runs = pd.concat([_full_order_rows(files["full_order"]), reruns], ignore_index=True)

@@ -43,8 +43,7 @@ def bundle(arguments: Sequence[str]) -> Status:
 def write_archive(root: Path, results: Mapping[str, Path], target: Path) -> None:
     """Write a gzipped tar archive of the last commit of ``root`` and of ``results`` to ``target``.
 
-    ``results`` maps names in the archive to paths of files. Raises ConfigurationError if git is
-    missing, ``root`` is no git clone, or tracked files differ from the last commit.
+    ``results`` maps names in the archive to paths of files.
     """
     date = int(os.environ.get("SOURCE_DATE_EPOCH", "0"))
     if changed := _git(root, "status", "--porcelain", "--untracked-files=no").decode():

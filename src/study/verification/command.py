@@ -66,11 +66,7 @@ def parser() -> argparse.ArgumentParser:
 
 
 def verify(arguments: Sequence[str]) -> Status:
-    """Run ``./reproduce verify`` with these command-line ``arguments``; return its exit code.
-
-    Raises ConfigurationError if the configuration is faulty, or has no expected tables. Raises
-    StorageError if a file cannot be read or written, or --update finds tables out of date.
-    """
+    """Run ``./reproduce verify`` with these command-line ``arguments``; return its exit code."""
     asked = parser().parse_args(arguments)
     subject = Subject.of(asked.configfile, asked.config)
     if asked.files:
@@ -82,10 +78,7 @@ def verify(arguments: Sequence[str]) -> Status:
 
 
 def verify_tables(subject: Subject) -> Status:
-    """Compare the tables of ``subject`` with the expected ones; print outcomes and write `PAGE`.
-
-    Raises ConfigurationError if the configuration has no expected tables.
-    """
+    """Compare the tables of ``subject`` with the expected ones; print outcomes and write `PAGE`."""
     folder = folder_of(subject.results)
     if not folder.is_dir():
         hint = 'write them by ./reproduce verify --update --reason "..."'
@@ -124,15 +117,7 @@ def counted(lines: Sequence[Line]) -> str:
 
 def page(lines: Sequence[Line], about: str) -> str:
     """Return a Markdown page: the sentence ``about``, and all ``lines`` with their differences."""
-    parts = [
-        "# Verification",
-        "",
-        about,
-        "See `docs/verification.md`.",
-        "",
-        f"{counted(lines)}.",
-        "",
-    ]
+    parts = [f"# Verification\n\n{about}\nSee `docs/verification.md`.\n\n{counted(lines)}.\n"]
     for line in lines:
         more = len(line.details) - ON_PAGE
         parts += [f"- {line}", *(f"  - {text}" for text in line.details[:ON_PAGE])]

@@ -74,10 +74,7 @@ def verify_files(subject: Subject) -> Status:
 
 
 def _fault(path: str, entry: Entry | None, ours: bool) -> str:
-    """Text on the fault of the file at ``path``; empty if the file agrees with the manifest.
-
-    ``ours`` tells whether the file belongs to the study, ``entry`` is its line in the manifest.
-    """
+    """Text on the fault of the file at ``path``; empty if it fits its ``entry``."""
     if not ours:
         return FOREIGN
     if not Path(path).is_file():

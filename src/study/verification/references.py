@@ -54,10 +54,7 @@ def write_reference(table: Table, frame: pd.DataFrame, folder: Path) -> None:
 
 
 def read_reference(table: Table, folder: Path) -> Reference | None:
-    """Return the expected ``table`` in ``folder``; None if there is none.
-
-    Raises StorageError if the file cannot be read.
-    """
+    """Return the expected ``table`` in ``folder``; None if there is none."""
     plain, packed = (folder / f"{table.name}{end}" for end in ENDS)
     path = plain if plain.is_file() else packed
     if not path.is_file():

@@ -34,7 +34,6 @@ class Subject:
         """Return the results of the configuration that files and ``settings`` (KEY=VALUE) define.
 
         If both are empty, it is the configuration of the last run.
-        Raises ConfigurationError if a configuration file is missing or is not a mapping.
         """
         files = ["--configfile", *configfiles] if configfiles else []
         options = [*files, *(["--config", *settings] if settings else [])] or recall()

@@ -387,10 +387,7 @@ def _variations(tests: Sequence[TestRule], rows: _Rows, tables: Tables) -> Itera
 def _kept(
     tests: Sequence[TestRule], rows: _Rows, varied: str, column: str, keeps: Mapping[str, _Keep]
 ) -> Iterator[_Variation]:
-    """Yield ``tests`` with fewer ``rows``, for each function in ``keeps`` that leaves out any.
-
-    A function gets ``column`` of one test's rows and returns True for each row to be kept.
-    """
+    """Yield ``tests`` with fewer ``rows``, for each function of ``column`` that leaves out any."""
     for name, keep in keeps.items():
         kept = [values[keep(values[column])] if column in values else values for values in rows]
         if sum(map(len, kept)) < sum(map(len, rows)):

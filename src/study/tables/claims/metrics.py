@@ -200,10 +200,7 @@ class Metric:
     ratio: Callable[[np.ndarray], np.ndarray] = np.asarray
 
     def values(self, tables: Tables, where: Where, accuracy: float) -> pd.DataFrame:
-        """Table with the metric (column `VALUE`), scene, group ... of rows that ``where`` allows.
-
-        A run counts as accurate if its error is at most ``accuracy``.
-        """
+        """Table of the metric (column `VALUE`), scene, group ... of rows that ``where`` allows."""
         rows = self.choose(tables[self.table], where)
         found = self.of(rows, accuracy)
         if isinstance(found, pd.DataFrame):

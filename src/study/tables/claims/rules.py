@@ -154,10 +154,8 @@ class ClaimRule(ConfigModel):
 def load_claims(path: Path, added: Added = NONE_ADDED) -> dict[str, ClaimRule]:
     """Read identifier -> claim from file ``path``; replace ``@name`` by the values of set ``name``.
 
-    Raises ConfigurationError if the file is invalid, or lacks a set that ``added`` names.
-
-    added : name of a set (list of values) in the file -> values to append to it, such as scenes
-        that only this study has
+    ``added`` maps names of sets in the file to values to append, such as scenes of this study only.
+    Raises ConfigurationError if the file is invalid, or lacks such a set.
     """
     content = read_yaml(path)
     if not isinstance(content, dict) or not {*content} - {SETS}:

@@ -128,11 +128,7 @@ def timed(column: Column) -> Column:
 
 
 def interval(names: str, make: Callable[..., Column] = number, unit: str = "") -> list[Column]:
-    """Return two columns with the 95 % bootstrap interval of the median in the column before.
-
-    names : names of both columns, separated by a space
-    make : function that makes a column
-    """
+    """Return two columns with the 95 % bootstrap interval of the median in the column before."""
     low, high = names.split()
     meaning = "2.5 % quantile of this median (bootstrap)"
     return [make(low, meaning, unit), make(high, "97.5 % quantile", unit)]
@@ -259,8 +255,7 @@ class Table(Artifact):
     def checked(self, table: pd.DataFrame) -> pd.DataFrame:
         """Return ``table`` with exactly the declared columns, in their order and with their types.
 
-        Raises StorageError if a column of a non-empty table is missing, or a value does not have
-        the column's type.
+        Raises StorageError if a column is missing, or a value does not have the column's type.
         """
         missing = [name for name in self.column_names if name not in table.columns]
         if missing and len(table):
@@ -279,13 +274,10 @@ class Table(Artifact):
 def table(
     *, title: str, columns: Sequence[Column], reads: Mapping[str, Read], **more: Any
 ) -> Callable[[Callable[..., pd.DataFrame]], Table]:
-    """Return a decorator for a function that computes a table; the table is named after it.
+    """Return a decorator for a function that computes a table, which has its name.
 
-    Raises TypeError if a column is declared twice, or the function's parameters do not match
-    ``reads``.
-
-    reads : parameter of the function -> input
-    more : values of the fields ``timed_cells`` and ``only_with_error`` of `Table`
+    ``more`` are other fields of `Table`. Raises TypeError if a column is declared twice, or the
+    function's parameters do not match ``reads``.
     """
 
     def decorate(function: Callable[..., pd.DataFrame]) -> Table:

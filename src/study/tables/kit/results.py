@@ -128,9 +128,6 @@ def over_motions(reruns: pd.DataFrame, keys: Sequence[str] = KEYS) -> pd.DataFra
     Errors use frames before the horizon, in which perturbed runs agree; a run that ended in these
     has an infinite error. Left out are sizes above the numerical rank, which cannot run, motions
     with horizon 0, and those for which playback of the training recording has an error <= `FAR`.
-
-    reruns : table reduced_reruns
-    keys : columns that identify a run
     """
     ran = (reruns.frames > 0) | reruns.blowup_frame.notna()
     tests = (reruns.horizon_frame > 0) & (reruns.playback_error > FAR)

@@ -16,7 +16,7 @@ from pdrom.reduction.basis import Basis, save_basis
 from study.artifact import paths
 from study.artifact.paths import File
 from study.experiments.kit.base import Horizon
-from study.tables.accuracy_cost import accuracy_cost, pareto, reference_of
+from study.tables.accuracy_cost import accuracy_cost, pareto
 from study.tables.effects_cost import local_share
 from study.tables.errors import sensitivity, singular_values
 from study.tables.kit.results import TRAIN, trained
@@ -337,9 +337,6 @@ def test_runs_with_other_iterations_have_their_own_reference(files, tmp_path):
     assert early.pareto.tolist() == [True]
     # against the converged run 0.1 takes 8 ms; the reduced run, 0.1 in 4 ms, is no rival of it
     assert fom.position_basis.unique().tolist() == ["full"]
-    assert reference_of(table).tolist() == [
-        "converged" if m.startswith("fom") else "own iterations" for m in table.method
-    ]
 
 
 def test_without_a_converged_run_there_is_no_point_against_it(files, tmp_path):
