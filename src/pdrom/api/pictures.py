@@ -10,7 +10,6 @@ from pdrom.core.errors import SceneError
 from pdrom.core.store import require_own
 from pdrom.view import style
 from pdrom.view.artists import Figure
-from pdrom.view.multiples import clipped, log_axis
 from pdrom.view.page import ViewedRun, ViewedScene, write_page
 
 LOW, HIGH = 1e-7, 1e3  # limits of the error axis; errors outside are drawn on the limit
@@ -43,11 +42,11 @@ def plot(reference: Run, *runs: Run) -> Figure:
     with style.look():
         figure = style.new_figure(3.0)
         ax = figure.subplots()
-        log_axis(ax, LOW, HIGH)
+        style.log_axis(ax, LOW, HIGH)
         for i, run in enumerate(runs):
             error = run.errors(reference)
             time = run.scene.config.time_step * np.arange(1, len(error) + 1)
-            colour, shown = style.CYCLE[i % len(style.CYCLE)], clipped(error, LOW, HIGH)
+            colour, shown = style.CYCLE[i % len(style.CYCLE)], np.clip(error, LOW, HIGH)
             ax.plot(time, shown, color=colour, label=run.method)
             if run.blowup_frame is not None and len(time):
                 ax.plot(time[-1:], shown[-1:], color=colour, marker="x", markersize=5)

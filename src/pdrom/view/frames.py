@@ -17,14 +17,18 @@ from pdrom.view.artists import Figure
 from pdrom.view.camera import Camera, obstacles, rotation_to, up_of
 from pdrom.view.page import ViewedRun, ViewedScene
 from pdrom.view.panels import Row, RunPanel, draw_rows, shared_window
-from pdrom.view.read import frame_numbers
-from pdrom.view.text import plain_words
+from pdrom.view.style import plain_words
 
 INSTANTS = (0.25, 0.5, 0.75, 1.0)  # times of the pictures, as fractions of the run
 CAMERA = Camera(30.0, 20.0)
 NO_LIMIT = 100.0  # inches, limit of the picture's height: practically none
 NAME, FRAMES = "frame_{:05d}.vtu", "frame_*.vtu"
 LABEL = 24  # characters of a line in the label of a row
+
+
+def frame_numbers(fractions: tuple[float, ...], frames: int) -> list[int]:
+    """Indices of frames (0 to ``frames``) at ``fractions`` of a run, without repetition."""
+    return list(dict.fromkeys(round(fraction * frames) for fraction in fractions))
 
 
 def write_frames(scene: ViewedScene, png: Path) -> None:

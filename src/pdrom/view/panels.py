@@ -12,7 +12,6 @@ from pdrom.model.mesh.types import Mesh
 from pdrom.view import mesh_render, style
 from pdrom.view.artists import Axes, Figure
 from pdrom.view.camera import Camera, Window, bounds, window_of
-from pdrom.view.read import RerunInfo, rerun_positions
 from pdrom.view.style import FAILED
 
 SAME_SCALE = 1.25  # runs that would enlarge the reference run's picture by more are drawn smaller
@@ -174,26 +173,6 @@ class Row:
             smaller = panel.zoomed(window, self.camera).width / window.width > SLACK
             counts.append(bool(panel.failure) + bool(panel.remark) + smaller)
         return max(counts)
-
-
-def run_panel(
-    path: str, info: RerunInfo, frame: int, colour: tuple[float, float, float], title: str
-) -> RunPanel:
-    """Panel of a reduced run at ``frame``, with a message if the run failed or never began.
-
-    The run that ``info`` describes is read from the file ``path``.
-    """
-    if info.marked:
-        return RunPanel(title, colour, None, remark="not run: r exceeds\nthe numerical rank")
-    blew_up = 0 <= info.blowup_frame < frame
-    failure = f"blew up at frame {info.blowup_frame}" if blew_up else None
-    found = rerun_positions(path, info, frame)
-    if found is None:
-        return RunPanel(title, colour, None, failure or "no finite positions")
-    entry, positions = found
-    drawn = f"frame {entry}" if entry else "initial state"
-    remark = f"drawn: {drawn}" if failure else None
-    return RunPanel(title, colour, positions, failure, remark)
 
 
 def draw_rows(rows: list[Row], height_limit: float = HEIGHT_LIMIT, footer: float = 0.0) -> Figure:

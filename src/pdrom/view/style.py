@@ -1,6 +1,7 @@
 """Common style of all figures: fonts, colours, markers, legends and axis helpers."""
 
 import textwrap
+import unicodedata
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any, Literal
@@ -118,6 +119,11 @@ def words(name: str) -> str:
     return name.replace("_", " ")
 
 
+def plain_words(text: str) -> str:
+    """Return ``text`` with dollar signs escaped, which matplotlib would read as mathematics."""
+    return unicodedata.normalize("NFC", text).replace("$", r"\$")
+
+
 def new_figure(height: float, layout: Literal["constrained"] | None = "constrained") -> Figure:
     """An empty figure of the manuscript's width, ``height`` inches high, with a ``layout``."""
     from matplotlib.figure import Figure
@@ -184,6 +190,16 @@ def label_rows(ax: Axes, labels: Sequence[str]) -> None:
 def grid(ax: Axes) -> None:
     """Draw a light grid behind the data of ``ax``."""
     ax.grid(True, which="major")
+
+
+def log_axis(ax: Axes, low: float, high: float) -> None:
+    """Make y of ``ax`` logarithmic from ``low`` to ``high`` with few ticks."""
+    from matplotlib.ticker import LogLocator
+
+    ax.set_yscale("log")
+    ax.set_ylim(low, high)
+    ax.yaxis.set_major_locator(LogLocator(base=10.0, numticks=6))
+    grid(ax)
 
 
 def note(text: str) -> Figure:

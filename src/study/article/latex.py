@@ -11,7 +11,7 @@ from typing import Any
 
 import pandas as pd
 
-from pdrom.view.text import escape
+from study.artifact.text import escape
 from study.paper.build import Facts
 from study.paper.macros import SHOWN, VAL, closing, matching, sentences
 from study.paper.source import COMMENT, PLACED

@@ -7,7 +7,7 @@ In the mark-up, a name between backticks is set in typewriter, ``$r \le 20$`` is
 import re
 from collections.abc import Callable
 
-from pdrom.view.text import escape
+from study.artifact.text import escape
 
 _Words = Callable[[str], str]
 _MARK = re.compile(r"`([^`]*)`|\$([^$]*)\$")

@@ -7,13 +7,13 @@ import numpy as np
 import pandas as pd
 
 from pdrom.model.held_out import FIRST, PLAYBACK
-from pdrom.view import multiples, style
+from pdrom.view import style
 from pdrom.view.artists import Axes, Figure, Line2D
-from pdrom.view.multiples import clipped, label_counts, log_axis, time_axis
 from study.artifact.reads import TableOf
 from study.experiments.alternatives.experiment import REDUCTIONS
 from study.experiments.kit.base import ANDERSON, FOM
 from study.figures.kit.declaration import Drawn, NothingToDraw, figure
+from study.figures.kit.multiples import label_outer, rows_of, small_multiples, time_axis
 from study.tables.accuracy_cost import FEWER, pareto
 
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "*")
@@ -25,6 +25,7 @@ BLIND = {"color": style.FAILED, "linewidth": 0.9, "linestyle": "-."}
 RATES = (60, 30)  # frame rates of real time, 1/s, drawn as lines
 LARGE, SMALL = 2.6, 1.6  # heights of the large and of the small panels, inches
 LINE, GAP = 0.145, 0.06  # height of a legend line, gap between rows of legend blocks, inches
+NEAR = 0.05  # markers closer in x than this fraction of the x axis share a label
 COLUMNS = 4  # number of legend blocks in a row
 # Families of reduced models and of full-order runs, each with its colour.
 FAMILIES = {
@@ -129,7 +130,7 @@ def draw_panel(ax: Axes, found: TradeOffs, scene: str, size: float = 3.0) -> Non
     arrows at its ends; runs that blew up are crosses near the upper end.
     """
     ax.set_xscale("log")
-    log_axis(ax, LOW, HIGH)
+    style.log_axis(ax, LOW, HIGH)
     rows = found.points[found.points.scene == scene]
     lost = found.blown_up[found.blown_up.scene == scene]
     for family, colour in FAMILIES.items():
@@ -140,7 +141,7 @@ def draw_panel(ax: Axes, found: TradeOffs, scene: str, size: float = 3.0) -> Non
             _points(ax, own[~hollow], size, colour, marker=marker)
             _points(ax, own[hollow], size, colour, marker=marker, fillstyle="none")
         front = best_points(part, ERROR)
-        heights = clipped(front[ERROR].to_numpy(float), LOW, HIGH)
+        heights = np.clip(front[ERROR].to_numpy(float), LOW, HIGH)
         steps = {"linewidth": 1.3, "drawstyle": "steps-post", "zorder": 1.5}
         ax.plot(front[TIME], heights, color=colour, **steps)
         ended = lost[lost.family == family]
@@ -174,7 +175,17 @@ def label_iterations(ax: Axes, found: TradeOffs, scene: str) -> None:
     """
     rows = found.points[(found.points.scene == scene) & (found.points.method == FEWER)]
     rows = rows.sort_values(TIME)
-    label_counts(ax, rows[TIME], rows[ERROR], counts=rows.iterations, prefix="K = ")
+    low, high = np.log10(ax.get_xlim())
+    groups: list[list[tuple[float, float, float]]] = []
+    for marker in zip(rows[TIME], rows[ERROR], rows.iterations, strict=True):
+        near = groups and np.log10(marker[0] / groups[-1][-1][0]) < NEAR * (high - low)
+        groups[-1].append(marker) if near else groups.append([marker])
+    for group in groups:
+        numbers = ", ".join(f"{count:.0f}" for _, _, count in group)
+        ax.annotate(
+            f"K = {numbers}", (group[0][0], min(height for _, height, _ in group)), (-2.5, -3.5),
+            textcoords="offset points", fontsize=6.5, ha="right", va="top",
+        )  # fmt: skip
 
 
 def handles(found: TradeOffs) -> list[Block]:
@@ -296,12 +307,11 @@ def alternatives(table: pd.DataFrame) -> Figure:
     cases = list(table.groupby(["scene", "vertices", "stiffness"]))
     if not cases:
         raise NothingToDraw("no alternatives")
-    beside = -(-len(cases) // multiples.rows_of(len(cases), BESIDE))
-    figure = style.new_figure(1.9 * multiples.rows_of(len(cases), beside) + 0.75)
-    axes = multiples.panels(figure, len(cases), beside, sharey=True)
+    beside = -(-len(cases) // rows_of(len(cases), BESIDE))
+    figure, axes = small_multiples(len(cases), beside, legend_rows=2, height=1.9)
     for (labels, case), ax in zip(cases, axes, strict=True):
         _draw_case(ax, labels, case)
-    multiples.label_outer(axes, beside, "ms a frame", y="relative error")
+    label_outer(axes, beside, "ms a frame", y="relative error")
     drawn = {label: (colour, "o") for label, (_, colour) in TRAINED.items()}
     lines = [style.handle(BARE, color=style.GREEN, linestyle=":")]
     lines.append(style.handle("playback", color="#555555", linestyle="--"))
@@ -314,15 +324,15 @@ def _draw_case(ax: Axes, labels: tuple[str, int, float], case: pd.DataFrame) -> 
     stiff = "" if stiffness == 1.0 else rf" $\times {stiffness:g}$"
     mark = "*" if case.recorded.notna().any() else ""
     ax.set_title(f"{style.words(scene)}{stiff}, {vertices:,} vertices{mark}", fontsize=7.0)
-    multiples.log_axis(ax, LEAST, MOST)
-    multiples.time_axis(ax, case.ms_per_frame.to_numpy(float))
+    style.log_axis(ax, LEAST, MOST)
+    time_axis(ax, case.ms_per_frame.to_numpy(float))
     rows = case.rename(columns={"error_implicit": "error"}).dropna(subset="error")
     for error in rows.error[rows.method == PLAYBACK]:
         ax.axhline(error, color="#555555", linestyle="--", linewidth=0.8)
     rows = rows[rows.ms_per_frame.notna()]
     inside = rows.method.isin(REDUCTIONS)
     full = rows[~inside]
-    errors = multiples.clipped(full.error.to_numpy(float), LEAST, MOST)
+    errors = np.clip(full.error.to_numpy(float), LEAST, MOST)
     ax.plot(full.ms_per_frame, errors, ".", color=DOT, markersize=3.0)
     _draw_best(ax, full, BEST[1], "-")
     for trained, colour in TRAINED.values():
@@ -333,7 +343,7 @@ def _draw_case(ax: Axes, labels: tuple[str, int, float], case: pd.DataFrame) -> 
 
 def _draw_best(ax: Axes, rows: pd.DataFrame, colour: str, line: str) -> None:
     points = best_points(rows, "error")
-    errors = multiples.clipped(points.error.to_numpy(float), LEAST, MOST)
+    errors = np.clip(points.error.to_numpy(float), LEAST, MOST)
     marker = "o" if line == "-" else None
     ax.plot(
         points.ms_per_frame, errors, line, color=colour, marker=marker, markersize=3.2,

@@ -8,11 +8,11 @@ import pandas as pd
 from pdrom.core.store import read_table
 from pdrom.view import style
 from pdrom.view.artists import Artist, Axes, Figure
-from pdrom.view.multiples import label_outer, plain_ticks, small_multiples
 from study.artifact.paths import CONTRIBUTIONS, File
 from study.artifact.reads import EachOf, TableOf
 from study.experiments.kit.base import GLOBAL, REST, RIGHT
 from study.figures.kit.declaration import MESHES, Drawn, NothingToDraw, figure
+from study.figures.kit.multiples import label_outer, plain_ticks, small_multiples
 from study.tables.effects_cost import NOTHING
 
 # Phases of a frame: (label, colour). The first two form the local step, whose share is printed.

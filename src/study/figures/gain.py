@@ -9,12 +9,12 @@ import numpy as np
 import pandas as pd
 
 from pdrom.core.store import read_table
-from pdrom.view import multiples, style
+from pdrom.view import style
 from pdrom.view.artists import Axes, Figure
-from pdrom.view.multiples import clipped, label_outer
-from pdrom.view.text import plain_words
+from pdrom.view.style import plain_words
 from study.artifact.reads import ProjectFile, TableOf
 from study.figures.kit.declaration import MESHES, Drawn, Experiment, NothingToDraw, figure
+from study.figures.kit.multiples import label_outer, small_multiples
 from study.tables.kit.results import FAILED, judged_runs
 
 GAINS = (1.0, 1e5)  # limits of the gain axis; points outside are drawn on the limits
@@ -54,7 +54,9 @@ def error_against_gain(drawn: Drawn, **tables: pd.DataFrame) -> Figure:
     for method in methods:
         own = runs[runs.method == method]
         _draw_method(left, own, ranges[ranges.method == method], *styles[method])
-    multiples.log_axes(left, GAINS, ERRORS)
+    style.log_axis(left, *ERRORS)
+    left.set_xscale("log")
+    left.set_xlim(*GAINS)
     left.set_xlabel("gain of the interpolation")
     left.set_ylabel("error within the horizon (relative)")
     left.axhline(FAILED, color="#333333", linewidth=0.8, linestyle="--", zorder=0)
@@ -70,13 +72,20 @@ def _draw_method(
 ) -> None:
     """Draw a dot (gain, error) per run; crosses span both over repetitions (``ranges``)."""
     x, y = runs.gain.to_numpy(float), runs.error.to_numpy(float)
-    multiples.rim_arrows(ax, x, y, colour=colour, across=GAINS, along=ERRORS)
+    outside = {4: x < GAINS[0], 5: x > GAINS[1], 6: y > ERRORS[1], 7: y < ERRORS[0]}
+    for arrow, beyond in outside.items():  # by Matplotlib's numbers of arrow markers
+        if beyond.any():
+            ax.plot(
+                np.clip(x[beyond], *GAINS), np.clip(y[beyond], *ERRORS), linestyle="none",
+                color=colour, alpha=0.8, marker=arrow, markersize=5.0, markeredgewidth=0.0,
+                clip_on=False,
+            )  # fmt: skip
     ax.plot(
-        clipped(x, *GAINS), clipped(y, *ERRORS), linestyle="none", color=colour, marker=marker,
+        np.clip(x, *GAINS), np.clip(y, *ERRORS), linestyle="none", color=colour, marker=marker,
         markersize=3.2, alpha=0.7, markeredgewidth=0.0, clip_on=False,
     )  # fmt: skip
-    gains = [clipped(ranges[f"gain_{e}"].to_numpy(float), *GAINS) for e in ENDS]
-    errors = [clipped(ranges[f"error_{e}"].to_numpy(float), *ERRORS) for e in ENDS]
+    gains = [np.clip(ranges[f"gain_{e}"].to_numpy(float), *GAINS) for e in ENDS]
+    errors = [np.clip(ranges[f"error_{e}"].to_numpy(float), *ERRORS) for e in ENDS]
     bars = {"color": colour, "linewidth": 0.9, "zorder": 3}
     ax.vlines(gains[1], errors[0], errors[2], **bars)
     ax.hlines(errors[1], gains[0], gains[2], **bars)
@@ -154,16 +163,16 @@ def _draw_quantity(
             np.array([rows[column].get(rung, np.nan) for rung in rungs], float)
             for column in columns
         )
-        values = clipped(np.nan_to_num(found, nan=np.inf), *limits)
+        values = np.clip(np.nan_to_num(found, nan=np.inf), *limits)
         heights = np.arange(len(rungs)) + 0.09 * (i - 0.5 * (len(scenes) - 1))
         colour, marker = style.scene_style(i)
         ax.plot(values, heights, linestyle="none", color=colour, marker=marker, markersize=3.2)
         repeated = ~np.isnan(low)
-        ends = (clipped(bound[repeated], *limits) for bound in (low, high))
+        ends = (np.clip(bound[repeated], *limits) for bound in (low, high))
         ax.hlines(heights[repeated], *ends, color=colour, linewidth=0.9)
         signs = table[(table.scene == scene) & (table.direction == "signs")][columns[0]]
         if len(signs):
-            spread = clipped(np.nan_to_num(signs.to_numpy(float), nan=np.inf), *limits)
+            spread = np.clip(np.nan_to_num(signs.to_numpy(float), nan=np.inf), *limits)
             ax.hlines(
                 heights[0], spread.min(), spread.max(), color=colour, linewidth=3.0, alpha=0.25
             )
@@ -196,9 +205,9 @@ def _panels(
     ]
     if not pairs:
         raise NothingToDraw("no experiment")
-    figure, axes = multiples.small_multiples(len(pairs), columns, legend_rows=legend)
+    figure, axes = small_multiples(len(pairs), columns, legend_rows=legend)
     for ax, (each, _) in zip(axes, pairs, strict=True):
-        multiples.log_axis(ax, *limits)
+        style.log_axis(ax, *limits)
         ax.set_title(each.title)
     return figure, [(ax, *pair) for ax, pair in zip(axes, pairs, strict=True)]
 
@@ -297,7 +306,7 @@ def reconstruction_error(drawn: Drawn, table: pd.DataFrame, published: Path) -> 
         output = output[output.split == "train"].sort_values("num_points")
         for axis in ("x", "y") if len(output) else ():
             reference = True
-            error = clipped(output[f"relative_error_{axis}"].to_numpy(float), *SHOWN)
+            error = np.clip(output[f"relative_error_{axis}"].to_numpy(float), *SHOWN)
             ax.plot(output.num_points, error, color=PUBLISHED, linewidth=0.7, zorder=1)
         lines = [_draw_errors(ax, rows[rows.method == m], m) for m in methods]
         if not any(lines):
@@ -326,7 +335,7 @@ def _draw_errors(ax: Axes, rows: pd.DataFrame, method: str) -> bool:
         if not np.isfinite(error).any():
             continue
         drawn, train = True, split == "train"
-        shown = clipped(np.where(np.isfinite(error), error, np.nan), *SHOWN)
+        shown = np.clip(np.where(np.isfinite(error), error, np.nan), *SHOWN)
         ax.plot(
             line.r, shown, linestyle=dashes, color=colour, linewidth=1.2 if train else 0.9,
             marker=marker if train else None, markersize=2.8,

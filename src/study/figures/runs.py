@@ -14,12 +14,12 @@ from pdrom.view import style
 from pdrom.view.artists import Figure, ScalarMappable
 from pdrom.view.camera import Camera, Window, obstacles
 from pdrom.view.panels import NOTHING_RAN, Row, RunPanel
-from pdrom.view.read import RerunInfo, choose_ranks, positions_at, rerun_infos
 from study.artifact.paths import MESH, NOISE_RUNS, RERUNS, SUBSPACES, TRAIN, File
 from study.artifact.reads import EachOf, Every, Read, TableOf
 from study.experiments.kit.base import Horizon
 from study.figures.kit.declaration import Drawn, Experiment, NothingToDraw, camera_of, figure
 from study.figures.kit.elements import magnitudes
+from study.figures.kit.read import choose_ranks, positions_at, rerun_infos
 from study.figures.sensitivity_floor import FLOORS, Floors
 from study.tables.errors import VOLUMES
 from study.tables.kit.results import trained
@@ -63,10 +63,6 @@ class Shown:
     full: np.ndarray
     colour: tuple[float, float, float]
     bodies: list[Mesh] | None
-
-    def panel(self, path: str, info: RerunInfo) -> RunPanel:
-        """Return the panel (picture) of the reduced run ``info`` in the file ``path``."""
-        return view.run_panel(path, info, self.frame, colour=self.colour, title=info.title)
 
     def window(self, panels: list[RunPanel]) -> Window:
         """Return the part of the image plane that contains the full-order run and ``panels``."""
@@ -136,7 +132,7 @@ class Runs:
         for method in self.drawn.methods:
             path = shown.experiment.path(self.reruns, method=method)
             infos = choose_ranks(rerun_infos(path), self.ranks)
-            found[method] = [shown.panel(path, info) for info in infos]
+            found[method] = [info.panel(shown.frame, shown.colour) for info in infos]
         return found
 
     def rows(self, experiment: Experiment) -> list[Row]:
@@ -244,7 +240,7 @@ def noise_rows(drawn: Drawn, shown: Shown, table: pd.DataFrame, path: str) -> li
         for counts, kinds in _alike(table[table.method == method]).items():
             fail = dict(counts)
             panels = [
-                replace(shown.panel(path, info), remark=fail[info.r])
+                replace(info.panel(shown.frame, shown.colour), remark=fail[info.r])
                 for info in rerun_infos(path, f"{kinds[0]}/{method}")
                 if info.r in fail
             ]
@@ -326,17 +322,16 @@ def _over_time(
     info = next((i for i in infos if not i.marked), None)
     if info is None:
         return None
-    plain = style.surface_colour(style.GREY)
-    panels = []
+    plain, panels = style.surface_colour(style.GREY), []
     for frame, q in zip(frames, full, strict=True):
-        panel = view.run_panel(path, info, frame, colour=plain, title="")
+        middle = frame == frames[len(frames) // 2]
+        titled = f"{title}, {info.title}" if middle else ""
+        panel = replace(info.panel(frame, plain), title=titled)
         if panel.positions is not None and not panel.failure:
             distance = np.linalg.norm(panel.positions - q, axis=1) / mesh.extent
             colour = _colours().to_rgba(distance[mesh.triangles].mean(axis=1))[:, :3]
             panel = replace(panel, colour=colour)
         panels.append(panel)
-    middle = len(panels) // 2
-    panels[middle] = replace(panels[middle], title=f"{title}, {info.title}")
     return panels
 
 

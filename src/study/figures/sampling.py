@@ -8,18 +8,19 @@ from pdrom.core.errors import StorageError
 from pdrom.core.store import open_hdf5
 from pdrom.model.mesh.types import load_mesh
 from pdrom.reduction.basis import Basis, load_basis
+from pdrom.reduction.sampling.reduction import Sampling
 from pdrom.reduction.snapshots import load_snapshots
 from pdrom.view import style
 from pdrom.view.artists import Axes, Figure, ScalarMappable
 from pdrom.view.camera import Camera, Window, window_of
 from pdrom.view.mesh_render import draw_surface, set_window
-from pdrom.view.multiples import panels, rows_of
 from pdrom.view.panels import fit_aspect
-from pdrom.view.read import SamplingView, positions_at, read_samplings
 from study.artifact.paths import BASIS, MESH, SAMPLING, SNAPSHOTS, TRAIN, File
 from study.artifact.reads import EachOf
 from study.figures.kit import elements as shapes
 from study.figures.kit.declaration import MESHES, Drawn, NothingToDraw, camera_of, figure
+from study.figures.kit.multiples import panels, rows_of
+from study.figures.kit.read import positions_at, read_samplings
 
 EARLIER = {
     "markerfacecolor": "#FFFFFF", "markeredgecolor": style.BLACK, "markeredgewidth": 0.8,
@@ -79,7 +80,7 @@ def deim_iterations(
     basis, samplings = load_basis(bases[0].path), read_samplings(path)
     if not samplings:
         raise NothingToDraw(f"nothing was sampled for {experiment.title}")
-    entries, camera = samplings[-1].entries, camera_of(experiment, 45.0)
+    entries, camera = samplings[max(samplings)].entries, camera_of(experiment, 45.0)
     steps = iterations(basis.V, entries, basis.rows_per_element, reduction.rows, STEPS)
     mesh = load_mesh(meshes[0].path)
     elements = shapes.element_map(experiment.group, mesh, basis.elements, source=str(path))
@@ -202,11 +203,11 @@ def deim_entries(drawn: Drawn, **files: list[File]) -> Figure:
             count, rows = int(file.attrs["elements"]), int(file.attrs["rows_per_element"])
         mesh = load_mesh(each.path(files["meshes"]))
         elements = shapes.element_map(each.group, mesh, count, source=source)
-        views = samplings[scalar[0]]
-        chosen = next((view for view in views if view.r == ENTRIES), views[-1])
-        _draw_hits(row[0], elements, chosen.entries, 3 * rows, camera_of(each))
-        row[0].set_title(f"{each.title}\nr = {chosen.r} entries")
-        _draw_counts(row[1], chosen, 3 * rows)
+        sizes = samplings[scalar[0]]
+        r = ENTRIES if ENTRIES in sizes else max(sizes)
+        _draw_hits(row[0], elements, sizes[r].entries, 3 * rows, camera_of(each))
+        row[0].set_title(f"{each.title}\nr = {r} entries")
+        _draw_counts(row[1], sizes[r].entries // (3 * rows), 3 * rows)
         _draw_evaluations(row[2], samplings, 3 * rows)
     dots = {"linestyle": "none", "marker": "o", "markersize": 4.5}
     named = {f"{axis} entry": colour for axis, colour in style.AXES.items()}
@@ -236,10 +237,10 @@ def _draw_hits(
     set_window(ax, window_of(camera, [points], 0.04))
 
 
-def _draw_counts(ax: Axes, chosen: SamplingView, per_element: int) -> None:
+def _draw_counts(ax: Axes, hit: np.ndarray, per_element: int) -> None:
     from matplotlib.ticker import MaxNLocator
 
-    counts = np.bincount(np.unique(chosen.entries // per_element, return_counts=True)[1])
+    counts = np.bincount(np.unique(hit, return_counts=True)[1])
     values = np.zeros(per_element, dtype=int)
     values[: len(counts) - 1] = counts[1 : per_element + 1]
     bars = ax.bar(np.arange(1, per_element + 1), values, color=style.ORANGE, width=0.7)
@@ -252,16 +253,18 @@ def _draw_counts(ax: Axes, chosen: SamplingView, per_element: int) -> None:
     ax.set_ylabel("elements")
 
 
-def _draw_evaluations(ax: Axes, samplings: dict[str, list[SamplingView]], per_element: int) -> None:
+def _draw_evaluations(
+    ax: Axes, samplings: dict[str, dict[int, Sampling]], per_element: int
+) -> None:
     styles = style.method_styles(samplings)
     largest = 1
-    for method, views in samplings.items():
-        if views:
-            r = np.array([view.r for view in views])
-            computed = per_element * np.array([len(view.elements) for view in views])
+    for method, sizes in samplings.items():
+        if sizes:
+            computed = [per_element * len(sampled.elements) for sampled in sizes.values()]
             colour, marker = styles[method]
-            ax.plot(r, computed, color=colour, marker=marker, markevery=max(1, len(r) // 6))
-            largest = max(largest, int(r[-1]))
+            every = max(1, len(sizes) // 6)
+            ax.plot(list(sizes), computed, color=colour, marker=marker, markevery=every)
+            largest = max(largest, *sizes)
     ax.plot([0, largest], [0, largest], color=style.GREY, linewidth=0.9, linestyle="--")
     ax.set_xlim(0, None)
     ax.set_ylim(0, None)

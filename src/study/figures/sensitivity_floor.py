@@ -8,11 +8,11 @@ from pdrom.core.store import read_table
 from pdrom.model.effects import EFFECTS
 from pdrom.view import style
 from pdrom.view.artists import Figure
-from pdrom.view.multiples import clipped, label_outer, log_axis, small_multiples
 from study.artifact.paths import SENSITIVITY, File
 from study.artifact.reads import EachOf, Read, Setting
 from study.experiments.kit.base import Horizon, floor_of, horizon
 from study.figures.kit.declaration import MESHES, Drawn, NothingToDraw, figure
+from study.figures.kit.multiples import label_outer, small_multiples
 from study.tables.kit.results import TWIN
 
 # Inputs from which figures make `Floors`: the sensitivity floor and horizon of each scene.
@@ -75,7 +75,7 @@ def sensitivity_floor(drawn: Drawn, sensitivity: list[File], horizon: Horizon) -
     columns = min(3, len(kinds))
     figure, axes = small_multiples(len(kinds), columns, height=2.7)
     for ax, (kind, scenes) in zip(axes, kinds.items(), strict=True):
-        log_axis(ax, LOW, HIGH)
+        style.log_axis(ax, LOW, HIGH)
         ax.axhline(floors.threshold, color=style.GREY, linewidth=0.9)
         families = list(dict.fromkeys(scene.removesuffix(TWIN) for scene in scenes))
         for scene in scenes:
@@ -84,7 +84,7 @@ def sensitivity_floor(drawn: Drawn, sensitivity: list[File], horizon: Horizon) -
             floor, end = floors.of[scene], floors.horizon(scene)
             label = f"{style.words(scene)}: {f'beyond {len(floor)}' if end is None else end}"
             line = "--" if scene.endswith(TWIN) else "-"
-            shown = clipped(floor, LOW, HIGH)
+            shown = np.clip(floor, LOW, HIGH)
             ax.plot(np.arange(len(shown)), shown, color=colour, label=label, linestyle=line)
             if end is not None:
                 dot = {"marker": "o", "markersize": 4.5, "zorder": 5}

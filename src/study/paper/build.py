@@ -19,10 +19,10 @@ from pdrom.core.errors import PaperError, StorageError
 from pdrom.core.machine import Machine
 from pdrom.core.store import read_table, read_text, require_intact, write_text
 from pdrom.core.yamlfile import describe
-from pdrom.view.text import replaced
 from study.artifact.artifact import Artifact
 from study.artifact.paths import FIGURE, MACHINE, PAPER_INPUT, TABLE, File
 from study.artifact.reads import Every, ProjectFile, Setting, SourcesOf
+from study.artifact.text import replaced
 from study.figures.kit.declaration import declarations
 from study.paper.macros import HIDDEN, captions, decisions, keys_of, macros, number_of, provenance
 from study.paper.source import COMMENT, DOCUMENTS, PLACED, documents

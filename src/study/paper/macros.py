@@ -21,7 +21,7 @@ import numpy as np
 import pandas as pd
 
 from pdrom.core.errors import PaperError
-from pdrom.view.text import escape
+from study.artifact.text import escape
 
 VAL = re.compile(r"\\val\{([^{}]*)\}")
 _FILTER = re.compile(r"(.*?)(!?=)(.*)")

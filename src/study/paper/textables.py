@@ -8,7 +8,7 @@ from typing import Any
 import pandas as pd
 
 from pdrom.model.held_out import PLAYBACK
-from pdrom.view.text import escape
+from study.artifact.text import escape
 from study.experiments.alternatives.experiment import ACCELERATED
 from study.figures.kit.declaration import declarations
 from study.paper.macros import HIDDEN, format_number

@@ -17,12 +17,12 @@ from typing import Any
 from pdrom.core.errors import ConfigurationError, SceneError, choices
 from pdrom.core.provenance import ORIGIN, provenance
 from pdrom.reduction.subspace.exported import DOUBLES, LARGEST, require_known
-from pdrom.view.text import require_typeset
 from study.article.build import article
 from study.artifact.artifact import Artifact, make, modules_in, recorded
 from study.artifact.logs import warnings_to
 from study.artifact.paths import FIGURE, FIGURE_PICTURE, LIVE_MODEL, PAPER_INPUT, TABLE, Place
 from study.artifact.reads import Labels, Paths, listed
+from study.artifact.text import require_typeset
 from study.experiments.kit.base import experiments
 from study.figures.kit.declaration import Declaration, declarations
 from study.live.page import live_page

@@ -30,7 +30,7 @@ from pdrom.model.effects.base import EffectConfigs
 from pdrom.view import style
 from pdrom.view.artists import Figure, Line2D
 from pdrom.view.camera import Camera, up_of
-from pdrom.view.text import plain_words
+from pdrom.view.style import plain_words
 from study.artifact.artifact import Artifact, declare, declared_in
 from study.artifact.markup import filled, to_plain
 from study.artifact.paths import FIGURE, FIGURE_PICTURE, File

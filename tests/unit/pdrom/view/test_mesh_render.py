@@ -12,8 +12,8 @@ from pdrom.model.mesh.generators import bar, cloth
 from pdrom.model.mesh.types import Mesh
 from pdrom.view import mesh_render, style
 from pdrom.view.camera import Camera, Window, bounds, window_of
+from pdrom.view.frames import frame_numbers
 from pdrom.view.panels import RunPanel, fit_aspect
-from pdrom.view.read import frame_numbers
 from places import CONFIG
 
 CAMERAS = [Camera(), Camera(0.0, 0.0), Camera(-120.0, 60.0), Camera(90.0, -30.0),

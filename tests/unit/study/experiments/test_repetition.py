@@ -17,10 +17,10 @@ from pdrom.reduction.deviations import Yardstick
 from pdrom.reduction.method import MethodSpec, load_methods
 from pdrom.reduction.sampling import Reduction, reductions, select
 from pdrom.reduction.snapshots import SnapshotSet, recorded
-from pdrom.view.read import rerun_infos
 from places import ROOT
 from study.experiments import repetitions as module
 from study.experiments.repetitions import LadderSection, ReducedRuns, Repetitions, drawn
+from study.figures.kit.read import rerun_infos
 from study.pipeline.scenes import Coarsen, load_bound_scene
 
 BLOCK = MethodSpec(title="elements", centring="affine", rows="element", solve="qr")

@@ -8,9 +8,9 @@ from pdrom.core.errors import ConfigurationError, StorageError
 from pdrom.model.mesh.generators import bar, cloth
 from pdrom.reduction.sampling.deim import block_elements, deim_entries
 from pdrom.view.camera import Camera
-from pdrom.view.read import choose_ranks, positions_at, rerun_infos, rerun_positions
 from study.artifact.paths import RERUNS, TRAIN
 from study.figures.kit.elements import element_map, magnitudes, signed_entry
+from study.figures.kit.read import choose_ranks, positions_at, rerun_infos
 from study.figures.sampling import iterations
 
 from .conftest import BLOWN_UP, BLOWUP_FRAME
@@ -126,9 +126,9 @@ def test_runs_are_read_only_where_finite(study):
     assert list(infos) == [6, 10, 14, 20]
     assert infos[14].full
     assert infos[20].marked
-    entry, positions = rerun_positions(path, infos[r], 15)
+    entry, positions = infos[r].at(15)
     assert entry == BLOWUP_FRAME - 1
     assert np.isfinite(positions).all()
-    assert rerun_positions(path, infos[20], 15) is None
+    assert infos[20].at(15) is None
     assert [i.r for i in choose_ranks(list(infos.values()), ("full", 14, 6, 99))] == [14, 6]
     assert choose_ranks(list(infos.values()), (99,)) == list(infos.values())

@@ -12,8 +12,9 @@ from matplotlib.figure import Figure
 
 from pdrom.core.errors import ConfigurationError, PaperError
 from pdrom.view import style
-from pdrom.view.text import escape, plain_words, replaced, require_typeset
+from pdrom.view.style import plain_words
 from places import ROOT
+from study.artifact.text import escape, replaced, require_typeset
 from study.paper.source import whole_source
 from study.paper.tex import build_pdfs
 

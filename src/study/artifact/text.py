@@ -1,4 +1,4 @@
-"""Typesetting of texts that a user wrote, in figures and in the manuscript.
+"""Typesetting of texts that a user wrote.
 
 The manuscript is typeset by pdfTeX with T1 fonts: Latin letters stand as they are, Greek letters
 and signs become formulas. Figures are drawn with DejaVu Sans, which has all of them.
@@ -36,30 +36,28 @@ def escape(text: str) -> str:
     for character in unicodedata.normalize("NFC", text):
         piece = _typeset(character)
         if piece is None:
-            raise PaperError(f"'{text}': {_named(character)} cannot be typeset")
+            name = unicodedata.name(character, "a control character")
+            named = f"'{_shown(character)}' (U+{ord(character):04X}, {name})"
+            raise PaperError(f"'{_shown(text)}': {named} cannot be typeset")
         pieces.append(piece)
     return "".join(pieces)
 
 
 def require_typeset(text: str, place: str) -> None:
     """Raise ConfigurationError, which names ``place`` (a key), if ``text`` cannot be typeset."""
-    for character in unicodedata.normalize("NFC", text):
-        if _typeset(character) is None:
-            raise ConfigurationError(
-                f"{place} = '{_shown(text)}': {_named(character)} cannot be typeset (allowed: "
-                "Latin and Greek letters, digits, ASCII and common mathematical signs)"
-            )
+    try:
+        escape(text)
+    except PaperError as error:
+        raise ConfigurationError(
+            f"{place} = {error} (allowed: Latin and Greek letters, digits, ASCII and common "
+            "mathematical signs)"
+        ) from error
 
 
 def replaced(text: str) -> str:
     """Return ``text``, a question mark in place of each character that cannot be typeset."""
     characters = unicodedata.normalize("NFC", text)
     return "".join("?" if _typeset(character) is None else character for character in characters)
-
-
-def plain_words(text: str) -> str:
-    """Return ``text`` with dollar signs escaped, which matplotlib would read as mathematics."""
-    return unicodedata.normalize("NFC", text).replace("$", r"\$")
 
 
 def _typeset(character: str) -> str | None:
@@ -88,11 +86,6 @@ def _greek(character: str) -> str | None:
     if name not in known.split():
         return None
     return "\\" + (name.capitalize() if words[1] == "CAPITAL" else name)
-
-
-def _named(character: str) -> str:
-    name = unicodedata.name(character, "a control character")
-    return f"'{_shown(character)}' (U+{ord(character):04X}, {name})"
 
 
 def _shown(text: str) -> str:
