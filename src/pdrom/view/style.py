@@ -2,7 +2,7 @@
 
 import textwrap
 import unicodedata
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any, Literal
 
@@ -21,28 +21,11 @@ GREY = "#8C8C8C"
 FAILED = "#B3261E"
 FULL_ORDER = "#DAD6CC"
 
-METHODS: dict[str, tuple[str, str]] = {
-    "pod": (BLACK, "o"),
-    "deim": (ORANGE, "s"),
-    "qdeim": (SKY, "^"),
-    "deim-joint": (VERMILLION, "D"),
-    "published": (PURPLE, "v"),
-    "block-deim": (BLUE, "P"),
-    "block-qdeim": (GREEN, "X"),
-    "gappy": ("#7A5C00", "<"),
-    "bounded": ("#1F9E89", "*"),
-}
-_RESERVE = (("#5A5A5A", "1"), ("#9A6A00", "2"), ("#6B3F00", "3"), ("#2B2B80", "4"))
-
 # Colours and markers of the constraint groups in the order of `EFFECTS`; they repeat if too few.
 GROUP_LOOKS = (
     (GREEN, "^"), (ORANGE, "s"), (BLUE, "o"), (SKY, "D"), (PURPLE, "v"), (VERMILLION, "P"),
     ("#7A5C00", "X"), ("#5A5A5A", "<"), ("#2B2B80", ">"),
 )  # fmt: skip
-AXES = {"x": VERMILLION, "y": GREEN, "z": BLUE}
-SPLITS = {"train": "-", "test": "--", "heldout": ":"}
-SPLIT_NAMES = {"train": "train", "test": "test", "heldout": "held-out run"}
-SCENE_MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 CYCLE = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY, BLACK, GREY)
 
 RC: dict[str, Any] = {
@@ -85,25 +68,6 @@ def look() -> Iterator[None]:
         mpl.rcdefaults()
         mpl.rcParams.update(RC)
         yield
-
-
-def method_styles(names: Iterable[str]) -> dict[str, tuple[str, str]]:
-    """Map each method to (colour, marker); methods not in `METHODS` share a few spare styles."""
-    names = list(names)
-    others = sorted(set(names) - set(METHODS))
-    spare = {name: _RESERVE[i % len(_RESERVE)] for i, name in enumerate(others)}
-    return {name: METHODS.get(name) or spare[name] for name in names}
-
-
-def scene_style(index: int) -> tuple[str, str]:
-    """(colour, marker) of the ``index``-th scene in a figure with a style per scene."""
-    return CYCLE[index % len(CYCLE)], SCENE_MARKERS[index % len(SCENE_MARKERS)]
-
-
-def scene_handles(scenes: Iterable[str]) -> list[Line2D]:
-    """Legend entries of scenes in the styles of `scene_style`."""
-    looks = {words(scene): scene_style(i) for i, scene in enumerate(scenes)}
-    return handles(looks, linestyle="none")
 
 
 def surface_colour(colour: str) -> tuple[float, float, float]:
@@ -169,11 +133,6 @@ def handles(looks: Mapping[str, tuple[str, str]], **common: Any) -> list[Line2D]
     ``common`` are keywords of `handle` for all entries.
     """
     return [handle(label, color=c, marker=m, **common) for label, (c, m) in looks.items()]
-
-
-def split_handles(splits: Iterable[str]) -> list[Line2D]:
-    """Legend entries of sets of snapshots, ``splits`` (train, test, heldout): a line style each."""
-    return [handle(SPLIT_NAMES[s], color="#555555", linestyle=SPLITS[s]) for s in splits]
 
 
 def legend(figure: Figure, entries: Sequence[Artist], columns: int) -> None:

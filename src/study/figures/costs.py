@@ -11,7 +11,7 @@ from pdrom.view.artists import Artist, Axes, Figure
 from study.artifact.paths import CONTRIBUTIONS, File
 from study.artifact.reads import EachOf, TableOf
 from study.experiments.kit.base import GLOBAL, REST, RIGHT
-from study.figures.kit.declaration import MESHES, Drawn, NothingToDraw, figure
+from study.figures.kit.declaration import MESHES, Drawn, NothingToDraw, figure, method_styles
 from study.figures.kit.multiples import label_outer, plain_ticks, small_multiples
 from study.tables.effects_cost import NOTHING
 
@@ -134,7 +134,7 @@ def scaling(drawn: Drawn, table: pd.DataFrame) -> Figure:
 
 def _look(method: str) -> tuple[str, str]:
     """Colour and marker of a method."""
-    return SCALED.get(method) or style.method_styles([method])[method]
+    return SCALED.get(method) or method_styles([method])[method]
 
 
 def _draw_times(ax: Axes, rows: pd.DataFrame) -> None:
@@ -173,7 +173,7 @@ def break_even(drawn: Drawn, table: pd.DataFrame) -> Figure:
         raise NothingToDraw("no reduced local step was timed")
     groups = [g for g in drawn.looks if (table.group == g).any()]
     figure, axes = small_multiples(len(groups), COLUMNS, legend_rows=2, height=1.8)
-    styles = style.method_styles([m for m in drawn.methods if (table.method == m).any()])
+    styles = method_styles([m for m in drawn.methods if (table.method == m).any()])
     for ax, group in zip(axes, groups, strict=True):
         ax.set_title(style.words(group))
         ax.set_yscale("log")

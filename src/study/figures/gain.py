@@ -3,6 +3,7 @@
 The gain is the factor by which sampling amplifies errors.
 """
 
+from itertools import cycle
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,14 @@ from pdrom.view import style
 from pdrom.view.artists import Axes, Figure
 from pdrom.view.style import plain_words
 from study.artifact.reads import ProjectFile, TableOf
-from study.figures.kit.declaration import MESHES, Drawn, Experiment, NothingToDraw, figure
+from study.figures.kit.declaration import (
+    MESHES,
+    Drawn,
+    Experiment,
+    NothingToDraw,
+    figure,
+    method_styles,
+)
 from study.figures.kit.multiples import label_outer, small_multiples
 from study.tables.kit.results import FAILED, judged_runs
 
@@ -50,7 +58,7 @@ def error_against_gain(drawn: Drawn, **tables: pd.DataFrame) -> Figure:
         repeated = repeated[repeated.varied == "training"]
         ranges = runs[[*_KEYS, "gain", "error"]].merge(repeated, on=_KEYS)
     methods = [m for m in drawn.methods if (runs.method == m).any()]
-    styles = style.method_styles(methods)
+    styles = method_styles(methods)
     for method in methods:
         own = runs[runs.method == method]
         _draw_method(left, own, ranges[ranges.method == method], *styles[method])
@@ -139,11 +147,18 @@ def ladder(drawn: Drawn, table: pd.DataFrame) -> Figure:
     right.set_xlabel("gain of the interpolation")
     left.set_yticks(range(len(rungs)), [plain_words(rung) for _, rung in rungs])
     left.invert_yaxis()
-    handles = style.scene_handles(list(dict.fromkeys(table.scene)))
+    looks = {style.words(scene): look for scene, look in _scene_looks(table).items()}
+    handles = style.handles(looks, linestyle="none")
     handles.append(style.handle("range: training frames", color=style.GREY, linewidth=0.9))
     handles.append(style.handle("range: signs", color=style.GREY, linewidth=3.0, alpha=0.35))
     style.legend(figure, handles, 4)
     return figure
+
+
+def _scene_looks(table: pd.DataFrame) -> dict[str, tuple[str, str]]:
+    """Map each scene in ``table`` to (colour, marker)."""
+    looks = zip(cycle(style.CYCLE), cycle("os^DvPX"), strict=False)
+    return dict(zip(dict.fromkeys(table.scene), looks, strict=False))
 
 
 def _draw_quantity(
@@ -156,8 +171,8 @@ def _draw_quantity(
     ax.set_xscale("log")
     ax.set_xlim(limits[0], limits[1] * 1.3)
     style.grid(ax)
-    scenes = list(dict.fromkeys(table.scene))
-    for i, scene in enumerate(scenes):
+    scenes = _scene_looks(table)
+    for i, (scene, (colour, marker)) in enumerate(scenes.items()):
         rows = table[table.scene == scene].set_index(["direction", "rung"])
         found, low, high = (
             np.array([rows[column].get(rung, np.nan) for rung in rungs], float)
@@ -165,7 +180,6 @@ def _draw_quantity(
         )
         values = np.clip(np.nan_to_num(found, nan=np.inf), *limits)
         heights = np.arange(len(rungs)) + 0.09 * (i - 0.5 * (len(scenes) - 1))
-        colour, marker = style.scene_style(i)
         ax.plot(values, heights, linestyle="none", color=colour, marker=marker, markersize=3.2)
         repeated = ~np.isnan(low)
         ends = (np.clip(bound[repeated], *limits) for bound in (low, high))
@@ -182,6 +196,8 @@ def _draw_quantity(
 
 VALUES = (1e-17, 3.0)
 SHOWN = (1e-7, 1e3)  # limits of the error axis; errors outside are drawn on the limits
+# Set of snapshots -> legend entry and line style.
+SPLITS = {"train": ("train", "-"), "test": ("test", "--"), "heldout": ("held-out run", ":")}
 PUBLISHED = "#B5B5B5"
 PUBLISHED_CODE = "config/reference/published_code"
 # Scene -> similar experiment of the published code, which is drawn beside it.
@@ -317,7 +333,8 @@ def reconstruction_error(drawn: Drawn, table: pd.DataFrame, published: Path) -> 
             )  # fmt: skip
         ax.set_xlim(0, max(float(rows.r.max()), 1.0) * 1.02)
     label_outer([ax for ax, *_ in panels], 3, "basis size r", "relative error")
-    handles = drawn.handles(style.method_styles(methods)) + style.split_handles(style.SPLITS)
+    handles = drawn.handles(method_styles(methods))
+    handles += [style.handle(words, color="#555555", linestyle=s) for words, s in SPLITS.values()]
     if reference:
         label = "published code's output (x, y)"
         handles.append(style.handle(label, color=PUBLISHED, linewidth=1.0))
@@ -327,9 +344,9 @@ def reconstruction_error(drawn: Drawn, table: pd.DataFrame, published: Path) -> 
 
 def _draw_errors(ax: Axes, rows: pd.DataFrame, method: str) -> bool:
     """Draw errors of ``method``, as arrows if too large for the axis; return if any is finite."""
-    colour, marker = style.method_styles([method])[method]
+    colour, marker = method_styles([method])[method]
     drawn = False
-    for split, dashes in style.SPLITS.items():
+    for split, (_, dashes) in SPLITS.items():
         line = rows[rows.split == split].sort_values("r")
         error = line.relative_error.to_numpy(float)
         if not np.isfinite(error).any():

@@ -12,7 +12,7 @@ from pdrom.model.mesh.types import Mesh, load_mesh
 from pdrom.view import panels as view
 from pdrom.view import style
 from pdrom.view.artists import Figure, ScalarMappable
-from pdrom.view.camera import Camera, Window, obstacles
+from pdrom.view.camera import Camera, obstacles
 from pdrom.view.panels import NOTHING_RAN, Row, RunPanel
 from study.artifact.paths import MESH, NOISE_RUNS, RERUNS, SUBSPACES, TRAIN, File
 from study.artifact.reads import EachOf, Every, Read, TableOf
@@ -64,18 +64,15 @@ class Shown:
     colour: tuple[float, float, float]
     bodies: list[Mesh] | None
 
-    def window(self, panels: list[RunPanel]) -> Window:
-        """Return the part of the image plane that contains the full-order run and ``panels``."""
-        return view.shared_window(self.camera, self.full[0], panels)
-
     def row(
-        self, label: str, panels: list[RunPanel], window: Window, note: str | None = None
+        self, label: str, panels: list[RunPanel], seen: list[RunPanel], note: str | None = None
     ) -> Row:
         """Return a row of pictures: the full-order run, then ``panels``.
 
-        The title of the row is that of the experiment, with ``label`` below. The text ``note``
-        stands to the right of the panels.
+        The title of the row is that of the experiment, with ``label`` below. The pictures show what
+        contains the full-order run and the panels ``seen``; ``note`` stands to the right of them.
         """
+        window = view.shared_window(self.camera, self.full[0], seen)
         first = RunPanel("full order", style.FULL_ORDER, self.full[0], reference=True)
         panels = [replace(panel, obstacles=self.bodies) for panel in (first, *panels)]
         return Row(
@@ -108,7 +105,7 @@ class Runs:
 
     @cached_property
     def floors(self) -> Floors:
-        """Differences of perturbed from unperturbed runs, and frames where they get too large."""
+        """Sensitivity floor and horizon of each scene."""
         return Floors(self.sensitivity, self.horizon)
 
     def shown(self, experiment: Experiment) -> Shown:
@@ -140,21 +137,15 @@ class Runs:
         shown = self.shown(experiment)
         reduced = self.reduced(shown)
         everything = [panel for panels in reduced.values() for panel in panels]
-        window = shown.window(everything)
         if nothing_ran(everything):
-            return [shown.row(f"any method\n{shown.when}", [], window, NOTHING_RAN)]
+            return [shown.row(f"any method\n{shown.when}", [], everything, NOTHING_RAN)]
         return [
-            shown.row(f"{self.drawn.title(method)}\n{shown.when}", panels, window)
+            shown.row(f"{self.drawn.title(method)}\n{shown.when}", panels, everything)
             for method, panels in reduced.items()
         ]
 
     def draw(self) -> Figure:
-        """Draw a row for each scene and method: the full-order run, then reduced runs by size.
-
-        All pictures of a scene show the last instant with the same camera. A picture
-        too large for the common scale has a border, and its scale below. The grey outline is the
-        full-order run.
-        """
+        """Draw a row for each scene and method: the full-order run, then reduced runs by size."""
         return view.draw_rows([row for each in self.drawn.experiments for row in self.rows(each)])
 
 
@@ -246,7 +237,7 @@ def noise_rows(drawn: Drawn, shown: Shown, table: pd.DataFrame, path: str) -> li
             ]
             start = ", ".join(NOISY[kind] for kind in kinds)
             label = f"{drawn.title(method)}\nnoise: {start}\n{shown.when}"
-            rows.append(shown.row(label, panels, shown.window(panels)))
+            rows.append(shown.row(label, panels, panels))
     return rows
 
 
@@ -368,8 +359,7 @@ def _teaser_row(
 ) -> Row:
     """Return a row with the full-order run and the reduced runs of ``experiment``.
 
-    errors : rows of the table reduced_reruns for the training motion
-    subspace : file of the runs in position subspaces, or None
+    ``errors`` is of the training motion; ``subspace`` has the runs in position subspaces, if any.
     """
     shown, panels = runs.shown(experiment), []
     reduced = runs.reduced(shown)
@@ -385,8 +375,8 @@ def _teaser_row(
     if sampled := subspace and _subspace(shown.frame, subspace):
         own = errors[(errors.position_basis == "pod") & (errors.method == TOLERANCE)]
         panels.append(_with_error(sampled, "ecsw", own, "k"))
-    window, label = shown.window(everything), shown.when.splitlines()[-1]
-    return shown.row(label, panels, window, None if ran else NOTHING_RAN)
+    label = shown.when.splitlines()[-1]
+    return shown.row(label, panels, everything, None if ran else NOTHING_RAN)
 
 
 def _with_error(panel: RunPanel, method: str, rows: pd.DataFrame, size: str) -> RunPanel:

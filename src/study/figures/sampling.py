@@ -18,7 +18,14 @@ from pdrom.view.panels import fit_aspect
 from study.artifact.paths import BASIS, MESH, SAMPLING, SNAPSHOTS, TRAIN, File
 from study.artifact.reads import EachOf
 from study.figures.kit import elements as shapes
-from study.figures.kit.declaration import MESHES, Drawn, NothingToDraw, camera_of, figure
+from study.figures.kit.declaration import (
+    MESHES,
+    Drawn,
+    NothingToDraw,
+    camera_of,
+    figure,
+    method_styles,
+)
 from study.figures.kit.multiples import panels, rows_of
 from study.figures.kit.read import positions_at, read_samplings
 
@@ -31,7 +38,7 @@ NEWEST = {
     "markersize": 8.5,
 }  # fmt: skip
 SEVERAL = "several"  # stands for x, y or z if entries of several axes of an element are sampled
-AXES = {**style.AXES, SEVERAL: "#333333"}
+AXES = {"x": style.VERMILLION, "y": style.GREEN, "z": style.BLUE, SEVERAL: "#333333"}
 SCENES = f"strain_oop strain_twist_twin spring_stretch bar_release {MESHES}"
 STEPS, COLUMNS = 6, 3  # selection steps of figure `deim_iterations`, and panels in a row
 ENTRIES = 20  # basis size of figure `deim_entries`; the largest one where there is none
@@ -210,10 +217,11 @@ def deim_entries(drawn: Drawn, **files: list[File]) -> Figure:
         _draw_counts(row[1], sizes[r].entries // (3 * rows), 3 * rows)
         _draw_evaluations(row[2], samplings, 3 * rows)
     dots = {"linestyle": "none", "marker": "o", "markersize": 4.5}
-    named = {f"{axis} entry": colour for axis, colour in style.AXES.items()}
-    named["several axes"] = AXES[SEVERAL]
-    handles = [style.handle(label, color=c, **dots) for label, c in named.items()]
-    handles += drawn.handles(style.method_styles(methods))
+    handles = [
+        style.handle("several axes" if axis == SEVERAL else f"{axis} entry", color=colour, **dots)
+        for axis, colour in AXES.items()
+    ]
+    handles += drawn.handles(method_styles(methods))
     handles.append(style.handle("numbers that DEIM uses (r)", color=style.GREY, linestyle="--"))
     style.legend(figure, handles, 4)
     return figure
@@ -256,7 +264,7 @@ def _draw_counts(ax: Axes, hit: np.ndarray, per_element: int) -> None:
 def _draw_evaluations(
     ax: Axes, samplings: dict[str, dict[int, Sampling]], per_element: int
 ) -> None:
-    styles = style.method_styles(samplings)
+    styles = method_styles(samplings)
     largest = 1
     for method, sizes in samplings.items():
         if sizes:

@@ -1,6 +1,5 @@
 """Figure of the stability map: the outcome of every reduced run of the study."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import pandas as pd
@@ -22,8 +21,7 @@ DENSE = 30  # panels with more columns than this have vertical labels and titles
 class Look:
     """Look of the cells of runs with one outcome: cell colour, symbol, its colour, legend text.
 
-    Outcomes can be distinguished without colour: cells differ in lightness, and cells of failed
-    runs have a symbol. The symbol of a blow-up is the number of the frame in which it happened.
+    Cells differ in lightness, those of failed runs have a symbol ("frame": that of the blow-up).
     """
 
     face: str
@@ -43,56 +41,49 @@ LOOKS = {
 
 
 Cells = dict[tuple[str, str], pd.Series]  # a column of the map: (scene, group) -> table row
-
-
-@dataclass(frozen=True)
-class Block:
-    """Neighbouring columns of cells with a common title; each column has a label."""
-
-    title: str
-    labels: Sequence[str]
-    columns: Sequence[Cells]
+Block = tuple[str, list[str], list[Cells]]
 
 
 @dataclass(frozen=True)
 class Strip:
-    """Panel of the stability map; ``rows``: (scene, group) -> label; ``blocks``: its columns."""
+    """Panel of the stability map.
+
+    rows : (scene, group) -> label
+    blocks : (title, labels of columns, columns) for each block of neighbouring columns
+    """
 
     rows: dict[tuple[str, str], str]
-    blocks: Sequence[Block]
+    blocks: list[Block]
     xlabel: str
 
-    def outcomes(self) -> set[str]:
-        """Outcomes of all runs that have a cell in this panel."""
-        cells = [column.get(key) for b in self.blocks for column in b.columns for key in self.rows]
-        return {str(cell.outcome) for cell in cells if cell is not None}
-
-    def draw(self, ax: Axes) -> None:
-        """Draw on ``ax`` a cell for each row and column in which there is a run."""
-        x, ticks = 0.0, []
-        labels = [label for block in self.blocks for label in block.labels]
-        dense = len(labels) > DENSE
-        for block in self.blocks:
-            width = len(block.labels)
-            title = block.title.replace("-", "-\n", 1) if dense else block.title
+    def draw(self, ax: Axes) -> set[str]:
+        """Draw on ``ax`` a cell for each row and column with a run; return their outcomes."""
+        x, ticks, drawn = 0.0, [], set()
+        texts = [label for _, labels, _ in self.blocks for label in labels]
+        dense = len(texts) > DENSE
+        for title, labels, columns in self.blocks:
+            width = len(labels)
             room = max(0.5 * (LEAST - width), 0.0)
             x += room
+            title = title.replace("-", "-\n", 1) if dense else title
             ax.text(x + 0.5 * width, -0.25, title, ha="center", va="bottom", fontsize=6.5)
-            for k, cells in enumerate(block.columns):
+            for k, cells in enumerate(columns):
                 ticks.append(x + k + 0.5)
                 for i, key in enumerate(self.rows):
                     if key in cells:
                         _draw_cell(ax, x + k, i, cells[key])
+                        drawn.add(str(cells[key].outcome))
             x += width + room + GAP
         ax.set_xlim(0.0, x - GAP)
         ax.set_ylim(len(self.rows), 0.0)
-        ax.set_xticks(ticks, labels, fontsize=6, rotation=90 if dense else 0)
+        ax.set_xticks(ticks, texts, fontsize=6, rotation=90 if dense else 0)
         places = [i + 0.5 for i in range(len(self.rows))]
         ax.set_yticks(places, list(self.rows.values()), fontsize=6.5)
         ax.tick_params(length=0, pad=2)
         ax.set_xlabel(self.xlabel, fontsize=7)
         ax.set_ylabel("scene", fontsize=7)
         ax.spines[:].set_visible(False)
+        return drawn
 
 
 def _draw_cell(ax: Axes, x: float, y: float, found: pd.Series) -> None:
@@ -122,9 +113,8 @@ def stability_map(drawn: Drawn, table: pd.DataFrame) -> Figure:
     rows = [len(strip.rows) for strip in strips]
     figure = style.new_figure(ROW * sum(rows) + 0.5 * len(strips) + 0.55)
     axes = figure.subplots(len(strips), 1, squeeze=False, height_ratios=rows)[:, 0]
-    for ax, strip in zip(axes, strips, strict=True):
-        strip.draw(ax)
-    present = {outcome for strip in strips for outcome in strip.outcomes()}
+    drawn_cells = (strip.draw(ax) for ax, strip in zip(axes, strips, strict=True))
+    present = set[str]().union(*drawn_cells)
     handles = [
         style.patch(
             f"{look.words} ({look.mark})" if look.mark not in ("", "frame") else look.words,
@@ -145,28 +135,24 @@ def _local_strips(table: pd.DataFrame, drawn: Drawn) -> list[Strip]:
     rows = {key: title for key, title in keys.items() if key in held}
     ranks = [r for r in RANKS if r == "full" or r in set(part.r)]
     largest = ran.sort_values("r", kind="stable").groupby(["scene", "group", "method"]).tail(1)
-    blocks = []
+    blocks: list[Block] = []
     for method in dict.fromkeys(part.method):
-        columns = [
-            _cells(largest[largest.method == method])
-            if r == "full"
-            else _cells(part[(part.method == method) & (part.r == r)])
-            for r in ranks
-        ]
-        blocks.append(Block(method, [str(r) for r in ranks], columns))
+        own, whole = (rows_of[rows_of.method == method] for rows_of in (part, largest))
+        columns = [_cells(whole if r == "full" else own[own.r == r]) for r in ranks]
+        blocks.append((method, [str(r) for r in ranks], columns))
     return _wrapped(rows, blocks, "number of modes r (full: numerical rank)")
 
 
 def _subspace_strips(table: pd.DataFrame) -> list[Strip]:
     part = table[table.position_basis != "full"]
     rows = {(scene, "all"): style.words(scene) for scene in dict.fromkeys(part.scene)}
-    blocks = []
+    blocks: list[Block] = []
     for basis, method in dict.fromkeys(zip(part.position_basis, part.method, strict=True)):
         own = part[(part.position_basis == basis) & (part.method == method)]
         sizes = sorted(own.k.dropna().unique())
         title = f"{basis}\n{'all' if method == 'full' else method}"
         labels = [str(int(k)) for k in sizes]
-        blocks.append(Block(title, labels, [_cells(own[own.k == k]) for k in sizes]))
+        blocks.append((title, labels, [_cells(own[own.k == k]) for k in sizes]))
     label = "number of modes k of the position subspace (all: all projections)"
     return _wrapped(rows, blocks, label)
 
@@ -180,9 +166,10 @@ def _wrapped(rows: dict[tuple[str, str], str], blocks: list[Block], xlabel: str)
     parts: list[list[Block]] = []
     used = 0
     for block in blocks if rows else ():
-        if not parts or (used and used + len(block.labels) > CELLS):
+        width = len(block[1])
+        if not parts or (used and used + width > CELLS):
             parts.append([])
             used = 0
         parts[-1].append(block)
-        used += len(block.labels)
+        used += width
     return [Strip(rows, part, xlabel) for part in parts]

@@ -239,17 +239,13 @@ class Numbers(NamedTuple):
     manuscript: str | None
     preprint: int | None
 
-    @property
-    def words(self) -> str:
-        """The figure's numbers: "figure S10 of supplement.pdf, figure 8 of the preprint"."""
+    def label(self, name: str) -> str:
+        """Return the figure's ``name`` and numbers: "teaser (figure 1 of main.pdf)"."""
         own = self.manuscript or ""
         document = "supplement.pdf" if own.startswith(SUPPLEMENT) else "main.pdf"
         places = {document: self.manuscript, "the preprint": self.preprint}
-        return ", ".join(f"figure {n} of {place}" for place, n in places.items() if n is not None)
-
-    def label(self, name: str) -> str:
-        """Return the figure's ``name`` and, if it has any, its numbers (`words`) in parentheses."""
-        return f"{name} ({self.words})" if self.words else name
+        words = ", ".join(f"figure {n} of {place}" for place, n in places.items() if n is not None)
+        return f"{name} ({words})" if words else name
 
 
 def figure_numbers(root: Path) -> dict[str, Numbers]:

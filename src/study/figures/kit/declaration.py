@@ -13,17 +13,18 @@ docstring is the caption::
 """
 
 import logging
+import math
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
+from itertools import cycle
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel
 
-from pdrom.core.errors import ConfigurationError
 from pdrom.core.store import atomic_path
 from pdrom.model.effects import EFFECTS
 from pdrom.model.effects.base import EffectConfigs
@@ -38,6 +39,19 @@ from study.artifact.reads import Read, Settings, TableOf
 from study.tables.effects_cost import unreliable
 
 MESHES = "disc_strain ball_shell torus_release starfish_twist"  # scenes of config/extended.yaml
+# Reduction method -> colour and marker.
+METHODS: dict[str, tuple[str, str]] = {
+    "pod": (style.BLACK, "o"),
+    "deim": (style.ORANGE, "s"),
+    "qdeim": (style.SKY, "^"),
+    "deim-joint": (style.VERMILLION, "D"),
+    "published": (style.PURPLE, "v"),
+    "block-deim": (style.BLUE, "P"),
+    "block-qdeim": (style.GREEN, "X"),
+    "gappy": ("#7A5C00", "<"),
+    "bounded": ("#1F9E89", "*"),
+}
+_RESERVE = (("#5A5A5A", "1"), ("#9A6A00", "2"), ("#6B3F00", "3"), ("#2B2B80", "4"))
 AZIMUTH = 30.0  # azimuth of every camera, degrees
 
 
@@ -45,16 +59,19 @@ class NothingToDraw(Exception):
     """Raised if the configuration has no data for a figure; the message names what is missing."""
 
 
-class _Plain(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
 def camera_of(experiment: "Experiment", elevation: float = 20.0) -> Camera:
     """Return the camera for pictures of the scene of ``experiment`` (elevation in degrees)."""
     return Camera(AZIMUTH, elevation, tuple(up_of(experiment.effects).tolist()))
 
 
-class Experiment(_Plain):
+def method_styles(names: Iterable[str]) -> dict[str, tuple[str, str]]:
+    """Map each method to (colour, marker); methods not in `METHODS` share a few spare styles."""
+    others = sorted({*names} - {*METHODS})
+    looks = METHODS | dict(zip(others, cycle(_RESERVE), strict=False))
+    return {name: looks[name] for name in names}
+
+
+class Experiment(BaseModel, extra="forbid", frozen=True):
     """A constraint group (all constraints of one kind) that is reduced in a scene.
 
     mesh, effects : identifier of the mesh of the scene, and all effects of the scene
@@ -83,8 +100,8 @@ class Experiment(_Plain):
     @property
     def title(self) -> str:
         """Title of a panel; the group is named only if the scene reduces several groups."""
-        name = self.scene.replace("_", " ")
-        return name if self.only else f"{name}: {self.group.replace('_', ' ')}"
+        name = style.words(self.scene)
+        return name if self.only else f"{name}: {style.words(self.group)}"
 
     def find(self, files: Sequence[File], **labels: str) -> str | None:
         """First path in ``files`` for this scene, group, mesh and ``labels``; None without one."""
@@ -100,14 +117,14 @@ class Experiment(_Plain):
         return path
 
 
-class Reduction(_Plain):
+class Reduction(BaseModel, extra="forbid", frozen=True):
     """Reduction method: title, and kind of rows that it samples (as in `MethodSpec.rows`)."""
 
     title: str
     rows: str
 
 
-class Drawn(_Plain):
+class Drawn(BaseModel, extra="forbid", frozen=True):
     """Experiments and methods that a figure draws, in the order of drawing.
 
     experiments : each is a scene with one of its reduced groups
@@ -167,7 +184,6 @@ class Drawn(_Plain):
 
 log = logging.getLogger(__name__)
 
-PACKAGE = "study.figures"
 PNG_DPI = 200
 RASTER_DPI = 300  # dots per inch of the rasterised parts of a PDF
 TIMES = "times_of_run"  # key of the input of a timed figure that says whether times are reliable
@@ -178,9 +194,6 @@ ELSEWHERE = "the full study (config/default.yaml) draws it"
 @dataclass(frozen=True)
 class Declaration(Artifact):
     """Figure of the study, named after the function that draws it.
-
-    The function raises `NothingToDraw` if the configuration has no data for the figure, and
-    StorageError for a damaged file.
 
     title, caption : text in the mark-up of `study.artifact.markup`; ``{key}`` in a caption stands
         for the value of a setting
@@ -200,10 +213,7 @@ class Declaration(Artifact):
     rule_pattern = "figure_{}"
 
     def words(self, value: Callable[[str], Any]) -> tuple[str, str]:
-        """Title and caption in mark-up; ``value(key)`` is the number put in place of ``{key}``.
-
-        Raises ConfigurationError if a setting does not exist.
-        """
+        """Title and caption in mark-up; ``value(key)`` is the number put in place of ``{key}``."""
         return self.title, filled(self.caption, value)
 
     def perform(
@@ -271,8 +281,7 @@ def write_figure(
 ) -> None:
     """Write ``figure`` to the files ``pdf`` and ``png``, with ``title`` in their metadata.
 
-    Fonts are embedded as TrueType. The files have no dates, so that repeated calls write the same
-    bytes. A file appears only when it is complete.
+    The files have no dates, so that repeated calls write the same bytes.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
@@ -287,14 +296,6 @@ def write_figure(
 
 @cache
 def declarations() -> dict[str, Declaration]:
-    """Return all figures by name: first those of the preprint by number, then the others by name.
-
-    Raises ConfigurationError if two figures have the same number.
-    """
-    found = declared_in(PACKAGE, Declaration)
-    numbers = [made.number for made in found.values() if made.number is not None]
-    for number in numbers:
-        if numbers.count(number) > 1:
-            raise ConfigurationError(f"{PACKAGE}: two figures have the number {number}")
-    last = len(found) + max(numbers, default=0)
-    return dict(sorted(found.items(), key=lambda item: (item[1].number or last, item[0])))
+    """Return all figures by name: those of the preprint by number, then the others by name."""
+    found = declared_in("study.figures", Declaration)
+    return dict(sorted(found.items(), key=lambda item: (item[1].number or math.inf, item[0])))

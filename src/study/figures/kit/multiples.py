@@ -37,9 +37,6 @@ def panels(
     axes = list(grid.ravel())
     for ax in axes[count:]:
         ax.remove()
-    if sharey:
-        for i, ax in enumerate(axes[:count]):
-            ax.tick_params(labelleft=i % columns == 0)
     return axes[:count]
 
 

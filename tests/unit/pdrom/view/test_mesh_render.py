@@ -15,6 +15,7 @@ from pdrom.view.camera import Camera, Window, bounds, window_of
 from pdrom.view.frames import frame_numbers
 from pdrom.view.panels import RunPanel, fit_aspect
 from places import CONFIG
+from study.figures.kit.declaration import METHODS, method_styles
 
 CAMERAS = [Camera(), Camera(0.0, 0.0), Camera(-120.0, 60.0), Camera(90.0, -30.0),
            Camera(up=(0.0, 0.0, 1.0))]  # fmt: skip
@@ -116,13 +117,13 @@ def test_a_run_outside_is_seen_together_with_the_window():
 
 
 def test_colours_and_markers_are_unique():
-    for looks in (style.METHODS.values(), style.GROUP_LOOKS):
+    for looks in (METHODS.values(), style.GROUP_LOOKS):
         for first, second in combinations(looks, 2):
             assert first[0] != second[0]
             assert first[1] != second[1]
-    named = style.method_styles(["pod", "mine", "yours"])
+    named = method_styles(["pod", "mine", "yours"])
     assert len(set(named.values())) == 3
-    assert named["mine"] == style.method_styles(["yours", "mine"])["mine"]
+    assert named["mine"] == method_styles(["yours", "mine"])["mine"]
 
 
 def test_instants_are_fractions_of_a_run():

@@ -353,7 +353,7 @@ def test_every_link_leads_somewhere(small):
 
 def numbers_of_tex(sources: Mapping[str, str], inputs: Path, folder: Path) -> dict[str, str]:
     """Number of every label, by its address in the article, as TeX counts; pictures are boxes."""
-    program = find_pdflatex(packages_of("".join(sources.values())), folder)
+    program = find_pdflatex(packages_of("".join(sources.values())))
     found = {}
     for name, text in sources.items():
         (folder / f"{name}.tex").write_text(rf"\PassOptionsToPackage{{demo}}{{graphicx}}{text}")
