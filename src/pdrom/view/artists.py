@@ -7,20 +7,16 @@ Matplotlib. Modules of figures thus import its types from here and its functions
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from matplotlib.artist import Artist
-    from matplotlib.axes import Axes
-    from matplotlib.axis import Axis
-    from matplotlib.cm import ScalarMappable
-    from matplotlib.collections import PolyCollection
-    from matplotlib.colors import Normalize
-    from matplotlib.figure import Figure, SubFigure
-    from matplotlib.lines import Line2D
-    from matplotlib.patches import Patch
+    from matplotlib.artist import Artist as Artist
+    from matplotlib.axes import Axes as Axes
+    from matplotlib.axis import Axis as Axis
+    from matplotlib.cm import ScalarMappable as ScalarMappable
+    from matplotlib.collections import PolyCollection as PolyCollection
+    from matplotlib.colors import Normalize as Normalize
+    from matplotlib.figure import Figure as Figure
+    from matplotlib.figure import SubFigure as SubFigure
+    from matplotlib.lines import Line2D as Line2D
+    from matplotlib.patches import Patch as Patch
 else:
     Artist = Axes = Axis = ScalarMappable = PolyCollection = Normalize = Any
     Figure = SubFigure = Line2D = Patch = Any
-
-__all__ = [
-    "Artist", "Axes", "Axis", "Figure", "Line2D", "Normalize", "Patch", "PolyCollection",
-    "ScalarMappable", "SubFigure",
-]  # fmt: skip

@@ -94,10 +94,8 @@ def vtk(scene: ViewedScene, collection: Path) -> None:
             written = meshio.Mesh(scene.positions[frame], cells, point_data=data)
             written.write(temporary, file_format="vtu")
             _mark(temporary)
-    for path in collection.parent.glob(
-        FRAMES
-    ):  # remove surplus frames of a longer run written earlier
-        if path.name not in names:
+    for path in collection.parent.glob(FRAMES):
+        if path.name not in names:  # of a longer run written earlier
             path.unlink()
     root = ElementTree.Element("VTKFile", type="Collection", version="0.1")
     series = ElementTree.SubElement(root, "Collection")
@@ -114,8 +112,7 @@ def point_data(scene: ViewedScene, frame: int) -> dict[str, np.ndarray]:
     """Data of each vertex of ``scene`` in a ``frame``, (N, 3) float32 each.
 
     Displacement from the initial state (m) of the full-order run; for each reduced run its
-    positions minus those of the full order (m), by which ParaView can warp the full-order mesh, and
-    NaN after the end of the reduced run.
+    positions minus those of the full order (m), NaN after the end of the reduced run.
     """
     now = scene.positions[frame]
     data = {"displacement": now - scene.positions[0]}

@@ -63,8 +63,6 @@ def draw_surface(
 
     The surface of a volume is closed; an open surface is shaded smoothly, its back darker.
 
-    Parameters
-    ----------
     points : (N, 3) m, finite, positions of the vertices
     colour : one colour, or one RGB row per face (T, 3)
     wire : opacity of the wireframe, 0 for none
@@ -97,13 +95,7 @@ def draw_surface(
 
 
 def draw_floor(ax: Axes, points: np.ndarray, mesh: Mesh, camera: Camera, window: Window) -> None:
-    """Draw the floor y = 0 with the shadow of ``mesh``, if the floor is in view.
-
-    Parameters
-    ----------
-    ax, camera, window : axes of the picture, its camera and its visible rectangle
-    points : (N, 3) m, positions of the vertices
-    """
+    """Draw the floor y = 0, if in view, with the shadow of ``mesh`` at ``points`` (N, 3) m."""
     from matplotlib.collections import PolyCollection
 
     margin = 0.25 * max(window.width, window.height)
@@ -156,10 +148,7 @@ def outline_edges(
 
 
 def draw_lines(ax: Axes, segments: np.ndarray, camera: Camera, colours: np.ndarray) -> None:
-    """Draw coloured ``segments`` (n, 2, 3) m on ``ax`` from far to near, as ``camera`` sees them.
-
-    ``colours`` (n, 4) are the RGBA colours of the segments.
-    """
+    """Draw ``segments`` (n, 2, 3) m in RGBA ``colours`` (n, 4) on ``ax`` from far to near."""
     from matplotlib.collections import LineCollection
 
     order = np.argsort(camera.depth(segments.mean(axis=1)), kind="stable")

@@ -128,10 +128,7 @@ def patch(label: str, **look: Any) -> Patch:
 
 
 def handles(looks: Mapping[str, tuple[str, str]], **common: Any) -> list[Line2D]:
-    """Legend entries from ``looks``: label -> (colour, marker).
-
-    ``common`` are keywords of `handle` for all entries.
-    """
+    """Legend entries from ``looks``: label -> (colour, marker), and looks ``common`` to all."""
     return [handle(label, color=c, marker=m, **common) for label, (c, m) in looks.items()]
 
 

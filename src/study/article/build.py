@@ -43,7 +43,6 @@ def shown_figure(
     """Return a figure as a node of pandoc's syntax tree: picture, caption, shell command, links.
 
     node : node that pandoc made from the figure in the TeX source
-    size : width and height of the picture, pixels
     with_pdf : whether the pages include a PDF of the figure
     known : names of all tables that have a page
     """
@@ -107,17 +106,6 @@ def argument(name: str) -> str:
     if name in FACTS:
         return "paper_inputs"
     return TABLE.at(RESULTS, name=name) if name in declarations() else name
-
-
-def list_page(names: list[str], template: str) -> str:
-    """HTML page that lists the tables ``names``: for each a link and the title of the table."""
-    known = declared()
-    items = "".join(
-        f"<li><a href='tables/{name}.html'><code>{name}</code></a> "
-        f"{escape(known[name].title if name in known else FACTS[name])}</li>"
-        for name in names
-    )
-    return filled(template, {"TITLE": "Tables", "BODY": f"<ul>{items}</ul>"})
 
 
 PARTS = {"published": "As published", "beyond": "Beyond"}
@@ -241,11 +229,8 @@ def write_article(
 ) -> None:
     """Write all pages of the article to ``outputs`` (name of a page or file -> path).
 
-    source, references : TeX sources of the manuscript and its bibliography
-    tables, machine : CSV files of the tables, and the file that describes the machine
     inputs : generated files that the manuscript includes; numbers.json: table cells of its numbers
     figures, pictures : PDF and PNG of each figure
-    facts, claims : captions and tables of settings; the file with the rules of the claims
     made : rules of all tables, figures and pages of the study
     added : name of a list of values in the file ``claims`` -> values that the study adds to it
     assets : templates, style and script (files of `ASSETS`)
@@ -273,7 +258,12 @@ def write_article(
     written = {name: templates[name] for name in ("style", "script")}
     for name, content in csv.items():
         written[f"table_{name}"] = table_page(name, content, of_table)
-    written["tables"] = list_page(sorted(csv), plain)
+    titles = FACTS | {name: table.title for name, table in declared().items()}
+    items = "".join(
+        f"<li><a href='tables/{name}.html'><code>{name}</code></a> {escape(titles[name])}</li>"
+        for name in sorted(csv)
+    )
+    written["tables"] = filled(plain, {"TITLE": "Tables", "BODY": f"<ul>{items}</ul>"})
     if "claims" in outputs:
         written["claims"] = claims_page(rules, known["claims_tests"], known["claims"], pages, plain)
     drawn = _write_figures(figures, pictures, outputs)

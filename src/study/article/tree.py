@@ -95,6 +95,7 @@ class Labels:
     page: str
     numbers: dict[str, tuple[str, str]]
     counts: Counter[str] = field(default_factory=Counter)
+    sections: list[int] = field(default_factory=list)
 
     def next(self, kind: str, label: str = "") -> str:
         """Return the next number of a ``kind`` (figure, table ...); store it under ``label``."""
@@ -103,11 +104,9 @@ class Labels:
 
     def section(self, level: int, label: str) -> str:
         """Return the number of the next section of a ``level`` and store it under ``label``."""
-        self.counts[f"level{level}"] += 1
-        for deeper in range(level + 1, PARAGRAPH):
-            self.counts[f"level{deeper}"] = 0
-        parts = [str(self.counts[f"level{above}"]) for above in range(1, level + 1)]
-        return self.note(label, self.prefix + ".".join(parts))
+        self.sections = [*self.sections, *[0] * level][:level]
+        self.sections[-1] += 1
+        return self.note(label, self.prefix + ".".join(map(str, self.sections)))
 
     def note(self, label: str, number: str) -> str:
         """Store ``number`` and this page under a ``label`` that is not empty; return ``number``."""

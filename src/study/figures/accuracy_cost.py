@@ -96,8 +96,6 @@ def trade_offs(
     """Return points (error, time) of what ``drawn`` selects, and a list of scenes with points.
 
     Raises NothingToDraw if no reduced model has both an error and a time.
-
-    table, runs : tables accuracy_cost and reduced_reruns
     """
     table = table.dropna(subset=[ERROR, TIME])
     own = (table.method == "full") & (table.position_basis == "full")
@@ -126,8 +124,7 @@ def _drawn(table: pd.DataFrame, drawn: Drawn) -> pd.DataFrame:
 def draw_panel(ax: Axes, found: TradeOffs, scene: str, size: float = 3.0) -> None:
     """Draw the models of ``scene``, the Pareto front of each family, and the full-order run.
 
-    Markers of the models have the given ``size`` (typographic points). Errors outside the axis are
-    arrows at its ends; runs that blew up are crosses near the upper end.
+    Errors outside the axis are arrows at its ends, runs that blew up crosses near the upper end.
     """
     ax.set_xscale("log")
     style.log_axis(ax, LOW, HIGH)
@@ -169,10 +166,7 @@ def _points(ax: Axes, rows: pd.DataFrame, size: float, colour: str, **look: Any)
 
 
 def label_iterations(ax: Axes, found: TradeOffs, scene: str) -> None:
-    """Write "K = ..." beside full-order runs of ``scene`` with fewer iterations K than configured.
-
-    The runs are in ``found`` and already drawn on ``ax``; neighbouring runs share a label.
-    """
+    """Write "K = ..." beside full-order runs of ``scene`` with K iterations; near ones share it."""
     rows = found.points[(found.points.scene == scene) & (found.points.method == FEWER)]
     rows = rows.sort_values(TIME)
     low, high = np.log10(ax.get_xlim())

@@ -87,8 +87,8 @@ def _draw_bars(ax: Axes, rows: pd.DataFrame, scenes: list[str]) -> None:
             continue
         times = np.nan_to_num(rows.loc[scene, [*PHASES][:-1]].to_numpy(float))
         total, start = float(rows.ms_per_frame[scene]), 0.0
-        rest = total - times.sum()
-        for time, (_, colour) in zip([*times, rest], PHASES.values(), strict=True):
+        parts = [*times, total - times.sum()]
+        for time, (_, colour) in zip(parts, PHASES.values(), strict=True):
             share = 100.0 * time / total
             ax.barh(y, share, left=start, color=colour, height=0.72)
             start += share
@@ -240,10 +240,8 @@ def _draw_forces(ax: Axes, frames: pd.DataFrame, looks: Looks) -> None:
     for effect, rows in frames.groupby("effect", sort=False):
         force = rows.force.where(rows.force > least)
         colour, marker = looks[str(effect)]
-        if len(rows) > 1:
-            ax.plot(rows.frame, force, color=colour, linewidth=1.1)
-        else:
-            ax.plot(rows.frame, force, color=colour, marker=marker, markersize=3.5)
+        alone = {"marker": marker, "markersize": 3.5} if len(rows) == 1 else {}
+        ax.plot(rows.frame, force, color=colour, **alone)
     ax.set_yscale("log")
     style.grid(ax)
 

@@ -210,10 +210,7 @@ Panel = tuple[Axes, Experiment, pd.DataFrame]
 def _panels(
     drawn: Drawn, table: pd.DataFrame, limits: tuple[float, float], columns: int, legend: int
 ) -> tuple[Figure, list[Panel]]:
-    """Figure with a panel for each scene and group in ``table``, and space for a legend.
-
-    ``limits`` are those of the vertical axes; ``legend`` is the number of lines of the legend.
-    """
+    """Figure with a panel for each scene and group in ``table``, and ``legend`` lines below."""
     pairs = [
         (each, rows)
         for each in drawn.experiments
@@ -229,11 +226,7 @@ def _panels(
 
 
 def _published(path: Path, columns: list[str], each: Experiment) -> pd.DataFrame:
-    """Rows of ``path`` for the group of ``each``, of the published experiment like its scene.
-
-    The file has output of the preprint authors' own code, and must have ``columns``;
-    `BESIDE` names the experiment of that code which is similar to the scene.
-    """
+    """Output of the preprint's own code in ``path`` for the experiment most like ``each``."""
     output = read_table(path, ["experiment", "group", *columns], result=False)
     name = BESIDE.get(each.scene)
     return output[(output.experiment == name) & (output.group == each.group)]

@@ -155,10 +155,7 @@ def nothing_ran(panels: list[RunPanel]) -> bool:
 
 
 def obstacles_of(experiment: Experiment, positions: np.ndarray) -> list[Mesh] | None:
-    """Meshes of obstacles near ``positions`` (F, N, 3) m; None if a floor is the only obstacle.
-
-    Such a floor is drawn as a shadow.
-    """
+    """Meshes of obstacles near ``positions`` (F, N, 3) m; None for a floor only (a shadow)."""
     bodies = obstacles(positions, experiment.effects)
     floor = any(effect.effect == "floor" for effect in experiment.effects)
     return None if floor and len(bodies) == 1 else bodies
@@ -222,9 +219,6 @@ def noise_rows(drawn: Drawn, shown: Shown, table: pd.DataFrame, path: str) -> li
 
     Below a picture stands how many starts of the kind led to failed runs. Kinds for which these
     numbers agree at every basis size share a row, with pictures of the first of these kinds.
-
-    table : rows of table ``noise`` for the experiment in ``shown``
-    path : file of these runs, whose bases are computed from snapshots of mere rounding errors
     """
     shown, rows = replace(shown, bodies=None), []
     for method in drawn.methods:

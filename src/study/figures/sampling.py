@@ -11,7 +11,7 @@ from pdrom.reduction.basis import Basis, load_basis
 from pdrom.reduction.sampling.reduction import Sampling
 from pdrom.reduction.snapshots import load_snapshots
 from pdrom.view import style
-from pdrom.view.artists import Axes, Figure, ScalarMappable
+from pdrom.view.artists import Axes, Figure
 from pdrom.view.camera import Camera, Window, window_of
 from pdrom.view.mesh_render import draw_surface, set_window
 from pdrom.view.panels import fit_aspect
@@ -98,7 +98,15 @@ def deim_iterations(
     figure.suptitle(f"{experiment.title}, {drawn.title(method)}", fontsize=9)
     axes, colours = panels(figure, len(steps), columns), shapes.magnitudes()
     for ax, step in zip(axes, steps, strict=True):
-        _draw_step(ax, step, elements, camera, colours)
+        largest = float(step.magnitude.max())
+        relative = step.magnitude / max(largest, np.finfo(float).tiny)
+        elements.draw(ax, mesh.points, relative, camera, colours)
+        centres = camera.project(elements.centres(mesh.points))
+        if len(step.earlier):
+            ax.plot(*centres[step.earlier].T, "o", zorder=5, **EARLIER)
+        ax.plot(*centres[step.newest], "o", zorder=6, **NEWEST)
+        ax.set_title(f"k = {step.k}: element {step.newest}, {'xyz'[step.entry % 3]} entry")
+        ax.set_xlabel(f"largest residual {largest:.2g}", fontsize=7.5)
         set_window(ax, window)
     bar = figure.colorbar(colours, ax=axes, aspect=25, pad=0.01, fraction=0.03)
     bar.set_label("residual of the element / largest")
@@ -106,20 +114,6 @@ def deim_iterations(
     marks = {"linestyle": "none", "marker": "o"}
     style.legend(figure, [style.handle(label, **marks, **d) for label, d in dots.items()], 2)
     return figure
-
-
-def _draw_step(
-    ax: Axes, step: Iteration, elements: shapes.ElementMap, camera: Camera, colours: ScalarMappable
-) -> None:
-    points, largest = elements.mesh.points, float(step.magnitude.max())
-    relative = step.magnitude / max(largest, np.finfo(float).tiny)
-    elements.draw(ax, points, relative, camera, colours)
-    centres = camera.project(elements.centres(points))
-    if len(step.earlier):
-        ax.plot(*centres[step.earlier].T, "o", zorder=5, **EARLIER)
-    ax.plot(*centres[step.newest], "o", zorder=6, **NEWEST)
-    ax.set_title(f"k = {step.k}: element {step.newest}, {'xyz'[step.entry % 3]} entry")
-    ax.set_xlabel(f"largest residual {largest:.2g}", fontsize=7.5)
 
 
 def iterations(
@@ -333,7 +327,11 @@ def snapshots_and_modes(drawn: Drawn, **files: list[File]) -> Figure:
         set_window(ax, resting)
         ratio = basis.singular_values[k] / basis.singular_values[0]
         ax.set_title(f"{k + 1}: {slot}, σ/σ₁ = {ratio:.2g}", pad=2, fontsize=7.5)
-    _draw_scale(figure)
+    ax = figure.add_axes((0.35, 0.33 / total, 0.45, 0.08 / total))
+    bar = figure.colorbar(shapes.signed(), cax=ax, orientation="horizontal")
+    bar.set_label("the named entry of each element / largest", labelpad=1)
+    bar.set_ticks([-1.0, 0.0, 1.0])
+    bar.outline.set_linewidth(0.4)
     return figure
 
 
@@ -410,12 +408,3 @@ def _draw_column(
     largest = max(float(np.abs(values).max()), np.finfo(float).tiny)
     elements.draw(ax, points, values / largest, camera, shapes.signed())
     return words
-
-
-def _draw_scale(figure: Figure) -> None:
-    whole = figure.get_figheight()
-    ax = figure.add_axes((0.35, 0.33 / whole, 0.45, 0.08 / whole))
-    bar = figure.colorbar(shapes.signed(), cax=ax, orientation="horizontal")
-    bar.set_label("the named entry of each element / largest", labelpad=1)
-    bar.set_ticks([-1.0, 0.0, 1.0])
-    bar.outline.set_linewidth(0.4)

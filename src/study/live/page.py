@@ -18,10 +18,7 @@ HEAD = re.compile(r'pdromLive\(\{"format":1,"scene":("\w+"),"title":("(?:[^"\\]|
 
 
 def _write(models: list[File], html: Path, outputs: Mapping[str, str], **parts: Path) -> None:
-    """Write the page: template ``html`` with ``parts`` (styles, scripts) and a list of scenes.
-
-    The list omits scenes without models. StorageError if a file is damaged or not of format 1.
-    """
+    """Write the page: template ``html`` with ``parts`` (styles, scripts) and a list of scenes."""
     texts = {name.upper(): path.read_text("utf-8") for name, path in parts.items()}
     texts["SCENES"] = safe_json([scene for file in models if (scene := _listed(file))])
     write_text(filled(html.read_text("utf-8"), texts), outputs["out"])

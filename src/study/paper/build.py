@@ -64,12 +64,9 @@ def write_inputs(
 ) -> None:
     r"""Write macros.tex, figures.tex, TeX tables, bibliographies and the file `NUMBERS`.
 
-    Inputs are TeX files ``source``, BibTeX ``references``, CSV ``tables``, the description of the
-    ``machine`` of the run, ``facts``, and the rules of all tables, figures and pages that are
-    ``made``. ``outputs`` maps names of the written files to paths.
-
-    `NUMBERS` (JSON) has the table cells from which the number of each ``\val`` key is computed, the
-    tables from which each TeX table is made, and which ``\known`` and ``\row`` blocks are shown.
+    ``made`` are the rules of all tables, figures and pages. `NUMBERS` (JSON) has the table cells
+    from which the number of each ``\val`` key is computed, the tables from which each TeX table is
+    made, and which ``\known`` and ``\row`` blocks are shown.
     """
     texts = documents(source[0].parent)
     whole = "".join(texts.values())

@@ -23,22 +23,18 @@ LONG = ("tab_scenes", "tab_ranks", "tab_local_share")  # tables that may break a
 FULL = "full"  # value of column position_basis for runs with unreduced positions
 
 
-def tabular(header: Sequence[str], rows: Sequence[Sequence[str]], columns: str) -> str:
-    """TeX tabular: ``header`` between rules, then ``rows``; ``columns`` has the column types."""
-    lines = [rf"\begin{{tabular}}{{{columns}}}", *_head(header), *map(_line, rows)]
-    return "\n".join([*lines, r"\hline", r"\end{tabular}"]) + "\n"
+def tabular(
+    header: Sequence[str], rows: Sequence[Sequence[str]], columns: str, long: bool = False
+) -> str:
+    r"""TeX table: ``header`` between rules, then ``rows``; ``columns`` has the column types.
 
-
-def longtable(header: Sequence[str], rows: Sequence[Sequence[str]], columns: str) -> str:
-    r"""TeX table that may break across pages; the source defines its caption as ``\captionrow``."""
-    head = _head(header)
-    lines = [rf"\begin{{longtable}}{{{columns}}}", r"\captionrow", *head, r"\endfirsthead"]
-    lines += [*head, r"\endhead", *map(_line, rows)]
-    return "\n".join([*lines, r"\hline", r"\end{longtable}"]) + "\n"
-
-
-def _head(header: Sequence[str]) -> list[str]:
-    return [r"\hline", _line(header), r"\hline"]
+    If ``long``, it may break across pages; the source defines its caption as ``\captionrow``.
+    """
+    head, kind = [r"\hline", _line(header), r"\hline"], "longtable" if long else "tabular"
+    if long:
+        head = [r"\captionrow", *head, r"\endfirsthead", *head, r"\endhead"]
+    lines = [rf"\begin{{{kind}}}{{{columns}}}", *head, *map(_line, rows)]
+    return "\n".join([*lines, r"\hline", rf"\end{{{kind}}}"]) + "\n"
 
 
 def _line(cells: Sequence[str]) -> str:
@@ -330,12 +326,9 @@ def local_share(local_share: pd.DataFrame) -> Rows:
     """Time of a frame and the local step's share of it, by interpreted, NumPy and compiled code."""
     yield "lrrrrrr", ["scene", "interp.\\ ms", "share", "NumPy ms", "share", "compiled ms", "share"]
     for scene, part in local_share.groupby("scene", sort=False):
-        by = part.set_index("implementation")
-        cells = []
-        for kind in ("interpreted", "numpy", "compiled"):
-            row = by.loc[kind]
-            cells += [format_number(row.ms_per_frame), format_number(row.local_share)]
-        yield [_name(scene), *cells]
+        by = part.set_index("implementation")[["ms_per_frame", "local_share"]]
+        cells = by.loc[["interpreted", "numpy", "compiled"]].to_numpy().ravel()
+        yield [_name(scene), *map(format_number, cells)]
 
 
 _OUTCOMES = ("accurate", "wrong", "left the scene", "blow-up")
@@ -385,4 +378,4 @@ def tex_rows(name: str, tables: Mapping[str, pd.DataFrame]) -> Rows:
 def tex_table(name: str, tables: Mapping[str, pd.DataFrame]) -> str:
     """Return the TeX table ``name``; ``tables`` maps names to the study's tables."""
     (columns, header), *rows = tex_rows(name, tables)
-    return (longtable if name in LONG else tabular)(header, rows, columns)
+    return tabular(header, rows, columns, long=name in LONG)

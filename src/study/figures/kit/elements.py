@@ -86,10 +86,7 @@ class ElementMap:
         camera: Camera,
         colours: ScalarMappable,
     ) -> None:
-        """Draw the mesh with vertices at ``points`` (N, 3), m, as seen by ``camera``.
-
-        ``values`` (e,) has a value for each element, which ``colours`` maps to a colour.
-        """
+        """Draw the mesh at ``points`` (N, 3) m, elements coloured by ``values`` (e,)."""
         if self.kind == "edge" and not len(self.mesh.tetrahedra):
             draw_surface(
                 ax, points, self.mesh, camera=camera, colour="#FFFFFF", wire=0.0, contrast=0.15
@@ -106,8 +103,7 @@ def element_map(group: str, mesh: Mesh, elements: int, source: str) -> ElementMa
     """Return the elements of the constraint ``group`` on ``mesh``, in the order of snapshot rows.
 
     Raises StorageError if the effect ``group`` is no constraint group, or its number of elements on
-    ``mesh`` is not ``elements``, the number in the file ``source``. Raises ConfigurationError if no
-    effect has the name ``group``.
+    ``mesh`` is not ``elements``, the number in the file ``source``.
     """
     effect = EFFECTS.load(group)
     if not issubclass(effect, ConstraintGroup):

@@ -54,10 +54,7 @@ class RerunInfo:
         return f"r = {self.r} (full rank)" if self.full else f"r = {self.r}"
 
     def at(self, frame: int) -> tuple[int, np.ndarray] | None:
-        """Index and positions (N, 3) m of the last finite frame up to ``frame``; None without any.
-
-        A run that blew up has fewer frames.
-        """
+        """Index and positions (N, 3) m of the last finite frame up to ``frame``, or None."""
         with open_hdf5(self.path) as file:
             for entry in range(min(frame, self.entries - 1), -1, -1):
                 positions = np.asarray(file[self.label]["positions"][entry], dtype=float)
