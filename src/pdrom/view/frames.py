@@ -17,7 +17,6 @@ from pdrom.view.artists import Figure
 from pdrom.view.camera import Camera, obstacles, rotation_to, up_of
 from pdrom.view.page import ViewedRun, ViewedScene
 from pdrom.view.panels import Row, RunPanel, draw_rows, shared_window
-from pdrom.view.style import plain_words
 
 INSTANTS = (0.25, 0.5, 0.75, 1.0)  # times of the pictures, as fractions of the run
 CAMERA = Camera(30.0, 20.0)
@@ -52,7 +51,7 @@ def _draw(scene: ViewedScene) -> Figure:
         for frame, q in zip(numbers, full, strict=True)
     ]
     labels = [f"{style.words(scene.name)}\nfull order"]
-    labels += ["\n".join(wrap(plain_words(run.title), LABEL)) for run in scene.runs]
+    labels += ["\n".join(wrap(style.plain_words(run.title), LABEL)) for run in scene.runs]
     every = [reference, *([_panel(i, run, f) for f in numbers] for i, run in enumerate(scene.runs))]
     windows = [
         shared_window(CAMERA, q, [panels[i] for panels in every]) for i, q in enumerate(full)

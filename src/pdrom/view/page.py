@@ -45,7 +45,6 @@ class ViewedScene:
     time_step : time step of a frame, s
     positions : (F + 1, N, 3) m of the full-order run
     ms : milliseconds per frame of the full-order run, None if not measured
-    runs : reduced runs
     effects : effects of the scene; obstacles among them are drawn
     """
 

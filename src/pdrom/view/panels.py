@@ -74,10 +74,7 @@ def fit_aspect(window: Window) -> Window:
 
 
 def draw_run(ax: Axes, row: "Row", i: int) -> None:
-    """Draw panel ``i`` of a ``row`` on ``ax``, at a smaller scale if its run exceeds its window.
-
-    Behind any run but the reference run, the outline of the latter (``row.ghosts``) is drawn.
-    """
+    """Draw panel ``i`` of a ``row`` on ``ax``, at a smaller scale if its run exceeds its window."""
     from matplotlib.collections import LineCollection
 
     mesh, panel, camera, window = row.mesh, row.panels[i], row.camera, row.windows[i]
@@ -143,7 +140,6 @@ class Row:
     """Row of n panels, each with a window of its own.
 
     ghosts : (n, N, 3) m, shapes of the reference run, outlined behind the reduced runs
-    camera : camera of all panels of the row
     note : text in place of the reduced runs, for an experiment in which none ran
     """
 
@@ -176,10 +172,7 @@ class Row:
 
 
 def draw_rows(rows: list[Row], height_limit: float = HEIGHT_LIMIT, footer: float = 0.0) -> Figure:
-    """Figure of ``rows``, one below the other.
-
-    It is no higher than ``height_limit``, inches; ``footer`` inches at its lower end are left free.
-    """
+    """Figure of ``rows``, up to ``height_limit`` inches high, with ``footer`` inches left free."""
     columns = max(len(row.panels) for row in rows)
     width = (style.WIDTH - LEFT) / columns
     texts = footer + sum(ABOVE + BELOW + LINE * row.lines for row in rows)

@@ -29,7 +29,6 @@ GROUP_LOOKS = (
 CYCLE = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY, BLACK, GREY)
 
 RC: dict[str, Any] = {
-    "font.family": "sans-serif",
     "font.sans-serif": ["DejaVu Sans"],
     "font.size": 8.0,
     "axes.titlesize": 8.0,
@@ -42,7 +41,6 @@ RC: dict[str, Any] = {
     "axes.spines.right": False,
     "axes.linewidth": 0.6,
     "axes.axisbelow": True,
-    "axes.grid": False,
     "grid.color": "#DDDDDD",
     "grid.linewidth": 0.5,
     "xtick.major.width": 0.6,
@@ -52,10 +50,7 @@ RC: dict[str, Any] = {
     "lines.linewidth": 1.1,
     "lines.markersize": 3.5,
     "hatch.linewidth": 0.5,
-    "figure.dpi": 100,
     "pdf.fonttype": 42,
-    "pdf.use14corefonts": False,
-    "svg.hashsalt": "pdrom",
 }
 
 
@@ -137,17 +132,6 @@ def legend(figure: Figure, entries: Sequence[Artist], columns: int) -> None:
     figure.legend(handles=list(entries), loc="outside lower center", ncols=columns)
 
 
-def label_rows(ax: Axes, labels: Sequence[str]) -> None:
-    """Label the rows of ``ax`` at y = 0, 1, 2, ..., from the top, by ``labels``."""
-    ax.set_yticks(range(len(labels)), labels)
-    ax.set_ylim(len(labels) - 0.4, -0.6)
-
-
-def grid(ax: Axes) -> None:
-    """Draw a light grid behind the data of ``ax``."""
-    ax.grid(True, which="major")
-
-
 def log_axis(ax: Axes, low: float, high: float) -> None:
     """Make y of ``ax`` logarithmic from ``low`` to ``high`` with few ticks."""
     from matplotlib.ticker import LogLocator
@@ -155,7 +139,7 @@ def log_axis(ax: Axes, low: float, high: float) -> None:
     ax.set_yscale("log")
     ax.set_ylim(low, high)
     ax.yaxis.set_major_locator(LogLocator(base=10.0, numticks=6))
-    grid(ax)
+    ax.grid(True)
 
 
 def note(text: str) -> Figure:

@@ -43,10 +43,7 @@ Block = tuple[str, list[Line2D]]
 
 
 def look_of(method: str, position_basis: str, drawn: Drawn) -> Look:
-    """Family of a model (see `FAMILIES`; None if the model is not drawn), and its legend entry.
-
-    Models that differ only in a tolerance share an entry. ``drawn`` has the titles of methods.
-    """
+    """Family of a model (see `FAMILIES`; None if it is not drawn), and its legend entry."""
     if method == FEWER:
         return ITERATIONS, "K iterations"
     if position_basis == "full":

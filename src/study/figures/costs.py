@@ -1,5 +1,6 @@
 """Figures of the cost of a run: by phase, effect and mesh size, and of reduced local steps."""
 
+from collections.abc import Sequence
 from itertools import cycle
 
 import numpy as np
@@ -73,12 +74,19 @@ def local_share(drawn: Drawn, table: pd.DataFrame) -> Figure:
         _draw_bars(ax, rows.set_index("scene"), scenes)
         ax.set_title(TITLES[implementation])
         ax.set_xlabel("share of a frame (%)")
-    style.label_rows(axes[0], [style.words(scene) for scene in scenes])
+    _label_rows(axes[0], scenes)
     handles: list[Artist] = [style.patch(label, color=c) for label, c in PHASES.values()]
     line = {"color": style.BLACK, "linestyle": "--"}
     handles.append(style.handle(f"{CLAIM:.0f} % (claim C1)", **line))
     style.legend(figure, handles, 3)
     return figure
+
+
+def _label_rows(ax: Axes, names: Sequence[str]) -> None:
+    """Label the rows of ``ax`` at y = 0, 1, 2, ..., from the top."""
+    ax.set_yticks(range(len(names)), [style.words(name) for name in names])
+    ax.set_ylim(len(names) - 0.4, -0.6)
+    ax.tick_params(axis="y", length=0)
 
 
 def _draw_bars(ax: Axes, rows: pd.DataFrame, scenes: list[str]) -> None:
@@ -113,11 +121,11 @@ def scaling(drawn: Drawn, table: pd.DataFrame) -> Figure:
     exponent of a fitted power law, where there are three sizes of the mesh or more.
     """
     scenes = drawn.scenes_of(table, "no mesh sizes")
-    figure = style.new_figure(2.9)
+    figure, looks = style.new_figure(2.9), method_styles({*table.method}) | SCALED
     times = figure.subplots(1, len(scenes), sharex=True, sharey=True, squeeze=False)[0]
     for ax, scene in zip(times, scenes, strict=True):
         rows = table[table.scene == scene].sort_values("vertices")
-        _draw_times(ax, rows)
+        _draw_times(ax, rows, looks)
         ax.set_title(style.words(scene))
         ax.set_xlabel("vertices")
     sizes = table[table.scene.isin(scenes)].vertices
@@ -126,23 +134,18 @@ def scaling(drawn: Drawn, table: pd.DataFrame) -> Figure:
         low, high = np.log10(axis.get_view_interval())
         plain_ticks(axis, high - low)
     times[0].set_ylabel("time of an iteration (ms)")
-    named = {NAMES.get(m) or drawn.title(m): _look(m) for m in dict.fromkeys(table.method)}
+    named = {NAMES.get(m) or drawn.title(m): looks[m] for m in dict.fromkeys(table.method)}
     lines = [style.handle(label, color="#555555", linestyle=s) for label, s in CURVES.values()]
     style.legend(figure, [*style.handles(named), *lines], 4)
     return figure
 
 
-def _look(method: str) -> tuple[str, str]:
-    """Colour and marker of a method."""
-    return SCALED.get(method) or method_styles([method])[method]
-
-
-def _draw_times(ax: Axes, rows: pd.DataFrame) -> None:
+def _draw_times(ax: Axes, rows: pd.DataFrame, looks: Looks) -> None:
     ax.set_xscale("log")
     ax.set_yscale("log")
-    style.grid(ax)
+    ax.grid(True)
     for method, part in rows.groupby("method", sort=False):
-        colour, marker = _look(str(method))
+        colour, marker = looks[str(method)]
         for quantity, (_, line) in CURVES.items():
             ax.plot(
                 part.vertices, part[quantity].where(part[quantity] > 0.0), line, color=colour,
@@ -177,7 +180,7 @@ def break_even(drawn: Drawn, table: pd.DataFrame) -> Figure:
     for ax, group in zip(axes, groups, strict=True):
         ax.set_title(style.words(group))
         ax.set_yscale("log")
-        style.grid(ax)
+        ax.grid(True)
         ax.axhline(1.0, color=style.BLACK, linestyle="--", linewidth=1.0, zorder=1)
         own = table[table.group == group]
         for (_, method), curve in own.groupby(["scene", "method"], sort=False):
@@ -243,7 +246,7 @@ def _draw_forces(ax: Axes, frames: pd.DataFrame, looks: Looks) -> None:
         alone = {"marker": marker, "markersize": 3.5} if len(rows) == 1 else {}
         ax.plot(rows.frame, force, color=colour, **alone)
     ax.set_yscale("log")
-    style.grid(ax)
+    ax.grid(True)
 
 
 def _draw_moved(ax: Axes, rows: pd.DataFrame, scenes: list[str], looks: Looks) -> None:
@@ -258,12 +261,11 @@ def _draw_moved(ax: Axes, rows: pd.DataFrame, scenes: list[str], looks: Looks) -
                 color=colour, markerfacecolor=colour if row.above_floor else "white",
                 clip_on=False,
             )  # fmt: skip
-    style.label_rows(ax, [style.words(scene) for scene in scenes])
+    _label_rows(ax, scenes)
     ax.set_xscale("log")
     ax.set_xlim(LOW, HIGH)
-    ax.tick_params(axis="y", length=0)
     ax.set_xlabel("drift of the run without the effect")
-    style.grid(ax)
+    ax.grid(True)
 
 
 @figure(
@@ -311,9 +313,8 @@ def _draw_scenes(
                 start += share
         total = rows.ms_per_frame.sum()
         ax.text(101.0, y, f"{total:.2g} ms", va="center", ha="left", fontsize=7)
-    style.label_rows(ax, [style.words(scene) for scene in scenes])
+    _label_rows(ax, scenes)
     ax.set_xlim(0, 100)
-    ax.tick_params(axis="y", length=0)
     ax.set_xlabel("share of a full-order frame (%)")
     ax.set_ylabel("scene")
     return parts
@@ -329,10 +330,7 @@ def _draw_left_out(ax: Axes, rows: pd.DataFrame, scene: str) -> None:
                 [whole - row.ms_per_frame], [y], marker="|", color=style.BLACK, markersize=9,
                 markeredgewidth=1.4,
             )  # fmt: skip
-    style.label_rows(
-        ax, [f"without {style.words(e)}" if e != NOTHING else "whole" for e in rows.effect]
-    )
+    _label_rows(ax, [f"without {e}" if e != NOTHING else "whole" for e in rows.effect])
     ax.set_xlim(0.0, 1.15 * float(rows.without_ms.max()))
-    ax.tick_params(axis="y", length=0)
     ax.set_xlabel("time per frame (ms)")
     ax.set_title(style.words(scene))

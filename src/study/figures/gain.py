@@ -12,7 +12,6 @@ import pandas as pd
 from pdrom.core.store import read_table
 from pdrom.view import style
 from pdrom.view.artists import Axes, Figure
-from pdrom.view.style import plain_words
 from study.artifact.reads import ProjectFile, TableOf
 from study.figures.kit.declaration import (
     MESHES,
@@ -117,7 +116,7 @@ def _draw_decades(ax: Axes, runs: pd.DataFrame) -> None:
     ax.set_xlabel("gain of the interpolation")
     ax.set_ylabel("failed runs (%)")
     ax.set_title("number of runs above each bar")
-    style.grid(ax)
+    ax.grid(True)
 
 
 @figure(
@@ -145,7 +144,7 @@ def ladder(drawn: Drawn, table: pd.DataFrame) -> Figure:
     _draw_quantity(right, table, rungs, ("gain", "gain_low", "gain_high"), GAINS)
     left.set_xlabel("error of the rerun within the horizon (relative)")
     right.set_xlabel("gain of the interpolation")
-    left.set_yticks(range(len(rungs)), [plain_words(rung) for _, rung in rungs])
+    left.set_yticks(range(len(rungs)), [style.plain_words(rung) for _, rung in rungs])
     left.invert_yaxis()
     looks = {style.words(scene): look for scene, look in _scene_looks(table).items()}
     handles = style.handles(looks, linestyle="none")
@@ -170,7 +169,7 @@ def _draw_quantity(
 ) -> None:
     ax.set_xscale("log")
     ax.set_xlim(limits[0], limits[1] * 1.3)
-    style.grid(ax)
+    ax.grid(True)
     scenes = _scene_looks(table)
     for i, (scene, (colour, marker)) in enumerate(scenes.items()):
         rows = table[table.scene == scene].set_index(["direction", "rung"])

@@ -112,12 +112,13 @@ class Runs:
         """Return the scene of ``experiment`` at the last of the instants."""
         path, instant = experiment.path(self.full_order), self.frames[-1:]
         (frame,), full = positions_at(path, instant)
+        end = self.floors.horizon(experiment.scene)
         return Shown(
             experiment,
             load_mesh(experiment.path(self.meshes)),
             camera_of(experiment),
             frame,
-            self.floors.instant(experiment.scene, frame).replace(", ", "\n"),
+            f"frame {frame}" if end is None or frame <= end else f"frame {frame}\npast horizon",
             full,
             style.surface_colour(self.drawn.looks[experiment.group][0]),
             obstacles_of(experiment, full),

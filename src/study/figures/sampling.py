@@ -272,7 +272,7 @@ def _draw_evaluations(
     ax.set_ylim(0, None)
     ax.set_xlabel("basis size r")
     ax.set_ylabel("numbers computed")
-    style.grid(ax)
+    ax.grid(True)
 
 
 # (left edge, width, height) of the four drawn matrices, inches; their upper edges are aligned.

@@ -30,9 +30,6 @@ class Floors:
     starts in each of F frames, the largest over all random seeds; it is empty without perturbed
     runs. The horizon is the first frame in which it exceeds a threshold; from there on runs cannot
     be compared. Attribute ``of`` maps scenes to floors. StorageError for a damaged file.
-
-    sensitivity : files with tables of the perturbed runs, one per scene
-    horizon : settings, with the perturbation whose runs are used and the threshold
     """
 
     def __init__(self, sensitivity: Sequence[File], horizon: Horizon) -> None:
@@ -44,11 +41,6 @@ class Floors:
         """First frame where the sensitivity floor exceeds `threshold` in ``scene``, or None."""
         end = horizon(self.of[scene], self.threshold)
         return end if end < len(self.of[scene]) else None
-
-    def instant(self, scene: str, frame: int) -> str:
-        """Text "frame n" for ``frame`` n, with "past horizon" if it is later than `horizon`."""
-        end = self.horizon(scene)
-        return f"frame {frame}" if end is None or frame <= end else f"frame {frame}, past horizon"
 
 
 LOW, HIGH = 1e-12, 1e2

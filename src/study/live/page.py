@@ -25,10 +25,7 @@ def _write(models: list[File], html: Path, outputs: Mapping[str, str], **parts: 
 
 
 def _listed(file: File) -> dict[str, str] | None:
-    """Entry of the page's list of scenes for a file of models; None if the file has no models.
-
-    Raises StorageError if the file is damaged or not of format 1, which the page reads.
-    """
+    """Entry of the page's list of scenes for a file of models; None if the file has no models."""
     text = read_text(file.path)
     if '"models":[]' in text:
         return None

@@ -47,11 +47,7 @@ def keys_of(source: str) -> list[str]:
 
 
 def macros(source: str, tables: Mapping[str, pd.DataFrame]) -> str:
-    r"""Return TeX macros for every ``\val`` key of ``source``, with numbers from ``tables``.
-
-    Raises PaperError if a table or column is unknown, or several rows match a key without an
-    aggregate.
-    """
+    r"""Return TeX macros for every ``\val`` key of ``source``, see `number_of`."""
     lines = [
         "% generated from results/tables",
         r"\makeatletter",
@@ -215,10 +211,7 @@ def sentences(source: str) -> list[Sentence]:
 def decisions(
     source: str, tables: Mapping[str, pd.DataFrame], drawn: Collection[str] = ()
 ) -> list[str]:
-    r"""Decide for each ``\known`` or ``\row`` block: show it, or drop it.
-
-    Blocks are shown if ``tables`` have all their numbers, and their figures are ``drawn``.
-    """
+    r"""Show each ``\known`` or ``\row`` block of which ``tables`` and ``drawn`` have everything."""
     return [
         SHOWN
         if {*PICTURE.findall(sentence.text)} <= {*drawn}

@@ -20,7 +20,7 @@ from pdrom.model.runs import BLOWUP_EXTENT
 from pdrom.model.scene import SceneConfig
 from pdrom.reduction.method import MethodSpec
 from study.artifact import paths
-from study.artifact.markup import to_tex
+from study.artifact.markup import filled, to_tex
 from study.artifact.reads import Labels
 from study.experiments.alternatives.experiment import CONTINUOUS_TOLERANCE
 from study.experiments.frame_times import NamedScene, ProjectionCase, SubspaceCase
@@ -162,9 +162,11 @@ def _runs(study: Study, labels: Labels) -> tuple[Experiment, ...]:
 def _facts(study: Study, labels: Labels) -> Facts:
     """Contents of the manuscript that are no results: captions, settings, page limits."""
     own = study.is_own
-    said = [(name, each.words(study.value)) for name, each in declarations().items()]
     return Facts(
-        captions={name: f"{to_tex(title)}. {to_tex(text)}" for name, (title, text) in said},
+        captions={
+            name: f"{to_tex(each.title)}. {to_tex(filled(each.caption, study.value))}"
+            for name, each in declarations().items()
+        },
         part=None if study.is_full or own else study.configuration,
         full_study=study.configuration if own else DEFAULT,
         pages={} if own else PAGES,

@@ -31,9 +31,8 @@ from pdrom.model.effects.base import EffectConfigs
 from pdrom.view import style
 from pdrom.view.artists import Figure, Line2D
 from pdrom.view.camera import Camera, up_of
-from pdrom.view.style import plain_words
 from study.artifact.artifact import Artifact, declare, declared_in
-from study.artifact.markup import filled, to_plain
+from study.artifact.markup import to_plain
 from study.artifact.paths import FIGURE, FIGURE_PICTURE, File
 from study.artifact.reads import Read, Settings, TableOf
 from study.tables.effects_cost import unreliable
@@ -159,7 +158,7 @@ class Drawn(BaseModel, extra="forbid", frozen=True):
     def title(self, method: str) -> str:
         """Title of ``method`` as plain words; its name if the method is not selected."""
         held = self.reductions.get(method)
-        return plain_words(held.title if held else method)
+        return style.plain_words(held.title if held else method)
 
     def handles(self, looks: Mapping[str, tuple[str, str]], **common: Any) -> list[Line2D]:
         """Legend entries for ``looks`` (method -> colour, marker); ``common``: options of each."""
@@ -211,10 +210,6 @@ class Declaration(Artifact):
     groups: Sequence[str] = ()
     several: bool = False
     rule_pattern = "figure_{}"
-
-    def words(self, value: Callable[[str], Any]) -> tuple[str, str]:
-        """Title and caption in mark-up; ``value(key)`` is the number put in place of ``{key}``."""
-        return self.title, filled(self.caption, value)
 
     def perform(
         self, settings: Mapping[str, Any], inputs: Mapping[str, Any], outputs: Mapping[str, str]

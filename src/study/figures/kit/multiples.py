@@ -28,10 +28,7 @@ def rows_of(count: int, columns: int) -> int:
 def panels(
     figure: Figure | SubFigure, count: int, columns: int, sharey: bool = False
 ) -> list[Axes]:
-    """Add ``count`` panels to ``figure`` row by row in ``columns``, the last row perhaps shorter.
-
-    With ``sharey`` the panels share the y axis, whose numbers stand at the left only.
-    """
+    """Add ``count`` panels to ``figure`` row by row in ``columns``."""
     columns = min(columns, count)
     grid = figure.subplots(rows_of(count, columns), columns, squeeze=False, sharey=sharey)
     axes = list(grid.ravel())

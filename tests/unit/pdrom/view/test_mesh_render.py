@@ -1,6 +1,4 @@
-"""The renderer: projection, depth order, shading, outlines, windows; looks that are told apart."""
-
-from itertools import combinations
+"""The renderer: projection, depth order, shading, outlines, windows."""
 
 import numpy as np
 import pytest
@@ -10,12 +8,11 @@ from matplotlib.figure import Figure
 from pdrom.model.mesh.files import read_mesh_file
 from pdrom.model.mesh.generators import bar, cloth
 from pdrom.model.mesh.types import Mesh
-from pdrom.view import mesh_render, style
+from pdrom.view import mesh_render
 from pdrom.view.camera import Camera, Window, bounds, window_of
 from pdrom.view.frames import frame_numbers
 from pdrom.view.panels import RunPanel, fit_aspect
 from places import CONFIG
-from study.figures.kit.declaration import METHODS, method_styles
 
 CAMERAS = [Camera(), Camera(0.0, 0.0), Camera(-120.0, 60.0), Camera(90.0, -30.0),
            Camera(up=(0.0, 0.0, 1.0))]  # fmt: skip
@@ -114,16 +111,6 @@ def test_a_run_outside_is_seen_together_with_the_window():
     assert larger.left <= -1.0
     assert larger.right >= 9.0
     assert larger.width / window.width == pytest.approx(10.0 * 1.06 / 2.0)
-
-
-def test_colours_and_markers_are_unique():
-    for looks in (METHODS.values(), style.GROUP_LOOKS):
-        for first, second in combinations(looks, 2):
-            assert first[0] != second[0]
-            assert first[1] != second[1]
-    named = method_styles(["pod", "mine", "yours"])
-    assert len(set(named.values())) == 3
-    assert named["mine"] == method_styles(["yours", "mine"])["mine"]
 
 
 def test_instants_are_fractions_of_a_run():

@@ -12,7 +12,6 @@ from matplotlib.figure import Figure
 
 from pdrom.core.errors import ConfigurationError, PaperError
 from pdrom.view import style
-from pdrom.view.style import plain_words
 from places import ROOT
 from study.artifact.text import escape, replaced, require_typeset
 from study.paper.source import whole_source
@@ -59,13 +58,13 @@ def test_figures_draw_all_that_is_let_through():
         warnings.simplefilter("error")
         figure = Figure()
         for i, text in enumerate(["".join(EVERY), *TITLES]):
-            figure.text(0.0, 0.1 * i, plain_words(text))
+            figure.text(0.0, 0.1 * i, style.plain_words(text))
         FigureCanvasAgg(figure).draw()
 
 
 @given(st.text(alphabet=st.sampled_from(EVERY), min_size=1))
 def test_no_text_is_mathematics_in_a_figure(text):
-    assert not is_math_text(plain_words(text))
+    assert not is_math_text(style.plain_words(text))
 
 
 @pytest.mark.parametrize(

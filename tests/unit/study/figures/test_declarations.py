@@ -3,14 +3,16 @@
 import os
 import subprocess
 import sys
+from itertools import combinations
 
 import pytest
 
 from pdrom.model.effects import EFFECTS
 from pdrom.reduction.method import load_methods
+from pdrom.view import style
 from places import CONFIG, ROOT
 from study.artifact.paths import MESH, RERUNS
-from study.figures.kit.declaration import declarations, figure
+from study.figures.kit.declaration import METHODS, declarations, figure, method_styles
 from study.pipeline.scenes import scene_names
 
 
@@ -64,3 +66,13 @@ def test_planning_loads_no_plotting_library():
     )
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
     assert subprocess.run([sys.executable, "-c", code], env=environment).returncode == 0
+
+
+def test_colours_and_markers_are_unique():
+    for looks in (METHODS.values(), style.GROUP_LOOKS):
+        for first, second in combinations(looks, 2):
+            assert first[0] != second[0]
+            assert first[1] != second[1]
+    named = method_styles(["pod", "mine", "yours"])
+    assert len(set(named.values())) == 3
+    assert named["mine"] == method_styles(["yours", "mine"])["mine"]
