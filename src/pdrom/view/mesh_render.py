@@ -38,10 +38,7 @@ def smooth_normals(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 
 def shade(normals: np.ndarray, camera: Camera) -> np.ndarray:
-    """Brightness (T,), in [AMBIENT, 1], of faces with unit ``normals`` (T, 3).
-
-    It is equal for both sides of a face. The lights are fixed relative to the ``camera``.
-    """
+    """Brightness (T,), in [AMBIENT, 1], of both sides of faces with unit ``normals`` (T, 3)."""
     view = normals @ camera.basis.T
     lit = np.zeros(len(normals))
     for direction, strength in LIGHTS:

@@ -266,10 +266,7 @@ def singular_values(drawn: Drawn, table: pd.DataFrame, published: Path) -> Figur
 
 
 def _draw_values(ax: Axes, rows: pd.DataFrame, colour: str, marker: str) -> None:
-    """Draw singular values; those below round-off have hollow markers in a shaded region.
-
-    The upper edge of the region lies between the largest hollow and the smallest other value.
-    """
+    """Draw singular values; those below round-off have hollow markers in a shaded region."""
     component = rows.component.to_numpy(float)
     above = rows.above_roundoff.astype(bool).to_numpy()
     # zeros cannot be drawn on a logarithmic axis and are raised to its lower limit

@@ -114,11 +114,9 @@ def shown_tables(tables: list[File]) -> tuple[dict[str, pd.DataFrame], str]:
         if "claim" in frame and "claims_tests" in data:
             tests = data["claims_tests"]
             on_times = frame.claim.isin(tests.claim[tests.margin.notna()])
-            said = [c.name for c in declared()[name].columns if c.timed and c.kind != "integer"]
-            said = [
-                c for c in said if c in frame and not c.startswith(("verdict", "same", "answer"))
-            ]
-            data[name].loc[on_times, said] = None
+            said = {c.name for c in declared()[name].columns if c.timed and c.kind != "integer"}
+            kept = frame.columns.str.startswith(("verdict", "same", "answer"))
+            data[name].loc[on_times, ~kept & frame.columns.isin(said)] = None
     return data, TIMES
 
 
@@ -149,10 +147,7 @@ def build(
     facts: Facts,
     outputs: Mapping[str, str],
 ) -> None:
-    """Build the PDFs of the paper and of its supplement at the paths in ``outputs``.
-
-    TeX files ``source`` include ``figures``, and ``inputs`` that `write_inputs` has made.
-    """
+    """Build the PDFs of paper and supplement, which include what `write_inputs` has made."""
     results = [Path(file.path) for file in (*figures, *inputs)]
     for path in results:
         require_intact(path)

@@ -96,9 +96,8 @@ def number_of(key: str, tables: Mapping[str, pd.DataFrame]) -> Number:
     if is_held(key, tables) if counts else len(cells):
         value = AGGREGATES[aggregate](cells) if aggregate else cells.iloc[0]
         text = str(value) if counts else format_number(value)
-        value = value if isinstance(value, str) else float(value)
-        # JSON has no infinite numbers: store them as text
-        value = value if isinstance(value, str) or np.isfinite(value) else str(value)
+        if not isinstance(value, str):  # JSON has no infinite numbers: store them as text
+            value = float(value) if np.isfinite(value) else str(float(value))
     held = [int(row) for row in np.flatnonzero(tables[table].index.isin(cells.index))]
     return Number(text, value, table, held, column, aggregate)
 

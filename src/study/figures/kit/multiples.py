@@ -11,10 +11,7 @@ PANEL_HEIGHT = 1.45  # inches
 def small_multiples(
     count: int, columns: int, legend_rows: int = 1, height: float = PANEL_HEIGHT
 ) -> tuple[Figure, list[Axes]]:
-    """Create a figure with ``count`` panels in ``columns`` columns that share the y axis.
-
-    A row of panels is ``height`` inches high; space for ``legend_rows`` lines of a legend is left.
-    """
+    """Figure of ``count`` panels that share y, with space for ``legend_rows`` lines below."""
     rows = rows_of(count, columns)
     figure = style.new_figure(rows * height + 0.2 * legend_rows + 0.35)
     return figure, panels(figure, count, columns, sharey=True)
