@@ -32,25 +32,11 @@ class Kernels(ConfigModel):
     threads: int
 
 
-class Units(ConfigModel):
-    """Times, s, of three benchmark loops: scalar, vector, memory (`study.experiments.machine`)."""
-
-    unit_scalar_s: float
-    unit_vector_s: float
-    unit_memory_s: float
-
-    @property
-    def unit_s(self) -> float:
-        """Geometric mean of the benchmark times, s; expected run times are proportional to it."""
-        return (self.unit_scalar_s * self.unit_vector_s * self.unit_memory_s) ** (1 / 3)
-
-
 class Machine(ConfigModel):
     """Machine and code that produced the results; timings and last digits depend on both.
 
     threads : largest number of threads that one of the libraries would use
     target : processor that the project's code is compiled for; empty leaves it to the compiler
-    units : times of the benchmark loops; None if they were not measured
     """
 
     cpu: str
@@ -63,11 +49,10 @@ class Machine(ConfigModel):
     libraries: dict[str, str]
     kernels: tuple[Kernels, ...]
     target: str = ""
-    units: Units | None = None
 
 
-def machine(units: Units | None = None) -> Machine:
-    """Record of this machine and this process, with the measured ``units`` if given."""
+def machine() -> Machine:
+    """Record of this machine and this process."""
     kernels = loaded_kernels()
     return Machine(
         cpu=_cpu_model(),
@@ -80,7 +65,6 @@ def machine(units: Units | None = None) -> Machine:
         libraries=library_versions(),
         kernels=kernels,
         target=os.environ.get("NUMBA_CPU_NAME", ""),
-        units=units,
     )
 
 

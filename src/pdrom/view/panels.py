@@ -114,7 +114,6 @@ def draw_run(ax: Axes, row: "Row", i: int) -> None:
 
 
 def _cover(ax: Axes, **look: Any) -> None:
-    """Draw a rectangle over the whole panel ``ax`` with the properties ``look``."""
     from matplotlib.patches import Rectangle
 
     ax.add_patch(Rectangle((0, 0), 1, 1, transform=ax.transAxes, clip_on=False, **look))

@@ -13,8 +13,8 @@ from time import thread_time
 import numpy as np
 
 from pdrom.core import machine as this
-from pdrom.core.machine import Units
 from pdrom.core.store import write_text
+from pdrom.core.yamlfile import ConfigModel
 from pdrom.model.compiled.arithmetic import add, add_product, constant, total
 from pdrom.model.compiled.functions import compiled
 from pdrom.model.compiled.rows import WIDTH, load
@@ -27,12 +27,32 @@ MEMORY_BYTES = 2**28  # size of the array that is read, larger than any cache
 REPEATS = 15
 
 
+class Units(ConfigModel):
+    """Times, s, of three benchmark loops: scalar, vector, memory."""
+
+    unit_scalar_s: float
+    unit_vector_s: float
+    unit_memory_s: float
+
+    @property
+    def unit_s(self) -> float:
+        """Geometric mean of the benchmark times, s; expected run times are proportional to it."""
+        return (self.unit_scalar_s * self.unit_vector_s * self.unit_memory_s) ** (1 / 3)
+
+
+class Record(this.Machine):
+    """Machine and code that produced the results, with the times of the benchmark loops."""
+
+    units: Units
+
+
 @experiment(
     "Record of the machine and the library versions", reads={}, writes={"out": MACHINE}, alone=True
 )
 def machine(out: File) -> None:
     """Write to ``out`` the times of benchmark loops, and data about machine and libraries."""
-    write_text(this.machine(units()).model_dump_json(indent=2) + "\n", out.path)
+    record = Record(**this.machine().model_dump(), units=units())
+    write_text(record.model_dump_json(indent=2) + "\n", out.path)
 
 
 def units() -> Units:

@@ -16,13 +16,13 @@ from pybtex.style.formatting.unsrt import Style
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from pdrom.core.errors import PaperError, StorageError
-from pdrom.core.machine import Machine
 from pdrom.core.store import read_table, read_text, require_intact, write_text
 from pdrom.core.yamlfile import describe
 from study.artifact.artifact import Artifact
 from study.artifact.paths import FIGURE, MACHINE, PAPER_INPUT, TABLE, File
 from study.artifact.reads import Every, ProjectFile, Setting, SourcesOf
 from study.artifact.text import replaced
+from study.experiments.machine import Record
 from study.figures.kit.declaration import declarations
 from study.paper.macros import HIDDEN, captions, decisions, keys_of, macros, number_of, provenance
 from study.paper.source import COMMENT, DOCUMENTS, PLACED, documents
@@ -127,14 +127,13 @@ def fact_tables(machine: Path, facts: Facts) -> dict[str, pd.DataFrame]:
     """
     tables = {name: pd.DataFrame(rows) for name, rows in facts.tables.items()}
     try:
-        record = Machine.model_validate_json(read_text(machine))
+        record = Record.model_validate_json(read_text(machine))
     except ValidationError as error:
-        raise StorageError(f"{machine}: {describe(error, Machine)}") from error
+        raise StorageError(f"{machine}: {describe(error, Record)}") from error
     row = record.model_dump(exclude={"libraries", "kernels", "units"})
     row |= {f"version_{name}": version for name, version in record.libraries.items()}
     row["kernels"] = ", ".join(sorted({k.architecture for k in record.kernels if k.architecture}))
-    if record.units is not None:
-        row |= {**record.units.model_dump(), "unit_s": record.units.unit_s}
+    row |= {**record.units.model_dump(), "unit_s": record.units.unit_s}
     # names of processor and system may contain characters that TeX cannot typeset
     words = {key: replaced(value) for key, value in row.items() if isinstance(value, str)}
     return {**tables, "machine": pd.DataFrame([{**row, **words}])}

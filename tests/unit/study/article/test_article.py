@@ -29,6 +29,7 @@ from places import ROOT
 from study.article.build import ASSETS, FACTS, FOLDER, PAGES, article, write_verified
 from study.article.latex import linked_table, plain_columns
 from study.artifact.paths import File
+from study.experiments.machine import Record, Units
 from study.paper import build, textables
 from study.paper.build import figure_numbers
 from study.paper.macros import AGGREGATES, MISSING, format_number, matching
@@ -131,7 +132,9 @@ def write_study(folder: Path) -> dict[str, object]:
     preamble = (ROOT / "paper" / "preamble.tex").read_text(encoding="utf-8")
     for name, text in {**texts, "preamble": preamble}.items():
         write_text(text, folder / "paper" / f"{name}.tex")
-    write_text(machine().model_dump_json(), folder / "machine.json")
+    units = dict.fromkeys(Units.model_fields, 1.0)
+    record = Record(**machine().model_dump(), units=units)
+    write_text(record.model_dump_json(), folder / "machine.json")
     given = {
         "source": [folder / "paper" / "main.tex"],
         "references": ROOT / "paper" / "references.bib",

@@ -7,7 +7,7 @@ from pdrom.core.store import write_table
 from study.artifact.paths import File
 from study.paper.build import shown_tables
 from study.paper.tex import build_pdfs
-from study.paper.textables import TEX_TABLES, longtable, tabular, tex_table
+from study.paper.textables import TEX_TABLES, tabular, tex_table
 from study.tables import declared
 
 ERROR = "relative_error_within_horizon"
@@ -206,12 +206,12 @@ PAGE = r"""\documentclass{article}\usepackage[T1]{fontenc}\usepackage{lmodern}\u
 \newcommand{\captionrow}{\caption{Table}\\}\begin{document}%s\end{document}"""
 
 
-@pytest.mark.parametrize("form", [tabular, longtable])
+@pytest.mark.parametrize("long", [False, True])
 @pytest.mark.parametrize("rows", [[], [["a", "1"]], [["a", "1"], ["b", "2"]]])
-def test_a_table_is_set(form, rows, tmp_path):
+def test_a_table_is_set(long, rows, tmp_path):
     """A table without rows is that of a configuration which holds nothing of what it shows."""
-    text = form(["name", "number"], rows, "lr")
-    assert text.count(r"name & number \\") == (2 if form is longtable else 1)
+    text = tabular(["name", "number"], rows, "lr", long)
+    assert text.count(r"name & number \\") == (2 if long else 1)
     assert [line for line in text.splitlines() if line.startswith(("a &", "b &"))] == [
         rf"{name} & {number} \\" for name, number in rows
     ]

@@ -9,11 +9,11 @@ import pytest
 import yaml
 
 from pdrom.core.errors import PdromError
-from pdrom.core.machine import Units
 from pdrom.core.store import write_table
 from places import ROOT
 from study.artifact.logs import Usage
 from study.experiments.kit.base import experiments
+from study.experiments.machine import Units
 from study.pipeline.run import expected_seconds
 from study.pipeline.scenes import Coarsen
 from study.pipeline.summary import minutes
