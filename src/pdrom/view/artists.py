@@ -14,9 +14,8 @@ if TYPE_CHECKING:
     from matplotlib.collections import PolyCollection as PolyCollection
     from matplotlib.colors import Normalize as Normalize
     from matplotlib.figure import Figure as Figure
-    from matplotlib.figure import SubFigure as SubFigure
     from matplotlib.lines import Line2D as Line2D
     from matplotlib.patches import Patch as Patch
 else:
     Artist = Axes = Axis = ScalarMappable = PolyCollection = Normalize = Any
-    Figure = SubFigure = Line2D = Patch = Any
+    Figure = Line2D = Patch = Any

@@ -163,7 +163,7 @@ def _points(ax: Axes, rows: pd.DataFrame, size: float, colour: str, **look: Any)
 
 
 def label_iterations(ax: Axes, found: TradeOffs, scene: str) -> None:
-    """Write "K = ..." beside full-order runs of ``scene`` with K iterations; near ones share it."""
+    """Write "K = ..." beside full-order runs of ``scene``; neighbouring runs share a label."""
     rows = found.points[(found.points.scene == scene) & (found.points.method == FEWER)]
     rows = rows.sort_values(TIME)
     low, high = np.log10(ax.get_xlim())

@@ -113,8 +113,9 @@ def stability_map(drawn: Drawn, table: pd.DataFrame) -> Figure:
     rows = [len(strip.rows) for strip in strips]
     figure = style.new_figure(ROW * sum(rows) + 0.5 * len(strips) + 0.55)
     axes = figure.subplots(len(strips), 1, squeeze=False, height_ratios=rows)[:, 0]
-    drawn_cells = (strip.draw(ax) for ax, strip in zip(axes, strips, strict=True))
-    present = set[str]().union(*drawn_cells)
+    present: set[str] = set()
+    for ax, strip in zip(axes, strips, strict=True):
+        present |= strip.draw(ax)
     handles = [
         style.patch(
             f"{look.words} ({look.mark})" if look.mark not in ("", "frame") else look.words,

@@ -3,7 +3,7 @@
 import numpy as np
 
 from pdrom.view import style
-from pdrom.view.artists import Axes, Axis, Figure, SubFigure
+from pdrom.view.artists import Axes, Axis, Figure
 
 PANEL_HEIGHT = 1.45  # inches
 
@@ -22,9 +22,7 @@ def rows_of(count: int, columns: int) -> int:
     return -(-count // min(columns, count))
 
 
-def panels(
-    figure: Figure | SubFigure, count: int, columns: int, sharey: bool = False
-) -> list[Axes]:
+def panels(figure: Figure, count: int, columns: int, sharey: bool = False) -> list[Axes]:
     """Add ``count`` panels to ``figure`` row by row in ``columns``."""
     columns = min(columns, count)
     grid = figure.subplots(rows_of(count, columns), columns, squeeze=False, sharey=sharey)
