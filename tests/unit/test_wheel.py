@@ -1,4 +1,4 @@
-"""The wheel: what it carries, and that it reduces where there is no checkout."""
+"""The wheel: what it carries, and that it trains a model where there is no checkout."""
 
 import subprocess
 import sys
@@ -44,7 +44,7 @@ def test_it_carries_the_package_and_the_files_that_it_reads(wheel: Path) -> None
 
 
 @pytest.mark.slow
-def test_installed_elsewhere_it_reduces(wheel: Path, tmp_path: Path) -> None:
+def test_installed_elsewhere_it_trains_a_model(wheel: Path, tmp_path: Path) -> None:
     environment, folder = tmp_path / "environment", tmp_path / "elsewhere"
     call(sys.executable, "-m", "venv", "--without-pip", environment, folder=tmp_path)
     python = environment / "bin" / "python"
@@ -64,5 +64,5 @@ def test_installed_elsewhere_it_reduces(wheel: Path, tmp_path: Path) -> None:
     call(pdrom, "new", "sheet", folder=folder, **home)
     assert "`pdrom show scene`" in (folder / "sheet.yaml").read_text("utf-8").splitlines()[0]
     assert call(pdrom, "show", "scene", folder=folder, **home).startswith("scene: ")
-    said = call(pdrom, "reduce", "small.yaml", "--group", "spring", "--r", 2, folder=folder, **home)
-    assert said.startswith("small_spring_gappy_2.h5: spring, gappy, r = 2: relative error")
+    said = call(pdrom, "train", "small.yaml", "--method", "gappy", "--r", 2, folder=folder, **home)
+    assert "small.model.h5: a model of 'small' (spring, " in said

@@ -119,7 +119,7 @@ def basis(full: Run, group: str, method: str | MethodSpec = "pod") -> Basis:
     chosen = full.scene.group(
         files.require(str, group, "group", source="the name of a constraint group")
     )
-    spec = _method_spec(method)
+    spec = method_spec(method)
     if group not in full.snapshots:
         raise SnapshotError(f"group '{group}': the run stored no snapshots of it")
     data = full.snapshots[group]
@@ -143,12 +143,12 @@ def projections_model(
     groups = full.scene.config.groups
     if group is None and len(groups) > 1:
         raise ConfigurationError(f"group: one of {', '.join(groups)} is required")
-    chosen, spec = full.scene.group(group or groups[0]), _method_spec(method)
+    chosen, spec = full.scene.group(group or groups[0]), method_spec(method)
     made = basis(full, chosen.name, spec)
     return ProjectionModel(chosen.name, Reduction(made, select(made, spec, r), spec, r=r))
 
 
-def _method_spec(method: str | MethodSpec) -> MethodSpec:
+def method_spec(method: str | MethodSpec) -> MethodSpec:
     """Return the method of this name in config/methods.yaml, or a specification, validated."""
     if isinstance(method, MethodSpec):
         return validate(MethodSpec, dict(method), "method")

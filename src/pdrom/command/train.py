@@ -10,12 +10,17 @@ from pdrom.command.base import SCENE, UNCHECKED, Command, Status, files_of, requ
 def perform(arguments: argparse.Namespace) -> Status:
     """Train a model on the run of a scene and on further runs; print it with its validation."""
     from pdrom.api import load, load_scene, run, train
+    from pdrom.api.runs import method_spec
     from pdrom.command.progress import Progress
     from pdrom.core.errors import StorageError
 
     file = Path(arguments.scene)
     out, scene = arguments.out or str(file.parent / f"{file.stem}.model.h5"), load_scene(file)
     require_output(out, [*files_of(arguments.scene, scene), *arguments.runs])
+    if arguments.group:
+        scene.group(arguments.group)
+    if arguments.method:
+        method_spec(arguments.method)
     runs = [load(path, arguments.unchecked) for path in arguments.runs]
     for path, one in zip(arguments.runs[:1], runs, strict=False):
         if one.scene.config != scene.config:

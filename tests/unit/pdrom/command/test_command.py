@@ -17,7 +17,7 @@ import yaml
 from builders import SMALL
 from mesh_files import write_mesh
 from pdrom import __version__
-from pdrom.api import load_scene
+from pdrom.api import load, load_scene
 from pdrom.command.base import Status
 from pdrom.command.main import COMMANDS, parser, run
 from pdrom.command.new import template
@@ -47,18 +47,33 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def test_a_scene_is_run_reduced_and_shown(folder, capsys):
+def test_a_scene_is_run_a_model_trained_and_run_and_all_is_shown(folder, capsys):
     assert run(["run", "small.yaml"]) == Status.DONE
     said = capsys.readouterr()
     assert said.out.startswith("small.h5: 12 frames of 30 vertices")
     assert "frame 12 of 12" in said.err
-    asked = ["reduce", "small.yaml", "--group", "spring", "--r", "2", "--run", "small.h5"]
-    assert run([*asked, "--plot", "e.png"]) == Status.DONE
-    assert capsys.readouterr().out.startswith("small_spring_gappy_2.h5: spring, gappy, r = 2: rel")
+    asked = ["train", "small.yaml", "small.h5", "--modes", "6", "--validate", "1"]
+    assert run(asked) == Status.DONE
+        run(["train", "small.yaml", "small.h5", "--modes", "6", "--validate", "1"]) == Status.DONE
+    )
+    said = capsys.readouterr()
+    assert "small, converged" in said.err
+    table, last = said.out.splitlines()[:-1], said.out.splitlines()[-1]
+    assert [row.split()[0] for row in table] == ["trajectory", "small", "small_validation_1"]
+    assert last.startswith("small.model.h5: a model of 'small' (6 modes, ")
+    assert "training took" in last
+    compared = ["run", "small.yaml", "--model", "small.model.h5", "--compare", "small.h5"]
+    assert run(compared) == Status.DONE
+    first, second = capsys.readouterr().out.splitlines()
+    assert first.startswith("small_small.h5: 12 frames")
+    assert "against the run of 'small' by full order, 10 iterations" in second
+    assert "measured now, in turn" in second
+    assert run(["view", "small_small.h5", "small.h5"]) == Status.DONE
     assert not list(folder.glob(".*"))  # no hidden file beside a user's own
-    assert run(["show", "small_spring_gappy_2.h5"]) == Status.DONE
+    capsys.readouterr()
+    assert run(["show", "small.model.h5"]) == Status.DONE
     shown = capsys.readouterr().out
-    for words in ("intact", "reduced: 13 x 30 x 3 float64, in m", "method: gappy", "scene: small"):
+    for words in ("intact", "model/columns/B: 30 x", "format: 1", "scene: small"):
         assert words in shown
     assert run(["show", "small.h5", "--configuration"]) == Status.DONE
     text = capsys.readouterr().out.split("configuration:\n")[1].split("attributes")[0]
@@ -74,7 +89,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-REDUCE = ["reduce", "small.yaml", "--group", "spring", "--r", "1"]
+TRAIN = ["train", "small.yaml", "--method", "gappy", "--r", "1"]
 
 
 def refusal(capsys: pytest.CaptureFixture[str], arguments: list[str]) -> str:
@@ -90,18 +105,18 @@ def content(folder: Path) -> dict[str, bytes]:
 
 def reads_of(name: str) -> list[list[str]]:
     """Commands that read a file as a run."""
-    return [[*REDUCE, "--run", name], ["view", name], ["view", name, "--unchecked"], ["show", name]]
+    return [[*TRAIN, name], ["view", name], ["view", name, "--unchecked"], ["show", name]]
 
 
 def test_a_run_is_read_wherever_it_was_copied(folder, finished, capsys):
     shutil.copy(finished / "small.h5", "copy.h5")
     shutil.copy(finished / "small.h5", "no suffix")
     for name in ("copy.h5", "no suffix"):
-        assert run([*REDUCE, "--run", name]) == Status.DONE
+        assert run([*TRAIN, name]) == Status.DONE
         assert run(["show", name]) == Status.DONE
         assert "bytes, intact" in capsys.readouterr().out
         assert check_file(name) == "intact"
-    made = {"small.yaml", "small_spring_gappy_1.h5"}
+    made = {"small.yaml", "small.model.h5"}
     assert set(content(folder)) == {"copy.h5", "no suffix", *made}
 
 
@@ -132,15 +147,15 @@ def test_a_run_without_a_checksum_is_read_if_that_is_asked_for(folder, finished,
     whole = (finished / "small.h5").read_bytes()[BLOCK:]
     Path("small.h5").write_bytes(whole)
     before = content(folder)
-    told = refusal(capsys, [*REDUCE, "--run", "small.h5"])
+    told = refusal(capsys, [*TRAIN, "small.h5"])
     assert told.startswith("pdrom: small.h5: no checksum inside (")
     assert "--unchecked" in told
     assert content(folder) == before
-    assert run([*REDUCE, "--run", "small.h5", "--unchecked"]) == Status.DONE
+    assert run([*TRAIN, "small.h5", "--unchecked"]) == Status.DONE
     assert run(["view", "small.h5", "--unchecked"]) == Status.DONE
     with h5py.File("small.h5", "r+") as file:
         del file["timings"]
-    told = refusal(capsys, [*REDUCE, "--run", "small.h5", "--unchecked"])
+    told = refusal(capsys, [*TRAIN, "small.h5", "--unchecked"])
     assert told.startswith("pdrom: small.h5: holds no run that could be opened")
 
 
@@ -258,7 +273,7 @@ def test_a_mesh_in_place_of_a_scene_is_named_with_the_command_that_helps(folder,
     mesh = f"a{suffix}"
     write_mesh(Path(mesh))
     told = f"pdrom: {mesh}: this is a mesh: `pdrom new --mesh {mesh}` makes a scene of it"
-    for command in (["run", mesh], ["reduce", mesh, "--group", "spring"], ["new", mesh]):
+    for command in (["run", mesh], ["train", mesh], ["new", mesh]):
         assert refusal(capsys, command) == told
     assert run(["new", "--mesh", mesh]) == Status.DONE
     assert load_scene("a.yaml").mesh.vertices == 12
@@ -296,20 +311,18 @@ FAULTY = [
     (["run", "none.yaml"], "none.yaml: no such configuration file"),
     (["show", "none.h5"], "none.h5: no such file"),
     (["show", "sprng"], "did you mean 'spring'?"),
-    (["reduce", "small.yaml", "--group", "sprin"], "no group 'sprin'"),
+    (["train", "small.yaml", "--group", "sprin"], "no group 'sprin'"),
+    ([*TRAIN[:-2], "--method", "gapy"], "did you mean 'gappy'"),
     (["new", "nowhere/x"], "No such file"),
     (["show", "a" * 5000], "File name too long"),
     (["show", "."], "is a folder"),
     (["run", "folder.h5"], "folder.h5: this is a result: `pdrom show folder.h5`"),
     (["run", "."], ".: a folder, name a file in it"),
-    (["reduce", "small.yaml", "--error", "0.1"], "--error: runs within a requested error"),
-    ([*REDUCE, "--plot", "x.exe"], "--plot x.exe: no kind of picture 'exe' (allowed: pdf, png"),
-    ([*REDUCE, "--plot", "x.pgn"], "did you mean 'png'?"),
-    ([*REDUCE, "--plot", "folder.png"], "folder.png: cannot be written (a folder)"),
-    ([*REDUCE, "--plot", "small.yaml/e.png"], "small.yaml: not a folder"),
-    ([*REDUCE, "--out", "."], ".: cannot be written (a folder)"),
-    ([*REDUCE, "--out", "small.yaml"], "is read by this command"),
-    ([*REDUCE, "--out", "e.png", "--plot", "e.png"], "is read by this command"),
+    ([*TRAIN, "--out", "."], ".: cannot be written (a folder)"),
+    ([*TRAIN, "--out", "small.yaml"], "is read by this command"),
+    (["run", "small.yaml", "--compare", "small.h5"], "--compare: only of runs with a model"),
+    (["run", "small.yaml", "--model", "none.h5"], "none.h5: no such file"),
+    (["run", "small.yaml", "--model", "x.h5", "--out", "x.h5"], "is read by this command"),
     (["run", "small.yaml", "--out", "."], ".: cannot be written (a folder)"),
     (["run", "small.yaml", "--out", "small.yaml"], "is read by this command"),
     (["run", "small.yaml", "--out", "a" * 5000], "File name too long"),
@@ -327,19 +340,16 @@ def test_files_of_others_and_the_mesh_of_the_scene_are_not_overwritten(folder, c
         ("own.yaml", "m.obj", "would be overwritten, and is read by this command"),
     ):
         before = Path(out).read_bytes()
-        reduce = ["reduce", scene, "--run", "none.h5", "--group", "spring"]
-        for command in (["run", scene], reduce):
+        for command in (["run", scene], ["train", scene, "none.h5"]):
             assert f"{out}: {words}" in refusal(capsys, [*command, "--out", out])
         assert Path(out).read_bytes() == before
 
 
 def test_what_pdrom_has_written_it_writes_again_and_leaves_no_hidden_file(folder, capsys):
-    picture = ["reduce", "small.yaml", "--group", "spring", "--r", "1", "--run", "small.h5"]
     for _ in range(2):
         assert run(["run", "small.yaml"]) == Status.DONE
         assert run(["view", "small.h5"]) == Status.DONE
-        for plot in ("e.png", "e.pdf"):
-            assert run([*picture, "--out", "r.h5", "--plot", plot]) == Status.DONE
+        assert run([*TRAIN, "small.h5"]) == Status.DONE
     assert capsys.readouterr().err.count("pdrom:") == 0
     assert [path.name for path in folder.iterdir() if path.name.startswith(".")] == []
 
@@ -403,27 +413,28 @@ def test_faults_that_a_run_meets_are_told(folder, finished, capsys):
     assert run(["run", "small.yaml", "--out", "nowhere.d/../small.yaml/x.h5"]) == Status.FAULTY
     assert "cannot be written" in capsys.readouterr().err.splitlines()[-1]
     shutil.copy(finished / "small.h5", folder)
-    for more, words in (("--method=gapy", "did you mean 'gappy'"), ("--r=99", "r = 99")):
-        assert words in refusal(capsys, [*REDUCE, "--run", "small.h5", more])
+    assert "r = 99" in refusal(capsys, [*TRAIN, "small.h5", "--r=99"])
     (folder / "small.yaml").write_text(SMALL.replace("1.0e+5", "2.0e+5"))
-    assert "a run of another scene" in refusal(capsys, [*REDUCE, "--run", "small.h5"])
+    assert "a run of another scene" in refusal(capsys, [*TRAIN, "small.h5"])
 
 
 def test_a_blow_up_has_a_code_of_its_own(folder, monkeypatch, capsys):
-    monkeypatch.setattr("pdrom.api.runs.BLOWUP_EXTENT", 1e-3)
-    assert run(["reduce", "small.yaml", "--group", "spring", "--r", "2"]) == Status.BLEW_UP
-    assert "blew up at frame 0" in capsys.readouterr().out
-    assert (folder / "small_spring_gappy_2.h5").is_file()
+    assert run(TRAIN) == Status.DONE
+    monkeypatch.setattr("pdrom.api.model.BLOWUP_EXTENT", 1e-3)
+    assert run(["run", "small.yaml", "--model", "small.model.h5"]) == Status.BLEW_UP
+    assert "blew up in frame 0" in capsys.readouterr().out
+    assert load("small_small.h5").blowup_frame == 0
 
 
 @pytest.mark.parametrize(
     "arguments",
     [
         [],
-        ["reduec"],
+        ["trian"],
+        ["reduce"],
         ["run"],
-        ["reduce", "x", "--r", "0"],
-        ["reduce", "x", "--group", "g", "--rnu"],
+        ["train", "x", "--r", "a"],
+        ["train", "x", "--group", "g", "--modse"],
     ],
 )
 def test_what_is_not_understood_has_code_2(arguments, capsys):
@@ -431,8 +442,9 @@ def test_what_is_not_understood_has_code_2(arguments, capsys):
         run(arguments)
     assert caught.value.code == 2
     said = capsys.readouterr().err
-    assert "--rnu" not in arguments or "did you mean '--run'?" in said
-    assert "reduec" not in arguments or "did you mean 'reduce'?" in said
+    assert "--modse" not in arguments or "did you mean '--modes'?" in said
+    assert "trian" not in arguments or "did you mean 'train'?" in said
+    assert "reduce" not in arguments or "`pdrom train --method`" in said
 
 
 @pytest.mark.parametrize("name", COMMANDS)
