@@ -29,7 +29,7 @@ OTHERS = {
     "slurm_partition", "multiprocessing", "NaN", "fetch", "tanh", "Node.js", "Zen",
     # that readers choose, or code puts together
     "config/scenes/my_sheet.yaml", "config/mine.yaml", "config/scenes/meshes/sheet.obj", "t.csv",
-    "train_frames", "heldout_frames",
+    "train_frames", "heldout_frames", "pulled.yaml",
 }  # fmt: skip
 WRITTEN = re.compile(r"\.(py|js|smk|tex|ya?ml|toml|sh|css|lock|rst)$|^(config|docs|src|tests)/")
 WORD = re.compile(r"(?<![\w-])--[a-z][\w-]+|(?<![\\\w.-])[.\w{}*-]*[\w}](?:/[.\w{}*-]+)*")

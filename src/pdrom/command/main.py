@@ -84,6 +84,9 @@ def _parsed(arguments: Sequence[str]) -> argparse.Namespace:
         gone = "; it is `pdrom train --method` now" * (arguments[0] == "reduce")
         top.error(f"no command '{arguments[0]}'{choices(arguments[0], COMMANDS)}{gone}")
     found, unknown = top.parse_known_args(arguments)
+    if hasattr(found, "runs"):  # argparse does not know files behind an option
+        found.runs += [word for word in unknown if word[:1] != "-"]
+        unknown = [word for word in unknown if word[:1] == "-"]
     if unknown:
         known = re.findall(r"--[a-z-]+", found.parser.format_usage())
         found.parser.error(f"not understood: {unknown[0]}{choices(unknown[0], known)}")

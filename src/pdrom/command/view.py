@@ -16,15 +16,15 @@ def perform(arguments: argparse.Namespace) -> Status:
     from pdrom.view.frames import FRAMES, vtk, write_frames
     from pdrom.view.page import write_page
 
-    first = Path(arguments.results[0])
+    first = Path(arguments.runs[0])
     out = Path(arguments.out or first.parent / f"{first.stem}.html")
-    require_output(out, arguments.results)
+    require_output(out, arguments.runs)
     written = [arguments.png] if arguments.png else []
     if arguments.vtk:
         written += [Path(arguments.vtk, "run.pvd"), *Path(arguments.vtk).glob(FRAMES)]
     for path in written:
-        require_output(path, [*arguments.results, str(out)])
-    scenes = viewed_scenes(*(load(file, arguments.unchecked) for file in arguments.results))
+        require_output(path, [*arguments.runs, str(out)])
+    scenes = viewed_scenes(*(load(file, arguments.unchecked) for file in arguments.runs))
     if len(scenes) > 1 and (arguments.png or arguments.vtk):
         raise ConfigurationError("--png and --vtk: of one scene at a time")
     write_page(scenes, out)
@@ -45,7 +45,7 @@ COMMAND = Command(
     "Write a page on which runs are looked at, a picture, or files for ParaView",
     "pdrom view pulled_sheet.h5 pulled.h5 --open",
     {
-        "results": {"metavar": "RESULT", "nargs": "+", "help": "files of pdrom run"},
+        "runs": {"metavar": "RESULT", "nargs": "+", "help": "files of pdrom run"},
         "--out": {"metavar": "FILE", "help": "page to write; the first RESULT as .html"},
         "--open": {"action": "store_true", "help": "open it in the browser"},
         "--png": {"metavar": "FILE", "help": "picture of four frames of each run, too"},

@@ -175,7 +175,7 @@ FAULTY = {
     "view into a folder": (lambda full, p: api.view(p, full), "cannot be written .a folder"),
     "load of a folder": (lambda _, p: api.load(p), "is a folder"),
     "run into a folder": (lambda full, p: api.run(full.scene, p), "cannot be written .a folder"),
-    "scene a folder": (lambda _, p: api.load_scene(p), "no such configuration file"),
+    "scene a folder": (lambda _, p: api.load_scene(p), "a folder, name a file in it"),
     "mass NaN": (lambda *_: given((SQUARE, HALVES), vertex_mass=np.nan), "vertex_mass"),
     "mesh nothing": (lambda *_: given(None), "key 'mesh' is"),
     "corner beyond": (lambda *_: given((SQUARE, [[0, 1, 4]])), "names vertex"),

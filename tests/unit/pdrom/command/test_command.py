@@ -54,8 +54,6 @@ def test_a_scene_is_run_a_model_trained_and_run_and_all_is_shown(folder, capsys)
     assert "frame 12 of 12" in said.err
     asked = ["train", "small.yaml", "small.h5", "--modes", "6", "--validate", "1"]
     assert run(asked) == Status.DONE
-        run(["train", "small.yaml", "small.h5", "--modes", "6", "--validate", "1"]) == Status.DONE
-    )
     said = capsys.readouterr()
     assert "small, converged" in said.err
     table, last = said.out.splitlines()[:-1], said.out.splitlines()[-1]
