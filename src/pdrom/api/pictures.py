@@ -10,6 +10,7 @@ from pdrom.core.errors import SceneError
 from pdrom.core.store import require_own
 from pdrom.view import style
 from pdrom.view.artists import Figure
+from pdrom.view.frames import write_frames
 from pdrom.view.page import ViewedRun, ViewedScene, write_page
 
 LOW, HIGH = 1e-7, 1e3  # limits of the error axis; errors outside are drawn on the limit
@@ -64,7 +65,8 @@ def view(path: str | os.PathLike[str], *runs: Run) -> None:
 
     Parameters
     ----------
-    path : file to write
+    path : file to write; one that ends in .png gets a picture of four frames of each run, which are
+        of one scene
     runs : full-order and reduced runs
 
     Raises
@@ -73,8 +75,14 @@ def view(path: str | os.PathLike[str], *runs: Run) -> None:
         An argument is no run; no run is given, or two different scenes have one name; the page
         would be too large, or cannot be written.
     """
-    require_own(file_path(path))
-    write_page(viewed_scenes(*runs), path)
+    path, scenes = file_path(path), viewed_scenes(*runs)
+    require_own(path)
+    if path.suffix.lower() != ".png":
+        write_page(scenes, path)
+        return
+    if len(scenes) > 1:
+        raise SceneError(f"{path}: runs of {len(scenes)} scenes, a picture has one")
+    write_frames(scenes[0], path)
 
 
 def viewed_scenes(*runs: Run) -> list[ViewedScene]:
