@@ -37,7 +37,6 @@ REDUCTIONS = outcomes.names(METHODS)
 
 @cache
 def training(case: str) -> outcomes.Training:
-    """The full-order run of a case, made once."""
     return outcomes.Training(CATALOGUE[case])
 
 

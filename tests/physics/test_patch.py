@@ -48,7 +48,6 @@ STEP = 1e-6
 
 
 def central(function, point: np.ndarray, direction: np.ndarray) -> np.ndarray:
-    """Central difference of ``function`` at ``point`` along ``direction``."""
     return (function(point + STEP * direction) - function(point - STEP * direction)) / (2 * STEP)
 
 

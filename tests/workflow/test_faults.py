@@ -6,7 +6,6 @@ The long ones are marked slow: ``./reproduce test -m slow``.
 """
 
 import os
-import random
 import re
 import resource
 import shutil
@@ -69,9 +68,6 @@ def heals(sandbox: Sandbox, undisturbed: Sandbox, target: str = TABLE) -> None:
     assert not sandbox.temporaries()
 
 
-# Killed jobs and runs -------------------------------------------------------------------------
-
-
 def test_lost_rows_and_a_killed_job_are_named_and_made_again(undisturbed, sandbox):
     """A file is damaged after the plan, by the next run the last job is killed."""
     sandbox.path(BASIS).unlink()
@@ -92,14 +88,10 @@ def test_lost_rows_and_a_killed_job_are_named_and_made_again(undisturbed, sandbo
     heals(sandbox, undisturbed)
 
 
-# rule -> an output of it
+# rule -> an output of it, of each kind of file
 RULES = {
     "mesh": f"{MICRO_RESULTS}/meshes/*.h5",
-    "fom": RUN,
-    "snapshots": SNAPSHOTS,
-    "pod": BASIS,
     "reruns": f"{MICRO_RESULTS}/reruns/spring_oop/spring/block-deim_heldout.csv",
-    "reduced_reruns_table": f"{MICRO_RESULTS}/tables/reduced_reruns.csv",
     "figure_singular_values": f"{MICRO_RESULTS}/figures/singular_values.png",
     "paper_inputs": f"{MICRO_RESULTS}/paper/main.bbl",
     "paper": MICRO_MANUSCRIPT,
@@ -198,9 +190,6 @@ def test_the_second_run_at_once_says_so_and_ends(undisturbed, fresh):
     assert fresh.results() == undisturbed.results()
 
 
-# Disks ----------------------------------------------------------------------------------------
-
-
 def files_of_32_kb() -> None:
     """As by a quota; no mount is needed. The script of the job is smaller, the run is not."""
     resource.setrlimit(resource.RLIMIT_FSIZE, (32_000, 32_000))
@@ -223,9 +212,6 @@ def test_a_write_that_fails(target, how, words, undisturbed, sandbox):
     assert "Traceback" not in output
     assert not sandbox.temporaries()
     heals(sandbox, undisturbed, target)
-
-
-# Damaged files --------------------------------------------------------------------------------
 
 
 def cut(path: Path) -> None:
@@ -284,19 +270,6 @@ def unfit(sandbox: Sandbox) -> list[str]:
     command = ("./reproduce", "verify", "--files", "--configfile", MICRO_FILE)
     done = subprocess.run(command, cwd=sandbox.folder, capture_output=True, text=True, check=False)
     return [line.split(": ")[0] for line in done.stdout.splitlines() if ": " in line]
-
-
-# Clocks and edited files ----------------------------------------------------------------------
-
-
-@slow
-def test_a_clock_that_jumped(undisturbed, sandbox):
-    """The files of a finished run bear any dates, as after several jumps or in a copy."""
-    jumps = random.Random(1)
-    for path in sandbox.path(MICRO_RESULTS).rglob("*"):
-        stat, days = path.stat(), jumps.randint(-4000, 4000)
-        os.utime(path, ns=(stat.st_atime_ns, stat.st_mtime_ns + days * 86_400 * 10**9))
-    heals(sandbox, undisturbed)
 
 
 def run_while_all_code_is_edited(sandbox: Sandbox, *targets: str) -> None:

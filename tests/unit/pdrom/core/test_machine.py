@@ -4,14 +4,13 @@ import subprocess
 from importlib.metadata import version
 
 import pytest
-from pydantic import ValidationError
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from pdrom.core import machine as module
-from pdrom.core.machine import Kernels, Machine, loaded_kernels, machine
+from pdrom.core.machine import Kernels, loaded_kernels, machine
 
 
-def test_it_names_threads_and_cores_and_survives_the_file_and_refuses_another_layout():
+def test_it_names_threads_cores_processor_and_libraries():
     for threads in (2, 1):
         with threadpool_limits(limits=threads):
             record = machine()
@@ -19,11 +18,6 @@ def test_it_names_threads_and_cores_and_survives_the_file_and_refuses_another_la
     assert record.cores >= 1
     assert record.cpu
     assert record.libraries["numpy"] == version("numpy")
-    # it survives the file, and another layout is refused
-    assert Machine.model_validate_json(record.model_dump_json()) == record
-    for fault in ({"kernels": 3}, {"architecture": "Haswell"}):
-        with pytest.raises(ValidationError):
-            Machine.model_validate({**record.model_dump(), **fault})
 
 
 def test_kernels_are_those_that_are_loaded():

@@ -15,7 +15,6 @@ def bent(rng):
 
 
 def moved(shapes, rng):
-    """Each shape rotated and shifted."""
     rotations = Rotation.random(len(shapes), random_state=int(rng.integers(1000))).as_matrix()
     return shapes @ rotations + 10.0 * rng.standard_normal((len(shapes), 1, 3))
 

@@ -5,14 +5,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from builders import OBSTACLES, make_scene, random_rotation
+from builders import make_scene, random_rotation
 from pdrom.model.runs import trajectory
 from pdrom.reduction import deviations
 from pdrom.reduction.deviations import (
     DEVIATIONS,
     ERRORS,
     REFERENCE,
-    TOUCH,
     Yardstick,
     errors_within,
 )
@@ -86,21 +85,6 @@ def test_first_contact_is_late_missed_or_should_not_be():
     assert errors(yardstick(), measure.reference)["contact_delay"] is None
     lying = {"kind": "cloth", "rows": 6, "columns": 5, "plane": "xz"}
     assert not yardstick({"effect": "floor", "height": 2.0}, mesh=lying).series["contact"].any()
-
-
-@pytest.mark.parametrize("name", OBSTACLES)
-def test_gaps_to_an_obstacle_shrink_to_nothing_on_its_surface(name):
-    scene = make_scene({"effect": name, **OBSTACLES[name]}, SPRING)
-    (obstacle,) = scene.contacts
-    outside = np.random.default_rng(5).uniform(-4.0, 4.0, (200, 3))
-    outside = outside[obstacle.gaps(outside) > 0.0]
-    inside = 0.99 * np.array([[0.1, 0.2, 0.3]])
-    assert len(outside) > 20
-    assert obstacle.gaps(inside)[0] < TOUCH
-    hits, entries, _ = obstacle.entries(outside, np.broadcast_to(inside, outside.shape))
-    if name != "plane":  # the point lies in the other two
-        assert hits.all()
-    np.testing.assert_allclose(obstacle.gaps(entries[hits]), 0.0, atol=1e-12)
 
 
 def test_blocks_of_frames_do_not_matter(monkeypatch):

@@ -27,7 +27,7 @@ from pdrom.core.machine import machine
 from pdrom.core.store import atomic_path, write_table, write_text
 from places import ROOT
 from study.article.build import ASSETS, FACTS, FOLDER, PAGES, article, write_verified
-from study.article.latex import linked_table, plain_columns
+from study.article.latex import linked_table
 from study.artifact.paths import File
 from study.experiments.machine import Record, Units
 from study.paper import build, textables
@@ -322,11 +322,6 @@ def test_a_number_among_words_is_a_link(cell, number):
     made = linked_table([("ll", ["a", "b"]), ["none", cell]], {"runs": RUNS})
     assert f"}}{{{number}}}" in made
     assert "{none}" not in made
-
-
-def test_columns_are_plain_letters():
-    spec = r"\begin{tabular}{>{\raggedright\arraybackslash}p{1.5cm}r@{\,}X}"
-    assert plain_columns(spec) == r"\begin{tabular}{lrl}"
 
 
 def study_or_small(small: Path) -> list[Path]:

@@ -10,11 +10,11 @@ from pydantic import ValidationError
 from pdrom.core.store import checksum_path, read_table, write_table
 from pdrom.core.yamlfile import ConfigModel
 from study.artifact import reads
-from study.artifact.artifact import Artifact, declare, declared_in, load, make, modules_in
+from study.artifact.artifact import Artifact, declared_in, load, make, modules_in
 from study.artifact.paths import File, Place
 from study.experiments.kit.base import Experiment, experiment, experiments
 
-SCENE, GROUP = Place("a/{scene}.csv"), Place("b/{scene}/{group}.csv")
+SCENE = Place("a/{scene}.csv")
 
 
 class Section(ConfigModel):
@@ -70,21 +70,6 @@ def test_faulty_settings_are_refused(settings, tmp_path):
     inputs = {"table": str(tmp_path / "a" / "s.csv")}
     with pytest.raises(ValidationError):
         multiplied.perform(settings, inputs, {"out": str(tmp_path / "c" / "s.csv")})
-
-
-def test_settings_that_go_together_are_one_model():
-    assert reads.Settings(Section).value(STUDY, {}) == Section(factor=3.0)
-
-
-def test_labels_are_those_of_what_is_written():
-    made = Artifact("a", "", {}, {"x": SCENE, "y": GROUP}, multiplied.function)
-    assert made.labels == ["scene", "group"]
-
-
-def test_a_function_that_does_not_take_what_is_declared_is_refused():
-    made = Artifact("a", "", {"table": reads.Every(SCENE)}, {"out": SCENE}, multiplied.function)
-    with pytest.raises(TypeError, match="a: missing a required argument: 'section'"):
-        declare(made, "out")
 
 
 def test_artifacts_are_found_and_loaded_by_their_address():

@@ -2,13 +2,11 @@
 
 import json
 import os
-import runpy
 import subprocess
 import sys
 
 import pytest
 
-from pdrom.model.compiled import functions
 from study.artifact.planned import KEPT, plan
 from study.pipeline.fork_server import SUPPORTED, interpreter
 
@@ -35,15 +33,3 @@ def test_a_job_imports_what_the_plan_has_read(first, job, tmp_path):
             env={**os.environ, KEPT: str(kept)}, capture_output=True, text=True, check=True,
         )  # fmt: skip
         assert done.stdout == 2 * f"{word} {path}\n", done.stderr
-
-
-def test_a_kernel_has_another_name_if_its_file_has_another_text(tmp_path):
-    """Of equal size and date: Numba's cache would not see the difference."""
-    names, path = set(), tmp_path / "kernel.py"
-    for number in "12":
-        kernel = f"@compiled\ndef f(): return {number}"
-        path.write_text(f"from pdrom.model.compiled.functions import compiled\n{kernel}")
-        os.utime(path, (0, 0))
-        functions._checksum.cache_clear()
-        names.add(runpy.run_path(str(path))["f"].py_func.__qualname__)
-    assert len(names) == 2

@@ -101,17 +101,6 @@ def test_bases_of_several_motions_are_run_on_the_held_out_ones(sheet):
     )
 
 
-def test_signs_are_drawn_by_a_seed(short):
-    """Signs change only a basis whose mean is added to its modes."""
-    published = MethodSpec(
-        title="p", centring="mean-in-modes", rows="joint", solve="tikhonov", repeat_rows=True
-    )
-    one, two = (short.basis(published, signs=seed).V for seed in (1, 2))
-    assert not np.array_equal(one, two)
-    assert short.basis(published, signs=1).V is one
-    np.testing.assert_array_equal(short.basis(BLOCK, signs=1).V, short.basis(BLOCK).V)
-
-
 def test_a_run_that_ends_early_is_wrong_without_bound(short, monkeypatch):
     """The limit is half of the extent of the sheet, so that the run ends after one frame."""
     monkeypatch.setattr("pdrom.reduction.deviations.BLOWUP_EXTENT", 0.5)
@@ -164,7 +153,6 @@ METHODS = load_methods(ROOT / "config" / "methods.yaml")
 
 @pytest.fixture(scope="module")
 def fall():
-    """The falling sheet, coarse and short."""
     return load_bound_scene(ROOT, "bend_fall", Coarsen(resolution=0.4, frames=0.4))
 
 

@@ -3,8 +3,6 @@
 import numpy as np
 import pandas as pd
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from builders import GRAVITY, frame, make_scene
 from builders import TOP as PINS
@@ -101,14 +99,6 @@ def test_floors_are_the_largest_over_the_seeds_and_horizons_survive_a_file(tmp_p
 )  # fmt: skip
 def test_horizon_is_the_first_frame_above(floor, expected):
     assert horizon(np.array(floor), 1e-3) == expected
-
-
-@given(st.lists(st.floats(0.0, 1.0), max_size=20), st.floats(1e-6, 0.5), st.floats(1.0, 3.0))
-def test_horizon_grows_with_the_threshold(floor, threshold, factor):
-    values = np.array(floor)
-    first = horizon(values, threshold)
-    assert (values[:first] <= threshold).all()
-    assert horizon(values, factor * threshold) >= first
 
 
 def test_the_error_counts_frames_before_the_end_only():

@@ -324,6 +324,7 @@ def test_every_rung_of_a_ladder_is_run_and_judged(study, again, array):
     rows = again(repetitions, settings=settings)["rungs"]
     kinds = {"up": len(asked.up), "down": len(asked.down), "signs": 2, "square": len(asked.square)}
     assert rows.direction.value_counts(sort=False).to_dict() == kinds  # none at 50: three modes
+    assert rows[rows.direction == "signs"].gain.nunique() == 2
     sigma, train = array(paths.BASIS, "singular_values"), array(paths.SNAPSHOTS, "train")
     best = np.linalg.norm(sigma[2:]) / np.linalg.norm(train)
     least = rows[rows.rung.isin(["- oversampling", asked.up[-1].title, "whole elements, shared"])]

@@ -10,7 +10,6 @@ from pdrom.model.effects import EFFECTS
 from pdrom.reduction.method import load_methods
 from pdrom.view import style
 from places import CONFIG, ROOT
-from study.artifact.paths import MESH, RERUNS
 from study.figures.kit.declaration import METHODS, declarations, figure, method_styles
 from study.pipeline.scenes import scene_names
 
@@ -35,16 +34,6 @@ def test_figures_name_scenes_methods_and_groups_that_exist():
         assert [
             kind for kind, names in known.items() if not {*getattr(made, kind)} <= names
         ] == [], name
-
-
-def test_files_follow_the_configuration(study, small_study):
-    """Figures of one experiment read one."""
-    invented = small_study(["spring_twist"], ["block-deim"])
-    inputs = invented.job("spring_runs").inputs
-    assert inputs["meshes"] == [invented.path(MESH, "spring_twist")]
-    assert inputs["reruns"] == [invented.path(RERUNS, "spring_twist", "spring", "block-deim")]
-    assert len(study.job("deim_iterations").inputs["samples"]) == 1
-    assert len(study.job("deim_entries").inputs["samples"]) > 1
 
 
 @pytest.mark.parametrize("name", ["strain_runs", "teaser", "local_share", "ladder", "spring_runs"])

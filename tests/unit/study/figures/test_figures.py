@@ -19,11 +19,9 @@ from pdrom.core.store import checksum_path, write_hdf5
 from pdrom.core.store.checksum import write_block
 from pdrom.model.effects.forces import Gravity
 from pdrom.model.effects.obstacle import Sphere
-from pdrom.model.mesh.generators import cloth
-from pdrom.model.mesh.types import save_mesh
 from pdrom.reduction.method import load_methods
 from places import CONFIG
-from study.artifact.paths import MESH, RERUNS, SUBSPACES
+from study.artifact.paths import RERUNS, SUBSPACES
 from study.figures import accuracy_cost as view
 from study.figures.gain import BESIDE
 from study.figures.kit.declaration import Drawn, Reduction, camera_of, declarations, write_figure
@@ -277,16 +275,6 @@ def test_published_values_are_drawn_where_they_are_given(study, name):
         assert any("published code's" in text for text in shown) == (scene in BESIDE)
 
 
-def test_a_mesh_that_does_not_fit_is_refused(small_study):
-    study = small_study(["strain_oop"], ["deim"])
-    save_mesh(cloth(4, 4), study.path(MESH, "strain_oop"))
-    with pytest.raises(StorageError, match="elements of 'strain'"):
-        study.draw("deim_iterations")
-
-
-# Cost -------------------------------------------------------------------------------------------
-
-
 def test_points_with_another_reference_are_no_dots(study):
     """Errors against the converged run are one line; no dot or ring lies at their times."""
     names = "scene method position_basis iterations relative_error_within_horizon ms_per_frame"
@@ -336,24 +324,13 @@ def test_a_scene_without_effects_ends_at_the_tick(study):
     assert [line.get_xdata()[0] for line in without.lines] == [3.5, 2.0]
 
 
-# Accuracy against time --------------------------------------------------------------------------
-
-
-def test_methods_have_a_family_and_models_that_differ_by_tolerance_or_basis_share_a_marker():
+def test_every_method_has_a_family():
     methods = load_methods(CONFIG / "methods.yaml")
     reductions = {m: Reduction(title=spec.title, rows=spec.rows) for m, spec in methods.items()}
     everything = Drawn(experiments=(), reductions=reductions, groups=())
     families = {name: view.look_of(name, "full", everything)[0] for name in everything.methods}
     assert set(families.values()) <= {*view.FAMILIES} - {view.ITERATIONS}
-    ecsw = view.look_of("ecsw-1e-02", "pod", everything)
-    assert ecsw[0] == view.WEIGHTED
-    assert ecsw == view.look_of("ecsw-1e-03", "skinning", everything)
-    assert view.look_of("full", "pod", everything) == view.look_of("full", "skinning", everything)
-    names = [("full", "pod"), ("ecsw-1e-02", "pod"), ("deim", "full"), ("deim-joint", "full")]
-    looks = [view.look_of(*name, everything) for name in names]
-    found = view.markers([*looks, ecsw])
-    assert list(found) == looks
-    assert [found[look] for look in looks] == ["o", "s", "o", "s"]
+    assert view.look_of("ecsw-1e-02", "pod", everything)[0] == view.WEIGHTED
 
 
 def invented(errors, times, method="deim", blown_up=(), position_basis="full"):
@@ -382,10 +359,3 @@ def test_points_outside_the_axis_are_arrows_on_its_rim():
     assert time == 4.0
     assert view.LOW < height < view.HIGH
     assert ax.get_xlim()[1] > 4.0
-
-
-def test_the_front_of_a_family_is_not_beaten():
-    ax = Figure().subplots()
-    view.draw_panel(ax, invented([0.5, 0.7, 0.1, 0.2], [1.0, 2.0, 3.0, 4.0]), "a")
-    steps = [line.get_xydata() for line in ax.lines if line.get_drawstyle() == "steps-post"]
-    assert [front.tolist() for front in steps if len(front)] == [[[1.0, 0.5], [3.0, 0.1]]]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from pdrom.core.errors import ConfigurationError, StorageError
+from pdrom.core.errors import StorageError
 from pdrom.model.mesh.generators import bar, cloth
 from pdrom.reduction.sampling.deim import block_elements, deim_entries
 from pdrom.view.camera import Camera
@@ -40,8 +40,6 @@ def test_elements_are_drawn_where_they_lie(group, mesh, kind):
 
 
 def test_what_has_no_elements_cannot_be_drawn():
-    with pytest.raises(ConfigurationError, match="unknown effect 'magic'"):
-        element_map("magic", cloth(4, 4), 3, "file")
     with pytest.raises(StorageError, match="'gravity' has no elements"):
         element_map("gravity", cloth(4, 4), 3, "file")
 

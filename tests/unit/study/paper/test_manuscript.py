@@ -178,8 +178,6 @@ def test_citations_have_entries_and_the_pdf_the_title_and_the_authors_of_the_man
         assert rf"pdfauthor={{{author}}}" in source
 
 
-# Bibliography and numbers of figures -----------------------------------------------------------
-
 BIB = """
 @article{beta, author = {Bea B{\\'e}ta}, title = {The {DEIM} of beta}, journal = {J. Beta},
   year = 2011, volume = 3, pages = {1--2}}

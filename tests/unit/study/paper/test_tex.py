@@ -6,7 +6,7 @@ import pytest
 
 from pdrom.core.errors import PaperError
 from pdrom.core.store import checksum_path
-from study.paper.tex import build_pdfs, packages_of
+from study.paper.tex import build_pdfs
 
 DOCUMENT = r"""\documentclass{article}
 \usepackage[T1]{fontenc}
@@ -114,9 +114,3 @@ def test_without_any_tex_the_reason_is_given(tmp_path, monkeypatch):
     monkeypatch.setattr("study.paper.tex.find_spec", lambda name: None)
     with pytest.raises(PaperError, match="no pdflatex with the needed packages on PATH"):
         build_pdfs({project(tmp_path): tmp_path / "main.pdf"}, [])
-
-
-def test_packages_of_a_source():
-    source = r"\usepackage{a} \usepackage[x=1,y]{b, c}" "\n" r"\usepackage{a}\RequirePackage{d}"
-    assert packages_of(source) == ["a", "b", "c"]
-    assert packages_of("") == []

@@ -64,12 +64,6 @@ def test_what_runs_no_job(arguments):
     assert parse(arguments).looks_only == (arguments in LOOKS_ONLY)
 
 
-@pytest.mark.parametrize("arguments", ["-n --config a=b x y", "--configfile a.yaml x --cores 2"])
-def test_a_forgotten_separator_is_explained(arguments):
-    with pytest.raises(ConfigurationError, match=r"'x': no KEY=VALUE .*two hyphens before"):
-        parse(arguments)
-
-
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -92,6 +86,8 @@ def test_a_forgotten_separator_is_explained(arguments):
         ("--rerun-triggers rubbish", "--rerun-triggers.* invalid choice: 'rubbish'"),
         ("--mode rubbish", "--mode rubbish: "),
         ("--profile rubbish", r"profile directory given \(rubbish\)"),
+        ("-n --config a=b x y", "'x': no KEY=VALUE .*two hyphens before"),
+        ("--configfile a.yaml x --cores 2", "'x': no KEY=VALUE .*two hyphens before"),
     ],
 )
 def test_a_wrong_option_is_named_with_its_value(arguments, words):

@@ -18,23 +18,12 @@ from pdrom.core.environment import (
 )
 
 INHERITED = {
-    "OPENBLAS_CORETYPE": "Prescott",
-    "MKL_CBWR": "AVX2",
-    "NPY_DISABLE_CPU_FEATURES": "AVX2",
-    "NUMBA_DISABLE_JIT": "1",
-    "NUMBA_CPU_NAME": "cascadelake",
-    "OMP_NUM_THREADS": "7",
-    "KMP_AFFINITY": "none",
-    "SOURCE_DATE_EPOCH": "1",
-    "PYTHONOPTIMIZE": "2",
-    "MATPLOTLIBRC": "/etc/rc",
-    "TEXINPUTS": "/etc/tex",
-    "LC_ALL": "tr_TR.UTF-8",
-    "PATH": "/bin",
-    "HOME": "/home/somebody",
-    "NUMBA_CACHE_DIR": "/cache",
-    "SLURM_JOB_ID": "3",
-}
+    "OPENBLAS_CORETYPE": "Prescott", "MKL_CBWR": "AVX2", "NPY_DISABLE_CPU_FEATURES": "AVX2",
+    "NUMBA_DISABLE_JIT": "1", "NUMBA_CPU_NAME": "cascadelake", "OMP_NUM_THREADS": "7",
+    "KMP_AFFINITY": "none", "SOURCE_DATE_EPOCH": "1", "PYTHONOPTIMIZE": "2",
+    "MATPLOTLIBRC": "/etc/rc", "TEXINPUTS": "/etc/tex", "LC_ALL": "tr_TR.UTF-8", "PATH": "/bin",
+    "HOME": "/home/somebody", "NUMBA_CACHE_DIR": "/cache", "SLURM_JOB_ID": "3",
+}  # fmt: skip
 
 
 def test_nothing_inherited_changes_a_result():

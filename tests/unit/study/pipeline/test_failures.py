@@ -32,7 +32,6 @@ def fail(logger, rule, log, said, indent=False):
 
 
 def end(logger):
-    """Exit status and last lines."""
     text, status = logger.failures.end()
     lines = text.splitlines()
     assert lines[-1] == ADVICE

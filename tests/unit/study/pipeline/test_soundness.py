@@ -28,12 +28,6 @@ soundness.main()
 """
 
 
-def test_the_packages_of_the_lock_calculate_correctly():
-    command = [sys.executable, "-m", "study.pipeline.soundness"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stdout.splitlines()[-1]
-
-
 def test_the_calculation_that_ends_the_process_is_the_last_one_named():
     done = subprocess.run(
         [sys.executable, "-c", STAND_IN], capture_output=True, text=True, check=False

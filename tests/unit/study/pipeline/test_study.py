@@ -1,10 +1,9 @@
 """Studies: settings and defaults, scenes made out of others, and those that no subspace takes."""
 
-import shutil
-
 import pytest
 import yaml
 
+from bad_input.project import make_project
 from pdrom.core.errors import ConfigurationError
 from pdrom.core.yamlfile import read_yaml, validate
 from places import CONFIG, ROOT
@@ -71,16 +70,9 @@ def test_a_replicated_scene_is_faster_and_starts_elsewhere() -> None:
 @pytest.fixture
 def root(tmp_path):
     """A project with a scene of its own, in which wind blows."""
-    scenes = tmp_path / "config" / "scenes"
-    scenes.mkdir(parents=True)
-    files = ("methods.yaml", "default.yaml", "scenes/spring_oop.yaml")
-    for name in files:
-        shutil.copy(ROOT / "config" / name, tmp_path / "config" / name)
-    scene = yaml.safe_load((scenes / "spring_oop.yaml").read_text())
-    scene["name"] = "windy"
+    scene = read_yaml(CONFIG / "scenes" / "spring_oop.yaml") | {"name": "windy"}
     scene["effects"].append({"effect": "wind", "velocity": [1.0, 0.0, 0.0]})
-    (scenes / "windy.yaml").write_text(yaml.safe_dump(scene))
-    return tmp_path
+    return make_project(tmp_path, {"config/scenes/windy.yaml": yaml.safe_dump(scene)})
 
 
 def windy(root, **sections) -> Study:

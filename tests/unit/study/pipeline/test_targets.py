@@ -24,12 +24,9 @@ TINY = Folders("results/studies/tiny", "results/studies/tiny/paper/main.pdf")
         ("results/fom/a.h5", ["fom/a.h5"]),
     ],
 )
-def test_files_of_a_target(target, names):
+def test_files_of_a_target_lie_in_the_folder_of_the_study_unless_named(target, names):
     for place in (Folders(), TINY):
         assert files(target, place) == [f"{place.results}/{name}" for name in names]
-
-
-def test_files_that_have_a_place_of_their_own():
     for name in ("results/studies/tiny/x", "figure_teaser"):
         assert files(name, Folders()) == files(name, TINY) == [name]
     for name in ("paper/main.pdf", "paper/supplement.pdf"):

@@ -21,9 +21,6 @@ HORIZON = Horizon(perturbation=1e-10, threshold=1e-3)
 NOT_TIMED = pd.DataFrame(columns=["scene", "ms_per_frame"])  # table frame_times without rows
 
 
-# Break-even ---------------------------------------------------------------------------------------
-
-
 def curve(folder, scene: str, offset: float, slope: float, full: float) -> File:
     """A local step that costs offset + slope r at five sizes in no order, as a file."""
     r = np.array([5, 10, 20, 40, 100])
@@ -48,9 +45,6 @@ def test_every_line_has_its_own_break_even(tmp_path):
     )
     # 1 + 0.1 r = 4; r = 30.5; never; it never pays; exactly at the last size
     assert table.breakeven_r.fillna(-1).tolist() == [*np.repeat([30, 31, -1, 5, 100], 5)]
-
-
-# Runs that pay -----------------------------------------------------------------------------------
 
 
 ERROR = "relative_error_within_horizon"
@@ -129,9 +123,6 @@ def test_what_did_not_run_does_not_count():
     reruns = tables([("a", "deim", 0.01, 2.0, None), ("b", "deim", 0.01, 2.0, None)])
     (row,) = paid(reruns.assign(max_extent=[1.0, None])).itertuples()
     assert (row.scenes, row.accurate, row.heldout) == (1, 1, 0)
-
-
-# Effects ------------------------------------------------------------------------------------------
 
 
 NO_RUNS = pd.DataFrame(columns=["scene", "perturbation", "frame", "relative_difference"])

@@ -29,9 +29,6 @@ def written(path, *rows) -> File:
     return File(str(path), {})
 
 
-# Singular values ----------------------------------------------------------------------------------
-
-
 def basis_file(path, sigma, rank) -> File:
     axes = (True,) * 3
     basis = Basis(np.zeros((6, rank)), np.zeros(6), np.array(sigma), rank, 1e-9, 1, axes)
@@ -53,8 +50,6 @@ def test_singular_values_with_their_share_and_round_off(tmp_path):
     assert table.relative[3:].isna().all()
     assert table.above_roundoff.tolist() == [True, True, False, False, False]
 
-
-# Reruns -------------------------------------------------------------------------------------------
 
 NOT_TIMED = pd.DataFrame(columns=["scene", "ms_per_frame"])  # table frame_times without rows
 DISPLACEMENT = np.array([1.0, 2.0, 3.0, 4.0])
@@ -262,9 +257,6 @@ def test_damaged_runs_are_named(files):
         reduced_reruns(**files)
 
 
-# Accuracy against cost ----------------------------------------------------------------------------
-
-
 POINTS = st.lists(st.tuples(st.integers(0, 5), st.integers(0, 5)), min_size=1, max_size=12)
 
 
@@ -343,9 +335,6 @@ def test_without_a_converged_run_there_is_no_point_against_it(files, tmp_path):
     table = points(files, reduced_reruns(**files), sweep(tmp_path, error_converged=None))
     assert "fom" not in set(table.method)
     assert (table.method == "fewer-iterations").sum() == 1
-
-
-# Local share --------------------------------------------------------------------------------------
 
 
 def test_local_share_counts_assembly_and_is_the_share_of_the_whole_frame(tmp_path, files):

@@ -139,14 +139,6 @@ def test_a_least_squares_fit_may_select_an_element_more_and_no_other_method_may(
     assert noticed("elements_sampled", differences(alone, more, rows))
 
 
-def test_verdicts_that_rest_on_times_are_not_compared(tiny, monkeypatch):
-    monkeypatch.chdir(ROOT)
-    claims = tiny["claims"]
-    for claim, compared in (("C1", False), ("C5", True)):
-        verdict = claims.e.verdict.mask(claims.e.claim == claim, "another one")
-        assert bool(differences(claims, claims.e.assign(verdict=verdict))) == compared
-
-
 def test_a_message_names_the_row_and_how_far_it_is_off(tiny):
     found = tiny["singular_values"].e.copy()
     found.loc[found.singular_value.idxmax(), "singular_value"] *= 2

@@ -234,17 +234,6 @@ def test_missing_pieces_are_named(tmp_path):
         file.attrs["unit"]
 
 
-@pytest.mark.parametrize("fault", [ZeroDivisionError, KeyboardInterrupt])
-def test_a_failure_inside_hdf5_leaves_the_old_file(tmp_path, fault):
-    path = tmp_path / "result.h5"
-    path.write_text("old")
-    with pytest.raises(fault), store.write_hdf5(path) as file:
-        file["x"] = np.arange(1000.0)
-        raise fault
-    assert path.read_text() == "old"
-    assert list(tmp_path.iterdir()) == [path]
-
-
 LIMITED = """
 import resource, sys
 import numpy as np

@@ -166,8 +166,3 @@ def test_a_plane_covers_the_region(name, seed):
     along = sides @ (point - centre) / np.einsum("ij,ij->i", sides, sides)
     assert np.abs(along).max() <= 0.5 + 1e-12
     assert abs(sides[0] @ sides[1]) < 1e-12
-
-
-def test_what_is_no_obstacle_has_no_body():
-    assert effect_config({"effect": "gravity"}, 0).body(LOW, HIGH) is None
-    assert effect_config({"effect": "self_collision", "thickness": 0.1}, 0).body(LOW, HIGH) is None

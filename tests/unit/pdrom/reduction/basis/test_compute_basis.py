@@ -76,9 +76,6 @@ def test_per_axis_layout_is_three_separate_pods():
     np.testing.assert_allclose(basis.singular_values, np.sqrt(squares), rtol=1e-12)
 
 
-# The published code's modes -----------------------------------------------------------------
-
-
 def published_modes(p: np.ndarray, signs: np.ndarray) -> np.ndarray:
     """The recipe written out with a dense SVD: divide by the deviation, POD, multiply, add, QR."""
     matrix = p.reshape(len(p), -1).T
@@ -124,9 +121,6 @@ def test_mean_in_modes_has_no_more_modes_than_rows(rng):
     p = rng.standard_normal((30, 6, 3))
     assert basis_of(p, BasisSpec()).rank == 18
     assert basis_of(p, BasisSpec(centring="mean-in-modes")).rank == 6
-
-
-# Hard input ---------------------------------------------------------------------------------
 
 
 @every_spec
@@ -215,9 +209,6 @@ def test_rows_without_mass_are_named(mass):
     basis_of(p, BasisSpec(), mass=masses)
     with pytest.raises(SnapshotError, match=r"\(11,\), required: \(12,\)"):
         basis_of(p, BasisSpec(), mass=masses[1:])
-
-
-# Type and file ------------------------------------------------------------------------------
 
 
 @every_spec

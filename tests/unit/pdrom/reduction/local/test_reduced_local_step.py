@@ -71,7 +71,6 @@ def whole(group, p: np.ndarray, preset: str) -> Reduction:
 
 
 def added(step: ReducedLocalStep) -> np.ndarray:
-    """What a step adds to the right-hand side."""
     rhs = np.zeros((N, 3))
     step.accumulate(np.zeros((N, 3)), rhs)
     return rhs
@@ -262,10 +261,3 @@ def test_steps_are_those_of_the_velocities():
     assert (expected > 0.0).all()
     np.testing.assert_allclose(step_norms(np.stack(positions)), expected, rtol=1e-12)
     assert len(step_norms(np.zeros((1, 2, 3)))) == 0
-
-
-def test_displacement_norms_by_hand():
-    reference = np.zeros((3, 2, 3))
-    reference[1:, 0, 0], reference[2, 1, 2] = 3.0, 4.0
-    assert displacement_norms(reference).tolist() == [3.0, 5.0]
-    assert displacement_norms(reference + 7.0).tolist() == [3.0, 5.0]

@@ -61,7 +61,6 @@ def reduction_of(p: np.ndarray, mass: np.ndarray, spec: MethodSpec, r: int) -> R
 
 
 def made(spec: MethodSpec, seed: int, r: int = 5) -> tuple[np.ndarray, Reduction]:
-    """Snapshots, and their reduction."""
     p, mass = data(seed)
     return p, reduction_of(p, mass, spec, r)
 
@@ -162,9 +161,6 @@ def test_selections_and_numbers_of_rows_and_elements_are_those_of_the_presets():
         assert len(reduction.elements) == len(np.unique(reduction.elements))
 
 
-# Axes ---------------------------------------------------------------------------------------
-
-
 def test_round_off_axis_does_not_enter_the_joint_method():
     """A planar scene: z is round-off, its coefficients are zero and the gain is that of x, y."""
     p, mass = data(13)
@@ -206,9 +202,6 @@ def test_poorer_axis_of_a_basis_per_axis_fails_beyond_its_rank_only():
     assert reduction_of(p, mass, joint, 5).gain == np.inf
     full = reduction_of(p, mass, MethodSpec(title="t", layout="per-axis", rows="all"), 8)
     np.testing.assert_allclose(full.reconstruct(p), p, atol=1e-11)
-
-
-# Selection ----------------------------------------------------------------------------------
 
 
 @given(name=st.sampled_from(list(EVERY)))

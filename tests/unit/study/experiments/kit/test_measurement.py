@@ -166,27 +166,6 @@ def test_a_stand_in_and_its_kernel_answer_as_the_effect_does(rng):
     assert space.compiled([module.Timed(g, ("begin_frame",)) for g in scene.groups])[0] is not None
 
 
-def test_a_scene_without_an_effect_does_not_ask_it(monkeypatch):
-    from pdrom.model.constraints.triangle_strain import TriangleStrain
-
-    scene = make_scene(*EFFECTS)
-    costs = module.effect_costs(scene, 2, 0, 1)
-
-    def refuse(*_):
-        raise AssertionError("strain was asked")
-
-    monkeypatch.setattr(TriangleStrain, "__init__", refuse)
-    with pytest.raises(AssertionError, match="strain was asked"):
-        module.left_out(scene, costs, 2, 0, 1)
-    monkeypatch.setattr("study.experiments.kit.costs.left_out_sets", lambda _: [("strain",)])
-    table = module.left_out(scene, costs, 2, 0, 1)
-    assert list(table.columns) == module.LEFT_OUT
-    row = table.iloc[0]
-    assert (row.left_out, row.groups) == ("strain", 1)
-    assert row.elements == scene.group("strain").elements
-    assert row.own_ms == costs.set_index("effect").ms_per_frame["strain"]
-
-
 def test_effects_of_a_frame_are_left_out_alone_and_groups_together():
     # a kick is over before the first frame
     bending = {"effect": "bending", "weight": 1.0}
@@ -198,6 +177,10 @@ def test_effects_of_a_frame_are_left_out_alone_and_groups_together():
         "spring + bending", "strain + bending",
     ]  # fmt: skip
     assert table.groups.tolist() == [3, 3, 3, 3, 2, 2, 2, 1, 1, 1]
+    assert list(table.columns) == module.LEFT_OUT
+    alone, both = costs.set_index("effect"), table.set_index("left_out").loc["spring + strain"]
+    assert both.elements == alone.elements[["spring", "strain"]].sum()
+    assert both.own_ms == pytest.approx(alone.ms_per_frame[["spring", "strain"]].sum())
     single = make_scene({"effect": "spring", "weight": 1.0})
     costs = module.effect_costs(single, 1, 0, 1)
     assert len(module.left_out(single, costs, 1, 0, 1)) == 0

@@ -207,16 +207,6 @@ def test_a_share_of_rows_must_agree_and_ratios_near_the_limit_decide_nothing(
     assert outcome.measured == "0.5 to 0.75"
 
 
-@given(st.floats(0.5, 1.0), st.integers(0, 60), st.integers(0, 60))
-def test_the_opposite_comparison_gives_the_opposite_answer(share, good, bad):
-    opposite = {HOLDS: FAILS, FAILS: HOLDS, DEPENDS: DEPENDS, UNDECIDED: UNDECIDED}
-    first, second = (verdicts.answer(share, agreeing, good + bad) for agreeing in (good, bad))
-    if share * (good + bad) == good == bad:  # half and half satisfies the share of a half
-        assert first == second
-    else:
-        assert second == opposite[first]
-
-
 def test_a_condition_breaks_the_answer_down():
     for threshold, margin, told in ((0.6, 1.0, True), (0.6, 1.6, True), (0.5, 1.0, False)):
         test = rule("local_share", ">=", threshold, margin=margin, by="scene", **COMPILED)
@@ -401,9 +391,6 @@ def test_held_out_motions_decide_by_their_median():
     assert verdicts.values_of(rule("heldout_rerun_error"), none).empty
 
 
-# Which cells a clock decides ----------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("name", RULES)
 def test_a_metric_reads_no_column_that_it_does_not_name(name):
     """So that a claim counts as timed if and only if it uses times."""
@@ -471,45 +458,32 @@ def made(**rule) -> pd.DataFrame:
     return rows[rows.part == "published"]
 
 
-def by_variation(rows: pd.DataFrame, varied: str) -> dict[str, str]:
+@pytest.mark.parametrize(
+    ("changes", "varied", "expected"),
+    [
+        ({}, "threshold",
+         {"x 0.5": HOLDS, "x 0.8": HOLDS, "x 1.25": DEPENDS, "x 2": FAILS}),
+        ({}, "share",
+         {"0.5": HOLDS, "0.6": DEPENDS, "0.75": DEPENDS, "0.9": DEPENDS, "1": DEPENDS}),
+        ({}, "sizes", {"r up to 10": HOLDS, "r above 10": FAILS}),
+        ({}, "scenes", {"without a": DEPENDS, "without b": DEPENDS}),
+        ({"where": {"scene": ["a"]}}, "scenes", {}),
+        # margins vary where times are compared, splits where a test names more than one
+        ({}, "margin", {}),
+        ({"metric": "local_share", "threshold": 0.35}, "margin",
+         {"1": HOLDS, "1.25": HOLDS, "1.5": HOLDS, **dict.fromkeys(("2", "3", "5"), MACHINE)}),
+        ({}, "splits", {}),
+        ({"where": {"split": ["train"]}}, "splits", {}),
+        ({"where": {"split": ["test", "train"]}}, "splits", {"train": DEPENDS}),
+    ],
+)  # fmt: skip
+def test_verdicts_under_other_rules(changes, varied, expected):
+    rows = made(**changes)
     chosen = rows[rows.varied == varied]
-    return dict(zip(chosen.variation, chosen.verdict, strict=True))
-
-
-def test_thresholds_and_shares():
-    rows = made()
-    assert set(rows.verdict_of_rules) == {"depends"}
-    assert by_variation(rows, "threshold") == {
-        "x 0.5": "holds", "x 0.8": "holds", "x 1.25": "depends", "x 2": "does not hold",
-    }  # fmt: skip
-    assert by_variation(rows, "share") == {
-        "0.5": "holds", "0.6": "depends", "0.75": "depends", "0.9": "depends", "1": "depends",
-    }  # fmt: skip
-    assert (rows.same == (rows.verdict == "depends")).all()
-
-
-def test_margins_vary_where_times_are_compared():
-    assert by_variation(made(), "margin") == {}
-    rows = made(metric="local_share", threshold=0.35)
-    assert by_variation(rows, "margin") == {
-        "1": "holds", "1.25": "holds", "1.5": "holds",
-        **dict.fromkeys(("2", "3", "5"), verdicts.MACHINE),
-    }  # fmt: skip
-    assert set(rows.verdict_of_rules) == {"holds"}
-
-
-def test_rows_that_are_left_out():
-    rows = made()
-    assert by_variation(rows, "sizes") == {"r up to 10": "holds", "r above 10": "does not hold"}
-    assert by_variation(rows, "scenes") == {"without a": "depends", "without b": "depends"}
-    assert by_variation(made(where={"scene": ["a"]}), "scenes") == {}
-
-
-def test_splits_vary_where_a_test_names_one():
-    assert by_variation(made(), "splits") == {}
-    # no row of this table is of another split: there is nothing to vary to
-    assert by_variation(made(where={"split": ["train"]}), "splits") == {}
-    assert by_variation(made(where={"split": ["test", "train"]}), "splits") == {"train": "depends"}
+    assert dict(zip(chosen.variation, chosen.verdict, strict=True)) == expected
+    unchanged = HOLDS if "metric" in changes else DEPENDS
+    assert set(rows.verdict_of_rules) == {unchanged}
+    assert (rows.same == (rows.verdict == unchanged)).all()
 
 
 def test_every_test_says_what_it_found_and_those_that_decide_give_the_by_variation():

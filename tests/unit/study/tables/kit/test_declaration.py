@@ -1,7 +1,5 @@
 """Declarations: what they refuse, what they make of a frame, and that the study's are sound."""
 
-import re
-
 import pandas as pd
 import pytest
 from hypothesis import given
@@ -10,8 +8,6 @@ from hypothesis import strategies as st
 from machines.same_results import without_times
 from pdrom.core.errors import StorageError
 from pdrom.core.store import read_table, write_table
-from places import ROOT
-from study.artifact.artifact import load
 from study.artifact.reads import Setting
 from study.tables import declared
 from study.tables.kit.declaration import flag, integer, number, table, text, timed
@@ -108,9 +104,6 @@ def test_a_faulty_declaration_is_refused(columns, reads, message):
             """Nothing."""
 
 
-# Times --------------------------------------------------------------------------------------------
-
-
 def test_only_times_may_differ(tmp_path):
     def seen(**changes):
         return without_times(invented, invented([ROW | changes]), tmp_path)
@@ -120,17 +113,6 @@ def test_only_times_may_differ(tmp_path):
     for name, other in {"name": "b", "count": 4, "size": 0.25, "good": False}.items():
         assert not seen(**{name: other}).equals(seen())
         assert not seen(**{name: None}).equals(seen())
-
-
-# The study's tables -------------------------------------------------------------------------------
-
-
-def test_every_table_is_declared_once_and_found_at_its_address():
-    texts = [path.read_text() for path in (ROOT / "src/study/tables").rglob("*.py")]
-    assert len(declared()) == sum(len(re.findall(r"^@(?:table|declare)\(", t, re.M)) for t in texts)
-    for name, made in declared().items():
-        assert load(made.address) is made
-        assert made.name == name
 
 
 def test_every_column_says_what_it_is_and_a_measured_time_is_timed():
