@@ -144,6 +144,8 @@ def body(name):
 def test_corners_are_on_the_surface_that_keeps_vertices_out(name):
     (contact,) = make_scene(SPRING, {"effect": name, **BODIES[name]}).contacts
     assert np.abs(contact.gaps(body(name).points)).max() < 1e-12
+    inside, outside = contact.gaps(np.array([[0.0, 0.0, 0.3], [0.0, 9.0, 0.0]]))
+    assert inside < 0.0 < outside
 
 
 @pytest.mark.parametrize("name", ["sphere", "box"])
