@@ -1,7 +1,7 @@
 """Faults lose nothing: after a plain rerun the results are those of an undisturbed run.
 
 The real ``./reproduce`` runs a very small study in a folder of its own; processes are killed, disks
-fill up, files are damaged, clocks jump. What a clock measured is not compared (`Sandbox.results`).
+fill up, files are damaged. What a clock measured is not compared (`Sandbox.results`).
 The long ones are marked slow: ``./reproduce test -m slow``.
 """
 
