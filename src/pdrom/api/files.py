@@ -182,6 +182,8 @@ def load(path: str | os.PathLike[str], unchecked: bool = False) -> Run:
 @contextmanager
 def opened(path: Path, what: str, unchecked: bool = False) -> Iterator[h5py.File]:
     """Open the file ``path`` to read a ``what`` from it; StorageError for any fault of it."""
+    if path.is_file() and not h5py.is_hdf5(path):
+        raise StorageError(f"{path}: holds no {what}: it is no HDF5 file")
     try:
         with store.open_hdf5(path, unchecked) as file:
             store.require_self_contained(file, path)

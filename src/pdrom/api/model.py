@@ -77,7 +77,8 @@ class Model:
     training : how it was trained
     validation : table of trajectories: ``trajectory``, ``position_error``, ``deformation_error``,
         ``replay_error`` (position error of the first training run, shown instead), ``ms`` per
-        frame, ``speedup`` over the full order, ``busy`` (other programs ran: times mean nothing)
+        frame, ``speedup`` over the full order, ``busy`` (other programs ran: times mean nothing),
+        ``blowup_frame`` (NaN: none)
     """
 
     scene: Scene
@@ -86,28 +87,22 @@ class Model:
     validation: pd.DataFrame
 
     def __repr__(self) -> str:
-        total = sum(group.elements for group in self.scene.groups)
-        used = f"{self.reduced.elements_evaluated(self.scene)} of {total} elements"
-        return f"Model({self.title}: {used}, {self.training}{self._validated()}, {self._size})"
+        own, solved = self.reduced, " converged" * self.training.converged
+        kept = own.columns.B if isinstance(own, SubspaceModel) else own.reduction.basis.V
+        parts = [f"Model({self.title}: {self.training}"]
+        if len(self.validation):
+            position, deformation = worst_errors(self.validation)
+            against = f"against {len(self.validation)}{solved} runs of the full order"
+            errors = f"{position:.2g} (positions), {deformation:.2g} (deformation)"
+            parts.append(f"largest errors {against} {errors}")
+        return f"{', '.join(parts)}, {kept.nbytes / 1e6:.2g} MB)"
 
     @property
     def title(self) -> str:
-        """Name of the training scene and size of the model."""
-        return f"a model of '{self.scene.config.name}' ({self.reduced.title})"
-
-    @property
-    def _size(self) -> str:
-        own = self.reduced
-        kept = own.columns.B if isinstance(own, SubspaceModel) else own.reduction.basis.V
-        return f"{kept.nbytes / 1e6:.1f} MB"
-
-    def _validated(self) -> str:
-        if self.validation.empty:
-            return ""
-        worst = self.validation[["position_error", "deformation_error"]].astype(float).max()
-        return (
-            f", largest errors {worst.iloc[0]:.2g} (positions), {worst.iloc[1]:.2g} (deformation)"
-        )
+        """Name of the training scene, modes of the model, and elements that it evaluates."""
+        total = sum(group.elements for group in self.scene.groups)
+        used = f"{self.reduced.elements_evaluated(self.scene)} of {total} elements"
+        return f"a model of '{self.scene.config.name}' ({self.reduced.title}, {used})"
 
     def run(
         self,
@@ -160,23 +155,24 @@ class Model:
             subspaces.require_holds(scene, self.reduced.columns)
         return self.reduced.loop(scene)
 
-    def speed(self, scene: Scene, frames: int = 20, repeats: int = 5) -> dict[str, Any]:
+    def speed(self, scene: Scene, repeats: int = 3) -> dict[str, Any]:
         """Measure the model and the full order in turn, in this process, on ``scene``.
 
-        Return ``ms`` and ``full_ms`` per frame, medians of ``repeats`` runs of the first ``frames``
-        frames, their ratio ``speedup``, and ``busy``, whether other programs ran meanwhile.
+        Return ``ms`` and ``full_ms`` per frame, medians of ``repeats`` runs of all frames, their
+        ratio ``speedup``, and ``busy``, whether other programs took the processor meanwhile.
         """
-        frames = min(frames, scene.config.frames)
+        files.require_runnable(scene, None, silent)
+        frames = scene.config.frames
         made: list[tuple[Stepper, State, Callable[..., Any]]] = [
             (*self.loop(scene), self.reduced.positions),
             (scene.stepper(track_objective=False), scene.initial_state(), lambda q: q),
         ]
-        spent = [[_ms(*one, frames) for one in made] for _ in range(1 + repeats)][1:]
-        (ms, full), share = (
-            np.median([[w for w, _ in pair] for pair in spent], axis=0),
-            np.median([wall / max(used, 1e-9) for pair in spent for wall, used in pair]),
-        )
-        return {"ms": ms, "full_ms": full, "speedup": full / ms, "busy": bool(share > BUSY)}
+        for one in made:
+            _ms(*one, 1)  # loads compiled code
+        spent = np.array([[_ms(*one, frames) for one in made] for _ in range(repeats)])
+        (ms, full), shares = np.median(spent[..., 0], axis=0), spent[..., 0] / spent[..., 1]
+        busy = bool(np.median(shares, axis=0).max() > BUSY)
+        return {"ms": ms, "full_ms": full, "speedup": full / ms, "busy": busy}
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the model to the file ``path`` (HDF5), from which `load_model` reads it."""
@@ -186,14 +182,14 @@ class Model:
         with made_by("pdrom.api.Model.save", config), store.write_hdf5(path) as file:
             file.attrs.update(format=FORMAT, kind=type(self.reduced).__name__)
             store_mesh(self.scene.mesh, file.create_group("mesh"))
-            file["masses"] = self.scene.masses
+            _put(file, "masses", self.scene.masses, "kg")
             record = file.create_group("training")
             known = {name: v for name, v in vars(self.training).items() if v is not None}
             record["trajectories"] = list(known.pop("trajectories"))
             record.attrs.update(known)
             table = file.create_group("validation", track_order=True)
             for name, values in self.validation.items():
-                table[str(name)] = values.to_list()
+                _put(table, str(name), values.to_list(), "ms" if name == "ms" else "")
             own = file.create_group("model")
             if isinstance(self.reduced, ProjectionModel):
                 self.reduced.store(own)
@@ -210,15 +206,26 @@ def require_same_mesh(own: Scene, other: Scene) -> None:
             fault = f"another mesh than that of the training ({own.mesh.vertices} vertices)"
             raise ConfigurationError(f"scene '{other.config.name}': {fault}")
     wanted, found = (
-        {e.effect: e.model_copy(update={"weight": 1.0})
+        {e.effect: e.model_dump(exclude={"weight", "factors"})
          for e in scene.config.effects if isinstance(e, GroupConfig)}
         for scene in (own, other)
     )  # fmt: skip
-    if wanted != found:
-        raise ConfigurationError(
-            f"scene '{other.config.name}': groups {', '.join(found)}, required are those of the "
-            f"training with all keys but their weights: {', '.join(wanted)}"
-        )
+    fault = ""
+    if set(wanted) != set(found):
+        fault = f"groups {', '.join(found)}; the training has {', '.join(wanted)}"
+    for name in {} if fault else wanted:
+        for key, value in wanted[name].items():
+            if found[name][key] != value:
+                fault = f"{name}.{key} = {found[name][key]}; the training has {value}"
+    if fault:
+        raise ConfigurationError(f"scene '{other.config.name}': {fault}")
+
+
+def worst_errors(validation: pd.DataFrame) -> list[float]:
+    """Largest errors of positions and of deformation; inf if one of the runs blew up."""
+    if validation.blowup_frame.notna().any():
+        return [np.inf, np.inf]
+    return [float(validation[f"{kind}_error"].max()) for kind in ("position", "deformation")]
 
 
 def _ms(loop: Stepper, start: State, lift: Callable[..., Any], frames: int) -> tuple[float, float]:
@@ -226,7 +233,13 @@ def _ms(loop: Stepper, start: State, lift: Callable[..., Any], frames: int) -> t
     wall, used = perf_counter(), process_time()
     for state, _ in loop.run(start, range(frames)):
         lift(state.positions)
-    return 1e3 * (perf_counter() - wall) / frames, 1e3 * (process_time() - used) / frames
+    spent = perf_counter() - wall, max(process_time() - used, 1e-9)
+    return 1e3 * spent[0] / frames, 1e3 * spent[1] / frames
+
+
+def _put(file: h5py.Group, name: str, values: Any, unit: str) -> None:
+    file[name] = values
+    file[name].attrs["unit"] = unit
 
 
 def _export(scene: Scene, model: SubspaceModel, file: h5py.Group) -> None:
@@ -251,8 +264,7 @@ def _export(scene: Scene, model: SubspaceModel, file: h5py.Group) -> None:
         arrays[f"groups/{group.name}/strain"] = step.strain, "1"
         arrays[f"groups/{group.name}/weights"] = step.group.row_weights, "N/m"
     for name, (values, unit) in arrays.items():
-        file[name] = values
-        file[name].attrs["unit"] = unit
+        _put(file, name, values, unit)
     file.attrs.update(time_step=scene.config.time_step, iterations=scene.config.iterations)
 
 

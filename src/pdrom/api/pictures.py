@@ -116,6 +116,7 @@ def _viewed(runs: list[Run]) -> ViewedScene:
         ms=float(np.median(first.ms)),
         runs=tuple(_shown(run, first) for run in runs if run is not first),
         effects=config.effects,
+        method=first.method,
     )
 
 

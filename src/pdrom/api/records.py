@@ -46,13 +46,14 @@ class Snapshots:
 
 
 FULL = "full order"
+STILL = 1e-9  # a body that moves by less than this fraction of its coordinates' range stands still
 
 
 @dataclass(frozen=True)
 class Errors:
     """Errors of a run against the run that ``reference`` names.
 
-    position : of the positions, relative to the displacements of the reference; None without any
+    position : of the positions, relative to the reference's displacements; None if it stands still
     deformation : of the shapes, see `pdrom.model.metrics.deformation_error`; None of a rigid body
     """
 
@@ -148,8 +149,10 @@ class Run:
         moved, other = self.positions[1:], reference.positions[1:]
         rest, masses = self.scene.mesh.points, reference.scene.masses
         distance, moved_by = self.differences(reference), displacement_norms(reference.positions)
-        shape = deformation_error(moved, other, rest, masses)
-        return Errors(trajectory_error(distance, moved_by), shape, reference.title)
+        shape, still = deformation_error(moved, other, rest, masses), np.abs(np.ptp(rest)) * STILL
+        moves = moved_by.max(initial=0.0) > still * np.sqrt(len(rest))
+        position = trajectory_error(distance, moved_by) if moves else None
+        return Errors(position, shape, reference.title)
 
     def errors(self, reference: "Run") -> np.ndarray:
         """Error (F',) of the positions in each frame, relative to the RMS displacement."""

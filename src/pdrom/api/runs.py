@@ -17,6 +17,7 @@ from pdrom.core.errors import ConfigurationError, SnapshotError, choices
 from pdrom.core.provenance import made_by
 from pdrom.core.store import open_hdf5
 from pdrom.core.yamlfile import shown, validate
+from pdrom.model.constraints.base import ConstraintGroup
 from pdrom.model.dynamics.stepper import FrameReport
 from pdrom.model.dynamics.system import DEFAULT_SOLVER
 from pdrom.model.runs import run as run_full_order
@@ -140,12 +141,17 @@ def projections_model(
     ``group`` None is the scene's only group. Raises the errors of `basis`, and RankError if the
     snapshots have fewer than r modes above round-off.
     """
-    groups = full.scene.config.groups
-    if group is None and len(groups) > 1:
-        raise ConfigurationError(f"group: one of {', '.join(groups)} is required")
-    chosen, spec = full.scene.group(group or groups[0]), method_spec(method)
+    chosen, spec = group_of(full.scene, group), method_spec(method)
     made = basis(full, chosen.name, spec)
     return ProjectionModel(chosen.name, Reduction(made, select(made, spec, r), spec, r=r))
+
+
+def group_of(scene: Scene, name: str | None) -> ConstraintGroup:
+    """Group of this name, for None the only one; ConfigurationError if there are several."""
+    groups = scene.config.groups
+    if name is None and len(groups) > 1:
+        raise ConfigurationError(f"group: one of {', '.join(groups)} is required")
+    return scene.group(name or groups[0])
 
 
 def method_spec(method: str | MethodSpec) -> MethodSpec:

@@ -1,7 +1,7 @@
 """Training of reduced models: trajectories, basis, sampled elements, validation."""
 
 import logging
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from time import perf_counter
 from typing import Annotated, Any
@@ -11,12 +11,12 @@ import pandas as pd
 from pydantic import Field
 
 from pdrom.api import files
-from pdrom.api.model import Model, OnFrame, Training, require_same_mesh, silent
+from pdrom.api.model import Model, OnFrame, Training, require_same_mesh, silent, worst_errors
 from pdrom.api.records import FULL, Run
-from pdrom.api.runs import projections_model, run
+from pdrom.api.runs import group_of, method_spec, projections_model, run
 from pdrom.core.errors import ConfigurationError, NotReducibleError, SnapshotError
 from pdrom.core.store import require_finite
-from pdrom.core.yamlfile import ConfigModel
+from pdrom.core.yamlfile import ConfigModel, shown
 from pdrom.core.yamlfile import validate as checked
 from pdrom.model.mesh.selection import Selection, select_vertices
 from pdrom.model.runs import converged_run
@@ -24,12 +24,14 @@ from pdrom.model.scene import Scene
 from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.subspace.ecsw import Choose
 from pdrom.reduction.subspace.model import SubspaceModel
+from pdrom.reduction.subspace.space import require_effects
 from pdrom.reduction.subspace.training import make_columns, sampled_models
 
 log = logging.getLogger(__name__)
 
 # A frame has converged when one more iteration moves no vertex by more than this part of the mesh.
 CONVERGED, EVALUATIONS = 1e-6, 20_000
+METHOD = "gappy"  # by which the projections of a group are reduced if none is named
 SIZES = (20, 40, 80)  # numbers of modes that are tried for a required error
 VALIDATION = 1_000_000  # first seed of the validation trajectories
 Progress = Callable[[str, int], OnFrame]
@@ -40,19 +42,57 @@ Count = Annotated[int, Field(ge=0, le=10_000)]
 Bound = Annotated[float, Field(gt=0.0, lt=1.0)]
 
 
-class _Asked(ConfigModel):
+class Arguments(ConfigModel):
     """Arguments of `train` that are numbers, names or selections."""
 
-    modes: Count
-    tolerance: Bound | None
-    skinning: Count
-    hold: tuple[Selection, ...]
-    variations: Count
-    validate_: Annotated[Count, Field(alias="validate")]
-    converged: bool
-    error: Bound | None
-    group: str | None
-    r: Annotated[int, Field(ge=1, le=1_000_000)]
+    modes: Count = 40
+    tolerance: Bound | None = 0.01
+    skinning: Count = 0
+    hold: tuple[Selection, ...] = ()
+    variations: Count = 0
+    validate_: Annotated[Count, Field(alias="validate")] = 0
+    converged: bool = True
+    error: Bound | None = None
+    group: str | None = None
+    r: Annotated[int, Field(ge=1, le=1_000_000)] = 20
+
+
+def arguments(scene: Scene, given: Mapping[str, Any]) -> Arguments:
+    """Check arguments ``given`` to `train` by name, as far as possible before a run of ``scene``.
+
+    Raises the errors of `train`; an argument that another one makes meaningless is one of them.
+    """
+    names = [field.alias or name for name, field in Arguments.model_fields.items()]
+    plain = {key: v.item() if isinstance(v := given[key], np.generic) else v for key in names}
+    asked, basis, method = checked(Arguments, plain, "train"), given.get("basis"), given["method"]
+    own, usual = (a.model_dump(by_alias=True) for a in (asked, Arguments()))
+    changed = {key for key in names if own[key] != usual[key]}
+    changed |= {key for key in ("basis", "selection") if given.get(key) is not None}
+    changed |= {"others"} if given["others"] else set()
+    local = method is not None or asked.group is not None
+    apart = {
+        "group and method": (local, changed - {"group", "r", "validate"}),
+        "no group and no method": (not local, changed & {"r"}),
+        "error, which tries 20, 40 and 80 modes": (asked.error is not None, changed & {"modes"}),
+        "an own basis": (basis is not None, changed & {"modes", "error"}),
+        "tolerance None": (asked.tolerance is None, changed & {"selection"}),
+    }
+    for what, (applies, wrong) in apart.items():
+        if applies and wrong:
+            raise ConfigurationError(f"train: {', '.join(sorted(wrong))}: not with {what}")
+    if asked.error is not None and not asked.validate_:
+        raise ConfigurationError("train: error: validate = 0, one trajectory is needed")
+    for name in ("selection", "progress"):
+        if (function := given.get(name)) is not None and not callable(function):
+            raise ConfigurationError(f"train: {name} = {shown(function, 60)}: no function")
+    if local:
+        group_of(scene, asked.group)
+        method_spec(method or METHOD)
+    else:
+        require_effects(scene)
+    for one in asked.hold:
+        select_vertices(scene.mesh, one)
+    return asked
 
 
 def train(
@@ -108,47 +148,56 @@ def train(
         that no position subspace can simulate.
     """
     started = perf_counter()
-    runs = [files.require_run(one, "full") for one in (full, *others)]
-    given, keys = locals(), [field.alias or name for name, field in _Asked.model_fields.items()]
-    plain = {key: v.item() if isinstance(v := given[key], np.generic) else v for key in keys}
-    asked = checked(_Asked, plain, "train")
-    if asked.error is not None and not asked.validate_:
-        raise ConfigurationError("train: error: validate = 0: one validation trajectory is needed")
+    given, runs = locals(), [_full_order(one) for one in (full, *others)]
+    asked = arguments(full.scene, given)
     drawn = _variations(full.scene, "validation", asked.validate_, VALIDATION)
-    if method is not None or group is not None:
-        if others or asked.variations or asked.error is not None:
-            raise ConfigurationError("train: others, variations, error: without group and method")
-        reduced = projections_model(full, asked.group, method or "gappy", asked.r)
+    if method is not None or asked.group is not None:
+        reduced = projections_model(full, asked.group, method or METHOD, asked.r)
         done = Training((full.scene.config.name,), False, None, None, perf_counter() - started)
         tests = [_reference(scene, False, progress) for scene in drawn]
         return _validated(Model(full.scene, reduced, done, pd.DataFrame()), [full], tests)
-    for one in others:
+    for one in runs:
         require_same_mesh(full.scene, one.scene)
+        require_effects(one.scene)
+    hold = [select_vertices(full.scene.mesh, one) for one in asked.hold]
     more = _variations(full.scene, "variation", asked.variations, 1)
+    own = _own_columns(full.scene, basis)
     if asked.converged:
         references = [_reference(s, True, progress) for s in [*(one.scene for one in runs), *more]]
     else:
         references = [*runs, *(_reference(scene, False, progress) for scene in more)]
+    spent = perf_counter() - started
     tests = [_reference(scene, asked.converged, progress) for scene in drawn]
-    own = _own_columns(full.scene, basis)
-    tried: list[str] = []
+    tried: list[tuple[float, str]] = []
     for size in (asked.modes,) if asked.error is None else SIZES:
-        model = _trained(references, asked, size, own, selection, perf_counter() - started)
-        model = _validated(model, references, tests)
+        model = _trained(references, asked, size, hold, own, selection, spent)
+        spent, model = model.training.seconds, _validated(model, references, tests)
         if asked.error is None:
             return model
-        worst = model.validation[["position_error", "deformation_error"]][len(references) :]
-        tried.append(f"{worst.max(axis=None):.2g} with {size} modes")
-        if worst.max(axis=None) <= asked.error:
+        position, deformation = worst_errors(model.validation[len(references) :])
+        worst = float(np.nanmax([position, deformation, 0.0]))  # nan of a body that is rigid
+        if worst <= asked.error:
             return model
-    fault = f"no model is within error = {asked.error:g}; reached are {', '.join(tried)}"
+        reached = f"{position:.2g} (positions) and {deformation:.2g} (deformation; inf: blew up)"
+        tried.append((worst, f"{size} modes, with errors {reached}"))
+    fault = f"no model is within error = {asked.error:g}; the best has {min(tried)[1]}"
     raise NotReducibleError(f"scene '{full.scene.config.name}': {fault}")
+
+
+def _full_order(run: Any) -> Run:
+    """Return ``run``, if it is a run in full order that did not blow up."""
+    files.require_run(run, "full")
+    if not run.full_order or run.blowup_frame is not None:
+        ended = "" if run.blowup_frame is None else f", which blew up in frame {run.blowup_frame}"
+        raise ConfigurationError(f"full: {run.title}{ended}: a run in full order is required")
+    return run
 
 
 def _trained(
     references: Sequence[Run],
-    asked: _Asked,
+    asked: Arguments,
     modes: int,
+    hold: Sequence[np.ndarray],
     own: np.ndarray | None,
     selection: Choose | None,
     before: float,
@@ -159,12 +208,14 @@ def _trained(
     """
     started, scenes = perf_counter(), [run.scene for run in references]
     frames = np.concatenate([run.positions[1 :: len(references)] for run in references])
-    hold = [select_vertices(scenes[0].mesh, one) for one in asked.hold]
     columns = make_columns(scenes, frames, modes, asked.skinning, own, hold)
-    reduced = SubspaceModel(columns)
+    reduced, count = SubspaceModel(columns), modes + asked.skinning
+    if own is None and columns.modes < count:
+        log.warning("%d modes are asked for, %d exist", count, columns.modes)
     if asked.tolerance is not None:
         log.info("%d columns: selecting elements", columns.B.shape[1])
-        all_frames, bounds = np.arange(scenes[0].config.frames), [asked.tolerance]
+        longest = max(scene.config.frames for scene in scenes)
+        all_frames, bounds = np.arange(longest), [asked.tolerance]
         (reduced,) = sampled_models(scenes, columns, all_frames, bounds, choose=selection)
     names, seconds = tuple(one.config.name for one in scenes), before + perf_counter() - started
     done = Training(names, asked.converged, asked.tolerance, reduced.residual, seconds)
@@ -182,7 +233,9 @@ def _own_columns(scene: Scene, basis: Any) -> np.ndarray | None:
     if found.dtype.kind not in "fiu" or found.ndim != 2 or len(found) != scene.mesh.vertices:
         required = f"({scene.mesh.vertices}, K) numbers, a column for each basis vector"
         raise SnapshotError(f"basis: {found.dtype} {found.shape}, required: {required}")
-    return require_finite("basis", found.astype(float), SnapshotError)
+    found = require_finite("basis", found.astype(float), SnapshotError)
+    largest = np.abs(found).max(axis=0, initial=0.0)
+    return found / np.where(largest > 0.0, largest, 1.0)
 
 
 def _variations(scene: Scene, kind: str, count: int, seed: int) -> list[Scene]:
@@ -208,6 +261,7 @@ def _reference(scene: Scene, converged: bool, progress: Progress) -> Run:
             "converged=False (--unconverged) trains on the frames as they are"
         )
     ms = np.full(frames, 1e3 * (perf_counter() - started) / frames)
+    log.info("%s: converged in %.1f s", name, 1e-3 * ms.sum())
     return Run(scene, found, ms, method=f"{FULL}, converged")
 
 
@@ -215,7 +269,8 @@ def _validated(model: Model, training: Sequence[Run], tests: Sequence[Run]) -> M
     """Return ``model`` with the table of its runs of all trajectories."""
     rows = []
     for reference in (*training, *tests):
-        errors = model.run(reference.scene).error(reference)
+        made = model.run(reference.scene)
+        errors = made.error(reference)
         steps = reference.scene.config.time_step / training[0].scene.config.time_step
         at = np.round(steps * np.arange(len(reference.positions))).astype(np.int64)
         shown = training[0].positions[np.minimum(at, len(training[0].positions) - 1)]
@@ -225,5 +280,7 @@ def _validated(model: Model, training: Sequence[Run], tests: Sequence[Run]) -> M
             "trajectory": reference.scene.config.name, "position_error": errors.position,
             "deformation_error": errors.deformation, "replay_error": replayed.position,
             "ms": speed["ms"], "speedup": speed["speedup"], "busy": speed["busy"],
+            "blowup_frame": made.blowup_frame,
         })  # fmt: skip
-    return replace(model, validation=pd.DataFrame(rows))
+    numbers = dict.fromkeys(set(rows[0]) - {"trajectory", "busy"}, float)
+    return replace(model, validation=pd.DataFrame(rows).astype(numbers))

@@ -72,7 +72,12 @@ def run(arguments: Sequence[str]) -> int:
     except OSError as error:
         _drop_output()
         return _fail(f"{error.filename or 'standard output'}: {reason(error)}")
-    except KeyboardInterrupt:
+    except BaseException as error:
+        cause: BaseException | None = error
+        while cause and not isinstance(cause, KeyboardInterrupt):
+            cause = cause.__context__  # Numba, interrupted while it compiles, fails otherwise
+        if cause is None:
+            raise
         sys.stderr.write("\npdrom: interrupted\n")
         return INTERRUPTED
 

@@ -31,6 +31,9 @@ def perform(arguments: argparse.Namespace) -> Status:
     require_output(out, read)
     model = load_model(arguments.model) if arguments.model else None
     reference = load(arguments.compare, arguments.unchecked) if arguments.compare else None
+    if reference and not (reference.full_order and reference.scene.config == scene.config):
+        fault = f"{reference.title} is no run of this scene in full order"
+        raise ConfigurationError(f"--compare {arguments.compare}: {fault}")
     progress = Progress(scene.config.name, scene.config.frames)
     made = model.run(scene, out, progress) if model else run(scene, out, progress)
     sys.stdout.write(

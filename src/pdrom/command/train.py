@@ -10,47 +10,35 @@ from pdrom.command.base import SCENE, UNCHECKED, Command, Status, files_of, requ
 def perform(arguments: argparse.Namespace) -> Status:
     """Train a model on the run of a scene and on further runs; print it with its validation."""
     from pdrom.api import load, load_scene, run, train
-    from pdrom.api.runs import method_spec
+    from pdrom.api.training import arguments as check
     from pdrom.command.progress import Progress
     from pdrom.core.errors import StorageError
 
     file = Path(arguments.scene)
     out, scene = arguments.out or str(file.parent / f"{file.stem}.model.h5"), load_scene(file)
     require_output(out, [*files_of(arguments.scene, scene), *arguments.runs])
-    if arguments.group:
-        scene.group(arguments.group)
-    if arguments.method:
-        method_spec(arguments.method)
+    keys = ("modes", "tolerance", "skinning", "hold", "variations", "validate", "error")
+    given = {key: getattr(arguments, key) for key in (*keys, "group", "method", "r")}
+    given |= {"converged": not arguments.unconverged, "progress": Progress}
+    check(scene, given | {"others": arguments.runs[1:]})
     runs = [load(path, arguments.unchecked) for path in arguments.runs]
     for path, one in zip(arguments.runs[:1], runs, strict=False):
         if one.scene.config != scene.config:
             raise StorageError(f"{path}: a run of another scene than {arguments.scene}")
+    before = 0.0
     if not runs:
         runs = [run(scene, on_frame=Progress(scene.config.name, scene.config.frames))]
-    model = train(
-        *runs,
-        modes=arguments.modes,
-        tolerance=arguments.tolerance,
-        skinning=arguments.skinning,
-        hold=arguments.hold,
-        variations=arguments.variations,
-        validate=arguments.validate,
-        converged=not arguments.unconverged,
-        error=arguments.error,
-        group=arguments.group,
-        method=arguments.method,
-        r=arguments.r,
-        progress=Progress,
-    )
+        before = 1e-3 * runs[0].ms.sum()
+    model = train(*runs, **given)
     model.save(out)
     sys.stdout.write(f"{model.validation.to_string(index=False, float_format='%.3g')}\n")
-    first = model.validation.iloc[0]
+    first, seconds = model.validation.iloc[0], before + model.training.seconds
     saved = first.ms * (first.speedup - 1.0)  # ms per frame
-    paid = f"paid back after {1e3 * model.training.seconds / saved:.0f} frames"
+    paid = f"paid back after {1e3 * seconds / saved:.0f} frames"
     sys.stdout.write(
-        f"{out}: {model.title}; training took {model.training.seconds:.3g} s, "
+        f"{out}: {model.title}; training took {seconds:.3g} s, "
         f"{paid if saved > 0.0 else 'never paid back: the full order is as fast'}"
-        f"{' (times are unreliable: other programs ran)' * bool(first.busy)}\n"
+        f"{' (times are unreliable: other programs ran)' * bool(model.validation.busy.any())}\n"
     )
     return Status.DONE
 

@@ -25,8 +25,9 @@ class ConfigModel(BaseModel):
     @classmethod
     def _as_written(cls, data: Any) -> Any:
         """Refuse truth values (yes, on, true) and texts such as 1_0 where numbers are required."""
+        fields = {field.alias or name: field for name, field in cls.model_fields.items()}
         for key, value in data.items() if isinstance(data, dict) else ():
-            field = cls.model_fields.get(key)
+            field = fields.get(key)
             kind = bool if field is None else field.annotation
             for entry in value if isinstance(value, (list, tuple)) else [value]:
                 if isinstance(entry, bool) and kind is not bool:

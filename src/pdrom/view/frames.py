@@ -50,7 +50,8 @@ def _draw(scene: ViewedScene) -> Figure:
         RunPanel(f"frame {frame}", style.FULL_ORDER, q, reference=True)
         for frame, q in zip(numbers, full, strict=True)
     ]
-    labels = [f"{style.words(scene.name)}\nfull order"]
+    own = "\n".join(wrap(style.plain_words(scene.method), LABEL))
+    labels = [f"{style.words(scene.name)}\n{own}"]
     labels += ["\n".join(wrap(style.plain_words(run.title), LABEL)) for run in scene.runs]
     every = [reference, *([_panel(i, run, f) for f in numbers] for i, run in enumerate(scene.runs))]
     windows = [

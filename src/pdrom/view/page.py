@@ -46,6 +46,7 @@ class ViewedScene:
     positions : (F + 1, N, 3) m of the full-order run
     ms : milliseconds per frame of the full-order run, None if not measured
     effects : effects of the scene; obstacles among them are drawn
+    method : what computed the run that is shown as full-order run, if another did
     """
 
     name: str
@@ -56,6 +57,7 @@ class ViewedScene:
     ms: float | None
     runs: tuple[ViewedRun, ...] = ()
     effects: tuple[EffectConfig, ...] = ()
+    method: str = "full order"
 
 
 LARGEST = 25_000_000  # largest number of bytes of a page
@@ -112,6 +114,7 @@ def pack_scene(scene: ViewedScene) -> dict[str, Any]:
     return {
         "name": scene.name,
         "title": scene.title,
+        "method": scene.method,
         "triangles": pack_text(triangles.reshape(-1, 3).astype("<u4")),
         "timeStep": scene.time_step,
         "stride": stride,

@@ -78,7 +78,7 @@
       body.set(q);
       drawing.add(body);
     }
-    at("left").textContent = above() ? "full order (wires) and reduced" : "full order";
+    at("left").textContent = above() ? `${scene.method} (wires) and reduced` : scene.method;
     at("right").textContent = beside ? "reduced" : "";
     at("legend").hidden = !(shown.reduced && at("colour").checked);
     at("largest").textContent = `${(0.1 * side() / 1.4).toPrecision(2)} and more`;
@@ -185,7 +185,7 @@
 
   function tell() {
     const { scene, run } = shown, ms = (value) => (value === null ? "not timed" : `${value.toPrecision(3)} ms a frame`);
-    const parts = [`${scene.title}.`, `Full order: ${ms(scene.ms)}.`];
+    const parts = [`${scene.title}.`, `${scene.method}: ${ms(scene.ms)}.`];
     if (run) parts.push(`Reduced: ${ms(run.ms)}.`);
     if (run) parts.push(`Relative error: distance of the two runs over the full order's motion (its distance from the start, root mean square over the frames); ${told(run)}.`);
     if (run && run.blowup !== null) parts.push(`The reduced run blew up at frame ${run.blowup}.`);

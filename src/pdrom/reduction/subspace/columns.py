@@ -93,7 +93,13 @@ def build_columns(
     b = np.zeros((n, ends[-1]))
     for (vertices, block), own in zip(blocks, ranges, strict=True):
         b[np.ix_(vertices, own)] = block
-    return Columns(b, ranges[0], list(atoms), ranges[1:], modes.shape[1])
+    count = modes.shape[1]
+    if trajectory is None:  # own columns may depend on each other or be affine
+        count = (
+            len(ranges[0])
+            - orthonormal(weight * raw[:, : affine_columns(points).shape[1]]).shape[1]
+        )
+    return Columns(b, ranges[0], list(atoms), ranges[1:], count)
 
 
 def _atom_columns(

@@ -45,9 +45,8 @@ class SubspaceModel:
 
     @property
     def title(self) -> str:
-        """Numbers of modes and of sampled elements."""
-        sampled = sum(len(own.elements) for own in self.samples.values())
-        return f"{self.columns.modes} modes, {sampled or 'all'} elements"
+        """Number of modes."""
+        return f"{self.columns.modes} modes"
 
     @property
     def residual(self) -> float | None:
@@ -137,7 +136,8 @@ def require_holds(scene: Scene, columns: spaces.Columns) -> None:
             inside = [atom for atom in columns.atoms if np.isin(atom, unit).any()]
             found = np.sort(np.concatenate([np.empty(0, np.int64), *inside]))
             if not np.array_equal(found, np.sort(unit)):
-                held = boundary.side or f"{len(unit)} vertices"
+                some = ", ".join(map(str, unit[:5])) + ", ..." * (len(unit) > 5)
+                held = boundary.side or f"the vertices [{some}]"
                 raise NotReducibleError(
                     f"scene '{scene.config.name}', effect '{boundary.name}': holds {held}; the "
                     "training neither held these nor declared them (hold=[...], --hold)"

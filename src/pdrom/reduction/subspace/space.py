@@ -74,6 +74,16 @@ class DenseElimination:
         return rows[:, self.free] @ self._inverse
 
 
+def require_effects(scene: Scene) -> None:
+    """Raise NotReducibleError if ``scene`` has an effect that no position subspace can simulate."""
+    for effect in (*scene.forces, *scene.boundaries, *scene.contacts):
+        if not effect.in_subspace:
+            raise NotReducibleError(
+                f"scene '{scene.config.name}', effect '{effect.name}': needs all vertices in every "
+                "frame, which a position subspace does not have; only group and method reduce it"
+            )
+
+
 # Largest number of probes, the vertices at which contacts are detected.
 PROBES = 200
 
@@ -94,9 +104,7 @@ class ReducedSpace(Space):
     """
 
     def __init__(self, scene: Scene, columns: Columns, matrices: Sequence[np.ndarray]) -> None:
-        for effect in (*scene.forces, *scene.boundaries, *scene.contacts):
-            if not effect.in_subspace:
-                raise NotReducibleError(f"effect '{effect.name}' needs all vertices in every frame")
+        require_effects(scene)
         h = scene.config.time_step
         self.columns = columns
         mass = columns.B.T @ (scene.masses[:, None] * columns.B)

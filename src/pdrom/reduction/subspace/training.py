@@ -61,15 +61,15 @@ def sampled_models(
     """Models in ``columns`` with energy-conserving samples of every group, one per tolerance.
 
     Training data are iterates of runs of ``scenes`` in the subspace, with all elements projected.
-    Of each run, equally many of ``frames`` are used, about `FRAMES` in total. The first run begins
+    Of each run, equally many of its ``frames`` are used, about `FRAMES` in total. The first begins
     at ``start``, in subspace coordinates, or (if None) at its initial state. ``choose`` selects
     elements instead of non-negative least squares.
     """
-    count = -(-FRAMES // len(scenes))
-    chosen = frames[np.unique(np.linspace(0, len(frames) - 1, count).round().astype(int))]
-    training = training_run(scenes[0], columns, chosen, start)
-    for other in scenes[1:]:
-        training += training_run(other, columns, chosen[chosen < other.config.frames])
+    count, training = -(-FRAMES // len(scenes)), []
+    for i, scene in enumerate(scenes):
+        own = frames[frames < scene.config.frames]
+        chosen = own[np.unique(np.linspace(0, len(own) - 1, count).round().astype(int))]
+        training += training_run(scene, columns, chosen, None if i else start)
     found = {
         group.name: ecsw_elements(group, columns, training, tolerances, choose)
         for group in scenes[0].groups

@@ -255,7 +255,7 @@ def test_representations_are_one_line(full):
         (full.snapshots["spring"], "Snapshots(p=<6 x "),
         (
             model,
-            "Model(a model of 'scene' (spring, POD projection, r = 2, gain 1): 69 of 69 elements",
+            "Model(a model of 'scene' (spring, POD projection, r = 2, gain 1, 69 of 69 elements)",
         ),
         (made, "Basis(V=<"),
     ]

@@ -123,11 +123,57 @@ def test_the_smallest_model_within_an_error_is_returned_or_the_best_is_named(ful
     assert found.reduced.columns.modes == 20
     with pytest.raises(
         NotReducibleError,
-        match=r"no model is within error = 1e-06; reached are .* with 20 modes, .* with 80 modes",
+        match=r"no model is within error = 1e-06; the best has \d0 modes, with errors .* \(deform",
     ):
         api.train(full, validate=1, error=1e-6, converged=False)
-    with pytest.raises(ConfigurationError, match="validation trajectory is needed"):
+    with pytest.raises(ConfigurationError, match="validate = 0, one trajectory"):
         api.train(full, error=0.1)
+
+
+def test_a_model_that_blows_up_in_validation_is_not_within_an_error(full, monkeypatch):
+    monkeypatch.setattr("pdrom.api.model.BLOWUP_EXTENT", 1e-3)
+    with pytest.raises(NotReducibleError, match=r"errors inf .* blew up"):
+        api.train(full, validate=1, error=0.9, converged=False)
+
+
+def test_arguments_that_another_one_makes_meaningless_are_refused(full, model):
+    reduced = model.run(full.scene)
+    blown = replace(full, positions=full.positions[:4], ms=full.ms[:3], blowup_frame=3)
+    for words, runs, keys in (
+        ("r: not with no group", [full], {"r": 3}),
+        ("others: not with group and", [full, full], {"method": "pod"}),
+        (
+            "modes, tolerance: not with gr",
+            [full],
+            {"group": "spring", "modes": 3, "tolerance": 0.1},
+        ),
+        ("modes: not with error", [full], {"error": 0.1, "validate": 1, "modes": 3}),
+        ("modes: not with an own basis", [full], {"basis": np.eye(30, 2), "modes": 3}),
+        ("selection: not with tolerance", [full], {"tolerance": None, "selection": len}),
+        ("selection = 3: no function", [full], {"selection": 3}),
+        ("validate = True: a truth value", [full], {"validate": True}),
+        ("a run in full order is required", [reduced], {}),
+        ("blew up in frame 3: a run in full", [full, blown], {}),
+    ):
+        with pytest.raises(ConfigurationError, match=words):
+            api.train(*runs, **keys)
+    with pytest.raises(ConfigurationError, match=r"is train.* now"):
+        api.reduce(full)
+
+
+def test_speeds_are_of_all_frames_and_a_file_holds_a_model_of_a_body_at_rest(tmp_path):
+    still = api.build_scene(effects=[SPRING], mesh=MESH, frames=4)
+    model = api.train(api.run(still), modes=4)
+    assert model.training.residual == 0.0  # there are no equations to fit
+    assert model.reduced.elements_evaluated(still) == 69
+    assert model.validation[["position_error", "deformation_error"]].isna().all(axis=None)
+    model.save(tmp_path / "still.h5")
+    assert api.load_model(tmp_path / "still.h5").validation.equals(model.validation)
+    frames = []
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("pdrom.api.model._ms", lambda *a: frames.append(a[-1]) or (2.0, 1.0))
+        assert model.speed(still)["busy"]
+    assert set(frames) == {1, 4}
 
 
 def test_skinning_columns_and_several_runs_enlarge_the_space(full):
@@ -155,7 +201,7 @@ def test_only_holds_of_the_training_or_declared_ones_are_taken(full, model):
 def test_another_mesh_and_other_groups_are_refused(full, model):
     faulty = {
         "another mesh than that of the training": scene(mesh=MESH | {"rows": 7}),
-        "groups spring, strain, required are": scene(LEFT, SPRING, STRAIN),
+        "groups spring, strain; the training has spring": scene(LEFT, SPRING, STRAIN),
         "needs all vertices": scene(LEFT, SPRING, {"effect": "self_collision", "thickness": 0.01}),
     }  # fmt: skip
     for words, other in faulty.items():
@@ -247,13 +293,3 @@ def test_projections_of_a_group_are_another_kind_of_model(full):
     two = api.run(scene(LEFT, SPRING, STRAIN))
     with pytest.raises(ConfigurationError, match="group: one of spring, strain is required"):
         api.train(two, method="pod")
-    with pytest.raises(ConfigurationError, match="without group and method"):
-        api.train(full, full, method="pod")
-
-
-def test_a_group_at_rest_is_not_sampled():
-    """Nothing moves: there are no equations to fit."""
-    still = api.build_scene(effects=[SPRING], mesh=MESH, frames=4)
-    model = api.train(api.run(still), modes=4)
-    assert model.training.residual == 0.0
-    assert model.reduced.elements_evaluated(still) == 69
