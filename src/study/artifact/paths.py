@@ -141,10 +141,13 @@ LIVE_PAGE = Place("article/live.html")
 PLACES = tuple(place for place in vars().copy().values() if isinstance(place, Place))
 
 
-def labels_in(path: str, results: str) -> Iterator[dict[str, str]]:
-    """Yield labels, as {"scene": "bar140"}, for each kind of file whose pattern ``path`` fits."""
-    for place in PLACES:
-        with suppress(StorageError):
-            labels = place.file(path).labels
-            if place.at(results, **labels) == path:
-                yield labels
+def labels_in(
+    path: str, results: str, places: Iterable[Place] = PLACES
+) -> Iterator[tuple[Place, dict[str, str]]]:
+    """Yield each of ``places`` whose pattern ``path`` fits, and labels, as {"scene": "bar140"}."""
+    for place in places:
+        if path.startswith(f"{results}/{place.pattern.partition('{')[0]}"):
+            with suppress(StorageError):
+                labels = place.file(path).labels
+                if place.at(results, **labels) == path:
+                    yield place, labels

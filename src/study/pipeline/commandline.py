@@ -18,7 +18,7 @@ from typing import Any
 
 from yaml import YAMLError
 
-from pdrom.core.errors import ConfigurationError, PdromError
+from pdrom.core.errors import INTERRUPTED, ConfigurationError, PdromError
 from pdrom.core.yamlfile import read_yaml, require_as_written, shown
 from study.pipeline.folders import folders
 from study.pipeline.running import blocked
@@ -197,6 +197,9 @@ def one_line() -> Iterator[None]:
         sys.exit(f"pdrom: {error}")
     except OSError as error:
         sys.exit(f"pdrom: {PdromError(blocked(error))}")
+    except KeyboardInterrupt:
+        sys.stderr.write("pdrom: interrupted\n")
+        sys.exit(INTERRUPTED)
 
 
 def remember(command: CommandLine) -> None:

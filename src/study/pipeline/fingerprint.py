@@ -10,7 +10,7 @@ import ast
 import hashlib
 import json
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import cache
 from itertools import compress
@@ -31,10 +31,11 @@ class Memory:
     """JSON data that earlier commands computed, by hash of everything on which they depend.
 
     path : file with the data; one that is missing, damaged or read-only does no harm
+    most : number of entries that are kept although this command has not used them, newest first
     """
 
-    def __init__(self, path: Path) -> None:
-        self._path, self._used = path, dict[str, Any]()
+    def __init__(self, path: Path, most: int = 0) -> None:
+        self._path, self._used, self._most = path, dict[str, Any](), most
         try:
             self._held = dict(json.loads(path.read_text(encoding="utf-8")))
         except (OSError, ValueError, TypeError):
@@ -42,16 +43,27 @@ class Memory:
 
     def get(self, compute: Callable[[], Any], *sources: str) -> Any:
         """Return what ``compute`` returns; it depends only on ``sources`` and Python's version."""
-        key = hashlib.sha256(json.dumps([sys.version, *sources]).encode()).hexdigest()
+        key = _key(sources)
         if key not in self._used:
             self._used[key] = self._held[key] if key in self._held else compute()
         return self._used[key]
 
+    def put(self, value: Any, *sources: str) -> None:
+        """Let `get` return ``value`` for ``sources`` from now on."""
+        self._used[_key(sources)] = value
+        self._held.pop(_key(sources), None)
+
     def save(self) -> None:
-        """Replace the content of the file by the data that `get` returned, if any are new."""
+        """Write the data that `get` returned into the file, if any are new."""
         if not self._used.keys() <= self._held.keys():
+            others = [item for item in self._held.items() if item[0] not in self._used]
+            kept = dict(others[len(others) - min(len(others), self._most) :])
             with suppress(StorageError):
-                write_text(json.dumps(self._used), self._path, with_checksum=False)
+                write_text(json.dumps(kept | self._used), self._path, with_checksum=False)
+
+
+def _key(sources: Sequence[str]) -> str:
+    return hashlib.sha256(json.dumps([sys.version, *sources]).encode()).hexdigest()
 
 
 @cache

@@ -122,7 +122,7 @@ def asked_for(found: Iterable[str], plan: Plan) -> Iterator[str]:
     for path in sorted({*found} - plan.own_files):
         told = read_checksum(path)
         if told is None or told.file in ("", path):
-            known = paths.labels_in(path, plan.results)
+            known = [labels for _, labels in paths.labels_in(path, plan.results)]
             if any(w.get("scene") in scenes and w.get("method", "") in methods for w in known):
                 yield path
 

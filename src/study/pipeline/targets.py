@@ -68,7 +68,7 @@ def check_targets(plan: Plan, targets: Iterable[str], rules: Sequence[Any]) -> N
             continue
         if not any(rule.is_producer(target) for rule in rules):
             raise ConfigurationError(f"target '{target}': {_unknown(plan, target, own)}")
-        for labels in paths.labels_in(target, plan.results):
+        for _, labels in paths.labels_in(target, plan.results):
             for label, allowed in _allowed(plan.study, labels):
                 if label in labels and labels[label] not in allowed:
                     what = f"unknown {label} '{labels[label]}'{suggestion(labels[label], allowed)}"

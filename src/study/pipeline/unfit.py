@@ -5,7 +5,6 @@ checksum says of which path, settings, code and inputs it is. Snakemake is told 
 again, and makes what follows from them.
 """
 
-import json
 import os
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
@@ -15,10 +14,10 @@ from typing import Any
 
 from pdrom.core.errors import StorageError
 from pdrom.core.provenance import ORIGIN
-from pdrom.core.store import Condition, check_file, checksum_path, write_text
-from pdrom.core.store.checksum import read_checksum
-from study.artifact.paths import Place
-from study.experiments.kit.base import Experiment
+from pdrom.core.store import Condition, check_file, checksum_path
+from pdrom.core.store.checksum import provenance_of, read_checksum
+from study.artifact.paths import labels_in
+from study.pipeline.fingerprint import Memory
 from study.pipeline.plan import Job, Plan
 
 MISSING = "output is missing"
@@ -26,54 +25,34 @@ DAMAGED = "output is damaged"
 FOREIGN = "output belongs to another result"
 CHANGED = "settings or code have changed"
 STALE = "output was made from other inputs"
+FILES = 20_000  # number of files of which the content of checksums is kept
 # Faults that no edit and no interrupted run explains: a run names every file that has one.
 UNUSUAL = (MISSING, DAMAGED, FOREIGN)
 
 
-class Checked:
-    """Content of the checksums of results, stored with size, inode and dates of every file.
+class Checked(Memory):
+    """Content of the checksums of results, by path, size, inode and dates of both files.
 
-    The bytes of a file are compared with its checksum only if one of these has changed since then,
-    or those of its checksum file.
+    The bytes of a file are compared with its checksum only if one of these has changed.
     """
 
     def __init__(self, results: str) -> None:
-        self._path, self._changed = Path(results, ".checked.json"), False
-        try:
-            stored = dict(json.loads(self._path.read_text(encoding="utf-8")))
-            self._stored = {
-                path: [state, {key: told[key] for key in ("digest", *ORIGIN) if told}]
-                for path, (state, told) in stored.items()
-            }
-        except (OSError, ValueError, TypeError, KeyError):  # missing or damaged: files are read
-            self._stored = {}
+        super().__init__(Path(results, ".checked.json"), FILES)
 
     def told(self, path: str) -> dict[str, str] | None:
         """Digest and origin that the checksum of ``path`` says: {} if damaged, None if missing."""
-        state, stored = _state(path), self._stored.get(path)
-        if state[0] is False:
-            return None
-        if not stored or stored[0] != state:
-            self._stored[path] = stored = [state, _read(path)]
-            self._changed = True
-        told: dict[str, str] = stored[1]
+        state, exists = _state(path)
+        told: dict[str, str] = self.get(lambda: _read(path), path, state) if exists else None
         return told
 
     def distrust(self, paths: Iterable[str]) -> None:
         """Count ``paths`` as damaged from now on, until they are made again."""
         for path in paths:
-            self._stored[path] = [_state(path), {}]
-            self._changed = True
-
-    def save(self) -> None:
-        """Store this for the next command; a folder that cannot be written does no harm."""
-        if self._changed:
-            with suppress(StorageError):
-                write_text(json.dumps(self._stored), self._path, with_checksum=False)
+            self.put({}, path, _state(path)[0])
 
 
-def _state(path: str) -> list[Any]:
-    """Size, inode and dates of ``path`` and its checksum file; False for one that is missing."""
+def _state(path: str) -> tuple[str, bool]:
+    """Size, inode and dates of ``path`` and its checksum file as text; whether ``path`` exists."""
     found: list[Any] = []
     for each in (path, os.fspath(checksum_path(path))):
         try:
@@ -81,13 +60,13 @@ def _state(path: str) -> list[Any]:
             found.append([stat.st_size, stat.st_ino, stat.st_mtime_ns, stat.st_ctime_ns])
         except OSError:  # there may be a link that leads nowhere
             found.append(os.path.lexists(each))
-    return found
+    return str(found), bool(found[0])
 
 
 def _read(path: str) -> dict[str, str]:
     with suppress(StorageError):  # a folder, a link that leads nowhere, or no permission
         if check_file(path) is Condition.INTACT and (checksum := read_checksum(path)):
-            told = json.loads(checksum.provenance or "{}")
+            told = provenance_of(path)
             return {"digest": checksum.digest, **{key: told.get(key, "") for key in ORIGIN}}
     return {}
 
@@ -131,19 +110,12 @@ def needed(plan: Plan, targets: Sequence[str] = ()) -> dict[str, Job]:
     fixed = [job for jobs in plan.fixed.values() for job in jobs]
     rules = {job.artifact.rule: [*job.outputs.values()] for job in fixed}
     makers = {path: job for job in fixed for path in job.outputs.values()}
-    kinds: dict[str, list[tuple[Experiment, Place]]] = {}
-    for experiment in plan.experiments.values():
-        for place in experiment.writes.values():
-            kinds.setdefault(place.pattern.partition("/")[0], []).append((experiment, place))
+    experiments = {p: made for made in plan.experiments.values() for p in made.writes.values()}
     found: dict[str, Job] = {}
 
     def maker(path: str) -> Job | None:
-        kind = path.removeprefix(f"{plan.results}/").partition("/")[0]
-        for experiment, place in kinds.get(kind, ()):
-            with suppress(StorageError):
-                labels = place.file(path).labels
-                if place.at(plan.results, **labels) == path:
-                    return plan.job(experiment, labels)
+        for place, labels in labels_in(path, plan.results, experiments):
+            return plan.job(experiments[place], labels)
         return None
 
     def visit(path: str) -> None:

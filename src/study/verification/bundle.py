@@ -16,9 +16,10 @@ from pdrom import __version__
 from pdrom.core.errors import ConfigurationError
 from pdrom.core.store import atomic_path
 from study.artifact import paths
+from study.pipeline.commandline import one_line
 from study.pipeline.manifest import read_manifest
 from study.verification.files import verify_files
-from study.verification.subject import Status, Subject, ended, options_parser, say
+from study.verification.subject import Status, Subject, options_parser, say
 
 NAME = f"pdrom-{__version__}"
 
@@ -69,4 +70,5 @@ def _git(root: Path, *words: str) -> bytes:
 
 
 if __name__ == "__main__":
-    sys.exit(ended(lambda: bundle(sys.argv[1:])))
+    with one_line():
+        sys.exit(bundle(sys.argv[1:]))

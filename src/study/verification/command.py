@@ -1,7 +1,6 @@
 """Command ``./reproduce verify`` compares results with expected tables, or updates these tables."""
 
 import argparse
-import subprocess
 import sys
 from collections.abc import Iterable, Sequence
 from datetime import UTC, datetime
@@ -11,14 +10,15 @@ from pdrom.core.errors import ConfigurationError, StorageError
 from pdrom.core.machine import machine
 from pdrom.core.store import write_text
 from study.article.build import INDEX, write_verified
-from study.artifact.paths import ARTICLE
+from study.artifact.paths import ARTICLE, TABLE
+from study.pipeline.commandline import one_line
+from study.pipeline.unfit import faults
 from study.tables import declared
 from study.verification.examine import GOOD, Examination, Line, Outcome
 from study.verification.files import verify_files
 from study.verification.references import LOG, folder_of, note, write_reference
-from study.verification.subject import Status, Subject, ended, options_parser, say
+from study.verification.subject import Status, Subject, options_parser, say
 
-NOTHING = "Nothing to be done"
 CODES = "exit codes: 0 all holds; 1 faulty input; 2 not understood; 3 differs; 4 not there"
 PAGE = "verification.md"
 # Largest number of differences that the file `PAGE` lists for one table, figure or claim.
@@ -36,14 +36,9 @@ def update(subject: Subject, reason: str) -> Path:
         raise ConfigurationError('verify --update: say why, as in --reason "a new method"')
     examination = Examination(subject)
     tables = {name: examination.found(name) for name in declared()}
-    command = [sys.executable, "-m", "study.pipeline.front", "-n", *subject.options, "--"]
-    done = subprocess.run([*command, *declared()], capture_output=True, text=True, check=False)
-    if done.returncode != 0:
-        last = (done.stderr.strip().splitlines() or ["no word"])[-1]
-        raise StorageError(f"verify --update: the run cannot be planned: {last}")
-    if NOTHING not in done.stdout + done.stderr:
-        fault = f"tables are older than what they are made from; run {subject.command()} first"
-        raise StorageError(f"verify --update: {fault}")
+    targets = [TABLE.at(subject.results, name=name) for name in tables]
+    for path, fault in faults(subject.plan, targets).items():
+        raise StorageError(f"verify --update: {path}: {fault}; run {subject.command()} first")
     folder = folder_of(subject.results)
     for name, frame in tables.items():
         write_reference(declared()[name], frame, folder)
@@ -126,4 +121,5 @@ def page(lines: Sequence[Line], about: str) -> str:
 
 
 if __name__ == "__main__":
-    sys.exit(ended(lambda: verify(sys.argv[1:])))
+    with one_line():
+        sys.exit(verify(sys.argv[1:]))

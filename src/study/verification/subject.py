@@ -6,13 +6,12 @@ The results belong to one configuration, by default that of the last run.
 import argparse
 import shlex
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import cached_property
 from pathlib import Path
 
-from pdrom.core.errors import INTERRUPTED, PdromError
 from pdrom.core.yamlfile import read_yaml
 from study.pipeline.commandline import CommandLine, check_files, recall
 from study.pipeline.folders import DEFAULT, Folders, folders
@@ -76,24 +75,11 @@ def options_parser(command: str, about: str, epilog: str | None = None) -> argpa
 
 
 class Status(IntEnum):
-    """Exit code of ``verify`` and ``bundle``; code 2 is argparse's code for an unknown option."""
+    """Exit code of ``verify`` and ``bundle``; 1 is that of an error, 2 of an unknown option."""
 
     HOLDS = 0
-    FAULTY = 1
     DIFFERS = 3
     MISSING = 4
-
-
-def ended(command: Callable[[], int]) -> int:
-    """Run ``command``; return its exit code; report an error or an interruption in one line."""
-    try:
-        return command()
-    except (PdromError, OSError) as error:
-        sys.stderr.write(f"pdrom: {error}\n")
-        return Status.FAULTY
-    except KeyboardInterrupt:
-        sys.stderr.write("pdrom: interrupted\n")
-        return INTERRUPTED
 
 
 def say(line: str) -> None:

@@ -46,7 +46,7 @@ def test_an_own_study_plans_only_what_its_own_scenes_have():
     default = read_yaml(CONFIG_FOLDER / "default.yaml")
     own = Plan(Study(default | {"scenes": ["ball_shell", "torus_release"]}, ROOT), Folders("out"))
     own.check()
-    known = [labels for path in own.own_files for labels in paths.labels_in(path, "out")]
+    known = [found[1] for path in own.own_files for found in paths.labels_in(path, "out")]
     assert {labels["scene"] for labels in known if "scene" in labels} == {
         "ball_shell",
         "torus_release",
