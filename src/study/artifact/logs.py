@@ -1,7 +1,6 @@
 """Log file of a job, its time and memory, and the message that the user sees when the job fails.
 
-The last line of a job's log has its time and memory, measured in the job's own process. Snakemake's
-``benchmark:`` measures only every 30 s, which is longer than most jobs take.
+Snakemake's ``benchmark:`` measures only every 30 s, which is longer than most jobs take.
 """
 
 import errno
@@ -15,7 +14,6 @@ import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from io import TextIOWrapper
 from pathlib import Path
 from typing import TextIO
 
@@ -34,27 +32,13 @@ _WORDS = re.compile(
 FORMAT = "%(asctime)s %(levelname)-7s %(name)s: %(message)s"
 
 
-class _LogFile(logging.FileHandler):
-    """Log file that ignores a full disk: the job will fail anyway when it writes its outputs."""
-
-    stream: TextIOWrapper
-
-    def handleError(self, record: logging.LogRecord) -> None:
-        """Ignore an error of writing, for which the base class would print a traceback."""
-
-
 @contextmanager
 def job_log(path: str) -> Iterator[logging.Logger]:
     """Write log messages to ``path`` while a job runs; limit libraries to one thread meanwhile.
 
-    Snakemake would allow libraries as many threads as the job has cores, and more threads would
-    change the order of sums.
-
-    A `PdromError` (a user's mistake) ends the job with one line on stderr. Any other exception
-    leaves its traceback in the log and one line on stderr with the log's path; this line also says
-    if memory or disk space was lacking. The last line of the log has time and memory of a job that
-    succeeds, or Python's stack trace if a signal ends the job.
-
+    More threads would change the order of sums. A `PdromError` ends the job with one line on
+    stderr; any other exception also leaves its traceback in the log. The last line of the log has
+    time and memory of a job that succeeds, or Python's stack trace if a signal ends the job.
     Damaged results that the job reads are renamed, so that the next run makes them again.
     """
     start = time.monotonic()
@@ -62,9 +46,11 @@ def job_log(path: str) -> Iterator[logging.Logger]:
     logger = loggers[0]
     try:
         Path(path).parent.mkdir(parents=True, exist_ok=True)
-        handler = _LogFile(path, mode="w", encoding="utf-8")
+        handler = logging.FileHandler(path, mode="w", encoding="utf-8")
     except OSError as error:
         sys.exit(f"pdrom: {path}: cannot be written ({error.strerror})")
+    # on a full disk the job fails anyway when it writes its outputs
+    handler.handleError = lambda record: None  # type: ignore[method-assign]
     handler.setFormatter(logging.Formatter(FORMAT))
     previous = [each.level for each in loggers]
     for each in loggers:

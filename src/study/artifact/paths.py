@@ -58,10 +58,6 @@ class Place:
             raise StorageError(f"{path}: no file of the kind '{self.pattern}'")
         return File(path, found.groupdict())
 
-    def files(self, paths: Iterable[str]) -> "list[File]":
-        """Return the `File` of each path in ``paths``, in order."""
-        return [self.file(path) for path in paths]
-
     def paths(self, sources: Any, labels: Mapping[str, str]) -> str:
         """Path, found by the plan ``sources``, of this kind of file for a job's ``labels``."""
         return str(sources.file(self, labels))

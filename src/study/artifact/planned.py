@@ -1,10 +1,10 @@
 """Import the code that a run has planned, whatever happens to its files while the run is at work.
 
-A plan reads every source file once; fingerprints describe these texts. A run keeps the texts in a
-file, and its jobs import modules from there, so that an edit has no effect before the next run. A
-module keeps the path of its source file, for tracebacks and for the cache of compiled kernels.
+A run keeps the texts that its plan has read in a file, and its jobs import modules from there
+(docs/decisions/0001-code-fingerprints.md).
 
-``python -m study.artifact.planned MODULE ARGUMENTS`` runs a module in a new process of a job.
+``python -m study.artifact.planned MODULE ARGUMENTS`` runs a module in a new process of a job, and
+``... planned SCRIPT.py`` a job without the fork server.
 """
 
 import hashlib
@@ -94,4 +94,8 @@ def import_planned() -> None:
 if __name__ == "__main__":
     import_planned()
     del sys.argv[0]
-    runpy.run_module(sys.argv[0], run_name="__main__", alter_sys=True)
+    if sys.argv[0].endswith(".py"):
+        sys.path[0] = os.path.dirname(sys.argv[0])
+        runpy.run_path(sys.argv[0], run_name="__main__")
+    else:
+        runpy.run_module(sys.argv[0], run_name="__main__", alter_sys=True)

@@ -40,7 +40,7 @@ class Every:
         return sources.files(self.place, labels)
 
     def content(self, paths: Any) -> Any:
-        return self.place.files(map(str, paths))
+        return [self.place.file(str(path)) for path in paths]
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ import json
 import re
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -25,7 +25,7 @@ from study.artifact.text import replaced
 from study.experiments.machine import Record
 from study.figures.kit.declaration import declarations
 from study.paper.macros import HIDDEN, captions, decisions, keys_of, macros, number_of, provenance
-from study.paper.source import COMMENT, DOCUMENTS, PLACED, documents
+from study.paper.source import DOCUMENTS, documents
 from study.paper.tex import build_pdfs
 from study.paper.textables import TEX_TABLES, reads, tex_table
 from study.tables import declared
@@ -161,8 +161,7 @@ _CITE = re.compile(r"\\cite\{([^}]*)\}")
 def bibliography(source: str, references: Path) -> str:
     """Return a TeX bibliography of the works cited in ``source``, in the order of citation.
 
-    Raises PaperError if a cited key is not in ``references`` or lacks a field, or the file is not
-    BibTeX.
+    Raises PaperError, which names the file ``references``, if it lacks a cited work or a field.
     """
     cited = [key.strip() for group in _CITE.findall(source) for key in group.split(",")]
     keys = list(dict.fromkeys(cited))
@@ -216,36 +215,3 @@ paper = Artifact(
     {},
     build,
 )
-
-
-SUPPLEMENT = "S"  # prefix of the figure numbers in the supplement
-
-
-class Numbers(NamedTuple):
-    """Numbers of a figure in the manuscript and in the preprint; None where it does not occur.
-
-    The number in the manuscript is "3" in the paper, "S7" in the supplement.
-    """
-
-    manuscript: str | None
-    preprint: int | None
-
-    def label(self, name: str) -> str:
-        """Return the figure's ``name`` and numbers: "teaser (figure 1 of main.pdf)"."""
-        own = self.manuscript or ""
-        document = "supplement.pdf" if own.startswith(SUPPLEMENT) else "main.pdf"
-        places = {document: self.manuscript, "the preprint": self.preprint}
-        words = ", ".join(f"figure {n} of {place}" for place, n in places.items() if n is not None)
-        return f"{name} ({words})" if words else name
-
-
-def figure_numbers(root: Path) -> dict[str, Numbers]:
-    """Return name of a figure -> its numbers, from the manuscript's source below ``root``.
-
-    Raises PaperError if a file of the source is missing.
-    """
-    counted: dict[str, str] = {}
-    for prefix, source in zip(("", SUPPLEMENT), documents(root / "paper").values(), strict=True):
-        placed = PLACED.findall(COMMENT.sub("", source))
-        counted |= {name: f"{prefix}{number}" for number, name in enumerate(placed, 1)}
-    return {name: Numbers(counted.get(name), f.number) for name, f in declarations().items()}

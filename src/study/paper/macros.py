@@ -58,7 +58,6 @@ def macros(source: str, tables: Mapping[str, pd.DataFrame]) -> str:
 
 
 def _defined(lines: Sequence[str], kind: str, texts: Mapping[str, str]) -> str:
-    """Return TeX: ``lines``, then macros ``kind@NAME`` with ``texts`` (NAME -> expansion)."""
     made = [rf"\expandafter\def\csname {kind}@{k}\endcsname{{{text}}}" for k, text in texts.items()]
     return "\n".join([*lines, *made, r"\makeatother"]) + "\n"
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from pdrom.core.errors import PaperError
 
 DOCUMENTS = ("main", "supplement")
+SUPPLEMENT = "S"  # prefix of the figure numbers in the supplement
 OWN = "paper/own"
 PLACED = re.compile(r"\\figureof\{(\w+)\}")
 COMMENT = re.compile(r"(?m)^[ \t]*%.*\n|(?<!\\)%.*$")
@@ -30,6 +31,18 @@ def whole_source(document: Path) -> str:
 def documents(folder: Path) -> dict[str, str]:
     """Map each document of the manuscript in ``folder`` to its source text with all sections."""
     return {name: whole_source(folder / f"{name}.tex") for name in DOCUMENTS}
+
+
+def figure_numbers(root: Path) -> dict[str, str]:
+    """Map each figure of the manuscript below ``root`` to its number: "3", or "S7" of supplement.
+
+    Raises PaperError if a file of the source is missing.
+    """
+    counted: dict[str, str] = {}
+    for prefix, source in zip(("", SUPPLEMENT), documents(root / "paper").values(), strict=True):
+        placed = PLACED.findall(COMMENT.sub("", source))
+        counted |= {name: f"{prefix}{number}" for number, name in enumerate(placed, 1)}
+    return counted
 
 
 def source_files(root: Path, own: bool = False) -> list[str]:

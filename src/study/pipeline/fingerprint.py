@@ -1,9 +1,7 @@
 """Fingerprints: hashes of the code that a job runs, without its comments and docstrings.
 
-Snakemake reruns a job if a parameter of its rule changes, but not if a module changes that its
-script imports. Each rule therefore has the fingerprint of its modules as a parameter. Snakemake
-also reruns a job if its script is newer than its results. This would happen after any copy of the
-files or error of the clock; a hash of the script, as a parameter of the rule, replaces the date.
+Each rule has the fingerprint of the modules that its job runs as a parameter: Snakemake reruns the
+job if it changes (docs/decisions/0001-code-fingerprints.md).
 """
 
 import ast
@@ -166,7 +164,10 @@ def digest(root: Path, *names: str) -> str:
 
 
 def track_scripts(workflow: Any) -> None:
-    """Make Snakemake repeat jobs if the code of their script changes, whatever the file's date."""
+    """Make Snakemake repeat jobs if the code of their script changes, whatever the file's date.
+
+    The date of the script would repeat all jobs after a copy of the files.
+    """
     # not imported at the top, so that a plan can be made without Snakemake
     from snakemake.settings.types import RerunTrigger
 

@@ -63,10 +63,7 @@ class Run:
     """Run of the workflow in this process: its lock on the folder, fork server, last messages."""
 
     def __init__(self) -> None:
-        """Lock the working directory, or end the process with a message if it is locked already.
-
-        A command that runs no job, such as a dry run, needs no lock and works during another run.
-        """
+        """Lock the working directory, or end the process if it is locked; not if no job runs."""
         handle(leave)
         JobScheduler.exit_gracefully = staticmethod(leave)  # until jobs start
         with one_line():

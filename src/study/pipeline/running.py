@@ -1,10 +1,8 @@
 """The process of a run: it locks its folder, and ends at signals with one line.
 
-The operating system releases the lock when the process ends, for whatever reason. Snakemake's own
-lock consists of files, which a killed run leaves behind: a process that has the operating system's
-lock deletes them.
-
-At a signal, running jobs are ended, too, since Snakemake would wait for them for minutes.
+Snakemake's own lock consists of files, which a killed run leaves behind: a process that has the
+operating system's lock deletes them. At a signal, running jobs are ended, too, since Snakemake
+would wait for them for minutes.
 """
 
 import errno

@@ -11,7 +11,7 @@ from typing import Any
 from pdrom.core.errors import ConfigurationError, choices, suggestion
 from study.artifact import paths
 from study.figures.kit.declaration import declarations
-from study.paper.build import figure_numbers
+from study.paper.source import SUPPLEMENT, figure_numbers
 from study.pipeline.folders import Folders
 from study.pipeline.plan import Plan
 from study.pipeline.scenes import scene_names
@@ -27,21 +27,23 @@ def figure_files(words: Sequence[str]) -> list[str]:
     A figure is given by its name, its number in the paper (``3``), in the supplement (``S3``) or in
     the preprint (``preprint:3``).
     """
-    numbers = figure_numbers(Path())
-    by_place = {n.manuscript: name for name, n in numbers.items() if n.manuscript}
-    # error messages list 1, 2, ... 10, ... S1, S2, ...
-    known = {n: by_place[n] for n in sorted(by_place, key=lambda n: (len(n), n))}
-    known |= {f"{PREPRINT}{n.preprint}": name for name, n in numbers.items() if n.preprint}
-    known |= {name: name for name in numbers}
+    numbers, figures, found = figure_numbers(Path()), declarations(), []
+    known = {number: name for name, number in numbers.items()}
+    known |= {f"{PREPRINT}{f.number}": name for name, f in figures.items() if f.number}
+    known |= {name: name for name in figures}
     if not words:
         raise ConfigurationError(f"figure: its number or name is missing{choices('', known)}")
-    found = []
     for word in words:
         if word not in known:
             raise ConfigurationError(f"figure {word}: there is none{choices(word, known)}")
-        found.append(paths.FIGURE.at(paths.RESULTS, name=known[word]))
-        label = numbers[known[word]].label(known[word])
-        sys.stderr.write(f"reproduce: figure {label}: {found[-1]}\n")
+        name = known[word]
+        number, document = numbers.get(name, ""), "main"
+        if number.startswith(SUPPLEMENT):
+            document = "supplement"
+        places = {f"{document}.pdf": number, "the preprint": figures[name].number}
+        label = ", ".join(f"figure {n} of {place}" for place, n in places.items() if n)
+        found.append(paths.FIGURE.at(paths.RESULTS, name=name))
+        sys.stderr.write(f"reproduce: figure {name} ({label or 'in no document'}): {found[-1]}\n")
     return found
 
 

@@ -1,8 +1,7 @@
 """Results that a run makes again although Snakemake, which compares dates, would keep them.
 
-A result may be missing below others that are up to date, or damaged, or belong to another job: its
-checksum says of which path, settings, code and inputs it is. Snakemake is told to make such files
-again, and makes what follows from them.
+A checksum says of which path, settings, code and inputs a result is. Snakemake is told to make
+files again that do not fit the plan, and makes what follows from them.
 """
 
 import os

@@ -28,8 +28,7 @@ ON_PAGE = 20
 def update(subject: Subject, reason: str) -> Path:
     """Replace the expected tables by those of ``subject`` and log the reason; return their folder.
 
-    Raises ConfigurationError if the reason is empty. Raises StorageError if a table is missing,
-    damaged, or older than its inputs; then nothing is written.
+    Raises ConfigurationError without a reason, StorageError if a run would make a table again.
     """
     words = " ".join(reason.split())
     if not words:
@@ -51,7 +50,6 @@ def update(subject: Subject, reason: str) -> Path:
 
 
 def parser() -> argparse.ArgumentParser:
-    """Return the parser of the arguments after the word ``verify``."""
     made = options_parser("verify", "Compare the last run's results with the expected ones.", CODES)
     what = made.add_mutually_exclusive_group()
     what.add_argument("--files", action="store_true", help="check that no file has changed")

@@ -1,9 +1,8 @@
 """``./reproduce verify --files``: check that every file is unchanged since the last run.
 
 The plan of the study lists the files that must exist, the manifest has their checksums. Tables,
-figures and the manuscript are also made again from the existing files and compared. This reveals a
-file that was replaced together with its checksum and its manifest entry. Experiments take too long
-to be repeated; of their results only the checksums are compared.
+figures and the manuscript, unlike experiments, are also made again and compared, which reveals a
+file that was replaced together with its checksum and its manifest entry.
 """
 
 import filecmp

@@ -1,14 +1,9 @@
 """Start of jobs as forks of a process in which the libraries are already loaded.
 
-A study has hundreds of jobs, and a new interpreter needs about a second to load NumPy, SciPy,
-pandas and numba. One server process loads them once; each job is a fork of it. The workflow starts
-scripts by `client.py`, which requests a fork from the server, passes on its streams, environment
-and folder, and exits with the status of the fork. If no server answers (on a platform without safe
-forks, or after the server was killed), the client runs the script in its own interpreter.
-
-No fork outlives its run. If the client or the run is killed, the server ends the forks. If the
-server is killed, the operating system ends the forks, and the client what they had started. A job
-in its own interpreter outlives a killed run, which does no harm.
+The workflow starts scripts by `client.py`, which requests a fork from the server, passes on its
+streams, environment and folder, and exits with the status of the fork. If no server answers, the
+client runs the script in its own interpreter. No fork outlives its run, whichever process is killed
+(docs/decisions/0005-fork-server.md).
 """
 
 import os
@@ -47,10 +42,8 @@ def interpreter() -> str:
 def start_server(libraries: Sequence[str] = LIBRARIES) -> None:
     """Start the fork server of this process; the server ends when this process ends.
 
-    Jobs inherit the server's address in an environment variable. The address is an abstract socket
-    name of Linux: it is no file and disappears with the last listening process, so that a killed
-    run leaves nothing behind. Clients that connect before the ``libraries`` are loaded wait in the
-    queue of the socket.
+    Jobs inherit the server's address, an abstract socket name of Linux, in an environment variable.
+    Clients that connect before the ``libraries`` are loaded wait in the queue of the socket.
     """
     if not SUPPORTED:
         return

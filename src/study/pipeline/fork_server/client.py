@@ -12,7 +12,6 @@ import sys
 from contextlib import suppress
 
 ADDRESS = "PDROM_JOB_SERVER"
-ALONE = "--alone"
 GONE = 69  # exit status if the server is gone
 FORWARDED = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
@@ -27,7 +26,7 @@ def main() -> int:
     answer = ask(connection) if connection else b""
     if connection is None or not answer:
         signal.pthread_sigmask(signal.SIG_UNBLOCK, FORWARDED)
-        alone = [__file__, ALONE] if script else []
+        alone = ["-m", "study.artifact.planned"] if script else []
         os.execv(sys.executable, [sys.executable, *alone, *sys.argv[1:]])
     job = int(answer)
     for number in FORWARDED:
@@ -96,25 +95,9 @@ def receive(connection: socket.socket) -> bytes:
 
 
 def forward(job: int, number: int) -> None:
-    """Send signal ``number`` to the process ``job`` and all processes that it has started."""
     with suppress(ProcessLookupError):
         os.killpg(job, number)
 
 
-def run_alone() -> None:
-    """Run the script ``sys.argv[2]`` as main module, with the code that the run has planned."""
-    import runpy
-
-    from study.artifact.planned import import_planned
-
-    import_planned()
-    del sys.argv[:2]
-    sys.path[0] = os.path.dirname(sys.argv[0])
-    runpy.run_path(sys.argv[0], run_name="__main__")
-
-
 if __name__ == "__main__":
-    if sys.argv[1:2] == [ALONE]:
-        run_alone()
-    else:
-        sys.exit(main())
+    sys.exit(main())

@@ -1,8 +1,6 @@
 """Server process from which jobs are forked.
 
-The server has one thread. It loads libraries and modules that most jobs import, not modules of
-effects, which only some scenes use. It ends, together with its jobs, when the process that started
-it has ended. A client that is killed or sends an invalid request is disconnected.
+It has one thread, and ends, together with its jobs, when the process that started it has ended.
 """
 
 import atexit

@@ -31,9 +31,8 @@ from study.article.latex import linked_table
 from study.artifact.paths import File
 from study.experiments.machine import Record, Units
 from study.paper import build, textables
-from study.paper.build import figure_numbers
 from study.paper.macros import AGGREGATES, MISSING, format_number, matching
-from study.paper.source import documents
+from study.paper.source import documents, figure_numbers
 from study.paper.tex import find_pdflatex, packages_of
 
 SPECIAL = r"""
@@ -378,7 +377,7 @@ def test_references_have_the_numbers_of_the_pdf(small, tmp_path):
         links = [link for page in PAGES.values() for link in Links(pages / page).links]
         placed = {address: n for address, n in numbers.items() if "#fig:" in address}
         root = paper.parent if pages == small else ROOT
-        figures = {f"fig:{name}": n.manuscript for name, n in figure_numbers(root).items()}
+        figures = {f"fig:{name}": number for name, number in figure_numbers(root).items()}
         assert placed == {address: figures[address.partition("#")[2]] for address in placed} != {}
         shown = {a: words.strip("()") for kind, a, words in links if a in numbers and not kind}
         assert shown == {address: numbers[address] for address in shown}

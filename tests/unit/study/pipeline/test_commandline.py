@@ -4,7 +4,7 @@ import pytest
 
 from pdrom.core.errors import ConfigurationError
 from places import ROOT
-from study.paper.build import figure_numbers
+from study.paper.source import figure_numbers
 from study.pipeline.commandline import (
     LINES,
     OPTIONS,
@@ -163,7 +163,7 @@ def test_names_become_files_and_it_is_said(capsys):
 )
 @pytest.mark.parametrize("asked", ["own", "preprint", "name"])
 def test_a_figure_has_two_numbers_and_a_name(name, document, preprint, asked, capsys):
-    number = figure_numbers(ROOT)[name].manuscript
+    number = figure_numbers(ROOT)[name]
     word = {"own": number, "preprint": f"preprint:{preprint}", "name": name}[asked]
     made = f"results/figures/{name}.pdf"
     assert completed(["figure", word, "-n"]) == [

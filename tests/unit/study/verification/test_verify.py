@@ -115,7 +115,7 @@ def test_an_update_writes_every_table_and_notes_the_reason(results, subject, mon
 
 def test_tables_that_a_run_would_make_again_are_not_expected(results, subject):
     """No job of this plan has written the tables at hand."""
-    with pytest.raises(StorageError, match=r"update: results/.*: settings or code have changed; run"):
+    with pytest.raises(StorageError, match=r"results/.*: settings or code have changed; run"):
         update(subject, "a new method")
     assert not (folder_of(RESULTS) / LOG).exists()
 
