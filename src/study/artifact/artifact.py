@@ -21,6 +21,7 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from functools import cache, cached_property
 from importlib import import_module
+from pkgutil import resolve_name
 from typing import Any, ClassVar, TypeVar, get_type_hints
 
 from pydantic import BaseModel, TypeAdapter
@@ -64,7 +65,7 @@ class Artifact:
 
     @property
     def address(self) -> str:
-        """Address ``module:name`` by which the function `load` imports the artifact."""
+        """Address ``module:name`` of the artifact."""
         return f"{self.function.__module__}:{self.name}"
 
     @property
@@ -97,8 +98,8 @@ class Artifact:
 
     def settings(self, sources: Sources, labels: Labels) -> dict[str, Any]:
         """Map parameters to the job's valid settings; a missing one raises ConfigurationError."""
-        reads = [(name, read) for name, read in self.reads.items() if isinstance(read, SettingRead)]
-        values = {name: read.value(sources, labels) for name, read in reads}
+        reads: Mapping[str, Any] = self.reads
+        values = {name: reads[name].value(sources, labels) for name in self.types}
         return {name: self.types[name].validate_python(value) for name, value in values.items()}
 
     def plain(self, settings: Mapping[str, Any]) -> dict[str, Any]:
@@ -138,7 +139,7 @@ def make(
 
     The other arguments are attributes of a `study.pipeline.plan.Job`.
     """
-    made = load(address)
+    made: Artifact = resolve_name(address)
     digests = map(digest_told, made.paths(job["inputs"], edited=False))
     try:
         with recorded(made, job["settings"], labels, code, content, digests):
@@ -154,13 +155,6 @@ def declare(made: A, *parameters: str) -> A:
         inspect.signature(made.function).bind(**made.reads, **dict.fromkeys(parameters))
     except TypeError as error:
         raise TypeError(f"{made.rule}: {error}") from error
-    return made
-
-
-def load(address: str) -> Artifact:
-    """Import the artifact at an address ``module:name``, and return it."""
-    module, _, name = address.partition(":")
-    made: Artifact = getattr(import_module(module), name)
     return made
 
 

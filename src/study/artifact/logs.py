@@ -13,9 +13,8 @@ import time
 import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TextIO
+from typing import NamedTuple, TextIO, cast
 
 from threadpoolctl import threadpool_limits
 
@@ -25,10 +24,7 @@ from pdrom.core.store.checksum import damaged_set_aside
 PACKAGES = ("pdrom", "study")
 MB = 1e6
 _PEAK = 1.0 if sys.platform == "darwin" else 1024.0  # bytes per unit of getrusage's ru_maxrss
-_WORDS = re.compile(
-    r"used (?P<wall>[0-9.]+) s, (?P<processor>[0-9.]+) s of processor time, "
-    r"(?P<memory>[0-9.]+) MB of memory$"
-)
+_WORDS = re.compile(r"used ([0-9.]+) s, ([0-9.]+) s of processor time, ([0-9.]+) MB of memory\n*\Z")
 FORMAT = "%(asctime)s %(levelname)-7s %(name)s: %(message)s"
 
 
@@ -56,7 +52,7 @@ def job_log(path: str) -> Iterator[logging.Logger]:
     for each in loggers:
         each.addHandler(handler)
         each.setLevel(logging.INFO)
-    faulthandler.enable(handler.stream)
+    faulthandler.enable(cast(TextIO, handler.stream))
     try:
         with threadpool_limits(limits=1), damaged_set_aside():
             yield logger
@@ -104,14 +100,10 @@ def _fault(error: Exception) -> str:
     return f"{type(error).__name__}: {error}"
 
 
-@dataclass(frozen=True)
-class Usage:
-    """Time and memory of a job.
+class Usage(NamedTuple):
+    """Seconds of a job, of processor time (with processes that it started), and memory in MB.
 
-    wall : seconds from its start to its end
-    processor : user and system seconds of the job and of the processes that it started
-    memory : largest resident memory, MB, of the job or of one process that it started, including
-        the memory of libraries, which jobs share
+    The memory is the largest of the job or of one such process, with libraries, which jobs share.
     """
 
     wall: float
@@ -137,11 +129,7 @@ def usage_since(start: float) -> Usage:
 
 def usage_of(log: str | Path) -> Usage | None:
     """Read time and memory of a job from its log; None without a log or if the job failed."""
-    try:
-        lines = Path(log).read_text(encoding="utf-8", errors="replace").splitlines()
-    except FileNotFoundError:
-        return None
-    found = _WORDS.search(lines[-1]) if lines else None
-    if found is None:
-        return None
-    return Usage(**{name: float(value) for name, value in found.groupdict().items()})
+    with suppress(FileNotFoundError):
+        if found := _WORDS.search(Path(log).read_text(encoding="utf-8", errors="replace")):
+            return Usage(*map(float, found.groups()))
+    return None

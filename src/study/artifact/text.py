@@ -5,6 +5,7 @@ and signs become formulas. Figures are drawn with DejaVu Sans, which has all of 
 """
 
 import unicodedata
+from typing import Any
 
 from pdrom.core.errors import ConfigurationError, PaperError
 
@@ -43,15 +44,19 @@ def escape(text: str) -> str:
     return "".join(pieces)
 
 
-def require_typeset(text: str, place: str) -> None:
-    """Raise ConfigurationError, which names ``place`` (a key), if ``text`` cannot be typeset."""
-    try:
-        escape(text)
-    except PaperError as error:
-        raise ConfigurationError(
-            f"{place} = {error} (allowed: Latin and Greek letters, digits, ASCII and common "
-            "mathematical signs)"
-        ) from error
+def require_typeset(data: Any, place: str) -> None:
+    """Raise ConfigurationError, with its key below ``place``, if TeX lacks a sign of the data."""
+    if isinstance(data, dict | list):
+        for key, value in data.items() if isinstance(data, dict) else enumerate(data):
+            require_typeset(value, f"{place}.{key}")
+    elif isinstance(data, str):
+        try:
+            escape(data)
+        except PaperError as error:
+            raise ConfigurationError(
+                f"{place} = {error} (allowed: Latin and Greek letters, digits, ASCII and common "
+                "mathematical signs)"
+            ) from error
 
 
 def replaced(text: str) -> str:

@@ -37,9 +37,8 @@ def figure_files(words: Sequence[str]) -> list[str]:
         if word not in known:
             raise ConfigurationError(f"figure {word}: there is none{choices(word, known)}")
         name = known[word]
-        number, document = numbers.get(name, ""), "main"
-        if number.startswith(SUPPLEMENT):
-            document = "supplement"
+        number = numbers.get(name, "")
+        document = "supplement" if number.startswith(SUPPLEMENT) else "main"
         places = {f"{document}.pdf": number, "the preprint": figures[name].number}
         label = ", ".join(f"figure {n} of {place}" for place, n in places.items() if n)
         found.append(paths.FIGURE.at(paths.RESULTS, name=name))

@@ -47,7 +47,7 @@ def measured_costs(results: str, coarse: str) -> pd.DataFrame:
 
     def used(folder: str) -> Any:
         logs = {str(log): usage_of(log) for log in sorted(Path(folder, "logs").rglob("*.log"))}
-        rows = [{"kind": kind_of(log, folder), **vars(use)} for log, use in logs.items() if use]
+        rows = [{"kind": kind_of(log, folder), **use._asdict()} for log, use in logs.items() if use]
         if not rows:
             raise PdromError(f"{folder}/logs: no job says what it used; run the study first")
         return pd.DataFrame(rows).groupby("kind")

@@ -41,7 +41,7 @@ class Checked(Memory):
     def told(self, path: str) -> dict[str, str] | None:
         """Digest and origin that the checksum of ``path`` says: {} if damaged, None if missing."""
         state, exists = _state(path)
-        told: dict[str, str] = self.get(lambda: _read(path), path, state) if exists else None
+        told: dict[str, str] | None = self.get(lambda: _read(path), path, state) if exists else None
         return told
 
     def distrust(self, paths: Iterable[str]) -> None:
@@ -112,13 +112,10 @@ def needed(plan: Plan, targets: Sequence[str] = ()) -> dict[str, Job]:
     experiments = {p: made for made in plan.experiments.values() for p in made.writes.values()}
     found: dict[str, Job] = {}
 
-    def maker(path: str) -> Job | None:
-        for place, labels in labels_in(path, plan.results, experiments):
-            return plan.job(experiments[place], labels)
-        return None
-
     def visit(path: str) -> None:
-        if path not in found and (job := makers.get(path) or maker(path)):
+        known = labels_in(path, plan.results, experiments)
+        made = (plan.job(experiments[place], labels) for place, labels in known)
+        if path not in found and (job := makers.get(path) or next(made, None)):
             for read in job.results:
                 visit(read)
             found.update(dict.fromkeys(job.outputs.values(), job))

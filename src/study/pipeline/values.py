@@ -215,10 +215,7 @@ def _scene(study: Study, name: str) -> dict[str, Any]:
         "groups": ", ".join(f"{group} ({weights[group]:g})" for group in config.groups),
         "vertices": vertices,
         "elements": elements,
-        "frames": config.frames,
-        "iterations": config.iterations,
-        "time_step": config.time_step,
-        "vertex_mass": config.vertex_mass,
+        **{k: getattr(config, k) for k in ("frames", "iterations", "time_step", "vertex_mass")},
     }
 
 

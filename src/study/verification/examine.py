@@ -14,13 +14,13 @@ from study.artifact.paths import TABLE
 from study.pipeline.plan import Job
 from study.pipeline.unfit import UNUSUAL, faults
 from study.tables import declared
+from study.tables.claims.claims import RULES
 from study.tables.claims.rules import load_claims
 from study.verification import compare
 from study.verification.files import differing, is_derived
 from study.verification.references import Reference, folder_of, read_references
 from study.verification.subject import Subject
 
-RULES = Path("config/claims.yaml")
 # Verdict column of table claims -> field of `ClaimRule` with its tests, its name in messages.
 PARTS = {"verdict": ("published", "as published"), "verdict_beyond": ("beyond", "beyond")}
 
@@ -194,7 +194,7 @@ def _claim(name: str, expected: pd.DataFrame, found: pd.DataFrame) -> Line:
         if a == b:
             same.append(f"{words}: {b}")
             continue
-        tests = getattr(load_claims(RULES).get(name), part, ())
+        tests = getattr(load_claims(Path(RULES)).get(name), part, ())
         timed = any(test.decides and test.timed for test in tests)
         changed.append(f"{words}: expected '{a}', found '{b}'" + timed * ", which rests on times")
         if worst is not Outcome.DIFFERS:

@@ -35,10 +35,9 @@ class Subject:
         If both are empty, it is the configuration of the last run.
         """
         files = ["--configfile", *configfiles] if configfiles else []
-        options = [*files, *(["--config", *settings] if settings else [])] or recall()
-        command = CommandLine(options)
+        command = CommandLine([*files, *(["--config", *settings] if settings else [])] or recall())
         check_files([DEFAULT, *command.configfiles])
-        return cls(tuple(options), folders(command.configfiles, command.settings))
+        return cls(tuple(command.configuration), folders(command.configfiles, command.settings))
 
     @property
     def results(self) -> str:

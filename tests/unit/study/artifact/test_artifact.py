@@ -1,6 +1,7 @@
 """Artifacts: declarations are checked, settings typed, jobs run from plain data."""
 
 from pathlib import Path
+from pkgutil import resolve_name
 from types import SimpleNamespace
 
 import pandas as pd
@@ -10,7 +11,7 @@ from pydantic import ValidationError
 from pdrom.core.store import checksum_path, read_table, write_table
 from pdrom.core.yamlfile import ConfigModel
 from study.artifact import reads
-from study.artifact.artifact import Artifact, declared_in, load, make, modules_in
+from study.artifact.artifact import Artifact, declared_in, make, modules_in
 from study.artifact.paths import File, Place
 from study.experiments.kit.base import Experiment, experiment, experiments
 
@@ -77,7 +78,7 @@ def test_artifacts_are_found_and_loaded_by_their_address():
     assert list(found) == sorted(found)
     assert {"fom", "pod", "reruns", "subspaces"} <= set(found)
     for made in found.values():
-        assert load(made.address) is made
+        assert resolve_name(made.address) is made
         assert set(made.types) | set(made.files) == set(made.reads)
     assert declared_in("pdrom.core", Experiment) == {}
 
