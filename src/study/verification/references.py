@@ -55,9 +55,8 @@ def write_reference(table: Table, frame: pd.DataFrame, folder: Path) -> None:
 
 def read_reference(table: Table, folder: Path) -> Reference | None:
     """Return the expected ``table`` in ``folder``; None if there is none."""
-    plain, packed = (folder / f"{table.name}{end}" for end in ENDS)
-    path = plain if plain.is_file() else packed
-    if not path.is_file():
+    path = next((p for end in ENDS if (p := folder / f"{table.name}{end}").is_file()), None)
+    if path is None:
         return None
     try:
         frame = pd.read_csv(path)
