@@ -98,8 +98,8 @@ class Artifact:
 
     def settings(self, sources: Sources, labels: Labels) -> dict[str, Any]:
         """Map parameters to the job's valid settings; a missing one raises ConfigurationError."""
-        reads: Mapping[str, Any] = self.reads
-        values = {name: reads[name].value(sources, labels) for name in self.types}
+        reads = [(name, read) for name, read in self.reads.items() if isinstance(read, SettingRead)]
+        values = {name: read.value(sources, labels) for name, read in reads}
         return {name: self.types[name].validate_python(value) for name, value in values.items()}
 
     def plain(self, settings: Mapping[str, Any]) -> dict[str, Any]:
