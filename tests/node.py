@@ -9,7 +9,7 @@ from playwright._impl._driver import compute_driver_executable
 
 from places import ROOT
 
-SCRIPTS = [ROOT / "src/pdrom/view/packed.js", ROOT / "src/study/live/engine.js"]
+SCRIPTS = [ROOT / "src/pdrom/view/packed.js", ROOT / "src/pdrom/view/engine.js"]
 # Unpacks the file of models, then evaluates the script with what was given.
 MAIN = """
 const { readFileSync } = require("fs");

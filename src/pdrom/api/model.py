@@ -15,7 +15,7 @@ import pandas as pd
 from pdrom.api import files
 from pdrom.api.records import Run
 from pdrom.core import store
-from pdrom.core.errors import ConfigurationError, StorageError
+from pdrom.core.errors import ConfigurationError, NotReducibleError, StorageError
 from pdrom.core.provenance import made_by
 from pdrom.core.yamlfile import shown, validate
 from pdrom.model.constraints.base import GroupConfig
@@ -27,9 +27,11 @@ from pdrom.reduction.rerun import rerun
 from pdrom.reduction.sampling.model import ProjectionModel
 from pdrom.reduction.subspace import model as subspaces
 from pdrom.reduction.subspace.ecsw import Samples
+from pdrom.reduction.subspace.exported import export_page
 from pdrom.reduction.subspace.interpolation import SubspaceLocalStep
 from pdrom.reduction.subspace.model import SubspaceModel
 from pdrom.reduction.subspace.space import ReducedSpace, reduced_state
+from pdrom.view.page import LIVE, page_of, view_of
 
 FORMAT = 1  # version of the file of a model
 BUSY = 1.25  # wall time over processor time from which the processor counts as busy
@@ -150,10 +152,41 @@ class Model:
 
     def loop(self, scene: Scene) -> tuple[Stepper, State]:
         """Step loop of ``scene`` in the model's unknowns, and the initial state; see `run`."""
+        self._require_runnable(scene)
+        return self.reduced.loop(scene)
+
+    def _require_runnable(self, scene: Scene) -> None:
         require_same_mesh(self.scene, scene)
         if isinstance(self.reduced, SubspaceModel):
             subspaces.require_holds(scene, self.reduced.columns)
-        return self.reduced.loop(scene)
+
+    def view(self, path: str | os.PathLike[str], full: Run | None = None) -> None:
+        """Write a page (HTML, one file) in which the model runs, and a reader drags its handles.
+
+        Parameters
+        ----------
+        path : file to write
+        full : full-order run, shown as wires, whose scene the model runs; None: the training scene
+
+        Raises
+        ------
+        ConfigurationError, SceneError, NotReducibleError, StorageError
+            The model reduces projections; the page lacks a group or effect of the scene; ``full``
+            is none, or of a scene that `run` refuses; the page is too large or cannot be written.
+        """
+        store.require_own(files.file_path(path))
+        if not isinstance(self.reduced, SubspaceModel):
+            raise NotReducibleError(f"{self.title} reduces projections: no page runs such a model")
+        scene = self.scene if full is None else files.require_run(full, "full").scene
+        if full and not full.full_order:
+            raise ConfigurationError(f"full = {full.title}: a full-order run is required")
+        self._require_runnable(scene)
+        family = "elements" if self.reduced.samples else "all"
+        labels = {"k": self.reduced.columns.modes, "tau": self.training.tolerance, "family": family}
+        config, positions = scene.config, full.positions if full else None
+        content = export_page(scene, config.title, positions, [(labels, self.reduced)])
+        entry = {"scene": config.name, "view": view_of(config.effects), "content": content}
+        store.write_text(page_of(LIVE, [entry]), path, with_checksum=False)
 
     def speed(self, scene: Scene, repeats: int = 3) -> dict[str, Any]:
         """Measure the model and the full order in turn, in this process, on ``scene``.

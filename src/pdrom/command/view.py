@@ -1,4 +1,4 @@
-"""``pdrom view RESULT ...``: show runs in an HTML page, a picture or files for ParaView."""
+"""``pdrom view RESULT ...``: show runs, or a model that runs, in an HTML page or other files."""
 
 import argparse
 import sys
@@ -10,7 +10,7 @@ from pdrom.command.base import UNCHECKED, Command, Status, require_output
 
 def perform(arguments: argparse.Namespace) -> Status:
     """Write the page, picture or ParaView files of the runs in ``arguments``; print their paths."""
-    from pdrom.api import load
+    from pdrom.api import load, load_model
     from pdrom.api.pictures import viewed_scenes
     from pdrom.core.errors import ConfigurationError
     from pdrom.view.frames import FRAMES, vtk, write_frames
@@ -24,10 +24,17 @@ def perform(arguments: argparse.Namespace) -> Status:
         written += [Path(arguments.vtk, "run.pvd"), *Path(arguments.vtk).glob(FRAMES)]
     for path in written:
         require_output(path, [*arguments.runs, str(out)])
-    scenes = viewed_scenes(*(load(file, arguments.unchecked) for file in arguments.runs))
-    if len(scenes) > 1 and (arguments.png or arguments.vtk):
+    if arguments.live and (written or len(arguments.runs) > 2):
+        raise ConfigurationError("--live: a model and at most one run, without --png and --vtk")
+    model = load_model(first) if arguments.live else None
+    runs = [load(file, arguments.unchecked) for file in arguments.runs[1 if model else 0 :]]
+    scenes = [] if model else viewed_scenes(*runs)
+    if len(scenes) > 1 and written:
         raise ConfigurationError("--png and --vtk: of one scene at a time")
-    write_page(scenes, out)
+    if model:
+        model.view(out, *runs)
+    else:
+        write_page(scenes, out)
     size = out.stat().st_size / 1e6
     sys.stdout.write(f"{out}: {size:.1f} MB; a browser opens it without a network\n")
     if arguments.png:
@@ -42,10 +49,11 @@ def perform(arguments: argparse.Namespace) -> Status:
 
 
 COMMAND = Command(
-    "Write a page on which runs are looked at, a picture, or files for ParaView",
+    "Write a page on which runs are looked at or a model runs, a picture, or files for ParaView",
     "pdrom view pulled_sheet.h5 pulled.h5 --open",
     {
         "runs": {"metavar": "RESULT", "nargs": "+", "help": "files of pdrom run"},
+        "--live": {"action": "store_true", "help": "run a model: its file, then a run as wires"},
         "--out": {"metavar": "FILE", "help": "page to write; the first RESULT as .html"},
         "--open": {"action": "store_true", "help": "open it in the browser"},
         "--png": {"metavar": "FILE", "help": "picture of four frames of each run, too"},

@@ -4,7 +4,8 @@
 const pdromDrawing = (() => {
   const WIDTH = 2048; // of a texture that holds a basis
   const MOST = 200; // coordinates that are lifted on the graphics card; more are lifted here
-  const FOCUS = 2.4, NEAREST = 0.25, FARTHEST = 6; // cotangent of half the angle of view; distances over the radius
+  const FOCUS = 4, NEAREST = 0.25, FARTHEST = 6; // cotangent of half the angle of view; distances over the radius
+  const FILLED = 0.88; // part of the picture that a fitted shape takes
 
   // Viridis, by a polynomial of six degrees for each colour (Zucker's fit; errors below 0.01).
   const VIRIDIS = [
@@ -112,6 +113,8 @@ const pdromDrawing = (() => {
     }
   }
 
+  const focuses = (shape) => (shape < 1 ? [FOCUS, FOCUS * shape] : [FOCUS / shape, FOCUS]);
+
   class Camera {
     constructor(up, eye) {
       this.up = unit(up);
@@ -156,7 +159,7 @@ const pdromDrawing = (() => {
     // Matrix to clip coordinates by columns, for a picture of this shape (width over height).
     matrix(shape) {
       const [x, y, z] = this.axes(), d = this.distance, near = 0.05 * d, end = d + 6 * this.radius;
-      const focus = shape < 1 ? [FOCUS, FOCUS * shape] : [FOCUS / shape, FOCUS];
+      const focus = focuses(shape);
       const rows = [[...x.map((v) => focus[0] * v), -focus[0] * dot(x, this.centre)],
         [...y.map((v) => focus[1] * v), -focus[1] * dot(y, this.centre)],
         [...z, -dot(z, this.centre) - d]];
@@ -278,6 +281,7 @@ const pdromDrawing = (() => {
       }
       own.valued = layer.valued;
       gl.depthMask(layer.alpha === 1);
+      gl.depthFunc(layer.look === "wires" && layer.alpha < 1 ? gl.ALWAYS : gl.LESS); // seen through what lies before them
       gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, own.indices);
       const mode = { surface: gl.TRIANGLES, wires: gl.LINES, points: gl.POINTS }[layer.look];
       gl.drawElements(mode, layer.indices.length, gl.UNSIGNED_INT, 0);
@@ -435,6 +439,18 @@ const pdromDrawing = (() => {
       const wide = this.canvas.clientWidth / this.views, high = this.canvas.clientHeight;
       const [x, y] = applied(this.camera.matrix(wide / high), ...point);
       return [(view + 0.5 * (x + 1)) * wide, 0.5 * (1 - y) * high];
+    }
+
+    // Centre and radius of a camera with this eye in whose picture points (n, 3) take the part FILLED.
+    fit(q) {
+      const { canvas, camera } = this, axes = camera.axes(), [f, g] = focuses(canvas.clientWidth / this.views / canvas.clientHeight);
+      const seen = Array.from({ length: q.length / 3 }, (_, v) => axes.map((axis) => dot(axis, q.subarray(3 * v))));
+      // how far in front of the origin a point is inside a rim of the picture, or in front of the eye
+      const most = (x, y, z) => Math.max(...seen.map((p) => (x * p[0] + y * p[1]) / FILLED + z * p[2]));
+      const [right, left, up, down] = [most(f, 0, 1), most(-f, 0, 1), most(0, g, 1), most(0, -g, 1)], near = most(0, 0, 1), end = -most(0, 0, -1);
+      const middle = [(right - left) * FILLED / f, (up - down) * FILLED / g, near + end].map((x) => 0.5 * x);
+      const away = Math.max(right + left, up + down, 2.5 * near - 0.5 * end) / 2 - middle[2];
+      return [[0, 1, 2].map((i) => dot(axes.map((axis) => axis[i]), middle)), away / Math.hypot(1, FOCUS)];
     }
 
     // Move in space of a move on the canvas (CSS pixels) at the depth of a point.

@@ -1,10 +1,10 @@
-"""HTML page that shows scenes with their runs: scripts and data in one file.
+"""HTML pages that show runs, or run models: scripts and data in one file.
 
-The file has only the surface vertices of a run, in some of its frames, quantised to 16 bits."""
+Of a run, a page has the surface vertices alone, in some of its frames, quantised to 16 bits."""
 
 import json
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 from math import ceil
@@ -61,28 +61,29 @@ class ViewedScene:
 
 
 LARGEST = 25_000_000  # largest number of bytes of a page
+# Files beside this module of which a page is made, its template first.
+VIEWER = ("viewer.html", "viewer.css", "packed.js", "drawing.js", "viewer.js")
+LIVE = ("live.html", "live.css", "packed.js", "engine.js", "drawing.js", "live.js")
 
 
 def write_page(scenes: Sequence[ViewedScene], path: str | os.PathLike[str]) -> None:
     """Write an HTML page of ``scenes`` to ``path``; StorageError if above `LARGEST` bytes."""
-    parts = {
-        "STYLE": _read("viewer.css"),
-        "SCENES": safe_json([pack_scene(scene) for scene in scenes]),
-        "PACKED": _read("packed.js"),
-        "DRAWING": _read("drawing.js"),
-        "SCRIPT": _read("viewer.js"),
-    }
-    text = filled(_read("viewer.html"), parts)
+    write_text(page_of(VIEWER, [pack_scene(scene) for scene in scenes]), path, with_checksum=False)
+
+
+def page_of(parts: Sequence[str], scenes: Sequence[Mapping[str, Any]]) -> str:
+    """Text of the page of ``parts`` (`VIEWER`, `LIVE`) with ``scenes``, the data of its script.
+
+    An entry of `LIVE` has a ``scene``'s name and ``content``, or the ``file`` beside the page that
+    has the content. StorageError if the page has more than `LARGEST` bytes.
+    """
+    texts = {name: files("pdrom.view").joinpath(name).read_text("utf-8") for name in parts}
+    text = filled(texts[parts[0]], {**texts, "SCENES": safe_json(scenes)})
     size = len(text.encode())
     if size > LARGEST:
-        raise StorageError(
-            f"{path}: {size / 1e6:.0f} MB, allowed are {LARGEST / 1e6:.0f}: choose fewer runs"
-        )
-    write_text(text, path, with_checksum=False)
-
-
-def _read(name: str) -> str:
-    return files("pdrom.view").joinpath(name).read_text(encoding="utf-8")
+        fault = f"{size / 1e6:.0f} MB, allowed are {LARGEST / 1e6:.0f}"
+        raise StorageError(f"page of {fault}: choose fewer runs or a smaller model")
+    return text
 
 
 def safe_json(value: object) -> str:
@@ -110,7 +111,7 @@ def pack_scene(scene: ViewedScene) -> dict[str, Any]:
     stride = max(1, ceil((len(scene.positions) - 1) / FRAMES))
     full = scene.positions[::stride, used]
     low, high = shown_region(full, scene.effects)
-    bodies, up = [effect.body(low, high) for effect in scene.effects], up_of(scene.effects)
+    bodies = [effect.body(low, high) for effect in scene.effects]
     return {
         "name": scene.name,
         "title": scene.title,
@@ -119,7 +120,7 @@ def pack_scene(scene: ViewedScene) -> dict[str, Any]:
         "timeStep": scene.time_step,
         "stride": stride,
         "full": pack_positions(full),
-        "view": {"up": up.tolist(), "eye": (rotation_to(up) @ EYE).tolist()},
+        "view": view_of(scene.effects),
         "ranges": np.stack([low, high], axis=1).tolist(),
         "bodies": [
             {
@@ -141,6 +142,12 @@ def pack_scene(scene: ViewedScene) -> dict[str, Any]:
             for run in scene.runs
         ],
     }
+
+
+def view_of(effects: Sequence[EffectConfig]) -> dict[str, list[float]]:
+    """Directions ``up`` and to the ``eye`` of a page of a scene with these ``effects``."""
+    up = up_of(effects)
+    return {"up": up.tolist(), "eye": (rotation_to(up) @ EYE).tolist()}
 
 
 def _numbers(values: np.ndarray) -> list[float | None]:

@@ -7,21 +7,20 @@ from pathlib import Path
 
 from pdrom.core.errors import StorageError
 from pdrom.core.store import read_text, write_text
-from pdrom.view.page import filled, safe_json
+from pdrom.view.page import LIVE, page_of
 from study.artifact.artifact import Artifact
 from study.artifact.paths import LIVE_MODEL, LIVE_PAGE, File
-from study.artifact.reads import Every, ProjectFile
+from study.artifact.reads import Every, ProjectFiles
 
 # Folder of the model files, relative to the page.
 MODELS = Path(LIVE_MODEL.pattern).parent.name
 HEAD = re.compile(r'pdromLive\(\{"format":1,"scene":("\w+"),"title":("(?:[^"\\]|\\.)*"),')
 
 
-def _write(models: list[File], html: Path, outputs: Mapping[str, str], **parts: Path) -> None:
-    """Write the page: template ``html`` with ``parts`` (styles, scripts) and a list of scenes."""
-    texts = {name.upper(): path.read_text("utf-8") for name, path in parts.items()}
-    texts["SCENES"] = safe_json([scene for file in models if (scene := _listed(file))])
-    write_text(filled(html.read_text("utf-8"), texts), outputs["out"])
+def _write(models: list[File], outputs: Mapping[str, str], parts: list[Path]) -> None:
+    """Write the page with a list of the scenes of ``models``."""
+    scenes = [scene for file in models if (scene := _listed(file))]
+    write_text(page_of(LIVE, scenes), outputs["out"])
 
 
 def _listed(file: File) -> dict[str, str] | None:
@@ -41,12 +40,7 @@ live_page = Artifact(
     "Page on which models run",
     {
         "models": Every(LIVE_MODEL),
-        "html": ProjectFile("src/study/live/live.html"),
-        "style": ProjectFile("src/study/live/live.css"),
-        "packed": ProjectFile("src/pdrom/view/packed.js"),
-        "engine": ProjectFile("src/study/live/engine.js"),
-        "drawing": ProjectFile("src/pdrom/view/drawing.js"),
-        "script": ProjectFile("src/study/live/live.js"),
+        "parts": ProjectFiles(tuple(f"src/pdrom/view/{name}" for name in LIVE)),
     },
     {"out": LIVE_PAGE},
     _write,

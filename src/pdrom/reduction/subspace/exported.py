@@ -165,22 +165,37 @@ def write_page_models(
     models: Sequence[Labelled],
     path: str | os.PathLike[str],
 ) -> None:
-    """Write ``models`` and a full-order run of ``scene`` to a script (.js) that a page loads.
+    """Write `export_page` to a script that a page loads; StorageError if above `LARGEST` bytes."""
+    content = export_page(scene, title, reference, models)
+    text = f"pdromLive({json.dumps(content, separators=(',', ':'), allow_nan=False)});\n"
+    if len(text) > LARGEST:
+        raise StorageError(
+            f"{path}: {len(text) / 1e6:.1f} MB, allowed are {LARGEST / 1e6:.1f}: choose fewer "
+            "sizes or tolerances (keys live.sizes, live.tolerances)"
+        )
+    write_text(text, path)
+
+
+def export_page(
+    scene: Scene, title: str, reference: np.ndarray | None, models: Sequence[Labelled]
+) -> dict[str, Any]:
+    """Export ``models`` and a full-order run of ``scene``: the content of a page.
 
     Parameters
     ----------
-    reference : (F + 1, N, 3) m, positions of the full-order run, of which some frames are shown
+    reference : (F + 1, N, 3) m of the full-order run, of which some frames are shown, or None
     models : pairs (labels, which the page shows; model)
-    path : file to write
 
     Raises
     ------
-    SceneError, StorageError
-        The browser's code cannot run the scene; the file would be larger than `LARGEST`.
+    SceneError
+        The browser's code cannot run the scene.
     """
+    motion = None if reference is None else mean_motion(reference)
+    reference = scene.mesh.points[None] if reference is None else reference
     used, triangles = np.unique(scene.mesh.triangles, return_inverse=True)
     stride = max(1, ceil((len(reference) - 1) * len(used) / GHOST))
-    content = {
+    return {
         "format": FORMAT,
         "scene": scene.config.name,
         "title": title,
@@ -193,12 +208,5 @@ def write_page_models(
             "stride": stride,
             "full": pack_positions(reference[::stride, used]),
         },
-        "motion": mean_motion(reference),
+        "motion": motion,
     }
-    text = f"pdromLive({json.dumps(content, separators=(',', ':'), allow_nan=False)});\n"
-    if len(text) > LARGEST:
-        raise StorageError(
-            f"{path}: {len(text) / 1e6:.1f} MB, allowed are {LARGEST / 1e6:.1f}: choose fewer "
-            "sizes or tolerances (keys live.sizes, live.tolerances)"
-        )
-    write_text(text, path)

@@ -14,7 +14,7 @@ from browser import page_at
 from builders import make_scene
 from pdrom.core.errors import StorageError
 from pdrom.core.store import write_text
-from study.live.page import filled
+from pdrom.view.page import filled
 from written_models import write_models, write_page
 
 

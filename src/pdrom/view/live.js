@@ -5,13 +5,12 @@
   const SPEED = 0.03; // a handle moves at most this part of the scene's size a frame
   const REACH = 26; // CSS pixels from a handle's vertex within which a pointer takes it
   const KEY_STEP = 0.04; // of the scene's size
-  const ROOM = 1.35; // of the picture about the shape at rest
   const LAG = 0.1; // part of its way to the shape that the camera goes in a frame
   const SAMPLE = 400; // vertices by which the camera follows the shape, at most
   const TOLD = 200; // ms between two updates of the numbers
   const MOST_ITERATIONS = 40; // that a reader may choose, unless the scene has more
   const EARLY = 4; // ms: screens do not keep time exactly
-  const METHODS = { elements: "whole elements", joint: "joint rows" };
+  const METHODS = { all: "all elements", elements: "whole elements", joint: "joint rows" };
   const at = (id) => document.getElementById(id);
   const scenes = JSON.parse(at("scenes").textContent);
   const loaded = new Map(); // scene -> promise of its unpacked file
@@ -23,21 +22,23 @@
   window.pdromLive = (content) => waiting.get(content.scene)?.(content);
 
   function load(index) {
-    if (!loaded.has(index)) loaded.set(index, new Promise((resolve, reject) => {
+    const { content: inside, file } = scenes[index];
+    if (!loaded.has(index)) loaded.set(index, inside ? unpacked(inside) : new Promise((resolve, reject) => {
       waiting.set(scenes[index].scene, resolve);
       const script = document.createElement("script");
-      script.src = scenes[index].file;
-      script.onerror = () => reject(new Error(`${scenes[index].file}: missing; it lies beside this page`));
+      script.src = file;
+      script.onerror = () => reject(new Error(`${file} is missing; it lies beside this page`));
       // a whole file has made its call before
-      script.onload = () => reject(new Error(`${scenes[index].file}: cut, or not of this scene`));
+      script.onload = () => reject(new Error(`${file} is cut, or not of this scene`));
       document.head.append(script);
-    }).then(async (content) => {
-      const { shown: { full, ...rest }, ...others } = content;
-      const [data, frames] = await Promise.all([
-        pdromPacked.unpacked({ ...others, shown: rest }), pdromPacked.frames(full)]);
-      return { data, frames, bases: new Map() };
-    }));
+    }).then(unpacked));
     return loaded.get(index);
+  }
+
+  async function unpacked({ shown: { full, ...rest }, ...others }) {
+    const [data, frames] = await Promise.all([
+      pdromPacked.unpacked({ ...others, shown: rest }), pdromPacked.frames(full)]);
+    return { data, frames, bases: new Map() };
   }
 
   function basis(number) {
@@ -47,11 +48,13 @@
 
   // ---- choices ----
 
+  // A list with one entry is text.
   function fill(id, values, words = String) {
     const select = at(id), before = select.value;
     select.replaceChildren(...values.map((value) => new Option(words(value), value)));
     if (values.map(String).includes(before)) select.value = before;
-    select.disabled = values.length < 2;
+    select.hidden = values.length < 2;
+    select.nextElementSibling.textContent = select.hidden ? values.map(words).join("") : "";
   }
 
   const distinct = (values) => [...new Set(values)];
@@ -86,8 +89,9 @@
       return error;
     });
     if (index !== Number(at("scene").value)) return; // another one was chosen in the meantime
-    if (found instanceof Error) return say(found.message, true);
+    if (found instanceof Error) return say(`This scene cannot be shown: ${found.message}.`, true);
     shown = found;
+    for (const id of ["wires", "apart"]) at(id).hidden = shown.data.motion === null;
     const { iterations: own } = shown.data;
     Object.assign(at("iterations"), { max: Math.max(MOST_ITERATIONS, own), value: own });
     const { models } = shown.data, sizes = distinct(models.filter((m) => m.tau).map((m) => m.k));
@@ -111,8 +115,10 @@
     make();
     buttons();
     at("elements").textContent = `${run.elements} of ${all()}`;
+    at("drag").hidden = handles.length === 0;
     const parts = [`${data.title}.`, model.family === "joint"
       ? `Joint rows: ${model.r} modes of the projections, interpolated at ${run.elements} elements (the preprint's way).`
+      : model.family === "all" ? "All elements are evaluated."
       : "Whole elements with weights, sampled so that the equations keep their energy.", drawing.accelerated
       ? "Drawn by WebGL2." : "This browser has no WebGL2: the picture is drawn on the processor, and slower."];
     at("about").textContent = parts.join(" ");
@@ -176,17 +182,16 @@
 
   // Layers of a run: its surface, the recorded run as wires, the handles, the floor.
   function make() {
-    const { data, frames } = shown, { vertices, triangles } = data.shown, K = run.K, n = vertices.length;
+    const { data } = shown, { vertices, triangles } = data.shown, K = run.K, n = vertices.length;
     const B = new Float32Array(n * K);
     vertices.forEach((v, i) => B.set(run.basis.B.subarray(K * v, K * (v + 1)), K * i));
     if (shown !== make.of) drawing.camera.reset();
     make.of = shown;
     dragging = false;
     drawing.clear();
-    const [centre, radius] = ball([frames[0]]);
-    drawing.camera.look(centre, ROOM * radius);
+    drawing.camera.look(...drawing.fit(sampled()));
     layers = { body: new Layer({ triangles, n, colour: colour("--surface") }),
-      ghost: new Layer({ triangles, n, look: "wires", colour: colour("--ghost"), alpha: 0.35 }) };
+      ghost: new Layer({ triangles, n, look: "wires", colour: colour("--ghost"), alpha: 0.45 }) };
     layers.body.lifted(B, K);
     run.held = Uint32Array.from(handles.flatMap((handle) => handle.vertices));
     layers.handles = new Layer({ n: run.held.length, look: "points", points: run.held.map((_, i) => i),
@@ -203,13 +208,11 @@
     return layer;
   }
 
-  // The camera goes with the shape, but not while a reader drags a part of it.
+  // The camera goes with the shape, and back until it sees all of it, but not while a reader drags a part.
   function followShape() {
     if (dragging || !run.finite) return;
-    const q = sampled(), centre = [0, 0, 0];
-    for (let i = 0; i < q.length; i++) centre[i % 3] += 3 * q[i] / q.length;
-    const { camera } = drawing;
-    camera.look(camera.centre.map((x, i) => x + LAG * (centre[i] - x)), camera.radius);
+    const { camera } = drawing, [centre, radius] = drawing.fit(sampled());
+    camera.look(camera.centre.map((x, i) => x + LAG * (centre[i] - x)), camera.radius + LAG * Math.max(0, radius - camera.radius));
   }
 
   function show() {
@@ -224,8 +227,8 @@
 
   // Positions of the recorded run at a frame, between two stored ones if need be; null after its end.
   function recordedAt(frame) {
-    const { frames, data: { shown: { stride } } } = shown, place = frame / stride, first = Math.floor(place);
-    if (place > frames.length - 1) return null;
+    const { frames, data: { motion, shown: { stride } } } = shown, place = frame / stride, first = Math.floor(place);
+    if (motion === null || place > frames.length - 1) return null;
     const part = place - first;
     if (part === 0) return frames[first];
     return frames[first].map((x, i) => (1 - part) * x + part * frames[first + 1][i]);
@@ -354,7 +357,7 @@
     }
   }
 
-  drawing = new Drawing(at("picture"), { grab, plain: location.hash === "#plain" });
+  drawing = new Drawing(at("picture"), { grab, plain: location.hash === "#plain", ...scenes[0]?.view });
   fill("scene", scenes.map((_, i) => i), (i) => scenes[i].scene.replaceAll("_", " "));
   at("choice").addEventListener("submit", (event) => event.preventDefault());
   at("scene").addEventListener("change", () => {
@@ -371,11 +374,13 @@
     pressed();
   });
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => run && make());
-  const named = scenes.findIndex(({ scene: name }) => location.search.slice(1).split("&").includes(name));
+  const names = scenes.map(({ scene: name }) => name), asked = [...new URLSearchParams(location.search).keys()];
+  const named = names.findIndex((name) => asked.includes(name));
+  const foreign = [...asked, location.hash].filter((word) => !["", "#plain", ...names].includes(word));
   if (scenes.length === 0) say("No scene of this study has models: its configuration lists none of them.", true);
   else {
     at("scene").value = Math.max(named, 0);
-    if (named < 0 && location.search.length > 1) unknown = `No models of ${location.search.slice(1)} are here; another scene is shown.`;
+    if (foreign.length) unknown = `This page has no ${foreign.join(", ")}: it shows ${names[Math.max(named, 0)]}.`;
     scene().then(() => requestAnimationFrame(beat));
   }
 })();
