@@ -152,13 +152,10 @@ class Model:
 
     def loop(self, scene: Scene) -> tuple[Stepper, State]:
         """Step loop of ``scene`` in the model's unknowns, and the initial state; see `run`."""
-        self._require_runnable(scene)
-        return self.reduced.loop(scene)
-
-    def _require_runnable(self, scene: Scene) -> None:
         require_same_mesh(self.scene, scene)
         if isinstance(self.reduced, SubspaceModel):
             subspaces.require_holds(scene, self.reduced.columns)
+        return self.reduced.loop(scene)
 
     def view(self, path: str | os.PathLike[str], full: Run | None = None) -> None:
         """Write a page (HTML, one file) in which the model runs, and a reader drags its handles.
@@ -175,16 +172,17 @@ class Model:
             is none, or of a scene that `run` refuses; the page is too large or cannot be written.
         """
         store.require_own(files.file_path(path))
-        if not isinstance(self.reduced, SubspaceModel):
+        own, scene, positions = self.reduced, self.scene, None
+        if not isinstance(own, SubspaceModel):
             raise NotReducibleError(f"{self.title} reduces projections: no page runs such a model")
-        scene = self.scene if full is None else files.require_run(full, "full").scene
-        if full and not full.full_order:
-            raise ConfigurationError(f"full = {full.title}: a full-order run is required")
-        self._require_runnable(scene)
-        family = "elements" if self.reduced.samples else "all"
-        labels = {"k": self.reduced.columns.modes, "tau": self.training.tolerance, "family": family}
-        config, positions = scene.config, full.positions if full else None
-        content = export_page(scene, config.title, positions, [(labels, self.reduced)])
+        if full is not None:
+            scene, positions = files.require_run(full, "full").scene, full.positions
+            if not full.full_order:
+                raise ConfigurationError(f"full = {full.title}: a full-order run is required")
+        self.loop(scene)  # refuses what `run` refuses
+        config, family = scene.config, "elements" if own.samples else "all"
+        labels = {"family": family, "k": own.columns.modes, "tau": self.training.tolerance}
+        content = export_page(scene, config.title, positions, [(labels, own)])
         entry = {"scene": config.name, "view": view_of(config.effects), "content": content}
         store.write_text(page_of(LIVE, [entry]), path, with_checksum=False)
 

@@ -27,7 +27,7 @@ def perform(arguments: argparse.Namespace) -> Status:
     if arguments.live and (written or len(arguments.runs) > 2):
         raise ConfigurationError("--live: a model and at most one run, without --png and --vtk")
     model = load_model(first) if arguments.live else None
-    runs = [load(file, arguments.unchecked) for file in arguments.runs[1 if model else 0 :]]
+    runs = [load(file, arguments.unchecked) for file in arguments.runs[bool(model) :]]
     scenes = [] if model else viewed_scenes(*runs)
     if len(scenes) > 1 and written:
         raise ConfigurationError("--png and --vtk: of one scene at a time")

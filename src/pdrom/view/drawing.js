@@ -387,7 +387,6 @@ const pdromDrawing = (() => {
       this.pen = gl ? new Card(gl) : new Plain(canvas.getContext("2d"));
       if (gl) canvas.addEventListener("webglcontextlost", () => this._lost());
       this._watch();
-      new ResizeObserver(() => this.redraw()).observe(canvas);
     }
 
     // The card is gone: canvases cannot change their kind, so that another one takes the place.
@@ -396,7 +395,6 @@ const pdromDrawing = (() => {
       this.canvas.replaceWith(other);
       Object.assign(this, { canvas: other, accelerated: false, pen: new Plain(other.getContext("2d")) });
       this._watch();
-      new ResizeObserver(() => this.redraw()).observe(other);
       this.redraw();
     }
 
@@ -463,6 +461,7 @@ const pdromDrawing = (() => {
 
     _watch() {
       const { canvas, camera } = this, fingers = new Map();
+      new ResizeObserver(() => this.redraw()).observe(canvas);
       let held = null;
       const place = (event) => {
         const box = canvas.getBoundingClientRect();
@@ -536,5 +535,14 @@ const pdromDrawing = (() => {
     return [1, 3, 5].map((at) => parseInt(text.slice(at, at + 2), 16) / 255);
   }
 
-  return { Drawing, Layer, ball, colour };
+  // The entries of a list; one that has a single entry is text.
+  function fill(select, values, words = String) {
+    const before = select.value;
+    select.replaceChildren(...values.map((value) => new Option(words(value), value)));
+    if (values.map(String).includes(before)) select.value = before;
+    select.hidden = values.length < 2;
+    select.nextElementSibling.textContent = select.hidden ? values.map(words).join("") : "";
+  }
+
+  return { Drawing, Layer, ball, colour, fill };
 })();

@@ -272,10 +272,6 @@ const pdromEngine = (() => {
 
   // ---- operators of an element from its rest shape: S_e (rows, corners) ----
 
-  function springOperator() {
-    return [-1, 1];
-  }
-
   // Rows of D^-T behind their negative sum, for D^-1 by rows.
   function withFirst(rows, inverted) {
     const out = [];
@@ -326,7 +322,7 @@ const pdromEngine = (() => {
       for (let e = 0; e < m; e++) {
         const vertices = [...samples.stencil.subarray(corners * e, corners * (e + 1))];
         const q = vertices.map((v) => [...file.points.subarray(3 * v, 3 * v + 3)]);
-        const operator = clamped ? (rows === 3 ? tetrahedronOperator(q) : triangleOperator(q)) : springOperator();
+        const operator = clamped ? (rows === 3 ? tetrahedronOperator(q) : triangleOperator(q)) : [-1, 1];
         for (let i = 0; i < rows; i++) for (let c = 0; c < corners; c++) {
           const value = operator[corners * i + c], row = (rows * e + i) * K, from = vertices[c] * K;
           for (let k = 0; k < K; k++) this.strain[row + k] += value * basis.B[from + k];

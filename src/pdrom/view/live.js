@@ -1,7 +1,7 @@
 "use strict";
 // The page's own script: choices, handles, the loop of frames, and what is said about them.
 (() => {
-  const { Drawing, Layer, ball, colour } = pdromDrawing;
+  const { Drawing, Layer, ball, colour, fill } = pdromDrawing;
   const SPEED = 0.03; // a handle moves at most this part of the scene's size a frame
   const REACH = 26; // CSS pixels from a handle's vertex within which a pointer takes it
   const KEY_STEP = 0.04; // of the scene's size
@@ -10,6 +10,7 @@
   const TOLD = 200; // ms between two updates of the numbers
   const MOST_ITERATIONS = 40; // that a reader may choose, unless the scene has more
   const EARLY = 4; // ms: screens do not keep time exactly
+  const FORMAT = 1; // of the data, as in exported.py
   const METHODS = { all: "all elements", elements: "whole elements", joint: "joint rows" };
   const at = (id) => document.getElementById(id);
   const scenes = JSON.parse(at("scenes").textContent);
@@ -17,7 +18,7 @@
   const waiting = new Map(); // scene -> takes its file when that has come
   let shown = null; // {data, frames, bases}: the scene
   let run = null, handles = [], times = [], dragging = false;
-  let playing = true, told = 0, due = 0, drawing = null, layers = {}, unknown = "";
+  let playing = true, told = 0, due = 0, drawing = null, layers = {}, unknown = "", measured = "";
 
   window.pdromLive = (content) => waiting.get(content.scene)?.(content);
 
@@ -35,7 +36,8 @@
     return loaded.get(index);
   }
 
-  async function unpacked({ shown: { full, ...rest }, ...others }) {
+  async function unpacked({ format, shown: { full, ...rest } = {}, ...others }) {
+    if (format !== FORMAT) throw new Error("its data are of another version of pdrom");
     const [data, frames] = await Promise.all([
       pdromPacked.unpacked({ ...others, shown: rest }), pdromPacked.frames(full)]);
     return { data, frames, bases: new Map() };
@@ -48,24 +50,15 @@
 
   // ---- choices ----
 
-  // A list with one entry is text.
-  function fill(id, values, words = String) {
-    const select = at(id), before = select.value;
-    select.replaceChildren(...values.map((value) => new Option(words(value), value)));
-    if (values.map(String).includes(before)) select.value = before;
-    select.hidden = values.length < 2;
-    select.nextElementSibling.textContent = select.hidden ? values.map(words).join("") : "";
-  }
-
   const distinct = (values) => [...new Set(values)];
 
   function chosen() {
     const { models } = shown.data;
-    fill("method", distinct(models.map((model) => model.family)), (family) => METHODS[family]);
+    fill(at("method"), distinct(models.map((model) => model.family)), (family) => METHODS[family]);
     const ofMethod = models.filter((model) => model.family === at("method").value);
-    fill("k", distinct(ofMethod.map((model) => model.k)));
+    fill(at("k"), distinct(ofMethod.map((model) => model.k)));
     const ofSize = ofMethod.filter((model) => String(model.k) === at("k").value);
-    fill("tau", ofSize.filter((model) => model.tau).map((model) => model.tau), (tau) => String(tau));
+    fill(at("tau"), ofSize.filter((model) => model.tau).map((model) => model.tau), (tau) => String(tau));
     at("tolerance").hidden = at("tau").options.length === 0;
     return ofSize.find((model) => !model.tau || String(model.tau) === at("tau").value);
   }
@@ -92,9 +85,8 @@
     if (found instanceof Error) return say(`This scene cannot be shown: ${found.message}.`, true);
     shown = found;
     for (const id of ["wires", "apart"]) at(id).hidden = shown.data.motion === null;
-    const { iterations: own } = shown.data;
+    const { iterations: own, models } = shown.data, sizes = distinct(models.filter((m) => m.tau).map((m) => m.k));
     Object.assign(at("iterations"), { max: Math.max(MOST_ITERATIONS, own), value: own });
-    const { models } = shown.data, sizes = distinct(models.filter((m) => m.tau).map((m) => m.k));
     chosen();
     if (sizes.includes(20)) at("k").value = 20;
     chosen();
@@ -122,8 +114,7 @@
       : "Whole elements with weights, sampled so that the equations keep their energy.", drawing.accelerated
       ? "Drawn by WebGL2." : "This browser has no WebGL2: the picture is drawn on the processor, and slower."];
     at("about").textContent = parts.join(" ");
-    playing = true;
-    pressed();
+    play(true);
     document.body.dataset.ready = "yes";
   }
 
@@ -160,13 +151,11 @@
   }
 
   function frame() {
-    const before = performance.now(), where = held();
+    const where = held(), before = performance.now();
     run.step(where);
-    const own = performance.now() - before;
-    times.push(own);
+    times.push(performance.now() - before);
     if (times.length > 60) times.shift();
-    if (!run.finite) playing = false;
-    if (!playing) pressed();
+    if (!run.finite) play(false);
   }
 
   const mine = () => handles.some((handle) => handle.own);
@@ -236,8 +225,6 @@
 
   // ---- words ----
 
-  let measured = "";
-
   function say(text, bad) {
     at("verdict").classList.toggle("bad", bad);
     if (at("verdict").textContent !== text) at("verdict").textContent = text;
@@ -293,7 +280,7 @@
     if (looking) return handle;
     take(handle);
     dragging = true;
-    resume();
+    play(true);
     const point = [...q.slice(3 * found, 3 * found + 3)];
     return {
       move: (right, down) => { handle.wanted = drawing.moved(right, down, point).map((d, i) => d + handle.wanted[i]); },
@@ -307,7 +294,7 @@
     if (!ways[event.key]) return;
     event.preventDefault();
     take(handle);
-    resume();
+    play(true);
     const [way, sign] = ways[event.key];
     handle.wanted = handle.wanted.map((w, i) => w + sign * step * way[i]);
   }
@@ -323,7 +310,7 @@
       holder.addEventListener("click", () => {
         if (handle.held) Object.assign(handle, { own: true, held: false });
         else take(handle);
-        resume();
+        play(true);
         tell();
       });
       return [mover, holder];
@@ -332,14 +319,9 @@
 
   // ---- the loop ----
 
-  function pressed() {
+  function play(on) {
+    playing = on && run.finite;
     at("play").textContent = playing ? "Pause" : "Play";
-  }
-
-  function resume() {
-    if (!run.finite) return;
-    playing = true;
-    pressed();
   }
 
   // A frame of the run takes its own time step, on faster screens too; slower ones show it slowly.
@@ -358,21 +340,19 @@
   }
 
   drawing = new Drawing(at("picture"), { grab, plain: location.hash === "#plain", ...scenes[0]?.view });
-  fill("scene", scenes.map((_, i) => i), (i) => scenes[i].scene.replaceAll("_", " "));
+  fill(at("scene"), scenes.map((_, i) => i), (i) => scenes[i].scene.replaceAll("_", " "));
   at("choice").addEventListener("submit", (event) => event.preventDefault());
   at("scene").addEventListener("change", () => {
     unknown = "";
     scene();
   });
+  addEventListener("unhandledrejection", ({ reason }) => say(`This scene cannot be shown: ${reason.message}.`, true));
   const whileRunning = (id, event, action) => at(id).addEventListener(event, () => run && action());
   for (const id of ["method", "k", "tau"]) whileRunning(id, "change", start);
   whileRunning("ghost", "change", show);
   whileRunning("iterations", "input", iterations);
   whileRunning("again", "click", start);
-  whileRunning("play", "click", () => {
-    playing = !playing && run.finite;
-    pressed();
-  });
+  whileRunning("play", "click", () => play(!playing));
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => run && make());
   const names = scenes.map(({ scene: name }) => name), asked = [...new URLSearchParams(location.search).keys()];
   const named = names.findIndex((name) => asked.includes(name));

@@ -1,7 +1,7 @@
 "use strict";
 // The page's own script: choices, frames, playing, the chart of errors.
 (async () => {
-  const { Drawing, Layer, colour } = pdromDrawing;
+  const { Drawing, Layer, colour, fill } = pdromDrawing;
   const LOWEST = 1e-12, HIGHEST = 1e6; // errors outside are drawn on the rim, whatever the axis
   const WIDTH = 400, HEIGHT = 360, LEFT = 52, RIGHT = 8, TOP = 24, BOTTOM = 64; // of the chart, in its own units
   const CUBE = 0.5; // of the shown cube's side: radius of the ball that the camera sees
@@ -18,13 +18,6 @@
 
   const positions = (packed) => once(packed, pdromPacked.frames);
   const corners = (data) => pdromPacked.unpack({ kind: "u4", data });
-
-  function fill(select, values, words = String) {
-    const before = select.value;
-    select.replaceChildren(...values.map((value) => new Option(words(value), value)));
-    if (values.map(String).includes(before)) select.value = before;
-    select.disabled = values.length < 2;
-  }
 
   function chosenRun() {
     const scene = scenes[at("scene").value];

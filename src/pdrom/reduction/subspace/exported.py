@@ -181,20 +181,13 @@ def export_page(
 ) -> dict[str, Any]:
     """Export ``models`` and a full-order run of ``scene``: the content of a page.
 
-    Parameters
-    ----------
-    reference : (F + 1, N, 3) m of the full-order run, of which some frames are shown, or None
-    models : pairs (labels, which the page shows; model)
-
-    Raises
-    ------
-    SceneError
-        The browser's code cannot run the scene.
+    ``reference`` (F + 1, N, 3) m are positions of the run, of which some frames are shown; None
+    without a run. ``models`` are pairs (labels, which the page shows; model). SceneError if the
+    browser's code cannot run the scene.
     """
-    motion = None if reference is None else mean_motion(reference)
-    reference = scene.mesh.points[None] if reference is None else reference
+    full = scene.mesh.points[None] if reference is None else reference
     used, triangles = np.unique(scene.mesh.triangles, return_inverse=True)
-    stride = max(1, ceil((len(reference) - 1) * len(used) / GHOST))
+    stride = max(1, ceil((len(full) - 1) * len(used) / GHOST))
     return {
         "format": FORMAT,
         "scene": scene.config.name,
@@ -206,7 +199,7 @@ def export_page(
             "vertices": pack_array(used, "u4"),
             "triangles": pack_array(triangles.reshape(-1, 3), "u4"),
             "stride": stride,
-            "full": pack_positions(reference[::stride, used]),
+            "full": pack_positions(full[::stride, used]),
         },
-        "motion": motion,
+        "motion": None if reference is None else mean_motion(reference),
     }
