@@ -28,7 +28,7 @@
       waiting.set(scenes[index].scene, resolve);
       const script = document.createElement("script");
       script.src = file;
-      script.onerror = () => reject(new Error(`${file} is missing; it lies beside this page`));
+      script.onerror = () => reject(new Error(`${file} is missing; it belongs beside this page`));
       // a whole file has made its call before
       script.onload = () => reject(new Error(`${file} is cut, or not of this scene`));
       document.head.append(script);
@@ -39,7 +39,7 @@
   async function unpacked({ format, shown: { full, ...rest } = {}, ...others }) {
     if (format !== FORMAT) throw new Error("its data are of another version of pdrom");
     const [data, frames] = await Promise.all([
-      pdromPacked.unpacked({ ...others, shown: rest }), pdromPacked.frames(full)]);
+      pdromPacked.unpacked({ ...others, shown: rest }), pdromPacked.frames(full)]).catch(() => { throw new Error("its data are damaged"); });
     return { data, frames, bases: new Map() };
   }
 

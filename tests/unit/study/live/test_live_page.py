@@ -83,14 +83,14 @@ def test_of_scenes_chosen_in_haste_the_last_is_shown_and_a_lost_one_is_named(tmp
         page.wait_for_selector("#verdict.bad")
         for button in ("#play", "#again"):
             page.click(button)
-        assert "live/d.js: missing" in page.inner_text("#verdict")
+        assert "live/d.js is missing" in page.inner_text("#verdict")
         for content in ("", whole[: len(whole) // 2], "document.title = 1", files[0].read_text()):
             files[3].write_text(content)  # cut, empty, foreign, of another scene
             page.evaluate(choose, [1])
             page.wait_for_selector('body[data-ready="yes"]')
             page.evaluate(choose, [3])
             page.wait_for_selector("#verdict.bad")
-            assert "live/d.js: cut, or not of this scene" in page.inner_text("#verdict")
+            assert "live/d.js is cut, or not of this scene" in page.inner_text("#verdict")
             assert page.inner_text("#about") == ""
         page.evaluate(choose, [1])
         page.wait_for_selector('body[data-ready="yes"]')
@@ -105,7 +105,7 @@ def test_a_scene_that_is_not_here_and_a_page_that_was_cut_are_told(tmp_path):
     with page_at(path.as_uri() + '?nosuch"%', width=900, height=800) as page:
         page.wait_for_selector("#verdict.bad")
         after(page, 2)
-        assert page.inner_text("#verdict").startswith("No models of nosuch%22% are here")
+        assert page.inner_text("#verdict").startswith('This page has no nosuch"%: it shows test')
         page.evaluate("document.getElementById('scene').dispatchEvent(new Event('change'))")
         page.wait_for_selector("#verdict:not(.bad)")
         assert page.said == []
