@@ -1,10 +1,13 @@
 """A headless browser for tests of pages; a machine without one skips them."""
 
+import io
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+import numpy as np
 import pytest
+from PIL import Image
 from playwright.sync_api import Page, sync_playwright
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
@@ -43,3 +46,10 @@ def page_at(address: str, width: int, height: int) -> Iterator[Page]:
         page.goto(address)
         yield page
         browser.close()
+
+
+def picture(page: Page) -> np.ndarray:
+    """What is drawn, (height, width, 3), without the words on it."""
+    page.evaluate("new Promise((seen) => requestAnimationFrame(() => requestAnimationFrame(seen)))")
+    with Image.open(io.BytesIO(page.locator("#picture").screenshot())) as image:
+        return np.asarray(image.convert("RGB"), dtype=int)[60:]

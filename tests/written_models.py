@@ -10,7 +10,6 @@ from pdrom.model.runs import trajectory
 from pdrom.model.scene import Scene
 from pdrom.reduction.subspace import model as subspaces
 from pdrom.reduction.subspace.training import make_columns
-from places import ROOT
 from study.artifact.paths import File
 from study.experiments.subspaces import LiveModels, Options, live
 from study.live.page import live_page
@@ -18,10 +17,8 @@ from study.live.page import live_page
 
 def write_page(folder: Path, models: list[Path]) -> Path:
     """The page of some files of models, which lie below its folder."""
-    reads = live_page.files.items()
-    assets = {name: ROOT / read.path for name, read in reads if name != "models"}
     out = folder / "live.html"
-    live_page([File(str(path), {}) for path in models], outputs={"out": str(out)}, **assets)
+    live_page([File(str(path), {}) for path in models], outputs={"out": str(out)}, parts=[])
     return out
 
 

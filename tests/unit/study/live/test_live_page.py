@@ -1,16 +1,14 @@
 """The page on which models run: one file, scenes beside it, and it works in a real browser."""
 
-import io
 import re
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
-from PIL import Image
 from playwright.sync_api import Page
 
-from browser import page_at
+from browser import page_at, picture
 from builders import make_scene
 from pdrom.core.errors import StorageError
 from pdrom.core.store import write_text
@@ -126,12 +124,6 @@ def opened(request, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
 
 def after(page: Page, frame: int) -> None:
     page.wait_for_function(f"Number(document.body.dataset.frame) >= {frame}")
-
-
-def picture(page: Page) -> np.ndarray:
-    """What is drawn, (height, width, 3), without the words on it."""
-    with Image.open(io.BytesIO(page.locator("#picture").screenshot())) as image:
-        return np.asarray(image.convert("RGB"), dtype=int)[60:]
 
 
 @pytest.mark.slow
