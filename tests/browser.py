@@ -8,7 +8,7 @@ from contextlib import contextmanager
 import numpy as np
 import pytest
 from PIL import Image
-from playwright.sync_api import Page, sync_playwright
+from playwright.sync_api import Locator, Page, sync_playwright
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
 # software rendering, so that a machine without a graphics card draws, too
@@ -48,8 +48,9 @@ def page_at(address: str, width: int, height: int) -> Iterator[Page]:
         browser.close()
 
 
-def picture(page: Page) -> np.ndarray:
-    """What is drawn, (height, width, 3), without the words on it."""
-    page.evaluate("new Promise((seen) => requestAnimationFrame(() => requestAnimationFrame(seen)))")
-    with Image.open(io.BytesIO(page.locator("#picture").screenshot())) as image:
-        return np.asarray(image.convert("RGB"), dtype=int)[60:]
+def picture(element: Locator) -> np.ndarray:
+    """What is seen of an element, (height, width, 3)."""
+    drawn = "new Promise((seen) => requestAnimationFrame(() => requestAnimationFrame(seen)))"
+    element.page.evaluate(drawn)
+    with Image.open(io.BytesIO(element.screenshot())) as image:
+        return np.asarray(image.convert("RGB"), dtype=int)

@@ -1,7 +1,6 @@
 """The viewer: positions survive packing, the page is one file, and it works in a real browser."""
 
 import base64
-import io
 import json
 import zlib
 from collections.abc import Iterator, Sequence
@@ -12,10 +11,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from PIL import Image
-from playwright.sync_api import Locator, Page
+from playwright.sync_api import Page
 
-from browser import browser_or_skip, page_at
+from browser import browser_or_skip, page_at, picture
 from pdrom.core.errors import StorageError
 from pdrom.core.packed import LEVELS, pack_positions
 from pdrom.model.effects.base import effect_config
@@ -195,12 +193,6 @@ def go_to(page: Page, frame: int) -> None:
     for _ in range(frame):
         page.keyboard.press("ArrowRight")
     page.wait_for_selector(f'body[data-frame="{frame}"]')
-
-
-def picture(element: Locator) -> np.ndarray:
-    """What is seen, (height, width, 3)."""
-    with Image.open(io.BytesIO(element.screenshot())) as image:
-        return np.asarray(image.convert("RGB"), dtype=int)
 
 
 def differ(first: np.ndarray, second: np.ndarray) -> bool:
