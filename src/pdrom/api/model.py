@@ -174,7 +174,7 @@ class Model:
         store.require_own(files.file_path(path))
         own, scene, positions = self.reduced, self.scene, None
         if not isinstance(own, SubspaceModel):
-            raise NotReducibleError(f"{self.title} reduces projections: no page runs such a model")
+            raise NotReducibleError(f"{self.title} reduces projections: train without a method")
         if full is not None:
             scene, positions = files.require_run(full, "full").scene, full.positions
             if not full.full_order:

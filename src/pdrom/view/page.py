@@ -97,7 +97,7 @@ def filled(template: str, parts: dict[str, str]) -> str:
     pieces = [before]
     for piece in rest:
         name, _, after = piece.partition("}}")
-        pieces += [parts[name], after]
+        pieces += [parts[name.strip()], after]
     return "".join(pieces)
 
 
