@@ -5,7 +5,7 @@
   const SPEED = 0.03; // a handle moves at most this part of the scene's size a frame
   const REACH = 26; // CSS pixels from a handle's vertex within which a pointer takes it
   const KEY_STEP = 0.04; // of the scene's size
-  const LAG = 0.1; // part of its way to the shape that the camera goes in a frame
+  const LAG = 0.25; // part of its way to the shape that the camera goes in a frame
   const SAMPLE = 400; // vertices by which the camera follows the shape, at most
   const TOLD = 200; // ms between two updates of the numbers
   const MOST_ITERATIONS = 40; // that a reader may choose, unless the scene has more
