@@ -11,9 +11,9 @@ import pytest
 from places import tracked
 
 LIMITS = {
-    "lines of src": 35_000,
-    "lines of tests": 22_600,
-    "words of documentation": 24_600,
+    "lines of src": 35_300,
+    "lines of tests": 22_700,
+    "words of documentation": 25_000,
     "tables": 24,
     "figures": 22,
     "experiments": 18,
