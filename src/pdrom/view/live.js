@@ -122,7 +122,7 @@
 
   function nameOf(vertices, number) {
     const hold = shown.data.holds.find((each) => each.vertices.includes(vertices[0]));
-    return hold ? hold.name : `handle ${number + 1}`;
+    return hold ? hold.name : `number ${number + 1}`;
   }
 
   function iterations() {
