@@ -48,7 +48,7 @@ def test_every_run_has_its_row_and_outcome(tmp_path):
     errors = [0.05, None, None, 0.01, 0.5]
     judged = judged.assign(relative_error_within_horizon=errors, motion="train")
     limits = {"time_steps": {"a": 0.016}, "wrong": 0.1, "departure": 2.0}
-    read = {**written, **limits, "full_order": paths.TRAIN.files([str(fom)])}
+    read = {**written, **limits, "full_order": [paths.TRAIN.file(str(fom))]}
     read["reduced_reruns"] = judged
     table = stability(**read)
     assert table.outcome.tolist() == [

@@ -61,6 +61,10 @@ def beside(runs: list[str], end: str) -> list[str]:
     return [run.removesuffix(".h5") + end for run in runs]
 
 
+def each(place: paths.Place, found: list[str]) -> list[File]:
+    return [place.file(path) for path in found]
+
+
 def store_series(run, difference):
     """Series of a run with these differences; it touches the floor at once."""
     run["difference"], run["shape_difference"] = difference, np.divide(difference, 10.0)
@@ -169,13 +173,13 @@ def files(tmp_path) -> dict[str, object]:
     path = tmp_path / "sensitivity.csv"
     write_table(frame("scene perturbation seed frame relative_difference", *rows), path)
     return {
-        "full_order": paths.FULL_ORDER.files(full_order),
-        "runs": paths.RERUNS.files(reruns),
-        "rows": paths.RERUNS_TRAIN.files(beside(reruns, ".csv")),
-        "rows_heldout": paths.RERUNS_HELDOUT.files(beside(reruns, "_heldout.csv")),
-        "subspaces": paths.SUBSPACES.files(subspaces),
-        "subspace_rows": paths.SUBSPACES_TRAIN.files(beside(subspaces, ".csv")),
-        "subspace_rows_heldout": paths.SUBSPACES_HELDOUT.files(beside(subspaces, "_heldout.csv")),
+        "full_order": each(paths.FULL_ORDER, full_order),
+        "runs": each(paths.RERUNS, reruns),
+        "rows": each(paths.RERUNS_TRAIN, beside(reruns, ".csv")),
+        "rows_heldout": each(paths.RERUNS_HELDOUT, beside(reruns, "_heldout.csv")),
+        "subspaces": each(paths.SUBSPACES, subspaces),
+        "subspace_rows": each(paths.SUBSPACES_TRAIN, beside(subspaces, ".csv")),
+        "subspace_rows_heldout": each(paths.SUBSPACES_HELDOUT, beside(subspaces, "_heldout.csv")),
         "timings": timings,
         "frame_times": NOT_TIMED,
         "sensitivity": sensitivity([File(str(path), {})]),

@@ -95,5 +95,5 @@ def test_a_thickness_that_lets_vertices_pass_is_said_in_the_log_and_mended_by_wh
 def test_a_position_subspace_refuses_it():
     scene = sheet()
     columns = make_columns([scene], scene.mesh.points[None], skinning=4)
-    with pytest.raises(NotReducibleError, match="effect 'self_collision' needs all vertices"):
+    with pytest.raises(NotReducibleError, match="effect 'self_collision': needs all vertices"):
         ReducedSpace(scene, columns, [])
