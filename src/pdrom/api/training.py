@@ -217,6 +217,8 @@ def _trained(
         longest = max(scene.config.frames for scene in scenes)
         all_frames, bounds = np.arange(longest), [asked.tolerance]
         (reduced,) = sampled_models(scenes, columns, all_frames, bounds, choose=selection)
+        used = reduced.elements_evaluated(scenes[0])
+        log.info("%d elements selected in %.1f s", used, perf_counter() - started)
     names, seconds = tuple(one.config.name for one in scenes), before + perf_counter() - started
     done = Training(names, asked.converged, asked.tolerance, reduced.residual, seconds)
     return Model(scenes[0], reduced, done, pd.DataFrame())
@@ -269,6 +271,7 @@ def _validated(model: Model, training: Sequence[Run], tests: Sequence[Run]) -> M
     """Return ``model`` with the table of its runs of all trajectories."""
     rows = []
     for reference in (*training, *tests):
+        log.info("%s: comparing the model with the full order", reference.scene.config.name)
         made = model.run(reference.scene)
         errors = made.error(reference)
         steps = reference.scene.config.time_step / training[0].scene.config.time_step
