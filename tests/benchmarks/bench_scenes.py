@@ -5,12 +5,16 @@ acceleration; the local step is compiled, with the vectorised NumPy reference be
 step is its assembly with factorisation, and the solves of one iteration.
 """
 
+from functools import cache
+
 import numpy as np
 import pytest
 
 from builders import GRAVITY, LEFT, make_scene
+from pdrom.api import load_scene, run, train
 from pdrom.model.dynamics.solvers import SOLVERS
 from pdrom.model.scene import Scene
+from places import ROOT
 from study.experiments.timing import NumpyLocalStep
 
 WEIGHTS = {
@@ -139,3 +143,27 @@ def bench_solve(benchmark, family, solver):
     benchmark.group = f"solve {family}"
     benchmark(elimination.solve, rhs, y)
     assert np.isfinite(y).all()
+
+
+RUNS = {"full": (10, 0, None), "5": (5, 0, "local_global"), "newton": (1, 0, None)}
+RUNS |= {f"anderson {k}": (k, 5, "local_global") for k in (20, 100, 400, 800)}
+
+
+@cache
+def trained(name):
+    scene = load_scene(ROOT / "config" / "scenes" / f"{name}.yaml").changed(frames=40, reduce={})
+    return scene, train(run(scene), modes=40, skinning=40 * (name == "strain_oop"))
+
+
+@pytest.mark.parametrize("kind", RUNS)
+@pytest.mark.parametrize("name", ["bar80", "sheet100_strain", "strain_oop", "spring_oop"])
+def bench_reduced_run(benchmark, name, kind):
+    """40 frames with all positions; the deformation error is the distance to converged frames."""
+    scene, model = trained(name)
+    own, solver, lift = scene.iterated(*RUNS[kind][:2]), RUNS[kind][2], model.reduced.positions
+    loop, start = model.loop(own, solver=solver)
+    if kind == "full":
+        loop, start, lift = own.stepper(track_objective=False), own.initial_state(), np.copy
+    benchmark.extra_info["distance"] = str(model.run(own, solver=solver).error(model.run(scene)))
+    benchmark.group = f"run {name}"
+    benchmark(lambda: [lift(state.positions) for state, _ in loop.run(start, range(40))])

@@ -2,24 +2,26 @@
 
 import json
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter, process_time
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import h5py
 import numpy as np
 import pandas as pd
+from pydantic import Field
 
 from pdrom.api import files
 from pdrom.api.records import Run
 from pdrom.core import store
 from pdrom.core.errors import ConfigurationError, NotReducibleError, StorageError
 from pdrom.core.provenance import made_by
-from pdrom.core.yamlfile import shown, validate
+from pdrom.core.yamlfile import ConfigModel, shown, validate
 from pdrom.model.constraints.base import GroupConfig
 from pdrom.model.dynamics.stepper import FrameReport, State, Stepper
+from pdrom.model.effects.base import Vector
 from pdrom.model.mesh.types import store_mesh, stored_mesh
 from pdrom.model.runs import BLOWUP_EXTENT
 from pdrom.model.scene import Scene, SceneConfig
@@ -33,7 +35,7 @@ from pdrom.reduction.subspace.model import SubspaceModel
 from pdrom.reduction.subspace.space import ReducedSpace, reduced_state
 from pdrom.view.page import LIVE, page_of, view_of
 
-FORMAT = 1  # version of the file of a model
+FORMAT = 2  # version of the file of a model; 1 has no solver
 BUSY = 1.25  # wall time over processor time from which the processor counts as busy
 OnFrame = Callable[[int, FrameReport], None]
 
@@ -52,6 +54,7 @@ class Training:
         without sampling
     residual : the residual that was reached, the largest of all groups; None without sampling
     seconds : time of the training, s
+    solver : by which the model runs if nothing else is asked for, see `Model.run`
     """
 
     trajectories: tuple[str, ...]
@@ -59,6 +62,7 @@ class Training:
     tolerance: float | None
     residual: float | None
     seconds: float
+    solver: str = "local_global"
 
     def __str__(self) -> str:
         solved = "converged frames" if self.converged else "the scene's iterations"
@@ -112,6 +116,7 @@ class Model:
         out: str | os.PathLike[str] | None = None,
         on_frame: OnFrame = silent,
         iterations: int | None = None,
+        solver: str | None = None,
     ) -> Run:
         """Run ``scene``; a run that blows up ends there and is a result like any other.
 
@@ -121,7 +126,8 @@ class Model:
             forces and the time step may differ; it may hold what a training scene held or declared
         out : file (HDF5) to write; None writes no file
         on_frame : called after each frame with its number, from 0, and the solver's report
-        iterations : local-global iterations of a frame; None: those of the scene
+        iterations : of a frame; None: until it has converged (Newton), or those of the scene
+        solver : "newton" or "local_global" (as the full order); None: that of the training
 
         Returns
         -------
@@ -135,12 +141,7 @@ class Model:
             simulate; ``out`` cannot be written.
         """
         files.require_runnable(scene, out, on_frame)
-        if not (iterations is None or (type(iterations) is int and 1 <= iterations <= 10_000)):
-            raise ConfigurationError(
-                f"iterations = {shown(iterations, 60)}: allowed are 1 to 10000"
-            )
-        scene = scene.iterated(iterations, scene.config.anderson_window) if iterations else scene
-        loop, start = self.loop(scene)
+        loop, start = self.loop(scene, iterations, solver)
         next(loop.run(start, range(1)))  # loads compiled code, which no frame's time shall include
         lift = self.reduced.positions
         run = rerun(scene, loop, start, None, BLOWUP_EXTENT, lift, on_frame)
@@ -150,11 +151,20 @@ class Model:
             files.save(found, out)
         return found
 
-    def loop(self, scene: Scene) -> tuple[Stepper, State]:
+    def loop(
+        self, scene: Scene, iterations: int | None = None, solver: str | None = None
+    ) -> tuple[Stepper, State]:
         """Step loop of ``scene`` in the model's unknowns, and the initial state; see `run`."""
         require_same_mesh(self.scene, scene)
+        asked = validate(_Asked, {"iterations": iterations, "solver": solver}, "run")
+        newton = (asked.solver or self.training.solver) == "newton"
+        count = asked.iterations or (256 if newton else None)
+        scene = scene.iterated(count, scene.config.anderson_window) if count else scene
         if isinstance(self.reduced, SubspaceModel):
             subspaces.require_holds(scene, self.reduced.columns)
+            return self.reduced.loop(scene, newton)
+        if newton:
+            raise ConfigurationError("run: solver = newton: this model has no position subspace")
         return self.reduced.loop(scene)
 
     def view(self, path: str | os.PathLike[str], full: Run | None = None) -> None:
@@ -185,6 +195,13 @@ class Model:
         content = export_page(scene, config.title, positions, [(labels, own)])
         entry = {"scene": config.name, "view": view_of(config.effects), "content": content}
         store.write_text(page_of(LIVE, [entry]), path, with_checksum=False)
+
+    def start(self, scene: Scene, **options: Any) -> "Loop":
+        """Start ``scene`` frame by frame; ``options`` are iterations and solver of `run`."""
+        files.require(Scene, scene, "scene", source="build_scene and load_scene make one")
+        if not isinstance(self.reduced, SubspaceModel):
+            raise ConfigurationError("start: this model has no position subspace; use run")
+        return Loop(*self.loop(scene, **options), self.reduced.positions)
 
     def speed(self, scene: Scene, repeats: int = 3) -> dict[str, Any]:
         """Measure the model and the full order in turn, in this process, on ``scene``.
@@ -228,6 +245,43 @@ class Model:
             subspaces.store_columns(own.create_group("columns"), self.reduced.columns)
             subspaces.store_model(own, {}, self.reduced.samples)
             _export(self.scene, self.reduced, file.create_group("frame"))
+
+
+class _Asked(ConfigModel):
+    iterations: Annotated[int, Field(ge=1, le=10_000)] | None = None
+    solver: Literal["newton", "local_global"] | None = None
+    displacement: Vector = (0.0, 0.0, 0.0)
+
+
+class Loop:
+    """A scene, computed frame by frame; ``frame`` is the number of the next one, from 0."""
+
+    def __init__(self, loop: Stepper, start: State, lift: Callable[..., np.ndarray]) -> None:
+        self._loop, self._state, self._lift, self.frame = loop, start, lift, 0
+
+    @property
+    def positions(self) -> np.ndarray:
+        """Positions (N, 3) m of all vertices after the last frame."""
+        return self._lift(self._state.positions)
+
+    def step(self) -> None:
+        """Compute the next frame."""
+        self._state, _ = self._loop.step(self._state, self.frame)
+        self.frame += 1
+
+    def move(self, hold: str, displacement: Sequence[float]) -> None:
+        """Displace a hold, named by its side ("left") or effect ("pins"), by ``displacement`` m.
+
+        Displacements add up. ConfigurationError unless one hold of the next frame has the name.
+        """
+        active = (b for b in self._loop.space.boundaries if b.active(self.frame))
+        found = [b for b in active if hold in (b.boundary.side, b.boundary.name)]
+        asked = validate(_Asked, {"displacement": displacement}, "move")
+        if len(found) != 1:
+            raise ConfigurationError(
+                f"move: {shown(hold, 60)}: {len(found)} holds, required is one"
+            )
+        found[0].shift = found[0].shift + np.array(asked.displacement)
 
 
 def require_same_mesh(own: Scene, other: Scene) -> None:
@@ -331,7 +385,7 @@ def _model(file: h5py.File, path: Path) -> Model:
     tolerance, residual = (None if bound is None else float(bound) for bound in bounds)
     training = Training(
         tuple(record["trajectories"].asstr()[...]), bool(record.attrs["converged"]), tolerance,
-        residual, float(record.attrs["seconds"]),
+        residual, float(record.attrs["seconds"]), str(record.attrs.get("solver", "local_global")),
     )  # fmt: skip
     rows = {name: (t.asstr() if t.dtype.kind == "O" else t)[...] for name, t in table.items()}
     reduced: SubspaceModel | ProjectionModel

@@ -220,7 +220,9 @@ def _trained(
         used = reduced.elements_evaluated(scenes[0])
         log.info("%d elements selected in %.1f s", used, perf_counter() - started)
     names, seconds = tuple(one.config.name for one in scenes), before + perf_counter() - started
-    done = Training(names, asked.converged, asked.tolerance, reduced.residual, seconds)
+    compiled = all(group.gradient_kernel for group in scenes[0].groups)
+    solver = "newton" if asked.converged and compiled else "local_global"
+    done = Training(names, asked.converged, asked.tolerance, reduced.residual, seconds, solver)
     return Model(scenes[0], reduced, done, pd.DataFrame())
 
 

@@ -30,7 +30,7 @@ class Space(ABC):
     a frame, the iterate ``y``, the prediction ``s``. ``h`` is the time step in seconds.
     """
 
-    _boundaries: Sequence[Any]  # each acts like a `base.Boundary`, on coordinates
+    boundaries: Sequence[Any]  # each acts like a `base.Boundary`, on coordinates
     _eliminated: Callable[[np.ndarray], Solve]
     _made: dict[bytes, Solve]
 
@@ -69,7 +69,7 @@ class Space(ABC):
         the state; anchors of the state after the frame are the third result.
         """
         one = range(frame, frame + 1)
-        indices, path, anchors = base.held_path(self._boundaries, one, positions, anchors)
+        indices, path, anchors = base.held_path(self.boundaries, one, positions, anchors)
         return indices, path[0], anchors
 
     def held_path(
@@ -79,7 +79,7 @@ class Space(ABC):
 
         Holds begin or end only in the first of these frames.
         """
-        return base.held_path(self._boundaries, frames, positions, anchors)
+        return base.held_path(self.boundaries, frames, positions, anchors)
 
     def elimination(self, fixed: np.ndarray) -> Any:
         """Return the factored system (`Solve`) without ``fixed`` coordinates, made only once."""
@@ -118,7 +118,7 @@ class VertexSpace(Space):
         contacts: Sequence[base.Contact] = (),
     ) -> None:
         self.system, self._eliminated, self._made = system, system.eliminate, {}
-        self._forces, self._boundaries, self._contacts = forces, boundaries, contacts
+        self._forces, self.boundaries, self._contacts = forces, boundaries, contacts
 
     def acceleration(self, positions: np.ndarray, velocities: np.ndarray) -> np.ndarray:
         total = np.zeros(3)
@@ -144,7 +144,7 @@ class VertexSpace(Space):
         if any(getattr(step, "local_kernel", None) is None for step in local_steps):
             return None, None
         loop = CompiledIterations(local_steps, self.system.inertia, acceleration)
-        effects = self._forces, self._boundaries, self._contacts
+        effects = self._forces, self.boundaries, self._contacts
         # whole frames are not compiled for subclasses, which may override any part of a frame
         if type(self) is not VertexSpace or not WholeFrames.suits(local_steps, *effects):
             return loop, None
@@ -160,6 +160,6 @@ class VertexSpace(Space):
     def correct(self, y: np.ndarray, before: np.ndarray, frame: int) -> None:
         if not self._contacts:
             return
-        held = base.held_vertices(self._boundaries, frame)
+        held = base.held_vertices(self.boundaries, frame)
         for contact in self._contacts:
             contact.apply(y, before, held)

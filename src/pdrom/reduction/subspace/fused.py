@@ -11,23 +11,17 @@ two small dense products and the projections; it allocates nothing, and no array
 mesh. If no group has data that are computed once per frame, c is the product of a matrix with s,
 whose fixed coordinates are set to their targets, and one compiled call computes many frames, up to
 the first in which a vertex is below a floor.
-
-The matrix of a product is stored in blocks of `TALL` rows, each block column by column, so that the
-sums of all rows of a block are computed side by side. Vectors are stored as three numbers each, but
-read and written four numbers at a time; their arrays have space for the additional numbers
-(`vectors`). Every sum is in the order of the columns on all processors.
 """
 
 from collections.abc import Sequence
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 
-from pdrom.model.compiled.arithmetic import add_scaled
+from pdrom.core.errors import NotReducibleError
 from pdrom.model.compiled.functions import clock, compiled, inner, now
-from pdrom.model.compiled.rows import WIDTH, at, copied, load, store, zeros
 from pdrom.model.compiled.rows import write as copy
-from pdrom.model.constraints.local_kernel import call_gradients
 from pdrom.model.dynamics.acceleration import NO_HISTORY, Anderson, History, combine, forget, refuse
 from pdrom.model.dynamics.frames import BLOCK, Blocks
 from pdrom.model.dynamics.space import Solve
@@ -35,6 +29,8 @@ from pdrom.model.dynamics.stepper import LocalStep, Observer, Stepper
 from pdrom.model.effects.base import Anchors
 from pdrom.model.scene import Scene
 from pdrom.reduction.subspace.interpolation import SubspaceLocalStep
+from pdrom.reduction.subspace.newton import CONVERGED, newton_arrays, run_newton
+from pdrom.reduction.subspace.products import blocks, objective, product, project, vectors
 from pdrom.reduction.subspace.space import DenseElimination, ReducedSpace
 
 
@@ -45,8 +41,10 @@ class FusedStepper(Stepper):
     `SubspaceLocalStep` or a group has no `gradient_kernel`, this class iterates like `Stepper`.
     """
 
-    def __init__(self, scene: Scene, space: ReducedSpace, local_steps: Sequence[LocalStep]) -> None:
-        config, acceleration = scene.config, scene.acceleration()
+    def __init__(
+        self, scene: Scene, space: ReducedSpace, local_steps: Sequence[LocalStep], newton: bool
+    ) -> None:
+        config, acceleration = scene.config, None if newton else scene.acceleration()
         h, iterations = config.time_step, config.iterations
         super().__init__(space, h, iterations, local_steps, False, acceleration)
         self._fused: _Fused | None = None
@@ -54,17 +52,24 @@ class FusedStepper(Stepper):
         kernels = [step.group.gradient_kernel for step in steps]
         if len(steps) == len(local_steps) and None not in kernels:
             self._fused = _Fused(space, _Sampled(steps), acceleration)
+            if newton:
+                self._fused.enough = scene.masses.sum() * (CONVERGED * scene.mesh.extent / h) ** 2
             if space.whole_frames and not any(step.group.frame_lagged for step in steps):
                 self._whole = self._fused
+        elif newton:
+            raise NotReducibleError("Newton's method needs sampled elements with gradient kernels")
 
     def _iterate(
         self, s: np.ndarray, base: np.ndarray, system: Solve, seconds: np.ndarray, watch: Observer
     ) -> tuple[np.ndarray, np.ndarray]:
-        if self._fused is None or watch is not None or not isinstance(system, DenseElimination):
+        plain = self._fused is None or (watch is not None and self._fused.enough is None)
+        if self._fused is None or plain or not isinstance(system, DenseElimination):
             return super()._iterate(s, base, system, seconds, watch)
         before = perf_counter()
         y = self._fused.iterate(system, s, base, self.iterations)
         seconds[1] += perf_counter() - before
+        if watch is not None:
+            watch(y)
         return y, np.empty(0)
 
 
@@ -75,6 +80,7 @@ class _Fused:
         self, space: ReducedSpace, sampled: "_Sampled", acceleration: Anderson | None
     ) -> None:
         self._space, self._sampled, self._acceleration = space, sampled, acceleration
+        self.enough: float | None = None  # argument of `newton_arrays`; None: local-global
         self._operators: dict[int, _Operators] = {}
         self._clock = clock()
         self._waiting = 0
@@ -84,7 +90,9 @@ class _Fused:
         key = id(elimination)
         if key not in self._operators:
             inertia = self._space.inertia_matrix
-            self._operators[key] = _Operators(self._sampled, elimination, inertia)
+            own = self._operators[key] = _Operators(self._sampled, elimination, inertia)
+            if self.enough is not None:
+                own.newton = newton_arrays(self._sampled, self._space, elimination, self.enough)
         return self._operators[key]
 
     def iterate(
@@ -99,9 +107,8 @@ class _Fused:
         count = 3 * len(free)
         own.constant[:count] = elimination.solved(base).ravel()
         own.z[:count] = s[free].ravel()
-        run_iterations(
-            iterations, len(free), own.rows, own.iterated, sampled.arrays, self._history(free)
-        )
+        arrays = own.iterated, sampled.arrays, self._history(free), own.newton
+        run_iterations(iterations, len(free), own.rows, *arrays)
         y = s.copy()
         y[free] = own.z[:count].reshape(-1, 3)
         return y
@@ -134,7 +141,7 @@ class _Fused:
         run_frames(
             positions, velocities, *self._space.affine, h, elimination.fixed, elimination.free,
             targets, own.begun, iterations, own.rows, own.iterated, self._sampled.arrays,
-            self._history(elimination.free), seconds, self._clock,
+            self._history(elimination.free), own.newton, seconds, self._clock,
         )  # fmt: skip
         free = self._space.free_frames(positions[1:])
         if free == 0:
@@ -149,7 +156,7 @@ class _Sampled:
 
     def __init__(self, steps: Sequence[SubspaceLocalStep]) -> None:
         groups = [step.group for step in steps]
-        self._groups = groups
+        self.groups = groups
         self.strain = np.vstack([step.strain for step in steps])
         self.row_weights = np.concatenate([group.row_weights for group in groups])
         rows = [group.elements * group.rows_per_element for group in groups]
@@ -172,7 +179,7 @@ class _Sampled:
         """Copy to `arrays` the parameters that groups have computed at the frame's beginning."""
         for i in self._lagged:
             start, stop = self._starts[i : i + 2]
-            self._parameters[start:stop] = self._groups[i].kernel_parameters().ravel()
+            self._parameters[start:stop] = self.groups[i].kernel_parameters().ravel()
 
 
 class _Operators:
@@ -182,6 +189,8 @@ class _Operators:
         and working memory, for the objective
     begun : matrices that map s to c and fixed coordinates to d_0, zeros, arrays for these inputs
     """
+
+    newton: tuple[Any, ...] | None = None
 
     def __init__(
         self, sampled: _Sampled, elimination: DenseElimination, inertia: np.ndarray
@@ -203,100 +212,33 @@ class _Operators:
         )  # fmt: skip
 
 
-TALL = 8
-
-
-def blocks(matrix: np.ndarray) -> np.ndarray:
-    """Arrange ``matrix`` (m, n) in blocks for `product`, flat; zero rows fill the last block."""
-    m, n = matrix.shape
-    whole = np.zeros((-(-m // TALL) * TALL, n))
-    whole[:m] = matrix
-    return copied(
-        np.ascontiguousarray(whole.reshape(len(whole) // TALL, TALL, n).transpose(0, 2, 1)).ravel()
-    )
-
-
-def vectors(count: int) -> np.ndarray:
-    """Flat array of zeros for ``count`` vectors of three numbers, padded as `product` requires."""
-    return zeros(3 * (-(-count // TALL) * TALL) + WIDTH)
-
-
 @compiled(nogil=True)
-def product(matrix, m, n, start, x, out):
-    """Set ``out`` = ``start`` + M ``x``; M (m, n) comes from `blocks`, arrays from `vectors`."""
-    entry = 0
-    for row in range(0, 3 * m, 3 * TALL):
-        a, b = load(start, row), load(start, row + 3)
-        c, d = load(start, row + 6), load(start, row + 9)
-        e, f = load(start, row + 12), load(start, row + 15)
-        g, h = load(start, row + 18), load(start, row + 21)
-        for k in range(0, 3 * n, 3):
-            v = load(x, k)
-            a, b = add_scaled(a, at(matrix, entry), v), add_scaled(b, at(matrix, entry + 1), v)
-            c, d = add_scaled(c, at(matrix, entry + 2), v), add_scaled(d, at(matrix, entry + 3), v)
-            e, f = add_scaled(e, at(matrix, entry + 4), v), add_scaled(f, at(matrix, entry + 5), v)
-            g, h = add_scaled(g, at(matrix, entry + 6), v), add_scaled(h, at(matrix, entry + 7), v)
-            entry += TALL
-        # the fourth number stored for each vector is overwritten by the next vector
-        store(out, row, a)
-        store(out, row + 3, b)
-        store(out, row + 6, c)
-        store(out, row + 9, d)
-        store(out, row + 12, e)
-        store(out, row + 15, f)
-        store(out, row + 18, g)
-        store(out, row + 21, h)
-
-
-@compiled(nogil=True)
-def run_iterations(count, size, rows, operators, sampled, history):
+def run_iterations(count, size, rows, operators, sampled, history, newton):
     """Do ``count`` iterations that change ``size`` free subspace coordinates z in place.
 
     rows : number of rows of all sampled elements
     operators : matrices and vectors `_Operators.iterated`, z among them
     sampled : data of the sampled elements, `_Sampled.arrays`
     history : arrays of Anderson acceleration, see `Anderson`; `NO_HISTORY` without it
+    newton : `newton_arrays`; with them, iterations are those of `run_newton`
     """
+    if newton is not None:
+        return run_newton(count, size, rows, operators, sampled, newton)
     strain, lift, offset, constant, z, weights, inertia, start = operators
-    addresses, elements, starts, parameters, parameter_starts, d, p = sampled
+    d, p = sampled[5:]
     y = z[: 3 * size]
     if history is not None:
         copy(y, start)
         forget(history)
     for k in range(count):
-        product(strain, rows, size, offset, z, d)
-        for g in range(len(addresses)):
-            call_gradients(
-                addresses[g],
-                d[3 * starts[g] :].ctypes.data,
-                parameters[parameter_starts[g] :].ctypes.data,
-                p[3 * starts[g] :].ctypes.data,
-                elements[g],
-            )
+        project(strain, rows, size, offset, z, sampled)
         refused = False
         if history is not None:
-            refused = refuse(history, y, _objective(weights, d, p, inertia, y, start))
+            refused = refuse(history, y, objective(weights, d, p, inertia, y, start))
         if not refused:
             product(lift, size, rows, constant, p, z)
             if history is not None and k < count - 1:
                 combine(history, y)
-
-
-@inner
-def _objective(weights, d, p, inertia, y, s):
-    """Objective, J, of y: 1/2 sum_i w_i |d_i - p_i|^2 + 1/2 (y - s)^T (M/h^2) (y - s), d = S q."""
-    total = 0.0
-    for i in range(len(weights)):
-        for axis in range(3):
-            total += weights[i] * (d[3 * i + axis] - p[3 * i + axis]) ** 2
-    for i in range(len(inertia)):
-        for axis in range(3):
-            moved = 0.0
-            for k in range(i):
-                moved += inertia[i, k] * (y[3 * k + axis] - s[3 * k + axis])
-            own = y[3 * i + axis] - s[3 * i + axis]
-            total += own * (2.0 * moved + inertia[i, i] * own)
-    return 0.5 * total
 
 
 @inner
@@ -313,7 +255,7 @@ def _predict(z, v, acceleration, rate, rates, h, s):
 @compiled(nogil=True)
 def run_frames(
     positions, velocities, acceleration, rate, rates, h, fixed, free, targets, begun, count,
-    rows, operators, sampled, history, seconds, watch,
+    rows, operators, sampled, history, newton, seconds, watch,
 ):  # fmt: skip
     """Compute one frame for each of ``targets`` by `run_iterations`.
 
@@ -325,7 +267,7 @@ def run_frames(
     fixed, free : (m,), (K',) indices of the fixed coordinates and of the free ones
     targets : (F, m, 3) values of the fixed coordinates in each frame
     begun : matrices for the start of a frame, see `_Operators`
-    count, rows, operators, sampled, history : arguments of `run_iterations`
+    count, rows, operators, sampled, history, newton : see `run_iterations`
     seconds : (F, 4) s, times of the phases of each frame, written
     watch : buffer for the clock, from `pdrom.model.compiled.functions.clock`
     """
@@ -348,7 +290,7 @@ def run_frames(
             for axis in range(3):
                 z[3 * i + axis] = s[3 * free[i] + axis]
         between = now(watch)
-        run_iterations(count, len(free), rows, operators, sampled, history)
+        run_iterations(count, len(free), rows, operators, sampled, history, newton)
         ended = now(watch)
         for i in range(len(free)):
             for axis in range(3):

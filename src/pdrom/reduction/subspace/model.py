@@ -59,8 +59,8 @@ class SubspaceModel:
         every = Samples(np.arange(group.elements), np.ones(group.elements))
         return self.samples.get(group.name, every)
 
-    def loop(self, scene: Scene) -> tuple[Stepper, State]:
-        """Step loop of ``scene`` in subspace coordinates, and the initial state in them."""
+    def loop(self, scene: Scene, newton: bool = False) -> tuple[Stepper, State]:
+        """Step loop of ``scene``, local-global or ``newton``, and initial state, in coordinates."""
         steps: list[Any] = []
         for group in scene.groups:
             own = self.chosen(group)
@@ -70,7 +70,7 @@ class SubspaceModel:
                 kept = own.elements, own.factors
                 steps.append(interpolation.SubspaceLocalStep(group, self.columns, *kept))
         space = ReducedSpace(scene, self.columns, [step.matrix for step in steps])
-        return FusedStepper(scene, space, steps), reduced_state(scene, self.columns)
+        return FusedStepper(scene, space, steps, newton), reduced_state(scene, self.columns)
 
     def positions(self, z: np.ndarray) -> np.ndarray:
         """Vertex positions (N, 3) m of coordinates ``z`` (K, 3)."""

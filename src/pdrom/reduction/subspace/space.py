@@ -113,7 +113,7 @@ class ReducedSpace(Space):
         self.inertia_matrix = mass / h**2
         self.forces = [_reduce_force(force, columns, scene) for force in scene.forces]
         # these objects act like a `Boundary`, with coordinates instead of vertices
-        self._boundaries = [_ReducedBoundary(b, columns) for b in scene.boundaries]
+        self.boundaries = [_ReducedBoundary(b, columns) for b in scene.boundaries]
         self._contacts = [_ReducedContact(c, columns, scene) for c in scene.contacts]
 
     def acceleration(self, positions: np.ndarray, velocities: np.ndarray) -> np.ndarray:
@@ -156,7 +156,7 @@ class ReducedSpace(Space):
     def correct(self, y: np.ndarray, before: np.ndarray, frame: int) -> None:
         if not self._contacts:
             return
-        held = base.held_vertices([b.boundary for b in self._boundaries], frame)
+        held = base.held_vertices([b.boundary for b in self.boundaries], frame)
         for contact in self._contacts:
             contact.correct(y, before, held)
 
@@ -213,13 +213,13 @@ def _reduce_force(force: base.Force, columns: Columns, scene: Scene) -> tuple[np
 
 
 class _ReducedBoundary:
-    """Boundary condition that prescribes the subspace coordinates that move only its vertices."""
+    """Boundary condition on coordinates that move only its vertices; ``shift`` moves targets, m."""
 
     def __init__(self, boundary: base.Boundary, columns: Columns) -> None:
         self.boundary = boundary
         self.active, self.takes_hold = boundary.active, boundary.takes_hold
         self._parts: dict[bytes, tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
-        self._columns = columns
+        self._columns, self.shift = columns, np.zeros(3)
 
     def held(self, frame: int) -> np.ndarray:
         """Ascending indices of subspace coordinates that move the vertices held in ``frame``."""
@@ -232,7 +232,7 @@ class _ReducedBoundary:
 
     def path(self, frames: range, anchor: np.ndarray) -> np.ndarray:
         """Values (n, m, 3) in ``frames`` of coordinates `held`; see `base.Boundary.path`."""
-        return self._of(frames.start)[2] @ self.boundary.path(frames, anchor)
+        return self._of(frames.start)[2] @ (self.boundary.path(frames, anchor) + self.shift)
 
     def _of(self, frame: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Indices i of coordinates prescribed in ``frame``, R = B[held vertices, i]; pinv(R)."""

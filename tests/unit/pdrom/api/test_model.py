@@ -253,7 +253,7 @@ def test_a_file_that_cannot_be_trusted_is_refused(model, tmp_path):
             old.copy(name, new)
         new.attrs.update(old.attrs)
         new.attrs["format"] = 99
-    with pytest.raises(StorageError, match="a model of version 99, this pdrom reads up to 1"):
+    with pytest.raises(StorageError, match="a model of version 99, this pdrom reads up to 2"):
         api.load_model(tmp_path / "newer.h5")
     api.save(model.run(model.scene), tmp_path / "run.h5")
     with pytest.raises(StorageError, match="holds no model"):
@@ -271,8 +271,31 @@ def test_the_files_page_computes_a_frame_with_numpy_alone(model, tmp_path, monke
     model.save("sheet.model.h5")
     names: dict = {}
     exec(compile(script, "library.md", "exec"), names)
-    expected = model.run(model.scene).positions[1]
+    expected = model.run(model.scene, solver="local_global").positions[1]
     assert names["positions"] == pytest.approx(expected, abs=1e-12)
+
+
+def test_models_of_converged_frames_run_by_newton_steps_others_as_the_full_order(full, model):
+    slow = model.run(full.scene, iterations=2000, solver="local_global")
+    assert model.run(full.scene).error(slow).deformation < 1e-3
+    loose = api.train(full, modes=8, converged=False)
+    one, two = loose.run(full.scene), loose.run(full.scene, iterations=10, solver="local_global")
+    assert np.array_equal(one.positions, two.positions)
+
+
+def test_a_loop_computes_the_frames_of_a_run_and_moves_its_holds(full, model):
+    loop, moved = model.start(full.scene), model.start(full.scene)
+    run, held = model.run(full.scene).positions, full.scene.boundaries[0].vertices
+    for expected in run[1:4]:
+        moved.move("left", [0.0, 0.1, 0.0])
+        moved.step()
+        loop.step()
+        assert np.array_equal(loop.positions, expected)
+    assert moved.positions[held] == pytest.approx(run[0, held] + [0.0, 0.3, 0.0], abs=1e-12)
+    assert np.abs(moved.positions[:, [0, 2]] - loop.positions[:, [0, 2]]).max() > 1e-3
+    for hold, shift in (("right", [0, 0, 0]), ("left", "up")):
+        with pytest.raises(ConfigurationError, match="move: "):
+            moved.move(hold, shift)
 
 
 def test_threads_get_the_runs_alone(full, model):

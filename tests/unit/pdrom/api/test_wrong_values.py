@@ -114,7 +114,7 @@ def test_a_field(known, tmp_path, monkeypatch, capfd, kind):
     assert capfd.readouterr() == ("", "")
 
 
-@pytest.mark.parametrize("argument", ["scene", "out", "on_frame", "iterations", "path"])
+@pytest.mark.parametrize("argument", ["scene", "out", "on_frame", "iterations", "solver", "path"])
 def test_an_argument_of_a_models_methods(known, tmp_path, monkeypatch, capfd, argument):
     monkeypatch.chdir(tmp_path)
     model, scene = known["model"], known["full"].scene

@@ -4,6 +4,7 @@ from functools import partial
 
 import numpy as np
 import pytest
+from scipy import optimize
 
 from builders import GROUPS, LEFT, TOP, make_scene
 from pdrom.core.errors import SceneError
@@ -217,6 +218,34 @@ def test_fused_iterations_are_the_plain_ones(name):
         np.testing.assert_allclose(state.positions, other.positions, rtol=1e-8, atol=1e-8)
     moved = other.positions - coordinates(columns, scene.masses, scene.mesh.points)
     assert np.linalg.norm(moved) > 1e-3
+
+
+@pytest.mark.parametrize("name", ["free", "handles", "bending", "bar"])
+def test_newton_steps_reach_the_minimum_that_scipy_and_local_global_iterations_find(name):
+    scene = SCENES[name]()
+    columns = training.make_columns([scene], trajectory(scene)[1:], 6)
+    model = models.SubspaceModel(columns, ecsw_of(scene, columns, 3))
+    loop, state = model.loop(scene.iterated(200), newton=True)
+    s, system, base, _ = loop._begin(state, 0)
+
+    def evaluate(numbers):
+        y, rhs = s.copy(), base.copy()
+        y[system.free] = numbers.reshape(-1, 3)
+        energy = sum(step.accumulate(y, rhs) for step in loop.local_steps)
+        gradient = (loop.space.matrix @ y - rhs)[system.free]
+        return energy + loop.space.inertia_energy(y - s), gradient.ravel()
+
+    start, seen = s[system.free].ravel(), []
+    wanted = optimize.minimize(evaluate, start, jac=True, options={"gtol": 1e-7}).x
+    found = loop.step(state, 0, seen.append)[0].positions
+    near = 2e-5 * scene.mesh.extent  # frames end at 1e-6, for the mean of all vertices
+    np.testing.assert_allclose(found[system.free].ravel(), wanted, atol=near)
+    limit = model.loop(scene.iterated(3000))[0].step(state, 0)[0].positions
+    np.testing.assert_allclose(found, limit, atol=near)
+    np.testing.assert_array_equal(found, seen[0])
+    scene.groups[0].gradient_kernel = None
+    with pytest.raises(SceneError, match="Newton's method needs sampled elements"):
+        model.loop(scene, newton=True)
 
 
 def test_forces_that_cannot_be_reduced_are_refused():
