@@ -15,7 +15,10 @@ from study.tables import declared
 
 LARGEST = 300_000
 # Binary files that are meant: pictures of the pages for readers, compressed tables.
-BINARY = ("docs/*.png", "results/reference/tables/*.xz", "results/reference/studies/*/tables/*.xz")
+BINARY = (
+    "docs/*.png", "docs/examples/*.png", "results/reference/tables/*.xz",
+    "results/reference/studies/*/tables/*.xz",
+)  # fmt: skip
 
 
 def offends(path: Path) -> bool:

@@ -35,7 +35,7 @@ from pdrom.reduction.subspace.model import SubspaceModel
 from pdrom.reduction.subspace.space import ReducedSpace, reduced_state
 from pdrom.view.page import LIVE, page_of, view_of
 
-FORMAT = 2  # version of the file of a model; 1 has no solver
+FORMAT = 1  # version of the file of a model
 BUSY = 1.25  # wall time over processor time from which the processor counts as busy
 OnFrame = Callable[[int, FrameReport], None]
 
@@ -98,7 +98,8 @@ class Model:
         parts = [f"Model({self.title}: {self.training}"]
         if len(self.validation):
             position, deformation = worst_errors(self.validation)
-            against = f"against {len(self.validation)}{solved} runs of the full order"
+            count = len(self.validation)
+            against = f"against {count}{solved} run{'s' * (count > 1)} of the full order"
             errors = f"{position:.2g} (positions), {deformation:.2g} (deformation)"
             parts.append(f"largest errors {against} {errors}")
         return f"{', '.join(parts)}, {kept.nbytes / 1e6:.2g} MB)"
@@ -143,8 +144,7 @@ class Model:
         files.require_runnable(scene, out, on_frame)
         loop, start = self.loop(scene, iterations, solver)
         next(loop.run(start, range(1)))  # loads compiled code, which no frame's time shall include
-        lift = self.reduced.positions
-        run = rerun(scene, loop, start, None, BLOWUP_EXTENT, lift, on_frame)
+        run = rerun(scene, loop, start, None, BLOWUP_EXTENT, self._lift(), on_frame)
         ended = run.blowup_frame
         found = Run(scene, run.positions, run.ms, method=self.title, blowup_frame=ended)
         if out is not None:
@@ -196,12 +196,19 @@ class Model:
         entry = {"scene": config.name, "view": view_of(config.effects), "content": content}
         store.write_text(page_of(LIVE, [entry]), path, with_checksum=False)
 
+    def _lift(self) -> Callable[[np.ndarray], np.ndarray]:
+        """Function that maps the unknowns of `loop` to positions (N, 3) m, for one thread."""
+        if not isinstance(self.reduced, SubspaceModel):
+            return self.reduced.positions
+        output = self.reduced.output(float)
+        return lambda z: output(z).copy()
+
     def start(self, scene: Scene, **options: Any) -> "Loop":
         """Start ``scene`` frame by frame; ``options`` are iterations and solver of `run`."""
         files.require(Scene, scene, "scene", source="build_scene and load_scene make one")
         if not isinstance(self.reduced, SubspaceModel):
             raise ConfigurationError("start: this model has no position subspace; use run")
-        return Loop(*self.loop(scene, **options), self.reduced.positions)
+        return Loop(*self.loop(scene, **options), self._lift())
 
     def speed(self, scene: Scene, repeats: int = 3) -> dict[str, Any]:
         """Measure the model and the full order in turn, in this process, on ``scene``.
@@ -212,7 +219,7 @@ class Model:
         files.require_runnable(scene, None, silent)
         frames = scene.config.frames
         made: list[tuple[Stepper, State, Callable[..., Any]]] = [
-            (*self.loop(scene), self.reduced.positions),
+            (*self.loop(scene), self._lift()),
             (scene.stepper(track_objective=False), scene.initial_state(), lambda q: q),
         ]
         for one in made:
@@ -385,7 +392,7 @@ def _model(file: h5py.File, path: Path) -> Model:
     tolerance, residual = (None if bound is None else float(bound) for bound in bounds)
     training = Training(
         tuple(record["trajectories"].asstr()[...]), bool(record.attrs["converged"]), tolerance,
-        residual, float(record.attrs["seconds"]), str(record.attrs.get("solver", "local_global")),
+        residual, float(record.attrs["seconds"]), str(record.attrs["solver"]),
     )  # fmt: skip
     rows = {name: (t.asstr() if t.dtype.kind == "O" else t)[...] for name, t in table.items()}
     reduced: SubspaceModel | ProjectionModel

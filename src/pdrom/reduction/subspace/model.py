@@ -76,9 +76,9 @@ class SubspaceModel:
         """Vertex positions (N, 3) m of coordinates ``z`` (K, 3)."""
         return self.columns.B @ z
 
-    def output(self) -> "Output":
-        """Return a faster form of `positions` in single precision, to write every frame."""
-        return Output(self.columns.B)
+    def output(self, kind: Any = np.float32) -> "Output":
+        """Return a faster form of `positions` in the precision ``kind``, for one thread."""
+        return Output(self.columns.B, kind)
 
 
 Labelled = tuple[dict[str, Any], SubspaceModel]
@@ -86,20 +86,20 @@ PANEL, TERMS = 512, 4
 
 
 class Output:
-    """Function of coordinates z (K, 3) that returns positions B z (N, 3) m in single precision.
+    """Function of coordinates z (K, 3) that returns positions B z (N, 3) m in a ``kind`` of floats.
 
     The matrix ``B`` (N, K) is stored in panels of `PANEL` rows, so that memory is read once and in
     order, and `TERMS` of its columns are added at a time. Each call overwrites the last result.
     """
 
-    def __init__(self, B: np.ndarray) -> None:
+    def __init__(self, B: np.ndarray, kind: Any = np.float32) -> None:
         n, k = B.shape
-        padded = np.zeros((-(-n // PANEL) * PANEL, -(-k // TERMS) * TERMS), np.float32)
+        padded = np.zeros((-(-n // PANEL) * PANEL, -(-k // TERMS) * TERMS), kind)
         padded[:n, :k] = B
         panels = padded.reshape(-1, PANEL, padded.shape[1]).transpose(0, 2, 1)
         self._panels = np.ascontiguousarray(panels)
-        self._z = np.zeros((padded.shape[1], 3), np.float32)
-        self._sums, self._result = np.empty((3, PANEL), np.float32), np.empty((n, 3), np.float32)
+        self._z = np.zeros((padded.shape[1], 3), kind)
+        self._sums, self._result = np.empty((3, PANEL), kind), np.empty((n, 3), kind)
 
     def __call__(self, z: np.ndarray) -> np.ndarray:
         self._z[: len(z)] = z

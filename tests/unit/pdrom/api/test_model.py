@@ -253,7 +253,7 @@ def test_a_file_that_cannot_be_trusted_is_refused(model, tmp_path):
             old.copy(name, new)
         new.attrs.update(old.attrs)
         new.attrs["format"] = 99
-    with pytest.raises(StorageError, match="a model of version 99, this pdrom reads up to 2"):
+    with pytest.raises(StorageError, match="a model of version 99, this pdrom reads up to 1"):
         api.load_model(tmp_path / "newer.h5")
     api.save(model.run(model.scene), tmp_path / "run.h5")
     with pytest.raises(StorageError, match="holds no model"):

@@ -71,7 +71,7 @@ def test_a_scene_is_run_a_model_trained_and_run_and_all_is_shown(folder, capsys)
     capsys.readouterr()
     assert run(["show", "small.model.h5"]) == Status.DONE
     shown = capsys.readouterr().out
-    for words in ("intact", "model/columns/B: 30 x", "format: 2", "scene: small"):
+    for words in ("intact", "model/columns/B: 30 x", "format: 1", "scene: small"):
         assert words in shown
     assert run(["show", "small.h5", "--configuration"]) == Status.DONE
     text = capsys.readouterr().out.split("configuration:\n")[1].split("attributes")[0]
