@@ -1,7 +1,8 @@
 """The run of a scene, in full order or with a model, its errors, and its arrays in a file."""
 
 from dataclasses import dataclass, field, is_dataclass
-from typing import Annotated, Any, get_type_hints
+from functools import cache
+from typing import Annotated, Any, cast, get_type_hints
 
 import h5py
 import numpy as np
@@ -20,11 +21,15 @@ from pdrom.reduction.rerun import displacement_norms, mean_motion
 def require_types(record: Any) -> None:
     """Raise ConfigurationError if a field of the dataclass ``record`` has not its declared type."""
     kind: Any = type(record)
-    hints = get_type_hints(kind, include_extras=True)
-    instance: Any = InstanceOf
+    validate(_strict(kind), vars(record), kind.__name__)
+
+
+@cache
+def _strict(kind: type) -> Any:
+    hints, instance = get_type_hints(kind, include_extras=True), cast(Any, InstanceOf)
     fields: Any = {n: (instance[h] if is_dataclass(h) else h, ...) for n, h in hints.items()}
     strict = ConfigDict(strict=True, arbitrary_types_allowed=True)
-    validate(create_model(kind.__name__, __config__=strict, **fields), vars(record), kind.__name__)
+    return create_model(kind.__name__, __config__=strict, **fields)
 
 
 @dataclass(frozen=True, eq=False)
