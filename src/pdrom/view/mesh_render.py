@@ -160,11 +160,8 @@ def draw_lines(ax: Axes, segments: np.ndarray, camera: Camera, colours: np.ndarr
 
 def set_window(ax: Axes, window: Window) -> None:
     """Show ``window`` on ``ax`` without axes, all directions to the same scale."""
-    ax.set_xlim(window.left, window.right)
-    ax.set_ylim(window.bottom, window.top)
-    ax.set_aspect("equal")
-    ax.set_xticks([])
-    ax.set_yticks([])
+    ax.set(xlim=(window.left, window.right), ylim=(window.bottom, window.top), aspect="equal")
+    ax.set(xticks=[], yticks=[])
     for spine in ax.spines.values():
         spine.set_visible(False)
 

@@ -136,8 +136,7 @@ def log_axis(ax: Axes, low: float, high: float) -> None:
     """Make y of ``ax`` logarithmic from ``low`` to ``high`` with few ticks."""
     from matplotlib.ticker import LogLocator
 
-    ax.set_yscale("log")
-    ax.set_ylim(low, high)
+    ax.set(yscale="log", ylim=(low, high))
     ax.yaxis.set_major_locator(LogLocator(base=10.0, numticks=6))
     ax.grid(True)
 

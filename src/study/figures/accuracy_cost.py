@@ -236,8 +236,7 @@ def accuracy_cost(drawn: Drawn, table: pd.DataFrame, runs: pd.DataFrame) -> Figu
         axes = parts[1].subplots(1, len(small), sharey=True, squeeze=False)[0]
         for ax, scene in zip(axes, small, strict=True):
             draw_panel(ax, found, scene, size=2.4)
-            ax.set_title(f"{groups[scene]}:\n{style.words(scene)}")
-            ax.set_xlabel("time per frame (ms)")
+            ax.set(title=f"{groups[scene]}:\n{style.words(scene)}", xlabel="time per frame (ms)")
         axes[0].set_ylabel("relative error")
     top = 1.0
     for row, height in zip(rows, lines, strict=True):

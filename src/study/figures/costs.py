@@ -72,8 +72,7 @@ def local_share(drawn: Drawn, table: pd.DataFrame) -> Figure:
     for ax, implementation in zip(axes, implementations, strict=True):
         rows = table[table.implementation == implementation].drop_duplicates("scene")
         _draw_bars(ax, rows.set_index("scene"), scenes)
-        ax.set_title(TITLES[implementation])
-        ax.set_xlabel("share of a frame (%)")
+        ax.set(title=TITLES[implementation], xlabel="share of a frame (%)")
     _label_rows(axes[0], scenes)
     handles: list[Artist] = [style.patch(label, color=c) for label, c in PHASES.values()]
     line = {"color": style.BLACK, "linestyle": "--"}
@@ -105,8 +104,7 @@ def _draw_bars(ax: Axes, rows: pd.DataFrame, scenes: list[str]) -> None:
         words = f"{total:.2g} ms" if total < 99.5 else f"{total:.0f} ms"
         ax.text(102.0, y, words, va="center", ha="left", fontsize=7)
     ax.axvline(CLAIM, color=style.BLACK, linewidth=1.0, linestyle="--")
-    ax.set_xlim(0, 100)
-    ax.set_xticks([0, 25, 50, 75, 100])
+    ax.set(xlim=(0, 100), xticks=[0, 25, 50, 75, 100])
     ax.tick_params(axis="y", length=0)
 
 
@@ -126,8 +124,7 @@ def scaling(drawn: Drawn, table: pd.DataFrame) -> Figure:
     for ax, scene in zip(times, scenes, strict=True):
         rows = table[table.scene == scene].sort_values("vertices")
         _draw_times(ax, rows, looks)
-        ax.set_title(style.words(scene))
-        ax.set_xlabel("vertices")
+        ax.set(title=style.words(scene), xlabel="vertices")
     sizes = table[table.scene.isin(scenes)].vertices
     times[0].set_xlim(0.75 * sizes.min(), ROOM * sizes.max())
     for axis in (times[0].xaxis, times[0].yaxis):  # all panels share the axes of the first panel
@@ -141,8 +138,7 @@ def scaling(drawn: Drawn, table: pd.DataFrame) -> Figure:
 
 
 def _draw_times(ax: Axes, rows: pd.DataFrame, looks: Looks) -> None:
-    ax.set_xscale("log")
-    ax.set_yscale("log")
+    ax.set(xscale="log", yscale="log")
     ax.grid(True)
     for method, part in rows.groupby("method", sort=False):
         colour, marker = looks[str(method)]
@@ -178,8 +174,7 @@ def break_even(drawn: Drawn, table: pd.DataFrame) -> Figure:
     figure, axes = small_multiples(len(groups), COLUMNS, legend_rows=2, height=1.8)
     styles = method_styles([m for m in drawn.methods if (table.method == m).any()])
     for ax, group in zip(axes, groups, strict=True):
-        ax.set_title(style.words(group))
-        ax.set_yscale("log")
+        ax.set(title=style.words(group), yscale="log")
         ax.grid(True)
         ax.axhline(1.0, color=style.BLACK, linestyle="--", linewidth=1.0, zorder=1)
         own = table[table.group == group]
@@ -262,9 +257,7 @@ def _draw_moved(ax: Axes, rows: pd.DataFrame, scenes: list[str], looks: Looks) -
                 clip_on=False,
             )  # fmt: skip
     _label_rows(ax, scenes)
-    ax.set_xscale("log")
-    ax.set_xlim(LOW, HIGH)
-    ax.set_xlabel("drift of the run without the effect")
+    ax.set(xscale="log", xlim=(LOW, HIGH), xlabel="drift of the run without the effect")
     ax.grid(True)
 
 
@@ -314,9 +307,7 @@ def _draw_scenes(
         total = rows.ms_per_frame.sum()
         ax.text(101.0, y, f"{total:.2g} ms", va="center", ha="left", fontsize=7)
     _label_rows(ax, scenes)
-    ax.set_xlim(0, 100)
-    ax.set_xlabel("share of a full-order frame (%)")
-    ax.set_ylabel("scene")
+    ax.set(xlim=(0, 100), xlabel="share of a full-order frame (%)", ylabel="scene")
     return parts
 
 
@@ -331,6 +322,5 @@ def _draw_left_out(ax: Axes, rows: pd.DataFrame, scene: str) -> None:
                 markeredgewidth=1.4,
             )  # fmt: skip
     _label_rows(ax, [f"without {e}" if e != NOTHING else "whole" for e in rows.effect])
-    ax.set_xlim(0.0, 1.15 * float(rows.without_ms.max()))
-    ax.set_xlabel("time per frame (ms)")
+    ax.set(xlim=(0.0, 1.15 * float(rows.without_ms.max())), xlabel="time per frame (ms)")
     ax.set_title(style.words(scene))

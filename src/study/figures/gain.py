@@ -62,9 +62,7 @@ def error_against_gain(drawn: Drawn, **tables: pd.DataFrame) -> Figure:
         own = runs[runs.method == method]
         _draw_method(left, own, ranges[ranges.method == method], *styles[method])
     style.log_axis(left, *ERRORS)
-    left.set_xscale("log")
-    left.set_xlim(*GAINS)
-    left.set_xlabel("gain of the interpolation")
+    left.set(xscale="log", xlim=GAINS, xlabel="gain of the interpolation")
     left.set_ylabel("error within the horizon (relative)")
     left.axhline(FAILED, color="#333333", linewidth=0.8, linestyle="--", zorder=0)
     left.text(GAINS[1], FAILED * 1.1, "failed ", ha="right", va="bottom", fontsize=7)
@@ -110,11 +108,9 @@ def _draw_decades(ax: Axes, runs: pd.DataFrame) -> None:
     spans = {upper: rf"$10^{{{upper - 1}}}$ to $10^{{{upper}}}$" for upper in decades.index}
     spans |= {upper: rf"over $10^{{{DECADES}}}$" for upper in spans if upper > DECADES}
     ax.set_xticks(places, list(spans.values()))
-    ax.set_ylim(0, 112)
-    ax.set_yticks([0, 25, 50, 75, 100])
+    ax.set(ylim=(0, 112), yticks=[0, 25, 50, 75, 100])
     ax.tick_params(axis="x", labelrotation=35)
-    ax.set_xlabel("gain of the interpolation")
-    ax.set_ylabel("failed runs (%)")
+    ax.set(xlabel="gain of the interpolation", ylabel="failed runs (%)")
     ax.set_title("number of runs above each bar")
     ax.grid(True)
 
@@ -167,8 +163,7 @@ def _draw_quantity(
     columns: tuple[str, str, str],
     limits: tuple[float, float],
 ) -> None:
-    ax.set_xscale("log")
-    ax.set_xlim(limits[0], limits[1] * 1.3)
+    ax.set(xscale="log", xlim=(limits[0], limits[1] * 1.3))
     ax.grid(True)
     scenes = _scene_looks(table)
     for i, (scene, (colour, marker)) in enumerate(scenes.items()):

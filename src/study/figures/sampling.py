@@ -247,12 +247,10 @@ def _draw_counts(ax: Axes, hit: np.ndarray, per_element: int) -> None:
     values[: len(counts) - 1] = counts[1 : per_element + 1]
     bars = ax.bar(np.arange(1, per_element + 1), values, color=style.ORANGE, width=0.7)
     ax.bar_label(bars, labels=[str(v) if v else "" for v in values], fontsize=7, padding=1)
-    ax.set_xlim(0.3, per_element + 0.7)
-    ax.set_ylim(0, 1.18 * values.max())
+    ax.set(xlim=(0.3, per_element + 0.7), ylim=(0, 1.18 * values.max()))
     ax.set_xticks(np.arange(1, per_element + 1))
     ax.yaxis.set_major_locator(MaxNLocator(integer=True, nbins=4))
-    ax.set_xlabel(f"entries used, of {per_element} per element")
-    ax.set_ylabel("elements")
+    ax.set(xlabel=f"entries used, of {per_element} per element", ylabel="elements")
 
 
 def _draw_evaluations(
@@ -268,10 +266,7 @@ def _draw_evaluations(
             ax.plot(list(sizes), computed, color=colour, marker=marker, markevery=every)
             largest = max(largest, *sizes)
     ax.plot([0, largest], [0, largest], color=style.GREY, linewidth=0.9, linestyle="--")
-    ax.set_xlim(0, None)
-    ax.set_ylim(0, None)
-    ax.set_xlabel("basis size r")
-    ax.set_ylabel("numbers computed")
+    ax.set(xlim=(0, None), ylim=(0, None), xlabel="basis size r", ylabel="numbers computed")
     ax.grid(True)
 
 

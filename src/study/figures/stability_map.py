@@ -74,8 +74,7 @@ class Strip:
                         _draw_cell(ax, x + k, i, cells[key])
                         drawn.add(str(cells[key].outcome))
             x += width + room + GAP
-        ax.set_xlim(0.0, x - GAP)
-        ax.set_ylim(len(self.rows), 0.0)
+        ax.set(xlim=(0.0, x - GAP), ylim=(len(self.rows), 0.0))
         ax.set_xticks(ticks, texts, fontsize=6, rotation=90 if dense else 0)
         places = [i + 0.5 for i in range(len(self.rows))]
         ax.set_yticks(places, list(self.rows.values()), fontsize=6.5)

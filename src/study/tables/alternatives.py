@@ -89,10 +89,7 @@ def alternatives(
     if len(rows):
         rows, processes = beside(rows, joined(times))
         ms = rows[processes]
-        rows = rows.assign(
-            ms_per_frame=ms.median(axis=1),
-            processes=ms.count(axis=1),
-        )
+        rows = rows.assign(ms_per_frame=ms.median(axis=1), processes=ms.count(axis=1))
     return with_recorded(rows, record)
 
 

@@ -58,9 +58,7 @@ def singular_values(bases: list[paths.File]) -> pd.DataFrame:
         *shared("scene group method r"),
         text("split", "snapshots that are reconstructed: train, test, heldout"),
         number("relative_error", f"of the projections; {_SMALL}"),
-        number("relative_error_x", f"of their x-coordinates; {_SMALL}"),
-        number("relative_error_y", f"of their y-coordinates; {_SMALL}"),
-        number("relative_error_z", f"of their z-coordinates; {_SMALL}"),
+        *(number(f"relative_error_{a}", f"of their {a}-coordinates; {_SMALL}") for a in "xyz"),
         *shared("gain"),
         integer("rows_sampled", "rows of the projections that are evaluated", compared="value"),
         *shared("elements_sampled"),
@@ -138,15 +136,9 @@ def repetitions(parts: list[paths.File]) -> pd.DataFrame:
     if rows.empty:
         return rows
     cells = rows.groupby(_CELL, sort=False)
-    made = cells.agg(
-        repetitions=("error", "size"),
-        error_median=("error", "median"),
-        error_low=("error", "min"),
-        error_high=("error", "max"),
-        gain_median=("gain", "median"),
-        gain_low=("gain", "min"),
-        gain_high=("gain", "max"),
-    )
+    ends = {"median": "median", "low": "min", "high": "max"}
+    found = {f"{n}_{end}": (n, how) for n in ("error", "gain") for end, how in ends.items()}
+    made = cells.agg(repetitions=("error", "size"), **found)
     made["ended"] = rows.error.isin([float("inf")]).groupby([rows[c] for c in _CELL]).sum()
     return made.assign(spread=made.error_high / made.error_low).reset_index()
 

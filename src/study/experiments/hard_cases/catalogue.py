@@ -10,6 +10,7 @@ from pdrom.model.mesh.files import read_mesh_file
 from pdrom.model.mesh.generators import bar, boundary, cloth
 from pdrom.model.mesh.types import Mesh
 from study.experiments.hard_cases import record
+from study.experiments.hard_cases.record import HardCase, Shape, scales, scrambled
 
 # Mesh files in config/scenes/meshes, which the experiment declares as its inputs.
 MESHES = ("hard_disc.obj", "hard_starfish_shell.obj", "hard_starfish.vtu", "hard_torus.vtu")
@@ -66,11 +67,11 @@ def shifted(mesh: Mesh, *offset: float) -> Mesh:
 
 
 def _case(
-    name: str, why: str, holds: tuple[str, ...], mesh: record.Shape, *effects: dict, **rest: Any
-) -> record.HardCase:
+    name: str, why: str, holds: tuple[str, ...], mesh: Shape, *effects: dict, **rest: Any
+) -> HardCase:
     """Return a `HardCase`; ``rest``: its fields start, bound and slow, and arguments of `build`."""
     own = {key: rest.pop(key) for key in ("start", "bound", "slow") if key in rest}
-    return record.HardCase(name, why, holds, mesh, effects, rest, **own)
+    return HardCase(name, why, holds, mesh, effects, rest, **own)
 
 
 def _heavy_and_light(mesh: Mesh) -> np.ndarray:
@@ -102,7 +103,7 @@ def _one_bad_element() -> Mesh:
     return Mesh(points, mesh.triangles, mesh.tetrahedra)
 
 
-def _squashed() -> list[record.HardCase]:
+def _squashed() -> list[HardCase]:
     """Sheets and bars that start flattened to a plane, a line or a point."""
     bar = "every tetrahedron is flattened to a {}: F is singular"
     flat = "every triangle is collinear: the sheet is a {}"
@@ -114,38 +115,34 @@ def _squashed() -> list[record.HardCase]:
     )
     to = {"plane": (1, 1, 0), "line": (1, 0, 0), "point": (0, 0, 0)}
     return [
-        _case(
-            name.format(target), why.format(target), CALM, mesh, group, start=record.scales(*sides)
-        )
+        _case(name.format(target), why.format(target), CALM, mesh, group, start=scales(*sides))
         for target, sides in to.items()
         for name, mesh, group, why in kinds
         if mesh is not sheet or target != "plane"  # a sheet at rest is a plane already
     ]
 
 
-def _states() -> list[record.HardCase]:
+def _states() -> list[HardCase]:
     """Scenes that are extreme only in their initial positions, such as inverted elements."""
     three = (BENDING, SPRING, STRAIN)
     turn = record.mapped((-1, 0, 0), (0, -1, 0), (0, 0, 1))
     cases = [
         _case("inverted_strain", "all tetrahedra are inverted: the signed singular values tie",
-              (*CALM, "recovers"), small_bar, TETRAHEDRON, start=record.scales(1, 1, -1),
-              frames=60),
+              (*CALM, "recovers"), small_bar, TETRAHEDRON, start=scales(1, 1, -1), frames=60),
         _case("inverted_rotation",
               "all tetrahedra are inverted: the nearest rotation is not unique",
-              (*CALM, "recovers"), small_bar, ROTATION, start=record.scales(1, 1, -1), frames=60),
+              (*CALM, "recovers"), small_bar, ROTATION, start=scales(1, 1, -1), frames=60),
         _case("inverted_uneven",
               "all tetrahedra are inverted, and one axis is the nearest to turn back",
-              (*CALM, "recovers"), small_bar, ROTATION, start=record.scales(1.2, 1.1, -0.7),
-              frames=60),
+              (*CALM, "recovers"), small_bar, ROTATION, start=scales(1.2, 1.1, -0.7), frames=60),
         _case("scrambled_strain", "vertices at random in a box", CALM, small_bar, TETRAHEDRON,
-              start=record.scrambled()),
+              start=scrambled()),
         _case("scrambled_rotation", "vertices at random in a box", CALM, small_bar, ROTATION,
-              start=record.scrambled()),
+              start=scrambled()),
         _case("scrambled_sheet", "vertices at random in a box, three groups", CALM,
-              partial(sheet, wave=0.05), *three, start=record.scrambled()),
+              partial(sheet, wave=0.05), *three, start=scrambled()),
         _case("scrambled_far", "vertices at random in a box of a million extents", CALM, sheet,
-              SPRING, start=record.scrambled(1e6)),
+              SPRING, start=scrambled(1e6)),
         _case("merged_spring", "edges of length zero: no direction to project on", CALM, sheet,
               SPRING, start=record.pairs_merged),
         _case("merged_strain", "triangles with two corners in one place", CALM, sheet, STRAIN,
@@ -153,9 +150,9 @@ def _states() -> list[record.HardCase]:
         _case("folded", "vertices of different elements coincide, cells of the fold are flat", CALM,
               partial(sheet, wave=0.05), *three, start=record.folded),
         _case("bending_mirrored", "every vertex is on the wrong side of its normal", FREE,
-              partial(sheet, wave=0.1), BENDING, start=record.scales(1, -1, 1)),
+              partial(sheet, wave=0.1), BENDING, start=scales(1, -1, 1)),
         _case("bending_collapsed", "no vertex has a normal", FREE, partial(sheet, wave=0.1),
-              BENDING, start=record.scales(0, 0, 0)),
+              BENDING, start=scales(0, 0, 0)),
     ]  # fmt: skip
     for label, mesh, group in (
         ("strain", sheet, STRAIN),
@@ -164,42 +161,39 @@ def _states() -> list[record.HardCase]:
     ):
         cases += [
             _case(f"repeated_{label}", "all singular values are equal: their vectors are arbitrary",
-                  CALM, mesh, group, start=record.scales(1.3, 1.3, 1.3)),
+                  CALM, mesh, group, start=scales(1.3, 1.3, 1.3)),
             _case(f"nearly_repeated_{label}", "singular values differ by round-off only", CALM,
-                  mesh, group, start=record.noisy(record.scales(1.3, 1.3, 1.3), 1e-15)),
+                  mesh, group, start=record.noisy(scales(1.3, 1.3, 1.3), 1e-15)),
             _case(f"half_turn_{label}", "the nearest rotation turns by pi: nothing may move",
                   (*CALM, "still"), mesh, group, start=turn),
         ]  # fmt: skip
     return cases
 
 
-def _sizes() -> list[record.HardCase]:
+def _sizes() -> list[HardCase]:
     """Scenes with volume or area constraints; the projection of an element may not be unique."""
     lying = record.mapped((1, 0, 5), (0, 1, 0), (0, 0, 1))
     # a large bound on the bounding box: a body of constant volume or area may stretch without limit
     loose, cases = 40.0, []
-    for label, mesh, group, flat in (
-        ("volume", small_bar, VOLUME, record.scales(1, 1, 0)),
-        ("area", sheet, AREA, record.scales(1, 1, 0)),
-    ):
+    for label, mesh, group in (("volume", small_bar, VOLUME), ("area", sheet, AREA)):
         cases += [
             _case(f"{label}_flat", "every element has lost its size along one axis", CALM, mesh,
-                  group, start=flat, bound=loose),
+                  group, start=scales(1, 1, 0), bound=loose),
             _case(f"{label}_point", "all vertices in one point: no direction to grow in", CALM,
-                  mesh, group, start=record.scales(0, 0, 0), bound=loose),
+                  mesh, group, start=scales(0, 0, 0), bound=loose),
             _case(f"{label}_scrambled",
                   "vertices at random in a box: needles of the right size are near", CALM, mesh,
-                  group, start=record.scrambled(), bound=loose),
+                  group, start=scrambled(), bound=loose),
             _case(f"{label}_swollen",
                   "three times as large along each axis: several shapes are near", CALM, mesh,
-                  group, start=record.scales(3, 3, 3), bound=loose),
+                  group, start=scales(3, 3, 3), bound=loose),
             _case(f"{label}_sheared", "sheared five times over: nothing may move", (*CALM, "still"),
                   mesh, group, start=lying),
         ]  # fmt: skip
     return [
         *cases,
         _case("volume_inverted", "all tetrahedra are inverted: any axis may turn back", CALM,
-              small_bar, VOLUME, start=record.scales(1, 1, -1), bound=loose, frames=60),
+              small_bar, VOLUME, start=scales(1, 1, -1), bound=loose, frames=60),
         _case("volume_large_step", "a soft bar that keeps its volume, h = 0.1 s", FORCED, small_bar,
               VOLUME, TETRAHEDRON | {"weight": 1e5}, GRAVITY, LEFT, bound=4.0, time_step=0.1),
         _case("area_falling", "a soft sheet that keeps its area hangs and touches the floor",
@@ -207,7 +201,7 @@ def _sizes() -> list[record.HardCase]:
     ]  # fmt: skip
 
 
-def _meshes() -> list[record.HardCase]:
+def _meshes() -> list[HardCase]:
     """Scenes with irregular meshes, such as needles and slivers."""
     three = (BENDING, SPRING, STRAIN)
     return [
@@ -218,15 +212,15 @@ def _meshes() -> list[record.HardCase]:
         _case("one_sliver", "one sliver among regular tetrahedra", FORCED, _one_bad_element,
               ROTATION, GRAVITY, LEFT),
         _case("one_triangle", "a mesh of one element", CALM, one_triangle, SPRING, STRAIN,
-              start=record.scales(1.5, 0.5, 1)),
+              start=scales(1.5, 0.5, 1)),
         _case("one_tetrahedron", "a mesh of one element, inverted", (*CALM, "recovers"),
-              one_tetrahedron, TETRAHEDRON, start=record.scales(1, 1, -1), frames=60),
+              one_tetrahedron, TETRAHEDRON, start=scales(1, 1, -1), frames=60),
         _case("two_components", "two sheets without a connection, one held and one free", FORCED,
               partial(_two_sheets, 3.0, 0.5, 0.0), SPRING, GRAVITY, FLOOR, LEFT, bound=3.0),
         _case("tiny_extent", "a bar of a micrometre", CALM, lambda: scaled(small_bar(), 1e-6),
-              ROTATION, start=record.scales(1.2, 1.2, 0), vertex_mass=1e-12),
+              ROTATION, start=scales(1.2, 1.2, 0), vertex_mass=1e-12),
         _case("huge_extent", "a bar of a thousand kilometres", CALM,
-              lambda: scaled(small_bar(), 1e6), ROTATION, start=record.scales(1.2, 1.2, 0)),
+              lambda: scaled(small_bar(), 1e6), ROTATION, start=scales(1.2, 1.2, 0)),
         _case("far_away", "a sheet a billion extents from the origin: edges cancel to seven digits",
               FORCED, lambda: shifted(sheet(), 1e9, 0, 0), SPRING, GRAVITY),
         _case("flat_bending", "the group does nothing: a flat sheet has no curvature to keep", FREE,
@@ -234,7 +228,7 @@ def _meshes() -> list[record.HardCase]:
     ]  # fmt: skip
 
 
-def _settings() -> list[record.HardCase]:
+def _settings() -> list[HardCase]:
     """Scenes with extreme weights, masses, time steps or forces."""
     held = (GRAVITY, LEFT)
     return [
@@ -242,25 +236,25 @@ def _settings() -> list[record.HardCase]:
               partial(sheet, wave=0.05), BENDING | {"weight": 1e-4}, SPRING | {"weight": 1e8},
               STRAIN | {"weight": 1e-4}, *held),
         _case("stiffest", "stiffness at its limit, held: masses are round-off, pins are not",
-              FORCED, sheet, SPRING | {"weight": 1e16}, LEFT, start=record.scales(1.1, 1, 1),
+              FORCED, sheet, SPRING | {"weight": 1e16}, LEFT, start=scales(1.1, 1, 1),
               time_step=1.0),
         _case("stiffest_free",
               "stiffness at its limit, free: a translation of the body is round-off", ("refused",),
-              sheet, SPRING | {"weight": 1e16}, start=record.scales(1.1, 1, 1), time_step=1.0),
+              sheet, SPRING | {"weight": 1e16}, start=scales(1.1, 1, 1), time_step=1.0),
         _case("softest", "forces far below round-off", FREE, sheet, SPRING | {"weight": 1e-300},
               GRAVITY),
         _case("denormal_weight", "a weight below the normal range of numbers", FREE, sheet,
               SPRING | {"weight": 1e-320}, GRAVITY),
         _case("light", "masses are round-off beside the stiffness", ("refused",), sheet, SPRING,
-              start=record.scales(1.1, 1, 1), vertex_mass=1e-12),
+              start=scales(1.1, 1, 1), vertex_mass=1e-12),
         _case("light_held", "masses of nothing, held", FORCED, sheet, SPRING, *held,
-              start=record.scales(1.1, 1, 1), vertex_mass=1e-100),
+              start=scales(1.1, 1, 1), vertex_mass=1e-100),
         _case("overdamped", "the explicit drag turns velocities round and enlarges them",
               ("refused",), sheet, SPRING, {"effect": "damping", "rate": 1e3}),
         _case("mass_ratio", "masses over eight decades, held", FORCED, sheet, SPRING, STRAIN, *held,
               bound=4.0, masses=_heavy_and_light),
         _case("mass_ratio_free", "masses over eight decades, free", CALM, small_bar, TETRAHEDRON,
-              start=record.scales(1.3, 0.7, -1), masses=_heavy_and_light),
+              start=scales(1.3, 0.7, -1), masses=_heavy_and_light),
         _case("smallest_step", "h = 1e-5 s: inertia is everything", FORCED, sheet, SPRING, *held,
               time_step=1e-5),
         _case("small_step", "h = 1e-3 s: K = 10 is more than it needs", FORCED, small_bar, ROTATION,
@@ -272,17 +266,17 @@ def _settings() -> list[record.HardCase]:
         _case("one_iteration", "K = 1: the local and the global step never agree", FORCED, sheet,
               STRAIN, *held, iterations=1),
         _case("one_iteration_inverted", "K = 1 and all tetrahedra inverted", (*CALM, "recovers"),
-              small_bar, ROTATION, start=record.scales(1, 1, -1), iterations=1, frames=60),
+              small_bar, ROTATION, start=scales(1, 1, -1), iterations=1, frames=60),
         _case("heavy_gravity", "gravity a thousand times the earth's", FORCED, sheet, SPRING, FLOOR,
               LEFT, {"effect": "gravity", "acceleration": [0, -9810, 0]}, bound=20.0),
         _case("long_run", "two thousand frames", FORCED, sheet, SPRING, *held, slow=True,
               frames=2000),
         _case("long_free", "two thousand frames from an uneven stretch", CALM, small_bar,
-              TETRAHEDRON, start=record.scales(1.4, 0.8, -0.9), slow=True, frames=2000),
+              TETRAHEDRON, start=scales(1.4, 0.8, -0.9), slow=True, frames=2000),
     ]  # fmt: skip
 
 
-def _boundaries() -> list[record.HardCase]:
+def _boundaries() -> list[HardCase]:
     """Scenes with contradictory or extreme pins and handles, or with a floor."""
     tear = {"effect": "translate", "select": "right", "offset": [100, 0, 0], "over": 1, "until": 10}
     twist = {"effect": "rotate", "select": "right", "axis": "x", "degrees": 180, "over": 1}
@@ -307,7 +301,7 @@ def _boundaries() -> list[record.HardCase]:
     ]  # fmt: skip
 
 
-def _air() -> list[record.HardCase]:
+def _air() -> list[HardCase]:
     """Scenes with extreme drag or wind."""
     storm = {"effect": "wind", "velocity": [3e3, 9e3, 3e3]}
     return [
@@ -317,11 +311,11 @@ def _air() -> list[record.HardCase]:
               partial(sheet, wave=0.05), STRAIN, storm, bound=20.0, vertex_mass=1e-2, frames=10),
         _case("syrup", "drag that stops the surface in far less than a frame", FORCED, small_bar,
               TETRAHEDRON, GRAVITY, {"effect": "drag", "coefficient": 1e12},
-              start=record.scales(1.2, 1, 1)),
+              start=scales(1.2, 1, 1)),
     ]  # fmt: skip
 
 
-def _obstacles() -> list[record.HardCase]:
+def _obstacles() -> list[HardCase]:
     """Scenes with obstacles: hits on edges, tunnelling, starts inside, no or infinite friction."""
     ball = {"effect": "sphere", "centre": [0, 1, 0], "radius": 0.4}
     edge = {"effect": "box", "lower": [-0.02, 1.0, -2], "upper": [0.03, 1.9, 2], "friction": 0.5}
@@ -368,7 +362,7 @@ def _obstacles() -> list[record.HardCase]:
     ]  # fmt: skip
 
 
-def _unstructured() -> list[record.HardCase]:
+def _unstructured() -> list[HardCase]:
     """Scenes with unstructured meshes: no two elements are alike, and none lies along an axis."""
     ring, skin, starfish, torus = (
         partial(read_mesh_file, config_file(f"scenes/meshes/{name}").resolve()) for name in MESHES
@@ -379,13 +373,13 @@ def _unstructured() -> list[record.HardCase]:
     three = {"effect": "pins", "select": {"kind": "nearest", "point": [0, 2, 0], "count": 3}}
     return [
         _case("torus_inverted", "all tetrahedra of a torus are inverted", CALM, torus, ROTATION,
-              start=record.scales(1, 1, -1), frames=60),
+              start=scales(1, 1, -1), frames=60),
         _case("starfish_flat", "all tetrahedra of a starfish are flattened", CALM, starfish,
-              TETRAHEDRON, start=record.scales(1, 0, 1)),
+              TETRAHEDRON, start=scales(1, 0, 1)),
         _case("starfish_swollen", "a starfish three times as large along each axis", CALM, starfish,
-              VOLUME, TETRAHEDRON | {"weight": 1e5}, start=record.scales(3, 3, 3)),
+              VOLUME, TETRAHEDRON | {"weight": 1e5}, start=scales(3, 3, 3)),
         _case("disc_crumpled", "a disc with a hole, crumpled into a third of its size", CALM, ring,
-              STRAIN, BENDING, start=record.scrambled(0.3)),
+              STRAIN, BENDING, start=scrambled(0.3)),
         _case("disc_on_ball", "a disc falls on a ball as wide as its hole, beside the middle",
               FORCED, ring, SPRING, GRAVITY, ball),
         _case("torus_on_edge", "a torus falls on the edges of a box narrower than its elements",
@@ -395,17 +389,16 @@ def _unstructured() -> list[record.HardCase]:
     ]  # fmt: skip
 
 
-def _collisions() -> list[record.HardCase]:
+def _collisions() -> list[HardCase]:
     """Scenes of bodies that collide with themselves."""
     apart = {"effect": "self_collision", "thickness": 0.18}
     return [
         _case("collision_folded", "vertices of different layers coincide, and fall as a heap",
               FORCED, sheet, SPRING, GRAVITY, FLOOR, apart, start=record.folded),
         _case("collision_point", "all vertices in one point, none of which may stay there", FORCED,
-              small_bar, TETRAHEDRON, apart | {"thickness": 0.3}, start=record.scales(0, 0, 0),
-              bound=4.0),
+              small_bar, TETRAHEDRON, apart | {"thickness": 0.3}, start=scales(0, 0, 0), bound=4.0),
         _case("collision_thick", "a thickness as large as the sheet, crumpled", FORCED, sheet,
-              SPRING, apart | {"thickness": 0.9}, start=record.scrambled(0.1), bound=4.0),
+              SPRING, apart | {"thickness": 0.9}, start=scrambled(0.1), bound=4.0),
         _case("collision_at_speed", "two layers pass through each other in a tenth of a frame",
               FORCED, partial(_two_sheets, 0.0, 0.5, 0.0), SPRING, apart, start=record.meeting(1e4),
               bound=1e4),
@@ -418,7 +411,7 @@ PARTS = (
     _squashed, _states, _sizes, _meshes, _settings, _boundaries, _air, _obstacles, _collisions,
     _unstructured,
 )  # fmt: skip
-CASES: dict[str, record.HardCase] = {case.name: case for part in PARTS for case in part()}
+CASES: dict[str, HardCase] = {case.name: case for part in PARTS for case in part()}
 
 
 def reducible_cases(slow: bool = False) -> list[str]:

@@ -416,13 +416,9 @@ def _kept(
 )
 def replication(claims: pd.DataFrame, rules: Path, recorded: Path) -> pd.DataFrame:
     """Verdicts of ``claims`` beside those of file ``recorded``; a row per common claim and part."""
-    loaded = load_claims(rules)
     both = claims.merge(pd.read_csv(recorded), on="claim", suffixes=("", "_replication"))
-    unchanged = [
-        loaded[claim].fingerprint == rule
-        for claim, rule in zip(both.claim, both.rules, strict=True)
-    ]
-    both["rules_unchanged"] = unchanged
+    fingerprints = {claim: rule.fingerprint for claim, rule in load_claims(rules).items()}
+    both["rules_unchanged"] = both.rules == both.claim.map(fingerprints)
     rows = []
     for part, suffix in PARTS.items():
         own = both[["claim", "rules_unchanged", "date"]].assign(part=part)

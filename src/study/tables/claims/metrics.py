@@ -258,9 +258,7 @@ METRICS |= {
     f"heldout_{name}": replace(
         metric,
         choose=partial(held_out, metric.choose),
-        columns=tuple(
-            dict.fromkeys((*metric.columns, *_RERUN, "horizon_frame", "playback_error", *KEYS))
-        ),
+        columns=(*metric.columns, *_RERUN, "horizon_frame", "playback_error", *KEYS),
     )
     for name, metric in METRICS.items()
     if metric.table == "reduced_reruns" and name != "trend_p_value"
