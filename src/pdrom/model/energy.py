@@ -58,21 +58,14 @@ class EnergyScale:
         """Return (energies of a run - `zero`) / `peak`, from its ``positions`` (F' + 1, N, 3) m.
 
         The n values are those of every `STRIDE`-th frame and the last; inf if the energy overflows.
-        The result is empty (0,) if the energy of the full-order run is only round-off.
+        A run with a value above one has gained energy that did not come from the initial state or
+        the moving vertices of the full-order run. The result is empty (0,) if the energy of the
+        full-order run is only round-off.
         """
         if not len(self.own):
             return self.own
         own = (energies(self.scene, positions) - self.zero) / self.peak
         return np.where(np.isfinite(own), own, np.inf)
-
-    def ratio(self, positions: np.ndarray) -> float | None:
-        """Return the largest energy of a run divided by that of the full-order run.
-
-        ``positions`` are (F' + 1, N, 3) m. A run with a ratio above one has gained energy that did
-        not come from the initial state or the moving vertices of the full-order run. The result is
-        None if the energy of the full-order run is only round-off.
-        """
-        return largest(self.relative(positions))
 
 
 def largest(energy: np.ndarray) -> float | None:

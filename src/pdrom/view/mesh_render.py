@@ -102,20 +102,11 @@ def draw_floor(ax: Axes, points: np.ndarray, mesh: Mesh, camera: Camera, window:
     low, high = points.min(axis=0) - margin, points.max(axis=0) + margin
     (west, _, south), (east, _, north) = low, high
     corners = np.array([[west, 0, south], [east, 0, south], [east, 0, north], [west, 0, north]])
-    quad = PolyCollection(
-        [camera.project(corners)], facecolors=FLOOR, edgecolors=FLOOR_LINE, linewidths=0.5
-    )
-    quad.set_zorder(0.1)
-    ax.add_collection(quad)
-    shadow = PolyCollection(
-        near[mesh.triangles],
-        facecolors=SHADOW,
-        edgecolors=SHADOW,
-        linewidths=0.25,
-        rasterized=len(mesh.triangles) > RASTER_ABOVE,
-    )
-    shadow.set_zorder(0.2)
-    ax.add_collection(shadow)
+    floor = {"facecolors": FLOOR, "edgecolors": FLOOR_LINE, "linewidths": 0.5, "zorder": 0.1}
+    ax.add_collection(PolyCollection([camera.project(corners)], **floor))
+    shadow = {"facecolors": SHADOW, "edgecolors": SHADOW, "linewidths": 0.25, "zorder": 0.2}
+    raster = len(mesh.triangles) > RASTER_ABOVE
+    ax.add_collection(PolyCollection(near[mesh.triangles], rasterized=raster, **shadow))
 
 
 def outline_edges(
@@ -151,10 +142,9 @@ def draw_lines(ax: Axes, segments: np.ndarray, camera: Camera, colours: np.ndarr
     order = np.argsort(camera.depth(segments.mean(axis=1)), kind="stable")
     flat = camera.project(segments.reshape(-1, 3)).reshape(-1, 2, 2)
     lines = LineCollection(
-        flat[order], colors=colours[order], linewidths=1.2, capstyle="round",
+        flat[order], colors=colours[order], linewidths=1.2, capstyle="round", zorder=2.0,
         rasterized=len(segments) > RASTER_ABOVE,
     )  # fmt: skip
-    lines.set_zorder(2.0)
     ax.add_collection(lines)
 
 

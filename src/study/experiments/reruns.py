@@ -44,9 +44,6 @@ ERROR_COLUMNS = [
     "relative_error", "relative_error_x", "relative_error_y", "relative_error_z",
     "gain", "rows_sampled", "elements_sampled",
 ]  # fmt: skip
-MOTION = "motion"  # column that only the table of held-out motions has
-
-
 DENSE, STEP = 10, 10
 
 
@@ -102,7 +99,7 @@ def reruns(motions: list[File], settings: Options, **files: File) -> None:
             made = _runs(yardstick, files["sampling"], space, settings, store)
             found[motion] = pd.DataFrame(made, columns=COLUMNS)
     write_table(found.pop(kit.TRAIN), files["out"].path)
-    heldout = [table.assign(**{MOTION: motion}) for motion, table in found.items()]
+    heldout = [table.assign(motion=motion) for motion, table in found.items()]
     write_table(pd.concat(heldout, ignore_index=True), files["heldout_table"].path)
 
 
@@ -263,8 +260,8 @@ def _rows(scene: Scene, models: Models) -> Iterator[dict[str, Any]]:
     own = Yardstick(scene, full.positions)
 
     def row(labels: dict[str, Any], outcome: Rerun) -> dict[str, Any]:
-        energy = {"energy_ratio": own.scale.ratio(outcome.positions)}
-        return {**labels, **own.row(outcome), **energy}
+        energy = largest(own.scale.relative(outcome.positions))
+        return {**labels, **own.row(outcome), "energy_ratio": energy}
 
     whole = row({"method": "full", "position_basis": "full"}, full)
     if not full.finite:

@@ -4,7 +4,7 @@
 """
 
 import logging
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
@@ -75,7 +75,6 @@ class InterpretedLocalStep(NumpyLocalStep):
             self._blocks.append((columns, block.toarray()[:, columns], group.weights[e]))
 
     def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
-        """Add S^T W p(y), p the projections at ``y`` (N, 3) m, to ``rhs``; return the energy, J."""
         energy = 0.0
         for e, (columns, block, weight) in enumerate(self._blocks):
             d = block @ y[columns]
@@ -88,10 +87,7 @@ class InterpretedLocalStep(NumpyLocalStep):
 
 
 # Name -> implementation of a local step that is timed in addition to the compiled one.
-IMPLEMENTATIONS: dict[str, Callable[[ConstraintGroup], Any]] = {
-    "numpy": NumpyLocalStep,
-    "interpreted": InterpretedLocalStep,
-}
+IMPLEMENTATIONS = {"numpy": NumpyLocalStep, "interpreted": InterpretedLocalStep}
 
 
 log = logging.getLogger(__name__)

@@ -13,14 +13,8 @@ from pdrom.core.store import read_table
 from pdrom.view import style
 from pdrom.view.artists import Axes, Figure
 from study.artifact.reads import ProjectFile, TableOf
-from study.figures.kit.declaration import (
-    MESHES,
-    Drawn,
-    Experiment,
-    NothingToDraw,
-    figure,
-    method_styles,
-)
+from study.figures.kit import declaration
+from study.figures.kit.declaration import MESHES, Drawn, Experiment, NothingToDraw, figure
 from study.figures.kit.multiples import label_outer, small_multiples
 from study.tables.kit.results import FAILED, judged_runs
 
@@ -57,7 +51,7 @@ def error_against_gain(drawn: Drawn, **tables: pd.DataFrame) -> Figure:
         repeated = repeated[repeated.varied == "training"]
         ranges = runs[[*_KEYS, "gain", "error"]].merge(repeated, on=_KEYS)
     methods = [m for m in drawn.methods if (runs.method == m).any()]
-    styles = method_styles(methods)
+    styles = declaration.method_styles(methods)
     for method in methods:
         own = runs[runs.method == method]
         _draw_method(left, own, ranges[ranges.method == method], *styles[method])
@@ -317,7 +311,7 @@ def reconstruction_error(drawn: Drawn, table: pd.DataFrame, published: Path) -> 
             )  # fmt: skip
         ax.set_xlim(0, max(float(rows.r.max()), 1.0) * 1.02)
     label_outer([ax for ax, *_ in panels], 3, "basis size r", "relative error")
-    handles = drawn.handles(method_styles(methods))
+    handles = drawn.handles(declaration.method_styles(methods))
     handles += [style.handle(words, color="#555555", linestyle=s) for words, s in SPLITS.values()]
     if reference:
         label = "published code's output (x, y)"
@@ -328,7 +322,7 @@ def reconstruction_error(drawn: Drawn, table: pd.DataFrame, published: Path) -> 
 
 def _draw_errors(ax: Axes, rows: pd.DataFrame, method: str) -> bool:
     """Draw errors of ``method``, as arrows if too large for the axis; return if any is finite."""
-    colour, marker = method_styles([method])[method]
+    colour, marker = declaration.method_styles([method])[method]
     drawn = False
     for split, (_, dashes) in SPLITS.items():
         line = rows[rows.split == split].sort_values("r")

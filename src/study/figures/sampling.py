@@ -17,15 +17,9 @@ from pdrom.view.mesh_render import draw_surface, set_window
 from pdrom.view.panels import fit_aspect
 from study.artifact.paths import BASIS, MESH, SAMPLING, SNAPSHOTS, TRAIN, File
 from study.artifact.reads import EachOf
+from study.figures.kit import declaration
 from study.figures.kit import elements as shapes
-from study.figures.kit.declaration import (
-    MESHES,
-    Drawn,
-    NothingToDraw,
-    camera_of,
-    figure,
-    method_styles,
-)
+from study.figures.kit.declaration import MESHES, Drawn, NothingToDraw, camera_of, figure
 from study.figures.kit.multiples import panels, rows_of
 from study.figures.kit.read import positions_at, read_samplings
 
@@ -215,7 +209,7 @@ def deim_entries(drawn: Drawn, **files: list[File]) -> Figure:
         style.handle("several axes" if axis == SEVERAL else f"{axis} entry", color=colour, **dots)
         for axis, colour in AXES.items()
     ]
-    handles += drawn.handles(method_styles(methods))
+    handles += drawn.handles(declaration.method_styles(methods))
     handles.append(style.handle("numbers that DEIM uses (r)", color=style.GREY, linestyle="--"))
     style.legend(figure, handles, 4)
     return figure
@@ -256,7 +250,7 @@ def _draw_counts(ax: Axes, hit: np.ndarray, per_element: int) -> None:
 def _draw_evaluations(
     ax: Axes, samplings: dict[str, dict[int, Sampling]], per_element: int
 ) -> None:
-    styles = method_styles(samplings)
+    styles = declaration.method_styles(samplings)
     largest = 1
     for method, sizes in samplings.items():
         if sizes:

@@ -275,9 +275,7 @@ class Floor(Contact):
         height: Length = 0.0
 
         def body(self, low: np.ndarray, high: np.ndarray) -> Mesh:
-            return square(
-                np.array([0.0, self.height, 0.0]), np.array([0.0, 1.0, 0.0]), low, high=high
-            )
+            return square(np.array([0.0, self.height, 0.0]), UP, low, high=high)
 
     def __init__(self, config: Config, mesh: Mesh, masses: np.ndarray) -> None:
         super().__init__(config, mesh, masses)

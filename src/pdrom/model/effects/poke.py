@@ -63,12 +63,9 @@ class Poke(Boundary):
 
     def targets(self, frame: int, anchor: np.ndarray) -> np.ndarray:
         phase = frame % (self.config.over + self.config.rest)
-        progress = (phase + 1) / self.config.over
-        target = anchor.copy()
-        times = np.linspace(0.0, 1.0, len(KNOTS))
-        target[:, AXES[self.config.axis]] += self.config.amplitude * np.interp(
-            progress, times, KNOTS
-        )
+        times, target = np.linspace(0.0, 1.0, len(KNOTS)), anchor.copy()
+        knot = np.interp((phase + 1) / self.config.over, times, KNOTS)
+        target[:, AXES[self.config.axis]] += self.config.amplitude * knot
         return target
 
     def units(self) -> list[np.ndarray]:

@@ -19,15 +19,7 @@ from pydantic import (
 
 from pdrom.core.errors import MeshError
 from pdrom.core.yamlfile import ConfigModel, check_lengths
-from pdrom.model.mesh.checks import (
-    SEAM,
-    check_mesh,
-    check_range,
-    merged,
-    mesh_of,
-    seams,
-    turned_alike,
-)
+from pdrom.model.mesh import checks
 from pdrom.model.mesh.files import MAX_VERTICES, read_mesh_file
 from pdrom.model.mesh.generators import Plane, bar, cloth
 from pdrom.model.mesh.types import Length, Mesh, PositiveLength
@@ -172,16 +164,17 @@ class MeshFile(MeshModel):
             surface is not orientable.
         """
         mesh = read_mesh_file(self.file(root))
-        check_range(mesh.points, self.scale, self.path)
+        checks.check_range(mesh.points, self.scale, self.path)
         scaled = Mesh(mesh.points * self.scale, mesh.triangles, mesh.tetrahedra)
         if self.merge:
-            scaled = merged(scaled, self.merge * scaled.extent, self.path)
-        check_mesh(scaled, self.path)
-        if "pairs" in (found := seams(scaled)):
-            log.warning("%s: %s; `merge: %.1e` below `mesh` merges them", self.path, found, SEAM)
+            scaled = checks.merged(scaled, self.merge * scaled.extent, self.path)
+        checks.check_mesh(scaled, self.path)
+        if "pairs" in (found := checks.seams(scaled)):
+            advice = f"`merge: {checks.SEAM:.1e}` below `mesh` merges them"
+            log.warning("%s: %s; %s", self.path, found, advice)
         if len(scaled.tetrahedra):
             return scaled
-        alike, turned = turned_alike(scaled, self.path)
+        alike, turned = checks.turned_alike(scaled, self.path)
         if len(turned):
             log.warning(
                 "%s: %d of %d triangles are listed the other way round than their neighbours, the "
@@ -256,9 +249,9 @@ def given_mesh(points: Any, cells: Any, name: str) -> Mesh:
     cells = _array(cells, f"{name}: cells", np.int64, (3, 4))
     if not len(points) or not len(cells):
         raise MeshError(f"{name}: {len(points)} points and {len(cells)} cells, both are required")
-    check_range(points, 1.0, name)
-    mesh = mesh_of(points, cells, name)
-    return mesh if len(mesh.tetrahedra) else turned_alike(mesh, name)[0]
+    checks.check_range(points, 1.0, name)
+    mesh = checks.mesh_of(points, cells, name)
+    return mesh if len(mesh.tetrahedra) else checks.turned_alike(mesh, name)[0]
 
 
 def _array(values: Any, name: str, kind: type[np.generic], widths: tuple[int, ...]) -> np.ndarray:

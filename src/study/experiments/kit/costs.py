@@ -5,6 +5,7 @@ Wrappers measure the times of effects, so that a normal run contains no timers.
 
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from copy import copy
+from functools import partial
 from itertools import combinations
 from time import perf_counter
 from typing import Any
@@ -70,10 +71,10 @@ def local_costs(
     steps: list[tuple[Hashable, LocalStep]] = [*groups.items(), *reduced.items()]
     for key, step in steps:
         step.begin_frame(states[0])
-        calls[key] = _each(step.accumulate, [(y, rhs) for y in iterates])
+        calls[key] = partial(_each, step.accumulate, [(y, rhs) for y in iterates])
     for key, own in reduced.items():
-        calls["solve", key] = _each(own.solve, [(own.sample(y),) for y in states])
-        calls["lift", key] = _each(own.lift, [(rhs,) for _ in states])
+        calls["solve", key] = partial(_each, own.solve, [(own.sample(y),) for y in states])
+        calls["lift", key] = partial(_each, own.lift, [(rhs,) for _ in states])
     with np.errstate(over="ignore", invalid="ignore"):
         times = measure_calls(calls, **often)
     rows = []
@@ -86,14 +87,10 @@ def local_costs(
     return pd.DataFrame(rows, columns=COLUMNS)
 
 
-def _each(call: Callable[..., object], arguments: Sequence[tuple]) -> Callable[[], None]:
-    """Return a function that calls ``call`` once with each tuple in ``arguments``."""
-
-    def every() -> None:
-        for own in arguments:
-            call(*own)
-
-    return every
+def _each(call: Callable[..., object], arguments: Sequence[tuple]) -> None:
+    """Call ``call`` once with each tuple in ``arguments``."""
+    for own in arguments:
+        call(*own)
 
 
 class Timed:

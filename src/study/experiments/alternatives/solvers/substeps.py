@@ -113,12 +113,8 @@ class Alternative(Stepper):
         parts = 1 if np.array_equal(q[fixed], targets) else self.substeps
         for part in range(1, parts + 1):
             now = targets + (1.0 - part / parts) * (q[fixed] - targets)
-            self._advance(
-                Substeps(
-                    *(y, v, acceleration, self.time_step, self.substeps // parts),
-                    *(self.iterations, fixed, now),
-                )
-            )
+            steps = (self.time_step, self.substeps // parts, self.iterations)
+            self._advance(Substeps(y, v, acceleration, *steps, fixed, now))
         # a vertex that a contact moves gets its mean velocity over the frame
         free = positions.copy()
         self.space.correct(positions, q, frame)
