@@ -24,13 +24,14 @@ from pdrom.model.scene import Scene
 from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.subspace.ecsw import Choose
 from pdrom.reduction.subspace.model import SubspaceModel
+from pdrom.reduction.subspace.newton import CONVERGED, UNNOTICED
 from pdrom.reduction.subspace.space import require_effects
 from pdrom.reduction.subspace.training import make_columns, sampled_models
 
 log = logging.getLogger(__name__)
 
-# A frame has converged when one more iteration moves no vertex by more than this part of the mesh.
-CONVERGED, EVALUATIONS = 1e-6, 20_000
+EVALUATIONS = 20_000  # largest number of a frame that is solved to convergence
+ROUNDOFF = 1e-13  # of positions, as part of the mesh
 METHOD = "gappy"  # by which the projections of a group are reduced if none is named
 SIZES = (20, 40, 80)  # numbers of modes that are tried for a required error
 VALIDATION = 1_000_000  # first seed of the validation trajectories
@@ -258,7 +259,8 @@ def _reference(scene: Scene, converged: bool, progress: Progress) -> Run:
     started = perf_counter()
     log.info("%s: solving every frame to convergence", name)
     tick = progress(f"{name}, converged", frames)
-    found = converged_run(scene, CONVERGED, EVALUATIONS, tick)
+    own = UNNOTICED * scene.config.time_step**2 / scene.mesh.extent
+    found = converged_run(scene, min(CONVERGED, max(own, ROUNDOFF)), EVALUATIONS, tick)
     if found is None:
         raise NotReducibleError(
             f"scene '{name}': a frame does not converge in {EVALUATIONS} evaluations; "

@@ -29,7 +29,7 @@ from pdrom.model.dynamics.stepper import LocalStep, Observer, Stepper
 from pdrom.model.effects.base import Anchors
 from pdrom.model.scene import Scene
 from pdrom.reduction.subspace.interpolation import SubspaceLocalStep
-from pdrom.reduction.subspace.newton import CONVERGED, newton_arrays, run_newton
+from pdrom.reduction.subspace.newton import CONVERGED, UNNOTICED, newton_arrays, run_newton
 from pdrom.reduction.subspace.products import blocks, objective, product, project, vectors
 from pdrom.reduction.subspace.space import DenseElimination, ReducedSpace
 
@@ -53,7 +53,8 @@ class FusedStepper(Stepper):
         if len(steps) == len(local_steps) and None not in kernels:
             self._fused = _Fused(space, _Sampled(steps), acceleration)
             if newton:
-                self._fused.enough = scene.masses.sum() * (CONVERGED * scene.mesh.extent / h) ** 2
+                enough = min(CONVERGED * scene.mesh.extent, UNNOTICED * h**2)
+                self._fused.enough = scene.masses.sum() * (enough / h) ** 2
             if space.whole_frames and not any(step.group.frame_lagged for step in steps):
                 self._whole = self._fused
         elif newton:

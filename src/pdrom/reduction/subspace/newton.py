@@ -4,8 +4,9 @@ It minimises what local-global iterations minimise (free coordinates y, predicti
 
     E(y) = 1/2 (y - s)^T (M/h^2) (y - s) + sum_i w_i/2 |d_i - p_i(d)|^2,    d = D y + d_0
 
-A step solves H x = grad E and halves x until E has decreased. H is the system matrix, and after
-`FIRST` steps and every `RENEW` others that minus D^T (w dp/dd) D (module `derivatives`), which
+A step solves H x = grad E and halves x until E has decreased; if it does not, a local-global
+iteration, which never raises E, replaces the step. H is the system matrix, and after `FIRST` steps,
+every `RENEW` others or such a failure that minus D^T (w dp/dd) D (module `derivatives`), which
 takes as long as ten to thirty steps; L-BFGS updates H (Nocedal 1980). Vectors are sorted by axis.
 """
 
@@ -13,7 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from pdrom.model.compiled.arithmetic import add_scaled, constant, subtract
+from pdrom.model.compiled.arithmetic import add_scaled, subtract
+from pdrom.model.compiled.arithmetic import constant as filled
 from pdrom.model.compiled.dots import dot
 from pdrom.model.compiled.functions import compiled, inner
 from pdrom.model.compiled.rows import WIDTH, at, copied, load, store
@@ -25,8 +27,9 @@ from pdrom.reduction.subspace.products import blocks, objective, product, projec
 AXES = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))  # in the order of `PAIRS`
 TALL, WIDE, CHUNK = 4, 8, 32  # entries summed in registers; elements whose rows fit in the cache
 RENEW, FIRST = 32, 16
-# A frame ends at a step of this part of the mesh (root mean square); round-off of an objective.
-CONVERGED, ROUNDOFF = 1e-6, 8.0 * np.finfo(float).eps
+# A frame ends at a step (root mean square) of this part of the mesh, or of what this acceleration,
+# m/s^2, moves in a frame, if that is less. Relative round-off of an objective.
+CONVERGED, UNNOTICED, ROUNDOFF = 1e-6, 1e-2, 8.0 * np.finfo(float).eps
 
 
 def newton_arrays(sampled: Any, space: Any, system: Any, enough: float) -> tuple[Any, ...]:
@@ -49,7 +52,7 @@ def newton_arrays(sampled: Any, space: Any, system: Any, enough: float) -> tuple
 def _subtract_products(a, i, b, j, k, rows, out, to):
     """Subtract A^T B, a tile, from ``out`` at the place and row length ``to``; A, B: rows of k."""
     place, width = to
-    s0 = t0 = s1 = t1 = s2 = t2 = s3 = t3 = constant(0.0)
+    s0 = t0 = s1 = t1 = s2 = t2 = s3 = t3 = filled(0.0)
     for r in range(0, rows * k, k):
         v, w = load(b, j + r), load(b, j + r + WIDTH)
         s0, t0 = add_scaled(s0, at(a, i + r), v), add_scaled(t0, at(a, i + r), w)
@@ -80,7 +83,7 @@ def factored_hessian(hessian, weights, sampled):
                 for row in range(n * count):
                     entry = (block + PAIRS * (row // n) + pair) * n * n + row % n
                     for i in range(0, k, WIDTH):
-                        total = constant(0.0)
+                        total = filled(0.0)
                         for s in range(n):
                             own = load(columns, start + (row // n * n + s) * k + i)
                             total = add_scaled(total, at(slopes, entry + n * s), own)
@@ -100,24 +103,24 @@ def factored_hessian(hessian, weights, sampled):
 @compiled(nogil=True)
 def run_newton(count, size, rows, operators, sampled, newton):
     """Do up to ``count`` steps in place of `run_iterations`; end when no step helps any more."""
-    strain, _, offset, _, z, weights, mass, start = operators
+    strain, lift, offset, constant, z, weights, mass, start = operators
     hessian, pull, inertia, (nothing, apart, moved, pushed, forces), enough, factor = newton
     d, p, y, before, n = sampled[5], sampled[6], z[: 3 * size], np.empty(3 * size), hessian[4]
     gradient, x, pairs = np.zeros(n), np.zeros(n), np.zeros((2 * RENEW, n))
     copy(y, start)
     project(strain, rows, size, offset, z, sampled)
     value, length = objective(weights, d, p, mass, y, start), 0.0
+    known, failed = 0, False
     for step in range(count):
         apart[: 3 * rows] = d[: 3 * rows] - p[: 3 * rows]
         moved[: 3 * size] = y - start
         product(inertia, size, size, nothing, moved, pushed)
         product(pull, size, rows, pushed, apart, forces)
-        known = step if step < FIRST else (step - FIRST) % RENEW
         if step == FIRST:
             moved[: 3 * size] = start  # at s, elements are stretched: later, many have no stiffness
             project(strain, rows, size, offset, moved, sampled)
-        if step and not known:
-            factor = factored_hessian(hessian, weights, sampled)
+        if step == FIRST or known == RENEW or failed:
+            known, factor = 0, factored_hessian(hessian, weights, sampled)
         for i in range(n):
             now = forces[i % (n // 3) * 3 + i // (n // 3)] if i % (n // 3) < size else 0.0
             if known:
@@ -125,7 +128,7 @@ def run_newton(count, size, rows, operators, sampled, newton):
             gradient[i] = now
         _direct(pairs, known, factor, gradient, x)
         slope, noise = -dot(gradient, x), ROUNDOFF * value
-        if not slope < -max(noise, enough):
+        if not slope < -(max(noise, enough) if step else noise):
             return
         copy(y, before)
         length, reached = 2.0, np.inf
@@ -133,6 +136,13 @@ def run_newton(count, size, rows, operators, sampled, newton):
             length *= 0.5
             for i in range(3 * size):
                 y[i] = before[i] - length * x[i % 3 * (n // 3) + i // 3]
+            project(strain, rows, size, offset, z, sampled)
+            reached = objective(weights, d, p, mass, y, start)
+        known, failed = known + 1, not reached <= value + noise
+        if failed:
+            copy(before, y)
+            project(strain, rows, size, offset, z, sampled)
+            product(lift, size, rows, constant, p, z)
             project(strain, rows, size, offset, z, sampled)
             reached = objective(weights, d, p, mass, y, start)
         value = reached
