@@ -71,9 +71,8 @@ def settled(
 def settle() -> None:
     """Replace `os.environ`, which child processes inherit, by `settled`, before NumPy loads."""
     system, machine, features = platform.system(), platform.machine(), features_here()
-    environment = settled(
-        os.environ, core_type(system, machine, features), compiled_for(machine, features)
-    )
+    kernels = core_type(system, machine, features)
+    environment = settled(os.environ, kernels, compiled_for(machine, features))
     for name in set(os.environ) - set(environment):
         del os.environ[name]
     os.environ.update(environment)

@@ -30,9 +30,8 @@ def trajectory(scene: Scene, perturbation: np.ndarray | None = None, **stepper: 
 
     ``perturbation`` (N, 3) m is added to them; ``stepper`` are options of `Scene.stepper`.
     """
-    return followed(
-        scene.stepper(**stepper), scene.initial_state(perturbation), scene.config.frames
-    )
+    start = scene.initial_state(perturbation)
+    return followed(scene.stepper(**stepper), start, scene.config.frames)
 
 
 def followed(loop: Stepper, state: State, frames: int) -> np.ndarray:

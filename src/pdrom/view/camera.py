@@ -88,9 +88,8 @@ def window_of(camera: Camera, clouds: Iterable[np.ndarray], margin: float = 0.08
 
 def up_of(effects: Sequence[EffectConfig]) -> np.ndarray:
     """Unit vector (3,) opposite to the gravity in a scene's ``effects``; y without gravity."""
-    pull = sum(
-        (np.array(e.acceleration) for e in effects if isinstance(e, Gravity.Config)), 0.0 * Y
-    )
+    pulls = [np.array(e.acceleration) for e in effects if isinstance(e, Gravity.Config)]
+    pull = sum(pulls, 0.0 * Y)
     strength = float(np.linalg.norm(pull))
     return -pull / strength if strength > 0.0 else Y
 

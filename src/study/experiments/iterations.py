@@ -95,9 +95,8 @@ def iterations(
             loop = scene.iterated(count, window).stepper(system, track_objective=False)
             reached = followed(loop, scene.initial_state(), frames)
         converged = runfiles.run_error(reached, limit) if best.converged else None
-        rows.append(
-            (name, count, window, frames, converged, runfiles.run_error(reached, own), None)
-        )
+        error = runfiles.run_error(reached, own)
+        rows.append((name, count, window, frames, converged, error, None))
     residual = max(best.changes) / scene.mesh.extent
     converged = 0.0 if best.converged else None
     rows.append((name, None, None, frames, converged, runfiles.run_error(limit, own), residual))

@@ -72,17 +72,12 @@ def _draw_method(
     """Draw a dot (gain, error) per run; crosses span both over repetitions (``ranges``)."""
     x, y = runs.gain.to_numpy(float), runs.error.to_numpy(float)
     outside = {4: x < GAINS[0], 5: x > GAINS[1], 6: y > ERRORS[1], 7: y < ERRORS[0]}
+    x, y = np.clip(x, *GAINS), np.clip(y, *ERRORS)
+    look = {"linestyle": "none", "color": colour, "markeredgewidth": 0.0, "clip_on": False}
     for arrow, beyond in outside.items():  # by Matplotlib's numbers of arrow markers
         if beyond.any():
-            ax.plot(
-                np.clip(x[beyond], *GAINS), np.clip(y[beyond], *ERRORS), linestyle="none",
-                color=colour, alpha=0.8, marker=arrow, markersize=5.0, markeredgewidth=0.0,
-                clip_on=False,
-            )  # fmt: skip
-    ax.plot(
-        np.clip(x, *GAINS), np.clip(y, *ERRORS), linestyle="none", color=colour, marker=marker,
-        markersize=3.2, alpha=0.7, markeredgewidth=0.0, clip_on=False,
-    )  # fmt: skip
+            ax.plot(x[beyond], y[beyond], marker=arrow, markersize=5.0, alpha=0.8, **look)
+    ax.plot(x, y, marker=marker, markersize=3.2, alpha=0.7, **look)
     gains = [np.clip(ranges[f"gain_{e}"].to_numpy(float), *GAINS) for e in ENDS]
     errors = [np.clip(ranges[f"error_{e}"].to_numpy(float), *ERRORS) for e in ENDS]
     bars = {"color": colour, "linewidth": 0.9, "zorder": 3}

@@ -75,15 +75,9 @@ class Shown:
         window = view.shared_window(self.camera, self.full[0], seen)
         first = RunPanel("full order", style.FULL_ORDER, self.full[0], reference=True)
         panels = [replace(panel, obstacles=self.bodies) for panel in (first, *panels)]
-        return Row(
-            f"{self.experiment.title}\n{label}",
-            self.mesh,
-            panels,
-            [window] * len(panels),
-            np.repeat(self.full, len(panels), axis=0),
-            self.camera,
-            note,
-        )
+        label, windows = f"{self.experiment.title}\n{label}", [window] * len(panels)
+        ghosts = np.repeat(self.full, len(panels), axis=0)
+        return Row(label, self.mesh, panels, windows, ghosts, self.camera, note)
 
 
 @dataclass(frozen=True)

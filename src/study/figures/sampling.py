@@ -53,7 +53,7 @@ class Iteration:
 
     k: int
     magnitude: np.ndarray
-    earlier: np.ndarray
+    earlier: list[int]
     newest: int
     entry: int
 
@@ -135,15 +135,9 @@ def iterations(
         residual = residual_of(V, entries[: k * per_step], k)
         norms = np.linalg.norm(residual.reshape(-1, length), axis=1)
         picked = entries[: (k + 1) * per_step : per_step] // per_element
-        steps.append(
-            Iteration(
-                k=k + 1,
-                magnitude=norms.reshape(-1, per_element // length).max(axis=1),
-                earlier=picked[:-1],
-                newest=int(picked[-1]),
-                entry=int(entries[k * per_step]),
-            )
-        )
+        magnitude = norms.reshape(-1, per_element // length).max(axis=1)
+        *earlier, newest = picked.tolist()
+        steps.append(Iteration(k + 1, magnitude, earlier, newest, int(entries[k * per_step])))
     return steps
 
 

@@ -133,9 +133,8 @@ class LocalPass:
         self.other = rows.zeros(0)
         if touched:
             self.touched = range(min(r.start for r in touched), max(r.stop for r in touched))
-            self.other = rows.zeros(
-                rows.WIDTH * max(int(kernel.record[VERTICES]) for kernel in kernels)
-            )
+            vertices = max(int(kernel.record[VERTICES]) for kernel in kernels)
+            self.other = rows.zeros(rows.WIDTH * vertices)
 
     def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
         """Add S^T W p(y) at ``y`` (N, 3) to ``rhs`` (N, 3), and return the energy, J."""

@@ -239,14 +239,9 @@ def factored(matrix: sparse.csr_array, ordering: str) -> SuperLU:
 
     Raises SolverError if the matrix is singular or not positive definite.
     """
-    size = matrix.shape[0]
+    size, options = matrix.shape[0], {"SymmetricMode": True}
     try:
-        factor = splu(
-            matrix.tocsc(),
-            permc_spec=ordering,
-            diag_pivot_thresh=0.0,
-            options={"SymmetricMode": True},
-        )
+        factor = splu(matrix.tocsc(), ordering, diag_pivot_thresh=0.0, options=options)
     except RuntimeError as error:
         raise SolverError(f"global system of size {size}: {error}") from error
     symmetric = ordering == "COLAMD" or np.array_equal(factor.perm_r, factor.perm_c)

@@ -132,9 +132,8 @@ class Wind(Force):
         kappa = self._half_density * self._at_vertices(area / 3.0) / self._masses
         slowing = 1.0 + self.time_step * kappa[self._triangles].max(axis=1) * np.abs(speed)
         force = (self._half_density * np.abs(speed) * speed / slowing)[:, None] * vector
-        return (
-            np.stack([self._at_vertices(f / 3.0) for f in force.T], axis=1) / self._masses[:, None]
-        )
+        shares = np.stack([self._at_vertices(f / 3.0) for f in force.T], axis=1)
+        return shares / self._masses[:, None]
 
     def _at_vertices(self, values: np.ndarray) -> np.ndarray:
         """Return sums (N,) of ``values`` (T,) over the triangles around each vertex."""

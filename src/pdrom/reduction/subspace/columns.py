@@ -95,10 +95,8 @@ def build_columns(
         b[np.ix_(vertices, own)] = block
     count = modes.shape[1]
     if trajectory is None:  # own columns may depend on each other or be affine
-        count = (
-            len(ranges[0])
-            - orthonormal(weight * raw[:, : affine_columns(points).shape[1]]).shape[1]
-        )
+        affine = orthonormal(weight * affine_columns(points)[free_vertices])
+        count = len(ranges[0]) - affine.shape[1]
     return Columns(b, ranges[0], list(atoms), ranges[1:], count)
 
 

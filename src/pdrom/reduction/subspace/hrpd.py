@@ -21,6 +21,7 @@ from pdrom.model.constraints.base import ConstraintGroup
 from pdrom.model.mesh.selection import farthest_points
 from pdrom.reduction.basis import pod
 from pdrom.reduction.sampling.reduction import element_rows, norm_and_condition, solution_operator
+from pdrom.reduction.snapshots import touched_vertices
 from pdrom.reduction.subspace.columns import DEPENDENT, Columns, orthonormal, skinning_weights
 from pdrom.reduction.subspace.interpolation import Interpolation, reduced_strain
 
@@ -124,6 +125,5 @@ def projection_space(
 
 def element_centres(group: ConstraintGroup, points: np.ndarray) -> np.ndarray:
     """Centres (e, 3) m of the elements: means of the ``points`` (N, 3) m at their vertices."""
-    rows, touches = group.rows_per_element, (group.S != 0).astype(np.float64)
-    touched = (sum(touches[row::rows] for row in range(rows)) != 0).astype(np.float64)
+    touched = touched_vertices(group)
     return (touched @ points) / np.asarray(touched.sum(axis=1)).reshape(-1, 1)

@@ -182,13 +182,11 @@ def _mass_solve(columns: Columns, masses: np.ndarray, rhs: np.ndarray) -> np.nda
     return scale * linalg.solve(scale * mass * scale.T, scale * rhs, assume_a="pos")
 
 
-def reduced_state(scene: Scene, columns: Columns) -> State:
-    """Initial state of ``scene``, projected on ``columns``, in whose span the rest shape lies."""
-    state = scene.initial_state()
-    return State(
-        coordinates(columns, scene.masses, state.positions),
-        coordinates(columns, scene.masses, state.velocities),
-    )
+def reduced_state(scene: Scene, columns: Columns, state: State | None = None) -> State:
+    """Project ``state`` of ``scene`` (None: the initial one) on ``columns``."""
+    state = state or scene.initial_state()
+    q, v = (coordinates(columns, scene.masses, f) for f in (state.positions, state.velocities))
+    return State(q, v, state.anchors)
 
 
 def _reduce_force(force: base.Force, columns: Columns, scene: Scene) -> tuple[np.ndarray, Any]:

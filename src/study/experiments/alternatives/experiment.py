@@ -25,7 +25,7 @@ from pdrom.model.held_out import FIRST, MOTIONS, PLAYBACK
 from pdrom.model.runs import BLOWUP_EXTENT, BoundedRun, converged_run, trajectory
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.subspace.model import SubspaceModel
-from pdrom.reduction.subspace.space import coordinates, projector
+from pdrom.reduction.subspace.space import projector, reduced_state
 from pdrom.reduction.subspace.training import make_columns, sampled_models
 from study.artifact.paths import ALTERNATIVE_TIMES, ALTERNATIVES, File
 from study.artifact.reads import Setting, SourcesOf
@@ -171,11 +171,7 @@ class Candidate:
 
     def state(self, state: State, scene: Scene) -> State:
         """Convert ``state`` of all vertices to coordinates in the method's subspace, if any."""
-        if self.model is None:
-            return state
-        own = (self.model.columns, scene.masses)
-        q, v = (coordinates(*own, field) for field in (state.positions, state.velocities))
-        return State(q, v, state.anchors)
+        return state if self.model is None else reduced_state(scene, self.model.columns, state)
 
     def run(self, frames: int, extent: float) -> np.ndarray | None:
         """Run the method; return positions (F + 1, N, 3) m at the start and at the ends of frames.

@@ -14,17 +14,16 @@ from pdrom.core.errors import NotReducibleError, PdromError, choices
 from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel, shown
 from pdrom.model.constraints.base import ConstraintGroup
-from pdrom.model.dynamics.stepper import State, Stepper
+from pdrom.model.dynamics.stepper import Stepper
 from pdrom.model.effects import EFFECTS
 from pdrom.reduction.basis import Basis, group_basis
 from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.sampling import Reduction, select
 from pdrom.reduction.sampling.model import ProjectionModel
 from pdrom.reduction.snapshots import recorded
-from pdrom.reduction.subspace.columns import Columns
 from pdrom.reduction.subspace.hrpd import HrpdSpec, hrpd, sampled_space
 from pdrom.reduction.subspace.model import SubspaceModel
-from pdrom.reduction.subspace.space import coordinates
+from pdrom.reduction.subspace.space import reduced_state
 from pdrom.reduction.subspace.training import make_columns, sampled_models
 from study.artifact.paths import HARD_CASES, File
 from study.artifact.reads import ProjectFiles, Setting
@@ -127,20 +126,14 @@ def reduced_model(
     modes: dict[str, Any] = {kind: K}
     columns = make_columns([scene], training.positions[1::2], **modes)
     if sampling == "ecsw":
-        frames, start = np.arange(scene.config.frames), _start(training, columns)
+        start = reduced_state(scene, columns, training.start)
+        frames = np.arange(scene.config.frames)
         return sampled_models([scene], columns, frames, [TOLERANCE], start)[0]
     if sampling == "hrpd":
         points = scene.mesh.points
         found = {g.name: hrpd(g, columns, sampled_space(g, points, HRPD)) for g in scene.groups}
         return SubspaceModel(columns, found)
     return SubspaceModel(columns)
-
-
-def _start(training: Training, columns: Columns) -> State:
-    """Initial state of the hard case in coordinates of the subspace of ``columns``."""
-    start, masses = training.start, training.scene.masses
-    q, v = (coordinates(columns, masses, f) for f in (start.positions, start.velocities))
-    return State(q, v)
 
 
 def reduced_run(training: Training, model: SubspaceModel | ProjectionModel) -> record.Record:
@@ -151,7 +144,7 @@ def reduced_run(training: Training, model: SubspaceModel | ProjectionModel) -> r
         return record.record(training.scene, loop, training.start, limit=limit)
     h, iterations = loop.time_step, loop.iterations
     tracked = Stepper(loop.space, h, iterations, local_steps=loop.local_steps)
-    start = _start(training, model.columns)
+    start = reduced_state(training.scene, model.columns, training.start)
     return record.record(training.scene, tracked, start, model, limit)
 
 
