@@ -22,6 +22,7 @@ from pdrom.core.yamlfile import ConfigModel, shown, validate
 from pdrom.model.constraints.base import GroupConfig
 from pdrom.model.dynamics.stepper import FrameReport, State, Stepper
 from pdrom.model.effects.base import Vector
+from pdrom.model.mesh.selection import Selection, select_vertices
 from pdrom.model.mesh.types import store_mesh, stored_mesh
 from pdrom.model.runs import BLOWUP_EXTENT
 from pdrom.model.scene import Scene, SceneConfig
@@ -145,8 +146,10 @@ class Model:
         loop, start = self.loop(scene, iterations, solver)
         next(loop.run(start, range(1)))  # loads compiled code, which no frame's time shall include
         run = rerun(scene, loop, start, None, BLOWUP_EXTENT, self._lift(), on_frame)
+        asked = f"{iterations} iterations" if iterations else ""
+        method = ", ".join(filter(None, (self.title, asked, solver)))
         ended = run.blowup_frame
-        found = Run(scene, run.positions, run.ms, method=self.title, blowup_frame=ended)
+        found = Run(scene, run.positions, run.ms, method=method, blowup_frame=ended)
         if out is not None:
             files.save(found, out)
         return found
@@ -156,7 +159,7 @@ class Model:
     ) -> tuple[Stepper, State]:
         """Step loop of ``scene`` in the model's unknowns, and the initial state; see `run`."""
         require_same_mesh(self.scene, scene)
-        asked = validate(_Asked, {"iterations": iterations, "solver": solver}, "run")
+        asked = validate(_Asked, {"iterations": iterations, "solver": solver}, "model")
         newton = (asked.solver or self.training.solver) == "newton"
         count = asked.iterations or (256 if newton else None)
         scene = scene.iterated(count, scene.config.anderson_window) if count else scene
@@ -164,7 +167,7 @@ class Model:
             subspaces.require_holds(scene, self.reduced.columns)
             return self.reduced.loop(scene, newton)
         if newton:
-            raise ConfigurationError("run: solver = newton: this model has no position subspace")
+            raise ConfigurationError("model: solver = newton: this model has no position subspace")
         return self.reduced.loop(scene)
 
     def view(self, path: str | os.PathLike[str], full: Run | None = None) -> None:
@@ -182,6 +185,8 @@ class Model:
             is none, or of a scene that `run` refuses; the page is too large or cannot be written.
         """
         store.require_own(files.file_path(path))
+        if files.file_path(path).suffix.lower() not in (".html", ".htm"):
+            raise ConfigurationError(f"{path}: the name of a page ends in .html")
         own, scene, positions = self.reduced, self.scene, None
         if not isinstance(own, SubspaceModel):
             raise NotReducibleError(f"{self.title} reduces projections: train without a method")
@@ -203,12 +208,14 @@ class Model:
         output = self.reduced.output(float)
         return lambda z: output(z).copy()
 
-    def start(self, scene: Scene, **options: Any) -> "Loop":
-        """Start ``scene`` frame by frame; ``options`` are iterations and solver of `run`."""
+    def start(
+        self, scene: Scene, iterations: int | None = None, solver: str | None = None
+    ) -> "Loop":
+        """Start ``scene`` frame by frame; ``iterations`` and ``solver`` are those of `run`."""
         files.require(Scene, scene, "scene", source="build_scene and load_scene make one")
         if not isinstance(self.reduced, SubspaceModel):
             raise ConfigurationError("start: this model has no position subspace; use run")
-        return Loop(*self.loop(scene, **options), self._lift())
+        return Loop(scene, *self.loop(scene, iterations, solver), self._lift())
 
     def speed(self, scene: Scene, repeats: int = 3) -> dict[str, Any]:
         """Measure the model and the full order in turn, in this process, on ``scene``.
@@ -257,14 +264,21 @@ class Model:
 class _Asked(ConfigModel):
     iterations: Annotated[int, Field(ge=1, le=10_000)] | None = None
     solver: Literal["newton", "local_global"] | None = None
+    hold: Selection = "x_min"
     displacement: Vector = (0.0, 0.0, 0.0)
 
 
 class Loop:
-    """A scene, computed frame by frame; ``frame`` is the number of the next one, from 0."""
+    """A scene, computed frame by frame; ``frame`` is the number of the next one, from 0.
 
-    def __init__(self, loop: Stepper, start: State, lift: Callable[..., np.ndarray]) -> None:
-        self._loop, self._state, self._lift, self.frame = loop, start, lift, 0
+    It may go on beyond the scene's frames, and does not end if it blows up.
+    """
+
+    def __init__(
+        self, scene: Scene, loop: Stepper, start: State, lift: Callable[..., np.ndarray]
+    ) -> None:
+        self._mesh, self._loop, self._state, self._lift = scene.mesh, loop, start, lift
+        self.frame = 0
 
     @property
     def positions(self) -> np.ndarray:
@@ -276,18 +290,25 @@ class Loop:
         self._state, _ = self._loop.step(self._state, self.frame)
         self.frame += 1
 
-    def move(self, hold: str, displacement: Sequence[float]) -> None:
-        """Displace a hold, named by its side ("left") or effect ("pins"), by ``displacement`` m.
+    def move(self, hold: Any, displacement: Sequence[float]) -> None:
+        """Displace a hold by ``displacement`` m; displacements add up.
 
-        Displacements add up. ConfigurationError unless one hold of the next frame has the name.
+        ``hold`` is the name of its effect ("pins"), or the selection of its vertices ("left").
+        ConfigurationError unless this is one hold of the next frame.
         """
-        active = (b for b in self._loop.space.boundaries if b.active(self.frame))
-        found = [b for b in active if hold in (b.boundary.side, b.boundary.name)]
-        asked = validate(_Asked, {"displacement": displacement}, "move")
+        active = [b for b in self._loop.space.boundaries if b.active(self.frame)]
+        found, names = (
+            [b for b in active if b.boundary.name == hold],
+            {"displacement": displacement},
+        )
+        asked = validate(_Asked, names | ({} if found else {"hold": hold}), "move")
+        if not found:
+            wanted = select_vertices(self._mesh, asked.hold)
+            found = [b for b in active if np.array_equal(b.vertices, wanted)]
         if len(found) != 1:
-            raise ConfigurationError(
-                f"move: {shown(hold, 60)}: {len(found)} holds, required is one"
-            )
+            known = (f"{b.boundary.name} of {b.boundary.side or len(b.vertices)}" for b in active)
+            fault = f"{len(found)} holds of frame {self.frame}; there are: {', '.join(known)}"
+            raise ConfigurationError(f"move: {shown(hold, 60)}: {fault}")
         found[0].shift = found[0].shift + np.array(asked.displacement)
 
 

@@ -43,14 +43,15 @@ def plot(reference: Run, *runs: Run) -> Figure:
     with style.look():
         figure = style.new_figure(3.0)
         ax = figure.subplots()
-        style.log_axis(ax, LOW, HIGH)
-        for i, run in enumerate(runs):
-            error = run.errors(reference)
+        errors = [np.clip(run.errors(reference), LOW, HIGH) for run in runs]
+        whole = np.log10(np.concatenate([*errors, [1e-3, 1.0]]))
+        style.log_axis(ax, 10.0 ** np.floor(whole.min()), 10.0 ** np.ceil(whole.max()))
+        for i, (run, error) in enumerate(zip(runs, errors, strict=True)):
             time = run.scene.config.time_step * np.arange(1, len(error) + 1)
-            colour, shown = style.CYCLE[i % len(style.CYCLE)], np.clip(error, LOW, HIGH)
-            ax.plot(time, shown, color=colour, label=run.method)
+            colour = style.CYCLE[i % len(style.CYCLE)]
+            ax.plot(time, error, color=colour, label=run.method)
             if run.blowup_frame is not None and len(time):
-                ax.plot(time[-1:], shown[-1:], color=colour, marker="x", markersize=5)
+                ax.plot(time[-1:], error[-1:], color=colour, marker="x", markersize=5)
         ax.set_xlim(0.0, None)
         ax.set_xlabel("time in s")
         ax.set_ylabel("error of the positions")

@@ -72,17 +72,20 @@ def arguments(scene: Scene, given: Mapping[str, Any]) -> Arguments:
     changed |= {"others"} if given["others"] else set()
     local = method is not None or asked.group is not None
     apart = {
-        "group and method": (local, changed - {"group", "r", "validate"}),
-        "no group and no method": (not local, changed & {"r"}),
-        "error, which tries 20, 40 and 80 modes": (asked.error is not None, changed & {"modes"}),
-        "an own basis": (basis is not None, changed & {"modes", "error"}),
-        "tolerance None": (asked.tolerance is None, changed & {"selection"}),
+        "with group or method": (local, changed - {"group", "r", "validate"}),
+        "without group or method": (not local, changed & {"r"}),
+        "with error, which tries 20, 40 and 80 modes": (
+            asked.error is not None,
+            changed & {"modes"},
+        ),
+        "with an own basis": (basis is not None, changed & {"modes", "error"}),
+        "with tolerance None": (asked.tolerance is None, changed & {"selection"}),
     }
     for what, (applies, wrong) in apart.items():
         if applies and wrong:
-            raise ConfigurationError(f"train: {', '.join(sorted(wrong))}: not with {what}")
+            raise ConfigurationError(f"train: {', '.join(sorted(wrong))}: no effect {what}")
     if asked.error is not None and not asked.validate_:
-        raise ConfigurationError("train: error: validate = 0, one trajectory is needed")
+        raise ConfigurationError("train: error: at least one trajectory to validate is needed")
     for name in ("selection", "progress"):
         if (function := given.get(name)) is not None and not callable(function):
             raise ConfigurationError(f"train: {name} = {shown(function, 60)}: no function")

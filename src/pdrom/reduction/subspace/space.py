@@ -218,6 +218,7 @@ class _ReducedBoundary:
         self.active, self.takes_hold = boundary.active, boundary.takes_hold
         self._parts: dict[bytes, tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
         self._columns, self.shift = columns, np.zeros(3)
+        self.vertices = np.unique(np.concatenate([np.empty(0, np.int64), *boundary.units()]))
 
     def held(self, frame: int) -> np.ndarray:
         """Ascending indices of subspace coordinates that move the vertices held in ``frame``."""

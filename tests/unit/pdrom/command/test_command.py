@@ -319,7 +319,10 @@ FAULTY = [
     ([*TRAIN, "--out", "."], ".: cannot be written (a folder)"),
     ([*TRAIN, "--out", "small.yaml"], "is read by this command"),
     (["run", "small.yaml", "--compare", "small.h5"], "--compare: only of runs with a model"),
-    (["train", "small.yaml", "--modes", "4", "--r", "3"], "r: not with no group and no method"),
+    (
+        ["train", "small.yaml", "--modes", "4", "--r", "3"],
+        "r: no effect without group or method",
+    ),
     (["run", "small.yaml", "--model", "none.h5"], "none.h5: no such file"),
     (["run", "small.yaml", "--model", "x.h5", "--out", "x.h5"], "is read by this command"),
     (["run", "small.yaml", "--out", "."], ".: cannot be written (a folder)"),

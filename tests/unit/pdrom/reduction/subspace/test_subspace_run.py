@@ -248,6 +248,21 @@ def test_newton_steps_reach_the_minimum_that_scipy_and_local_global_iterations_f
         model.loop(scene, newton=True)
 
 
+def test_newton_steps_never_raise_the_objective_of_a_stiff_bar():
+    bar, stiff = {"kind": "bar", "nx": 5, "ny": 2, "nz": 2}, TETRAHEDRA | {"weight": 2e12}
+    scene = make_scene(LEFT, GRAVITY, stiff, mesh=bar, masses=[{"density": 1000.0}])
+    model = models.SubspaceModel(whole_space(scene))
+    loop, state = model.loop(scene.iterated(9), newton=True)
+    for frame in range(5):
+        s, values = loop._begin(state, frame)[0], []
+        for count in (20, 40, 90):
+            y = model.loop(scene.iterated(count), newton=True)[0].step(state, frame)[0].positions
+            energies = [step.accumulate(y, np.zeros_like(y)) for step in loop.local_steps]
+            values.append(sum(energies) + loop.space.inertia_energy(y - s))
+        assert values == sorted(values, reverse=True)
+        state = loop.step(state, frame)[0]
+
+
 def test_forces_that_cannot_be_reduced_are_refused():
     scene = make_scene(SPRING, GRAVITY)
     force = scene.forces[0]
