@@ -21,7 +21,6 @@ from pdrom.core.provenance import made_by
 from pdrom.core.yamlfile import ConfigModel, shown, validate
 from pdrom.model.constraints.base import GroupConfig
 from pdrom.model.dynamics.stepper import FrameReport, State, Stepper
-from pdrom.model.effects.base import Vector
 from pdrom.model.mesh.selection import Selection, select_vertices
 from pdrom.model.mesh.types import store_mesh, stored_mesh
 from pdrom.model.runs import BLOWUP_EXTENT
@@ -265,7 +264,6 @@ class _Asked(ConfigModel):
     iterations: Annotated[int, Field(ge=1, le=10_000)] | None = None
     solver: Literal["newton", "local_global"] | None = None
     hold: Selection = "x_min"
-    displacement: Vector = (0.0, 0.0, 0.0)
 
 
 class Loop:
@@ -278,7 +276,7 @@ class Loop:
         self, scene: Scene, loop: Stepper, start: State, lift: Callable[..., np.ndarray]
     ) -> None:
         self._mesh, self._loop, self._state, self._lift = scene.mesh, loop, start, lift
-        self.frame = 0
+        self.frame, self._selected = 0, dict[str, np.ndarray]()
 
     @property
     def positions(self) -> np.ndarray:
@@ -296,20 +294,26 @@ class Loop:
         ``hold`` is the name of its effect ("pins"), or the selection of its vertices ("left").
         ConfigurationError unless this is one hold of the next frame.
         """
+        try:
+            shift = np.asarray(displacement)
+        except ValueError:
+            shift = np.empty(0)
+        if shift.shape != (3,) or shift.dtype.kind not in "fiu" or not np.isfinite(shift).all():
+            fault = "three finite numbers are required"
+            raise ConfigurationError(f"move: displacement = {shown(displacement, 60)}: {fault}")
         active = [b for b in self._loop.space.boundaries if b.active(self.frame)]
-        found, names = (
-            [b for b in active if b.boundary.name == hold],
-            {"displacement": displacement},
-        )
-        asked = validate(_Asked, names | ({} if found else {"hold": hold}), "move")
+        named = isinstance(hold, str)
+        found = [b for b in active if named and hold in (b.boundary.name, b.boundary.side)]
         if not found:
-            wanted = select_vertices(self._mesh, asked.hold)
-            found = [b for b in active if np.array_equal(b.vertices, wanted)]
+            if (key := repr(hold)) not in self._selected:
+                asked = validate(_Asked, {"hold": hold}, "move")
+                self._selected[key] = select_vertices(self._mesh, asked.hold)
+            found = [b for b in active if np.array_equal(b.vertices, self._selected[key])]
         if len(found) != 1:
             known = (f"{b.boundary.name} of {b.boundary.side or len(b.vertices)}" for b in active)
             fault = f"{len(found)} holds of frame {self.frame}; there are: {', '.join(known)}"
             raise ConfigurationError(f"move: {shown(hold, 60)}: {fault}")
-        found[0].shift = found[0].shift + np.array(asked.displacement)
+        found[0].shift = found[0].shift + shift
 
 
 def require_same_mesh(own: Scene, other: Scene) -> None:
