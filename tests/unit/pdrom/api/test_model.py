@@ -292,8 +292,7 @@ def test_a_loop_computes_the_frames_of_a_run_and_moves_its_holds(full, model):
 
 def test_short_time_steps_converge_too():
     short = scene(LEFT, SPRING | {"weight": 1e6}, time_step=1e-4, frames=300, iterations=50)
-    full = api.run(short)
-    model = api.train(full, basis=np.eye(30), tolerance=None)
+    model = api.train(api.run(short), basis=np.eye(30), tolerance=None)
     assert max(model.validation[["position_error", "deformation_error"]].iloc[0]) < 1e-3
 
 

@@ -148,6 +148,7 @@ def signalled(number: int, *command: str) -> tuple[int, str, str]:
     process = subprocess.Popen(
         [sys.executable, "-c", *command],
         stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        preexec_fn=lambda: signal.signal(number, signal.SIG_DFL),  # nohup may start the tests
     )  # fmt: skip
     assert process.stdout.readline() == "ready\n"
     process.send_signal(number)
