@@ -31,6 +31,6 @@ scene = build_scene(
 full = run(scene)
 built_in = train(full, modes=15)
 own = train(full, modes=15, selection=at_random)
-for model in (built_in, own):
-    print(model)
+for name, model in {"built in": built_in, "at random": own}.items():
+    print(name, model)
 plot(full, built_in.run(scene), own.run(scene)).savefig("own_selection.png")

@@ -261,6 +261,8 @@ class Model:
 
 
 class _Asked(ConfigModel):
+    """Arguments of `Model.run` and `Loop.move`; each call sets its own ones."""
+
     iterations: Annotated[int, Field(ge=1, le=10_000)] | None = None
     solver: Literal["newton", "local_global"] | None = None
     hold: Selection = "x_min"

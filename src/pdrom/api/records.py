@@ -125,7 +125,7 @@ class Run:
 
     @property
     def title(self) -> str:
-        """What the run is, in words that name it as a reference."""
+        """Description of the run by which messages name it as a reference."""
         config = self.scene.config
         again = f", {config.iterations} iterations a frame" if self.method == FULL else ""
         return f"the run of '{config.name}' by {self.method}{again}"

@@ -37,7 +37,7 @@ def perform(arguments: argparse.Namespace) -> Status:
     paid = f"paid back after {1e3 * seconds / saved:.0f} frames"
     sys.stdout.write(
         f"{out}: {model.title}; training took {seconds:.3g} s, "
-        f"{paid if saved > 0.0 else 'never paid back: the full order is as fast'}"
+        f"{paid if saved > 0.0 else 'never paid back: the full order is at least as fast'}"
         f"{' (times are unreliable: other programs ran)' * bool(model.validation.busy.any())}\n"
     )
     return Status.DONE
