@@ -178,7 +178,7 @@
 
   function tell() {
     const { scene, run } = shown, ms = (value) => (value === null ? "not timed" : `${value.toPrecision(3)} ms a frame`);
-    const parts = [`${scene.title}.`, `${scene.method}: ${ms(scene.ms)}.`];
+    const parts = [`${scene.title}.`, `${scene.method[0].toUpperCase()}${scene.method.slice(1)}: ${ms(scene.ms)}.`];
     if (run) parts.push(`Reduced: ${ms(run.ms)}.`);
     if (run) parts.push(`Relative error: distance of the two runs over the full order's motion (its distance from the start, root mean square over the frames); ${told(run)}.`);
     if (run && run.blowup !== null) parts.push(`The reduced run blew up at frame ${run.blowup}.`);
