@@ -44,11 +44,21 @@ class ConvergedStepper(Stepper):
     """Full-order step loop that minimises the objective of every frame up to a tolerance.
 
     ``changes`` and ``evaluations`` list these fields of `Minimum` for the frames computed so far.
+    A minimisation starts from the positions that inertia predicts or, if ``from_last``, from those
+    at the beginning of the frame; it may find another minimum then.
     """
 
-    def __init__(self, scene: Scene, system: GlobalSystem, tolerance: float, limit: int) -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        system: GlobalSystem,
+        tolerance: float,
+        limit: int,
+        from_last: bool = False,
+    ) -> None:
         super().__init__(scene.space(system), scene.config.time_step, limit, scene.groups)
         self.space: VertexSpace
+        self._from_last = from_last
         self._tolerance = tolerance * scene.mesh.extent
         self.changes: list[float] = []
         self.evaluations: list[int] = []
@@ -64,7 +74,11 @@ class ConvergedStepper(Stepper):
         """Compute ``frame`` from ``state``; ``on_last_iterate`` is ignored."""
         started = perf_counter()
         s, elimination, base, anchors = self._begin(state, frame)
-        rhs = np.empty_like(s)
+        rhs, first = np.empty_like(s), s
+        if self._from_last:
+            fixed, targets, _ = self.space.fixed(frame, state.positions, state.anchors)
+            first = s.copy()
+            first[:], first[fixed] = state.positions, targets
 
         def evaluate(y: np.ndarray) -> tuple[float, np.ndarray]:
             np.copyto(rhs, base)
@@ -74,7 +88,11 @@ class ConvergedStepper(Stepper):
             return energy + self.space.inertia_energy(y - s), target
 
         end = minimise(
-            evaluate, self.space.system.matrix, s, tolerance=self._tolerance, limit=self.iterations
+            evaluate,
+            self.space.system.matrix,
+            first,
+            tolerance=self._tolerance,
+            limit=self.iterations,
         )
         self.changes.append(end.change)
         self.evaluations.append(end.evaluations)
@@ -88,14 +106,17 @@ def converged_run(
     tolerance: float,
     limit: int,
     on_frame: Callable[[int, FrameReport], None] = lambda frame, report: None,
+    from_last: bool = False,
 ) -> np.ndarray | None:
     """Positions (F + 1, N, 3) m of a run of ``scene`` in which every frame has converged.
 
     Initial positions come first. None if, after ``limit`` evaluations of a frame's objective, one
     more iteration would move a vertex by over ``tolerance`` times the mesh's longest side.
-    ``on_frame`` is called after each frame with its number and report.
+    ``on_frame`` is called after each frame with its number and report; ``from_last``: see
+    `ConvergedStepper`.
     """
-    best, state = ConvergedStepper(scene, scene.system, tolerance, limit), scene.initial_state()
+    best = ConvergedStepper(scene, scene.system, tolerance, limit, from_last)
+    state = scene.initial_state()
     ends = takewhile(lambda _: best.converged, best.run(state, range(scene.config.frames)))
     positions = [state.positions]
     for frame, (after, report) in enumerate(ends):

@@ -61,6 +61,7 @@ def test_a_frame_ends_where_very_many_iterations_end(group, rng):
     scene = sheet(group)
     state = scene.initial_state(0.02 * rng.standard_normal(scene.mesh.points.shape))
     best = ConvergedStepper(scene, scene.system, 1e-11, 2000)
+    other, begun = ConvergedStepper(scene, scene.system, 1e-11, 2000, from_last=True), state
     config = scene.config
     plain = Stepper(scene.space(scene.system), config.time_step, 10_000, scene.groups)
     for frame in range(3):
@@ -70,5 +71,9 @@ def test_a_frame_ends_where_very_many_iterations_end(group, rng):
         assert report.objective[-2] - report.objective[-1] <= 1e-10 * report.objective[-1]
         np.testing.assert_allclose(state.positions, expected.positions, rtol=0.0, atol=2e-7)
         state = expected
+        again, _ = other.step(begun, frame)
+        np.testing.assert_allclose(again.positions, expected.positions, rtol=0.0, atol=2e-7)
+        begun = expected
     assert best.converged
     assert max(best.evaluations) < 500
+    assert best.evaluations != other.evaluations  # their frames start from different positions
