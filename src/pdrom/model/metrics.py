@@ -30,46 +30,46 @@ def relative_errors(p: np.ndarray, p_hat: np.ndarray, roundoff: float) -> list[f
     ]
 
 
-def shape_residuals(positions: np.ndarray, reference: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def shape_residuals(
+    positions: np.ndarray, reference: np.ndarray, masses: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Return differences R q + t - q_ref in each of F frames after the best rigid motion R, t.
 
-    R is the least-squares rotation, never a reflection (Kabsch 1976), t aligns the centroids.
+    R is the rotation, never a reflection, with the least mass-weighted squares (Kabsch 1976), t
+    aligns the centres of mass.
 
     Parameters
     ----------
     positions, reference : (F, N, 3) m, finite: the q and the q_ref
+    masses : (N,) kg
 
     Returns
     -------
     residuals, scale
-        (F, N, 3) differences divided by ``scale`` (F,) m, which is at least 1 m and at least every
-        coordinate of the frame, as squares of differences in metres may overflow.
+        (F, N, 3) differences divided by ``scale`` (F,) m, which is at least every coordinate of the
+        frame, as squares of differences in metres may overflow.
     """
-    # scale both runs, since products of positions in an unstable run would overflow
     largest = np.abs(positions).max(initial=0.0, axis=(1, 2), keepdims=True)
-    scale = np.maximum(np.maximum(largest, np.abs(reference).max(initial=0.0)), 1.0)
+    scale = np.maximum(largest, np.abs(reference).max(initial=0.0, axis=(1, 2), keepdims=True))
+    scale[scale == 0.0] = 1.0
     a, b = positions / scale, reference / scale
-    a = a - a.mean(axis=1, keepdims=True)
-    b = b - b.mean(axis=1, keepdims=True)
-    u, _, vt = np.linalg.svd(a.transpose(0, 2, 1) @ b)
+    weights = masses / masses.sum()
+    a, b = (q - np.einsum("n,fna->fa", weights, q)[:, None] for q in (a, b))
+    u, _, vt = np.linalg.svd((weights[:, None] * a).transpose(0, 2, 1) @ b)
     u[..., -1] *= np.sign(np.linalg.det(u @ vt))[:, None]
     return a @ (u @ vt) - b, scale[:, 0, 0]
 
 
-def shape_differences(positions: np.ndarray, reference: np.ndarray) -> np.ndarray:
-    """Return norms (F,) m of two runs' differences in each frame after the best rigid motion.
-
-    ``positions`` and ``reference`` are (F, N, 3) m, finite.
-    """
-    residuals, scale = shape_residuals(positions, reference)
-    return np.linalg.norm(residuals, axis=(1, 2)) * scale
+BLOCK = 32  # frames that are compared at a time, so that the memory used does not grow with the run
 
 
-def deformation(positions: np.ndarray, reference: np.ndarray, masses: np.ndarray) -> float:
-    """Return how far two runs differ in shape, m sqrt(kg): the root of the sum of D_f^2.
+def shape_differences(
+    positions: np.ndarray, reference: np.ndarray, masses: np.ndarray
+) -> np.ndarray:
+    """Return how far two runs differ in shape in each frame, as norms (F,) m.
 
-    D_f(a, b)^2 is the least sum over the vertices of m_i |R a_i + t - b_i|^2, R a rotation, never a
-    reflection (Kabsch 1976), t a translation, in frame f of F.
+    D_f(a, b)^2 is the least sum over the vertices of m_i / m |R a_i + t - b_i|^2, R a rotation, t a
+    translation, m the mean mass: of equal masses, the norm of all differences.
 
     Parameters
     ----------
@@ -77,20 +77,25 @@ def deformation(positions: np.ndarray, reference: np.ndarray, masses: np.ndarray
     reference : (F, N, 3) m, b
     masses : (N,) kg
     """
-    scale = max(
-        float(np.abs(positions).max(initial=0.0)), float(np.abs(reference).max(initial=0.0))
-    )
-    if scale == 0.0 or not np.isfinite(scale):
-        return scale
-    weights, root = masses / masses.sum(), np.sqrt(masses / masses.sum())[:, None]
-    total = 0.0
-    for a, b in zip(np.broadcast_to(positions, reference.shape), reference, strict=True):
-        a, b = a / scale, b / scale
-        a, b = root * (a - weights @ a), root * (b - weights @ b)
-        u, _, vt = np.linalg.svd(a.T @ b)
-        u[:, -1] *= np.sign(np.linalg.det(u @ vt))
-        total += float(np.sum((a @ (u @ vt) - b) ** 2))
-    return scale * float(np.sqrt(total * masses.sum()))
+    positions, root = np.broadcast_to(positions, reference.shape), np.sqrt(masses / masses.mean())
+    norms = [np.zeros(0)]
+    for start in range(0, len(reference), BLOCK):
+        block = slice(start, start + BLOCK)
+        residuals, scale = shape_residuals(positions[block], reference[block], masses)
+        norms.append(np.linalg.norm(residuals * root[:, None], axis=(1, 2)) * scale)
+    return np.concatenate(norms)
+
+
+def affine_residuals(rest: np.ndarray, reference: np.ndarray, masses: np.ndarray) -> np.ndarray:
+    """Return norms (F,) m as `shape_differences`, from the best affine image of the shape ``rest``.
+
+    ``rest`` is (N, 3) m, ``reference`` (F, N, 3) m, ``masses`` (N,) kg.
+    """
+    root = np.sqrt(masses / masses.mean())[:, None]
+    q, sigma, _ = np.linalg.svd(root * np.c_[rest, np.ones(len(rest))], full_matrices=False)
+    q = q[:, sigma > 1e-12 * sigma[0]]
+    weighted = root * reference
+    return np.linalg.norm(weighted - q @ (q.T @ weighted), axis=(1, 2))
 
 
 RIGID = 1e-3  # a body whose deformation is below this fraction of its size counts as rigid
@@ -111,12 +116,31 @@ def deformation_error(
     rest : (N, 3) m, the rest shape
     masses : (N,) kg
     """
+    difference = shape_differences(positions, reference, masses)
+    deformed = shape_differences(rest, reference, masses)
+    return relative_deformation(difference, deformed, rest_size(rest, masses))
+
+
+def rest_size(rest: np.ndarray, masses: np.ndarray) -> float:
+    """Norm, m, of the distances of the vertices at ``rest`` (N, 3) m from their centre of mass.
+
+    They are weighted by ``masses`` (N,) kg over their mean.
+    """
     centred = rest - masses @ rest / masses.sum()
-    size = float(np.sqrt(len(reference) * np.sum(masses[:, None] * centred**2)))
-    deformed = deformation(rest, reference, masses)
-    if not deformed > RIGID * size:
+    return float(np.linalg.norm(np.sqrt(masses / masses.mean())[:, None] * centred))
+
+
+def relative_deformation(difference: np.ndarray, deformed: np.ndarray, size: float) -> float | None:
+    """Return `deformation_error` from the norms (F,) m of both runs' differences in shape.
+
+    ``deformed`` (F,) m are the norms for the rest shape in place of the run, ``size`` m is its
+    `rest_size`.
+    """
+    whole = float(np.linalg.norm(deformed))
+    if not whole > RIGID * size * np.sqrt(len(deformed)):
         return None
-    return deformation(positions, reference, masses) / deformed
+    with np.errstate(over="ignore"):
+        return float(np.linalg.norm(difference / whole))
 
 
 def trajectory_error(difference: np.ndarray, displacement: np.ndarray) -> float | None:

@@ -43,7 +43,8 @@ def followed(loop: Stepper, state: State, frames: int) -> np.ndarray:
 class ConvergedStepper(Stepper):
     """Full-order step loop that minimises the objective of every frame up to a tolerance.
 
-    ``changes`` and ``evaluations`` list these fields of `Minimum` for the frames computed so far.
+    ``changes`` and ``evaluations`` list these fields of `Minimum` for the frames computed so far;
+    ``converged`` says whether each reached the ``tolerance``, m, that held in it.
     A minimisation starts from the positions that inertia predicts or, if ``from_last``, from those
     at the beginning of the frame; it may find another minimum then.
     """
@@ -59,14 +60,9 @@ class ConvergedStepper(Stepper):
         super().__init__(scene.space(system), scene.config.time_step, limit, scene.groups)
         self.space: VertexSpace
         self._from_last = from_last
-        self._tolerance = tolerance * scene.mesh.extent
+        self.tolerance, self.converged = tolerance * scene.mesh.extent, True
         self.changes: list[float] = []
         self.evaluations: list[int] = []
-
-    @property
-    def converged(self) -> bool:
-        """Whether every frame computed so far reached the tolerance."""
-        return not np.greater(self.changes, self._tolerance).any()
 
     def step(
         self, state: State, frame: int, on_last_iterate: Callable[[np.ndarray], None] | None = None
@@ -91,9 +87,10 @@ class ConvergedStepper(Stepper):
             evaluate,
             self.space.system.matrix,
             first,
-            tolerance=self._tolerance,
+            tolerance=self.tolerance,
             limit=self.iterations,
         )
+        self.converged &= end.change <= self.tolerance
         self.changes.append(end.change)
         self.evaluations.append(end.evaluations)
         after, seconds = self._finish(state, end.y, frame, anchors), np.zeros(len(PHASES))

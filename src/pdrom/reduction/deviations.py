@@ -13,23 +13,31 @@ import numpy as np
 
 from pdrom.model.dynamics.stepper import State, Stepper
 from pdrom.model.energy import STRIDE, EnergyScale
-from pdrom.model.metrics import shape_differences, trajectory_error
+from pdrom.model.metrics import (
+    BLOCK,
+    relative_deformation,
+    rest_size,
+    shape_differences,
+    trajectory_error,
+)
 from pdrom.model.runs import BLOWUP_EXTENT
 from pdrom.model.scene import Scene
 from pdrom.reduction.rerun import Rerun, displacement_norms, rerun, step_norms
 
-# Number of frames compared at a time, so that the memory used does not grow with the run.
-BLOCK = 32
 # A vertex touches an obstacle if it is closer than this fraction of the mesh's longest side, since
 # a subspace model does not place vertices exactly on the surface.
 TOUCH = 1e-3
 
 # Names of series over frames: of a full-order run; of another run, or its difference from it.
-REFERENCE = ("displacement", "step", "energy", "contact")
-DEVIATIONS = ("difference", "shape_difference", "step_difference", "energy", "contact")
+CONVERGED = ("displacement_converged", "deformed_converged")
+REFERENCE = ("displacement", "deformed", "step", "energy", "contact", *CONVERGED)
+DEVIATIONS = (
+    "difference", "shape_difference", "step_difference", "energy", "contact",
+    "difference_converged", "shape_difference_converged",
+)  # fmt: skip
 ERRORS = (
-    "relative_error_within_horizon", "error_over_extent", "shape_error", "relative_shape_error",
-    "velocity_error", "energy_drift", "contact_delay",
+    "relative_error_within_horizon", "deformation_error", "error_over_extent", "shape_error",
+    "velocity_error", "energy_drift", "contact_delay", "error_converged", "deformation_converged",
 )  # fmt: skip
 Series = Mapping[str, np.ndarray]
 
@@ -47,15 +55,24 @@ class Yardstick:
 
     scene : scene of the full-order run
     reference : (F + 1, N, 3) m, positions of the full-order run; entry 0 is the initial state
+    converged : the same of a run whose frames have converged, to compare with it as well
     """
 
-    def __init__(self, scene: Scene, reference: np.ndarray) -> None:
+    def __init__(
+        self, scene: Scene, reference: np.ndarray, converged: np.ndarray | None = None
+    ) -> None:
         self.scene, self.reference = scene, reference
+        self.converged = None if converged is None else Yardstick(scene, converged)
 
     @cached_property
     def displacement(self) -> np.ndarray:
         """Frobenius norm (F,) m of the displacements from the initial state in each frame."""
         return displacement_norms(self.reference)
+
+    @cached_property
+    def deformed(self) -> np.ndarray:
+        """Norm (F,) m of the difference in shape from the rest shape in each frame."""
+        return shape_differences(self.scene.mesh.points, self.reference[1:], self.scene.masses)
 
     @cached_property
     def scale(self) -> EnergyScale:
@@ -66,15 +83,21 @@ class Yardstick:
     def series(self) -> dict[str, np.ndarray]:
         """Per-frame series of the full-order run for the argument ``reference`` of `errors_within`.
 
-        ``displacement`` (F,) m; ``step`` (F,) m, norm of time step times velocities; ``energy`` in
-        every `STRIDE`-th frame and the last, scaled by `scale`; ``contact`` (F,), 1 at contact.
+        ``displacement`` and ``deformed`` (F,) m; ``step`` (F,) m, norm of time step times
+        velocities; ``energy`` in every `STRIDE`-th frame and the last, scaled by `scale`;
+        ``contact`` (F,), 1 at contact; `CONVERGED`: the first two of the converged run, empty
+        without it.
         """
+        limit = self.converged
+        others = [np.zeros(0)] * 2 if limit is None else [limit.displacement, limit.deformed]
         blocks = [q for q, _ in _blocks(self.reference, self.reference)]
         return {
             "displacement": self.displacement,
+            "deformed": self.deformed,
             "step": np.concatenate([step_norms(q) for q in blocks]),
             "energy": self.scale.own,
             "contact": np.concatenate([self._touched(q[1:]) for q in blocks]),
+            **dict(zip(CONVERGED, others, strict=True)),
         }
 
     def run(self, model: Reduced, offset: np.ndarray | None = None) -> Rerun:
@@ -102,13 +125,36 @@ class Yardstick:
 
     @property
     def units(self) -> dict[str, float]:
-        """Extent norm, m, and time step, s: keyword arguments of `errors_within`.
+        """Extent norm and `rest_size`, m, and time step, s: keyword arguments of `errors_within`.
 
         The extent norm is the Frobenius norm of a shift of all N vertices by the mesh's longest
         side: sqrt(N) times that side.
         """
-        norm = self.scene.mesh.extent * float(np.sqrt(self.reference.shape[1]))
-        return {"extent_norm": norm, "time_step": self.scene.config.time_step}
+        mesh, step = self.scene.mesh, self.scene.config.time_step
+        size = rest_size(mesh.points, self.scene.masses)
+        norm = mesh.extent * float(np.sqrt(mesh.vertices))
+        return {"extent_norm": norm, "rest_norm": size, "time_step": step}
+
+    def errors(self, positions: np.ndarray, end: int) -> tuple[float | None, float | None]:
+        """Position and deformation error of ``positions`` (F' + 1, N, 3) m before frame ``end``.
+
+        Both are None if the run ended earlier.
+        """
+        if len(positions) <= end:
+            return None, None
+        difference, shapes = self.differences(positions[: end + 1])
+        size = self.units["rest_norm"]
+        return (
+            trajectory_error(difference, self.displacement[:end]),
+            relative_deformation(shapes, self.deformed[:end], size),
+        )
+
+    def differences(self, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Norms (F',) m of differences in position and shape; ``positions`` (F' + 1, N, 3) m."""
+        blocks, masses = _blocks(positions, self.reference), self.scene.masses
+        apart = [np.linalg.norm((q - p)[1:], axis=(1, 2)) for q, p in blocks]
+        shapes = [shape_differences(q[1:], p[1:], masses) for q, p in blocks]
+        return np.concatenate(apart), np.concatenate(shapes)
 
     def deviations(self, outcome: Rerun) -> dict[str, np.ndarray]:
         """Deviations in each of the F' frames of the run ``outcome`` from the full-order run.
@@ -116,20 +162,23 @@ class Yardstick:
         ``difference``, ``shape_difference`` (without rigid motion), ``step_difference`` (of changes
         of the positions in a frame): (F',) m, norms of the differences of both runs. Two series are
         of ``outcome`` alone: ``energy``, every `STRIDE`-th frame and its last, scaled by `scale`
-        (empty if the full order's is round-off); ``contact`` (F',), 1 where a vertex touches.
+        (empty if the full order's is round-off); ``contact`` (F',), 1 where a vertex touches. The
+        first two are also given from the converged run (empty without it).
         """
-        steps, shapes, contacts = [], [], []
+        steps, contacts, limit = [], [], self.converged
         with np.errstate(over="ignore", invalid="ignore"):
             for q, p in _blocks(outcome.positions, self.reference):
                 steps.append(step_norms(q - p))
-                shapes.append(shape_differences(q[1:], p[1:]))
                 contacts.append(self._touched(q[1:]))
+            shapes = self.differences(outcome.positions)[1]
+            others = limit.differences(outcome.positions) if limit else (np.zeros(0), np.zeros(0))
         return {
             "difference": outcome.difference,
-            "shape_difference": np.concatenate(shapes),
+            "shape_difference": shapes,
             "step_difference": np.concatenate(steps),
             "energy": self.scale.relative(outcome.positions),
             "contact": np.concatenate(contacts),
+            **dict(zip(DEVIATIONS[-2:], others, strict=True)),
         }
 
     def _touched(self, positions: np.ndarray) -> np.ndarray:
@@ -147,7 +196,12 @@ class Yardstick:
 
 
 def errors_within(
-    run: Series, reference: Series, end: int, extent_norm: float, time_step: float
+    run: Series,
+    reference: Series,
+    end: int,
+    extent_norm: float,
+    rest_norm: float,
+    time_step: float,
 ) -> dict[str, float | None]:
     """Return a mapping of column names to the errors over the frames before number ``end``.
 
@@ -156,7 +210,7 @@ def errors_within(
     Parameters
     ----------
     run, reference : per-frame series from `Yardstick.deviations` and `Yardstick.series`
-    extent_norm, time_step : norm of a shift by the mesh's longest side, m, and time step, s
+    extent_norm, rest_norm, time_step : as `Yardstick.units`
     """
     if len(run["difference"]) < end:
         return dict.fromkeys(ERRORS)
@@ -177,12 +231,18 @@ def errors_within(
 
     found = (
         error_within(run["difference"], displacement, end),
+        relative_deformation(shape[:end], reference["deformed"][:end], rest_norm),
         over_extent(run["difference"]),
         over_extent(shape),
-        error_within(shape, displacement, end),
         error_within(run["step_difference"], reference["step"], end),
         drift,
         None if first == wanted == np.inf else time_step * (first - wanted),
+        error_within(run["difference_converged"], reference["displacement_converged"], end),
+        relative_deformation(
+            run["shape_difference_converged"][:end],
+            reference["deformed_converged"][:end],
+            rest_norm,
+        ),
     )
     return dict(zip(ERRORS, found, strict=True))
 

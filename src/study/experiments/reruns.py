@@ -32,6 +32,7 @@ from study.artifact.reads import Every, Setting, Settings
 from study.experiments.kit import base as kit
 from study.experiments.kit import runfiles
 from study.experiments.kit.base import experiment
+from study.experiments.references import converged_positions
 
 log = logging.getLogger(__name__)
 
@@ -67,6 +68,7 @@ class Options(ConfigModel):
         "mesh": paths.MESH,
         "fom": paths.TRAIN,
         "motions": Every(paths.FULL_ORDER),
+        "converged": Every(paths.CONVERGED),
         "snapshots": paths.SNAPSHOTS,
         "basis": paths.BASIS,
         "settings": Settings(Options),
@@ -79,7 +81,7 @@ class Options(ConfigModel):
         "heldout_table": paths.RERUNS_HELDOUT,
     },
 )
-def reruns(motions: list[File], settings: Options, **files: File) -> None:
+def reruns(motions: list[File], converged: list[File], settings: Options, **files: File) -> None:
     """Sample a constraint group; run training and held-out motions with it reduced to every size r.
 
     One job does the sampling and the runs, as sampling takes less time than starting a process.
@@ -88,10 +90,10 @@ def reruns(motions: list[File], settings: Options, **files: File) -> None:
     _sample(space, data, settings, files["sampling"], files["errors"])
     found = {}
     with write_hdf5(files["runs"].path) as file:
-        for run in motions:
+        for run, limit in zip(motions, converged, strict=True):
             motion = run["run"]
             scene = kit.scene_of(settings.scene, files["mesh"], motion)
-            yardstick = Yardstick(scene, kit.positions_of(run))
+            yardstick = Yardstick(scene, kit.positions_of(run), converged_positions(limit))
             file.attrs.update(yardstick.units)
             store = file if motion == kit.TRAIN else file.create_group(motion)
             for name, values in yardstick.series.items():

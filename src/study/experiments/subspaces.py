@@ -37,6 +37,7 @@ from study.artifact.reads import EachOf, Every, Setting, Settings, SourcesOf
 from study.experiments.kit import base as kit
 from study.experiments.kit import runfiles
 from study.experiments.kit.base import experiment
+from study.experiments.references import converged_positions
 
 log = logging.getLogger(__name__)
 
@@ -45,10 +46,11 @@ _RUN = [
     "max_extent", "training_residual", "relative_error",
 ]  # fmt: skip
 COLUMNS = [*_RUN, "energy_ratio"]
-_MADE = [*COLUMNS, "motion", "playback_error", "tau", "reduction_s"]
+_MADE = [*COLUMNS, "deformation_error", "motion", "playback_error", "tau", "reduction_s"]
 SECONDS_COLUMNS = ["scene", "position_basis", "k", "method", "reduction_s"]
 LARGE_COLUMNS = [
-    *_RUN, "motion", "playback_error", "tau", "vertices", "elements", "iterations", "reduction_s",
+    *_RUN, "deformation_error", "motion", "playback_error", "tau", "vertices", "elements",
+    "iterations", "reduction_s",
 ]  # fmt: skip
 FULL, HRPD = "full", "hrpd"
 
@@ -107,6 +109,7 @@ class Online(LargeModels):
     reads={
         "mesh": paths.MESH,
         "full_order": Every(paths.FULL_ORDER),
+        "converged": Every(paths.CONVERGED),
         "config": Setting("scene"),
         "asked": Setting("subspace"),
     },
@@ -118,14 +121,20 @@ class Online(LargeModels):
     },
 )
 def subspaces(
-    full_order: list[File], config: SceneConfig, asked: SubspaceModels, **files: File
+    full_order: list[File],
+    converged: list[File],
+    config: SceneConfig,
+    asked: SubspaceModels,
+    **files: File,
 ) -> None:
     """Build a model for every basis, size and sampling, and run all motions with each."""
     motions = {
         run["run"]: Yardstick(
-            kit.scene_of(config, files["mesh"], run["run"]), kit.positions_of(run)
+            kit.scene_of(config, files["mesh"], run["run"]),
+            kit.positions_of(run),
+            converged_positions(limit),
         )
-        for run in full_order
+        for run, limit in zip(full_order, converged, strict=True)
     }
     with write_hdf5(files["out"].path) as file:
         for name, motion in motions.items():
@@ -204,6 +213,9 @@ def _runs(
                 series = {"coordinates": outcome.coordinates, "extent": outcome.extent, **seen}
                 for key, values in series.items():
                     store[f"{name}/{key}"] = values
+            else:
+                end = motion.scene.config.frames
+                row["deformation_error"] = motion.errors(outcome.positions, end)[1]
             rows.append(row)
             log.info("%s %s, %s: error %s", base, labels["method"], name, row["relative_error"])
     order = list(motions)

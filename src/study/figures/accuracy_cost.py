@@ -14,14 +14,13 @@ from study.experiments.alternatives.experiment import REDUCTIONS
 from study.experiments.kit.base import ANDERSON, FOM
 from study.figures.kit.declaration import Drawn, NothingToDraw, figure
 from study.figures.kit.multiples import label_outer, rows_of, small_multiples, time_axis
-from study.tables.accuracy_cost import FEWER, pareto
+from study.tables.accuracy_cost import pareto
 
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "*")
 ERROR, TIME = "relative_error_within_horizon", "ms_per_frame"
 LOW, HIGH = 1e-3, 1e2  # limits of the error axis; errors outside are arrows at the limits
 ABOVE, BELOW, BLOWN_UP = 6, 7, "x"  # Matplotlib markers: error above axis, below it, blow-up
 OWN = {"color": style.GREY, "linewidth": 1.2}
-BLIND = {"color": style.FAILED, "linewidth": 0.9, "linestyle": "-."}
 RATES = (60, 30)  # frame rates of real time, 1/s, drawn as lines
 LARGE, SMALL = 2.6, 1.6  # heights of the large and of the small panels, inches
 LINE, GAP = 0.145, 0.06  # height of a legend line, gap between rows of legend blocks, inches
@@ -29,7 +28,7 @@ NEAR = 0.05  # markers closer in x than this fraction of the x axis share a labe
 COLUMNS = 4  # number of legend blocks in a row
 # Families of reduced models and of full-order runs, each with its colour.
 FAMILIES = {
-    "full order, fewer iterations": style.BLACK,
+    "full order, K iterations": style.BLACK,
     "orthogonal projection": style.PURPLE,
     "single entries, joint rows": style.VERMILLION,
     "whole elements": style.BLUE,
@@ -44,7 +43,7 @@ Block = tuple[str, list[Line2D]]
 
 def look_of(method: str, position_basis: str, drawn: Drawn) -> Look:
     """Family of a model (see `FAMILIES`; None if it is not drawn), and its legend entry."""
-    if method == FEWER:
+    if method == FOM:
         return ITERATIONS, "K iterations"
     if position_basis == "full":
         held = drawn.reductions.get(method)
@@ -69,17 +68,15 @@ class TradeOffs:
 
     The "own" full-order run of a scene has as many iterations as the scene's configuration sets.
 
-    points : rows of table accuracy_cost; errors are against the scene's own full-order run
+    points : rows of table accuracy_cost; errors are against the converged run
     blown_up : reduced runs that blew up before an error could be computed
     own_ms : scene -> time per frame of its own full-order run, ms
-    own_error : scene -> error of its own full-order run against one iterated to convergence
     marker : (name in `FAMILIES`, legend entry) -> Matplotlib marker
     """
 
     points: pd.DataFrame
     blown_up: pd.DataFrame
     own_ms: dict[str, float]
-    own_error: dict[str, float]
     marker: dict[Look, str]
 
     def members(self, family: str) -> dict[str, str]:
@@ -97,15 +94,13 @@ def trade_offs(
     table = table.dropna(subset=[ERROR, TIME])
     own = (table.method == "full") & (table.position_basis == "full")
     full = table[own].set_index("scene")
-    fom = table[table.method == FOM].set_index(["scene", "iterations"])[ERROR]
-    errors = {s: float(fom[s, k]) for s, k in full.iterations.items() if (s, k) in fom}
-    shown = (table[TIME] > 0.0) & ~own & ~table.method.isin([FOM, ANDERSON])
+    shown = (table[TIME] > 0.0) & ~own & (table.method != ANDERSON)
     points = _drawn(table[shown], drawn)
     blown_up = runs[(runs.blowup_frame >= 0) & runs[ERROR].isna() & (runs[TIME] > 0.0)]
     scenes = drawn.scenes_of(points, "no reduced model with both an error and a time")
     points = points[points.scene.isin(scenes)]
     marker = markers(list(zip(points.family, points.member, strict=True)))
-    found = TradeOffs(points, _drawn(blown_up, drawn), dict(full[TIME]), errors, marker)
+    found = TradeOffs(points, _drawn(blown_up, drawn), dict(full[TIME]), marker)
     return found, scenes
 
 
@@ -147,8 +142,6 @@ def draw_panel(ax: Axes, found: TradeOffs, scene: str, size: float = 3.0) -> Non
     time_axis(ax, np.asarray(times, dtype=float))
     if scene in found.own_ms:
         ax.axvline(found.own_ms[scene], zorder=0, **OWN)
-    if scene in found.own_error:
-        ax.axhline(np.clip(found.own_error[scene], LOW, HIGH), zorder=0, **BLIND)
 
 
 def _points(ax: Axes, rows: pd.DataFrame, size: float, colour: str, **look: Any) -> None:
@@ -164,7 +157,7 @@ def _points(ax: Axes, rows: pd.DataFrame, size: float, colour: str, **look: Any)
 
 def label_iterations(ax: Axes, found: TradeOffs, scene: str) -> None:
     """Write "K = ..." beside full-order runs of ``scene``; neighbouring runs share a label."""
-    rows = found.points[(found.points.scene == scene) & (found.points.method == FEWER)]
+    rows = found.points[(found.points.scene == scene) & (found.points.method == FOM)]
     rows = rows.sort_values(TIME)
     low, high = np.log10(ax.get_xlim())
     groups: list[list[tuple[float, float, float]]] = []
@@ -185,8 +178,7 @@ def handles(found: TradeOffs) -> list[Block]:
     entries = [
         ("full order", [
             style.handle("K iterations", color=FAMILIES[ITERATIONS], marker="X", **common),
-            style.handle("its time", **OWN),
-            style.handle("its own error", **BLIND),
+            style.handle("time with the scene's K", **OWN),
         ]),
     ]  # fmt: skip
     for family, colour in FAMILIES.items():
@@ -205,12 +197,11 @@ def handles(found: TradeOffs) -> list[Block]:
     timed=True,
 )
 def accuracy_cost(drawn: Drawn, table: pd.DataFrame, runs: pd.DataFrame) -> Figure:
-    """Error within the horizon against the time per frame of every reduced model, and of the
-    full-order run with fewer iterations $K$; both against the scene's own full-order run, whose
-    time is the vertical line. A colour is a family of models, a marker one of its members (one for
-    all tolerances; hollow: in a subspace of skinning weights), a line the best trade-offs within
-    the family: further down and further left is better. The horizontal line is the full-order run's
-    own error, against the converged one: errors below it cannot be seen. Arrows on the rim are
+    """Position error within the horizon, against the converged run, and time per frame of every
+    reduced model and of the full-order run with $K$ iterations. The vertical line is the time of
+    the scene's own number of iterations. A colour is a family of models, a marker one of its
+    members (one for all tolerances; hollow: in a subspace of skinning weights), a line the best
+    trade-offs within the family: further down and further left is better. Arrows on the rim are
     errors outside the axis, crosses runs that blew up. Below, a scene for each other constraint
     group.
     """

@@ -22,8 +22,9 @@ from study.artifact import paths
 from study.experiments.alternatives.experiment import Alternatives
 from study.experiments.frame_times import FrameTimes
 from study.experiments.hard_cases.outcomes import HardCases
-from study.experiments.iterations import IterationSweep
+from study.experiments.iterations import IterationCounts
 from study.experiments.kit.base import Rank
+from study.experiments.references import Reference
 from study.experiments.repetitions import LadderSection, Noise, RepetitionSection
 from study.experiments.reruns import Stability
 from study.experiments.sensitivity import Sensitivity
@@ -48,7 +49,8 @@ class StudySettings(ConfigModel):
     replicate: scene_kit.Replicate = scene_kit.Replicate()
     claim_sets: dict[str, tuple[SceneName, ...]] = Field(default_factory=dict)
     sensitivity: Sensitivity = Sensitivity()
-    iterations: IterationSweep = IterationSweep()
+    reference: Reference = Reference()
+    iterations: IterationCounts = IterationCounts()
     timing: Timing = Timing()
     frame_times: FrameTimes = FrameTimes()
     subspace: Subspace = Subspace()

@@ -198,7 +198,7 @@ def _numbers(study: Study) -> dict[str, Any]:
         "ranks": ", ".join(str(r) for r in settings.ranks),
         "wrong": settings.stability.wrong,
         "left": settings.stability.left,
-        "tolerance": settings.iterations.tolerance,
+        "tolerance": settings.reference.tolerance,
         "continuous_tolerance": CONTINUOUS_TOLERANCE,
         "opponent_frames": settings.alternatives.frames,
         "opponent_processes": settings.alternatives.processes,

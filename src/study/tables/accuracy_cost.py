@@ -1,15 +1,11 @@
 """Tables of error and time: each method and size, where reductions save time.
 
-Errors are taken against one of two reference runs; only rows with the same one are comparable. For
-``fom`` and ``fom-anderson``, the reference is a full-order run with converged frames (K -> infinity
-local/global iterations), for all other methods the scene's own full-order run with its finite K.
-
-Among the other methods, ``full`` without a position subspace is the scene's own full-order run,
-with error zero by definition. ``fewer-iterations`` is the full-order run with fewer iterations,
-which a reduction must beat. ``fom-anderson`` is a full-order run with Anderson acceleration.
+Errors are taken against the run with converged frames (K -> infinity local/global iterations).
+Method ``full`` without a position subspace is the full-order run with the scene's own K, ``fom``
+one with another K, ``fom-anderson`` one with Anderson acceleration.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 import pandas as pd
@@ -19,11 +15,24 @@ from study.artifact.reads import Every, Setting, TableOf
 from study.experiments.kit.base import ANDERSON, FOM
 from study.tables.kit import results
 from study.tables.kit.declaration import count, flag, integer, number, shared, table, timed
-from study.tables.kit.results import FAILED, joined, trained, with_held_out
+from study.tables.kit.results import (
+    CONVERGED,
+    DEFORMATION,
+    ERROR,
+    FAILED,
+    MEASURE,
+    MEASURES,
+    OWN_ERRORS,
+    REFERENCE,
+    against_converged,
+    joined,
+    judged_by,
+    trained,
+    with_held_out,
+)
 
 FEWER = "fewer-iterations"
-_MODEL = ["scene", "position_basis", "k", "method"]
-_POINT = ["relative_error_within_horizon", "ms_per_frame"]
+_POINT = [ERROR, "ms_per_frame"]
 
 
 @table(
@@ -32,23 +41,18 @@ _POINT = ["relative_error_within_horizon", "ms_per_frame"]
     columns=(
         *shared("scene group method position_basis k r"),
         integer("iterations", "local/global iterations of a frame"),
-        *shared("relative_error_within_horizon ms_per_frame"),
-        timed(flag("pareto", "no point of the same reference is as good in both, better in one")),
-        number(
-            "error_converged",
-            "error against the run of converged frames: of the full order, whose error before "
-            "the horizon may have another reference, and in position subspaces",
-            tolerance=0.05,
-        ),
+        *shared("relative_error_within_horizon deformation_error ms_per_frame"),
+        timed(flag("pareto", "no point of the scene is as good in error and time, better in one")),
+        REFERENCE,
+        *shared("reference_error reference_deformation_error"),
         *results.COLUMNS,
-        *shared("velocity_error relative_shape_error energy_drift"),
+        *shared("velocity_error energy_drift"),
     ),
     reads={
         "reruns": TableOf("reduced_reruns"),
         "timings": Every(paths.TIMINGS),
         "frame_times": TableOf("frame_times"),
         "sweeps": Every(paths.ITERATIONS),
-        "models": Every(paths.SUBSPACES_CONVERGED),
         "iterations": Setting("scene_iterations"),
     },
 )
@@ -60,44 +64,33 @@ def accuracy_cost(
 ) -> pd.DataFrame:
     """One row for each full-order run, and for each reduced run with a time and an error.
 
-    The column ``pareto`` compares rows of the same scene whose errors have the same reference.
+    Velocities and energies are compared with the full-order run of the scene's own iterations.
     """
     times = results.timings_in_one_time(files["timings"], frame_times)
-    times = times[times.implementation == "compiled"]
-    full = times[times.method.isna()].copy()
-    full = full.assign(method="full", position_basis="full", relative_error_within_horizon=0.0)
-    sweep = _sweep(results.joined(files["sweeps"]), times)
-    points = results.trained(reruns).dropna(subset=_POINT)
-    points = results.with_held_out(points.assign(iterations=points.scene.map(iterations)), reruns)
-    known = results.joined(files["models"]).reindex(columns=[*_MODEL, "error_converged"])
-    known = known.astype({"k": "Int64"})
-    points = points.merge(known, on=_MODEL, how="left")
-    own = sweep[sweep.method == FOM].set_index(["scene", "iterations"]).error_converged
-    full["error_converged"] = [own.get((scene, iterations[scene]), np.nan) for scene in full.scene]
-    parts = [full.assign(iterations=full.scene.map(iterations)), points, sweep]
-    points = pd.concat([part for part in parts if len(part)], ignore_index=True)
-    against_converged = points.method.isin([FOM, ANDERSON])
-    for _, rows in points.groupby(["scene", against_converged], sort=False):
+    sweep = _sweep(joined(files["sweeps"]), times[times.implementation == "compiled"])
+    own = sweep[(sweep.method == FOM) & (sweep.iterations == sweep.scene.map(iterations))]
+    reduced = against_converged(reruns)
+    points = trained(reduced).dropna(subset=_POINT)
+    points = with_held_out(points.assign(iterations=points.scene.map(iterations)), reduced)
+    known = trained(reruns).drop_duplicates("scene")[["scene", *OWN_ERRORS]]
+    own, sweep = (full.merge(known, "left", "scene") for full in (own.assign(method="full"), sweep))
+    parts = [part for part in (own, points, sweep) if len(part)]
+    points = pd.concat(parts, ignore_index=True)
+    for _, rows in points.groupby("scene", sort=False):
         points.loc[rows.index, "pareto"] = pareto(*rows[_POINT].to_numpy(float).T)
     order = points.scene.map({scene: i for i, scene in enumerate(iterations)})
-    return points.iloc[np.argsort(order, kind="stable")]
+    return points.iloc[np.argsort(order, kind="stable")].assign(reference=CONVERGED)
 
 
 def _sweep(errors: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
-    """Full-order runs; those of `FOM` with fewer iterations than the scene's also as `FEWER`."""
+    """Rows of full-order runs with each number of iterations, that of the scene among them."""
     full = times[times.method.isna() | times.method.isin([FOM, ANDERSON])]
     cost = full[["scene", "method", "iterations", "ms_per_frame"]]
     cost = cost.fillna({"method": FOM})
-    errors = errors.dropna(subset=["iterations"])
     errors["method"] = (errors.window > 0).map({True: ANDERSON, False: FOM})
-    errors = errors.merge(cost, on=["scene", "method", "iterations"])
-    own = full[full.method.isna()].set_index("scene").iterations
-    early = (errors.iterations < errors.scene.map(own)) & (errors.method == FOM)
-    every = errors.assign(relative_error_within_horizon=errors.error_converged)
-    fewer = errors[early].assign(method=FEWER, relative_error_within_horizon=errors.error_scene)
-    points = pd.concat([every, fewer], ignore_index=True)
-    points = points.assign(position_basis="full", k=None, r=None)
-    return points.dropna(subset=_POINT)
+    errors = errors.rename(columns={"error_converged": ERROR, "deformation_converged": DEFORMATION})
+    points = errors.merge(cost, on=["scene", "method", "iterations"])
+    return points.assign(position_basis="full", k=None, r=None).dropna(subset=_POINT)
 
 
 def pareto(error: Sequence[float], cost: Sequence[float]) -> list[bool]:
@@ -112,7 +105,6 @@ def pareto(error: Sequence[float], cost: Sequence[float]) -> list[bool]:
 CURVE = ["scene", "group", "method", "factor"]
 OWN_MESH = "1"  # value of the column ``factor`` for a scene's configured mesh
 SHARE = 1e-3  # table payoff omits groups with at most this share of all forces in a scene
-_ERROR = "relative_error_within_horizon"
 
 
 @table(
@@ -170,9 +162,10 @@ def break_even(r: Sequence[int], ratio: Sequence[float]) -> int | None:
 @table(
     title="Where reductions pay and where they lose to the full order",
     columns=(
+        MEASURE,
         *shared("position_basis method"),
-        count("scenes", "scenes (and groups) with a timed run"),
-        count("accurate", "those with a run whose error before the horizon is at most a tenth"),
+        count("scenes", "scenes (and groups) with a timed run and a known enough reference"),
+        count("accurate", "those with a run within a tenth of the converged one"),
         timed(integer("pays", "those among them with an accurate run faster than the full order")),
         timed(integer("loses", "those whose accurate runs are all slower")),
         timed(number("best_speedup", "median over them of the fastest accurate run's speed-up")),
@@ -199,25 +192,37 @@ def payoff(reruns: pd.DataFrame, points: pd.DataFrame, effects: pd.DataFrame) ->
     For each scene and group, a size is chosen in the training motion (that of the fastest accurate
     run, or else of the most accurate run) and evaluated on held-out motions. Groups with at most
     `SHARE` of all forces in a scene are left out. The first row is the full order with fewer
-    iterations (from ``points``); as it needs no training, its held-out columns are empty. Speed-ups
-    are relative to the scene's own full-order run.
+    iterations (from ``points``); as it needs no training, its held-out columns are empty. Errors
+    are those against the converged run; motions in which it is not known well enough are left out.
+    Speed-ups are relative to the scene's own full-order run.
     """
     shares = effects.set_index(["scene", "effect"]).force_share
     weak = shares.index[shares <= SHARE]
+    found = []
+    for measure in MEASURES:
+        judged = judged_by(against_converged(reruns), measure, FAILED)
+        fewer = judged_by(_fewer(points), measure, FAILED)
+        found += [{"measure": measure, **row} for row in _summaries(judged, fewer, weak)]
+    return pd.DataFrame(found)
+
+
+def _summaries(
+    reruns: pd.DataFrame, fewer: pd.DataFrame, weak: pd.MultiIndex
+) -> Iterator[dict[str, object]]:
+    """Yield a row for each method in ``fewer`` and ``reruns``, without groups that are ``weak``."""
     runs = trained(reruns)
     runs = runs[runs.speedup.notna() & runs.max_extent.notna()]
     runs = runs[~pd.MultiIndex.from_frame(runs[["scene", "group"]]).isin(weak)]
-    runs = pd.concat([_fewer(points), with_held_out(runs, reruns)], ignore_index=True)
-    rows = []
+    runs = pd.concat([fewer, with_held_out(runs, reruns)], ignore_index=True)
     for (basis, method), own in runs.groupby(["position_basis", "method"], sort=False):
-        accurate = own[own[_ERROR] <= FAILED]
+        accurate = own[own[ERROR] <= FAILED]
         fastest = accurate.sort_values("speedup").groupby(["scene", "group"]).tail(1)
         speed = fastest.speedup.to_numpy(float)
-        best = own.sort_values(_ERROR, kind="stable").groupby(["scene", "group"]).head(1)
+        best = own.sort_values(ERROR, kind="stable").groupby(["scene", "group"]).head(1)
         seen = best[best.error_heldout.notna()]
         # one run per scene and group, accurate or not: medians of all methods cover the same groups
-        every = pd.concat([fastest, best[~(best[_ERROR] <= FAILED)]])
-        rows.append({
+        every = pd.concat([fastest, best[~(best[ERROR] <= FAILED)]])
+        yield {
             "position_basis": basis,
             "method": method,
             "scenes": own.groupby(["scene", "group"]).ngroups,
@@ -227,7 +232,7 @@ def payoff(reruns: pd.DataFrame, points: pd.DataFrame, effects: pd.DataFrame) ->
             "best_speedup": fastest.speedup.median(),
             "least_speedup": fastest.speedup.min(),
             "most_speedup": fastest.speedup.max(),
-            "error_train": every[_ERROR].fillna(np.inf).median(),
+            "error_train": every[ERROR].fillna(np.inf).median(),
             "error_heldout": every.error_heldout.median(),
             "heldout": len(seen),
             "error_heldout_low": every.error_heldout_low.median(),
@@ -235,13 +240,14 @@ def payoff(reruns: pd.DataFrame, points: pd.DataFrame, effects: pd.DataFrame) ->
             "playback_error": every.playback_error.median(),
             "accurate_heldout": int((seen.error_heldout <= FAILED).sum()),
             "pays_heldout": int(np.sum((speed > 1.0) & (fastest.error_heldout <= FAILED))),
-        })  # fmt: skip
-    return pd.DataFrame(rows)
+        }
 
 
 def _fewer(points: pd.DataFrame) -> pd.DataFrame:
-    """Rows `FEWER` of ``points``, with speed-ups over the scene's run with all its iterations."""
+    """Runs of ``points`` with fewer iterations than the scene's, and their speed-ups over it."""
     full = points[(points.method == "full") & (points.position_basis == "full")]
-    fewer = points[points.method == FEWER]
-    speedup = fewer.scene.map(full.set_index("scene").ms_per_frame) / fewer.ms_per_frame
-    return fewer.assign(group="all", speedup=speedup)
+    full = full.set_index("scene")
+    fewer = points[points.method == FOM]
+    fewer = fewer[fewer.iterations < fewer.scene.map(full.iterations)]
+    speedup = fewer.scene.map(full.ms_per_frame) / fewer.ms_per_frame
+    return fewer.assign(group="all", method=FEWER, speedup=speedup)

@@ -193,7 +193,6 @@ def scaling(parts: list[File]) -> pd.DataFrame:
 _MODEL = ["scene", "position_basis", "k", "method"]
 _REDUCTION = ["scene", "group", "method", "r"]
 _LABELS = ["scene", "group", "method", "position_basis", "k", "r"]
-_ERROR = "relative_error_within_horizon"
 # As a control, the full-order run is timed twice. Speed-ups are not shown if the two times differ
 # by more than this factor, which was fixed on 2026-11-22, before any control was measured.
 CONFIRMED = 1.5
@@ -203,6 +202,7 @@ _ERRORS = {
     "error_train": "relative_error_train", results.MEDIAN: "relative_error_heldout",
     results.HIGH: "relative_error_heldout_high",
 }  # fmt: skip
+_TRAIN = {results.ERROR: "error_train", results.DEFORMATION: "deformation_train"}
 _TIMES = ["ms_per_frame", "vertices_ms", "speedup", "speedup_low", "speedup_high"]
 
 
@@ -263,7 +263,9 @@ def frame_times(parts: list[File]) -> pd.DataFrame:
         timed(number("training_s", "time of the training run", "s")),
         timed(number("reduction_s", "processor time of basis and sampling", "s")),
         timed(number("frames_to_break_even", "frames that pay both back; none if never")),
+        results.REFERENCE,
         number("error_train", "of the training motion before the horizon (large: over all)"),
+        number("deformation_train", "deformation error over the same frames"),
         *results.COLUMNS,
     ),
     reads={
@@ -285,14 +287,17 @@ def speedups(times: pd.DataFrame, reruns: pd.DataFrame, **files: list[File]) -> 
         results.joined(files["projections"]).reindex(columns=[*_REDUCTION, "reduction_s"]),
         results.joined(files["subspaces"]).reindex(columns=[*_MODEL, "reduction_s"]),
     ]
-    errors = [_errors(reruns, keys) for keys in (_REDUCTION, _MODEL)]
+    small = results.against_converged(reruns)
+    errors = [_errors(small, keys) for keys in (_REDUCTION, _MODEL)]
     own = results.joined(files["large"])
     if len(own):
         extra.append(own[own.motion == results.TRAIN].reindex(columns=[*_MODEL, "reduction_s"]))
         errors.append(large_errors(own))
     made = _first_known(made, extra, "reduction_s")
-    for column in ("error_train", *(column.name for column in results.COLUMNS)):
+    for column in (*_TRAIN.values(), *(column.name for column in results.COLUMNS)):
         made = _first_known(made, errors, column)
+    large = ~made.scene.isin(reruns.scene)
+    made["reference"] = large.map({True: results.ITERATIONS, False: results.CONVERGED})
     made["training_s"] = 1e-3 * made.full_ms * made.frames
     saved = made.full_ms - made.ms_per_frame
     paid = 1e3 * (made.training_s + made.reduction_s) / saved
@@ -343,14 +348,14 @@ def unreliable(times: pd.DataFrame) -> bool:
 
 def _errors(reruns: pd.DataFrame, keys: list[str]) -> pd.DataFrame:
     runs = reruns[(reruns.position_basis != "full") == (keys == _MODEL)]
-    train = results.trained(runs)[[*keys, _ERROR]].rename(columns={_ERROR: "error_train"})
+    train = results.trained(runs)[[*keys, *_TRAIN]].rename(columns=_TRAIN)
     sizes = {key: "Int64" for key in keys if key in ("k", "r")}
     return train.astype(sizes).merge(results.over_motions(runs, keys), on=keys, how="outer")
 
 
 def large_errors(large: pd.DataFrame) -> pd.DataFrame:
     """Errors over all frames, per model: on the training motion; median, range on held-out ones."""
-    whole = large.rename(columns={"relative_error": _ERROR}).assign(horizon_frame=1)
+    whole = large.rename(columns={"relative_error": results.ERROR}).assign(horizon_frame=1)
     return _errors(whole, _MODEL)
 
 
@@ -374,7 +379,9 @@ def _first_known(made: pd.DataFrame, sources: list[pd.DataFrame], column: str) -
         *shared("position_basis k"),
         number("tau", "tolerance of the element sampling", compared="exact"),
         *shared("elements_sampled training_residual"),
+        results.REFERENCE,
         number("relative_error_train", "error of the positions in the training motion"),
+        number("deformation_train", "deformation error there"),
         number("relative_error_heldout", "the same in held-out motions: their median"),
         number("relative_error_heldout_high", "the largest"),
         *results.COLUMNS[3:],
@@ -395,6 +402,7 @@ def online(parts: list[File], measured: list[File], times: pd.DataFrame) -> pd.D
         return rows
     found = pd.DataFrame(list(timed_reductions(results.joined(measured), times)))
     made = rows[rows.motion == results.TRAIN].rename(columns={"r": "elements_sampled"})
+    made = made.assign(reference=results.ITERATIONS)
     made = made.drop(columns="playback_error")  # zero, as playback repeats the training motion
     made = made.merge(large_errors(rows).rename(columns=_ERRORS), on=_MODEL, how="left")
     made = made.merge(found[[*_MODEL, *_TIMES]], on=_MODEL, how="left")

@@ -9,14 +9,25 @@ import pandas as pd
 
 from pdrom.core.store import open_hdf5, read_table
 from pdrom.model.held_out import MOTIONS, PLAYBACK
-from pdrom.reduction.deviations import DEVIATIONS, ERRORS, REFERENCE, Series, errors_within
+from pdrom.reduction import deviations
+from pdrom.reduction.deviations import DEVIATIONS, ERRORS, Series, errors_within
 from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, Setting, TableOf
-from study.experiments.kit.base import Horizon, floor_of, horizons, positions_of
-from study.experiments.kit.runfiles import run_error
-from study.tables.kit.declaration import flag, number, shared, table, text
-from study.tables.kit.results import KEYS, TRAIN, joined, timings_in_one_time, trained
+from study.experiments.kit.base import Horizon, floor_of, horizons
+from study.tables.kit.declaration import flag, integer, number, shared, table, text
+from study.tables.kit.results import (
+    DEFORMATION,
+    ERROR,
+    ITERATIONS,
+    KEYS,
+    OWN_ERRORS,
+    REFERENCE,
+    TRAIN,
+    joined,
+    timings_in_one_time,
+    trained,
+)
 
 
 @table(
@@ -24,18 +35,21 @@ from study.tables.kit.results import KEYS, TRAIN, joined, timings_in_one_time, t
     columns=(
         *shared("scene group method position_basis k r frames finite blowup_frame max_extent"),
         *shared("training_residual"),
-        *shared("relative_error relative_error_within_horizon playback_error"),
+        *shared("relative_error relative_error_within_horizon deformation_error playback_error"),
+        REFERENCE,
+        *shared("error_converged deformation_converged"),
+        *shared("reference_error reference_deformation_error"),
         *shared("horizon_frame sensitivity_floor"),
         *shared("ms_per_frame vertices_ms local_ms global_ms speedup"),
         *shared("error_over_extent shape_error"),
-        *shared("velocity_error relative_shape_error energy_drift"),
+        *shared("velocity_error energy_drift"),
         text(
             "motion",
             f"{TRAIN}, or how the motion differs from the training one: {', '.join(MOTIONS)}",
         ),
     ),
     reads={
-        "full_order": Every(paths.FULL_ORDER),
+        "references": Every(paths.REFERENCES),
         "runs": Every(paths.RERUNS),
         "rows": Every(paths.RERUNS_TRAIN),
         "rows_heldout": Every(paths.RERUNS_HELDOUT),
@@ -58,7 +72,10 @@ def reduced_reruns(
     a scene and motion is the first frame in which perturbed full-order runs differ from unperturbed
     ones by more than a limit. Errors "within the horizon" use earlier frames only, and are empty if
     a run blew up in these. Rows of method `PLAYBACK` compare the training with a held-out motion.
+    Errors are against the full-order run with the scene's iterations, and also against the
+    converged one.
     """
+    references = joined(files["references"])
     judged: list[pd.DataFrame] = []
     for motion in (TRAIN, *MOTIONS):
         label = horizon.perturbation if motion == TRAIN else motion
@@ -73,30 +90,29 @@ def reduced_reruns(
         found["horizon_frame"] = found.scene.map(ends)
         found["sensitivity_floor"] = found.scene.map(floor)
         if motion != TRAIN:
-            played = _played(files["full_order"], ends, motion)
+            played = _played(references, motion)
             distance = played.set_index("scene").playback_error
             found["playback_error"] = found.scene.map(distance)
             found = pd.concat([found, played], ignore_index=True)
         judged.append(found)
     judged[0] = _with_times(judged[0], timings_in_one_time(files["timings"], frame_times))
-    return pd.concat(judged, ignore_index=True)
+    made = pd.concat(judged, ignore_index=True).assign(reference=ITERATIONS)
+    return made.merge(
+        references[["scene", "motion", *OWN_ERRORS]], on=["scene", "motion"], how="left"
+    )
 
 
-def _played(full_order: list[File], ends: Mapping[str, int], motion: str) -> pd.DataFrame:
+def _played(references: pd.DataFrame, motion: str) -> pd.DataFrame:
     """Errors, a row per scene, if the training motion is played back in place of ``motion``."""
-    runs = {(run["scene"], run["run"]): run for run in full_order}
-    rows = []
-    for scene in dict.fromkeys(run["scene"] for run in full_order):
-        training, other = (positions_of(runs[scene, name]) for name in (TRAIN, motion))
-        end = ends[scene]
-        within = run_error(training[: end + 1], other[: end + 1]) if end else None
-        rows.append({
-            "scene": scene, "group": "all", "method": PLAYBACK, "position_basis": "full",
-            "frames": len(other) - 1, "finite": True, "motion": motion, "horizon_frame": end,
-            "relative_error": run_error(training, other), "playback_error": within,
-            "relative_error_within_horizon": within,
-        })  # fmt: skip
-    return pd.DataFrame(rows)
+    rows = references[references.motion == motion]
+    return pd.DataFrame({
+        "scene": rows.scene, "group": "all", "method": PLAYBACK, "position_basis": "full",
+        "frames": rows.frames, "finite": True, "motion": motion,
+        "horizon_frame": rows.horizon_frame, "relative_error": rows.playback_all,
+        "playback_error": rows.playback_error, ERROR: rows.playback_error,
+        DEFORMATION: rows.playback_deformation_error, "error_converged": rows.replay_error,
+        "deformation_converged": rows.replay_deformation_error,
+    })  # fmt: skip
 
 
 def _judged(run: File, row: File, end: int, motion: str) -> pd.DataFrame:
@@ -109,11 +125,11 @@ def _judged(run: File, row: File, end: int, motion: str) -> pd.DataFrame:
             table = table.assign(position_basis="full", k=None, training_residual=None)
             store = file if motion == TRAIN else file[motion]
             runs = [store[f"r{r:04d}"] for r in table.r]
-            reference = {series: store[series][...] for series in REFERENCE}
+            reference = {series: store[series][...] for series in deviations.REFERENCE}
         else:
             models = [f"{t.position_basis}_k{t.k:03d}_{t.method}" for t in table.itertuples()]
             runs = [file[f"models/{model}/{motion}"] for model in models]
-            reference = {series: file[f"{series}/{motion}"][...] for series in REFERENCE}
+            reference = {series: file[f"{series}/{motion}"][...] for series in deviations.REFERENCE}
         return table.assign(**_errors(runs, reference, end, file.attrs))
 
 
@@ -122,9 +138,9 @@ def _errors(
 ) -> dict[str, list[float | None]]:
     """Name of an error -> its values over frames before ``end``, one per run.
 
-    A value is None if the run ended earlier. ``units`` has values extent_norm, m, and time_step, s.
+    A value is None if the run ended earlier. ``units`` are those of the `Yardstick`.
     """
-    known = {unit: float(units[unit]) for unit in ("extent_norm", "time_step")}
+    known = {unit: float(units[unit]) for unit in ("extent_norm", "rest_norm", "time_step")}
     found = [
         errors_within({series: run[series][...] for series in DEVIATIONS}, reference, end, **known)
         if "difference" in run
@@ -152,6 +168,34 @@ def _with_times(runs: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
             found = found[keys + measured].astype(whole)
             parts.append(rows.astype(whole).merge(found, on=keys, how="left"))
     return pd.concat(parts, ignore_index=True)
+
+
+@table(
+    title="Test trajectories: how far from rigid, and from the training",
+    columns=(
+        *shared("scene"),
+        text("motion", f"how it differs from the training one: {', '.join(MOTIONS)}"),
+        integer("frames", "frames of the run", compared="exact"),
+        *shared("horizon_frame"),
+        number(
+            "deformation",
+            "norm of what the best rigid motions of the rest shape leave of the converged run, "
+            "over the norm of the displacement, in all frames",
+        ),
+        number("affine", "the same of the best affine images"),
+        number("replay_error", "position error if the training trajectory is replayed instead"),
+        number("replay_deformation_error", "its deformation error"),
+        number("full_order_error", "position error of the run with the scene's iterations"),
+        number("full_order_deformation_error", "its deformation error"),
+        *shared("reference_error reference_deformation_error"),
+        number("evaluations", "evaluations of a frame of the converged run"),
+    ),
+    reads={"references": Every(paths.REFERENCES)},
+)
+def test_trajectories(references: list[File]) -> pd.DataFrame:
+    """One row per scene and held-out motion; errors are before the horizon, of converged runs."""
+    rows = joined(references)
+    return rows[rows.motion != TRAIN]
 
 
 # Possible outcomes of a run.

@@ -49,6 +49,7 @@ def experiments() -> dict[str, Experiment]:
     return declared_in("study.experiments", Experiment)
 
 
+TRAIN = "train"
 FOM = "fom"  # method in tables: full-order run, with the scene's or another number of iterations
 ANDERSON = "fom-anderson"  # method in tables: full-order run with Anderson acceleration
 
@@ -108,9 +109,10 @@ class Horizon(ConfigModel):
     perturbation: Tolerance
     threshold: Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 
-    def frames(self, perturbed: File) -> int:
+    def frames(self, perturbed: File, motion: str = TRAIN) -> int:
         """Number of frames before runs in file ``perturbed`` differ by more than `threshold`."""
-        spread = floor_of(read_table(perturbed.path), perturbed["scene"], self.perturbation)
+        label = self.perturbation if motion == TRAIN else motion
+        spread = floor_of(read_table(perturbed.path), perturbed["scene"], label)
         return horizon(spread, self.threshold)
 
 
@@ -118,9 +120,6 @@ def resolve_ranks(ranks: Sequence[Rank], rank: int) -> list[int]:
     """Sort basis sizes ``ranks``; "full" becomes the numerical ``rank`` (left out if it is 0)."""
     full = [rank] if "full" in ranks and rank > 0 else []
     return sorted({*(int(r) for r in ranks if r != "full"), *full})
-
-
-TRAIN = "train"
 
 
 def scene_of(config: SceneConfig, mesh: File, run: str = TRAIN) -> Scene:

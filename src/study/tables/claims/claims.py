@@ -19,12 +19,14 @@ from study.tables.claims.metrics import METRICS, VALUE, Tables, filtered
 from study.tables.claims.rules import PARTS, READS, Added, ClaimRule, TestRule, load_claims
 from study.tables.kit.declaration import Column, TimedCells, flag, number, table, text, timed
 from study.tables.kit.declaration import table as declare
+from study.tables.kit.results import BOTH, measured
 
 VERDICTS = HOLDS, FAILS, DEPENDS, MACHINE, UNDECIDED, UNTESTED = (
     "holds", "does not hold", "depends", "depends on the machine", "cannot be decided",
     "not tested",
 )  # fmt: skip
 RULES = "config/claims.yaml"
+RERUNS = "reduced_reruns"
 RECORDED = "config/reference/replication/claims.csv"
 MEASURED = [f"{name}{suffix}" for suffix in PARTS.values() for name in ("verdict", "measured")]
 
@@ -160,6 +162,7 @@ def timed_columns(rule: ClaimRule) -> set[str]:
             found.add(f"why{suffix}")
         if any(test.decides for test in timed):
             found |= {f"{name}{suffix}" for name in ("measured", "verdict", "condition")}
+            found.add(f"verdict{suffix}_both")
             found.add("answer")
     return found
 
@@ -196,7 +199,7 @@ SHARES = (0.5, 0.6, 0.75, 0.9, 1.0)
 MARGINS = (1.0, 1.25, 1.5, 2.0, 3.0, 5.0)  # tried values of `TestRule.margin`; 1: no margin
 SMALL = 10  # claims_sensitivity repeats tests with sizes r <= this only, and with larger r only
 SPLITS = ("train", "test", "heldout")
-VARIED = ("threshold", "share", "margin", "sizes", "splits", "scenes")
+VARIED = ("threshold", "share", "margin", "sizes", "splits", "scenes", "measure")
 # Share of claims_sensitivity's verdicts (some rest on few runs) that may differ from expected ones.
 FRAGILE = 0.01
 _Rows = list[pd.DataFrame]
@@ -221,6 +224,8 @@ _Variation = tuple[str, str, Sequence[TestRule], _Rows]  # (one of `VARIED`, cha
         skipped("text", "condition", "what the verdict depends on"),
         skipped("text", "measured_beyond", "the same of sound variants on well-posed scenes"),
         timed(text("verdict_beyond", "the verdict there", compared="exact")),
+        timed(text("verdict_both", "as published, of position and deformation", compared="exact")),
+        timed(text("verdict_beyond_both", "the same of sound variants", compared="exact")),
         skipped("text", "condition_beyond", "what it depends on"),
         skipped("text", "why_beyond", "all tests there in words"),
         skipped("text", "answer", "both verdicts in words"),
@@ -237,11 +242,17 @@ def claims(rules: Path, added: Added, **tables: pd.DataFrame) -> pd.DataFrame:
 
 def _row(name: str, rule: ClaimRule, tables: Tables) -> dict[str, Any]:
     published, beyond = _decided(rule.published, tables), _decided(rule.beyond, tables)
+    both = with_both(tables)
+    verdicts = {
+        f"verdict{suffix}_both": _decided(getattr(rule, part), both)["verdict"]
+        for part, suffix in PARTS.items()
+    }
     return {
         "claim": name,
         **rule.model_dump(include=WORDS),
         **published,
         **{f"{key}_beyond": value for key, value in beyond.items()},
+        **verdicts,
         "answer": f"as published it {published['verdict']}, beyond it {beyond['verdict']}",
         "history": " ".join(
             f"{change.date.isoformat()}{' (results were known)' * change.after_data}: "
@@ -382,6 +393,14 @@ def _variations(tests: Sequence[TestRule], rows: _Rows, tables: Tables) -> Itera
     scenes = dict.fromkeys(s for values in rows if "scene" in values for s in values.scene)
     others = {f"without {s}": lambda values, s=s: values != s for s in scenes}
     yield from _kept(tests, rows, "scenes", "scene", others)
+    if any(METRICS[test.metric].table == RERUNS for test in tests):
+        both = with_both(tables)
+        yield "measure", BOTH, tests, [values_of(test, both) for test in tests]
+
+
+def with_both(tables: Tables) -> Tables:
+    """Return ``tables`` in which the error of a reduced run is the larger one of its two errors."""
+    return {**tables, RERUNS: measured(tables[RERUNS], BOTH)}
 
 
 def _kept(

@@ -169,6 +169,15 @@ _SHARED = (
     number("relative_error", "error of the positions over all frames"),
     number("relative_error_within_horizon", "error of the positions before the horizon"),
     number(
+        "deformation_error",
+        "error of the shapes over the same frames, relative to the deformation; empty for a rigid "
+        "reference",
+    ),
+    number("error_converged", "error of the positions before the horizon, of the converged run"),
+    number("deformation_converged", "the deformation error against it"),
+    number("reference_error", "position error of the converged run itself, by a second solve"),
+    number("reference_deformation_error", "its deformation error"),
+    number(
         "playback_error",
         "error of playback before the horizon: of the recorded training motion in place of the run",
     ),
@@ -182,10 +191,6 @@ _SHARED = (
     number(
         "velocity_error",
         "error of the velocities before the horizon, over the norm of those of the full-order run",
-    ),
-    number(
-        "relative_shape_error",
-        "error of the positions before the horizon without the best rigid motion of each frame",
     ),
     number(
         "energy_drift",

@@ -21,11 +21,14 @@ from study.tables.kit.declaration import integer, number, text
 RESAMPLES, SEED, LEVEL = 2000, 1, 0.95
 KEYS = ["scene", "group", "method", "position_basis", "k", "r"]  # columns that identify a run
 TRAIN = "train"
+ERROR, DEFORMATION = "relative_error_within_horizon", "deformation_error"
 MEDIAN, LOW, HIGH, COUNT = "error_heldout", "error_heldout_low", "error_heldout_high", "motions"
+SHAPE = "deformation_heldout"
 COLUMNS = (
     number(MEDIAN, "the same error on held-out motions: their median; inf where a run ended"),
     number(LOW, "the least of them"),
     number(HIGH, "the largest"),
+    number(SHAPE, "median of their deformation errors; inf where a run ended"),
     integer(COUNT, "held-out motions that were run, can be judged and are far enough"),
     number("playback_error", "median error of playback on these motions, see reduced_reruns"),
 )
@@ -33,6 +36,15 @@ COLUMNS = (
 FAR = 0.3
 _WHOLE = {"k": "Int64", "r": "Int64"}
 EXPERIMENT = ["scene", "group"]
+MEASURES = POSITION, BOTH = "position", "both"
+MEASURE = text(
+    "measure", "errors that have to be within a limit: position, or both (deformation, too)"
+)
+# What the column `reference` names: full-order runs with the scene's iterations, converged ones.
+ITERATIONS, CONVERGED = "iterations", "converged"
+REFERENCE = text("reference", f"run that errors refer to: {ITERATIONS} of the scene or {CONVERGED}")
+OWN_ERRORS = "reference_error", "reference_deformation_error"
+THIRD = 1.0 / 3.0  # largest error of a reference over a limit by which runs are judged
 ORTHOGONAL = "pod"  # method that evaluates all elements and projects onto the basis orthogonally
 FAILED = 0.1  # a run whose error over the compared frames exceeds this counts as failed
 TWIN = "_twin"
@@ -122,6 +134,31 @@ def trained(reruns: pd.DataFrame) -> pd.DataFrame:
     return reruns[reruns.motion == TRAIN]
 
 
+def against_converged(reruns: pd.DataFrame) -> pd.DataFrame:
+    """Rows of ``reruns`` whose errors are those against the converged runs."""
+    errors = {ERROR: reruns.error_converged, DEFORMATION: reruns.deformation_converged}
+    return reruns.assign(**errors, reference=CONVERGED)
+
+
+def measured(rows: pd.DataFrame, measure: str) -> pd.DataFrame:
+    """Return ``rows`` whose error is that of the ``measure``: of "both", the larger one.
+
+    It is the position error where there is no deformation error, as the reference moves rigidly.
+    """
+    position = rows[ERROR].astype(float)
+    if measure == POSITION:
+        return rows
+    return rows.assign(**{ERROR: np.fmax(position, rows[DEFORMATION]).where(position.notna())})
+
+
+def judged_by(rows: pd.DataFrame, measure: str, limit: float) -> pd.DataFrame:
+    """Rows that can be judged by ``limit``: own errors of their references are at most a third."""
+    own = OWN_ERRORS[: MEASURES.index(measure) + 1]
+    errors = rows[[*own]].astype(float)
+    known = errors.iloc[:, 0].notna() & ~(errors > THIRD * limit).any(axis=1)
+    return measured(rows[known], measure)
+
+
 def over_motions(reruns: pd.DataFrame, keys: Sequence[str] = KEYS) -> pd.DataFrame:
     """Median, least and largest error of each run over its held-out motions, and their number.
 
@@ -133,12 +170,13 @@ def over_motions(reruns: pd.DataFrame, keys: Sequence[str] = KEYS) -> pd.DataFra
     tests = (reruns.horizon_frame > 0) & (reruns.playback_error > FAR)
     rows = reruns[(reruns.motion != TRAIN) & ran & tests]
     rows = rows.astype({key: kind for key, kind in _WHOLE.items() if key in keys})
-    error = rows.relative_error_within_horizon.astype(float).fillna(np.inf)
-    own = [rows[key] for key in keys]
-    runs = error.groupby(own, sort=False, dropna=False)
+    error, own = rows[ERROR].astype(float), [rows[key] for key in keys]
+    ended = error.isna()
+    runs = error.fillna(np.inf).groupby(own, sort=False, dropna=False)
     made = runs.agg(**{MEDIAN: "median", LOW: "min", HIGH: "max", COUNT: "count"})
-    playback = rows.playback_error.groupby(own, sort=False, dropna=False).median()
-    return made.join(playback).reset_index()
+    shape = rows[DEFORMATION].astype(float).mask(ended, np.inf)
+    beside = pd.DataFrame({SHAPE: shape, "playback_error": rows.playback_error})
+    return made.join(beside.groupby(own, sort=False, dropna=False).median()).reset_index()
 
 
 def with_held_out(runs: pd.DataFrame, reruns: pd.DataFrame) -> pd.DataFrame:
