@@ -400,7 +400,8 @@ def _variations(tests: Sequence[TestRule], rows: _Rows, tables: Tables) -> Itera
 
 def with_both(tables: Tables) -> Tables:
     """Return ``tables`` in which the error of a reduced run is the larger one of its two errors."""
-    return {**tables, RERUNS: measured(tables[RERUNS], BOTH)}
+    runs = tables.get(RERUNS, pd.DataFrame())
+    return {**tables, RERUNS: measured(runs, BOTH)} if len(runs) else tables
 
 
 def _kept(

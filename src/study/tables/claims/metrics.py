@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from study.tables.accuracy_cost import CURVE
-from study.tables.kit.results import KEYS, MEDIAN, families, trained, with_held_out
+from study.tables.kit.results import DEFORMATION, KEYS, MEDIAN, families, trained, with_held_out
 
 Tables = Mapping[str, pd.DataFrame]
 Value = str | int | float
@@ -22,7 +22,7 @@ LABELS = (
 AXES = ("x", "y", "z")
 _ERROR = "relative_error_within_horizon"
 _RUN = ["scene", "group", "method"]
-_RERUN = ("motion", "frames", "blowup_frame", _ERROR, *_RUN, "position_basis", "r")
+_RERUN = ("motion", "frames", "blowup_frame", _ERROR, DEFORMATION, *_RUN, "position_basis", "r")
 
 
 def filtered(table: pd.DataFrame, where: Where) -> pd.DataFrame:
@@ -250,7 +250,7 @@ METRICS = {
     "position_basis_ratio": Metric(
         position_basis_ratio,
         "reduced_reruns",
-        ("motion", "scene", "k", "position_basis", _ERROR),
+        ("motion", "scene", "k", "position_basis", _ERROR, DEFORMATION),
         lambda table, where: filtered(trained(table), where),
     ),
 }
