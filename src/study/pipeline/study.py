@@ -20,6 +20,7 @@ from pdrom.model.scene import SceneConfig
 from pdrom.reduction.method import BasisSpec, MethodSpec, load_methods
 from study.artifact import paths
 from study.experiments.alternatives.experiment import Alternatives
+from study.experiments.error_budget import Budget
 from study.experiments.frame_times import FrameTimes
 from study.experiments.hard_cases.outcomes import HardCases
 from study.experiments.iterations import IterationCounts
@@ -50,6 +51,7 @@ class StudySettings(ConfigModel):
     claim_sets: dict[str, tuple[SceneName, ...]] = Field(default_factory=dict)
     sensitivity: Sensitivity = Sensitivity()
     reference: Reference = Reference()
+    error_budget: Budget = Budget()
     iterations: IterationCounts = IterationCounts()
     timing: Timing = Timing()
     frame_times: FrameTimes = FrameTimes()
@@ -260,7 +262,7 @@ MODELS = (
 # Kind of file -> function that returns the scenes for which a study makes it; for files of several
 # mesh sizes, a mapping scene -> factors that multiply the number of vertices along a mesh's side.
 SCENES: dict[paths.Place, Callable[[Study], Iterable[str]]] = {
-    **dict.fromkeys(MODELS, _with_subspaces),
+    **dict.fromkeys((*MODELS, paths.ERROR_BUDGET), _with_subspaces),
     paths.SCALING: lambda study: study.settings.scaling.scenes,
     paths.BREAK_EVEN_SIZED: lambda study: study.settings.scaling.scenes,
     paths.ALTERNATIVES: lambda study: study.settings.alternatives.scenes,

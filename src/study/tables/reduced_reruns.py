@@ -15,7 +15,7 @@ from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, Setting, TableOf
 from study.experiments.kit.base import Horizon, floor_of, horizons
-from study.tables.kit.declaration import flag, integer, number, shared, table, text
+from study.tables.kit.declaration import flag, number, shared, table, text
 from study.tables.kit.results import (
     DEFORMATION,
     ERROR,
@@ -168,34 +168,6 @@ def _with_times(runs: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
             found = found[keys + measured].astype(whole)
             parts.append(rows.astype(whole).merge(found, on=keys, how="left"))
     return pd.concat(parts, ignore_index=True)
-
-
-@table(
-    title="Test trajectories: how far from rigid, and from the training",
-    columns=(
-        *shared("scene"),
-        text("motion", f"how it differs from the training one: {', '.join(MOTIONS)}"),
-        integer("frames", "frames of the run", compared="exact"),
-        *shared("horizon_frame"),
-        number(
-            "deformation",
-            "norm of what the best rigid motions of the rest shape leave of the converged run, "
-            "over the norm of the displacement, in all frames",
-        ),
-        number("affine", "the same of the best affine images"),
-        number("replay_error", "position error if the training trajectory is replayed instead"),
-        number("replay_deformation_error", "its deformation error"),
-        number("full_order_error", "position error of the run with the scene's iterations"),
-        number("full_order_deformation_error", "its deformation error"),
-        *shared("reference_error reference_deformation_error"),
-        number("evaluations", "evaluations of a frame of the converged run"),
-    ),
-    reads={"references": Every(paths.REFERENCES)},
-)
-def test_trajectories(references: list[File]) -> pd.DataFrame:
-    """One row per scene and held-out motion; errors are before the horizon, of converged runs."""
-    rows = joined(references)
-    return rows[rows.motion != TRAIN]
 
 
 # Possible outcomes of a run.

@@ -1,0 +1,82 @@
+"""Tables of the test trajectories, and of what keeps a reduced model from following them."""
+
+import numpy as np
+import pandas as pd
+
+from pdrom.model.held_out import MOTIONS
+from study.artifact import paths
+from study.artifact.paths import File
+from study.artifact.reads import Every
+from study.experiments.error_budget import FULL_ORDER, PARTS, SPAN
+from study.tables.kit.declaration import flag, integer, number, shared, table, text
+from study.tables.kit.results import CONVERGED, DEFORMATION, REFERENCE, TRAIN, joined
+
+MOTION = text("motion", f"how it differs from the training one: {', '.join(MOTIONS)}")
+
+
+@table(
+    title="Test trajectories: how far from rigid, and from the training",
+    columns=(
+        *shared("scene"),
+        MOTION,
+        integer("frames", "frames of the run", compared="exact"),
+        *shared("horizon_frame"),
+        number(
+            "deformation",
+            "norm of what the best rigid motions of the rest shape leave of the converged run, "
+            "over the norm of the displacement, in all frames",
+        ),
+        number("affine", "the same of the best affine images"),
+        number("replay_error", "position error if the training trajectory is replayed instead"),
+        number("replay_deformation_error", "its deformation error"),
+        number("full_order_error", "position error of the run with the scene's iterations"),
+        number("full_order_deformation_error", "its deformation error"),
+        *shared("reference_error reference_deformation_error"),
+        number("evaluations", "evaluations of a frame of the converged run"),
+    ),
+    reads={"references": Every(paths.REFERENCES)},
+)
+def test_trajectories(references: list[File]) -> pd.DataFrame:
+    """One row per scene and held-out motion; errors are before the horizon, of converged runs."""
+    rows = joined(references)
+    return rows[rows.motion != TRAIN]
+
+
+@table(
+    title="Error budget of reduced models",
+    columns=(
+        *shared("scene"),
+        MOTION,
+        integer("k", "POD modes of the training trajectory"),
+        integer("skinning", "skinning columns beside them"),
+        *shared("elements_sampled"),
+        integer("frames", "frames that errors are taken over: those before the horizon"),
+        text(
+            "part",
+            "span: best approximation in the subspace; closure: the converged step in it, with all "
+            "elements; sampling: with the sampled ones; run: five local/global iterations; "
+            "full_order: the full order with the scene's iterations",
+        ),
+        REFERENCE,
+        number("error", "position error"),
+        *shared("deformation_error"),
+        number("added", "deformation error less that of the part before", compared="error"),
+        flag("largest", "the part adds most", compared="error"),
+    ),
+    reads={"parts": Every(paths.ERROR_BUDGET)},
+)
+def error_budget(parts: list[File]) -> pd.DataFrame:
+    """One row per test trajectory, model and part; parts of a reduced model follow one another.
+
+    Where the reference moves rigidly, ``added`` is that of the position error.
+    """
+    rows = joined(parts).assign(reference=CONVERGED)
+    if rows.empty:
+        return rows
+    error = rows[DEFORMATION].fillna(rows.error).fillna(np.inf)
+    before = error.shift().where(rows.part != SPAN, 0.0)
+    own = rows.part != FULL_ORDER
+    with np.errstate(invalid="ignore"):
+        added = (error - before).where(own)
+    trajectory = pd.Series(np.arange(len(rows)) // len(PARTS), rows.index)
+    return rows.assign(added=added, largest=added == added.groupby(trajectory).transform("max"))
