@@ -7,19 +7,25 @@ from typing import Any
 
 import pandas as pd
 
-from pdrom.model.held_out import PLAYBACK
+from pdrom.model.held_out import MOTIONS, PLAYBACK
 from study.artifact.text import escape
 from study.experiments.alternatives.experiment import ACCELERATED
+from study.experiments.error_budget import PARTS
 from study.figures.kit.declaration import declarations
 from study.paper.macros import HIDDEN, format_number
 from study.tables.alternatives import CASE, CURVE
-from study.tables.kit.results import MEDIAN, in_words, over_motions, trained
+from study.tables.kit.results import MEASURES, MEDIAN, in_words, over_motions, trained
 
 NONE = "--"
 LEFT = r">{\raggedright\arraybackslash}"
 # Iterator over a table: first (column definitions, header), then the rows; all cells are TeX.
 Rows = Iterator[Any]
-LONG = ("tab_scenes", "tab_ranks", "tab_local_share")  # tables that may break across pages
+LONG = (
+    "tab_scenes",
+    "tab_trajectories",
+    "tab_ranks",
+    "tab_local_share",
+)  # tables that may break across pages
 FULL = "full"  # value of column position_basis for runs with unreduced positions
 
 
@@ -78,17 +84,22 @@ _SIGNS = {">=": r"$\ge$", "<=": r"$\le$"}
 
 
 def claims(claims_tests: pd.DataFrame, claims: pd.DataFrame) -> Rows:
-    """Claims: verdicts on the preprint's and on improved methods, counts of rows passing tests."""
+    """Claims: verdicts on the preprint's and on improved methods, counts of rows passing tests.
+
+    A verdict that differs if the deformation error counts, too, stands beside the other.
+    """
     tests = claims_tests[claims_tests.decides.astype(bool)]
     columns = rf"l{LEFT}p{{4.7cm}}{LEFT}p{{3.2cm}}{LEFT}p{{4.1cm}}l"
     yield columns, ["claim", "the preprint says", "as published", "beyond", "shown in"]
     for row in claims.itertuples():
         cells = []
-        for part, verdict in zip(_PARTS, (row.verdict, row.verdict_beyond), strict=True):
+        verdicts = (row.verdict, row.verdict_both), (row.verdict_beyond, row.verdict_beyond_both)
+        for part, (verdict, both) in zip(_PARTS, verdicts, strict=True):
             mine = _rows(tests, claim=row.claim, part=part).itertuples()
             counted = ", ".join(f"{test.satisfied}/{test.of}" for test in mine)
             colour = _VERDICT_COLOUR.get(verdict, "okgrey")
-            cells.append(rf"\textcolor{{{colour}}}{{{escape(verdict)}}} ({counted})")
+            other = "" if both == verdict else f"; both errors: {escape(both)}"
+            cells.append(rf"\textcolor{{{colour}}}{{{escape(verdict)}}} ({counted}){other}")
         place = shown = row.figure_or_table
         if row.claim in _SHOWN:
             place = rf"table~\ref{{tab:{_SHOWN[row.claim]}}}"
@@ -199,26 +210,40 @@ def speedups(speedups: pd.DataFrame) -> Rows:
             _name(f"{row.method}, {size}"),
             _known(row.full_ms),
             _known(row.shown, escape) + (" (loses)" if row.loses == 1 else ""),
-            *map(_known, (row.error_train, row.error_heldout, row.playback_error)),
+            f"{_known(row.error_train)} ({_known(row.deformation_train)})",
+            f"{_known(row.error_heldout)} ({_known(row.deformation_heldout)})",
+            _known(row.playback_error),
             *map(_known, (row.training_s, row.reduction_s)),
             "never" if pd.isna(frames) else _whole(float(f"{frames:.1e}")),
         ]
 
 
 def payoff(payoff: pd.DataFrame) -> Rows:
-    """Numbers of scenes in which a reduction is accurate, and faster or slower than full order."""
+    """Numbers of scenes in which a reduction is accurate, and faster or slower than full order.
+
+    A number that differs if the deformation error counts, too, stands after a stroke.
+    """
     yield "lrrrrrrrrrrrr", [
         "reduction", "runs in", "accurate in", "pays in", "loses in", "least", "median", "most",
         "training", "held out (of)", "playback", "accurate", "pays",
     ]  # fmt: skip
-    for row in payoff.itertuples():
+    position, both = (_rows(payoff, measure=measure) for measure in MEASURES)
+    both = both.set_index(["position_basis", "method"])
+
+    def counted(row: Any, column: str) -> str:
+        key, own = (row.position_basis, row.method), getattr(row, column)
+        other = both.loc[key, column] if key in both.index else None
+        same = pd.isna(other) or other == own
+        return _known(own, _whole) + ("" if same else f" / {_whole(other)}")
+
+    for row in position.itertuples():
         basis = "" if row.position_basis == FULL else f", {row.position_basis}"
         unseen = f"{_known(row.error_heldout)} ({row.heldout})"
         errors = _known(row.error_train), unseen, _known(row.playback_error)
         gains = map(_known, (row.least_speedup, row.best_speedup, row.most_speedup))
-        counts = (_known(n, _whole) for n in (row.scenes, row.accurate, row.pays, row.loses))
-        judged = (row.accurate_heldout, row.pays_heldout)
-        scored = [_known(n, _whole) if row.heldout else NONE for n in judged]
+        counts = (counted(row, name) for name in ("scenes", "accurate", "pays", "loses"))
+        judged = ("accurate_heldout", "pays_heldout")
+        scored = [counted(row, name) if row.heldout else NONE for name in judged]
         yield [_name(f"{row.method}{basis}"), *counts, *gains, *errors, *scored]
 
 
@@ -266,18 +291,54 @@ def training(alternatives: pd.DataFrame) -> Rows:
         yield [_name(scene) + stiff, str(vertices), motion, *map(_known, numbers)]
 
 
-def scenes(reduced_reruns: pd.DataFrame, scenes: pd.DataFrame) -> Rows:
-    """Scenes: groups, mesh size, number of frames, first frame in which runs are not compared."""
+def scenes(
+    reduced_reruns: pd.DataFrame, scenes: pd.DataFrame, test_trajectories: pd.DataFrame
+) -> Rows:
+    """Scenes: groups, mesh size, frames, first frame in which runs are not compared, and errors.
+
+    These are the position and deformation errors of the full-order runs of the test trajectories.
+    """
     horizon = trained(reduced_reruns).groupby("scene").horizon_frame.first()
-    header = ["scene", "groups (weight)", "vertices", "elements", "frames", "horizon"]
-    yield rf"l{LEFT}p{{5.2cm}}rrrr", header
+    header = ["scene", "groups (weight)", "vertices", "elements", "frames", "horizon", *MOTIONS]
+    yield rf"l{LEFT}p{{3.2cm}}rrrrrrr", header
+
+    def off(run: pd.Series) -> str:
+        error, shape = run.full_order_error, run.full_order_deformation_error
+        return f"{_known(error)}, {_known(shape)}"
+
     for row in scenes.itertuples():
         end = horizon.get(row.scene)
         shown = "run" if end == row.frames and not pd.isna(end) else _known(end, _whole)
         # numbers such as 1e+06 are written as powers of ten
         powers = re.sub(r"([\d.]+)e\+?(-?)0*(\d+)", r"$\1\\cdot 10^{\2\3}$", _group(row.groups))
         sizes = map(str, (row.vertices, row.elements, row.frames))
-        yield [_name(row.scene), powers.replace(r"$1\cdot 10", "$10"), *sizes, shown]
+        runs = [_rows(test_trajectories, scene=row.scene, motion=motion) for motion in MOTIONS]
+        errors = [_cell(run, off) for run in runs]
+        yield [_name(row.scene), powers.replace(r"$1\cdot 10", "$10"), *sizes, shown, *errors]
+
+
+def trajectories(test_trajectories: pd.DataFrame) -> Rows:
+    """Test trajectories: how far from rigid and affine, errors of replay, errors of references."""
+    columns = {
+        "rigid": "deformation", "affine": "affine", "replay": "replay_error",
+        "shape": "replay_deformation_error", "reference": "reference_error",
+        "its shape": "reference_deformation_error",
+    }  # fmt: skip
+    yield "ll" + "r" * len(columns), ["scene", "trajectory", *columns]
+    for _, row in test_trajectories.iterrows():
+        yield [_name(row.scene), row.motion, *(_known(row[name]) for name in columns.values())]
+
+
+def error_budget(error_budget: pd.DataFrame) -> Rows:
+    """Error budget: median deformation error of the test trajectories by part, and largest part."""
+    yield "lr" + "r" * (len(PARTS) + 1), ["scene", "columns", *map(escape, PARTS), "largest"]
+    for (scene, k, skinning), own in error_budget.groupby(["scene", "k", "skinning"], sort=False):
+        error = own.deformation_error.fillna(own.error)
+        medians = error.groupby(own.part).median().reindex(PARTS)
+        most = own.part[own.largest.astype(bool)].value_counts()
+        largest = ", ".join(f"{part} {count}" for part, count in most.items())
+        size = f"{k}" + (f" + {skinning}" if skinning else "")
+        yield [_name(scene), size, *map(_known, medians), largest]
 
 
 def methods(methods: pd.DataFrame) -> Rows:
