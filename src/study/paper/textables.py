@@ -20,12 +20,8 @@ NONE = "--"
 LEFT = r">{\raggedright\arraybackslash}"
 # Iterator over a table: first (column definitions, header), then the rows; all cells are TeX.
 Rows = Iterator[Any]
-LONG = (
-    "tab_scenes",
-    "tab_trajectories",
-    "tab_ranks",
-    "tab_local_share",
-)  # tables that may break across pages
+# Tables that may break across pages.
+LONG = ("tab_scenes", "tab_trajectories", "tab_ranks", "tab_local_share")
 FULL = "full"  # value of column position_basis for runs with unreduced positions
 
 
@@ -232,9 +228,8 @@ def payoff(payoff: pd.DataFrame) -> Rows:
 
     def counted(row: Any, column: str) -> str:
         key, own = (row.position_basis, row.method), getattr(row, column)
-        other = both.loc[key, column] if key in both.index else None
-        same = pd.isna(other) or other == own
-        return _known(own, _whole) + ("" if same else f" / {_whole(other)}")
+        other = float(both.loc[key, column]) if key in both.index else own
+        return _known(own, _whole) + ("" if other == own else f" / {_known(other, _whole)}")
 
     for row in position.itertuples():
         basis = "" if row.position_basis == FULL else f", {row.position_basis}"
