@@ -14,7 +14,7 @@ from scipy import sparse
 
 from pdrom.core.errors import SceneError
 from pdrom.core.yamlfile import ConfigModel
-from pdrom.model.constraints.local_kernel import LocalKernel, LocalPass, projections
+from pdrom.model.constraints.local_kernel import LocalKernel
 from pdrom.model.effects.base import Effect, EffectConfig
 from pdrom.model.mesh.selection import Selection, select_vertices
 from pdrom.model.mesh.types import Mesh
@@ -59,16 +59,12 @@ class ConstraintGroup(Effect):
     """
 
     rows_per_element: int
-    split_from: int
-    """With at least this many elements, the local step is computed in two parts (see module
-    `local_kernel`); a group that is always computed in one part does not set it."""
     S: sparse.csr_array
     weights: np.ndarray
     gradient_kernel: Any = None
     """Compiled function that maps S q to projections (`local_kernel.gradient_kernel`), or None."""
     local_kernel: LocalKernel | None = None
     """Compiled form of `accumulate` for compiled loops, in a group from `for_run`, else None."""
-    _pass: LocalPass | None = None
     _of_run = False
     manifold: ClassVar[str | None] = None
     """Set onto which elements are projected: "clamped" (signed singular values in the range
@@ -126,7 +122,6 @@ class ConstraintGroup(Effect):
         """Return the group with memory of its own for all that a run writes, the rest shared."""
         own = copy(self)
         own.local_kernel, own._of_run = own._accumulator(), True
-        own._pass = None if own.local_kernel is None else LocalPass([own.local_kernel])
         return own
 
     def _accumulator(self) -> LocalKernel | None:
@@ -154,12 +149,12 @@ class ConstraintGroup(Effect):
     def project_elements(self, y: np.ndarray, elements: np.ndarray) -> np.ndarray:
         """Return projections (m p, 3) at ``y`` (N, 3) m, in the order of ``elements`` (m,)."""
         elements = np.ascontiguousarray(elements, dtype=np.int64)
-        return projections(self.sampler(elements), y, self.rows_per_element * len(elements))
+        return self.sampler(elements).projections(y, self.rows_per_element * len(elements))
 
     def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
         """Add S^T W p(y) of ``y`` (N, 3) m to ``rhs`` (N, 3) in place; return the energy, J."""
         self._require_frame()
-        own = self._pass or self.for_run()._pass
+        own = self.local_kernel or self.for_run().local_kernel
         if own is None:
             raise NotImplementedError(f"{self.name} has neither a local kernel nor its own")
         return own.accumulate(y, rhs)

@@ -14,7 +14,7 @@ from pdrom.model.compiled.rows import WIDTH, at
 from pdrom.model.constraints import lanes
 from pdrom.model.constraints import local_kernel as kernels
 from pdrom.model.constraints.base import ConstraintGroup, GroupConfig, directions, require_cells
-from pdrom.model.constraints.local_kernel import FIRST, OWN, VERTICES, LocalKernel
+from pdrom.model.constraints.local_kernel import OWN, VERTICES, LocalKernel
 from pdrom.model.mesh.types import Mesh, barycentric_areas, boundary_edges
 
 # Length below which a unit vector's component orthogonal to the vertex normal is only round-off.
@@ -28,9 +28,11 @@ NEAR_POLE = 1e-4
 WEIGHT, MAGNITUDE, REST, POLE, MANIFOLD = 0, 1, 2, 5, 8
 # Offsets in a working array, SIZE numbers per lane: H(q), projection p, cosine of H and the POLE
 H, P, HEIGHT, SIZE = 0, 3, 6, 7
-# Indices into a kernel's record: number of all elements, of those to project; addresses of the CSR
-# arrays of S, packed numbers, working arrays, elements to project, memory for their packed numbers.
-ELEMENTS, COUNT, START, INDICES, DATA, SPHERES, WORK, SAMPLED, TAKEN, ARRAYS = range(OWN, OWN + 10)
+# Indices into a kernel's record: numbers of blocks, of all elements and of those to project;
+# addresses of the CSR arrays of S, packed numbers, working array, elements to project, memory for
+# their packed numbers.
+BLOCKS, ELEMENTS, COUNT, START, INDICES, DATA = range(OWN, OWN + 6)
+SPHERES, WORK, SAMPLED, TAKEN, ARRAYS = range(OWN + 6, OWN + 11)
 
 
 @compiled(nogil=True)
@@ -103,33 +105,30 @@ def _to_rims(work, manifold, first):
 
 
 @lanes.lane_function
-def _operator(y_place, record):
-    """Return positions y (at address ``y_place``) and CSR arrays of S that ``record`` points to."""
+def _arguments(y_place, record):
+    """Return positions y (at address ``y_place``) and what ``record`` points to: CSR arrays of S,
+    packed numbers and the working array."""
     entries = rows.indices(record, ARRAYS)
     y = rows.doubles(y_place, WIDTH * entries[VERTICES])
     start = rows.integers(entries[START], entries[ELEMENTS] + 1)
     count = at(start, entries[ELEMENTS])
-    return y, start, rows.integers(entries[INDICES], count), rows.doubles(entries[DATA], count)
-
-
-@lanes.lane_function
-def _spheres(record, part):
-    """Return the packed numbers and the working array ``part`` to which ``record`` points."""
-    entries = rows.indices(record, ARRAYS)
     return (
-        rows.doubles(entries[SPHERES], entries[FIRST + 2] * MANIFOLD * lanes.LANES),
-        rows.doubles(entries[WORK] + 8 * SIZE * lanes.LANES * part, SIZE * lanes.LANES),
+        y,
+        start,
+        rows.integers(entries[INDICES], count),
+        rows.doubles(entries[DATA], count),
+        rows.doubles(entries[SPHERES], entries[BLOCKS] * MANIFOLD * lanes.LANES),
+        rows.doubles(entries[WORK], SIZE * lanes.LANES),
     )
 
 
 @kernels.local_kernel
-def project_vertices(y_place, p_place, record, part):
+def project_vertices(y_place, p_place, record):
     """Write the projections p (m, 3) of the m elements that the ``record`` lists; return 0.
 
-    ``y_place``, ``p_place``, ``record`` are addresses; ``part`` (0 or 1) selects a working array.
+    ``y_place``, ``p_place``, ``record`` are addresses.
     """
-    y, start, indices, data = _operator(y_place, record)
-    manifold, work = _spheres(record, part)
+    y, start, indices, data, manifold, work = _arguments(y_place, record)
     entries = rows.indices(record, ARRAYS)
     count = entries[COUNT]
     elements = rows.indices(entries[SAMPLED], count)
@@ -150,17 +149,16 @@ def project_vertices(y_place, p_place, record, part):
 
 
 @kernels.local_kernel
-def accumulate_vertices(y_place, rhs_place, record, part):
-    """Add S^T W p of the blocks of ``part`` (0 or 1) to the right-hand side; return the energy, J.
+def accumulate_vertices(y_place, rhs_place, record):
+    """Add S^T W p of all elements to the right-hand side; return the energy, J.
 
     ``y_place``, ``rhs_place``, ``record`` are addresses of positions, right-hand side and record.
     """
     entries = rows.indices(record, ARRAYS)
-    y, start, indices, data = _operator(y_place, record)
-    manifold, work = _spheres(record, part)
+    y, start, indices, data, manifold, work = _arguments(y_place, record)
     rhs, elements = rows.doubles(rhs_place, WIDTH * entries[VERTICES]), entries[ELEMENTS]
     energy = 0.0
-    for block in range(entries[FIRST + part], entries[FIRST + part + 1]):
+    for block in range(entries[BLOCKS]):
         begin = block * lanes.LANES
         used = min(lanes.LANES, elements - begin)
         for lane in range(0, used, WIDTH):
@@ -310,7 +308,6 @@ class VertexBending(ConstraintGroup):
     cells = "vertex"
     unit = "1/m"
     rows_per_element = 1
-    split_from = 4096
     frame_lagged = True
     manifold = "half sphere"
     gradient_kernel = project_gradients
@@ -367,20 +364,16 @@ class VertexBending(ConstraintGroup):
         return self._kernel(project_vertices, elements)
 
     def _accumulator(self) -> LocalKernel:
-        def touched(block: int) -> np.ndarray:
-            return self.S.indices[self.S.indptr[block * lanes.LANES] :]
+        return self._kernel(accumulate_vertices, np.empty(0, np.int64))
 
-        split, none = self.elements >= self.split_from, np.empty(0, np.int64)
-        return self._kernel(accumulate_vertices, none, touched if split else None)
-
-    def _kernel(self, function: Any, elements: np.ndarray, touched: Any = None) -> LocalKernel:
+    def _kernel(self, function: Any, elements: np.ndarray) -> LocalKernel:
         """Return a `LocalKernel` with a ``function`` that either writes the projections of
-        ``elements`` or adds the forces of all elements; for ``touched``, see `LocalKernel`."""
+        ``elements`` or adds the forces of all elements."""
         operator = self.S.indptr, self.S.indices, self.S.data
-        memory = lanes.workspaces(SIZE), elements, lanes.workspace(MANIFOLD)
+        memory = lanes.workspace(SIZE), elements, lanes.workspace(MANIFOLD)
         arrays = (*operator, self._manifold, *memory)
-        numbers, count = (self.elements, len(elements)), lanes.blocks(self.elements)
-        return LocalKernel(function, self.S.shape[1], count, arrays, numbers, touched)
+        numbers = lanes.blocks(self.elements), self.elements, len(elements)
+        return LocalKernel(function, self.S.shape[1], arrays, numbers)
 
     def restricted(
         self, elements: np.ndarray, factors: np.ndarray

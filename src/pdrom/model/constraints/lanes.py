@@ -43,11 +43,6 @@ def workspace(numbers: int) -> np.ndarray:
     return rows.zeros(numbers * LANES)
 
 
-def workspaces(numbers: int) -> np.ndarray:
-    """Return two working arrays, one per part of a local kernel, as rows (2, LANES * numbers)."""
-    return workspace(2 * numbers).reshape(2, -1)
-
-
 @lane_function
 def take(packed, numbers, elements, start, out):
     """Copy the packed numbers of ``elements[start:start + LANES]`` to the block ``out``.

@@ -20,18 +20,18 @@ from pdrom.model.compiled import rows
 from pdrom.model.compiled.arithmetic import add, constant, subtract, transposed
 from pdrom.model.compiled.rows import WIDTH, at
 from pdrom.model.constraints.base import StencilGroup
-from pdrom.model.constraints.lanes import LANES, blocks, lane_function, load, pack, save, workspaces
-from pdrom.model.constraints.local_kernel import FIRST, OWN, VERTICES, LocalKernel
+from pdrom.model.constraints.lanes import LANES, blocks, lane_function, load, pack, save, workspace
+from pdrom.model.constraints.local_kernel import OWN, VERTICES, LocalKernel
 
 # offsets in the working array: edges, S q, p, forces on all corners except corner 0, energy
 EDGE, F, P, FORCE, ENERGY, SIZE = 0, 9, 18, 27, 36, 37
 # offsets in the packed geometry: weight, then the operator or other numbers of an element
 WEIGHT, OPERATOR = 0, 1
-# Indices into a kernel's record: size of a working array, number of elements to project; addresses
-# of corners, geometry, constants, working arrays, elements to project, memory for a block's corners
-# and memory for its geometry.
-WORK_SIZE, COUNT, CORNERS, GEOMETRY, CONSTANTS, WORK, ELEMENTS = range(OWN, OWN + 7)
-TAKEN, TAKEN_GEOMETRY, ARRAYS = range(OWN + 7, OWN + 10)
+# Indices into a kernel's record: number of blocks, size of the working array, number of elements to
+# project; addresses of corners, geometry, constants, working array, elements to project, memory for
+# a block's corners and memory for its geometry.
+BLOCKS, WORK_SIZE, COUNT, CORNERS, GEOMETRY, CONSTANTS, WORK = range(OWN, OWN + 7)
+ELEMENTS, TAKEN, TAKEN_GEOMETRY, ARRAYS = range(OWN + 7, OWN + 11)
 
 
 class SimplexGroup(StencilGroup):
@@ -70,10 +70,7 @@ class SimplexGroup(StencilGroup):
         self._corners.flags.writeable = self._geometry.flags.writeable = False
 
     def _accumulator(self) -> LocalKernel:
-        visited = self._visited(self.stencil)
-        split = self.elements >= self.split_from
-        touched = (lambda block: visited[block * LANES :]) if split else None
-        return self._kernel(self.accumulate_kernel, np.empty(0, np.int64), touched)
+        return self._kernel(self.accumulate_kernel, np.empty(0, np.int64))
 
     def _visited(self, values: np.ndarray) -> np.ndarray:
         """Return the values (e, ...) of all elements in the order in which kernels visit them."""
@@ -83,16 +80,16 @@ class SimplexGroup(StencilGroup):
         places = elements if self._order is None else np.argsort(self._order)[elements]
         return self._kernel(self.project_kernel, places)
 
-    def _kernel(self, function: Any, elements: np.ndarray, touched: Any = None) -> LocalKernel:
+    def _kernel(self, function: Any, elements: np.ndarray) -> LocalKernel:
         """Return a `LocalKernel` with a ``function`` that either writes the projections of
-        ``elements`` or adds the forces of all elements; for ``touched``, see `LocalKernel`."""
-        count, work = blocks(self.elements), workspaces(self.work_size)
+        ``elements`` or adds the forces of all elements."""
+        work = workspace(self.work_size)
         data = (self._corners, self._geometry, np.array(self.allowed), work, elements)
         corners = np.empty(self.stencil.shape[1] * LANES, np.int32)
         memory = corners, rows.zeros(LANES * self._numbers)
         arrays = (*data, *memory, *self._own_arrays, np.empty(self._own_memory))
-        numbers = work.shape[1], len(elements)
-        return LocalKernel(function, self.S.shape[1], count, arrays, numbers, touched)
+        numbers = blocks(self.elements), len(work), len(elements)
+        return LocalKernel(function, self.S.shape[1], arrays, numbers)
 
     def _extra(self) -> list[np.ndarray]:
         """Return arrays (e, numbers) to pack after the weights: operators S_e without column 0."""
@@ -100,25 +97,23 @@ class SimplexGroup(StencilGroup):
 
 
 @lane_function
-def arguments(y, rhs, record, part, corners, numbers):
-    """Return arrays y, rhs, corners, geometry, constants, work; block range [a, b) of ``part``.
+def arguments(y, rhs, record, corners, numbers):
+    """Return arrays y, rhs, corners, geometry, constants, work, and the number of blocks.
 
     ``y``, ``rhs`` and ``record`` are the addresses that a `local_kernel` gets. An element has
     ``corners`` vertices and ``numbers`` packed numbers.
     """
     entries = rows.indices(record, ARRAYS)
     count = WIDTH * entries[VERTICES]
-    packed = entries[FIRST + 2] * LANES
-    size = entries[WORK_SIZE]
+    packed = entries[BLOCKS] * LANES
     return (
         rows.doubles(y, count),
         rows.doubles(rhs, count),
         rows.integers(entries[CORNERS], packed * corners),
         rows.doubles(entries[GEOMETRY], packed * numbers),
         rows.doubles(entries[CONSTANTS], 2),
-        rows.doubles(entries[WORK] + 8 * size * part, size),
-        entries[FIRST + part],
-        entries[FIRST + part + 1],
+        rows.doubles(entries[WORK], entries[WORK_SIZE]),
+        entries[BLOCKS],
     )
 
 

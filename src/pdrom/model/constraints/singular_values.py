@@ -25,18 +25,17 @@ from pdrom.model.mesh.types import Mesh
 
 
 @inner(forceinline=True)
-def project(y_place, p_place, record, part, rows, gradients, nearest):
+def project(y_place, p_place, record, rows, gradients, nearest):
     """Write projections of the elements that ``record`` lists; each S_e has ``rows`` rows.
 
     Parameters
     ----------
     y_place, p_place, record : addresses of positions, projections and record of a local kernel
-    part : 0 or 1, selects the working array
     gradients, nearest : functions of a block, which compute S q and the projections
     """
     corners, numbers = rows + 1, 1 + rows * rows
-    y, _, packed, geometry, allowed, work, _, _ = simplex.arguments(
-        y_place, p_place, record, part, corners, numbers
+    y, _, packed, geometry, allowed, work, _ = simplex.arguments(
+        y_place, p_place, record, corners, numbers
     )
     elements, taken, taken_geometry = simplex.samples(record, corners, numbers)
     p = doubles(p_place, 3 * rows * len(elements))
@@ -52,22 +51,22 @@ def project(y_place, p_place, record, part, rows, gradients, nearest):
 
 
 @inner(forceinline=True)
-def accumulate(y_place, rhs_place, record, part, rows, gradients, nearest, forces):
-    """Add S^T W p of the elements of a ``part`` to the right-hand side; return their energy in J.
+def accumulate(y_place, rhs_place, record, rows, gradients, nearest, forces):
+    """Add S^T W p of all elements to the right-hand side; return their energy in J.
 
     Parameters
     ----------
-    y_place, rhs_place, record, part : arguments of a kernel, see `local_kernel`
+    y_place, rhs_place, record : arguments of a kernel, see `local_kernel`
     rows : number of rows of S_e
     gradients, nearest, forces : functions of a block of elements; they compute S q, p, the forces
     """
-    y, rhs, corners, geometry, allowed, work, first, last = simplex.arguments(
-        y_place, rhs_place, record, part, rows + 1, 1 + rows * rows
+    y, rhs, corners, geometry, allowed, work, count = simplex.arguments(
+        y_place, rhs_place, record, rows + 1, 1 + rows * rows
     )
     low, high = allowed[0], allowed[1]
     for lane in range(LANES):
         work[simplex.ENERGY * LANES + lane] = 0.0
-    for block in range(first, last):
+    for block in range(count):
         simplex.gather_edges(y, corners, block, rows, work)
         gradients(work, geometry, block)
         nearest(work, low, high)

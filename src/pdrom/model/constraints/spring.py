@@ -69,13 +69,13 @@ def _project_block(work, geometry, geometry_block, rest, rest_block):
 
 
 @local_kernel
-def _project(y_place, p_place, record, part):
-    y, _, corners, geometry, _, work, _, last = simplex.arguments(
-        y_place, p_place, record, part, 2, GEOMETRY
+def _project(y_place, p_place, record):
+    y, _, corners, geometry, _, work, count = simplex.arguments(
+        y_place, p_place, record, 2, GEOMETRY
     )
     elements, taken, taken_geometry = simplex.samples(record, 2, GEOMETRY)
     entries = rows.indices(record, TAKEN_REST + 1)
-    rest = rows.doubles(entries[REST_EDGES], last * REST * LANES)
+    rest = rows.doubles(entries[REST_EDGES], count * REST * LANES)
     taken_rest = rows.doubles(entries[TAKEN_REST], REST * LANES)
     p = rows.doubles(p_place, 3 * len(elements))
     for start in range(0, len(elements), LANES):
@@ -89,14 +89,14 @@ def _project(y_place, p_place, record, part):
 
 
 @local_kernel
-def _accumulate(y_place, rhs_place, record, part):
-    y, rhs, corners, geometry, _, _, first, last = simplex.arguments(
-        y_place, rhs_place, record, part, 2, GEOMETRY
+def _accumulate(y_place, rhs_place, record):
+    y, rhs, corners, geometry, _, _, count = simplex.arguments(
+        y_place, rhs_place, record, 2, GEOMETRY
     )
-    rest = rows.doubles(rows.indices(record, REST_EDGES + 1)[REST_EDGES], last * REST * LANES)
+    rest = rows.doubles(rows.indices(record, REST_EDGES + 1)[REST_EDGES], count * REST * LANES)
     none = arithmetic.constant(0.0)
     energies = none
-    for block in range(first, last):
+    for block in range(count):
         numbers = block * GEOMETRY * LANES
         for lane in range(0, LANES, WIDTH):
             a = block * 2 * LANES + lane
@@ -145,7 +145,6 @@ class EdgeSpring(simplex.SimplexGroup):
     rows_per_element = 1
     per_element = ("rest",)
     reordered = False  # the edges of a mesh are sorted by their vertices already
-    split_from = 8192
     _own_memory = REST * LANES
     project_kernel = _project
     accumulate_kernel = _accumulate

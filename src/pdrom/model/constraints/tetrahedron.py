@@ -146,13 +146,13 @@ def forces(work, geometry, block):
 
 
 @local_kernel
-def _project(y, p, record, part):
-    return singular_values.project(y, p, record, part, 3, gradients, _nearest)
+def _project(y, p, record):
+    return singular_values.project(y, p, record, 3, gradients, _nearest)
 
 
 @local_kernel
-def _accumulate(y, rhs, record, part):
-    return singular_values.accumulate(y, rhs, record, part, 3, gradients, _nearest, forces)
+def _accumulate(y, rhs, record):
+    return singular_values.accumulate(y, rhs, record, 3, gradients, _nearest, forces)
 
 
 @gradient_kernel
@@ -166,7 +166,6 @@ class TetrahedronGroup(singular_values.SingularValueGroup):
     cells = "tetrahedron"
     rows_per_element = 3
     work_size = svd3.SIZE
-    split_from = 1024
     project_kernel = _project
     accumulate_kernel = _accumulate
     gradient_kernel = _project_gradients

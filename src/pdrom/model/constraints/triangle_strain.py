@@ -125,13 +125,13 @@ def _nearest(work, low, high):
 
 
 @local_kernel
-def _project(y, p, record, part):
-    return singular_values.project(y, p, record, part, 2, gradients, _nearest)
+def _project(y, p, record):
+    return singular_values.project(y, p, record, 2, gradients, _nearest)
 
 
 @local_kernel
-def _accumulate(y, rhs, record, part):
-    return singular_values.accumulate(y, rhs, record, part, 2, gradients, _nearest, forces)
+def _accumulate(y, rhs, record):
+    return singular_values.accumulate(y, rhs, record, 2, gradients, _nearest, forces)
 
 
 @gradient_kernel
@@ -171,7 +171,6 @@ class TriangleStrain(singular_values.SingularValueGroup):
     cells = "triangle"
     rows_per_element = 2
     work_size = WORK
-    split_from = 4096
     project_kernel = _project
     accumulate_kernel = _accumulate
     gradient_kernel = _project_gradients

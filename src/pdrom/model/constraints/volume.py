@@ -40,13 +40,13 @@ def _nearest(work, low, high):
 
 
 @local_kernel
-def _project(y, p, record, part):
-    return singular_values.project(y, p, record, part, 3, gradients, _nearest)
+def _project(y, p, record):
+    return singular_values.project(y, p, record, 3, gradients, _nearest)
 
 
 @local_kernel
-def _accumulate(y, rhs, record, part):
-    return singular_values.accumulate(y, rhs, record, part, 3, gradients, _nearest, forces)
+def _accumulate(y, rhs, record):
+    return singular_values.accumulate(y, rhs, record, 3, gradients, _nearest, forces)
 
 
 @gradient_kernel
@@ -106,14 +106,14 @@ def _nearest_area(work, low, high):
 
 
 @local_kernel
-def _project_area(y, p, record, part):
-    return singular_values.project(y, p, record, part, 2, triangle_strain.gradients, _nearest_area)
+def _project_area(y, p, record):
+    return singular_values.project(y, p, record, 2, triangle_strain.gradients, _nearest_area)
 
 
 @local_kernel
-def _accumulate_area(y, rhs, record, part):
+def _accumulate_area(y, rhs, record):
     gradients, forces = triangle_strain.gradients, triangle_strain.forces
-    return singular_values.accumulate(y, rhs, record, part, 2, gradients, _nearest_area, forces)
+    return singular_values.accumulate(y, rhs, record, 2, gradients, _nearest_area, forces)
 
 
 @gradient_kernel

@@ -17,7 +17,7 @@ import numpy as np
 from pdrom.model.compiled import rows
 from pdrom.model.compiled.functions import clock, compiled, inner, now
 from pdrom.model.compiled.rows import WIDTH, empty, unflat, write, zeros
-from pdrom.model.constraints.local_kernel import LocalPass, add_part
+from pdrom.model.constraints.local_kernel import add_all, table_of
 from pdrom.model.dynamics.acceleration import NO_HISTORY, Anderson, combine, forget, refuse
 from pdrom.model.dynamics.sweeps import load, sweep
 from pdrom.model.dynamics.system import Elimination
@@ -91,11 +91,9 @@ class CompiledIterations:
     def __init__(
         self, local_steps: Sequence[Any], inertia: np.ndarray, acceleration: Anderson | None = None
     ) -> None:
-        local = self._pass = LocalPass([step.local_kernel for step in local_steps])
+        self._kernels = [step.local_kernel for step in local_steps]
         self._acceleration = acceleration
-        tables = (local.first, local.preparing, local.second)
-        second = (local.other, local.touched.start, local.touched.stop)
-        self.compiled_arguments = inertia, tables, second, clock()
+        self.compiled_arguments = inertia, table_of(self._kernels), clock()
 
     def takes(self, elimination: object) -> TypeGuard[Elimination]:
         """Return whether ``elimination`` is a factored system that compiled code can solve."""
@@ -127,18 +125,17 @@ class CompiledIterations:
         right = rows.empty(WIDTH * len(y))
         iterate, start = rows.flat(y), rows.flat(base)
         prediction = rows.flat(s) if tracked else start
-        inertia, tables, second, watch = self.compiled_arguments
+        inertia, table, watch = self.compiled_arguments
         all_iterations(
             (which.start, which.stop, iterations), iterate, prediction, start, right,
-            inertia, tables, second, elimination.factor, history, objective, seconds, watch,
+            inertia, table, elimination.factor, history, objective, seconds, watch,
         )  # fmt: skip
 
 
 @compiled(nogil=True)
 def all_iterations(
-    which, y, s, base, rhs, inertia, tables, second, factor, history, objective,
-    seconds, watch,
-):  # fmt: skip
+    which, y, s, base, rhs, inertia, table, factor, history, objective, seconds, watch
+):
     """Compute iterations of a frame in place, see `CompiledIterations.run`.
 
     Parameters
@@ -146,29 +143,18 @@ def all_iterations(
     which : (first, end, K): compute iterations first, ..., end - 1 of the K iterations of a frame
     y, s, base, rhs : iterate, prediction, (M/h^2) s, working array; flat rows of four numbers
     inertia : (N,) M/h^2, kg/s^2
-    tables : tables of a `LocalPass`: for first parts of local steps, preparation, second parts
-    second : array to which second parts add; first and end index of the vertices that they change
+    table : local kernels of all local steps, from `pdrom.model.constraints.local_kernel.table_of`
     factor : triangular factor of the global system (`pdrom.model.dynamics.solvers.Factor`)
     history : history of the acceleration; with `NO_HISTORY` its code is not compiled
     objective, seconds : arrays that receive results, as in `CompiledIterations.run`
     watch : buffer for the clock, from `pdrom.model.compiled.functions.clock`
     """
     first, end, iterations = which
-    local, preparing, kernels = tables
-    other, start, stop = second
     panels, vertices, loads, work = factor
     for k in range(first, end):
         before = now(watch)
         write(base, rhs)
-        add_part(preparing, y.ctypes.data, rhs.ctypes.data)
-        energy = add_part(local, y.ctypes.data, rhs.ctypes.data)
-        if stop > start:
-            # part 1 of the work (module `local_kernel`) adds to ``other``, which is added to rhs
-            for i in range(WIDTH * start, WIDTH * stop):
-                other[i] = 0.0
-            energy += add_part(kernels, y.ctypes.data, other.ctypes.data)
-            for i in range(WIDTH * start, WIDTH * stop):
-                rhs[i] += other[i]
+        energy = add_all(table, y, rhs)
         between = now(watch)
         seconds[1] += between - before
         value = np.nan
@@ -316,7 +302,7 @@ def _correct(y, floors, fixed, targets):
 @compiled(nogil=True)
 def _frames(
     positions, velocities, constants, rates, acceleration, h, fixed, targets, coupling, floors,
-    work, which, history, objective, seconds, inertia, tables, second, watch, factor,
+    work, which, history, objective, seconds, inertia, table, watch, factor,
 ):  # fmt: skip
     y, rhs = work
     beside, indptr, indices, data = coupling
@@ -334,8 +320,7 @@ def _frames(
             forget(history)
         seconds[f, 0] = now(watch) - began
         all_iterations(
-            which, y, s, base, rhs, inertia, tables, second, factor, history, objective[f],
-            seconds[f], watch,
+            which, y, s, base, rhs, inertia, table, factor, history, objective[f], seconds[f], watch
         )  # fmt: skip
         began = now(watch)
         if len(floors):

@@ -17,12 +17,10 @@ from pdrom.model.compiled.functions import clock, compiled, now
 from pdrom.model.compiled.rows import WIDTH, as_vertices, at, flat, shares, unflat
 from pdrom.model.constraints import local_kernel as kernels
 from pdrom.model.constraints.base import ConstraintGroup
-from pdrom.model.constraints.local_kernel import OWN, LocalKernel, LocalPass
+from pdrom.model.constraints.local_kernel import OWN, LocalKernel
 from pdrom.model.dynamics.stepper import LocalStep
 from pdrom.model.scene import Scene
 from pdrom.reduction.sampling.reduction import Reduction
-
-SPLIT_FROM = 1 << 17  # vertices times modes from which the kernel's work is done in two `PARTS`
 
 # Indices into the record (int64 array) of the kernel of `Lift`: numbers of modes, coefficient sets,
 # columns (see `Lift`), samples; addresses of the sampling kernel, of its record and of all arrays.
@@ -44,7 +42,7 @@ class Lift:
     axes, own_sets : (c,) for each reconstructed column (x, y, z): axis, set of its coefficients
     lifted : (c, N, r) S^T W V of each column
     offset : (4 N,) S^T W mean, flat, with a zero after the three numbers of each vertex
-    seconds : (2,) s, accumulated time of the reconstruction in each of the two `PARTS`
+    seconds : (1,) s, accumulated time of the reconstruction
     """
 
     starts: np.ndarray
@@ -62,23 +60,13 @@ class Lift:
     def kernel(self, sampler: LocalKernel, sampled: int) -> LocalKernel:
         """Compiled local step; ``sampler`` projects the sampled elements: ``sampled`` numbers."""
         columns, vertices, modes = self.lifted.shape
-        split = vertices * modes >= SPLIT_FROM
         numbers = (
             modes, len(self.shifts), columns, sampled, sampler.address, sampler.record.ctypes.data
         )  # fmt: skip
-        clocks = np.stack([clock(), clock()])
         # the kernel's record lists the arrays of `Lift` in the order of its fields
         own = vars(self).values()
-        arrays = (*own, np.empty(sampled), clocks, sampler.record, *sampler.arrays)
-        return LocalKernel(
-            _accumulate,
-            vertices,
-            units=vertices,
-            arrays=arrays,
-            numbers=numbers,
-            touched=(lambda first: np.arange(first, vertices)) if split else None,
-            prepares=True,
-        )
+        arrays = (*own, np.empty(sampled), clock(), sampler.record, *sampler.arrays)
+        return LocalKernel(_accumulate, vertices, arrays, numbers)
 
 
 @compiled(nogil=True)
@@ -111,52 +99,49 @@ def coefficients(sampled, starts, positions, packed, operators, shifts, result):
 
 
 @compiled(nogil=True)
-def lift(values, axes, own_sets, lifted, offset, first, last, rhs):
-    """Add S^T W (mean + V c) to the rows ``first`` to ``last`` - 1 of the right-hand side.
+def lift(values, axes, own_sets, lifted, offset, rhs):
+    """Add S^T W (mean + V c) to the right-hand side.
 
     values : (sets, r) coefficients
     axes, own_sets, lifted, offset : arrays of `Lift`
     rhs : (4 N,) right-hand side, flat, with a zero after the three numbers of each vertex
     """
-    for i in range(WIDTH * first, WIDTH * last):
+    for i in range(len(offset)):
         rhs[i] += offset[i]
     columns, vertices, modes = lifted.shape
     flat = lifted.reshape(columns * vertices * modes)
     for column in range(columns):
         own, axis, start = values[own_sets[column]], axes[column], column * vertices
-        for vertex in range(first, last - 2, 3):
+        for vertex in range(0, vertices - 2, 3):
             i = (start + vertex) * modes
             x, y, z = dots(flat, i, i + modes, i + 2 * modes, modes, own, (0.0, 0.0, 0.0))
             rhs[WIDTH * vertex + axis] += x
             rhs[WIDTH * (vertex + 1) + axis] += y
             rhs[WIDTH * (vertex + 2) + axis] += z
-        for vertex in range(last - (last - first) % 3, last):
+        for vertex in range(vertices - vertices % 3, vertices):
             i = (start + vertex) * modes
             rhs[WIDTH * vertex + axis] += dots(flat, i, i, i, modes, own, (0.0, 0.0, 0.0))[0]
 
 
 @kernels.local_kernel
-def _accumulate(y, rhs_place, record, part):
+def _accumulate(y, rhs_place, record):
     entries = rows.indices(record, SIZE)
     modes, sets, columns = entries[MODES], entries[SETS], entries[COLUMNS]
     values = rows.doubles(entries[COEFFICIENTS], sets * modes).reshape((sets, modes))
-    if part == kernels.PREPARE:
-        starts = rows.indices(entries[STARTS], sets + 1)
-        count = starts[sets]
-        projections = entries[PROJECTIONS]
-        kernels.call(entries[SAMPLER], y, projections, entries[SAMPLER_RECORD], kernels.PARTS[0])
-        coefficients(
-            rows.doubles(projections, entries[SAMPLED]),
-            starts,
-            rows.indices(entries[POSITIONS], count),
-            rows.doubles(entries[PACKED], count),
-            rows.doubles(entries[OPERATORS], count * modes),
-            rows.doubles(entries[SHIFTS], sets * modes).reshape((sets, modes)),
-            values,
-        )
-        return 0.0
+    starts = rows.indices(entries[STARTS], sets + 1)
+    count = starts[sets]
+    kernels.call(entries[SAMPLER], y, entries[PROJECTIONS], entries[SAMPLER_RECORD])
+    coefficients(
+        rows.doubles(entries[PROJECTIONS], entries[SAMPLED]),
+        starts,
+        rows.indices(entries[POSITIONS], count),
+        rows.doubles(entries[PACKED], count),
+        rows.doubles(entries[OPERATORS], count * modes),
+        rows.doubles(entries[SHIFTS], sets * modes).reshape((sets, modes)),
+        values,
+    )
     vertices = entries[kernels.VERTICES]
-    watch = rows.indices(entries[CLOCK] + 16 * part, 2)
+    watch = rows.indices(entries[CLOCK], 2)
     before = now(watch)
     lift(
         values,
@@ -166,11 +151,9 @@ def _accumulate(y, rhs_place, record, part):
             (columns, vertices, modes)
         ),
         rows.doubles(entries[OFFSET], WIDTH * vertices),
-        entries[kernels.FIRST + part],
-        entries[kernels.FIRST + part + 1],
         rows.doubles(rhs_place, WIDTH * vertices),
     )
-    rows.doubles(entries[SECONDS], 2)[part] += now(watch) - before
+    rows.doubles(entries[SECONDS], 1)[0] += now(watch) - before
     return np.nan
 
 
@@ -197,11 +180,9 @@ class ReducedLocalStep:
     def _take(self, group: ConstraintGroup, lift: Lift) -> None:
         self._group, self._lift = group.for_run(), lift
         self.local_kernel: LocalKernel | None = None
-        self._pass: LocalPass | None = None
         if self._group.local_kernel is not None:
             sampled = 3 * group.rows_per_element * len(self._elements)
             self.local_kernel = lift.kernel(self._group.sampler(self._elements), sampled)
-            self._pass = LocalPass([self.local_kernel])
 
     def for_run(self) -> Self:
         """Return the step with memory of its own for all that a run writes, matrices shared."""
@@ -216,8 +197,8 @@ class ReducedLocalStep:
 
     def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
         """Add the reduced S^T W p(``y``), (N, 3), to ``rhs``; return nan for the unknown energy."""
-        if self._pass is not None:
-            return self._pass.accumulate(y, rhs)
+        if self.local_kernel is not None:
+            return self.local_kernel.accumulate(y, rhs)
         self.solve(self.sample(y))
         self.lift(rhs)
         return float("nan")
@@ -238,17 +219,14 @@ class ReducedLocalStep:
         """Add S^T W (mean + V c) with the coefficients of the last `solve` to ``rhs`` (N, 3)."""
         data, right = self._lift, flat(rhs)
         added = right if shares(rhs, right) else np.zeros_like(right)
-        lift(
-            data.coefficients, data.axes, data.own_sets, data.lifted, data.offset, 0,
-            data.lifted.shape[1], added,
-        )  # fmt: skip
+        lift(data.coefficients, data.axes, data.own_sets, data.lifted, data.offset, added)
         if added is not right:
             rhs += unflat(added)
 
     @property
     def lift_seconds(self) -> float:
         """Accumulated time of the reconstruction, s."""
-        return float(self._lift.seconds.sum())
+        return float(self._lift.seconds[0])
 
     @lift_seconds.setter
     def lift_seconds(self, seconds: float) -> None:
@@ -281,7 +259,7 @@ def _lift(group: ConstraintGroup, reduction: Reduction) -> Lift:
         own_sets=np.array([k for _, k in columns], dtype=np.int64),
         lifted=lifted,
         offset=flat(as_vertices(operator @ mean.reshape(-1, 3))),
-        seconds=np.zeros(2),
+        seconds=np.zeros(1),
     )
 
 

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from pdrom.model.constraints.base import ConstraintGroup
-from pdrom.model.constraints.local_kernel import projections
 from pdrom.reduction.sampling.reduction import Reduction, element_rows
 from pdrom.reduction.subspace.columns import Columns
 
@@ -65,7 +64,7 @@ class InterpolatedLocalStep:
         if len(self._elements) == 0:
             return float("nan")
         count = self.group.rows_per_element * len(self._elements)
-        values = projections(self._sampler, self._rows @ y, count)
+        values = self._sampler.projections(self._rows @ y, count)
         coefficients = i.operator @ values.reshape(i.operator.shape[1], -1)
         rhs += (i.modes @ coefficients).reshape(rhs.shape)
         return float("nan")

@@ -17,7 +17,7 @@ from pdrom.model.compiled import rows
 from pdrom.model.compiled.functions import clock, now
 from pdrom.model.compiled.rows import as_vertices, vertices
 from pdrom.model.constraints.base import ConstraintGroup
-from pdrom.model.constraints.local_kernel import OWN, PREPARE, LocalKernel, call, local_kernel
+from pdrom.model.constraints.local_kernel import OWN, LocalKernel, call, local_kernel
 from pdrom.model.dynamics.space import VertexSpace
 from pdrom.model.dynamics.stepper import LocalStep, Stepper
 from pdrom.model.effects.base import Effect
@@ -37,9 +37,9 @@ _QUESTIONS = (
     ("begin_frame", "accumulate"), ("acceleration",),
     ("active", "held", "takes_hold", "anchor", "path"), ("apply",),
 )  # fmt: skip
-# Indices into the data array ("record") of a kernel with timers. Its entries are the addresses of
-# the kernel without timers, its record, the summed times, the clocks. SIZE: length of the array.
-KERNEL, RECORD, SECONDS, CLOCKS, SIZE = range(OWN, OWN + 5)
+# Indices into the data array ("record") of a kernel with a timer. Its entries are the addresses of
+# the kernel without a timer, its record, the summed time, the clock. SIZE: length of the array.
+KERNEL, RECORD, SECONDS, CLOCK, SIZE = range(OWN, OWN + 5)
 
 
 def variant(
@@ -96,7 +96,7 @@ def _each(call: Callable[..., object], arguments: Sequence[tuple]) -> None:
 class Timed:
     """Wrapper of an effect; adds up the time of the methods that the step loop calls.
 
-    local_kernel : for a constraint group, its kernel with timers in compiled code; else None
+    local_kernel : for a constraint group, its kernel with a timer in compiled code; else None
     """
 
     def __init__(self, effect: Effect, questions: Sequence[str]) -> None:
@@ -118,7 +118,7 @@ class Timed:
     @property
     def kernel_seconds(self) -> float:
         """Seconds spent in compiled code of the effect since the last call of `reset`."""
-        return float(self._kernel.sum())
+        return float(self._kernel[0])
 
     def reset(self) -> None:
         """Set all times to zero."""
@@ -233,19 +233,18 @@ def left_out(
 
 
 @local_kernel
-def _timed(y, rhs, record, part):
+def _timed(y, rhs, record):
     entries = rows.indices(record, SIZE)
-    watch = rows.indices(entries[CLOCKS] + 16 * part, 2)
+    watch = rows.indices(entries[CLOCK], 2)
     before = now(watch)
-    energy = call(entries[KERNEL], y, rhs, entries[RECORD], part)
-    rows.doubles(entries[SECONDS], PREPARE + 1)[part] += now(watch) - before
+    energy = call(entries[KERNEL], y, rhs, entries[RECORD])
+    rows.doubles(entries[SECONDS], 1)[0] += now(watch) - before
     return energy
 
 
 def timed(kernel: LocalKernel) -> tuple[LocalKernel, np.ndarray]:
-    """Return ``kernel`` with timers, and seconds (3,) spent in each of `PARTS` and in `PREPARE`."""
-    seconds, clocks = np.zeros(PREPARE + 1), np.stack([clock() for _ in range(PREPARE + 1)])
-    arrays = (seconds, clocks)
+    """Return ``kernel`` with a timer, and the seconds (1,) spent in it."""
+    arrays = seconds, _ = np.zeros(1), clock()
     places = [kernel.address, kernel.record.ctypes.data, *(array.ctypes.data for array in arrays)]
     record = np.concatenate([kernel.record[:OWN], np.array(places, dtype=np.int64)])
     same = copy(kernel)

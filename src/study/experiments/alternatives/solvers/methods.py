@@ -14,7 +14,7 @@ from pdrom.core.errors import SceneError
 from pdrom.model.compiled.arithmetic import add, add_scaled, constant
 from pdrom.model.compiled.functions import compiled, inner
 from pdrom.model.compiled.rows import WIDTH, at, load, store, unflat, write
-from pdrom.model.constraints.local_kernel import LocalPass
+from pdrom.model.constraints.local_kernel import add_all, table_of
 from pdrom.model.dynamics.acceleration import Anderson, combine, forget, refuse
 from pdrom.model.dynamics.frames import inertia_energy, weighted
 from pdrom.model.dynamics.sweeps import sweep
@@ -25,7 +25,6 @@ from pdrom.reduction.subspace.model import SubspaceModel
 from study.experiments.alternatives.solvers.substeps import (
     Alternative,
     Substeps,
-    add_projections,
     begin,
     end,
 )
@@ -45,11 +44,11 @@ class SmallSteps(Alternative):
     name = "projective"
 
     def _advance(self, part: Substeps) -> None:
-        _plain(*part, self.space.system.inertia, self.tables, self._factor(part))
+        _plain(*part, self.space.system.inertia, self.table, self._factor(part))
 
 
 @compiled(nogil=True)
-def _plain(y, v, acceleration, step, substeps, iterations, fixed, targets, inertia, tables, factor):
+def _plain(y, v, acceleration, step, substeps, iterations, fixed, targets, inertia, table, factor):
     panels, vertices, loads, work = factor
     before, s, rhs = np.empty(len(y)), np.empty(len(y)), np.empty(len(y))
     for _ in range(substeps):
@@ -57,7 +56,7 @@ def _plain(y, v, acceleration, step, substeps, iterations, fixed, targets, inert
         base = weighted(inertia, s)
         for _ in range(iterations):
             write(base, rhs)
-            add_projections(tables, y, rhs)
+            add_all(table, y, rhs)
             sweep(panels, vertices, loads, work, rhs, y)
         end(y, before, step, v)
 
@@ -72,13 +71,13 @@ class Accelerated(Alternative):
 
     def _advance(self, part: Substeps) -> None:
         self._history.begin_frame(part.y.reshape(-1, WIDTH))
-        inertia, tables = self.space.system.inertia, self.tables
-        _anderson(*part, inertia, tables, self._factor(part), self._history.history)
+        inertia, table = self.space.system.inertia, self.table
+        _anderson(*part, inertia, table, self._factor(part), self._history.history)
 
 
 @compiled(nogil=True)
 def _anderson(
-    y, v, acceleration, step, substeps, iterations, fixed, targets, inertia, tables, factor, history
+    y, v, acceleration, step, substeps, iterations, fixed, targets, inertia, table, factor, history
 ):
     panels, vertices, loads, work = factor
     before, s, rhs = np.empty(len(y)), np.empty(len(y)), np.empty(len(y))
@@ -88,7 +87,7 @@ def _anderson(
         forget(history)
         for k in range(iterations):
             write(base, rhs)
-            objective = add_projections(tables, y, rhs) + inertia_energy(y, s, inertia)
+            objective = add_all(table, y, rhs) + inertia_energy(y, s, inertia)
             if not refuse(history, y, objective):
                 sweep(panels, vertices, loads, work, rhs, y)
                 # no extrapolation after the last iteration, as it could raise the objective
@@ -103,12 +102,12 @@ class Chebyshev(Alternative):
     name = "chebyshev"
 
     def _advance(self, part: Substeps) -> None:
-        _chebyshev(*part, self.space.system.inertia, self.tables, self._factor(part))
+        _chebyshev(*part, self.space.system.inertia, self.table, self._factor(part))
 
 
 @compiled(nogil=True)
 def _chebyshev(
-    y, v, acceleration, step, substeps, iterations, fixed, targets, inertia, tables, factor
+    y, v, acceleration, step, substeps, iterations, fixed, targets, inertia, table, factor
 ):
     panels, vertices, loads, work = factor
     before, s, rhs = np.empty(len(y)), np.empty(len(y)), np.empty(len(y))
@@ -120,7 +119,7 @@ def _chebyshev(
         write(y, last)
         for k in range(iterations):
             write(base, rhs)
-            add_projections(tables, y, rhs)
+            add_all(table, y, rhs)
             write(y, image)
             sweep(panels, vertices, loads, work, rhs, image)
             if k == PLAIN:
@@ -175,7 +174,7 @@ class TwoLevel(Alternative):
         inertia = (span * (scene.masses / self.time_step**2)) @ span.T
         inverse = linalg.inv(inertia + rows.T @ (self._group.system_matrix() @ rows))
         assert self._group.local_kernel is not None
-        self._sampled = LocalPass([self._group.local_kernel])
+        self._sampled = table_of([self._group.local_kernel])
         self._matrices = tuple(
             np.ascontiguousarray(m) for m in (span.T, image, rows, inverse @ rows.T, inverse)
         )
@@ -186,15 +185,14 @@ class TwoLevel(Alternative):
         y = unflat(part.y)
         self._history.begin_frame(part.y.reshape(-1, WIDTH))
         self._group.begin_frame(y[self._vertices])
-        tables = self._sampled.first, self._sampled.preparing, self._sampled.second
-        coarse = (*self._matrices, self._vertices, tables, self._inner.history)
+        coarse = (*self._matrices, self._vertices, self._sampled, self._inner.history)
         inertia = self.space.system.inertia
-        _two_level(*part, inertia, self.tables, self._factor(part), self._history.history, coarse)
+        _two_level(*part, inertia, self.table, self._factor(part), self._history.history, coarse)
 
 
 @compiled(nogil=True)
 def _two_level(
-    y, v, acceleration, step, substeps, iterations, fixed, targets, inertia, tables, factor,
+    y, v, acceleration, step, substeps, iterations, fixed, targets, inertia, table, factor,
     history, coarse,
 ):  # fmt: skip
     panels, vertices, loads, work = factor
@@ -206,7 +204,7 @@ def _two_level(
         forget(history)
         for k in range(iterations):
             write(base, rhs)
-            objective = add_projections(tables, y, rhs) + inertia_energy(y, s, inertia)
+            objective = add_all(table, y, rhs) + inertia_energy(y, s, inertia)
             # 0: test also the iterate after the first correction, which may raise the objective
             if refuse(history, y, objective, 0):
                 write(plain, y)
@@ -222,13 +220,13 @@ def _two_level(
 @inner
 def _correct(coarse, start, image):
     """Correct ``image`` = G(y) on the ``coarse`` level, as in `TwoLevel`; ``start`` is y."""
-    span, duals, rows, steps, inverse, vertices, tables, history = coarse
+    span, duals, rows, steps, inverse, vertices, table, history = coarse
     size, sampled = WIDTH * span.shape[1], WIDTH * len(vertices)
     step, x, at_start = np.zeros(size), np.empty(sampled), np.zeros(sampled)
     _add_product(duals, image - start, step)
     for i in range(len(vertices)):
         store(x, WIDTH * i, load(start, WIDTH * vertices[i]))
-    add_projections(tables, x, at_start)
+    add_all(table, x, at_start)
     first, z, moved, forces = np.zeros(size), np.empty(size), np.empty(sampled), np.empty(sampled)
     _add_product(inverse, step, first)
     write(first, z)
@@ -238,7 +236,7 @@ def _correct(coarse, start, image):
         for i in range(sampled):
             moved[i], forces[i] = x[i], 0.0
         _add_product(rows, z, moved)
-        add_projections(tables, moved, forces)
+        add_all(table, moved, forces)
         for i in range(sampled):
             forces[i] -= at_start[i]
         write(first, z)
@@ -292,18 +290,18 @@ class Explicit(Alternative):
         part.v.reshape(-1, WIDTH)[fixed, :3] = speed
         inverse = 1.0 / self.masses
         inverse[fixed] = 0.0  # fixed vertices are not accelerated
-        _explicit(*part[:5], inverse, self.tables, self._stiffness)
+        _explicit(*part[:5], inverse, self.table, self._stiffness)
         rows[fixed, :3] = part.targets
 
 
 @compiled(nogil=True)
-def _explicit(y, v, acceleration, step, substeps, inverse, tables, stiffness):
+def _explicit(y, v, acceleration, step, substeps, inverse, table, stiffness):
     pull, elastic = np.empty(len(y)), np.empty(len(y))
     for _ in range(substeps):
         for k in range(len(y)):
             y[k] += 0.5 * step * v[k]
             pull[k] = 0.0
-        add_projections(tables, y, pull)
+        add_all(table, y, pull)
         _multiply(stiffness, y, elastic)
         for i in range(len(inverse)):
             if inverse[i] > 0.0:

@@ -17,7 +17,7 @@ from pdrom.core.errors import SceneError
 from pdrom.core.registry import Registry
 from pdrom.model.compiled.functions import inner
 from pdrom.model.compiled.rows import WIDTH, as_vertices, flat, write
-from pdrom.model.constraints.local_kernel import LocalPass, add_part
+from pdrom.model.constraints.local_kernel import table_of
 from pdrom.model.dynamics.solvers import Factor
 from pdrom.model.dynamics.space import VertexSpace
 from pdrom.model.dynamics.stepper import PHASES, FrameReport, State, Stepper
@@ -86,9 +86,7 @@ class Alternative(Stepper):
         for group, kernel in zip(scene.groups, kernels, strict=True):
             if kernel is None:
                 raise SceneError(named % group.name + "needs a compiled local step")
-        # keep the kernels: `self.tables` contains addresses of their memory
-        self._kernels = local = LocalPass(kernels)
-        self.tables = local.first, local.preparing, local.second
+        self._kernels, self.table = kernels, table_of(kernels)
         self._prepare(scene)
 
     def _prepare(self, scene: Scene) -> None:
@@ -167,16 +165,3 @@ def end(y, before, step, v):
     """Set velocities ``v`` to (``y`` - ``before``) / ``step``; ``step`` is the duration in s."""
     for k in range(len(y)):
         v[k] = (y[k] - before[k]) / step
-
-
-@inner
-def add_projections(tables, y, rhs):
-    """Add S^T W p(y) of all groups to ``rhs``; return their potential energy (see the module), J.
-
-    ``y`` and ``rhs`` (4 N,) have x, y, z and 0 of each vertex; ``tables`` are from `LocalPass`.
-    """
-    first, preparing, second = tables
-    y_place, rhs_place = y.ctypes.data, rhs.ctypes.data
-    add_part(preparing, y_place, rhs_place)
-    energy = add_part(first, y_place, rhs_place)
-    return energy + add_part(second, y_place, rhs_place)

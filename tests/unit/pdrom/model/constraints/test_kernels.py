@@ -1,7 +1,6 @@
 """Compiled kernels against the NumPy reference, and projections against their definition.
 
-Elements of an unstructured mesh are visited in an order of their own, which nobody sees. The split
-of large groups into two parts is only a matter of order.
+Elements of an unstructured mesh are visited in an order of their own, which nobody sees.
 """
 
 import numpy as np
@@ -11,11 +10,8 @@ from hypothesis import strategies as st
 
 from builders import GRAVITY, GROUPS, LEFT, call_kernel, make_scene
 from pdrom.model.constraints.base import ConstraintGroup
-from pdrom.model.constraints.local_kernel import projections
 from pdrom.model.constraints.simplex import visiting_order
-from pdrom.model.effects import EFFECTS
 from pdrom.model.mesh.generators import bar, cloth
-from pdrom.model.scene import Scene
 from study.experiments.timing import IMPLEMENTATIONS
 
 STATES = {
@@ -132,7 +128,7 @@ def test_what_others_see_is_in_the_order_of_the_mesh(effect):
     expected = group.reference_project(d, every).reshape(-1, 3)
     assert group.project(y) == pytest.approx(expected, abs=1e-11)
     some = rng.permutation(every)[:70]
-    p = projections(group.sampler(some), y, 70 * group.rows_per_element)
+    p = group.sampler(some).projections(y, 70 * group.rows_per_element)
     rows = (group.rows_per_element * some[:, None] + np.arange(group.rows_per_element)).ravel()
     assert p == pytest.approx(expected[rows], abs=1e-11)
     rhs = np.zeros_like(y)
@@ -142,47 +138,17 @@ def test_what_others_see_is_in_the_order_of_the_mesh(effect):
     assert energy == pytest.approx(0.5 * np.sum(weights * (group.S @ y - expected) ** 2), rel=1e-9)
 
 
-SPLIT = [name for name in sorted(GROUPS) if hasattr(EFFECTS.load(name), "split_from")]
-
-
-@pytest.mark.parametrize("name", SPLIT)
-def test_parts_change_the_order_of_summation_only(name, rng, monkeypatch):
-    """A group that counts as large or not, on a mesh of several blocks."""
-    mesh = {**GROUPS[name], "rows": 9, "columns": 8} if "rows" in GROUPS[name] else GROUPS[name]
-    scene = make_scene({"effect": name, "weight": 1e4}, mesh=mesh)
-    y = scene.mesh.points + 0.05 * rng.standard_normal(scene.mesh.points.shape)
-    sums = []
-    for large in (10**9, 2):
-        monkeypatch.setattr(type(scene.groups[0]), "split_from", large)
-        group = Scene.build(scene.config, scene.mesh).groups[0].for_run()
-        assert bool(group.local_kernel.touched) == (large == 2)
-        group.begin_frame(y)
-        rhs = np.zeros_like(y)
-        sums.append((group.accumulate(y, rhs), rhs))
-    assert sums[0][0] == pytest.approx(sums[1][0], rel=1e-13)
-    assert np.abs(sums[0][1] - sums[1][1]).max() <= 1e-13 * np.abs(sums[0][1]).max()
-
-
-def test_compiled_iterations_add_both_parts(monkeypatch):
-    """All groups of a scene, several frames: without the compiled loop each adds its own parts."""
-    mesh = {"kind": "cloth", "rows": 9, "columns": 8, "plane": "xz", "wave": 0.1}
+def test_compiled_iterations_add_all_groups():
+    """Several frames: without the compiled loop, Python code calls each group's kernel."""
     effects = [{"effect": name, "weight": 1e3} for name in ("bending", "spring", "strain")]
-    scene = make_scene(GRAVITY, LEFT, *effects, mesh=mesh)
-    for group in scene.groups:
-        monkeypatch.setattr(type(group), "split_from", 2)
-    scene = Scene.build(scene.config, scene.mesh)
-    compiled, plain = scene.stepper(scene.system), scene.stepper(scene.system)
+    scene = make_scene(GRAVITY, LEFT, *effects, mesh=GROUPS["bending"])
+    compiled, plain = scene.stepper(), scene.stepper()
     assert compiled._compiled is not None
-    assert all(group.local_kernel.touched for group in compiled.local_steps)
     plain._compiled = plain._whole = None
-    states = [scene.initial_state(), scene.initial_state()]
+    state = other = scene.initial_state()
     for frame in range(5):
-        states = [
-            loop.step(state, frame)[0]
-            for loop, state in zip((compiled, plain), states, strict=True)
-        ]
-    moved = np.abs(states[0].positions - scene.mesh.points).max()
-    assert np.abs(states[0].positions - states[1].positions).max() <= 1e-11 * moved
+        state, other = compiled.step(state, frame)[0], plain.step(other, frame)[0]
+    np.testing.assert_array_equal(state.positions, other.positions)
 
 
 def test_a_group_without_a_kernel_writes_its_own_local_step():
