@@ -28,9 +28,8 @@ NEAR_POLE = 1e-4
 WEIGHT, MAGNITUDE, REST, POLE, MANIFOLD = 0, 1, 2, 5, 8
 # Offsets in a working array, SIZE numbers per lane: H(q), projection p, cosine of H and the POLE
 H, P, HEIGHT, SIZE = 0, 3, 6, 7
-# Indices into a kernel's record: numbers of blocks, of all elements and of those to project;
-# addresses of the CSR arrays of S, packed numbers, working array, elements to project, memory for
-# their packed numbers.
+# Indices into a kernel's record: numbers of blocks, elements, elements to project; addresses of the
+# CSR arrays of S, packed numbers, working array, elements to project, memory for their numbers.
 BLOCKS, ELEMENTS, COUNT, START, INDICES, DATA = range(OWN, OWN + 6)
 SPHERES, WORK, SAMPLED, TAKEN, ARRAYS = range(OWN + 6, OWN + 11)
 
@@ -124,10 +123,7 @@ def _arguments(y_place, record):
 
 @kernels.local_kernel
 def project_vertices(y_place, p_place, record):
-    """Write the projections p (m, 3) of the m elements that the ``record`` lists; return 0.
-
-    ``y_place``, ``p_place``, ``record`` are addresses.
-    """
+    """Write projections p (m, 3) of the m elements that ``record`` lists; arguments: addresses."""
     y, start, indices, data, manifold, work = _arguments(y_place, record)
     entries = rows.indices(record, ARRAYS)
     count = entries[COUNT]

@@ -86,7 +86,7 @@ class Alternative(Stepper):
         for group, kernel in zip(scene.groups, kernels, strict=True):
             if kernel is None:
                 raise SceneError(named % group.name + "needs a compiled local step")
-        self._kernels, self.table = kernels, table_of(kernels)
+        self.table = table_of(kernels)  # the local steps keep the kernels
         self._prepare(scene)
 
     def _prepare(self, scene: Scene) -> None:
