@@ -178,11 +178,18 @@ STEPS = {
     "whole elements for single entries": ("deim", "block-deim"),
     "three elements a mode for one": ("block-deim", "gappy"),
 }
-# Change -> methods of table ladder before and after it: one set of coefficients for x, y and z, or
-# whole elements sampled instead of single rows (compared only if elements have several rows).
+# Change -> methods of table ladder before and after it: one set of coefficients for x, y and z,
+# three elements a mode for one, or whole elements sampled instead of single rows (compared only if
+# elements have several rows).
 SQUARE = {
     "shared coefficients, single rows": ("single rows, separate", "single rows, shared"),
     "shared coefficients, whole elements": ("whole elements, separate", "whole elements, shared"),
+    "shared coefficients, three elements": ("three elements, separate", "three elements, shared"),
+    "three elements, separate coefficients": (
+        "whole elements, separate",
+        "three elements, separate",
+    ),
+    "three elements, shared coefficients": ("whole elements, shared", "three elements, shared"),
     "whole elements, separate coefficients": ("single rows, separate", "whole elements, separate"),
     "whole elements, shared coefficients": ("single rows, shared", "whole elements, shared"),
 }
@@ -209,6 +216,9 @@ share = partial(number, compared="share")
         count("scenes", "scenes among them"),
         count("failing", "pairs whose error before exceeds a tenth"),
         count("rescued", "pairs among these whose error after does not"),
+        count("failing_after", "pairs whose error after exceeds a tenth"),
+        share("error_before", "median of the error before; inf for a run that ended early"),
+        share("error_after", "median of the error after"),
         share("gain_ratio", "median of the gain after over that before"),
         share("error_ratio", "median of the error of the run after over that before"),
         *declaration.interval("error_ratio_low error_ratio_high", share),
@@ -303,6 +313,9 @@ def _summary(pairs: pd.DataFrame) -> Mapping[str, float]:
         "scenes": pairs.scene.nunique(),
         "failing": int(failing.sum()),
         "rescued": int((failing & (pairs.error_after <= FAILED)).sum()),
+        "failing_after": int((pairs.error_after > FAILED).sum()),
+        "error_before": float(pairs.error_before.median()),
+        "error_after": float(pairs.error_after.median()),
         "gain_ratio": float(pairs.gain.median()),
         "error_ratio": float(pairs.error.median()),
         "error_ratio_low": float(low),

@@ -71,6 +71,8 @@ def test_samples_and_coefficients_are_exchanged_at_equal_entries():
             ("single rows, shared", 50.0, 0.05),
             ("whole elements, separate", 100.0, 0.6),
             ("whole elements, shared", 8.0, 0.05),
+            ("three elements, separate", 10.0, 0.3),
+            ("three elements, shared", 4.0, 0.02),
         )
     ]
     twins = [t.assign(scene="calm_twin")[t.scene == "calm"] for t in (reruns, reconstruction)]
@@ -82,6 +84,15 @@ def test_samples_and_coefficients_are_exchanged_at_equal_entries():
     elements = table.loc["whole elements, separate coefficients"]
     # the gain falls tenfold and the error does not
     assert (elements.pairs, elements.families, elements.unexplained_share) == (2, 1, 1.0)
+    # the four cells of coefficients by samples: elements of a single row count, too
+    names = ["pairs", "failing", "failing_after", "error_before", "error_after"]
+    one, three = (
+        table.loc[f"shared coefficients, {n} elements", names] for n in ("whole", "three")
+    )
+    assert (one.tolist(), three.tolist()) == ([3, 3, 0, 0.6, 0.05], [3, 3, 0, 0.3, 0.02])
+    samples = table.loc[[f"three elements, {kind} coefficients" for kind in ("separate", "shared")]]
+    assert samples.error_ratio.tolist() == pytest.approx([0.5, 0.4])
+    assert samples[["failing", "rescued"]].to_numpy().tolist() == [[3, 0], [0, 0]]
 
 
 def test_interventions_compare_runs_on_one_basis():
