@@ -206,8 +206,8 @@ class Ladder(Repetitions):
     up : methods, the published one first, each with one more change; the last is called sound
     down : methods that differ from the sound one in one choice each
     square : methods with separate or with shared coefficients, which sample single rows or whole
-        elements, each at all ``sizes``; p single rows replace an element of p rows, so that numbers
-        of entries are equal
+        elements, one or more for each mode, each at all ``sizes``; p single rows replace an element
+        of p rows, so that numbers of entries are equal
     """
 
     r: Annotated[int, Field(ge=1, le=100_000)] = 20

@@ -173,13 +173,13 @@ class Reduction:
 
         With several sets of coefficients it is the largest.
 
-        For orthonormal V the reconstruction p^ of p satisfies || p - p^ || <= gain
-        || (I - V V^T)(p - mean) || (Chaturantabut and Sorensen 2010, lemma 3.2), also for separate
-        axes, where the parts V_a of V have norm at most 1. The Tikhonov solution is no projection:
-        its gain is the norm of its operator, the factor in the bound is sqrt(1 + gain^2), and a
-        bias is added. With mass weighting V is orthonormal in the mass inner product, and the
-        factor in that norm is || (P^T V)^+ P^T M^(-1/2) ||_2; the gain remains the amplification of
-        sampled values.
+        For orthonormal V and distinct rows the reconstruction p^ of p satisfies || p - p^ || <=
+        gain || (I - V V^T)(p - mean) || (Chaturantabut and Sorensen 2010, lemma 3.2), also for
+        separate axes, where the parts V_a of V have norm at most 1. The Tikhonov solution is no
+        projection: its gain is the norm of its operator, the factor in the bound is
+        sqrt(1 + gain^2), and a bias is added. For rows taken up to m times sqrt(m) gain replaces
+        gain. With mass weighting V is orthonormal in the mass inner product, and the factor in that
+        norm is || (P^T V)^+ P^T M^(-1/2) ||_2; the gain remains that of sampled values.
         """
         return self._norms[0]
 

@@ -145,7 +145,6 @@ def test_the_square_samples_as_many_entries_for_separate_and_shared_coefficients
             basis = compute_basis(snapshots, np.ones(20 * p), 0.0, p, method)
             reduction = Reduction(basis, select(basis, method, 5), method, 5)
             entries.append(sum(len(block.entries) for block in reduction.blocks))
-    # six methods at each of the sizes, of which the last two sample three elements for each mode
     assert entries == [3 * p * 5 * n for n in (1, 1, 1, 1, 3, 3)] * len(LADDER.sizes)
 
 
