@@ -163,6 +163,7 @@ def break_even(r: Sequence[int], ratio: Sequence[float]) -> int | None:
     title="Where reductions pay and where they lose to the full order",
     columns=(
         MEASURE,
+        REFERENCE,
         *shared("position_basis method"),
         count("scenes", "scenes (and groups) with a timed run and a known enough reference"),
         count("accurate", "those with a run within a tenth of the converged one"),
@@ -203,7 +204,7 @@ def payoff(reruns: pd.DataFrame, points: pd.DataFrame, effects: pd.DataFrame) ->
         judged = judged_by(against_converged(reruns), measure, FAILED)
         fewer = judged_by(_fewer(points), measure, FAILED)
         found += [{"measure": measure, **row} for row in _summaries(judged, fewer, weak)]
-    return pd.DataFrame(found)
+    return pd.DataFrame(found).assign(reference=CONVERGED)
 
 
 def _summaries(

@@ -21,7 +21,16 @@ from study.artifact import paths
 from study.artifact.reads import EachOf, Every, TableOf
 from study.tables.kit import declaration
 from study.tables.kit.declaration import count, flag, integer, number, shared, table, text
-from study.tables.kit.results import FAILED, RESAMPLES, SEED, families, joined, judged_runs
+from study.tables.kit.results import (
+    FAILED,
+    ITERATIONS,
+    REFERENCE,
+    RESAMPLES,
+    SEED,
+    families,
+    joined,
+    judged_runs,
+)
 
 _SMALL = "empty at round-off level"
 _CELL = ["scene", "group", "method", "r", "varied"]
@@ -102,13 +111,14 @@ def sensitivity(parts: list[paths.File]) -> pd.DataFrame:
         # modes made of round-off, and thus their gain (error amplification), depend on the machine
         replace(*shared("gain"), compared="skipped"),
         *shared("frames finite blowup_frame"),
+        REFERENCE,
         number("relative_error", "error of the positions over all frames up to the horizon"),
     ),
     reads={"parts": Every(paths.NOISE)},
 )
 def noise(parts: list[paths.File]) -> pd.DataFrame:
     """Rows of files ``parts``, one per scene and group: runs with bases made of round-off."""
-    return joined(parts)
+    return joined(parts).assign(reference=ITERATIONS)
 
 
 @table(
@@ -118,6 +128,7 @@ def noise(parts: list[paths.File]) -> pd.DataFrame:
         text("varied", "training (frames), start; held-out motions, with the number trained on"),
         integer("repetitions", "runs; their range encloses the median of all but by 2^(1 - n)"),
         integer("ended", "runs that ended early, with an infinite error", compared="error"),
+        REFERENCE,
         number("error_median", "median of the errors of the positions before the horizon"),
         *declaration.extremes("error"),
         number("gain_median", "median of the gains"),
@@ -140,7 +151,8 @@ def repetitions(parts: list[paths.File]) -> pd.DataFrame:
     found = {f"{n}_{end}": (n, how) for n in ("error", "gain") for end, how in ends.items()}
     made = cells.agg(repetitions=("error", "size"), **found)
     made["ended"] = rows.error.isin([float("inf")]).groupby([rows[c] for c in _CELL]).sum()
-    return made.assign(spread=made.error_high / made.error_low).reset_index()
+    made = made.assign(spread=made.error_high / made.error_low, reference=ITERATIONS)
+    return made.reset_index()
 
 
 @table(
@@ -160,7 +172,9 @@ def repetitions(parts: list[paths.File]) -> pd.DataFrame:
         *shared("gain"),
         number("error_train", "reconstruction error of the training snapshots"),
         number("error_heldout", "the same of the held-out motion"),
-        *shared("finite blowup_frame relative_error_within_horizon"),
+        *shared("finite blowup_frame"),
+        REFERENCE,
+        *shared("relative_error_within_horizon"),
         integer("repetitions", "runs trained on other frames, where they were repeated"),
         number("error_median", "median of their errors; inf for a run that ended early"),
         *declaration.extremes("error"),
@@ -170,7 +184,7 @@ def repetitions(parts: list[paths.File]) -> pd.DataFrame:
 )
 def ladder(parts: list[paths.File]) -> pd.DataFrame:
     """Join the tables in the files ``parts``, one for each scene and group, in their order."""
-    return joined(parts)
+    return joined(parts).assign(reference=ITERATIONS)
 
 
 # Step that changes samples, in table gain_interventions -> (method before it, method after it).
@@ -219,6 +233,7 @@ share = partial(number, compared="share")
         count("failing_after", "pairs whose error after exceeds a tenth"),
         share("error_before", "median of the error before; inf for a run that ended early"),
         share("error_after", "median of the error after"),
+        REFERENCE,
         share("gain_ratio", "median of the gain after over that before"),
         share("error_ratio", "median of the error of the run after over that before"),
         *declaration.interval("error_ratio_low error_ratio_high", share),
@@ -252,7 +267,7 @@ def gain_interventions(
             if len(own):
                 labels = {"step": name, "mesh": mesh, "method_before": before}
                 rows.append({**labels, "method_after": after, **_summary(own)})
-    return pd.DataFrame(rows)
+    return pd.DataFrame(rows).assign(reference=ITERATIONS)
 
 
 def _steps(

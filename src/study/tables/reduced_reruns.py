@@ -185,6 +185,7 @@ FRAGILE = 0.005
         number("stiffness_ratio", "factor on the weights of the reduced groups", compared="exact"),
         *shared("finite blowup_frame max_extent energy_ratio gain group position_basis k"),
         text("experiment", "rerun (of the study) or sweep (a short run)"),
+        REFERENCE,
         *shared("relative_error"),
         text("outcome", f"one of: {', '.join(OUTCOMES)}", compared="error"),
     ),
@@ -215,7 +216,7 @@ def stability(
     runs = pd.concat([_full_order_rows(files["full_order"]), reruns], ignore_index=True)
     runs = runs.assign(h=runs.scene.map(time_steps), stiffness_ratio=1.0, experiment="rerun")
     rows = pd.concat([runs, joined(files["sweeps"]).assign(experiment="sweep")], ignore_index=True)
-    return rows.assign(outcome=outcomes(rows, wrong, departure))
+    return rows.assign(outcome=outcomes(rows, wrong, departure), reference=ITERATIONS)
 
 
 def outcomes(runs: pd.DataFrame, wrong: float, departure: float) -> list[str]:

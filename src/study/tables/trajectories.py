@@ -27,6 +27,7 @@ MOTION = text("motion", f"how it differs from the training one: {', '.join(MOTIO
             "over the norm of the displacement, in all frames",
         ),
         number("affine", "the same of the best affine images"),
+        REFERENCE,
         number("replay_error", "position error if the training trajectory is replayed instead"),
         number("replay_deformation_error", "its deformation error"),
         number("full_order_error", "position error of the run with the scene's iterations"),
@@ -39,7 +40,7 @@ MOTION = text("motion", f"how it differs from the training one: {', '.join(MOTIO
 def test_trajectories(references: list[File]) -> pd.DataFrame:
     """One row per scene and held-out motion; errors are before the horizon, of converged runs."""
     rows = joined(references)
-    return rows[rows.motion != TRAIN]
+    return rows[rows.motion != TRAIN].assign(reference=CONVERGED)
 
 
 @table(
