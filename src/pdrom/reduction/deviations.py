@@ -1,7 +1,7 @@
 """Deviations of a run from the full-order run: norms in each frame, and errors over all frames.
 
 Positions, velocities, shapes (the difference after the best rigid motion of each frame, Kabsch
-1976), the total energy, and the frame of first contact with an obstacle are compared.
+1976) and the total energy are compared.
 """
 
 from collections.abc import Mapping
@@ -24,20 +24,16 @@ from pdrom.model.runs import BLOWUP_EXTENT
 from pdrom.model.scene import Scene
 from pdrom.reduction.rerun import Rerun, displacement_norms, rerun, step_norms
 
-# A vertex touches an obstacle if it is closer than this fraction of the mesh's longest side, since
-# a subspace model does not place vertices exactly on the surface.
-TOUCH = 1e-3
-
 # Names of series over frames: of a full-order run; of another run, or its difference from it.
 CONVERGED = ("displacement_converged", "deformed_converged")
-REFERENCE = ("displacement", "deformed", "step", "energy", "contact", *CONVERGED)
+REFERENCE = ("displacement", "deformed", "step", "energy", *CONVERGED)
 DEVIATIONS = (
-    "difference", "shape_difference", "step_difference", "energy", "contact",
-    "difference_converged", "shape_difference_converged",
+    "difference", "shape_difference", "step_difference", "energy", "difference_converged",
+    "shape_difference_converged",
 )  # fmt: skip
 ERRORS = (
     "relative_error_within_horizon", "deformation_error", "error_over_extent", "shape_error",
-    "velocity_error", "energy_drift", "contact_delay", "error_converged", "deformation_converged",
+    "velocity_error", "energy_drift", "error_converged", "deformation_converged",
 )  # fmt: skip
 Series = Mapping[str, np.ndarray]
 
@@ -85,18 +81,16 @@ class Yardstick:
 
         ``displacement`` and ``deformed`` (F,) m; ``step`` (F,) m, norm of time step times
         velocities; ``energy`` in every `STRIDE`-th frame and the last, scaled by `scale`;
-        ``contact`` (F,), 1 at contact; `CONVERGED`: the first two of the converged run, empty
-        without it.
+        `CONVERGED`: the first two of the converged run, empty without it.
         """
         limit = self.converged
         others = [np.zeros(0)] * 2 if limit is None else [limit.displacement, limit.deformed]
-        blocks = [q for q, _ in _blocks(self.reference, self.reference)]
+        blocks = _blocks(self.reference, self.reference)
         return {
             "displacement": self.displacement,
             "deformed": self.deformed,
-            "step": np.concatenate([step_norms(q) for q in blocks]),
+            "step": np.concatenate([step_norms(q) for q, _ in blocks]),
             "energy": self.scale.own,
-            "contact": np.concatenate([self._touched(q[1:]) for q in blocks]),
             **dict(zip(CONVERGED, others, strict=True)),
         }
 
@@ -125,15 +119,15 @@ class Yardstick:
 
     @property
     def units(self) -> dict[str, float]:
-        """Extent norm and `rest_size`, m, and time step, s: keyword arguments of `errors_within`.
+        """Extent norm and `rest_size`, m: keyword arguments of `errors_within`.
 
         The extent norm is the Frobenius norm of a shift of all N vertices by the mesh's longest
         side: sqrt(N) times that side.
         """
-        mesh, step = self.scene.mesh, self.scene.config.time_step
+        mesh = self.scene.mesh
         size = rest_size(mesh.points, self.scene.masses)
         norm = mesh.extent * float(np.sqrt(mesh.vertices))
-        return {"extent_norm": norm, "rest_norm": size, "time_step": step}
+        return {"extent_norm": norm, "rest_norm": size}
 
     def errors(self, positions: np.ndarray, end: int) -> tuple[float | None, float | None]:
         """Position and deformation error of ``positions`` (F' + 1, N, 3) m before frame ``end``.
@@ -160,16 +154,15 @@ class Yardstick:
         """Deviations in each of the F' frames of the run ``outcome`` from the full-order run.
 
         ``difference``, ``shape_difference`` (without rigid motion), ``step_difference`` (of changes
-        of the positions in a frame): (F',) m, norms of the differences of both runs. Two series are
-        of ``outcome`` alone: ``energy``, every `STRIDE`-th frame and its last, scaled by `scale`
-        (empty if the full order's is round-off); ``contact`` (F',), 1 where a vertex touches. The
-        first two are also given from the converged run (empty without it).
+        of the positions in a frame): (F',) m, norms of the differences of both runs. ``energy`` is
+        of ``outcome`` alone: every `STRIDE`-th frame and its last, scaled by `scale` (empty if the
+        full order's is round-off). The first two are also given from the converged run (empty
+        without it).
         """
-        steps, contacts, limit = [], [], self.converged
+        limit = self.converged
         with np.errstate(over="ignore", invalid="ignore"):
-            for q, p in _blocks(outcome.positions, self.reference):
-                steps.append(step_norms(q - p))
-                contacts.append(self._touched(q[1:]))
+            blocks = _blocks(outcome.positions, self.reference)
+            steps = [step_norms(q - p) for q, p in blocks]
             shapes = self.differences(outcome.positions)[1]
             others = limit.differences(outcome.positions) if limit else (np.zeros(0), np.zeros(0))
         return {
@@ -177,31 +170,12 @@ class Yardstick:
             "shape_difference": shapes,
             "step_difference": np.concatenate(steps),
             "energy": self.scale.relative(outcome.positions),
-            "contact": np.concatenate(contacts),
             **dict(zip(DEVIATIONS[-2:], others, strict=True)),
         }
 
-    def _touched(self, positions: np.ndarray) -> np.ndarray:
-        """Array (f,): 1 if a vertex touches an obstacle in a frame of ``positions`` (f, N, 3) m.
-
-        Vertices that touch the obstacle in the initial state are ignored.
-        """
-        near = TOUCH * self.scene.mesh.extent
-        touched = np.zeros(len(positions), dtype=np.uint8)
-        for contact in self.scene.contacts:
-            away = contact.gaps(self.reference[0]) > near
-            gaps = contact.gaps(positions.reshape(-1, 3)).reshape(positions.shape[:2])
-            touched |= ((gaps <= near) & away).any(axis=1)
-        return touched
-
 
 def errors_within(
-    run: Series,
-    reference: Series,
-    end: int,
-    extent_norm: float,
-    rest_norm: float,
-    time_step: float,
+    run: Series, reference: Series, end: int, extent_norm: float, rest_norm: float
 ) -> dict[str, float | None]:
     """Return a mapping of column names to the errors over the frames before number ``end``.
 
@@ -210,7 +184,7 @@ def errors_within(
     Parameters
     ----------
     run, reference : per-frame series from `Yardstick.deviations` and `Yardstick.series`
-    extent_norm, rest_norm, time_step : as `Yardstick.units`
+    extent_norm, rest_norm : as `Yardstick.units`
     """
     if len(run["difference"]) < end:
         return dict.fromkeys(ERRORS)
@@ -219,11 +193,6 @@ def errors_within(
     drift, within = None, slice(None if end == len(displacement) else end // STRIDE + 1)
     if len(reference["energy"][within]) > 1:
         drift = float(np.abs(run["energy"][within] - reference["energy"][within]).max())
-    # first frame with contact of this run and of the full-order run; inf if there is no contact
-    first, wanted = (
-        float(np.argmax(touched)) if np.any(touched) else np.inf
-        for touched in (run["contact"][:end], reference["contact"][:end])
-    )
 
     def over_extent(difference: np.ndarray) -> float | None:
         """RMS of ``difference`` / ``extent_norm`` in the first ``end`` frames; None if end = 0."""
@@ -236,7 +205,6 @@ def errors_within(
         over_extent(shape),
         error_within(run["step_difference"], reference["step"], end),
         drift,
-        None if first == wanted == np.inf else time_step * (first - wanted),
         error_within(run["difference_converged"], reference["displacement_converged"], end),
         relative_deformation(
             run["shape_difference_converged"][:end],

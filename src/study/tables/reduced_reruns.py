@@ -140,7 +140,7 @@ def _errors(
 
     A value is None if the run ended earlier. ``units`` are those of the `Yardstick`.
     """
-    known = {unit: float(units[unit]) for unit in ("extent_norm", "rest_norm", "time_step")}
+    known = {unit: float(units[unit]) for unit in ("extent_norm", "rest_norm")}
     found = [
         errors_within({series: run[series][...] for series in DEVIATIONS}, reference, end, **known)
         if "difference" in run
